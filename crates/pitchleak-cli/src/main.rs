@@ -1,0 +1,2 @@
+//! The program `pitchleak`.
+fn main() {}

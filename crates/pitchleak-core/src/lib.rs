@@ -1,0 +1,21 @@
+//! Plant, filters, estimators and leak detector of a hydraulic pitch cylinder.
+//!
+//! The core never touches the world: it reads no clock and no file, allocates nothing and
+//! cannot panic. The caller passes the time step. All quantities are SI; pressures are gauge;
+//! a flow Q is positive INTO its chamber; chamber A is the piston side and x the piston position
+//! from the A end.
+//!
+//! Equations are cited by their number in X. Wu, Y. Li, F. Li, Z. Yang, W. Teng (2011),
+//! "Adaptive Estimation-Based Leakage Detection for a Wind Turbine Hydraulic Pitching System",
+//! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
+#![cfg_attr(not(feature = "std"), no_std)]
+
+mod cylinder;
+mod real;
+mod sample;
+mod sensors;
+
+pub use cylinder::{Cylinder, CylinderError, Fluid};
+pub use real::Real;
+pub use sample::Sample;
+pub use sensors::{SensorSpread, Sensors};

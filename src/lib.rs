@@ -1,0 +1,4 @@
+//! The engine of pitchleak: traces, rig files, replay, scoring and reports around
+//! [`pitchleak_core`].
+
+pub use pitchleak_core as core;
