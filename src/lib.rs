@@ -2,3 +2,5 @@
 //! [`pitchleak_core`].
 
 pub use pitchleak_core as core;
+
+pub mod openfast;
