@@ -11,11 +11,15 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod cylinder;
+mod estimate;
 mod real;
+mod rls;
 mod sample;
 mod sensors;
 
 pub use cylinder::{Cylinder, CylinderError, Fluid};
+pub use estimate::{Estimate, PerLeak};
 pub use real::Real;
+pub use rls::{Rls, RlsSettings, Update};
 pub use sample::Sample;
 pub use sensors::{SensorSpread, Sensors};

@@ -1,0 +1,124 @@
+use crate::{Cylinder, Real, Sample};
+
+/// Integrals of one chamber's continuity equation (theory: Q = A ẋ + κ V Ṗ + leaks, κ = 1/β), by the
+/// trapezoidal rule over a step or summed over a block.
+///
+/// No derivative is taken of a noisy signal: ∫ V Ṗ dt is V at mid-step times the pressure's rise.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ChamberIntegral<T> {
+    /// ∫ Q dt, m³.
+    pub flow: T,
+    /// ∫ V dP, m³·Pa.
+    pub compression: T,
+    /// ∫ P dt, Pa·s.
+    pub pressure: T,
+}
+
+/// Both chambers over the same time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Integrals<T> {
+    pub a: ChamberIntegral<T>,
+    pub b: ChamberIntegral<T>,
+    /// ∫ dt, s.
+    pub time: T,
+    /// Σ dt², s²: times the variance of one sample it is the variance of ∫ Q dt.
+    pub time_square: T,
+    /// Number of steps.
+    pub steps: T,
+}
+
+impl<T: Real> Integrals<T> {
+    /// Integrals over the step from `last` to `now`; a resting flow counts as zero here.
+    #[inline]
+    pub fn step(cylinder: &Cylinder<T>, dt_s: T, last: &Sample<T>, now: &Sample<T>) -> Self {
+        let half = T::lit(0.5);
+        let half_dt = half * dt_s;
+        let x = (half * (last.x_m + now.x_m)).max(T::zero()).min(cylinder.stroke_m);
+        let flow = |a: Option<T>, b: Option<T>| half_dt * (a.unwrap_or(T::zero()) + b.unwrap_or(T::zero()));
+        Self {
+            a: ChamberIntegral {
+                flow: flow(last.qa_m3s, now.qa_m3s),
+                compression: cylinder.volume_a_m3(x) * (now.pa_pa - last.pa_pa),
+                pressure: half_dt * (last.pa_pa + now.pa_pa),
+            },
+            b: ChamberIntegral {
+                flow: flow(last.qb_m3s, now.qb_m3s),
+                compression: cylinder.volume_b_m3(x) * (now.pb_pa - last.pb_pa),
+                pressure: half_dt * (last.pb_pa + now.pb_pa),
+            },
+            time: dt_s,
+            time_square: dt_s * dt_s,
+            steps: T::one(),
+        }
+    }
+
+    pub fn add(&mut self, step: &Self) {
+        self.a.add(&step.a);
+        self.b.add(&step.b);
+        self.time += step.time;
+        self.time_square += step.time_square;
+        self.steps += step.steps;
+    }
+}
+
+impl<T: Real> ChamberIntegral<T> {
+    fn add(&mut self, step: &Self) {
+        self.flow += step.flow;
+        self.compression += step.compression;
+        self.pressure += step.pressure;
+    }
+}
+
+/// Parameters in their fixed order; an estimator of N parameters has the first N.
+pub(super) mod column {
+    pub const COMPRESSIBILITY: usize = 0;
+    pub const INTERNAL: usize = 1;
+    pub const EXTERNAL_A: usize = 2;
+    pub const EXTERNAL_B: usize = 3;
+    pub const OFFSET_A: usize = 4;
+    pub const OFFSET_B: usize = 5;
+    pub const GAIN_A: usize = 6;
+    pub const GAIN_B: usize = 7;
+    pub const GAIN_POSITION: usize = 8;
+}
+
+/// One scalar equation, left side and regressor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equation<T, const N: usize> {
+    pub left: T,
+    pub columns: [T; N],
+}
+
+/// w_a·(chamber A) + w_b·(chamber B), in prior units: `scale` holds each parameter's prior standard
+/// deviation, `compressibility` its prior mean 1/β (the other means are zero).
+#[inline]
+pub(super) fn combine<T: Real, const N: usize>(
+    integrals: &Integrals<T>,
+    weight_a: T,
+    weight_b: T,
+    compressibility: T,
+    scale: &[T; N],
+) -> Equation<T, N> {
+    let (a, b) = (&integrals.a, &integrals.b);
+    let compression = weight_a * a.compression + weight_b * b.compression;
+    let flow_a = weight_a * a.flow;
+    let flow_b = weight_b * b.flow;
+    let left = flow_a + flow_b - compressibility * compression;
+    let all = [
+        compression,
+        (weight_a - weight_b) * (a.pressure - b.pressure),
+        weight_a * a.pressure,
+        weight_b * b.pressure,
+        weight_a * integrals.time,
+        weight_b * integrals.time,
+        flow_a,
+        flow_b,
+        // A position that reads (1 + γ) x travels (1 + γ) times as far: only the odometer sees it.
+        T::zero(),
+    ];
+    let mut columns = [T::zero(); N];
+    for ((column, value), scale) in columns.iter_mut().zip(all).zip(scale) {
+        *column = value * *scale;
+    }
+    Equation { left, columns }
+}

@@ -1,0 +1,241 @@
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
+use crate::Real;
+
+/// Weighted normal equations of a linear regression with exponential forgetting and a unit prior.
+///
+/// Parameters are counted in units of their prior standard deviation from their prior mean, so that the
+/// prior is the identity. The prior is never forgotten: when excitation stops, the covariance grows back
+/// to the prior and no further (no blow-up).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Information<T, const N: usize> {
+    /// Σ w f fᵀ, lower triangle.
+    matrix: [[T; N]; N],
+    /// Σ w² f fᵀ, lower triangle: what the weighted sum's own noise amounts to.
+    noise: [[T; N]; N],
+    /// Σ w f y.
+    vector: [T; N],
+}
+
+/// Solution of [`Information`] in prior units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solution<T, const N: usize> {
+    pub mean: [T; N],
+    pub covariance: [[T; N]; N],
+}
+
+/// Sums over one block: what is forgotten as one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockSums<T, const N: usize> {
+    /// Σ f fᵀ/S, lower triangle.
+    pub matrix: [[T; N]; N],
+    /// Σ f y/S.
+    pub vector: [T; N],
+    /// Σ y²/S.
+    pub square: T,
+    /// Number of terms.
+    pub count: T,
+}
+
+impl<T: Real, const N: usize> BlockSums<T, N> {
+    pub fn new() -> Self {
+        Self { matrix: [[T::zero(); N]; N], vector: [T::zero(); N], square: T::zero(), count: T::zero() }
+    }
+
+    /// Adds one observation y = fᵀθ + noise of variance 1/`weight`.
+    #[inline]
+    pub fn add(&mut self, f: &[T; N], y: T, weight: T) {
+        for i in 0..N {
+            let wf = weight * f[i];
+            for j in 0..=i {
+                self.matrix[i][j] += wf * f[j];
+            }
+            self.vector[i] += wf * y;
+        }
+        self.square += weight * y * y;
+        self.count += T::one();
+    }
+
+    /// Takes out what sensor noise of variance `variance` (prior units, weight included) in column 0 adds
+    /// to the normal equations on average; `mean` is the prior mean of that parameter in prior units.
+    pub fn compensate_column_0(&mut self, variance: T, mean: T) {
+        let taken = variance.min(self.matrix[0][0]);
+        self.matrix[0][0] -= taken;
+        self.vector[0] += taken * mean;
+    }
+
+    /// Σ (y − fᵀθ)²/S at `theta`.
+    pub fn chi_square(&self, theta: &[T; N]) -> T {
+        let mut chi = self.square;
+        for i in 0..N {
+            chi -= T::lit(2.0) * theta[i] * self.vector[i];
+            for j in 0..=i {
+                let twice = if i == j { T::one() } else { T::lit(2.0) };
+                chi += twice * theta[i] * theta[j] * self.matrix[i][j];
+            }
+        }
+        chi.max(T::zero())
+    }
+}
+
+impl<T: Real, const N: usize> Information<T, N> {
+    pub fn new() -> Self {
+        Self { matrix: [[T::zero(); N]; N], noise: [[T::zero(); N]; N], vector: [T::zero(); N] }
+    }
+
+    /// Weighs all that is known by `keep` (0 to 1).
+    pub fn forget(&mut self, keep: T) {
+        let keep_noise = keep * keep;
+        for i in 0..N {
+            for j in 0..=i {
+                self.matrix[i][j] *= keep;
+                self.noise[i][j] *= keep_noise;
+            }
+            self.vector[i] *= keep;
+        }
+    }
+
+    pub fn add(&mut self, block: &BlockSums<T, N>) {
+        for i in 0..N {
+            for j in 0..=i {
+                self.matrix[i][j] += block.matrix[i][j];
+                self.noise[i][j] += block.matrix[i][j];
+            }
+            self.vector[i] += block.vector[i];
+        }
+    }
+
+    /// Posterior mean and the covariance of its error, A⁻¹ (N + I) A⁻¹ with A = M + I: forgetting weighs
+    /// the samples unequally, so A⁻¹ alone would overstate the spread (White 1980, sandwich form).
+    pub fn solve(&self) -> Solution<T, N> {
+        let inverse = self.posterior_inverse();
+        let mut mean = [T::zero(); N];
+        let mut half = [[T::zero(); N]; N];
+        for i in 0..N {
+            for k in 0..N {
+                mean[i] += inverse[i][k] * self.vector[k];
+                for j in 0..N {
+                    half[i][j] += inverse[i][k] * self.noise_with_prior(k, j);
+                }
+            }
+        }
+        let mut covariance = [[T::zero(); N]; N];
+        for i in 0..N {
+            for j in 0..N {
+                for k in 0..N {
+                    covariance[i][j] += half[i][k] * inverse[k][j];
+                }
+            }
+            covariance[i][i] = covariance[i][i].max(T::min_positive_value());
+        }
+        Solution { mean, covariance }
+    }
+
+    #[inline]
+    fn noise_with_prior(&self, i: usize, j: usize) -> T {
+        let (row, column) = if i >= j { (i, j) } else { (j, i) };
+        self.noise[row][column] + if i == j { T::one() } else { T::zero() }
+    }
+
+    /// (M + I)⁻¹ by LDLᵀ (Golub & Van Loan, Matrix Computations, §4.1.2). A pivot is kept above the
+    /// rounding error of its diagonal, which only matters in f32.
+    fn posterior_inverse(&self) -> [[T; N]; N] {
+        let floor = T::lit(8.0) * T::epsilon();
+        let mut lower = [[T::zero(); N]; N];
+        let mut inverse_pivot = [T::zero(); N];
+        for i in 0..N {
+            for j in 0..i {
+                let mut sum = self.matrix[i][j];
+                for k in 0..j {
+                    sum -= lower[i][k] * lower[j][k];
+                }
+                lower[i][j] = sum;
+            }
+            let diagonal = self.matrix[i][i] + T::one();
+            let mut pivot = diagonal;
+            for j in 0..i {
+                // lower[i][j] holds L D here; turn it to L as it is used.
+                let l = lower[i][j] * inverse_pivot[j];
+                pivot -= l * lower[i][j];
+                lower[i][j] = l;
+            }
+            inverse_pivot[i] = T::one() / pivot.max(floor * diagonal);
+        }
+        invert_factored(&lower, &inverse_pivot)
+    }
+}
+
+/// (L D Lᵀ)⁻¹ from the unit lower L and 1/D.
+fn invert_factored<T: Real, const N: usize>(lower: &[[T; N]; N], inverse_pivot: &[T; N]) -> [[T; N]; N] {
+    let mut inverse = [[T::zero(); N]; N];
+    for column in 0..N {
+        let mut x = [T::zero(); N];
+        for i in 0..N {
+            let mut sum = if i == column { T::one() } else { T::zero() };
+            for k in 0..i {
+                sum -= lower[i][k] * x[k];
+            }
+            x[i] = sum;
+        }
+        for back in 0..N {
+            let i = N - 1 - back;
+            let mut sum = x[i] * inverse_pivot[i];
+            for k in 0..N {
+                if k > i {
+                    sum -= lower[k][i] * x[k];
+                }
+            }
+            x[i] = sum;
+        }
+        for i in 0..N {
+            inverse[i][column] = x[i];
+        }
+    }
+    inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn recovers_a_linear_law_and_its_covariance() {
+        let mut sums = BlockSums::<f64, 3>::new();
+        let truth = [0.3, -1.2, 2.0];
+        let mut expected = nalgebra::Matrix3::<f64>::identity();
+        for k in 0..200 {
+            let t = k as f64 * 0.1;
+            let f = [t.sin(), (0.7 * t).cos(), 1.0 + 0.1 * t];
+            let y = f.iter().zip(truth).map(|(a, b)| a * b).sum();
+            sums.add(&f, y, 1e6);
+            let v = nalgebra::Vector3::from(f);
+            expected += v * v.transpose() * 1e6;
+        }
+        let mut information = Information::new();
+        information.add(&sums);
+        let solution = information.solve();
+        let inverse = expected.try_inverse().unwrap();
+        for i in 0..3 {
+            assert!((solution.mean[i] - truth[i]).abs() < 1e-5);
+            for j in 0..3 {
+                assert!((solution.covariance[i][j] - inverse[(i, j)]).abs() < 1e-9 * inverse[(i, i)].abs());
+            }
+        }
+        assert!(sums.chi_square(&solution.mean) < 1e-3);
+    }
+
+    #[test]
+    fn forgetting_everything_returns_to_the_prior() {
+        let mut sums = BlockSums::<f64, 2>::new();
+        sums.add(&[1.0, 2.0], 3.0, 1e4);
+        let mut information = Information::new();
+        information.add(&sums);
+        for _ in 0..200 {
+            information.forget(0.5);
+        }
+        let solution = information.solve();
+        assert!((solution.covariance[0][0] - 1.0).abs() < 1e-9);
+        assert!(solution.mean[1].abs() < 1e-9);
+    }
+}

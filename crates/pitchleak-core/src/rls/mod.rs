@@ -1,0 +1,537 @@
+//! The default estimator: recursive generalised least squares on both continuity equations.
+//!
+//! Per chamber eq. (1) is linear in 1/β, C_ip, C_epA and C_epB. The two equations are split into a
+//! *balance*, in which the piston speed cancels and only flow meters and pressures speak, and an
+//! *odometer*, which carries the piston by the flows and is compared with the position sensor
+//! ([`weights`]). Both are whitened by the declared sensor noise, so their sum is the likelihood:
+//! - the balance is summed over blocks of a quarter of a second; the noise of the pressures in its columns
+//!   (errors in variables) then averages out instead of biasing the leaks;
+//! - the odometer's innovations are white by a scalar Kalman filter on the piston position ([`odometer`]),
+//!   and its columns are smooth by nature.
+//!
+//! Time and memory per sample are constant; nothing is ever differentiated.
+
+mod balance;
+mod information;
+mod odometer;
+mod surprise;
+mod weights;
+
+use crate::{Cylinder, Estimate, Fluid, PerLeak, Real, Sample, Sensors};
+use balance::{Integrals, column, combine};
+use information::{BlockSums, Information, Solution};
+use odometer::Odometer;
+use surprise::{NoiseMeter, Surprise};
+use weights::Weights;
+
+/// How [`Rls`] forgets and averages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RlsSettings<T> {
+    /// Time constant of forgetting, s; infinite to remember everything.
+    pub forgetting_time_s: T,
+    /// Length of the balance's blocks, s: the estimates are renewed once per block.
+    pub block_time_s: T,
+    /// A step longer than this, s, is a gap: nothing is integrated over it.
+    pub max_step_s: T,
+}
+
+impl<T: Real> Default for RlsSettings<T> {
+    fn default() -> Self {
+        Self { forgetting_time_s: T::lit(60.0), block_time_s: T::lit(0.25), max_step_s: T::lit(0.5) }
+    }
+}
+
+/// What one [`Rls::update`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// The first sample, or the first after a gap: nothing to integrate yet.
+    Started,
+    /// The sample was taken in.
+    Accepted,
+    /// The sample completed a block: the estimates are new.
+    Renewed,
+    /// Not a number, or beyond what a cylinder can do: the sample was left out.
+    Rejected,
+}
+
+/// Standard deviations of the sensors' white noise, kept above zero.
+#[derive(Clone, Copy, Debug)]
+struct NoiseStd<T> {
+    flow_a_m3s: T,
+    flow_b_m3s: T,
+    pressure_pa: T,
+    position_m: T,
+}
+
+impl<T: Real> NoiseStd<T> {
+    /// A perfect sensor does not exist: its resolution is at least a millionth of the range.
+    fn of(sensors: &Sensors<T>, cylinder: &Cylinder<T>) -> Self {
+        let millionth = T::lit(1e-6);
+        let flow_floor = millionth * cylinder.area_a_m2 * cylinder.stroke_m;
+        Self {
+            flow_a_m3s: sensors.flow_a.noise_std.max(flow_floor),
+            flow_b_m3s: sensors.flow_b.noise_std.max(flow_floor),
+            pressure_pa: sensors.pressure.noise_std.max(T::one()),
+            position_m: sensors.position.noise_std.max(millionth * cylinder.stroke_m),
+        }
+    }
+
+    /// Variance of a chamber equation's error: flow noise, and the chamber's own and the other's
+    /// pressure noise through the leaks.
+    fn chamber_variance(&self, flow_std: T, own: T, cross: T) -> T {
+        flow_std * flow_std + self.pressure_pa * self.pressure_pa * (own * own + cross * cross)
+    }
+}
+
+/// Recursive generalised least squares on both chambers, with N parameters:
+/// - N = 4: 1/β and the three leak coefficients;
+/// - N = 6: also the offsets of the two flow meters;
+/// - N = 9: also the gains of both flow meters and of the position sensor.
+#[derive(Clone, Copy, Debug)]
+pub struct Rls<T, const N: usize> {
+    cylinder: Cylinder<T>,
+    noise: NoiseStd<T>,
+    settings: RlsSettings<T>,
+    pressure_bias_pa: T,
+    compressibility: T,
+    scale: [T; N],
+    last: Option<Sample<T>>,
+    both: Weights<T>,
+    only_a: Weights<T>,
+    only_b: Weights<T>,
+    odometer: Option<Odometer<T, N>>,
+    sums: BlockSums<T, N>,
+    block: Integrals<T>,
+    /// The part of the block in which both flows were measured.
+    fed: Integrals<T>,
+    pressure_noise_a: NoiseMeter<T>,
+    pressure_noise_b: NoiseMeter<T>,
+    /// The balance equation's moving-average noise filter: last whitened block.
+    memory: Option<BalanceMemory<T, N>>,
+    information: Information<T, N>,
+    solution: Solution<T, N>,
+    surprise: Surprise<T>,
+    pressures: PressureMeans<T>,
+}
+
+/// Last whitened balance and its weight on the next: the pressure noise at a block's end stands in two
+/// blocks with opposite sign (a moving average of order 1, inverted recursively).
+#[derive(Clone, Copy, Debug)]
+struct BalanceMemory<T, const N: usize> {
+    left: T,
+    columns: [T; N],
+    /// Variance of the stored oil's pressure noise at the block's end.
+    stored: T,
+    /// Variance of the block's innovation.
+    variance: T,
+}
+
+impl<T: Real, const N: usize> BalanceMemory<T, N> {
+    /// Share of this block's innovation that is expected to come back in the next.
+    fn share(&self) -> T {
+        self.stored / self.variance
+    }
+}
+
+/// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted.
+#[derive(Clone, Copy, Debug, Default)]
+struct PressureMeans<T> {
+    time: T,
+    load: T,
+    a: T,
+    b: T,
+    block_load: T,
+}
+
+impl<T: Real, const N: usize> Rls<T, N> {
+    /// An estimator for a rig. `fluid` holds the prior of the bulk modulus; `sensors` the noise, and the
+    /// priors of the offsets and gains.
+    pub fn new(
+        cylinder: Cylinder<T>,
+        fluid: Fluid<T>,
+        sensors: &Sensors<T>,
+        settings: RlsSettings<T>,
+    ) -> Self {
+        let noise = NoiseStd::of(sensors, &cylinder);
+        let no_leak = PerLeak::default();
+        Self {
+            cylinder,
+            noise,
+            settings,
+            pressure_bias_pa: sensors.pressure.bias_std,
+            compressibility: T::one() / fluid.bulk_modulus_pa,
+            scale: prior_spread(&cylinder, &fluid, sensors),
+            last: None,
+            both: Weights::both(&cylinder, &noise, &no_leak),
+            only_a: Weights::only_a(&cylinder, &noise, &no_leak),
+            only_b: Weights::only_b(&cylinder, &noise, &no_leak),
+            odometer: None,
+            sums: BlockSums::new(),
+            block: Integrals::default(),
+            fed: Integrals::default(),
+            pressure_noise_a: NoiseMeter::default(),
+            pressure_noise_b: NoiseMeter::default(),
+            memory: None,
+            information: Information::new(),
+            solution: Information::new().solve(),
+            surprise: Surprise::default(),
+            pressures: PressureMeans::default(),
+        }
+    }
+
+    /// Takes in the reading `sample`, `dt_s` after the one before.
+    #[inline]
+    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update {
+        if !self.plausible(sample) {
+            return Update::Rejected;
+        }
+        let Some(last) = self.last.replace(*sample) else {
+            return self.restart(sample);
+        };
+        let integrable = dt_s > T::zero() && dt_s <= self.settings.max_step_s;
+        if !integrable {
+            return self.restart(sample);
+        }
+        let step = Integrals::step(&self.cylinder, dt_s, &last, sample);
+        self.pressure_noise_a.add(last.pa_pa, sample.pa_pa);
+        self.pressure_noise_b.add(last.pb_pa, sample.pb_pa);
+        self.pressures.block_load += dt_s * sample.load_pressure_pa().abs();
+        self.block.add(&step);
+        self.advance(&step, &last, sample);
+        let full = self.block.time >= self.settings.block_time_s && self.block.steps >= T::lit(8.0);
+        if full {
+            self.renew();
+            Update::Renewed
+        } else {
+            Update::Accepted
+        }
+    }
+
+    /// Odometer step, by whichever flows both ends of the step have.
+    #[inline]
+    fn advance(&mut self, step: &Integrals<T>, last: &Sample<T>, now: &Sample<T>) {
+        let sensor_variance = self.noise.position_m * self.noise.position_m;
+        let odometer = self.odometer.get_or_insert(Odometer::anchored(last.x_m, sensor_variance));
+        let fed_a = last.qa_m3s.is_some() && now.qa_m3s.is_some();
+        let fed_b = last.qb_m3s.is_some() && now.qb_m3s.is_some();
+        let weights = match (fed_a, fed_b) {
+            (true, true) => {
+                self.fed.add(step);
+                &self.both
+            }
+            (true, false) => &self.only_a,
+            (false, true) => &self.only_b,
+            (false, false) => {
+                odometer.anchor(now.x_m, sensor_variance);
+                return;
+            }
+        };
+        let mut equation =
+            combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
+        if N > column::GAIN_POSITION {
+            equation.columns[column::GAIN_POSITION] = -equation.left * self.scale[column::GAIN_POSITION];
+        }
+        let variance = weights.odometer_variance * step.time_square;
+        odometer.advance(
+            equation.left,
+            &equation.columns,
+            variance,
+            now.x_m,
+            sensor_variance,
+            &mut self.sums,
+        );
+    }
+
+    /// Closes the block: both whitened equations go into the information, and the estimates are renewed.
+    fn renew(&mut self) {
+        let travelled = self.sums;
+        self.compensate_odometer();
+        let balance = self.whitened_balance();
+        if let Some(equation) = balance {
+            self.add_balance(&equation);
+        } else {
+            self.memory = None;
+        }
+        let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
+        if self.surprise.take_change() {
+            // The leak has changed: what was learnt before it counts for next to nothing.
+            self.information.forget(T::lit(1e-4));
+            self.pressures.forget(T::lit(1e-4));
+        }
+        self.information.forget(keep);
+        self.information.add(&self.sums);
+        self.pressures.add_block(&self.block, keep);
+        self.surprise.forget(keep);
+        self.solution = self.information.solve();
+        self.surprise.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
+        self.reweigh();
+        self.sums = BlockSums::new();
+        self.block = Integrals::default();
+        self.fed = Integrals::default();
+        if let Some(odometer) = &mut self.odometer {
+            odometer.weight_sum = T::zero();
+        }
+    }
+
+    /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
+    fn whitened_balance(&mut self) -> Option<balance::Equation<T, N>> {
+        if self.fed.steps < T::lit(2.0) {
+            return None;
+        }
+        let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
+        let mut equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
+        let stored =
+            self.stored_oil_variance(weight_a, weight_b, self.noise.pressure_pa, self.noise.pressure_pa)
+                * self.compressibility
+                * self.compressibility;
+        let mut variance = self.both.balance_variance * self.fed.time_square + stored;
+        if let Some(memory) = &self.memory {
+            let share = memory.share();
+            equation.left += share * memory.left;
+            for (now, before) in equation.columns.iter_mut().zip(&memory.columns) {
+                *now += share * *before;
+            }
+            variance += memory.stored * (T::one() - share);
+        } else {
+            variance += stored;
+        }
+        self.memory =
+            Some(BalanceMemory { left: equation.left, columns: equation.columns, stored, variance });
+        let scale = T::one() / variance.sqrt();
+        equation.left *= scale;
+        for value in &mut equation.columns {
+            *value *= scale;
+        }
+        Some(equation)
+    }
+
+    fn add_balance(&mut self, equation: &balance::Equation<T, N>) {
+        let covariance = &self.solution.covariance;
+        let mut innovation = equation.left;
+        let mut variance = T::one();
+        for i in 0..N {
+            innovation -= equation.columns[i] * self.solution.mean[i];
+            for j in 0..N {
+                variance += equation.columns[i] * covariance[i][j] * equation.columns[j];
+            }
+        }
+        self.surprise.balance(innovation, variance);
+        self.sums.add(&equation.columns, equation.left, T::one());
+        // Both ends of the block are noisy readings of the pressure.
+        if let Some(memory) = self.memory {
+            let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
+            let noise = T::lit(2.0)
+                * self.stored_oil_variance(
+                    weight_a,
+                    weight_b,
+                    self.pressure_noise_a.std_pa(),
+                    self.pressure_noise_b.std_pa(),
+                );
+            self.compensate(noise / memory.variance);
+        }
+    }
+
+    /// Pressure noise in the odometer's compressibility column: the last reading's only, as the
+    /// differences before it telescope.
+    fn compensate_odometer(&mut self) {
+        let Some(odometer) = &self.odometer else { return };
+        let noise = self.stored_oil_variance(
+            self.both.odometer_a,
+            self.both.odometer_b,
+            self.pressure_noise_a.std_pa(),
+            self.pressure_noise_b.std_pa(),
+        );
+        self.compensate(noise * odometer.weight_sum);
+    }
+
+    /// Takes noise of `variance` (SI, over the equation's own variance) out of the compressibility's
+    /// normal equation.
+    fn compensate(&mut self, variance: T) {
+        let scale = self.scale[column::COMPRESSIBILITY];
+        let prior_mean = self.compressibility / scale;
+        self.sums.compensate_column_0(variance * scale * scale, prior_mean);
+    }
+
+    /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given spread.
+    fn stored_oil_variance(&self, weight_a: T, weight_b: T, std_a_pa: T, std_b_pa: T) -> T {
+        let x = self.last.map_or(T::zero(), |s| s.x_m).max(T::zero()).min(self.cylinder.stroke_m);
+        let a = weight_a * self.cylinder.volume_a_m3(x) * std_a_pa;
+        let b = weight_b * self.cylinder.volume_b_m3(x) * std_b_pa;
+        a * a + b * b
+    }
+
+    /// The leaks found decide how much pressure noise the equations carry.
+    fn reweigh(&mut self) {
+        let leaks = self.raw_leaks().map(|c| c.value.max(T::zero()));
+        self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
+        self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
+        self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);
+    }
+
+    fn restart(&mut self, sample: &Sample<T>) -> Update {
+        self.last = Some(*sample);
+        let variance = self.noise.position_m * self.noise.position_m;
+        match &mut self.odometer {
+            Some(odometer) => odometer.anchor(sample.x_m, variance),
+            None => self.odometer = Some(Odometer::anchored(sample.x_m, variance)),
+        }
+        self.memory = None;
+        self.pressure_noise_a.interrupt();
+        self.pressure_noise_b.interrupt();
+        Update::Started
+    }
+
+    /// Finite, and within ten times what any pitch cylinder meets.
+    #[inline]
+    fn plausible(&self, sample: &Sample<T>) -> bool {
+        let pressure_limit = T::lit(1e9);
+        let flow_limit = T::lit(1e3) * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
+        let flow_ok = |q: Option<T>| q.is_none_or(|q| q.abs() <= flow_limit);
+        sample.x_m.abs() <= T::lit(2.0) * self.cylinder.stroke_m
+            && sample.pa_pa.abs() <= pressure_limit
+            && sample.pb_pa.abs() <= pressure_limit
+            && flow_ok(sample.qa_m3s)
+            && flow_ok(sample.qb_m3s)
+    }
+
+    /// Estimate of parameter `index` in SI, its spread not below what the residuals show.
+    fn parameter(&self, index: usize) -> Estimate<T> {
+        match (self.solution.mean.get(index), self.solution.covariance.get(index), self.scale.get(index)) {
+            (Some(mean), Some(row), Some(scale)) => {
+                let variance = row.get(index).copied().unwrap_or(T::one());
+                Estimate {
+                    value: *mean * *scale,
+                    std: (variance * self.surprise.inflation()).sqrt() * *scale,
+                }
+            }
+            _ => Estimate::default(),
+        }
+    }
+
+    fn raw_leaks(&self) -> PerLeak<Estimate<T>> {
+        PerLeak {
+            internal: self.parameter(column::INTERNAL),
+            external_a: self.parameter(column::EXTERNAL_A),
+            external_b: self.parameter(column::EXTERNAL_B),
+        }
+    }
+
+    /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means
+    /// that the model lacks an effect.
+    pub fn leak_coefficients(&self) -> PerLeak<Estimate<T>> {
+        self.raw_leaks()
+    }
+
+    /// Compressibility κ = 1/β, 1/Pa.
+    pub fn compressibility(&self) -> Estimate<T> {
+        let deviation = self.parameter(column::COMPRESSIBILITY);
+        Estimate { value: deviation.value + self.compressibility, std: deviation.std }
+    }
+
+    /// Offsets of the flow meters A and B, m³/s (reading minus truth); zero where N < 6.
+    pub fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
+        [self.parameter(column::OFFSET_A), self.parameter(column::OFFSET_B)]
+    }
+
+    /// Scale errors of flow meter A, flow meter B and the position sensor, as shares; zero where N < 9.
+    pub fn gains(&self) -> [Estimate<T>; 3] {
+        [
+            self.parameter(column::GAIN_A),
+            self.parameter(column::GAIN_B),
+            self.parameter(column::GAIN_POSITION),
+        ]
+    }
+
+    /// Prior standard deviations of the leak coefficients, m³/(s·Pa).
+    pub fn leak_prior_std(&self) -> T {
+        self.scale[column::INTERNAL]
+    }
+
+    /// Prior standard deviation of the compressibility, 1/Pa.
+    pub fn compressibility_prior_std(&self) -> T {
+        self.scale[column::COMPRESSIBILITY]
+    }
+
+    /// Mean leak flows over the memory, m³/s, by eq. (15): coefficient times mean |P_L|, P_A, P_B. A
+    /// declared pressure bias widens them.
+    pub fn mean_leak_flows_m3s(&self) -> PerLeak<Estimate<T>> {
+        let root_two = T::lit(core::f64::consts::SQRT_2);
+        let bias = self.pressure_bias_pa;
+        let biases = PerLeak { internal: root_two * bias, external_a: bias, external_b: bias };
+        self.leak_coefficients().zip(self.pressures.means()).zip(biases).map(|((c, pressure), bias)| {
+            Estimate { value: c.value * pressure, std: (c.std * pressure).hypot(c.value * bias) }
+        })
+    }
+
+    /// Means of |P_L|, P_A, P_B over the memory, Pa.
+    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
+        self.pressures.means()
+    }
+
+    /// Normalised innovation squared of the balance and of the odometer: 1 where the declared noise and
+    /// the model explain the data, above where they do not (Bar-Shalom, Li, Kirubarajan, Estimation with
+    /// Applications to Tracking and Navigation, §5.4).
+    pub fn normalised_innovation(&self) -> [T; 2] {
+        self.surprise.ratios()
+    }
+}
+
+impl<T: Real> PressureMeans<T> {
+    fn add_block(&mut self, block: &Integrals<T>, keep: T) {
+        self.forget(keep);
+        self.time += block.time;
+        self.load += self.block_load;
+        self.a += block.a.pressure;
+        self.b += block.b.pressure;
+        self.block_load = T::zero();
+    }
+
+    fn forget(&mut self, keep: T) {
+        self.time *= keep;
+        self.load *= keep;
+        self.a *= keep;
+        self.b *= keep;
+    }
+
+    fn means(&self) -> PerLeak<T> {
+        let per_time = if self.time > T::zero() { T::one() / self.time } else { T::zero() };
+        PerLeak {
+            internal: self.load * per_time,
+            external_a: self.a * per_time,
+            external_b: self.b * per_time,
+        }
+    }
+}
+
+/// Prior standard deviation of each parameter, SI. A leak that would empty the cylinder in a tenth of a
+/// second at 1 MPa is the widest that anyone could overlook.
+fn prior_spread<T: Real, const N: usize>(
+    cylinder: &Cylinder<T>,
+    fluid: &Fluid<T>,
+    sensors: &Sensors<T>,
+) -> [T; N] {
+    let tiny = T::lit(1e-9);
+    let leak = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(1e-5);
+    let relative = (fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa).max(T::lit(1e-6));
+    let flow_floor = tiny * cylinder.area_a_m2 * cylinder.stroke_m;
+    // A biased pressure leaks a constant flow more or less: the offset takes it up.
+    let through_leak = T::lit(1e-4) * leak * T::lit(50.0) * sensors.pressure.bias_std;
+    let offset = |bias: T| bias.hypot(through_leak).max(flow_floor);
+    let all = [
+        relative / fluid.bulk_modulus_pa,
+        leak,
+        leak,
+        leak,
+        offset(sensors.flow_a.bias_std),
+        offset(sensors.flow_b.bias_std),
+        sensors.flow_a.gain_std.max(tiny),
+        sensors.flow_b.gain_std.max(tiny),
+        sensors.position.gain_std.max(tiny),
+    ];
+    let mut spread = [T::zero(); N];
+    for (s, value) in spread.iter_mut().zip(all) {
+        *s = value;
+    }
+    spread
+}

@@ -1,0 +1,64 @@
+use super::information::BlockSums;
+use crate::Real;
+
+/// Position whitener: a scalar Kalman filter that carries the piston by the flows (the odometer) and is
+/// corrected by the position sensor.
+///
+/// Its innovation is white, so the regression on it is generalised least squares. The filtered position
+/// is kept as x̂ − gᵀθ: x̂ as if θ stood at its prior mean, g the sensitivity to θ (Friedland 1969,
+/// "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14, separate-bias form).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Odometer<T, const N: usize> {
+    position_m: T,
+    variance_m2: T,
+    sensitivity: [T; N],
+    /// Σ 1/S over the block, to compensate pressure noise in the compressibility column.
+    pub weight_sum: T,
+}
+
+impl<T: Real, const N: usize> Odometer<T, N> {
+    /// Starts from one reading of the sensor.
+    pub fn anchored(x_m: T, sensor_variance_m2: T) -> Self {
+        Self {
+            position_m: x_m,
+            variance_m2: sensor_variance_m2,
+            sensitivity: [T::zero(); N],
+            weight_sum: T::zero(),
+        }
+    }
+
+    /// Carries the piston by `travel_m` − `columns`ᵀθ, whose error has variance `variance_m2`, and compares
+    /// with the reading `x_m`; the whitened observation goes to `sums`.
+    #[inline]
+    pub fn advance(
+        &mut self,
+        travel_m: T,
+        columns: &[T; N],
+        variance_m2: T,
+        x_m: T,
+        sensor_variance_m2: T,
+        sums: &mut BlockSums<T, N>,
+    ) {
+        for (g, c) in self.sensitivity.iter_mut().zip(columns) {
+            *g += *c;
+        }
+        let predicted = self.position_m + travel_m;
+        let variance = self.variance_m2 + variance_m2;
+        let weight = T::one() / (variance + sensor_variance_m2);
+        let innovation = predicted - x_m;
+        sums.add(&self.sensitivity, innovation, weight);
+        self.weight_sum += weight;
+        let gain = variance * weight;
+        let keep = T::one() - gain;
+        self.position_m = predicted - gain * innovation;
+        self.variance_m2 = keep * variance;
+        for g in &mut self.sensitivity {
+            *g *= keep;
+        }
+    }
+
+    /// Forgets where the piston is (no flow was measured over this step).
+    pub fn anchor(&mut self, x_m: T, sensor_variance_m2: T) {
+        *self = Self { weight_sum: self.weight_sum, ..Self::anchored(x_m, sensor_variance_m2) };
+    }
+}

@@ -1,0 +1,104 @@
+use crate::Real;
+
+/// Watches the innovations: are they as large as the declared noise says, and did the leak change?
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Surprise<T> {
+    balance_sum: T,
+    balance_count: T,
+    odometer_sum: T,
+    odometer_count: T,
+    page: T,
+    changed: bool,
+}
+
+/// Page's test on ν²/S, which is χ²₁ as long as nothing changes: drift, largest step and bound. A false
+/// change comes at most once per exp(0.398 · 40) ≈ 8·10⁶ blocks, three weeks at four blocks a second
+/// (Page 1954; Basseville & Nikiforov 1993, Detection of Abrupt Changes, §2.2 and §5.2).
+const PAGE_DRIFT: f64 = 2.0;
+const PAGE_STEP: f64 = 16.0;
+const PAGE_BOUND: f64 = 40.0;
+
+impl<T: Real> Surprise<T> {
+    /// Takes one balance innovation of variance `variance`, both over the declared noise's variance.
+    pub fn balance(&mut self, innovation: T, variance: T) {
+        let ratio = innovation * innovation / variance;
+        let known = self.inflation();
+        let step = (ratio / known).min(T::lit(PAGE_STEP)) - T::lit(PAGE_DRIFT);
+        self.page = (self.page + step).max(T::zero());
+        self.balance_sum += ratio;
+        self.balance_count += T::one();
+        if self.page > T::lit(PAGE_BOUND) {
+            self.changed = true;
+        }
+    }
+
+    /// Takes the χ² of `count` odometer innovations.
+    pub fn odometer(&mut self, chi_square: T, count: T) {
+        self.odometer_sum += chi_square;
+        self.odometer_count += count;
+    }
+
+    /// Whether the parameters changed since the last call; the test starts again.
+    pub fn take_change(&mut self) -> bool {
+        let changed = self.changed;
+        if changed {
+            *self = Self::default();
+        }
+        changed
+    }
+
+    pub fn forget(&mut self, keep: T) {
+        self.balance_sum *= keep;
+        self.balance_count *= keep;
+        self.odometer_sum *= keep;
+        self.odometer_count *= keep;
+    }
+
+    /// Mean ν²/S of balance and odometer.
+    pub fn ratios(&self) -> [T; 2] {
+        let ratio = |sum: T, count: T| if count > T::zero() { sum / count } else { T::zero() };
+        [ratio(self.balance_sum, self.balance_count), ratio(self.odometer_sum, self.odometer_count)]
+    }
+
+    /// Factor on the variances: where the residuals are larger than declared, the intervals grow with
+    /// them; they never shrink (Birge 1932, "The calculation of errors by the method of least squares").
+    /// One prior count keeps the first blocks from deciding.
+    pub fn inflation(&self) -> T {
+        let prior = T::lit(8.0);
+        let ratio = |sum: T, count: T| (sum + prior) / (count + prior);
+        let balance = ratio(self.balance_sum, self.balance_count);
+        balance.max(ratio(self.odometer_sum, self.odometer_count)).max(T::one())
+    }
+}
+
+/// Variance of a sensor's white noise from second differences of the signal, which cancel its slope:
+/// E (p₂ − 2 p₁ + p₀)² = 6 σ² (von Neumann et al. 1941 use first differences).
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct NoiseMeter<T> {
+    last_rise: Option<T>,
+    sum: T,
+    count: T,
+}
+
+impl<T: Real> NoiseMeter<T> {
+    #[inline]
+    pub fn add(&mut self, before: T, now: T) {
+        let rise = now - before;
+        if let Some(last) = self.last_rise.replace(rise) {
+            let second = rise - last;
+            let keep = T::lit(0.999);
+            self.sum = keep * self.sum + second * second;
+            self.count = keep * self.count + T::one();
+        }
+    }
+
+    /// A gap: the next difference starts anew.
+    pub fn interrupt(&mut self) {
+        self.last_rise = None;
+    }
+
+    /// Standard deviation, Pa.
+    pub fn std_pa(&self) -> T {
+        if self.count > T::zero() { (self.sum / (T::lit(6.0) * self.count)).sqrt() } else { T::zero() }
+    }
+}
