@@ -8,18 +8,30 @@
 //! Equations are cited by their number in X. Wu, Y. Li, F. Li, Z. Yang, W. Teng (2011),
 //! "Adaptive Estimation-Based Leakage Detection for a Wind Turbine Hydraulic Pitching System",
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
-#![cfg_attr(not(feature = "std"), no_std)]
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 mod cylinder;
+mod detector;
 mod estimate;
+mod excitation;
+mod load;
+mod momentum;
+mod paper_law;
 mod real;
+mod regressors;
 mod rls;
 mod sample;
 mod sensors;
 
 pub use cylinder::{Cylinder, CylinderError, Fluid};
+pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use estimate::{Estimate, PerLeak};
+pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
+pub use load::LoadEstimator;
+pub use momentum::{Momentum, force_imbalance_n, hydraulic_force_n};
+pub use paper_law::{PaperGains, PaperLaw, PaperLawRate, Theta};
 pub use real::Real;
-pub use rls::{Rls, RlsSettings, Update};
+pub use regressors::regressors;
+pub use rls::{Parameter, Rls, RlsSettings, Update};
 pub use sample::Sample;
 pub use sensors::{SensorSpread, Sensors};

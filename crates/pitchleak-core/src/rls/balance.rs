@@ -69,19 +69,6 @@ impl<T: Real> ChamberIntegral<T> {
     }
 }
 
-/// Parameters in their fixed order; an estimator of N parameters has the first N.
-pub(super) mod column {
-    pub const COMPRESSIBILITY: usize = 0;
-    pub const INTERNAL: usize = 1;
-    pub const EXTERNAL_A: usize = 2;
-    pub const EXTERNAL_B: usize = 3;
-    pub const OFFSET_A: usize = 4;
-    pub const OFFSET_B: usize = 5;
-    pub const GAIN_A: usize = 6;
-    pub const GAIN_B: usize = 7;
-    pub const GAIN_POSITION: usize = 8;
-}
-
 /// One scalar equation, left side and regressor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equation<T, const N: usize> {
@@ -90,7 +77,8 @@ pub(super) struct Equation<T, const N: usize> {
 }
 
 /// w_a·(chamber A) + w_b·(chamber B), in prior units: `scale` holds each parameter's prior standard
-/// deviation, `compressibility` its prior mean 1/β (the other means are zero).
+/// deviation, `compressibility` its prior mean 1/β (the other means are zero). Columns in the order of
+/// [`Parameter`](super::Parameter).
 #[inline]
 pub(super) fn combine<T: Real, const N: usize>(
     integrals: &Integrals<T>,

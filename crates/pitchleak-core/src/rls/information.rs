@@ -79,6 +79,21 @@ impl<T: Real, const N: usize> BlockSums<T, N> {
     }
 }
 
+impl<T: Real, const N: usize> Solution<T, N> {
+    /// Innovation y − fᵀθ̂ of an observation with unit noise, and its variance 1 + fᵀP f.
+    pub fn predict(&self, y: T, f: &[T; N]) -> (T, T) {
+        let mut innovation = y;
+        let mut variance = T::one();
+        for i in 0..N {
+            innovation -= f[i] * self.mean[i];
+            for j in 0..N {
+                variance += f[i] * self.covariance[i][j] * f[j];
+            }
+        }
+        (innovation, variance)
+    }
+}
+
 impl<T: Real, const N: usize> Information<T, N> {
     pub fn new() -> Self {
         Self { matrix: [[T::zero(); N]; N], noise: [[T::zero(); N]; N], vector: [T::zero(); N] }

@@ -14,13 +14,15 @@
 mod balance;
 mod information;
 mod odometer;
+mod parameter;
 mod surprise;
 mod weights;
 
 use crate::{Cylinder, Estimate, Fluid, PerLeak, Real, Sample, Sensors};
-use balance::{Integrals, column, combine};
+use balance::{Integrals, combine};
 use information::{BlockSums, Information, Solution};
 use odometer::Odometer;
+pub use parameter::Parameter;
 use surprise::{NoiseMeter, Surprise};
 use weights::Weights;
 
@@ -229,8 +231,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
         };
         let mut equation =
             combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
-        if N > column::GAIN_POSITION {
-            equation.columns[column::GAIN_POSITION] = -equation.left * self.scale[column::GAIN_POSITION];
+        let gain = Parameter::GainPosition as usize;
+        if N > gain {
+            equation.columns[gain] = -equation.left * self.scale[gain];
         }
         let variance = weights.odometer_variance * step.time_square;
         odometer.advance(
@@ -307,15 +310,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     fn add_balance(&mut self, equation: &balance::Equation<T, N>) {
-        let covariance = &self.solution.covariance;
-        let mut innovation = equation.left;
-        let mut variance = T::one();
-        for i in 0..N {
-            innovation -= equation.columns[i] * self.solution.mean[i];
-            for j in 0..N {
-                variance += equation.columns[i] * covariance[i][j] * equation.columns[j];
-            }
-        }
+        let (innovation, variance) = self.solution.predict(equation.left, &equation.columns);
         self.surprise.balance(innovation, variance);
         self.sums.add(&equation.columns, equation.left, T::one());
         // Both ends of the block are noisy readings of the pressure.
@@ -348,7 +343,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Takes noise of `variance` (SI, over the equation's own variance) out of the compressibility's
     /// normal equation.
     fn compensate(&mut self, variance: T) {
-        let scale = self.scale[column::COMPRESSIBILITY];
+        let scale = self.scale[Parameter::Compressibility as usize];
         let prior_mean = self.compressibility / scale;
         self.sums.compensate_column_0(variance * scale * scale, prior_mean);
     }
@@ -363,7 +358,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// The leaks found decide how much pressure noise the equations carry.
     fn reweigh(&mut self) {
-        let leaks = self.raw_leaks().map(|c| c.value.max(T::zero()));
+        let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
         self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
         self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
         self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);
@@ -395,62 +390,64 @@ impl<T: Real, const N: usize> Rls<T, N> {
             && flow_ok(sample.qb_m3s)
     }
 
-    /// Estimate of parameter `index` in SI, its spread not below what the residuals show.
-    fn parameter(&self, index: usize) -> Estimate<T> {
-        match (self.solution.mean.get(index), self.solution.covariance.get(index), self.scale.get(index)) {
-            (Some(mean), Some(row), Some(scale)) => {
-                let variance = row.get(index).copied().unwrap_or(T::one());
-                Estimate {
-                    value: *mean * *scale,
-                    std: (variance * self.surprise.inflation()).sqrt() * *scale,
-                }
+    /// Estimate of a parameter's deviation from its prior mean, SI; zero with no spread where N is too
+    /// small to have it.
+    fn parameter(&self, parameter: Parameter) -> Estimate<T> {
+        let index = parameter as usize;
+        match (self.solution.mean.get(index), self.scale.get(index)) {
+            (Some(mean), Some(scale)) => {
+                Estimate { value: *mean * *scale, std: self.covariance(parameter, parameter).sqrt() * *scale }
             }
             _ => Estimate::default(),
         }
     }
 
-    fn raw_leaks(&self) -> PerLeak<Estimate<T>> {
-        PerLeak {
-            internal: self.parameter(column::INTERNAL),
-            external_a: self.parameter(column::EXTERNAL_A),
-            external_b: self.parameter(column::EXTERNAL_B),
-        }
+    /// Covariance of two parameters' errors, each in units of its prior's standard deviation; not below
+    /// what the residuals show. Zero where N is too small to have them.
+    pub fn covariance(&self, a: Parameter, b: Parameter) -> T {
+        let row = self.solution.covariance.get(a as usize);
+        let entry = row.and_then(|row| row.get(b as usize));
+        entry.map_or(T::zero(), |entry| *entry * self.surprise.inflation())
     }
 
     /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means
     /// that the model lacks an effect.
     pub fn leak_coefficients(&self) -> PerLeak<Estimate<T>> {
-        self.raw_leaks()
+        PerLeak {
+            internal: self.parameter(Parameter::Internal),
+            external_a: self.parameter(Parameter::ExternalA),
+            external_b: self.parameter(Parameter::ExternalB),
+        }
     }
 
     /// Compressibility κ = 1/β, 1/Pa.
     pub fn compressibility(&self) -> Estimate<T> {
-        let deviation = self.parameter(column::COMPRESSIBILITY);
+        let deviation = self.parameter(Parameter::Compressibility);
         Estimate { value: deviation.value + self.compressibility, std: deviation.std }
     }
 
     /// Offsets of the flow meters A and B, m³/s (reading minus truth); zero where N < 6.
     pub fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
-        [self.parameter(column::OFFSET_A), self.parameter(column::OFFSET_B)]
+        [self.parameter(Parameter::OffsetA), self.parameter(Parameter::OffsetB)]
     }
 
     /// Scale errors of flow meter A, flow meter B and the position sensor, as shares; zero where N < 9.
     pub fn gains(&self) -> [Estimate<T>; 3] {
         [
-            self.parameter(column::GAIN_A),
-            self.parameter(column::GAIN_B),
-            self.parameter(column::GAIN_POSITION),
+            self.parameter(Parameter::GainA),
+            self.parameter(Parameter::GainB),
+            self.parameter(Parameter::GainPosition),
         ]
     }
 
     /// Prior standard deviations of the leak coefficients, m³/(s·Pa).
     pub fn leak_prior_std(&self) -> T {
-        self.scale[column::INTERNAL]
+        self.scale[Parameter::Internal as usize]
     }
 
     /// Prior standard deviation of the compressibility, 1/Pa.
     pub fn compressibility_prior_std(&self) -> T {
-        self.scale[column::COMPRESSIBILITY]
+        self.scale[Parameter::Compressibility as usize]
     }
 
     /// Mean leak flows over the memory, m³/s, by eq. (15): coefficient times mean |P_L|, P_A, P_B. A

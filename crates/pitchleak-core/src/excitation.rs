@@ -1,0 +1,102 @@
+//! What the data can tell: per parameter, whether this trace pins it down.
+
+use crate::{Estimate, PerLeak, Real, Rls, rls::Parameter};
+
+/// When a parameter counts as identified.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ExcitationSettings<T> {
+    /// A leak is identified once the 95 % interval of its flow is within ± this, m³/s …
+    pub resolution_m3s: T,
+    /// … or within ± this share of the flow itself.
+    pub resolution_share: T,
+    /// The bulk modulus is identified once its spread is below this share of its prior's.
+    pub prior_share: T,
+}
+
+impl<T: Real> Default for ExcitationSettings<T> {
+    /// 0.1 L/min or a tenth of the leak; half the prior's spread (three quarters of what is known about
+    /// the bulk modulus then comes from the trace).
+    fn default() -> Self {
+        Self {
+            resolution_m3s: T::lit(0.1 / 60_000.0),
+            resolution_share: T::lit(0.1),
+            prior_share: T::lit(0.5),
+        }
+    }
+}
+
+/// What a trace tells about one parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Excitation<T> {
+    /// Whether the trace identifies the parameter.
+    pub identifiable: bool,
+    /// Share of the prior's variance that the trace took away, 0 (dead parameter) to 1 (pinned).
+    pub share_learnt: T,
+    /// The parameter it trades off with (|correlation| above 0.95), if any: only their combination is
+    /// known well.
+    pub traded_with: Option<Parameter>,
+}
+
+/// What a trace tells about the four parameters of eq. (1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ExcitationReport<T> {
+    /// The three leak coefficients.
+    pub leaks: PerLeak<Excitation<T>>,
+    /// The bulk modulus.
+    pub bulk_modulus: Excitation<T>,
+}
+
+impl<T: Real, const N: usize> Rls<T, N> {
+    /// Says for each parameter whether the samples so far identify it: identifiability as accumulated
+    /// Fisher information against the prior.
+    pub fn excitation(&self, settings: &ExcitationSettings<T>) -> ExcitationReport<T> {
+        let one = |parameter: Parameter, identifiable: bool| Excitation {
+            identifiable,
+            share_learnt: self.share_learnt(parameter),
+            traded_with: self.traded_with(parameter),
+        };
+        let pinned = self.mean_leak_flows_m3s().map(|flow| is_resolved(&flow, settings));
+        let compressibility = self.compressibility();
+        let learnt = compressibility.std <= settings.prior_share * self.compressibility_prior_std();
+        ExcitationReport {
+            leaks: PerLeak {
+                internal: one(Parameter::Internal, pinned.internal),
+                external_a: one(Parameter::ExternalA, pinned.external_a),
+                external_b: one(Parameter::ExternalB, pinned.external_b),
+            },
+            bulk_modulus: one(Parameter::Compressibility, learnt),
+        }
+    }
+
+    fn share_learnt(&self, parameter: Parameter) -> T {
+        (T::one() - self.covariance(parameter, parameter)).max(T::zero())
+    }
+
+    fn traded_with(&self, parameter: Parameter) -> Option<Parameter> {
+        let own = self.covariance(parameter, parameter);
+        let mut strongest = T::lit(0.95);
+        let mut partner = None;
+        for other in Parameter::ALL.into_iter().take(N) {
+            if other == parameter {
+                continue;
+            }
+            let scale = (own * self.covariance(other, other)).sqrt();
+            let correlation = self.covariance(parameter, other).abs() / scale;
+            if correlation > strongest {
+                strongest = correlation;
+                partner = Some(other);
+            }
+        }
+        partner
+    }
+}
+
+fn is_resolved<T: Real>(flow: &Estimate<T>, settings: &ExcitationSettings<T>) -> bool {
+    let [low, high] = flow.ci95();
+    let half_width = (high - low) * T::lit(0.5);
+    let pressed = flow.std > T::zero();
+    pressed && half_width <= settings.resolution_m3s.max(settings.resolution_share * flow.value.abs())
+}
