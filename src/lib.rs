@@ -3,4 +3,6 @@
 
 pub use pitchleak_core as core;
 
+pub mod curve;
 pub mod openfast;
+pub mod reference;
