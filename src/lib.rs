@@ -4,5 +4,6 @@
 pub use pitchleak_core as core;
 
 pub mod curve;
+pub mod figure;
 pub mod openfast;
 pub mod reference;

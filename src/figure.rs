@@ -1,0 +1,187 @@
+//! Figures of curves over time, as SVG text: panels on a grid, each with its axes, units and legend.
+
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+/// Colours that stay apart in print and for the colour-blind (Okabe and Ito 2008).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ink {
+    /// Black: what was measured, or asked for.
+    Measured,
+    /// Blue: our estimate, or what came out.
+    Ours,
+    /// Vermilion: the paper's estimate.
+    Paper,
+}
+
+impl Ink {
+    fn colour(self) -> RGBColor {
+        match self {
+            Self::Measured => RGBColor(0, 0, 0),
+            Self::Ours => RGBColor(0, 114, 178),
+            Self::Paper => RGBColor(213, 94, 0),
+        }
+    }
+
+    fn width(self) -> u32 {
+        match self {
+            Self::Measured => 1,
+            Self::Ours | Self::Paper => 2,
+        }
+    }
+}
+
+/// One curve of a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Name in the legend; empty for none.
+    pub label: &'static str,
+    /// Its colour.
+    pub ink: Ink,
+    /// Points of the curve, in the panel's units; breaks at values that are not finite.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// One pair of axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Heading.
+    pub title: String,
+    /// Quantity and unit of the vertical axis; the horizontal one is time in seconds.
+    pub y_label: &'static str,
+    /// The curves, drawn in this order.
+    pub lines: Vec<Line>,
+    /// Vertical range; `None` takes in every point.
+    pub y_range: Option<(f64, f64)>,
+}
+
+/// Why a figure was not drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cannot draw the figure: {0}")]
+pub struct FigureError(String);
+
+const PANEL_WIDTH: u32 = 560;
+const PANEL_HEIGHT: u32 = 250;
+
+/// Draws `panels` row by row, `columns` to a row.
+///
+/// # Errors
+/// [`FigureError`] when the plotting library gives up.
+pub fn svg(panels: &[Panel], columns: usize) -> Result<String, FigureError> {
+    let columns = columns.max(1);
+    let rows = panels.len().div_ceil(columns).max(1);
+    let size = (PANEL_WIDTH * columns as u32, PANEL_HEIGHT * rows as u32);
+    let mut text = String::new();
+    {
+        let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        area.fill(&WHITE).map_err(error)?;
+        for (panel, cell) in panels.iter().zip(area.split_evenly((rows, columns))) {
+            draw(panel, &cell)?;
+        }
+        area.present().map_err(error)?;
+    }
+    Ok(text)
+}
+
+fn error(cause: impl std::fmt::Display) -> FigureError {
+    FigureError(cause.to_string())
+}
+
+type Cell<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
+    let finite =
+        || panel.lines.iter().flat_map(|line| &line.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+    let (left, right) = range(finite().map(|p| p.0), 0.0);
+    let (low, high) = panel.y_range.unwrap_or_else(|| range(finite().map(|p| p.1), 0.08));
+    let mut chart = ChartBuilder::on(cell)
+        .caption(&panel.title, ("sans-serif", 17))
+        .margin(8)
+        .margin_right(16)
+        .x_label_area_size(38)
+        .y_label_area_size(68)
+        .build_cartesian_2d(left..right, low..high)
+        .map_err(error)?;
+    chart
+        .configure_mesh()
+        .x_desc("time (s)")
+        .y_desc(panel.y_label)
+        .axis_desc_style(("sans-serif", 15))
+        .label_style(("sans-serif", 13))
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(RGBColor(220, 220, 220))
+        .x_labels(6)
+        .y_labels(6)
+        .y_label_formatter(&|value| short(*value, high - low))
+        .draw()
+        .map_err(error)?;
+    for line in &panel.lines {
+        draw_line(&mut chart, line, low, high)?;
+    }
+    if panel.lines.iter().any(|line| !line.label.is_empty()) {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .label_font(("sans-serif", 13))
+            .background_style(WHITE.mix(0.8))
+            .border_style(RGBColor(180, 180, 180))
+            .draw()
+            .map_err(error)?;
+    }
+    Ok(())
+}
+
+fn draw_line(chart: &mut Chart, line: &Line, low: f64, high: f64) -> Result<(), FigureError> {
+    let style = line.ink.colour().stroke_width(line.ink.width());
+    // A curve that leaves the panel stops at its edge.
+    let inside = |p: &(f64, f64)| p.1.is_finite() && p.1 >= low && p.1 <= high;
+    let mut label = line.label;
+    for piece in line.points.split(|p| !inside(p)).filter(|piece| piece.len() > 1) {
+        let drawn = chart.draw_series(LineSeries::new(piece.iter().copied(), style)).map_err(error)?;
+        if !label.is_empty() {
+            drawn.label(label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+            label = "";
+        }
+    }
+    Ok(())
+}
+
+/// Least and greatest value, widened by `share` of their distance; never empty.
+fn range(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let room = (high - low).max(1e-9 * high.abs().max(low.abs())).max(1e-12);
+    if low <= high { (low - share * room, high + share * room) } else { (0.0, 1.0) }
+}
+
+/// A tick's number with as many decimals as ticks over `span` need.
+fn short(value: f64, span: f64) -> String {
+    let decimals = (1.0 - span.max(1e-12).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn panel(points: Vec<(f64, f64)>) -> Panel {
+        let line = Line { label: "ours", ink: Ink::Ours, points };
+        Panel { title: "A title".into(), y_label: "leak (L/min)", lines: vec![line], y_range: None }
+    }
+
+    #[test]
+    fn a_figure_names_its_axes_and_draws_its_curve() {
+        let wave = (0..100).map(|k| (0.1 * f64::from(k), (0.3 * f64::from(k)).sin())).collect();
+        let text = svg(&[panel(wave)], 1).expect("draws");
+        for part in ["A title", "time (s)", "leak (L/min)", "ours", "<polyline"] {
+            assert!(text.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn no_points_or_strange_ones_still_make_a_figure() {
+        for points in [vec![], vec![(0.0, f64::NAN), (1.0, f64::INFINITY)], vec![(0.0, 3.0), (1.0, 3.0)]] {
+            assert!(svg(&[panel(points.clone()), panel(points)], 2).is_ok());
+        }
+    }
+}
