@@ -7,3 +7,9 @@ pub mod curve;
 pub mod figure;
 pub mod openfast;
 pub mod reference;
+pub mod rig;
+pub mod signal;
+pub mod trace;
+pub mod units;
+
+pub use rig::Rig;

@@ -1,0 +1,115 @@
+use super::bound::Bound;
+use super::document::Section;
+use super::error::RigError;
+use crate::units::Dimension;
+use pitchleak_core::{Cylinder, SensorSpread, Sensors};
+
+/// One sensor as its data sheet declares it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instrument {
+    /// Full scale, in the sensor's SI unit.
+    pub full_scale: f64,
+    /// 3 σ of white noise, as a share of full scale.
+    pub accuracy: f64,
+    /// How far the offset may be off, 1 σ, as a share of full scale.
+    pub bias: f64,
+    /// How far the scale may be off, 1 σ, as a share of the reading.
+    pub gain: f64,
+}
+
+/// The data sheets of all sensors of a rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instruments {
+    /// Flow meter of chamber A, m³/s.
+    pub flow_a: Instrument,
+    /// Flow meter of chamber B, m³/s.
+    pub flow_b: Instrument,
+    /// Both pressure sensors, Pa.
+    pub pressure: Instrument,
+    /// Position sensor, m.
+    pub position: Instrument,
+    /// Force sensor, N.
+    pub force: Instrument,
+}
+
+impl Instrument {
+    /// Wu et al. (2011), Section III: every sensor within 1 % of its full scale.
+    const PAPER_ACCURACY: f64 = 0.01;
+
+    /// A sensor of the paper's accuracy.
+    pub fn of_full_scale(full_scale: f64) -> Self {
+        Self { full_scale, accuracy: Self::PAPER_ACCURACY, bias: 0.0, gain: 0.0 }
+    }
+
+    /// The declared spread as the estimators use it.
+    pub fn spread(&self) -> SensorSpread<f64> {
+        SensorSpread {
+            bias_std: self.bias * self.full_scale,
+            gain_std: self.gain,
+            ..SensorSpread::of_full_scale(self.full_scale, self.accuracy)
+        }
+    }
+
+    fn read(sensors: &Section<'_>, key: &str, dimension: Dimension) -> Result<Option<Self>, RigError> {
+        let sheet = sensors.section(key)?;
+        if !sheet.is_present() {
+            return Ok(None);
+        }
+        sheet.allow(&["full_scale", "accuracy", "bias", "gain"])?;
+        let share = |key| sheet.quantity(key, Dimension::Share, Bound::from_zero(1.0));
+        Ok(Some(Self {
+            full_scale: sheet.required("full_scale", dimension, Bound::above_zero(1e10))?,
+            accuracy: share("accuracy")?.unwrap_or(Self::PAPER_ACCURACY),
+            bias: share("bias")?.unwrap_or(0.0),
+            gain: share("gain")?.unwrap_or(0.0),
+        }))
+    }
+}
+
+impl Instruments {
+    /// Sensors of the paper's rig (Section III) on this cylinder: flow meters 20 L/min, the position
+    /// sensor as long as the stroke.
+    pub fn paper(cylinder: &Cylinder<f64>) -> Self {
+        let flow = Instrument::of_full_scale(20.0 / 60e3);
+        Self {
+            flow_a: flow,
+            flow_b: flow,
+            pressure: Instrument::of_full_scale(16e6),
+            position: Instrument::of_full_scale(cylinder.stroke_m),
+            force: Instrument::of_full_scale(10e3),
+        }
+    }
+
+    /// The declared spread of every sensor as the estimators use it.
+    pub fn spread(&self) -> Sensors<f64> {
+        Sensors {
+            flow_a: self.flow_a.spread(),
+            flow_b: self.flow_b.spread(),
+            pressure: self.pressure.spread(),
+            position: self.position.spread(),
+            force: self.force.spread(),
+        }
+    }
+
+    /// A sensor that the file leaves out is the paper's.
+    pub(super) fn read(sensors: &Section<'_>, cylinder: &Cylinder<f64>) -> Result<Self, RigError> {
+        sensors.allow(&["flow", "flow_a", "flow_b", "pressure", "position", "force"])?;
+        let default = Self::paper(cylinder);
+        let flow = |key| Instrument::read(sensors, key, Dimension::Flow);
+        let (both, flow_a, flow_b) = (flow("flow")?, flow("flow_a")?, flow("flow_b")?);
+        if both.is_some() && (flow_a.is_some() || flow_b.is_some()) {
+            return Err(sensors.impossible(
+                "flow",
+                "declared twice",
+                "either `flow` or `flow_a` and `flow_b`",
+            ));
+        }
+        Ok(Self {
+            flow_a: flow_a.or(both).unwrap_or(default.flow_a),
+            flow_b: flow_b.or(both).unwrap_or(default.flow_b),
+            pressure: Instrument::read(sensors, "pressure", Dimension::Pressure)?.unwrap_or(default.pressure),
+            position: Instrument::read(sensors, "position", Dimension::Length)?.unwrap_or(default.position),
+            force: Instrument::read(sensors, "force", Dimension::Force)?.unwrap_or(default.force),
+        })
+    }
+}

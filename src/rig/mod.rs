@@ -1,0 +1,131 @@
+//! Rig files: the cylinder, its oil, its sensors, and how to watch it.
+
+mod bound;
+mod document;
+mod error;
+mod instruments;
+mod settings;
+mod write;
+
+pub use error::{Fault, Place, RigError};
+pub use instruments::{Instrument, Instruments};
+pub use settings::{
+    AlarmSettings, ColumnMap, EffectMap, EffectValue, EstimatorKind, EstimatorSettings, ForeignColumn,
+};
+
+use crate::units::Dimension;
+use bound::Bound;
+use document::{Document, Section};
+use pitchleak_core::{Cylinder, Fluid, Sensors};
+use std::path::Path;
+use toml::de::DeTable;
+
+/// A rig file, read and checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// The file's path as given, or `wu2011` for the built-in rig.
+    pub name: String,
+    /// Geometry and mass.
+    pub cylinder: Cylinder<f64>,
+    /// Prior of the bulk modulus.
+    pub fluid: Fluid<f64>,
+    /// Data sheets of the sensors.
+    pub instruments: Instruments,
+    /// `[estimator]`.
+    pub estimator: EstimatorSettings,
+    /// `[alarms]`.
+    pub alarms: AlarmSettings,
+    /// `[columns]`.
+    pub columns: ColumnMap,
+    /// `[effects]`: what a diagnosis found.
+    pub effects: EffectMap,
+}
+
+impl Rig {
+    /// Name of the built-in rig.
+    pub const PAPER_NAME: &'static str = "wu2011";
+
+    /// The rig of Wu et al. (2011), Section III.
+    pub fn paper() -> Self {
+        let cylinder = Cylinder::paper();
+        Self {
+            name: Self::PAPER_NAME.to_owned(),
+            instruments: Instruments::paper(&cylinder),
+            cylinder,
+            fluid: Fluid::paper(),
+            estimator: EstimatorSettings::default(),
+            alarms: AlarmSettings::default(),
+            columns: ColumnMap::new(),
+            effects: EffectMap::new(),
+        }
+    }
+
+    /// Reads a rig file.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, RigError> {
+        let file = path.as_ref().display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(source) => Err(RigError::Read { file, source }),
+        }
+    }
+
+    /// The rig for a trace: `rig.toml` beside it, else the built-in one.
+    pub fn beside(trace: &Path) -> Result<Self, RigError> {
+        let neighbour = trace.with_file_name("rig.toml");
+        if neighbour.is_file() { Self::load(neighbour) } else { Ok(Self::paper()) }
+    }
+
+    /// Reads the text of a rig file; `file` is its name for messages.
+    pub fn parse(text: &str, file: &str) -> Result<Self, RigError> {
+        let text = text.trim_start_matches('\u{feff}');
+        let document = Document { file, text };
+        let table = DeTable::parse(text).map_err(|error| {
+            let message = error.message().replace('\n', " ");
+            document.fail(error.span().map(|span| span.start), Fault::Syntax(message))
+        })?;
+        let root = Section::root(&document, table.get_ref());
+        root.allow(&["cylinder", "fluid", "sensors", "estimator", "alarms", "columns", "effects"])?;
+        let cylinder = read_cylinder(&root.section("cylinder")?)?;
+        let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
+        Ok(Self {
+            name: file.to_owned(),
+            cylinder,
+            fluid: read_fluid(&root.section("fluid")?)?,
+            instruments,
+            estimator: EstimatorSettings::read(&root.section("estimator")?)?,
+            alarms: AlarmSettings::read(&root.section("alarms")?, &instruments)?,
+            columns: settings::read_columns(&root.section("columns")?)?,
+            effects: settings::read_effects(&root.section("effects")?)?,
+        })
+    }
+
+    /// The spread of every sensor as the estimators use it.
+    pub fn sensors(&self) -> Sensors<f64> {
+        self.instruments.spread()
+    }
+}
+
+fn read_cylinder(section: &Section<'_>) -> Result<Cylinder<f64>, RigError> {
+    section.allow(&["area_a", "area_b", "stroke", "moving_mass", "dead_volume_a", "dead_volume_b"])?;
+    let area = |key| section.required(key, Dimension::Area, Bound::above_zero(10.0));
+    let volume = |key| section.quantity(key, Dimension::Volume, Bound::from_zero(10.0));
+    Ok(Cylinder {
+        area_a_m2: area("area_a")?,
+        area_b_m2: area("area_b")?,
+        stroke_m: section.required("stroke", Dimension::Length, Bound::above_zero(100.0))?,
+        moving_mass_kg: section.required("moving_mass", Dimension::Mass, Bound::above_zero(1e7))?,
+        dead_volume_a_m3: volume("dead_volume_a")?.unwrap_or(0.0),
+        dead_volume_b_m3: volume("dead_volume_b")?.unwrap_or(0.0),
+    })
+}
+
+/// A prior of a quarter of β where the file gives none, as for the paper's rig.
+fn read_fluid(section: &Section<'_>) -> Result<Fluid<f64>, RigError> {
+    section.allow(&["bulk_modulus", "bulk_modulus_std"])?;
+    let bulk_modulus_pa = section.required("bulk_modulus", Dimension::Pressure, Bound::between(1e6, 1e11))?;
+    let std = section.quantity("bulk_modulus_std", Dimension::Pressure, Bound::from_zero(1e11))?;
+    Ok(Fluid { bulk_modulus_pa, bulk_modulus_std_pa: std.unwrap_or(bulk_modulus_pa / 4.0) })
+}
+
+#[cfg(test)]
+mod tests;

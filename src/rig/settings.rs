@@ -1,0 +1,222 @@
+//! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`, `[effects]`.
+
+use super::bound::Bound;
+use super::document::Section;
+use super::error::RigError;
+use super::instruments::Instruments;
+use crate::signal::Signal;
+use crate::units::{self, Dimension, Unit};
+use std::collections::BTreeMap;
+
+/// Which estimator a replay runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EstimatorKind {
+    /// Recursive least squares on both chamber equations.
+    #[default]
+    Rls,
+    /// The adaptive law of Wu et al. (2011), eq. (8)–(13).
+    Paper,
+}
+
+impl EstimatorKind {
+    /// The names accepted.
+    pub const NAMES: [&'static str; 2] = ["rls", "paper"];
+
+    /// As written in rig files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rls => "rls",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// The estimator of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        [Self::Rls, Self::Paper].into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// `[estimator]`: what the file leaves out is up to the estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct EstimatorSettings {
+    /// Which estimator.
+    pub kind: EstimatorKind,
+    /// Time constant of forgetting, s.
+    pub forgetting_time_s: Option<f64>,
+    /// Cut-off of the input filter, Hz.
+    pub filter_cutoff_hz: Option<f64>,
+    /// Length of the blocks that samples are gathered into, s.
+    pub block_time_s: Option<f64>,
+    /// λ of the paper's law, eq. (8), 1/s.
+    pub lambda_per_s: Option<f64>,
+    /// Scale γ of the paper's adaptation gains, eq. (9).
+    pub gamma: Option<f64>,
+}
+
+/// `[alarms]`: when a leak becomes an alarm, and when it is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlarmSettings {
+    /// Thresholds of the internal, external A and external B leak flow, m³/s.
+    pub threshold_m3s: [f64; 3],
+    /// An alarm clears this far below its threshold, m³/s.
+    pub hysteresis_m3s: f64,
+    /// How long the evidence must last, s.
+    pub hold_time_s: f64,
+}
+
+/// A foreign column: its name in the header and its unit (none for a timestamp).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForeignColumn {
+    /// As in the header row.
+    pub name: String,
+    /// The unit its numbers are in.
+    pub unit: Option<Unit>,
+}
+
+/// `[columns]`: the foreign name of each mapped signal.
+pub type ColumnMap = BTreeMap<Signal, ForeignColumn>;
+
+/// An effect found by a diagnosis, SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectValue {
+    /// Its parameter.
+    pub value: f64,
+    /// Standard deviation of the parameter, where known.
+    pub std: Option<f64>,
+}
+
+/// `[effects]`: by id.
+pub type EffectMap = BTreeMap<String, EffectValue>;
+
+const SECONDS: Bound = Bound::above_zero(1e7);
+const GAIN: Bound = Bound::above_zero(1e12);
+
+impl EstimatorSettings {
+    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
+        section.allow(&["kind", "forgetting_time", "filter_cutoff", "block_time", "gains"])?;
+        let kind = match section.text("kind")? {
+            None => EstimatorKind::default(),
+            Some(name) => EstimatorKind::by_name(name)
+                .ok_or_else(|| section.impossible("kind", name, &EstimatorKind::NAMES.join(" or ")))?,
+        };
+        let gains = section.section("gains")?;
+        gains.allow(&["lambda", "gamma"])?;
+        Ok(Self {
+            kind,
+            forgetting_time_s: section.quantity("forgetting_time", Dimension::Time, SECONDS)?,
+            filter_cutoff_hz: section.quantity(
+                "filter_cutoff",
+                Dimension::Frequency,
+                Bound::above_zero(1e5),
+            )?,
+            block_time_s: section.quantity("block_time", Dimension::Time, SECONDS)?,
+            lambda_per_s: gains.quantity("lambda", Dimension::Share, GAIN)?,
+            gamma: gains.quantity("gamma", Dimension::Share, GAIN)?,
+        })
+    }
+}
+
+impl Default for AlarmSettings {
+    /// 0.1 L/min on every leak, cleared at half of it, after 2 s.
+    fn default() -> Self {
+        Self { threshold_m3s: [0.1 / 60e3; 3], hysteresis_m3s: 0.05 / 60e3, hold_time_s: 2.0 }
+    }
+}
+
+impl AlarmSettings {
+    pub(super) fn read(section: &Section<'_>, instruments: &Instruments) -> Result<Self, RigError> {
+        section.allow(&["internal", "external_a", "external_b", "hysteresis", "hold_time"])?;
+        let default = Self::default();
+        let most = instruments.flow_a.full_scale.max(instruments.flow_b.full_scale);
+        let flow = |key| section.quantity(key, Dimension::Flow, Bound::above_zero(most));
+        let [internal, external_a, external_b] = default.threshold_m3s;
+        let threshold_m3s = [
+            flow("internal")?.unwrap_or(internal),
+            flow("external_a")?.unwrap_or(external_a),
+            flow("external_b")?.unwrap_or(external_b),
+        ];
+        let least = threshold_m3s.into_iter().fold(f64::INFINITY, f64::min);
+        let hysteresis = section.quantity("hysteresis", Dimension::Flow, Bound::from_zero(least))?;
+        let hold_time = section.quantity("hold_time", Dimension::Time, Bound::from_zero(1e7))?;
+        Ok(Self {
+            threshold_m3s,
+            hysteresis_m3s: hysteresis.unwrap_or(default.hysteresis_m3s.min(least / 2.0)),
+            hold_time_s: hold_time.unwrap_or(default.hold_time_s),
+        })
+    }
+}
+
+/// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar" }`.
+pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError> {
+    section.allow(&Signal::ALL.map(Signal::name))?;
+    let mut columns = ColumnMap::new();
+    for signal in section.keys().filter_map(Signal::by_name) {
+        let entry = section.section(signal.name())?;
+        entry.allow(&["name", "unit"])?;
+        let name =
+            entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
+        let unit = read_unit(&entry, signal)?;
+        columns.insert(signal, ForeignColumn { name: name.to_owned(), unit });
+    }
+    Ok(columns)
+}
+
+fn read_unit(entry: &Section<'_>, signal: Signal) -> Result<Option<Unit>, RigError> {
+    match (signal.dimension(), entry.text("unit")?) {
+        (None, None) => Ok(None),
+        (None, Some(unit)) => Err(entry.impossible("unit", unit, "left out: a timestamp has no unit")),
+        (Some(dimension), None) => Err(entry.missing("unit", &format!("one of {}", dimension.suffixes()))),
+        (Some(dimension), Some(name)) => units::unit(name, dimension)
+            .map(Some)
+            .map_err(|source| entry.fail("unit", super::Fault::Quantity { key: entry.path("unit"), source })),
+    }
+}
+
+/// Reads `[effects]`: id = value, or id = { value, std }; bare SI numbers.
+pub(super) fn read_effects(section: &Section<'_>) -> Result<EffectMap, RigError> {
+    section.allow(EFFECT_IDS)?;
+    let any = Bound::between(-1e15, 1e15);
+    let mut effects = EffectMap::new();
+    for id in section.keys() {
+        let effect = if section.is_table(id) {
+            let entry = section.section(id)?;
+            entry.allow(&["value", "std"])?;
+            let value = entry.required("value", Dimension::Share, any)?;
+            let std = entry.quantity("std", Dimension::Share, Bound::from_zero(1e15))?;
+            EffectValue { value, std }
+        } else {
+            EffectValue { value: section.required(id, Dimension::Share, any)?, std: None }
+        };
+        effects.insert(id.to_owned(), effect);
+    }
+    Ok(effects)
+}
+
+/// Effects a rig file may carry.
+const EFFECT_IDS: &[&str] = &[
+    "dead_volume_a",
+    "dead_volume_b",
+    "internal_leak_turbulent",
+    "external_leak_a_turbulent",
+    "external_leak_b_turbulent",
+    "external_leak_b",
+    "entrained_air",
+    "accumulator_a",
+    "accumulator_b",
+    "flow_meter_offset_a",
+    "flow_meter_offset_b",
+    "flow_meter_gain_a",
+    "flow_meter_gain_b",
+    "flow_meter_lag",
+    "position_gain",
+    "position_offset",
+    "pressure_offset_a",
+    "pressure_offset_b",
+    "drag_leak",
+    "position_dependent_leak",
+    "viscous_friction",
+    "coulomb_friction",
+    "stribeck_friction",
+    "load_offset",
+];

@@ -1,0 +1,191 @@
+//! What a reader noticed about a trace.
+
+use super::Record;
+use pitchleak_core::Sample;
+use std::fmt;
+
+/// How many bad rows are kept with their place.
+const KEPT: usize = 5;
+
+/// Why a row is of no use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BadReason {
+    /// A cell is not a finite number.
+    NotANumber,
+    /// A time stamp is not ISO 8601.
+    NotATime,
+    /// A cell that every row must have is empty.
+    Missing,
+    /// Fewer cells than the header.
+    ShortRow,
+    /// More cells than the header.
+    LongRow,
+    /// Not possible on this rig.
+    OutOfRange,
+    /// Time stands still or goes back.
+    TimeBack,
+}
+
+impl BadReason {
+    /// In the plural, as a count of rows.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NotANumber => "not a number",
+            Self::NotATime => "not a time in ISO 8601",
+            Self::Missing => "missing value",
+            Self::ShortRow => "too few cells",
+            Self::LongRow => "too many cells",
+            Self::OutOfRange => "out of physical range",
+            Self::TimeBack => "time not rising",
+        }
+    }
+}
+
+/// One bad row.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct BadRow {
+    /// Line of the file, from 1.
+    pub line: u64,
+    /// Header of the column, where one cell is to blame.
+    pub column: Option<String>,
+    /// Why.
+    pub reason: BadReason,
+    /// What was found and what was expected.
+    pub detail: String,
+}
+
+impl fmt::Display for BadRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}", self.line)?;
+        if let Some(column) = &self.column {
+            write!(f, ", column `{column}`")?;
+        }
+        write!(f, ": {}", self.detail)
+    }
+}
+
+/// What a reader noticed so far; whole once [`next_record`](super::TraceReader::next_record) has
+/// given its last.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TraceQuality {
+    /// Good rows.
+    pub rows: u64,
+    /// Bad rows, skipped.
+    pub skipped: u64,
+    /// The bad rows by reason.
+    pub reasons: std::collections::BTreeMap<BadReason, u64>,
+    /// The first few bad rows.
+    pub first_bad: Vec<BadRow>,
+    /// Pauses much longer than the usual step.
+    pub gaps: u64,
+    /// The longest of them, s.
+    pub longest_gap_s: f64,
+    /// All of them together, s.
+    pub gap_time_s: f64,
+    /// How often the time began anew further back.
+    pub clock_restarts: u64,
+    /// From the first to the last good row, s.
+    pub duration_s: f64,
+    /// Rows without Q_A and without Q_B.
+    pub flow_rests: [u64; 2],
+    /// Columns that no signal is read from.
+    pub ignored_columns: Vec<String>,
+    /// Mapped columns that the header does not have.
+    pub absent_columns: Vec<String>,
+    /// Why the rest of a broken stream was not read.
+    pub cut_off: Option<String>,
+    /// Time of the first row, or of the first after the clock's last restart.
+    pub(super) first_s: f64,
+    pub(super) before_restart_s: f64,
+    pub(super) regular_steps: u64,
+    pub(super) regular_time_s: f64,
+}
+
+impl TraceQuality {
+    /// Samples per second where they come regularly; none for a trace of one row.
+    pub fn sample_rate_hz(&self) -> Option<f64> {
+        (self.regular_steps > 0).then(|| self.regular_steps as f64 / self.regular_time_s)
+    }
+
+    /// Share of the duration that is not in gaps.
+    pub fn share_covered(&self) -> f64 {
+        if self.duration_s > 0.0 { 1.0 - self.gap_time_s / self.duration_s } else { 1.0 }
+    }
+
+    /// One line each on what a reader of results should know.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.skipped > 0 {
+            warnings.push(self.skipped_text());
+        }
+        warnings.extend(self.cut_off.as_ref().map(|why| format!("{why}: the rows before are used")));
+        if self.clock_restarts > 0 {
+            warnings.push(format!("time starts anew {} times", self.clock_restarts));
+        }
+        if self.gaps > 0 {
+            let (gaps, longest) = (self.gaps, self.longest_gap_s);
+            warnings.push(format!("{gaps} gaps in time, the longest {longest:.3} s"));
+        }
+        if !self.absent_columns.is_empty() {
+            warnings.push(format!("mapped but not in the trace: {}", self.absent_columns.join(", ")));
+        }
+        if !self.ignored_columns.is_empty() {
+            warnings.push(format!("columns ignored: {}", self.ignored_columns.join(", ")));
+        }
+        warnings
+    }
+
+    fn skipped_text(&self) -> String {
+        let reasons: Vec<_> =
+            self.reasons.iter().map(|(reason, count)| format!("{count} {}", reason.text())).collect();
+        let total = self.rows + self.skipped;
+        let mut text = format!("{} of {total} rows skipped ({})", self.skipped, reasons.join(", "));
+        for (index, bad) in self.first_bad.iter().enumerate() {
+            text.push_str(if index == 0 { ": " } else { "; " });
+            text.push_str(&bad.to_string());
+        }
+        if self.skipped > self.first_bad.len() as u64 {
+            text.push_str("; …");
+        }
+        text
+    }
+
+    pub(super) fn count_bad(&mut self, bad: BadRow) {
+        self.skipped += 1;
+        *self.reasons.entry(bad.reason).or_default() += 1;
+        if self.first_bad.len() < KEPT {
+            self.first_bad.push(bad);
+        }
+    }
+
+    #[inline]
+    pub(super) fn count_step(&mut self, dt_s: f64, regular: bool, gap: bool) {
+        if regular {
+            self.regular_steps += 1;
+            self.regular_time_s += dt_s;
+        }
+        if gap {
+            self.gaps += 1;
+            self.gap_time_s += dt_s;
+            self.longest_gap_s = self.longest_gap_s.max(dt_s);
+        }
+    }
+
+    /// The time counts from `t_s` on: at the first row, and where the clock was set back.
+    #[cold]
+    pub(super) fn count_from(&mut self, t_s: f64) {
+        self.before_restart_s = self.duration_s;
+        self.first_s = t_s;
+    }
+
+    #[inline]
+    pub(super) fn count_row(&mut self, record: &Record) {
+        self.rows += 1;
+        self.duration_s = self.before_restart_s + (record.t_s - self.first_s);
+        let Sample { qa_m3s, qb_m3s, .. } = record.sample;
+        let [a, b] = &mut self.flow_rests;
+        *a += u64::from(qa_m3s.is_none());
+        *b += u64::from(qb_m3s.is_none());
+    }
+}

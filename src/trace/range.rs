@@ -1,0 +1,75 @@
+//! What readings are possible on a rig.
+
+use super::csv::Row;
+use crate::rig::Rig;
+use crate::signal::Signal;
+use crate::units::Dimension;
+
+/// A vacuum, Pa gauge.
+const VACUUM_PA: f64 = -101_325.0;
+/// Noise and offset may carry a sound reading this share of full scale past what is possible.
+const SLACK: f64 = 0.05;
+/// No sensor reads more than this many times its full scale.
+const OVERRANGE: f64 = 2.0;
+
+#[derive(Clone, Copy)]
+struct Range {
+    signal: Signal,
+    least: f64,
+    most: f64,
+}
+
+/// The possible range of every reading that has one.
+pub(super) struct Ranges([Range; 8]);
+
+impl Ranges {
+    pub(super) fn of(rig: &Rig) -> Self {
+        let sheets = &rig.instruments;
+        let slack_m = SLACK * rig.cylinder.stroke_m.max(sheets.position.full_scale);
+        let position =
+            Range { signal: Signal::Position, least: -slack_m, most: rig.cylinder.stroke_m + slack_m };
+        let pressure = |signal| Range {
+            signal,
+            least: VACUUM_PA - SLACK * sheets.pressure.full_scale,
+            most: OVERRANGE * sheets.pressure.full_scale,
+        };
+        let both_ways = |signal, full_scale: f64| Range {
+            signal,
+            least: -OVERRANGE * full_scale,
+            most: OVERRANGE * full_scale,
+        };
+        Self([
+            position,
+            pressure(Signal::PressureA),
+            pressure(Signal::PressureB),
+            both_ways(Signal::FlowA, sheets.flow_a.full_scale),
+            both_ways(Signal::FlowB, sheets.flow_b.full_scale),
+            both_ways(Signal::Force, sheets.force.full_scale),
+            // Absolute zero, and where oil burns.
+            Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
+            both_ways(Signal::Speed, 100.0),
+        ])
+    }
+
+    /// The first reading that is not possible; a missing one is.
+    #[inline]
+    pub(super) fn broken_by(&self, row: &Row) -> Option<Signal> {
+        let broken = self.0.iter().find(|range| {
+            let value = row.get(range.signal);
+            value < range.least || value > range.most
+        });
+        broken.map(|range| range.signal)
+    }
+
+    pub(super) fn describe(&self, signal: Signal, value: f64) -> String {
+        let unit = signal.dimension().map_or("", Dimension::si);
+        let range = self.0.iter().find(|range| range.signal == signal);
+        let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
+        let source = match signal {
+            Signal::Position => "the stroke",
+            Signal::Temperature | Signal::Speed => "what is possible",
+            _ => "the range of the sensor in the rig file",
+        };
+        format!("{value} {unit} is outside {source} ({least} to {most} {unit})")
+    }
+}

@@ -1,0 +1,300 @@
+use super::*;
+use proptest::prelude::*;
+use std::io::Write;
+
+const HEADER: &str = "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s";
+
+fn open(text: impl Into<Vec<u8>>, rig: &Rig) -> Result<TraceReader, TraceError> {
+    TraceReader::from_stream("trace.csv", Box::new(std::io::Cursor::new(text.into())), rig)
+}
+
+fn read_all(mut reader: TraceReader) -> Result<(Vec<Record>, TraceQuality), TraceError> {
+    let (mut records, mut record) = (Vec::new(), Record::default());
+    while reader.next_record(&mut record)? {
+        records.push(record);
+    }
+    assert!(!reader.next_record(&mut record)?, "the end stays the end");
+    Ok((records, reader.quality().clone()))
+}
+
+fn read(text: impl Into<Vec<u8>>) -> Result<(Vec<Record>, TraceQuality), TraceError> {
+    open(text, &Rig::paper()).and_then(read_all)
+}
+
+fn message(text: impl Into<Vec<u8>>) -> String {
+    let message = read(text).unwrap_err().to_string();
+    assert!(!message.contains('\n'), "{message}");
+    message
+}
+
+/// `count` sound rows at 100 Hz under [`HEADER`].
+fn rows(count: usize) -> Vec<String> {
+    let row = |i: usize| format!("{:.2},0.1,5e6,4e6,1e-5,-1e-5", i as f64 * 0.01);
+    (0..count).map(row).collect()
+}
+
+fn file(rows: &[String]) -> String {
+    format!("{HEADER}\n{}\n", rows.join("\n"))
+}
+
+fn gzip(text: &str) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(text.as_bytes()).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn a_row_is_a_record_in_si() {
+    let text = "t_ms,x_mm,v_mmps,pa_bar,pb_mpa,qa_lpm,qb_lpm,force_kn,temp_c,q_int_lpm,q_ext_a_m3s,note\n\
+                0,100,25,50,4,6,-3,1.5,25,6,1e-6,a\n10,101,25,50,4,,-3,1.5,25,6,1e-6,b\n";
+    let (records, quality) = read(text).unwrap();
+    let first = Record {
+        line: 2,
+        sample: Sample {
+            x_m: 0.1,
+            pa_pa: 5e6,
+            pb_pa: 4e6,
+            qa_m3s: Some(1e-4),
+            qb_m3s: Some(-5e-5),
+            force_n: Some(1500.0),
+        },
+        speed_mps: Some(0.025),
+        temperature_k: Some(298.15),
+        leak_m3s: [Some(1e-4), Some(1e-6), None],
+        ..Record::default()
+    };
+    assert_eq!(records[0], first);
+    assert_eq!((records[1].t_s, records[1].dt_s, records[1].sample.qa_m3s), (0.01, 0.01, None));
+    assert_eq!(quality.ignored_columns, ["note"]);
+    assert_eq!(quality.flow_rests, [1, 0]);
+}
+
+#[test]
+fn header_errors_say_what_is_expected() {
+    let cases = [
+        ("", "the trace is empty"),
+        ("\u{feff}", "no column for time: t_s or t_ms or timestamp expected"),
+        (HEADER, "no usable row: the trace has only a header"),
+        (
+            "t_s,x_m,pa_pa\n",
+            "no column for pressure B: pb_pa or pb_kpa or pb_mpa or pb_bar expected; the header has t_s, x_m, pa_pa",
+        ),
+        ("t_s,x_m,x_mm,pa_pa,pb_pa\n", "columns `x_m` and `x_mm` both give `x`"),
+        ("t_s,x_m,x_m,pa_pa,pb_pa\n", "columns `x_m` and `x_m` both give `x`"),
+        (
+            "t_s,x_m,pa_psi,pb_pa\n",
+            "column `pa_psi`: unknown unit `psi`; allowed for `pa`: pa, kpa, mpa, bar",
+        ),
+        ("t_s,x_m,pa_pa,pb_pa,qa_gpm\n", "column `qa_gpm`: unknown unit `gpm`; allowed for `qa`: m3s, lpm"),
+        ("t_s,x_m,pa_pa,pb_pa,qa\n", "column `qa`: unknown unit ``"),
+        ("PAR1\u{0}", "Parquet"),
+        ("\u{0}\u{1}\u{2}\u{3}", "not a CSV file"),
+        ("\u{1b}[31m\n", "\\u{1b}"),
+    ];
+    for (text, expected) in cases {
+        let message = message(text);
+        assert!(message.starts_with("trace.csv: ") && message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn unrelated_columns_that_look_alike_are_ignored() {
+    let text = format!("{HEADER},x_ref_m,t_amb,pa_raw_v\n0,0.1,5e6,4e6,0,0,a,b,c\n");
+    let (_, quality) = read(text).unwrap();
+    assert_eq!(quality.ignored_columns, ["x_ref_m", "t_amb", "pa_raw_v"]);
+}
+
+#[test]
+fn bad_rows_are_counted_with_their_place_and_skipped() {
+    let bad = [
+        ("abc,0.1,5e6,4e6,0,0", BadReason::NotANumber, Some("t_s")),
+        ("0.03,NaN,5e6,4e6,0,0", BadReason::NotANumber, Some("x_m")),
+        ("0.03,0.1,inf,4e6,0,0", BadReason::NotANumber, Some("pa_pa")),
+        ("0.03,0.1,5e6,1e999,0,0", BadReason::NotANumber, Some("pb_pa")),
+        ("0.03,0.1,5e6,4e6,0,nan", BadReason::NotANumber, Some("qb_m3s")),
+        ("0.03,0.1,5e6,4e6,1.2.3,0", BadReason::NotANumber, Some("qa_m3s")),
+        ("0.03,,5e6,4e6,0,0", BadReason::Missing, Some("x_m")),
+        (",0.1,5e6,4e6,0,0", BadReason::Missing, Some("t_s")),
+        ("0.03,0.1,5e6,4e6,0", BadReason::ShortRow, None),
+        ("0.03,0.1,5e6,4e6,0,0,0", BadReason::LongRow, None),
+        ("0.03,0.31,5e6,4e6,0,0", BadReason::OutOfRange, Some("x_m")),
+        ("0.03,-0.02,5e6,4e6,0,0", BadReason::OutOfRange, Some("x_m")),
+        ("0.03,0.1,-2e6,4e6,0,0", BadReason::OutOfRange, Some("pa_pa")),
+        ("0.03,0.1,5e6,4e6,1,0", BadReason::OutOfRange, Some("qa_m3s")),
+        ("0.02,0.1,5e6,4e6,0,0", BadReason::TimeBack, Some("t_s")),
+        ("0.01,0.1,5e6,4e6,0,0", BadReason::TimeBack, Some("t_s")),
+        ("\"0.03,0.1,5e6,4e6,0,0", BadReason::NotANumber, Some("t_s")),
+        ("\u{fffd}", BadReason::NotANumber, Some("t_s")),
+    ];
+    for (row, reason, column) in bad {
+        let mut all = rows(6);
+        all.insert(3, row.to_owned());
+        let (records, quality) = read(file(&all)).unwrap();
+        let kept = quality.first_bad.first().unwrap_or_else(|| panic!("{row} passed"));
+        assert_eq!((kept.line, kept.reason, kept.column.as_deref()), (5, reason, column), "{row}: {kept}");
+        assert_eq!((records.len(), quality.skipped), (6, 1), "{row}");
+        assert_eq!(records[3].line, 6);
+
+        let strict = open(file(&all), &Rig::paper()).unwrap().with_bad_rows(BadRows::Fatal);
+        let message = read_all(strict).unwrap_err().to_string();
+        assert!(message.starts_with("trace.csv: line 5"), "{message}");
+    }
+}
+
+#[test]
+fn when_all_rows_are_bad_the_first_says_why() {
+    let text = file(&rows(3)).replace("5e6", "5e9");
+    let message = message(text);
+    assert!(
+        message.contains("no usable row: 3 skipped, the first for this: line 2, column `pa_pa`"),
+        "{message}"
+    );
+}
+
+#[test]
+fn bom_crlf_blank_lines_quotes_and_other_delimiters_are_fine() {
+    let plain = file(&rows(4));
+    let (expected, _) = read(plain.clone()).unwrap();
+    let quoted = plain.replace("0.1,", "\"0.1\",").replace("x_m", "\"x_m\"");
+    let variants = [
+        format!("\u{feff}{}", plain.replace('\n', "\r\n")),
+        plain.replace(',', ";"),
+        plain.replace(',', "\t"),
+        plain.replace(',', " , "),
+        plain.trim_end().to_owned(),
+        quoted,
+        plain.replace("5e6", "+5.0E+06"),
+    ];
+    for text in variants {
+        let (records, quality) = read(text.clone()).unwrap();
+        assert_eq!((&records, quality.skipped), (&expected, 0), "{text}");
+    }
+    let (records, _) = read(plain.replace('\n', "\n\n")).unwrap();
+    assert_eq!(records.len(), expected.len());
+}
+
+#[test]
+fn a_quoted_cell_may_hold_delimiters_quotes_and_line_ends() {
+    let text = format!("note,{HEADER}\n\"a, \"\"b\"\"\nc\",0,0.1,5e6,4e6,0,0\nplain,0.01,0.1,5e6,4e6,0,0\n");
+    let (records, quality) = read(text).unwrap();
+    assert_eq!((records.len(), quality.skipped), (2, 0));
+    assert_eq!(records[1].line, 4);
+}
+
+#[test]
+fn a_stray_quote_costs_its_own_row_only() {
+    let mut all = rows(5000);
+    all[7] = all[7].replace("5e6", "\"5e6");
+    let (records, quality) = read(file(&all)).unwrap();
+    assert_eq!((records.len(), quality.skipped), (4999, 1), "{:?}", quality.first_bad);
+}
+
+#[test]
+fn gaps_are_marked_and_counted() {
+    let mut all = rows(300);
+    all.drain(100..200);
+    let (records, quality) = read(file(&all)).unwrap();
+    let marked: Vec<_> = records.iter().filter(|record| record.after_gap).map(|record| record.line).collect();
+    assert_eq!((marked.as_slice(), quality.gaps), (&[102][..], 1));
+    assert!((quality.longest_gap_s - 1.01).abs() < 1e-9);
+    assert!((quality.sample_rate_hz().unwrap() - 100.0).abs() < 1e-6);
+    assert!((quality.duration_s - 2.99).abs() < 1e-12);
+}
+
+#[test]
+fn gzip_in_members_reads_as_one_file() {
+    let all = rows(2000);
+    let mut bytes = gzip(&file(&all[..1000]));
+    bytes.extend(gzip(&(all[1000..].join("\n") + "\n")));
+    assert_eq!(read(bytes).unwrap().0, read(file(&all)).unwrap().0);
+}
+
+#[test]
+fn a_broken_gzip_keeps_the_rows_before_the_break_and_says_so() {
+    let whole = gzip(&file(&rows(20_000)));
+    let broken = &whole[..whole.len() / 2];
+    let (records, quality) = read(broken).unwrap();
+    assert!(records.len() > 1000 && records.len() < 20_000);
+    let warning = &quality.warnings()[0];
+    assert!(warning.contains("the gzip stream breaks off in line"), "{warning}");
+
+    let strict = open(broken, &Rig::paper()).unwrap().with_bad_rows(BadRows::Fatal);
+    assert!(read_all(strict).unwrap_err().to_string().contains("breaks off"));
+    assert!(message(&whole[..12]).starts_with("trace.csv: "));
+}
+
+#[test]
+fn foreign_columns_are_mapped() {
+    let rig = Rig::paper().to_toml()
+        + "[columns]\ntimestamp = { name = \"Zeit\" }\nx = { name = \"Weg, innen\", unit = \"mm\" }\n\
+           pa = { name = \"Head pressure\", unit = \"bar\" }\npb = { name = \"Rod pressure\", unit = \"bar\" }\n\
+           qa = { name = \"Flow\", unit = \"L/min\" }\n";
+    let rig = Rig::parse(&rig, "rig.toml").unwrap();
+    let text = "Zeit,\"Weg, innen\",Head pressure,Rod pressure\n\
+                2026-11-20T12:00:00Z,100,50,40\n2026-11-20T12:00:00.010Z,100,50,40\nlater,100,50,40\n";
+    let (records, quality) = read_all(open(text, &rig).unwrap()).unwrap();
+    assert_eq!(records[1].sample, Sample { x_m: 0.1, pa_pa: 5e6, pb_pa: 4e6, ..Sample::default() });
+    assert_eq!((records[1].t_s, records[1].dt_s), (0.01, 0.01));
+    assert_eq!(quality.absent_columns, ["Flow"]);
+    assert_eq!(quality.first_bad[0].to_string(), "line 4, column `Zeit`: `later` is not a time in ISO 8601");
+}
+
+#[test]
+fn a_line_without_end_is_an_error_in_bounded_memory() {
+    let stream = std::io::Read::chain(std::io::Cursor::new("t_s,x_m,pa_pa,pb_pa\n"), std::io::repeat(b'1'));
+    let reader = TraceReader::from_stream("endless", Box::new(stream), &Rig::paper()).unwrap();
+    assert!(read_all(reader).unwrap_err().to_string().contains("line 2 is longer than a megabyte"));
+}
+
+fn in_units(rows: &[[f64; 6]], header: &str, factors: [f64; 6]) -> String {
+    let mut text = format!("{header}\n");
+    for row in rows {
+        let cells: Vec<_> = row.iter().zip(factors).map(|(v, f)| format!("{:e}", v * f)).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+proptest! {
+    #[test]
+    fn the_units_of_the_columns_do_not_matter(
+        cells in prop::collection::vec((0.0..0.2f64, 0.0..16e6f64, 0.0..16e6f64, -3e-4..3e-4f64, -3e-4..3e-4f64), 1..20),
+    ) {
+        let rows: Vec<_> =
+            cells.iter().enumerate().map(|(i, c)| [i as f64 * 0.01, c.0, c.1, c.2, c.3, c.4]).collect();
+        let (si, _) = read(in_units(&rows, HEADER, [1.0; 6])).unwrap();
+        let field = in_units(&rows, "t_ms,x_mm,pa_bar,pb_mpa,qa_lpm,qb_lpm", [1e3, 1e3, 1e-5, 1e-6, 6e4, 6e4]);
+        let (field, _) = read(field).unwrap();
+        prop_assert_eq!(si.len(), field.len());
+        let same = |a: f64, b: f64| (a - b).abs() <= 1e-15 * a.abs().max(b.abs());
+        for (a, b) in si.iter().zip(&field) {
+            prop_assert!(same(a.t_s, b.t_s) && same(a.sample.x_m, b.sample.x_m));
+            prop_assert!(same(a.sample.pa_pa, b.sample.pa_pa) && same(a.sample.pb_pa, b.sample.pb_pa));
+            prop_assert!(same(a.sample.qa_m3s.unwrap(), b.sample.qa_m3s.unwrap()));
+            prop_assert!(same(a.sample.qb_m3s.unwrap(), b.sample.qb_m3s.unwrap()));
+        }
+    }
+
+    #[test]
+    fn any_bytes_give_finite_records_in_order_or_one_line(
+        body in prop::collection::vec(prop_oneof![
+            r#"[-+0-9.,eE"; \r\n\t]{0,40}"#.prop_map(String::into_bytes),
+            (0..200u32).prop_map(|i| format!("{},0.1,5e6,4e6,1e-5,-1e-5\n", f64::from(i) * 0.01).into_bytes()),
+            prop::collection::vec(any::<u8>(), 0..40),
+        ], 0..30),
+        with_header in any::<bool>(),
+    ) {
+        let mut bytes = if with_header { format!("{HEADER}\n").into_bytes() } else { Vec::new() };
+        bytes.extend(body.concat());
+        match read(bytes) {
+            Err(error) => prop_assert!(!error.to_string().contains('\n')),
+            Ok((records, quality)) => {
+                prop_assert_eq!(records.len() as u64, quality.rows);
+                for record in &records {
+                    prop_assert!(record.sample.is_finite() && record.t_s.is_finite() && record.dt_s >= 0.0);
+                }
+                prop_assert!(quality.warnings().iter().all(|warning| !warning.contains('\n')));
+            }
+        }
+    }
+}

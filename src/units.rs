@@ -1,0 +1,275 @@
+//! Quantities in text ("12.6 cm^2", "20 L/min", "1 %") and the units of trace columns, to SI.
+//!
+//! Every unit converts by a factor or a divisor that a double holds exactly, with one rounding:
+//! the same quantity in two units differs by at most two units in the last place.
+
+/// What a quantity measures; each has its list of accepted units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// m²
+    Area,
+    /// m
+    Length,
+    /// m³
+    Volume,
+    /// kg
+    Mass,
+    /// Pa
+    Pressure,
+    /// m³/s
+    Flow,
+    /// N
+    Force,
+    /// m/s
+    Speed,
+    /// s
+    Time,
+    /// Hz
+    Frequency,
+    /// K
+    Temperature,
+    /// A plain number or a share of something, 1.
+    Share,
+}
+
+/// One accepted unit: SI value = value · `factor` / `divisor` + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// As written in a rig file, e.g. `L/min`.
+    pub text: &'static str,
+    /// As the suffix of a trace column, e.g. `lpm`; none where the contract has no such column.
+    pub suffix: Option<&'static str>,
+    factor: f64,
+    divisor: f64,
+    offset: f64,
+}
+
+impl Unit {
+    /// A value in this unit, in SI.
+    #[inline(always)]
+    pub fn to_si(&self, value: f64) -> f64 {
+        value * self.factor / self.divisor + self.offset
+    }
+
+    /// Whether the unit is the SI unit itself.
+    #[allow(clippy::float_cmp)]
+    pub fn is_si(&self) -> bool {
+        self.factor == 1.0 && self.divisor == 1.0 && self.offset == 0.0
+    }
+}
+
+/// Error returned by [`parse`] and [`unit()`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnitError {
+    /// The text does not start with a finite number.
+    #[error("`{text}` is not a quantity; write a number and one of: {allowed}")]
+    NotANumber {
+        /// The whole text.
+        text: String,
+        /// The units accepted.
+        allowed: String,
+    },
+    /// The unit is unknown, or measures something else.
+    #[error("unit `{unit}` is not one of: {allowed}")]
+    Unit {
+        /// The unit as written.
+        unit: String,
+        /// The units accepted.
+        allowed: String,
+    },
+}
+
+const fn unit_of(
+    text: &'static str,
+    suffix: Option<&'static str>,
+    factor: f64,
+    divisor: f64,
+    offset: f64,
+) -> Unit {
+    Unit { text, suffix, factor, divisor, offset }
+}
+
+const fn times(text: &'static str, suffix: Option<&'static str>, factor: f64) -> Unit {
+    unit_of(text, suffix, factor, 1.0, 0.0)
+}
+
+const fn over(text: &'static str, suffix: Option<&'static str>, divisor: f64) -> Unit {
+    unit_of(text, suffix, 1.0, divisor, 0.0)
+}
+
+const AREA: &[Unit] = &[times("m^2", None, 1.0), over("cm^2", None, 1e4), over("mm^2", None, 1e6)];
+const LENGTH: &[Unit] = &[times("m", Some("m"), 1.0), over("cm", None, 1e2), over("mm", Some("mm"), 1e3)];
+const VOLUME: &[Unit] = &[
+    times("m^3", None, 1.0),
+    over("dm^3", None, 1e3),
+    over("L", None, 1e3),
+    over("cm^3", None, 1e6),
+    over("mL", None, 1e6),
+];
+const MASS: &[Unit] = &[times("kg", None, 1.0), over("g", None, 1e3), times("t", None, 1e3)];
+const PRESSURE: &[Unit] = &[
+    times("Pa", Some("pa"), 1.0),
+    times("kPa", Some("kpa"), 1e3),
+    times("MPa", Some("mpa"), 1e6),
+    times("GPa", None, 1e9),
+    times("bar", Some("bar"), 1e5),
+];
+const FLOW: &[Unit] = &[
+    times("m^3/s", Some("m3s"), 1.0),
+    over("L/min", Some("lpm"), 60e3),
+    over("L/s", None, 1e3),
+    over("cm^3/s", None, 1e6),
+    over("mL/min", None, 60e6),
+];
+const FORCE: &[Unit] = &[times("N", Some("n"), 1.0), times("kN", Some("kn"), 1e3), times("MN", None, 1e6)];
+const SPEED: &[Unit] = &[times("m/s", Some("mps"), 1.0), over("mm/s", Some("mmps"), 1e3)];
+const TIME: &[Unit] = &[
+    times("s", Some("s"), 1.0),
+    over("ms", Some("ms"), 1e3),
+    times("min", None, 60.0),
+    times("h", None, 3600.0),
+];
+const FREQUENCY: &[Unit] = &[times("Hz", None, 1.0), times("kHz", None, 1e3)];
+const TEMPERATURE: &[Unit] = &[times("K", Some("k"), 1.0), unit_of("°C", Some("c"), 1.0, 1.0, 273.15)];
+const SHARE: &[Unit] = &[times("1", None, 1.0), over("%", None, 1e2)];
+
+impl Dimension {
+    /// The accepted units, SI first.
+    pub fn units(self) -> &'static [Unit] {
+        match self {
+            Self::Area => AREA,
+            Self::Length => LENGTH,
+            Self::Volume => VOLUME,
+            Self::Mass => MASS,
+            Self::Pressure => PRESSURE,
+            Self::Flow => FLOW,
+            Self::Force => FORCE,
+            Self::Speed => SPEED,
+            Self::Time => TIME,
+            Self::Frequency => FREQUENCY,
+            Self::Temperature => TEMPERATURE,
+            Self::Share => SHARE,
+        }
+    }
+
+    /// The SI unit as text; empty for a plain number.
+    pub fn si(self) -> &'static str {
+        match self {
+            Self::Share => "",
+            other => other.units().first().map_or("", |unit| unit.text),
+        }
+    }
+
+    fn allowed(self) -> String {
+        join(self.units().iter().map(|unit| unit.text))
+    }
+
+    /// The unit with this column suffix.
+    pub fn by_suffix(self, suffix: &str) -> Option<Unit> {
+        self.units().iter().find(|unit| unit.suffix == Some(suffix)).copied()
+    }
+
+    /// The column suffixes accepted, e.g. `pa, kpa, mpa, bar`.
+    pub fn suffixes(self) -> String {
+        join(self.units().iter().filter_map(|unit| unit.suffix))
+    }
+}
+
+fn join<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// Spelled as in the tables: `cm²` → `cm^2`, `l/min` → `L/min`.
+fn canonical(unit: &str) -> String {
+    let unit = unit.replace('²', "^2").replace('³', "^3").replace("m3", "m^3").replace("m2", "m^2");
+    match unit.as_str() {
+        "l" | "ltr" => "L".to_owned(),
+        "l/min" | "lpm" => "L/min".to_owned(),
+        "l/s" => "L/s".to_owned(),
+        "ml" => "mL".to_owned(),
+        "ml/min" => "mL/min".to_owned(),
+        "m^3s" => "m^3/s".to_owned(),
+        "C" | "degC" => "°C".to_owned(),
+        _ => unit,
+    }
+}
+
+/// The unit of this name in a rig file; a column suffix (`lpm`, `mpa`) does as well.
+pub fn unit(name: &str, dimension: Dimension) -> Result<Unit, UnitError> {
+    let text = canonical(name);
+    let found = dimension.units().iter().find(|unit| unit.text == text).copied();
+    found
+        .or_else(|| dimension.by_suffix(name))
+        .ok_or_else(|| UnitError::Unit { unit: name.to_owned(), allowed: dimension.allowed() })
+}
+
+/// Reads a quantity such as `"12.6 cm^2"`; a bare number is SI. The result is finite and in SI.
+pub fn parse(text: &str, dimension: Dimension) -> Result<f64, UnitError> {
+    let not_a_number =
+        || UnitError::NotANumber { text: text.trim().to_owned(), allowed: dimension.allowed() };
+    let trimmed = text.trim();
+    let (value, length) =
+        fast_float2::parse_partial::<f64, _>(trimmed.as_bytes()).map_err(|_| not_a_number())?;
+    let name = trimmed.get(length..).ok_or_else(not_a_number)?.trim();
+    let si = match name {
+        "" => value,
+        _ => unit(name, dimension)?.to_si(value),
+    };
+    if si.is_finite() { Ok(si) } else { Err(not_a_number()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    #[allow(clippy::float_cmp)]
+    fn rig_file_quantities_are_exact() {
+        let cases = [
+            ("12.6 cm^2", Dimension::Area, 1.26e-3),
+            ("12.6 cm²", Dimension::Area, 1.26e-3),
+            ("0.8 GPa", Dimension::Pressure, 0.8e9),
+            ("20 L/min", Dimension::Flow, 20.0 / 60_000.0),
+            ("20l/min", Dimension::Flow, 20.0 / 60_000.0),
+            ("1 %", Dimension::Share, 0.01),
+            ("75 mm", Dimension::Length, 0.075),
+            ("0.02 l", Dimension::Volume, 0.02e-3),
+            ("10 kN", Dimension::Force, 10e3),
+            (" 1.5e-3 ", Dimension::Area, 1.5e-3),
+            ("25 °C", Dimension::Temperature, 298.15),
+        ];
+        for (text, dimension, si) in cases {
+            assert_eq!(parse(text, dimension), Ok(si), "{text}");
+        }
+    }
+
+    #[test]
+    fn errors_name_the_units_allowed() {
+        let error = parse("12.6 cm", Dimension::Area).unwrap_err();
+        assert_eq!(error.to_string(), "unit `cm` is not one of: m^2, cm^2, mm^2");
+        for text in ["", "cm^2", "nan", "inf m", "1e999", "-", "1 2 m"] {
+            assert!(parse(text, Dimension::Length).is_err(), "{text:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_value_or_an_error(text in ".{0,20}") {
+            if let Ok(value) = parse(&text, Dimension::Flow) {
+                prop_assert!(value.is_finite());
+            }
+        }
+
+        #[test]
+        fn every_unit_scales(value in 1e-6..1e6f64) {
+            for dimension in [Dimension::Area, Dimension::Volume, Dimension::Pressure, Dimension::Flow] {
+                for unit in dimension.units() {
+                    let si = parse(&format!("{value:e} {}", unit.text), dimension).unwrap();
+                    let twice = parse(&format!("{:e} {}", 2.0 * value, unit.text), dimension).unwrap();
+                    prop_assert!((twice - 2.0 * si).abs() <= 1e-15 * twice);
+                }
+            }
+        }
+    }
+}
