@@ -10,28 +10,39 @@
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+mod balance;
+mod butterworth;
 mod cylinder;
 mod detector;
+pub mod effects;
 mod estimate;
 mod excitation;
+mod linkage;
 mod load;
 mod momentum;
 mod paper_law;
+pub mod plant;
 mod real;
 mod regressors;
+mod rk4;
 mod rls;
 mod sample;
 mod sensors;
 
+pub use balance::{Leaks, Model, Moment, Terms};
+pub use butterworth::{Butterworth, FilterError};
 pub use cylinder::{Cylinder, CylinderError, Fluid};
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
+pub use effects::{Effect, EffectSet};
 pub use estimate::{Estimate, PerLeak};
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
+pub use linkage::{Linkage, LinkageError};
 pub use load::LoadEstimator;
 pub use momentum::{Momentum, force_imbalance_n, hydraulic_force_n};
 pub use paper_law::{PaperGains, PaperLaw, PaperLawRate, Theta};
 pub use real::Real;
 pub use regressors::regressors;
+pub use rk4::rk4_step;
 pub use rls::{Parameter, Rls, RlsSettings, Update};
 pub use sample::Sample;
 pub use sensors::{SensorSpread, Sensors};

@@ -1,0 +1,155 @@
+use crate::{Cylinder, Fluid, Real};
+
+/// Laminar leak coefficients of eq. (1), m³/(s·Pa).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Leaks<T> {
+    /// C_ip, from chamber A past the piston to chamber B.
+    pub internal_m3spa: T,
+    /// C_epA, from chamber A to the outside.
+    pub external_a_m3spa: T,
+    /// C_epB, from chamber B to the outside.
+    pub external_b_m3spa: T,
+}
+
+/// Everything the equations of one cylinder need to know about one instant, true or as read by
+/// sensors. Pressures are gauge, flows go into their chamber.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Moment<T> {
+    /// Piston position x from the A end, m.
+    pub x_m: T,
+    /// Piston speed ẋ, m/s.
+    pub v_mps: T,
+    /// Piston acceleration ẍ, m/s².
+    pub a_mps2: T,
+    /// Pressure P_A, Pa.
+    pub pa_pa: T,
+    /// Pressure P_B, Pa.
+    pub pb_pa: T,
+    /// Ṗ_A, Pa/s.
+    pub dpa_pas: T,
+    /// Ṗ_B, Pa/s.
+    pub dpb_pas: T,
+    /// Flow Q_A, m³/s.
+    pub qa_m3s: T,
+    /// Flow Q_B, m³/s.
+    pub qb_m3s: T,
+    /// Q̇_A, m³/s².
+    pub dqa_m3s2: T,
+    /// Q̇_B, m³/s².
+    pub dqb_m3s2: T,
+    /// Load force F against extension, N.
+    pub force_n: T,
+    /// Oil temperature, K.
+    pub temp_k: T,
+}
+
+/// One number for each equation of the cylinder.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Terms<T> {
+    /// In the continuity equation of chamber A, m³/s.
+    pub chamber_a_m3s: T,
+    /// In the continuity equation of chamber B, m³/s.
+    pub chamber_b_m3s: T,
+    /// In the force balance, N.
+    pub force_n: T,
+}
+
+/// The declared model of a cylinder: what eq. (1)–(2) know about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Model<T> {
+    /// Geometry and moving mass.
+    pub cylinder: Cylinder<T>,
+    /// Oil.
+    pub fluid: Fluid<T>,
+    /// Leaks.
+    pub leaks: Leaks<T>,
+}
+
+impl<T: Real> Model<T> {
+    /// The rig of the paper without leaks.
+    pub fn paper() -> Self {
+        Self { cylinder: Cylinder::paper(), fluid: Fluid::paper(), leaks: Leaks::default() }
+    }
+
+    /// What eq. (1)–(2) leave over at an instant, left side less right side:
+    ///
+    /// ```text
+    /// chamber A  Q_A − A_A ẋ − (V_A/β) Ṗ_A − C_ip P_L − C_epA P_A
+    /// chamber B  Q_B + A_B ẋ − (V_B/β) Ṗ_B + C_ip P_L − C_epB P_B
+    /// force      P_A A_A − P_B A_B − m ẍ − F
+    /// ```
+    ///
+    /// Zero where the model is complete; else it is the missing effect's term.
+    #[inline]
+    pub fn residual(&self, at: &Moment<T>) -> Terms<T> {
+        let (cylinder, leaks, bulk) = (&self.cylinder, &self.leaks, self.fluid.bulk_modulus_pa);
+        let internal = leaks.internal_m3spa * (at.pa_pa - at.pb_pa);
+        Terms {
+            chamber_a_m3s: at.qa_m3s
+                - cylinder.area_a_m2 * at.v_mps
+                - cylinder.volume_a_m3(at.x_m) / bulk * at.dpa_pas
+                - internal
+                - leaks.external_a_m3spa * at.pa_pa,
+            chamber_b_m3s: at.qb_m3s + cylinder.area_b_m2 * at.v_mps
+                - cylinder.volume_b_m3(at.x_m) / bulk * at.dpb_pas
+                + internal
+                - leaks.external_b_m3spa * at.pb_pa,
+            force_n: at.pa_pa * cylinder.area_a_m2
+                - at.pb_pa * cylinder.area_b_m2
+                - cylinder.moving_mass_kg * at.a_mps2
+                - at.force_n,
+        }
+    }
+}
+
+impl<T: Real> Leaks<T> {
+    /// Whether every coefficient is a number and none is negative.
+    pub fn is_physical(&self) -> bool {
+        [self.internal_m3spa, self.external_a_m3spa, self.external_b_m3spa]
+            .iter()
+            .all(|c| c.is_finite() && *c >= T::zero())
+    }
+}
+
+impl<T: Real> Terms<T> {
+    /// Each number of `self` with its partner of `other` through `f`.
+    #[inline]
+    pub fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
+        Self {
+            chamber_a_m3s: f(self.chamber_a_m3s, other.chamber_a_m3s),
+            chamber_b_m3s: f(self.chamber_b_m3s, other.chamber_b_m3s),
+            force_n: f(self.force_n, other.force_n),
+        }
+    }
+
+    /// `self + scale · other`.
+    #[inline]
+    pub fn plus(self, scale: T, other: Self) -> Self {
+        self.zip(other, |own, more| own + scale * more)
+    }
+}
+
+impl<T: Real> Moment<T> {
+    /// Each signal of `self` with its partner of `other` through `f`.
+    pub fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
+        Self {
+            x_m: f(self.x_m, other.x_m),
+            v_mps: f(self.v_mps, other.v_mps),
+            a_mps2: f(self.a_mps2, other.a_mps2),
+            pa_pa: f(self.pa_pa, other.pa_pa),
+            pb_pa: f(self.pb_pa, other.pb_pa),
+            dpa_pas: f(self.dpa_pas, other.dpa_pas),
+            dpb_pas: f(self.dpb_pas, other.dpb_pas),
+            qa_m3s: f(self.qa_m3s, other.qa_m3s),
+            qb_m3s: f(self.qb_m3s, other.qb_m3s),
+            dqa_m3s2: f(self.dqa_m3s2, other.dqa_m3s2),
+            dqb_m3s2: f(self.dqb_m3s2, other.dqb_m3s2),
+            force_n: f(self.force_n, other.force_n),
+            temp_k: f(self.temp_k, other.temp_k),
+        }
+    }
+}

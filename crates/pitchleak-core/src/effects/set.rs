@@ -1,0 +1,104 @@
+use super::{Effect, EffectKind, Shape};
+use crate::{Model, Moment, Real, Terms};
+
+/// Effects that may act at the same time.
+const CAPACITY: usize = 8;
+
+/// One effect that is switched on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ActiveEffect<T> {
+    /// Which.
+    pub effect: Effect,
+    /// How large, in the unit of its [`super::EffectSpec`].
+    pub value: T,
+    /// The constants it is not linear in.
+    pub shape: Shape<T>,
+}
+
+/// The effects that are switched on, at most eight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EffectSet<T> {
+    active: [Option<ActiveEffect<T>>; CAPACITY],
+}
+
+/// Error returned by [`EffectSet::set`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EffectError {
+    /// The value is not a number or lies outside the bounds of this effect.
+    Value(Effect),
+    /// A constant of the effect's shape is not usable.
+    Shape(Effect),
+    /// No room for another effect.
+    Full,
+}
+
+impl core::fmt::Display for EffectError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Value(effect) => {
+                let spec = effect.spec();
+                write!(f, "{effect} must lie between {} and {} {}", spec.lower, spec.upper, spec.unit)
+            }
+            Self::Shape(effect) => {
+                write!(f, "widths, speeds and the exponent of {effect} must be positive")
+            }
+            Self::Full => write!(f, "at most {CAPACITY} effects may act at the same time"),
+        }
+    }
+}
+
+impl core::error::Error for EffectError {}
+
+impl<T> Default for EffectSet<T> {
+    fn default() -> Self {
+        Self { active: [const { None }; CAPACITY] }
+    }
+}
+
+impl<T: Real> EffectSet<T> {
+    /// Switches an effect on, or changes it; zero switches it off.
+    pub fn set(&mut self, effect: Effect, value: T, shape: Shape<T>) -> Result<(), EffectError> {
+        let spec = effect.spec();
+        if !(value >= T::lit(spec.lower) && value <= T::lit(spec.upper)) {
+            return Err(EffectError::Value(effect));
+        }
+        if !shape.is_physical() {
+            return Err(EffectError::Shape(effect));
+        }
+        let entry = (value != T::zero()).then_some(ActiveEffect { effect, value, shape });
+        let own = |slot: &Option<ActiveEffect<T>>| slot.is_some_and(|active| active.effect == effect);
+        let place = self.active.iter().position(own).or(self.active.iter().position(Option::is_none));
+        let slot = place.and_then(|i| self.active.get_mut(i)).ok_or(EffectError::Full)?;
+        *slot = entry;
+        Ok(())
+    }
+
+    /// The effects that are on.
+    pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect<T>> {
+        self.active.iter().flatten()
+    }
+
+    /// The terms of all physical effects whose kind passes `counts`.
+    #[inline]
+    pub fn terms(&self, at: &Moment<T>, model: &Model<T>, counts: impl Fn(EffectKind) -> bool) -> Terms<T> {
+        self.iter()
+            .map(|active| (active, active.effect.spec().kind))
+            .filter(|(_, kind)| *kind != EffectKind::Sensor && counts(*kind))
+            .fold(Terms::default(), |sum, (active, _)| {
+                sum.plus(active.value, active.effect.unit_term(at, model, &active.shape))
+            })
+    }
+
+    /// What the sensors show of the truth, all sensor effects one after the other.
+    pub fn read(&self, truth: &Moment<T>) -> Moment<T> {
+        self.iter().fold(*truth, |seen, active| active.effect.read(active.value, &seen))
+    }
+
+    /// The truth behind a reading: [`EffectSet::read`] undone, last effect first.
+    pub fn correct(&self, reading: &Moment<T>) -> Moment<T> {
+        let known = |seen: Moment<T>, active: &ActiveEffect<T>| active.effect.correct(active.value, &seen);
+        self.active.iter().rev().flatten().fold(*reading, known)
+    }
+}

@@ -1,0 +1,54 @@
+use crate::Real;
+
+/// Standard atmosphere, Pa: gauge pressures count from here.
+pub const ATMOSPHERE_PA: f64 = 101_325.0;
+
+/// Absolute pressure below which no gas law is evaluated, Pa.
+pub const LEAST_ABSOLUTE_PA: f64 = 1_000.0;
+
+/// One chamber of compressible oil that may cavitate. Its state is the oil it holds, counted at
+/// zero gauge pressure, `W = V exp(P/β)`; d/dt of it is eq. (1) exactly:
+/// `Q − leaks = V̇ + (V/β) Ṗ`.
+///
+/// When W no longer fills V at vapour pressure, the pressure stays there and the rest of V is
+/// vapour (the vapour-volume form of column separation: Wylie and Streeter, "Fluid Transients in
+/// Systems", ch. 8, discrete vapour cavity). As W goes on counting the oil, none is lost or made
+/// when the cavity opens and closes, which clamping a pressure state would do.
+#[derive(Clone, Copy)]
+pub(super) struct Chamber<T> {
+    pub bulk_modulus_pa: T,
+    pub vapour_pressure_pa: T,
+}
+
+impl<T: Real> Chamber<T> {
+    pub fn pressure_pa(&self, oil_m3: T, volume_m3: T) -> T {
+        let liquid = self.bulk_modulus_pa * (oil_m3 / volume_m3).ln();
+        if self.is_full(oil_m3, volume_m3) { liquid } else { self.vapour_pressure_pa }
+    }
+
+    pub fn oil_m3(&self, pressure_pa: T, volume_m3: T) -> T {
+        volume_m3 * self.density(pressure_pa.max(self.vapour_pressure_pa))
+    }
+
+    pub fn is_full(&self, oil_m3: T, volume_m3: T) -> bool {
+        oil_m3 > volume_m3 * self.density(self.vapour_pressure_pa)
+    }
+
+    pub fn vapour_m3(&self, oil_m3: T, volume_m3: T) -> T {
+        (volume_m3 - oil_m3 / self.density(self.vapour_pressure_pa)).max(T::zero())
+    }
+
+    /// dW/dt for a net inflow at the chamber's own density. Oil enters as liquid and leaves as the
+    /// mixture that is there, so an empty chamber cannot be emptied further.
+    pub fn oil_rate_m3s(&self, oil_m3: T, volume_m3: T, inflow_m3s: T) -> T {
+        let mixture = oil_m3 / volume_m3;
+        let enters = inflow_m3s > T::zero();
+        let density = if enters { mixture.max(self.density(self.vapour_pressure_pa)) } else { mixture };
+        density * inflow_m3s
+    }
+
+    /// Density relative to that at zero gauge pressure.
+    fn density(&self, pressure_pa: T) -> T {
+        (pressure_pa / self.bulk_modulus_pa).exp()
+    }
+}

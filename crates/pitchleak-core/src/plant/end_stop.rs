@@ -1,0 +1,53 @@
+use crate::{Cylinder, Real};
+
+/// Both end stops: springs with dampers that begin `gap_m` before the ends of the stroke, so that
+/// a chamber without dead volume keeps some oil. A stop pushes, it never pulls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EndStop<T> {
+    /// Where the stop begins, measured from the end of the stroke, m.
+    pub gap_m: T,
+    /// Stiffness, N/m.
+    pub stiffness_npm: T,
+    /// Damping, N·s/m.
+    pub damping_nspm: T,
+}
+
+impl<T: Real> EndStop<T> {
+    /// A stop at a thousandth of the stroke that 20 MPa on the piston side push in by half the
+    /// gap, damped to 0.5 of critical.
+    pub fn for_cylinder(cylinder: &Cylinder<T>) -> Self {
+        let gap_m = cylinder.stroke_m * T::lit(1e-3);
+        let stiffness_npm = T::lit(20e6) * cylinder.area_a_m2 / (gap_m / T::lit(2.0));
+        let damping_nspm = (stiffness_npm * cylinder.moving_mass_kg).sqrt();
+        Self { gap_m, stiffness_npm, damping_nspm }
+    }
+
+    pub(super) fn is_physical(&self, stroke_m: T) -> bool {
+        let positive = |v: T| v.is_finite() && v > T::zero();
+        positive(self.gap_m)
+            && self.gap_m < stroke_m / T::lit(2.0)
+            && positive(self.stiffness_npm)
+            && self.damping_nspm.is_finite()
+            && self.damping_nspm >= T::zero()
+    }
+
+    /// Force of the stops against extension, N.
+    pub(super) fn force_n(&self, x_m: T, v_mps: T, stroke_m: T) -> T {
+        let zero = T::zero();
+        let push = |depth: T, speed: T| {
+            if depth > zero {
+                (self.stiffness_npm * depth + self.damping_nspm * speed).max(zero)
+            } else {
+                zero
+            }
+        };
+        push(x_m - (stroke_m - self.gap_m), v_mps) - push(self.gap_m - x_m, -v_mps)
+    }
+
+    /// Position for which chamber volumes are counted: never closer than a tenth of the gap.
+    pub(super) fn guarded_m(&self, x_m: T, stroke_m: T) -> T {
+        let least = self.gap_m / T::lit(10.0);
+        x_m.max(least).min(stroke_m - least)
+    }
+}

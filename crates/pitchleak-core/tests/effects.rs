@@ -1,0 +1,114 @@
+//! The table of effects and the maps between truth and reading.
+
+use pitchleak_core::effects::{EffectError, EffectKind, Shape};
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment};
+use proptest::prelude::*;
+
+fn moment() -> impl Strategy<Value = Moment<f64>> {
+    let motion = (0.01..0.19, -0.1..0.1, -2.0..2.0);
+    let oil = (1e5..8e6, 1e5..8e6, -1e7..1e7, -1e7..1e7);
+    let flow = (-3e-4..3e-4, -3e-4..3e-4, -1e-3..1e-3, -1e-3..1e-3);
+    (motion, oil, flow, -5e3..5e3).prop_map(|((x, v, a), (pa, pb, dpa, dpb), (qa, qb, dqa, dqb), force)| {
+        Moment {
+            x_m: x,
+            v_mps: v,
+            a_mps2: a,
+            pa_pa: pa,
+            pb_pa: pb,
+            dpa_pas: dpa,
+            dpb_pas: dpb,
+            qa_m3s: qa,
+            qb_m3s: qb,
+            dqa_m3s2: dqa,
+            dqb_m3s2: dqb,
+            force_n: force,
+            temp_k: 320.0,
+        }
+    })
+}
+
+fn numbers(m: Moment<f64>) -> [f64; 9] {
+    [m.x_m, m.v_mps, m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas, m.qa_m3s, m.qb_m3s, m.force_n]
+}
+
+proptest! {
+    #[test]
+    fn correcting_undoes_reading(truth in moment()) {
+        let mut all = EffectSet::default();
+        for effect in [Effect::PositionGain, Effect::PressureOffsetA, Effect::LineResistanceB,
+            Effect::FlowMeterGainA, Effect::FlowMeterOffsetA, Effect::ForceGain, Effect::FlowMeterLag] {
+            all.set(effect, effect.spec().default_size, Shape::default()).unwrap();
+        }
+        for (back, truth) in numbers(all.correct(&all.read(&truth))).into_iter().zip(numbers(truth)) {
+            prop_assert!((back - truth).abs() <= 1e-9 * truth.abs().max(1e-9), "{back} {truth}");
+        }
+    }
+
+    /// A sensor's regressor is the slope of the residual in the effect's value.
+    #[test]
+    fn sensor_term_is_the_slope_of_the_residual(truth in moment()) {
+        let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 1e-12 };
+        let model = Model { leaks, ..Model::paper() };
+        for effect in Effect::ALL.iter().copied().filter(|e| e.spec().kind == EffectKind::Sensor) {
+            let value = effect.spec().default_size * 1e-2;
+            let change = model.residual(&effect.read(value, &truth)).plus(-1.0, model.residual(&truth));
+            let unit = effect.unit_term(&truth, &model, &Shape::default());
+            for (change, term, scale) in [(change.chamber_a_m3s, unit.chamber_a_m3s, 1e-4),
+                (change.chamber_b_m3s, unit.chamber_b_m3s, 1e-4), (change.force_n, unit.force_n, 1e4)] {
+                prop_assert!((change - value * term).abs() < 1e-3 * (value * term).abs() + 1e-12 * scale,
+                    "{effect}: {change} {}", value * term);
+            }
+        }
+    }
+}
+
+#[test]
+fn signs_of_the_terms_an_operator_would_check_by_hand() {
+    let (model, shape) = (Model::<f64>::paper(), Shape::default());
+    let at = Moment { x_m: 0.1, v_mps: 0.05, pa_pa: 4e6, pb_pa: 1e6, qa_m3s: 2e-4, ..Moment::default() };
+    let term = |effect: Effect| effect.unit_term(&at, &model, &shape);
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
+    assert!(close(term(Effect::FlowMeterOffsetA).chamber_a_m3s, 1.0));
+    assert!(close(term(Effect::FlowMeterGainA).chamber_a_m3s, 2e-4));
+    assert!(close(term(Effect::PositionGain).chamber_a_m3s, -1.26e-3 * 0.05));
+    assert!(close(term(Effect::PositionGain).chamber_b_m3s, 0.94e-3 * 0.05));
+    assert!(close(term(Effect::PressureOffsetB).force_n, -0.94e-3));
+    assert!(
+        close(term(Effect::InternalLeakTurbulent).chamber_a_m3s, 3e6_f64.sqrt()) || {
+            let ratio = term(Effect::InternalLeakTurbulent).chamber_a_m3s / 3e6_f64.sqrt();
+            (ratio - 1.0).abs() < 1e-4
+        }
+    );
+    assert!(close(term(Effect::ViscousFriction).force_n, 0.05));
+}
+
+#[test]
+fn every_id_names_its_effect() {
+    for effect in Effect::ALL.iter().copied() {
+        let spec = effect.spec();
+        assert_eq!(spec.id.parse(), Ok(effect));
+        assert!(spec.lower <= 0.0 && spec.default_size > 0.0 && spec.default_size < spec.upper, "{effect}");
+        assert_eq!(format!("{effect:?}").to_lowercase(), spec.id.replace('_', ""));
+    }
+    let error = "slip".parse::<Effect>().unwrap_err().to_string();
+    assert!(error.contains(" position_gain "), "{error}");
+}
+
+#[test]
+fn a_set_refuses_what_cannot_be() {
+    let (mut set, shape) = (EffectSet::<f64>::default(), Shape::default());
+    for bad in [-1e-5, f64::NAN, f64::INFINITY] {
+        let error = set.set(Effect::DeadVolumeA, bad, shape);
+        assert_eq!(error, Err(EffectError::Value(Effect::DeadVolumeA)));
+    }
+    let flat = Shape { spot_width_m: 0.0, ..shape };
+    let error = set.set(Effect::PositionDependentLeak, 1e-12, flat);
+    assert_eq!(error, Err(EffectError::Shape(Effect::PositionDependentLeak)));
+    for effect in &Effect::ALL[..8] {
+        set.set(*effect, effect.spec().default_size, shape).unwrap();
+    }
+    assert_eq!(set.set(Effect::LoadOffset, 1.0, shape), Err(EffectError::Full));
+    set.set(Effect::DeadVolumeA, 0.0, shape).unwrap();
+    set.set(Effect::LoadOffset, 1.0, shape).unwrap();
+    assert_eq!(set.iter().count(), 8);
+}

@@ -1,0 +1,211 @@
+//! Properties of the simulated cylinder.
+
+use pitchleak_core::effects::{EffectKind, Shape};
+use pitchleak_core::plant::{CylinderPlant, CylinderState, Drive, Supply, Valve, ValvePlant};
+use pitchleak_core::{Cylinder, Effect, Fluid, Leaks, Model};
+use proptest::prelude::*;
+
+fn model() -> impl Strategy<Value = Model<f64>> {
+    let geometry = (5e-4..5e-3, 0.5..0.95, 0.1..0.6, 5.0..200.0, 0.0..2e-4, 0.0..2e-4);
+    let oil_and_leaks = (0.4e9..1.6e9, 0.0..3e-11, 0.0..1e-11, 0.0..1e-11);
+    (geometry, oil_and_leaks).prop_map(
+        |((area, ratio, stroke, mass, dead_a, dead_b), (bulk, ip, epa, epb))| Model {
+            cylinder: Cylinder {
+                area_a_m2: area,
+                area_b_m2: area * ratio,
+                stroke_m: stroke,
+                moving_mass_kg: mass,
+                dead_volume_a_m3: dead_a,
+                dead_volume_b_m3: dead_b,
+            },
+            fluid: Fluid { bulk_modulus_pa: bulk, bulk_modulus_std_pa: 0.0 },
+            leaks: Leaks { internal_m3spa: ip, external_a_m3spa: epa, external_b_m3spa: epb },
+        },
+    )
+}
+
+/// Oil at zero gauge pressure that volumes, pressures and vapour account for.
+fn oil_m3(plant: &CylinderPlant<f64>, state: &CylinderState<f64>) -> (f64, f64) {
+    let model = &plant.model;
+    let (pa, pb) = plant.pressures_pa(state);
+    let (vapour_a, vapour_b) = plant.vapour_m3(state);
+    let density = |p: f64| (p / model.fluid.bulk_modulus_pa).exp();
+    (
+        (model.cylinder.volume_a_m3(state.x_m) - vapour_a) * density(pa),
+        (model.cylinder.volume_b_m3(state.x_m) - vapour_b) * density(pb),
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    /// The integral of flows less leaks is the change of stored volume, eq. (1) integrated:
+    /// swept volume, compression and vapour, in each chamber, from the readings alone.
+    #[test]
+    fn oil_volume_is_conserved(
+        model in model(), start in 0.3..0.7, pa in 1e6..8e6, pb in 1e6..8e6,
+        speed in 0.01..0.2_f64, hertz in 0.5..5.0_f64, load in -5e3..5e3,
+    ) {
+        let plant = CylinderPlant::new(model).unwrap();
+        let (stroke, bulk) = (model.cylinder.stroke_m, model.fluid.bulk_modulus_pa);
+        let mut state = plant.state_at(start * stroke, 0.0, pa, pb);
+        let drive = |t: f64| {
+            let v = speed * stroke * (std::f64::consts::TAU * hertz * t).sin();
+            Drive { qa_m3s: model.cylinder.area_a_m2 * v, qb_m3s: -model.cylinder.area_b_m2 * v, force_n: load }
+        };
+        let seen = |state: &CylinderState<f64>, t: f64| {
+            let rates = plant.rates(state, &drive(t));
+            let leaks = plant.leak_flows(&rates.moment);
+            let m = rates.moment;
+            let c = &model.cylinder;
+            let vapour = plant.vapour_m3(state);
+            [
+                [m.qa_m3s - leaks.internal_m3s - leaks.external_a_m3s, m.pa_pa, c.volume_a_m3(m.x_m), vapour.0],
+                [m.qb_m3s + leaks.internal_m3s - leaks.external_b_m3s, m.pb_pa, c.volume_b_m3(m.x_m), vapour.1],
+            ]
+        };
+        let (step, first) = (1e-5, seen(&state, 0.0));
+        let (mut before, mut inflow, mut compressed, mut passed) = (first, [0.0; 2], [0.0; 2], [1e-9; 2]);
+        for i in 0..20_000 {
+            let t = f64::from(i) * step;
+            state = plant.step(&state, step, |elapsed| drive(t + elapsed));
+            let now = seen(&state, t + step);
+            for side in 0..2 {
+                let (old, new) = (before[side], now[side]);
+                inflow[side] += 0.5 * step * (old[0] + new[0]);
+                passed[side] += 0.5 * step * (old[0] + new[0]).abs();
+                compressed[side] += 0.5 * (old[2] + new[2] - old[3] - new[3]) / bulk * (new[1] - old[1]);
+            }
+            before = now;
+        }
+        for side in 0..2 {
+            // In a cavity the oil has the density at vapour pressure, which is 1 − 1e5/β of that at zero.
+            let stored = before[side][2] - first[side][2] - (before[side][3] - first[side][3]) + compressed[side];
+            prop_assert!((inflow[side] - stored).abs() < 1e-5 * passed[side] + 1e-12,
+                "side {side}: {} in, {stored} stored, {} passed", inflow[side], passed[side]);
+        }
+    }
+
+    /// Sealed, the chambers keep their oil while the load pulls them into cavitation and back.
+    #[test]
+    fn sealed_oil_stays_through_cavitation(
+        model in model(), start in 0.3..0.7, pa in 1e6..4e6, hertz in 5.0..40.0_f64,
+    ) {
+        let model = Model { leaks: Leaks::default(), ..model };
+        let plant = CylinderPlant::new(model).unwrap();
+        let cylinder = &model.cylinder;
+        let pb = pa * cylinder.area_a_m2 / cylinder.area_b_m2;
+        let mut state = plant.state_at(start * cylinder.stroke_m, 0.0, pa, pb);
+        let before = oil_m3(&plant, &state);
+        let (mut least, mut most_vapour) = (f64::MAX, 0.0_f64);
+        for i in 0..4_000 {
+            let t = f64::from(i) * 5e-5;
+            state = plant.step(&state, 5e-5, |elapsed| Drive {
+                force_n: -4.0 * pa * cylinder.area_a_m2 * (std::f64::consts::TAU * hertz * (t + elapsed)).sin(),
+                ..Drive::default()
+            });
+            let pressures = plant.pressures_pa(&state);
+            least = least.min(pressures.0).min(pressures.1);
+            most_vapour = most_vapour.max(plant.vapour_m3(&state).0);
+        }
+        let after = oil_m3(&plant, &state);
+        prop_assert!(least >= -1e5 && most_vapour > 0.0, "least pressure {least}, vapour {most_vapour}");
+        prop_assert!((after.0 / before.0 - 1.0).abs() < 1e-9 && (after.1 / before.1 - 1.0).abs() < 1e-9,
+            "{before:?} {after:?}");
+    }
+
+    /// Nothing but numbers, whatever comes in.
+    #[test]
+    fn every_state_stays_finite(
+        x in any::<f64>(), v in any::<f64>(), pa in any::<f64>(), pb in any::<f64>(),
+        inputs in proptest::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), 0..6u8), 1..30),
+        which in 0..Effect::ALL.len(),
+    ) {
+        let mut cylinder = CylinderPlant::new(Model::paper()).unwrap();
+        let effect = Effect::ALL[which];
+        cylinder.effects.set(effect, effect.spec().upper, Shape::default()).unwrap();
+        let plant = ValvePlant { cylinder, valve: Valve::paper(), supply: Supply::paper() };
+        let mut free = cylinder.state_at(x, v, pa, pb);
+        let mut driven = plant.state_at(free);
+        for (a, b, c, bad) in inputs {
+            let special = [a, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 0.0][usize::from(bad)];
+            free = cylinder.step(&free, 1e-3, |_| Drive { qa_m3s: a, qb_m3s: special, force_n: b });
+            driven = plant.step(&driven, 1e-3, special, c);
+            driven = plant.step(&driven, special, a, b);
+            let (p, q) = (cylinder.pressures_pa(&free), cylinder.pressures_pa(&driven.cylinder));
+            let leak = plant.leak_flows(&driven);
+            for value in [free.x_m, free.v_mps, free.oil_a_m3, free.oil_b_m3, p.0, p.1, q.0, q.1,
+                driven.spool, driven.spool_speed_ps, driven.supply_pa, leak.internal_m3s] {
+                prop_assert!(value.is_finite(), "{free:?} {driven:?}");
+            }
+            prop_assert!((0.0..=0.2).contains(&free.x_m) && p.0 >= -1e5 && p.1 >= -1e5);
+        }
+    }
+}
+
+/// Free oscillation between two oil columns: the error of a step falls with its fourth power.
+#[test]
+fn plant_converges_with_the_fourth_power_of_the_step() {
+    let model = Model::<f64>::paper();
+    let plant = CylinderPlant::new(model).unwrap();
+    let pressure_after = |steps: u32| {
+        let step = 2e-3 / f64::from(steps);
+        let mut state = plant.state_at(0.1, 0.01, 3e6, 3e6);
+        for _ in 0..steps {
+            state = plant.step(&state, step, |_| Drive { force_n: 900.0, ..Drive::default() });
+        }
+        plant.pressures_pa(&state).0
+    };
+    let reference = pressure_after(6400);
+    for steps in [50, 100] {
+        let order =
+            ((pressure_after(steps) - reference) / (pressure_after(2 * steps) - reference)).abs().log2();
+        assert!((order - 4.0).abs() < 0.3, "order {order} at {steps} steps");
+    }
+}
+
+/// The piston rests on the stop, with some oil left in a chamber without dead volume.
+#[test]
+fn end_stops_hold_full_pressure() {
+    let plant = CylinderPlant::new(Model::<f64>::paper()).unwrap();
+    for (start, load) in [(0.02, 12_000.0), (0.18, -12_000.0)] {
+        let mut state = plant.state_at(start, 0.0, 1e6, 1e6);
+        let push = f64::signum(load) * 3e-4;
+        for _ in 0..4_000 {
+            state =
+                plant.step(&state, 5e-4, |_| Drive { qa_m3s: -push, qb_m3s: push * 0.746, force_n: load });
+        }
+        let end = if load > 0.0 { 0.0 } else { 0.2 };
+        assert!((state.x_m - end).abs() < 3e-4, "rests at {}", state.x_m);
+    }
+}
+
+/// In simulation an effect is exactly what the diagnosis will look for.
+#[test]
+fn residual_of_the_plain_model_is_the_effects_term() {
+    for effect in Effect::ALL.iter().copied() {
+        let spec = effect.spec();
+        if spec.kind == EffectKind::Sensor {
+            continue;
+        }
+        let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 0.0 };
+        let mut plant = CylinderPlant::new(Model::<f64> { leaks, ..Model::paper() }).unwrap();
+        plant.temp_k = 323.0;
+        plant.effects.set(effect, spec.default_size, Shape::default()).unwrap();
+        let state = plant.state_at(0.09, 0.02, 4e6, 2e6);
+        let moment = plant.rates(&state, &Drive { qa_m3s: 5e-5, qb_m3s: -1e-5, force_n: 2e3 }).moment;
+        let residual = plant.model.residual(&moment);
+        let term = effect.unit_term(&moment, &plant.model, &Shape::default());
+        let expected = term.zip(term, |unit, _| unit * spec.default_size);
+        let scale = [1e-4, 1e-4, 5e3];
+        let pairs = [
+            (residual.chamber_a_m3s, expected.chamber_a_m3s),
+            (residual.chamber_b_m3s, expected.chamber_b_m3s),
+            (residual.force_n, expected.force_n),
+        ];
+        for ((left, right), scale) in pairs.into_iter().zip(scale) {
+            assert!((left - right).abs() < 1e-10 * scale, "{effect}: {residual:?} {expected:?}");
+        }
+        assert!(pairs.iter().any(|(_, right)| *right != 0.0), "{effect} has no term");
+    }
+}
