@@ -38,13 +38,14 @@ impl<T: Real> Chamber<T> {
         (volume_m3 - oil_m3 / self.density(self.vapour_pressure_pa)).max(T::zero())
     }
 
-    /// dW/dt for a net inflow at the chamber's own density. Oil enters as liquid and leaves as the
-    /// mixture that is there, so an empty chamber cannot be emptied further.
+    /// dW/dt for a net inflow at the chamber's own density. What passes is liquid, until only the
+    /// last twentieth of the chamber is: then less and less leaves, so none is left owing.
     pub fn oil_rate_m3s(&self, oil_m3: T, volume_m3: T, inflow_m3s: T) -> T {
-        let mixture = oil_m3 / volume_m3;
-        let enters = inflow_m3s > T::zero();
-        let density = if enters { mixture.max(self.density(self.vapour_pressure_pa)) } else { mixture };
-        density * inflow_m3s
+        let filled = oil_m3 / volume_m3;
+        let liquid = filled.max(self.density(self.vapour_pressure_pa));
+        let leaves = inflow_m3s < T::zero();
+        let share = if leaves { (filled * T::lit(20.0)).min(T::one()) } else { T::one() };
+        liquid * share * inflow_m3s
     }
 
     /// Density relative to that at zero gauge pressure.
