@@ -13,3 +13,4 @@ pub mod trace;
 pub mod units;
 
 pub use rig::Rig;
+pub mod cramer_rao;

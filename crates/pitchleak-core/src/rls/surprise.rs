@@ -60,15 +60,18 @@ impl<T: Real> Surprise<T> {
         [ratio(self.balance_sum, self.balance_count), ratio(self.odometer_sum, self.odometer_count)]
     }
 
-    /// Factor on the variances: where the residuals are larger than declared, the intervals grow with
-    /// them; they never shrink (Birge 1932, "The calculation of errors by the method of least squares").
-    /// One prior count keeps the first blocks from deciding.
+    /// Factor on the variances: where the residuals are larger than declared by more than two standard
+    /// deviations of their own scatter, the intervals grow with them; they never shrink (Birge 1932, "The
+    /// calculation of errors by the method of least squares").
     pub fn inflation(&self) -> T {
-        let prior = T::lit(8.0);
-        let ratio = |sum: T, count: T| (sum + prior) / (count + prior);
-        let balance = ratio(self.balance_sum, self.balance_count);
-        balance.max(ratio(self.odometer_sum, self.odometer_count)).max(T::one())
+        let balance = significant_ratio(self.balance_sum, self.balance_count);
+        balance.max(significant_ratio(self.odometer_sum, self.odometer_count)).max(T::one())
     }
+}
+
+/// Mean of χ²₁ terms over what such a mean may be by chance (its variance is 2/count).
+fn significant_ratio<T: Real>(sum: T, count: T) -> T {
+    if count > T::zero() { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
 }
 
 /// Variance of a sensor's white noise from second differences of the signal, which cancel its slope:
