@@ -74,16 +74,18 @@ impl<T: Real> PaperLaw<T> {
     /// ```
     ///
     /// V of eq. (10) does not grow for any h > 0 on data that obey P_L(k) − P_L(k−1) = h fᵀθ.
+    #[inline]
     pub fn step(&mut self, gains: &PaperGains<T>, dt_s: T, load_pressure_pa: T, f: &[T; 5]) {
-        let h = dt_s;
-        let mut stiffness = T::zero();
-        for (gamma, f) in gains.gamma.iter().zip(f) {
-            stiffness += *gamma * *f * *f;
+        let mut turn = [T::zero(); 5];
+        for ((turn, gamma), f) in turn.iter_mut().zip(&gains.gamma).zip(f) {
+            *turn = *gamma * *f;
         }
-        let predicted = self.load_pressure_pa + h * dot(&self.theta, f);
-        let error = (predicted - load_pressure_pa) / (T::one() + gains.lambda_per_s * h + h * h * stiffness);
-        for ((theta, gamma), f) in self.theta.iter_mut().zip(&gains.gamma).zip(f) {
-            *theta -= h * *gamma * *f * error;
+        let predicted = self.load_pressure_pa + dt_s * dot(&self.theta, f);
+        let stiffness = T::one() + dt_s * (gains.lambda_per_s + dt_s * dot(&turn, f));
+        let error = (predicted - load_pressure_pa) / stiffness;
+        let push = dt_s * error;
+        for (theta, turn) in self.theta.iter_mut().zip(&turn) {
+            *theta -= *turn * push;
         }
         self.load_pressure_pa = load_pressure_pa + error;
     }
@@ -116,6 +118,7 @@ impl<T: Real> PaperLaw<T> {
     }
 }
 
+#[inline(always)]
 fn dot<T: Real>(a: &[T; 5], b: &[T; 5]) -> T {
     a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
 }

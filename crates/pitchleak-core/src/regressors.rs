@@ -9,6 +9,7 @@ use crate::{Cylinder, Real, Sample};
 /// The volumes hold the dead volumes, too; without them the expressions are the paper's. The last argument is
 /// the integral of the force imbalance P_A A_A − P_B A_B − F, N·s, which equals m ẋ, eq. (14). A resting
 /// flow gives `None`: the law needs both.
+#[inline]
 pub fn regressors<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>, momentum_n_s: T) -> Option<[T; 5]> {
     let (qa, qb) = (sample.qa_m3s?, sample.qb_m3s?);
     let x = guarded_position(cylinder, sample.x_m);
@@ -27,5 +28,12 @@ pub fn regressors<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>, momentum_
 /// denominators vanish.
 fn guarded_position<T: Real>(cylinder: &Cylinder<T>, x_m: T) -> T {
     let guard = T::lit(1e-3) * cylinder.stroke_m;
-    x_m.max(guard).min(cylinder.stroke_m - guard)
+    let end = cylinder.stroke_m - guard;
+    if x_m > guard && x_m < end {
+        x_m
+    } else if x_m >= end {
+        end
+    } else {
+        guard
+    }
 }
