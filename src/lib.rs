@@ -3,6 +3,7 @@
 
 pub use pitchleak_core as core;
 
+pub mod cramer_rao;
 pub mod curve;
 pub mod figure;
 pub mod openfast;

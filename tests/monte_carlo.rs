@@ -1,6 +1,8 @@
 //! Statistics of the default estimator over noise seeds: do its intervals cover, is it efficient, does a
 //! sound cylinder stay silent?
 
+#![allow(clippy::unwrap_used)]
+
 mod synthetic;
 
 use pitchleak::core::{Fluid, LeakDetector, PerLeak, Rls, RlsSettings, Sensors, Update};
