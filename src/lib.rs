@@ -14,4 +14,3 @@ pub mod trace;
 pub mod units;
 
 pub use rig::Rig;
-pub mod cramer_rao;
