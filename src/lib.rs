@@ -12,5 +12,6 @@ pub mod rig;
 pub mod signal;
 pub mod trace;
 pub mod units;
+pub mod wind;
 
 pub use rig::Rig;
