@@ -9,14 +9,12 @@ mod write;
 
 pub use error::{Fault, Place, RigError};
 pub use instruments::{Instrument, Instruments};
-pub use settings::{
-    AlarmSettings, ColumnMap, EffectMap, EffectValue, EstimatorKind, EstimatorSettings, ForeignColumn,
-};
+pub use settings::{ColumnMap, EffectMap, EffectValue, EstimatorKind, EstimatorSettings, ForeignColumn};
 
 use crate::units::Dimension;
 use bound::Bound;
 use document::{Document, Section};
-use pitchleak_core::{Cylinder, Fluid, Sensors};
+use pitchleak_core::{AlarmSettings, Cylinder, Fluid, Sensors};
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -34,7 +32,7 @@ pub struct Rig {
     /// `[estimator]`.
     pub estimator: EstimatorSettings,
     /// `[alarms]`.
-    pub alarms: AlarmSettings,
+    pub alarms: AlarmSettings<f64>,
     /// `[columns]`.
     pub columns: ColumnMap,
     /// `[effects]`: what a diagnosis found.
@@ -93,7 +91,7 @@ impl Rig {
             fluid: read_fluid(&root.section("fluid")?)?,
             instruments,
             estimator: EstimatorSettings::read(&root.section("estimator")?)?,
-            alarms: AlarmSettings::read(&root.section("alarms")?, &instruments)?,
+            alarms: settings::read_alarms(&root.section("alarms")?, &instruments)?,
             columns: settings::read_columns(&root.section("columns")?)?,
             effects: settings::read_effects(&root.section("effects")?)?,
         })

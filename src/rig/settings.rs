@@ -6,6 +6,7 @@ use super::error::RigError;
 use super::instruments::Instruments;
 use crate::signal::Signal;
 use crate::units::{self, Dimension, Unit};
+use pitchleak_core::{AlarmSettings, PerLeak};
 use std::collections::BTreeMap;
 
 /// Which estimator a replay runs.
@@ -52,17 +53,6 @@ pub struct EstimatorSettings {
     pub lambda_per_s: Option<f64>,
     /// Scale γ of the paper's adaptation gains, eq. (9).
     pub gamma: Option<f64>,
-}
-
-/// `[alarms]`: when a leak becomes an alarm, and when it is over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlarmSettings {
-    /// Thresholds of the internal, external A and external B leak flow, m³/s.
-    pub threshold_m3s: [f64; 3],
-    /// An alarm clears this far below its threshold, m³/s.
-    pub hysteresis_m3s: f64,
-    /// How long the evidence must last, s.
-    pub hold_time_s: f64,
 }
 
 /// A foreign column: its name in the header and its unit (none for a timestamp).
@@ -117,34 +107,28 @@ impl EstimatorSettings {
     }
 }
 
-impl Default for AlarmSettings {
-    /// 0.1 L/min on every leak, cleared at half of it, after 2 s.
-    fn default() -> Self {
-        Self { threshold_m3s: [0.1 / 60e3; 3], hysteresis_m3s: 0.05 / 60e3, hold_time_s: 2.0 }
-    }
-}
-
-impl AlarmSettings {
-    pub(super) fn read(section: &Section<'_>, instruments: &Instruments) -> Result<Self, RigError> {
-        section.allow(&["internal", "external_a", "external_b", "hysteresis", "hold_time"])?;
-        let default = Self::default();
-        let most = instruments.flow_a.full_scale.max(instruments.flow_b.full_scale);
-        let flow = |key| section.quantity(key, Dimension::Flow, Bound::above_zero(most));
-        let [internal, external_a, external_b] = default.threshold_m3s;
-        let threshold_m3s = [
-            flow("internal")?.unwrap_or(internal),
-            flow("external_a")?.unwrap_or(external_a),
-            flow("external_b")?.unwrap_or(external_b),
-        ];
-        let least = threshold_m3s.into_iter().fold(f64::INFINITY, f64::min);
-        let hysteresis = section.quantity("hysteresis", Dimension::Flow, Bound::from_zero(least))?;
-        let hold_time = section.quantity("hold_time", Dimension::Time, Bound::from_zero(1e7))?;
-        Ok(Self {
-            threshold_m3s,
-            hysteresis_m3s: hysteresis.unwrap_or(default.hysteresis_m3s.min(least / 2.0)),
-            hold_time_s: hold_time.unwrap_or(default.hold_time_s),
-        })
-    }
+/// Reads `[alarms]`: a threshold per leak, `hysteresis` as the share of it that a leak must fall below
+/// it to clear the alarm, and how long the evidence must last.
+pub(super) fn read_alarms(
+    section: &Section<'_>,
+    instruments: &Instruments,
+) -> Result<AlarmSettings<f64>, RigError> {
+    section.allow(&["internal", "external_a", "external_b", "hysteresis", "hold_time"])?;
+    let default = AlarmSettings::default();
+    let most = instruments.flow_a.full_scale.max(instruments.flow_b.full_scale);
+    let flow = |key| section.quantity(key, Dimension::Flow, Bound::above_zero(most));
+    let hysteresis = section.quantity("hysteresis", Dimension::Share, Bound::from_zero(1.0))?;
+    let hold_time = section.quantity("hold_time", Dimension::Time, Bound::from_zero(1e7))?;
+    Ok(AlarmSettings {
+        threshold_m3s: PerLeak {
+            internal: flow("internal")?.unwrap_or(default.threshold_m3s.internal),
+            external_a: flow("external_a")?.unwrap_or(default.threshold_m3s.external_a),
+            external_b: flow("external_b")?.unwrap_or(default.threshold_m3s.external_b),
+        },
+        clear_share: hysteresis.map_or(default.clear_share, |share| 1.0 - share),
+        hold_time_s: hold_time.unwrap_or(default.hold_time_s),
+        ..default
+    })
 }
 
 /// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar" }`.

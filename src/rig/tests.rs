@@ -44,6 +44,7 @@ filter_cutoff = 5
 gains = { lambda = 50, gamma = 0.5 }
 [alarms]
 internal = "0.2 L/min"
+hysteresis = "25 %"
 hold_time = "5 s"
 [columns]
 pa = { name = "Head pressure", unit = "bar" }
@@ -60,9 +61,9 @@ load_offset = 12
     assert_eq!(rig.estimator.kind, EstimatorKind::Paper);
     assert_eq!(rig.estimator.filter_cutoff_hz, Some(5.0));
     assert_eq!(rig.estimator.lambda_per_s, Some(50.0));
-    for (threshold_m3s, lpm) in rig.alarms.threshold_m3s.into_iter().zip([0.2, 0.1, 0.1]) {
-        assert!((threshold_m3s * 60e3 / lpm - 1.0).abs() < 1e-15);
-    }
+    assert!((rig.alarms.threshold_m3s.internal * 60e3 / 0.2 - 1.0).abs() < 1e-15);
+    assert!((rig.alarms.threshold_m3s.external_b * 60e3 / 0.1 - 1.0).abs() < 1e-15);
+    assert!((rig.alarms.clear_share - 0.75).abs() < 1e-15);
     assert_eq!(rig.columns[&Signal::PressureA].name, "Head pressure");
     assert_eq!(rig.effects["position_gain"], EffectValue { value: 0.02, std: Some(0.001) });
     let again = Rig::parse(&rig.to_toml(), "rig.toml").unwrap();

@@ -76,16 +76,16 @@ impl Rig {
                 ("gains.gamma", number(estimator.gamma)),
             ],
         );
-        let [internal, external_a, external_b] = self.alarms.threshold_m3s;
+        let threshold = self.alarms.threshold_m3s;
         let flow = |value| Some(quantity(value, Dimension::Flow));
         out.push_str("\n[alarms]\n");
         put(
             out,
             &[
-                ("internal", flow(internal)),
-                ("external_a", flow(external_a)),
-                ("external_b", flow(external_b)),
-                ("hysteresis", flow(self.alarms.hysteresis_m3s)),
+                ("internal", flow(threshold.internal)),
+                ("external_a", flow(threshold.external_a)),
+                ("external_b", flow(threshold.external_b)),
+                ("hysteresis", number(Some(1.0 - self.alarms.clear_share))),
                 ("hold_time", seconds(Some(self.alarms.hold_time_s))),
             ],
         );

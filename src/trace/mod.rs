@@ -17,7 +17,7 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use clock::{Clock, Step};
 use csv::{CsvRows, Next, Row};
-use pitchleak_core::Sample;
+use pitchleak_core::{PerLeak, Sample};
 use range::Ranges;
 use std::io::Read;
 use std::path::Path;
@@ -41,7 +41,7 @@ pub struct Record {
     /// Oil temperature, K.
     pub temperature_k: Option<f64>,
     /// Reference flows of the internal, external A and external B leak, m³/s.
-    pub leak_m3s: [Option<f64>; 3],
+    pub leak_m3s: PerLeak<Option<f64>>,
 }
 
 /// What becomes of a bad row.
@@ -211,7 +211,11 @@ impl TraceReader {
             },
             speed_mps: reading(Signal::Speed),
             temperature_k: reading(Signal::Temperature),
-            leak_m3s: [Signal::LeakInternal, Signal::LeakExternalA, Signal::LeakExternalB].map(reading),
+            leak_m3s: PerLeak {
+                internal: reading(Signal::LeakInternal),
+                external_a: reading(Signal::LeakExternalA),
+                external_b: reading(Signal::LeakExternalB),
+            },
         };
     }
 

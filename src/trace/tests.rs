@@ -60,7 +60,7 @@ fn a_row_is_a_record_in_si() {
         },
         speed_mps: Some(0.025),
         temperature_k: Some(298.15),
-        leak_m3s: [Some(1e-4), Some(1e-6), None],
+        leak_m3s: PerLeak { internal: Some(1e-4), external_a: Some(1e-6), external_b: None },
         ..Record::default()
     };
     assert_eq!(records[0], first);

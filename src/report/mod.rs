@@ -1,0 +1,227 @@
+//! What a replay found, as data (`pitchleak.replay/1`) and as text for people.
+
+mod text;
+
+pub use text::{Palette, data_line};
+
+use crate::rig::EstimatorKind;
+use crate::score::LeakScore;
+use crate::trace::TraceQuality;
+use pitchleak_core::{AlarmState, Estimate, PerLeak};
+use serde::Serialize;
+
+/// Where oil can leak.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Leak {
+    /// Past the piston seal, chamber A to chamber B.
+    Internal,
+    /// Out of chamber A.
+    ExternalA,
+    /// Out of chamber B.
+    ExternalB,
+}
+
+impl Leak {
+    /// Every leak, each with its own name.
+    pub const ALL: PerLeak<Self> =
+        PerLeak { internal: Self::Internal, external_a: Self::ExternalA, external_b: Self::ExternalB };
+}
+
+/// A replay's result, as `replay --json` prints it. Numbers that are not finite become `null`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReplayReport {
+    /// `pitchleak.replay/1`.
+    pub schema: &'static str,
+    /// What was read.
+    pub trace: TraceSummary,
+    /// `wu2011`, or the rig file's path.
+    pub rig: String,
+    /// The estimator that ran.
+    pub estimator: EstimatorKind,
+    /// At the end of the trace.
+    pub estimates: Estimates,
+    /// Mean leak flows.
+    pub leakage: PerLeak<Leakage>,
+    /// What to make of it.
+    pub verdict: Verdict,
+    /// In the order of time.
+    pub alarms: Vec<Alarm>,
+    /// Only where the trace has reference leak flows; none for a leak without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub score: Option<PerLeak<Option<LeakScore>>>,
+}
+
+impl ReplayReport {
+    /// Name and version of the JSON form.
+    pub const SCHEMA: &'static str = "pitchleak.replay/1";
+
+    /// One line of JSON.
+    ///
+    /// # Errors
+    /// None in practice: every field has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+}
+
+/// What was read of a trace.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TraceSummary {
+    /// As the user named it.
+    pub path: String,
+    /// Good rows.
+    pub samples: u64,
+    /// Bad rows.
+    pub skipped: u64,
+    /// From the first to the last good row, s.
+    pub duration_s: f64,
+    /// Samples per second where they come regularly; none for a single row.
+    pub sample_rate_hz: Option<f64>,
+    /// Pauses much longer than the usual step.
+    pub gaps: u64,
+    /// What a reader of the results should know of the data, a line each.
+    pub warnings: Vec<String>,
+}
+
+impl TraceSummary {
+    /// The summary of a trace that has been read to its end.
+    pub fn new(path: &str, quality: &TraceQuality) -> Self {
+        Self {
+            path: path.to_owned(),
+            samples: quality.rows,
+            skipped: quality.skipped,
+            duration_s: quality.duration_s,
+            sample_rate_hz: quality.sample_rate_hz(),
+            gaps: quality.gaps,
+            warnings: quality.warnings(),
+        }
+    }
+}
+
+/// The parameters of eq. (1).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Estimates {
+    /// C_ip.
+    pub internal_leak_coefficient: EstimateEntry,
+    /// C_epA.
+    pub external_leak_a_coefficient: EstimateEntry,
+    /// C_epB.
+    pub external_leak_b_coefficient: EstimateEntry,
+    /// β.
+    pub bulk_modulus: EstimateEntry,
+}
+
+impl Estimates {
+    /// The coefficients by leak.
+    pub fn leaks(&self) -> PerLeak<&EstimateEntry> {
+        PerLeak {
+            internal: &self.internal_leak_coefficient,
+            external_a: &self.external_leak_a_coefficient,
+            external_b: &self.external_leak_b_coefficient,
+        }
+    }
+}
+
+/// One parameter's estimate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EstimateEntry {
+    /// Best value, in `unit`.
+    pub value: f64,
+    /// Standard deviation of its error; none where the estimator gives none.
+    pub std: Option<f64>,
+    /// The interval that holds the true value with 95 % probability.
+    pub ci95: Option<[f64; 2]>,
+    /// SI.
+    pub unit: &'static str,
+    /// Whether this trace pins the parameter down.
+    pub identifiable: bool,
+    /// Why it does not, in a few words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+impl EstimateEntry {
+    /// Unit of the leak coefficients.
+    pub const COEFFICIENT_UNIT: &'static str = "m3/(s*Pa)";
+    /// Unit of the bulk modulus.
+    pub const BULK_MODULUS_UNIT: &'static str = "Pa";
+
+    /// An identified estimate with its interval.
+    pub fn new(estimate: Estimate<f64>, unit: &'static str) -> Self {
+        let Estimate { value, std } = estimate;
+        Self { value, std: Some(std), ci95: Some(estimate.ci95()), unit, identifiable: true, reason: None }
+    }
+
+    /// A bare value of an estimator that does not know how good it is.
+    pub fn without_spread(value: f64, unit: &'static str) -> Self {
+        Self { value, std: None, ci95: None, unit, identifiable: true, reason: None }
+    }
+
+    /// The same, which this trace does not pin down for `reason`.
+    #[must_use]
+    pub fn not_identifiable(self, reason: impl Into<String>) -> Self {
+        Self { identifiable: false, reason: Some(reason.into()), ..self }
+    }
+}
+
+/// Mean flow of one leak.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Leakage {
+    /// L/min.
+    pub mean_lpm: f64,
+    /// Standard deviation of its error, L/min; none where the estimator gives none.
+    pub std_lpm: Option<f64>,
+}
+
+impl Leakage {
+    /// From a flow in m³/s.
+    pub fn new(flow_m3s: Estimate<f64>) -> Self {
+        let lpm = flow_m3s.scaled(LPM_PER_M3S);
+        Self { mean_lpm: lpm.value, std_lpm: Some(lpm.std) }
+    }
+}
+
+/// 1 m³/s in L/min.
+pub const LPM_PER_M3S: f64 = 60e3;
+/// 1 m³/(s·Pa) in L/min/bar.
+pub const LPM_PER_BAR: f64 = 6e9;
+
+/// An alarm raised or cleared.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Alarm {
+    /// Time in the trace, s.
+    pub time_s: f64,
+    /// Which leak.
+    pub fault: Leak,
+    /// What happened.
+    pub state: AlarmState,
+}
+
+/// What an operator acts on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The leaks whose alarm stands at the end of the trace.
+    pub faults: Vec<Leak>,
+    /// In a sentence or two.
+    pub text: String,
+}
+
+impl Verdict {
+    /// The verdict on leak flows `leakage` of which `active` are above their alarm `threshold_m3s`, and
+    /// of which the trace can judge only those that `estimates` calls identifiable.
+    pub fn new(
+        active: PerLeak<bool>,
+        leakage: &PerLeak<Leakage>,
+        estimates: &Estimates,
+        threshold_m3s: &PerLeak<f64>,
+    ) -> Self {
+        let faults = Leak::ALL.zip(active).map(|(leak, active)| active.then_some(leak));
+        let faults: Vec<_> =
+            [faults.internal, faults.external_a, faults.external_b].into_iter().flatten().collect();
+        Self { text: text::verdict(&faults, leakage, estimates, threshold_m3s), faults }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! The report as lines of text: verdict first, then what backs it.
+
+use super::{
+    EstimateEntry, Estimates, LPM_PER_BAR, LPM_PER_M3S, Leak, Leakage, ReplayReport, TraceSummary, Verdict,
+};
+use crate::rig::Rig;
+use pitchleak_core::{AlarmState, PerLeak};
+use std::fmt::Write;
+
+/// z of a two-sided 95 % interval.
+const Z95: f64 = 1.959_963_984_540_054;
+
+/// Escape sequences around a text, empty where the reader is no terminal.
+#[derive(Clone, Copy, Debug)]
+pub struct Palette {
+    fault: &'static str,
+    sound: &'static str,
+    caution: &'static str,
+    faint: &'static str,
+    reset: &'static str,
+}
+
+impl Palette {
+    /// No colours.
+    pub const PLAIN: Self = Self { fault: "", sound: "", caution: "", faint: "", reset: "" };
+    /// ANSI colours.
+    pub const ANSI: Self = Self {
+        fault: "\x1b[1;31m",
+        sound: "\x1b[1;32m",
+        caution: "\x1b[33m",
+        faint: "\x1b[2m",
+        reset: "\x1b[0m",
+    };
+}
+
+impl Leak {
+    /// For people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Internal => "internal",
+            Self::ExternalA => "external A",
+            Self::ExternalB => "external B",
+        }
+    }
+
+    /// Where to look.
+    fn advice(self) -> &'static str {
+        match self {
+            Self::Internal => "oil passes the piston seal: plan its change, check the bore for scoring",
+            Self::ExternalA => "oil leaves the piston-side chamber: check its port, hose, fittings and valve",
+            Self::ExternalB => "oil leaves the rod-side chamber: check rod seal, port, hose and valve",
+        }
+    }
+}
+
+fn pick<V: Copy>(values: &PerLeak<V>, leak: Leak) -> V {
+    match leak {
+        Leak::Internal => values.internal,
+        Leak::ExternalA => values.external_a,
+        Leak::ExternalB => values.external_b,
+    }
+}
+
+const LEAKS: [Leak; 3] = [Leak::Internal, Leak::ExternalA, Leak::ExternalB];
+
+/// The verdict as a sentence or two.
+pub(super) fn verdict(
+    faults: &[Leak],
+    leakage: &PerLeak<Leakage>,
+    estimates: &Estimates,
+    threshold_m3s: &PerLeak<f64>,
+) -> String {
+    let identified = estimates.leaks().map(|entry| entry.identifiable);
+    let (open, judged): (Vec<_>, Vec<_>) =
+        LEAKS.into_iter().filter(|leak| !faults.contains(leak)).partition(|leak| !pick(&identified, *leak));
+    let mut sentences: Vec<_> = faults.iter().map(|leak| fault_sentence(*leak, leakage)).collect();
+    if !judged.is_empty() {
+        let limit = judged.iter().map(|leak| pick(threshold_m3s, *leak)).fold(0.0, f64::max) * LPM_PER_M3S;
+        sentences.push(format!("No {} leak above {limit:.2} L/min.", join(&judged, "or")));
+    }
+    if !open.is_empty() {
+        sentences.push(format!("This trace cannot tell about {} leaks.", join(&open, "and")));
+    }
+    sentences.extend(LEAKS.into_iter().filter_map(|leak| impossible_sentence(leak, leakage)));
+    sentences.join(" ")
+}
+
+fn fault_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> String {
+    let label = leak.label();
+    let capital = label[..1].to_uppercase() + &label[1..];
+    let flow = flow_text(&pick(leakage, leak));
+    format!("{capital} leak of {flow} L/min: {}.", leak.advice())
+}
+
+/// A leak that feeds oil in is evidence against the model, not a leak.
+fn impossible_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> Option<String> {
+    let Leakage { mean_lpm, std_lpm } = pick(leakage, leak);
+    let impossible = std_lpm.is_some_and(|std| mean_lpm + 3.0 * std < 0.0);
+    impossible.then(|| {
+        let label = leak.label();
+        format!("The {label} leak comes out negative, which is impossible: the rig file lacks an effect (see `pitchleak diagnose`).")
+    })
+}
+
+fn join(leaks: &[Leak], word: &str) -> String {
+    match leaks {
+        [one] => one.label().to_owned(),
+        [head @ .., last] => {
+            let head: Vec<_> = head.iter().map(|leak| leak.label()).collect();
+            format!("{} {word} {}", head.join(", "), last.label())
+        }
+        [] => String::new(),
+    }
+}
+
+/// Value and half width of the 95 % interval, with as many decimals as the half width carries.
+fn with_interval(value: f64, std: Option<f64>) -> String {
+    let Some(half) = std.map(|std| Z95 * std).filter(|half| half.is_finite()) else {
+        return format!("{value:.4}");
+    };
+    let decimals = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
+    format!("{value:.decimals$} ± {half:.decimals$}")
+}
+
+fn flow_text(leakage: &Leakage) -> String {
+    with_interval(leakage.mean_lpm, leakage.std_lpm)
+}
+
+/// One line on the data: how much, how regular, what was lost.
+pub fn data_line(trace: &TraceSummary) -> String {
+    let mut line = format!("{} samples over {:.1} s", trace.samples, trace.duration_s);
+    if let Some(rate) = trace.sample_rate_hz {
+        let _ = write!(line, " at {} Hz", (rate * 100.0).round() / 100.0);
+    }
+    let _ = write!(line, ", {} rows skipped, {} gaps", trace.skipped, trace.gaps);
+    line
+}
+
+/// Which rig a report rests on.
+fn rig_line(rig: &str) -> String {
+    if rig == Rig::PAPER_NAME {
+        "wu2011, built in (no rig.toml beside the trace; --rig FILE for your own)".to_owned()
+    } else {
+        rig.to_owned()
+    }
+}
+
+impl ReplayReport {
+    /// The report for people, in the colours of `palette`.
+    pub fn to_text(&self, palette: &Palette) -> String {
+        let mut out = String::new();
+        self.write_verdict(&mut out, palette);
+        self.write_leaks(&mut out, palette);
+        self.write_alarms(&mut out);
+        self.write_scores(&mut out);
+        let _ = writeln!(out, "\ntrace      {}: {}", self.trace.path, data_line(&self.trace));
+        let _ = writeln!(out, "rig        {}", rig_line(&self.rig));
+        let _ = writeln!(out, "estimator  {}", self.estimator.name());
+        out
+    }
+
+    fn write_verdict(&self, out: &mut String, palette: &Palette) {
+        let Verdict { faults, text } = &self.verdict;
+        let all_identified = LEAKS.into_iter().all(|leak| pick(&self.identified(), leak));
+        let (word, colour) = match (faults.is_empty(), all_identified) {
+            (false, _) => ("LEAK", palette.fault),
+            (true, true) => ("SOUND", palette.sound),
+            (true, false) => ("NOT SURE", palette.caution),
+        };
+        let _ = writeln!(out, "{colour}{word}{}  {text}\n", palette.reset);
+    }
+
+    fn identified(&self) -> PerLeak<bool> {
+        self.estimates.leaks().map(|entry| entry.identifiable)
+    }
+
+    fn write_leaks(&self, out: &mut String, palette: &Palette) {
+        let Palette { faint, reset, caution, .. } = palette;
+        let _ = writeln!(out, "{faint}{:<12}{:<24}L/min/bar, 95 %{reset}", "leak", "L/min, 95 %");
+        for leak in LEAKS {
+            let entry = pick(&self.estimates.leaks(), leak);
+            let flow = flow_text(&pick(&self.leakage, leak));
+            let scaled = entry.std.map(|std| std * LPM_PER_BAR);
+            let coefficient = with_interval(entry.value * LPM_PER_BAR, scaled);
+            let line = format!("{:<12}{flow:<24}{coefficient:<24}", leak.label());
+            write_row(out, &line, entry, caution, reset);
+        }
+        let bulk = &self.estimates.bulk_modulus;
+        let gpa = with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9));
+        let line = format!("{:<12}{:<48}", "oil", format!("bulk modulus {gpa} GPa"));
+        write_row(out, &line, bulk, caution, reset);
+    }
+
+    fn write_alarms(&self, out: &mut String) {
+        if self.alarms.is_empty() {
+            return;
+        }
+        out.push('\n');
+        for alarm in &self.alarms {
+            let state = match alarm.state {
+                AlarmState::Raised => "raised",
+                AlarmState::Cleared => "cleared",
+            };
+            let _ = writeln!(out, "alarm {state} at {:.2} s: {} leak", alarm.time_s, alarm.fault.label());
+        }
+    }
+
+    fn write_scores(&self, out: &mut String) {
+        let Some(scores) = &self.score else { return };
+        let _ = writeln!(out, "\nagainst the reference leak flows, in steady state");
+        for leak in LEAKS {
+            let Some(score) = pick(scores, leak) else { continue };
+            let converged = match score.convergence_time_s {
+                Some(time_s) => format!("within 5 % after {time_s:.2} s"),
+                None => "never within 5 % for good".to_owned(),
+            };
+            let _ = writeln!(
+                out,
+                "{:<12}leakage error {:.2} % mean, {:.2} % peak; coefficient {:.2} %, {:.2} %; {converged}",
+                leak.label(),
+                score.leakage_mean_error_percent,
+                score.leakage_peak_error_percent,
+                score.coefficient_mean_error_percent,
+                score.coefficient_peak_error_percent,
+            );
+        }
+    }
+}
+
+/// A row of the table, and why it is to be doubted.
+fn write_row(out: &mut String, line: &str, entry: &EstimateEntry, caution: &str, reset: &str) {
+    let _ = if entry.identifiable {
+        writeln!(out, "{}", line.trim_end())
+    } else {
+        let reason = entry.reason.as_deref().unwrap_or("not enough excitation");
+        writeln!(out, "{line}{caution}not identifiable: {reason}{reset}")
+    };
+}
