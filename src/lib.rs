@@ -9,6 +9,7 @@ pub mod figure;
 pub mod openfast;
 pub mod reference;
 pub mod report;
+pub mod replay;
 pub mod rig;
 pub mod score;
 pub mod signal;

@@ -101,6 +101,11 @@ impl<T: Real> PaperLaw<T> {
         v
     }
 
+    /// Whether every number of the state is finite.
+    pub fn is_finite(&self) -> bool {
+        self.load_pressure_pa.is_finite() && self.theta.iter().all(|theta| theta.is_finite())
+    }
+
     /// β, Pa.
     pub fn bulk_modulus_pa(&self) -> T {
         self.theta[0]

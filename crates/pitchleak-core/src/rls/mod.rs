@@ -136,14 +136,14 @@ impl<T: Real, const N: usize> BalanceMemory<T, N> {
     }
 }
 
-/// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted.
+/// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
+/// block's mean, so that sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
 struct PressureMeans<T> {
     time: T,
     load: T,
     a: T,
     b: T,
-    block_load: T,
 }
 
 impl<T: Real, const N: usize> Rls<T, N> {
@@ -198,7 +198,6 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let step = Integrals::step(&self.cylinder, dt_s, &last, sample);
         self.pressure_noise_a.add(last.pa_pa, sample.pa_pa);
         self.pressure_noise_b.add(last.pb_pa, sample.pb_pa);
-        self.pressures.block_load += dt_s * sample.load_pressure_pa().abs();
         self.block.add(&step);
         self.advance(&step, &last, sample);
         let full = self.block.time >= self.settings.block_time_s && self.block.steps >= T::lit(8.0);
@@ -478,10 +477,9 @@ impl<T: Real> PressureMeans<T> {
     fn add_block(&mut self, block: &Integrals<T>, keep: T) {
         self.forget(keep);
         self.time += block.time;
-        self.load += self.block_load;
+        self.load += (block.a.pressure - block.b.pressure).abs();
         self.a += block.a.pressure;
         self.b += block.b.pressure;
-        self.block_load = T::zero();
     }
 
     fn forget(&mut self, keep: T) {

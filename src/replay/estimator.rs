@@ -1,0 +1,204 @@
+use crate::rig::{EstimatorKind, Rig};
+use crate::trace::Record;
+use pitchleak_core::{
+    Estimate, ExcitationReport, ExcitationSettings, PaperEstimator, PaperGains, PerLeak, Rls, RlsSettings,
+    Sensors, Update,
+};
+
+/// Gains of the paper's law where the rig file gives none: a search over simulated wind traces
+/// (docs/reproduction.md).
+const PAPER_LAMBDA_PER_S: f64 = 10.0;
+const PAPER_GAMMA: f64 = 1.0;
+const PAPER_CUTOFF_HZ: f64 = 5.0;
+
+/// The estimator that a rig file asks for.
+pub enum Estimator {
+    /// Leaks and compressibility.
+    Plain(Box<Rls<f64, 4>>),
+    /// The same, and the flow meters' offsets.
+    WithOffsets(Box<Rls<f64, 6>>),
+    /// The same, and the gains of flow meters and position sensor.
+    WithGains(Box<Rls<f64, 9>>),
+    /// The paper's law; its filters are set up once the sample rate is known.
+    Paper(Box<PaperChain>),
+}
+
+/// The paper's law, waiting for its sample rate.
+pub struct PaperChain {
+    rig: Rig,
+    waiting: Option<Record>,
+    estimator: Option<PaperEstimator<f64>>,
+}
+
+/// What is known of the bulk modulus, Pa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BulkModulus {
+    /// Best value.
+    pub value: f64,
+    /// Standard deviation and 95 % interval; none from the paper's law.
+    pub spread: Option<(f64, [f64; 2])>,
+}
+
+impl Estimator {
+    /// The estimator for `rig`.
+    pub fn new(rig: &Rig) -> Self {
+        if rig.estimator.kind == EstimatorKind::Paper {
+            return Self::Paper(Box::new(PaperChain { rig: rig.clone(), waiting: None, estimator: None }));
+        }
+        let sensors = rig.sensors();
+        if has_gains(&sensors) {
+            Self::WithGains(Box::new(rls(rig, &sensors)))
+        } else if has_biases(&sensors) {
+            Self::WithOffsets(Box::new(rls(rig, &sensors)))
+        } else {
+            Self::Plain(Box::new(rls(rig, &sensors)))
+        }
+    }
+
+    /// Takes in one record.
+    #[inline]
+    pub fn update(&mut self, record: &Record) -> Update {
+        // A step of no length makes the core start anew.
+        let dt_s = if record.after_gap { 0.0 } else { record.dt_s };
+        match self {
+            Self::Plain(rls) => rls.update(dt_s, &record.sample),
+            Self::WithOffsets(rls) => rls.update(dt_s, &record.sample),
+            Self::WithGains(rls) => rls.update(dt_s, &record.sample),
+            Self::Paper(chain) => chain.update(dt_s, record),
+        }
+    }
+
+    /// Leak coefficients, m³/(s·Pa); the paper's law knows no spread, it is zero there.
+    pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
+        match self {
+            Self::Plain(rls) => rls.leak_coefficients(),
+            Self::WithOffsets(rls) => rls.leak_coefficients(),
+            Self::WithGains(rls) => rls.leak_coefficients(),
+            Self::Paper(chain) => chain.leak_coefficients().map(|value| Estimate { value, std: 0.0 }),
+        }
+    }
+
+    /// Mean leak flows over the estimator's memory, m³/s; `None` for the paper's law.
+    pub fn mean_leak_flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
+        match self {
+            Self::Plain(rls) => Some(rls.mean_leak_flows_m3s()),
+            Self::WithOffsets(rls) => Some(rls.mean_leak_flows_m3s()),
+            Self::WithGains(rls) => Some(rls.mean_leak_flows_m3s()),
+            Self::Paper(_) => None,
+        }
+    }
+
+    /// The bulk modulus, from the interval of the compressibility.
+    pub fn bulk_modulus(&self) -> BulkModulus {
+        let compressibility = match self {
+            Self::Plain(rls) => rls.compressibility(),
+            Self::WithOffsets(rls) => rls.compressibility(),
+            Self::WithGains(rls) => rls.compressibility(),
+            Self::Paper(chain) => {
+                return BulkModulus { value: chain.bulk_modulus_pa(), spread: None };
+            }
+        };
+        let value = 1.0 / compressibility.value;
+        let [low, high] = compressibility.ci95();
+        let stiffest = if low > 0.0 { 1.0 / low } else { f64::INFINITY };
+        BulkModulus { value, spread: Some((compressibility.std * value * value, [1.0 / high, stiffest])) }
+    }
+
+    /// Which parameters the samples identify; `None` for the paper's law, which cannot tell.
+    pub fn excitation(&self) -> Option<ExcitationReport<f64>> {
+        let settings = ExcitationSettings::default();
+        match self {
+            Self::Plain(rls) => Some(rls.excitation(&settings)),
+            Self::WithOffsets(rls) => Some(rls.excitation(&settings)),
+            Self::WithGains(rls) => Some(rls.excitation(&settings)),
+            Self::Paper(_) => None,
+        }
+    }
+
+    /// Offsets of the flow meters A and B, m³/s, where the rig file says they may be off.
+    pub fn flow_offsets_m3s(&self) -> Option<[Estimate<f64>; 2]> {
+        match self {
+            Self::WithOffsets(rls) => Some(rls.flow_offsets_m3s()),
+            Self::WithGains(rls) => Some(rls.flow_offsets_m3s()),
+            Self::Plain(_) | Self::Paper(_) => None,
+        }
+    }
+
+    /// Scale errors of flow meter A, flow meter B and position sensor, where the rig file says they may
+    /// be off.
+    pub fn gains(&self) -> Option<[Estimate<f64>; 3]> {
+        match self {
+            Self::WithGains(rls) => Some(rls.gains()),
+            Self::Plain(_) | Self::WithOffsets(_) | Self::Paper(_) => None,
+        }
+    }
+
+    /// Normalised innovations squared of balance and odometer; `None` for the paper's law.
+    pub fn normalised_innovation(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Plain(rls) => Some(rls.normalised_innovation()),
+            Self::WithOffsets(rls) => Some(rls.normalised_innovation()),
+            Self::WithGains(rls) => Some(rls.normalised_innovation()),
+            Self::Paper(_) => None,
+        }
+    }
+}
+
+fn has_biases(sensors: &Sensors<f64>) -> bool {
+    [sensors.flow_a, sensors.flow_b, sensors.pressure].iter().any(|s| s.bias_std > 0.0)
+}
+
+fn has_gains(sensors: &Sensors<f64>) -> bool {
+    [sensors.flow_a, sensors.flow_b, sensors.position].iter().any(|s| s.gain_std > 0.0)
+}
+
+fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>) -> Rls<f64, N> {
+    let default = RlsSettings::default();
+    let settings = RlsSettings {
+        forgetting_time_s: rig.estimator.forgetting_time_s.unwrap_or(default.forgetting_time_s),
+        block_time_s: rig.estimator.block_time_s.unwrap_or(default.block_time_s),
+        // The reader marks gaps by the trace's own rhythm.
+        max_step_s: f64::MAX,
+    };
+    Rls::new(rig.cylinder, rig.fluid, sensors, settings)
+}
+
+impl PaperChain {
+    fn update(&mut self, dt_s: f64, record: &Record) -> Update {
+        if let Some(estimator) = &mut self.estimator {
+            return estimator.update(dt_s, &record.sample);
+        }
+        let Some(first) = self.waiting.replace(*record) else {
+            return Update::Started;
+        };
+        let Some(mut estimator) = self.set_up(dt_s) else {
+            return Update::Started;
+        };
+        estimator.update(0.0, &first.sample);
+        let update = estimator.update(dt_s, &record.sample);
+        self.estimator = Some(estimator);
+        update
+    }
+
+    /// Filters need a rate: that of the first step, with the cut-off well below half of it.
+    fn set_up(&self, dt_s: f64) -> Option<PaperEstimator<f64>> {
+        let settings = &self.rig.estimator;
+        let rate_hz = 1.0 / dt_s;
+        let gains = PaperGains::scaled(
+            &self.rig.cylinder,
+            &self.rig.fluid,
+            settings.lambda_per_s.unwrap_or(PAPER_LAMBDA_PER_S),
+            settings.gamma.unwrap_or(PAPER_GAMMA),
+        );
+        let cutoff_hz = settings.filter_cutoff_hz.unwrap_or(PAPER_CUTOFF_HZ).min(0.4 * rate_hz);
+        PaperEstimator::new(self.rig.cylinder, self.rig.fluid, gains, cutoff_hz, rate_hz).ok()
+    }
+
+    fn leak_coefficients(&self) -> PerLeak<f64> {
+        self.estimator.as_ref().map_or_else(PerLeak::default, PaperEstimator::leak_coefficients)
+    }
+
+    fn bulk_modulus_pa(&self) -> f64 {
+        self.estimator.as_ref().map_or(self.rig.fluid.bulk_modulus_pa, PaperEstimator::bulk_modulus_pa)
+    }
+}

@@ -1,0 +1,53 @@
+use crate::trace::Record;
+use pitchleak_core::PerLeak;
+
+/// Pressures across each leak, averaged over a whole trace, Pa.
+///
+/// The size of the internal leak goes with |P_L|: it is taken of means over a quarter of a second, so that
+/// sensor noise does not count as pressure.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TracePressures {
+    block_time: f64,
+    block_load: f64,
+    time: f64,
+    load_size: f64,
+    load: f64,
+    a: f64,
+    b: f64,
+}
+
+const BLOCK_S: f64 = 0.25;
+
+impl TracePressures {
+    #[inline]
+    pub fn add(&mut self, record: &Record) {
+        // The first sample of a stretch stands for no time of its own.
+        let dt = if record.after_gap { 0.0 } else { record.dt_s };
+        let (pa, pb) = (record.sample.pa_pa, record.sample.pb_pa);
+        self.time += dt;
+        self.load += (pa - pb) * dt;
+        self.a += pa * dt;
+        self.b += pb * dt;
+        self.block_time += dt;
+        self.block_load += (pa - pb) * dt;
+        if self.block_time >= BLOCK_S {
+            self.load_size += self.block_load.abs();
+            (self.block_time, self.block_load) = (0.0, 0.0);
+        }
+    }
+
+    /// Means of |P_L|, P_A, P_B.
+    pub fn sizes(&self) -> PerLeak<f64> {
+        let mean = |sum: f64| if self.time > 0.0 { sum / self.time } else { 0.0 };
+        PerLeak {
+            internal: mean(self.load_size + self.block_load.abs()),
+            external_a: mean(self.a),
+            external_b: mean(self.b),
+        }
+    }
+
+    /// Mean of P_L with its sign.
+    pub fn net_load(&self) -> f64 {
+        if self.time > 0.0 { self.load / self.time } else { 0.0 }
+    }
+}
