@@ -59,7 +59,7 @@ pub(super) fn unit_term<T: Real>(effect: Effect, at: &Moment<T>, model: &Model<T
 }
 
 /// The dynamic form of [`Effect::FlowMeterLag`]: τ y' + y = u by backward Euler, stable for every
-/// step; [`read`]'s `−τ dQ/dt` is its first-order part.
+/// step; [`Effect::read`]'s `−τ dQ/dt` is its first-order part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LaggedFlow<T> {

@@ -22,30 +22,33 @@ pub(super) struct Chamber<T> {
 
 impl<T: Real> Chamber<T> {
     pub fn pressure_pa(&self, oil_m3: T, volume_m3: T) -> T {
-        let liquid = self.bulk_modulus_pa * (oil_m3 / volume_m3).ln();
-        if self.is_full(oil_m3, volume_m3) { liquid } else { self.vapour_pressure_pa }
+        (self.bulk_modulus_pa * (oil_m3 / volume_m3).ln()).max(self.vapour_pressure_pa)
     }
 
     pub fn oil_m3(&self, pressure_pa: T, volume_m3: T) -> T {
         volume_m3 * self.density(pressure_pa.max(self.vapour_pressure_pa))
     }
 
-    pub fn is_full(&self, oil_m3: T, volume_m3: T) -> bool {
-        oil_m3 > volume_m3 * self.density(self.vapour_pressure_pa)
-    }
-
     pub fn vapour_m3(&self, oil_m3: T, volume_m3: T) -> T {
         (volume_m3 - oil_m3 / self.density(self.vapour_pressure_pa)).max(T::zero())
+    }
+
+    /// Ṗ for a flow that a compliance V/β (and what stores oil beside it) has to take.
+    pub fn slope_pas(&self, pressure_pa: T, net_m3s: T, compliance_m3pa: T) -> T {
+        let opening = pressure_pa <= self.vapour_pressure_pa && net_m3s < T::zero();
+        if opening { T::zero() } else { net_m3s / compliance_m3pa }
     }
 
     /// dW/dt for a net inflow at the chamber's own density. What passes is liquid, until only the
     /// last twentieth of the chamber is: then less and less leaves, so none is left owing.
     pub fn oil_rate_m3s(&self, oil_m3: T, volume_m3: T, inflow_m3s: T) -> T {
         let filled = oil_m3 / volume_m3;
-        let liquid = filled.max(self.density(self.vapour_pressure_pa));
+        if filled >= T::one() {
+            return filled * inflow_m3s;
+        }
         let leaves = inflow_m3s < T::zero();
         let share = if leaves { (filled * T::lit(20.0)).min(T::one()) } else { T::one() };
-        liquid * share * inflow_m3s
+        filled.max(self.density(self.vapour_pressure_pa)) * share * inflow_m3s
     }
 
     /// Density relative to that at zero gauge pressure.

@@ -98,7 +98,7 @@ pub enum PlantError {
     Supply,
     /// A gain of a controller is negative or not a number.
     Controller,
-    /// The internal step is not positive and finite.
+    /// A step is not positive and finite, or far too long.
     Step,
 }
 
@@ -113,7 +113,7 @@ impl core::fmt::Display for PlantError {
             Self::Valve => "figures of a valve must be positive and its lap below its stroke",
             Self::Supply => "figures of the supply must be positive",
             Self::Controller => "gains of a controller must not be negative",
-            Self::Step => "the step must be positive",
+            Self::Step => "the step must be positive and of sensible length",
         })
     }
 }
@@ -214,12 +214,11 @@ impl<T: Real> CylinderPlant<T> {
         let net = self.model.residual(&moment).plus(-T::one(), effects);
         let storage = self.storage(&moment);
 
-        let slope = |net: T, oil: T, volume: T, extra: T| {
-            let compliance = volume / self.model.fluid.bulk_modulus_pa + extra;
-            if net < T::zero() && !chamber.is_full(oil, volume) { T::zero() } else { net / compliance }
-        };
-        moment.dpa_pas = slope(net.chamber_a_m3s, state.oil_a_m3, volume_a, storage.chamber_a_m3s);
-        moment.dpb_pas = slope(net.chamber_b_m3s, state.oil_b_m3, volume_b, storage.chamber_b_m3s);
+        let bulk = self.model.fluid.bulk_modulus_pa;
+        let (soft_a, soft_b) =
+            (volume_a / bulk + storage.chamber_a_m3s, volume_b / bulk + storage.chamber_b_m3s);
+        moment.dpa_pas = chamber.slope_pas(pa_pa, net.chamber_a_m3s, soft_a);
+        moment.dpb_pas = chamber.slope_pas(pb_pa, net.chamber_b_m3s, soft_b);
 
         let least_mass = cylinder.moving_mass_kg * T::lit(0.1);
         let mass_kg = (cylinder.moving_mass_kg + storage.force_n).max(least_mass);
@@ -278,14 +277,15 @@ impl<T: Real> CylinderPlant<T> {
             let moment = Moment { v_mps, pa_pa, pb_pa, x_m: state.x_m, ..Moment::default() };
             self.effects.terms(&moment, &self.model, |kind| kind == EffectKind::Force).force_n
         };
-        let drag = (friction(slow) - friction(-slow)).abs() / (slow + slow) + self.end_stop.damping_nspm;
-        ((oil_spring + self.end_stop.stiffness_npm) / mass).sqrt() + drag / mass
+        let drag = (friction(slow) - friction(-slow)).abs() / (slow + slow);
+        let (stop_spring, stop_drag) = self.end_stop.near(state.x_m, cylinder.stroke_m);
+        ((oil_spring + stop_spring) / mass).sqrt() + (drag + stop_drag) / mass
     }
 
-    /// Rate at which a conductance fills the smaller chamber, 1/s.
-    pub(crate) fn filling_ps(&self, state: &CylinderState<T>, conductance_m3spa: T) -> T {
+    /// Rate at which conductances at A and B, m³/(s·Pa), fill their chambers, 1/s.
+    pub(crate) fn filling_ps(&self, state: &CylinderState<T>, at_a: T, at_b: T) -> T {
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
-        self.model.fluid.bulk_modulus_pa * conductance_m3spa / volume_a.min(volume_b)
+        self.model.fluid.bulk_modulus_pa * (at_a / volume_a).max(at_b / volume_b)
     }
 
     /// `next` brought back to what can exist, or `last` where a number was lost.

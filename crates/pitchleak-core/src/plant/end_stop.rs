@@ -45,6 +45,13 @@ impl<T: Real> EndStop<T> {
         push(x_m - (stroke_m - self.gap_m), v_mps) - push(self.gap_m - x_m, -v_mps)
     }
 
+    /// Stiffness and damping that may act within a step, N/m and N·s/m.
+    pub(super) fn near(&self, x_m: T, stroke_m: T) -> (T, T) {
+        let reach = T::lit(5.0) * self.gap_m;
+        let far = x_m > reach && x_m < stroke_m - reach;
+        if far { (T::zero(), T::zero()) } else { (self.stiffness_npm, self.damping_nspm) }
+    }
+
     /// Position for which chamber volumes are counted: never closer than a tenth of the gap.
     pub(super) fn guarded_m(&self, x_m: T, stroke_m: T) -> T {
         let least = self.gap_m / T::lit(10.0);

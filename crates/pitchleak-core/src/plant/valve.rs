@@ -72,11 +72,7 @@ impl<T: Real> Valve<T> {
 
     /// Flows over the four edges.
     pub fn flows(&self, spool: T, supply_pa: T, pa_pa: T, pb_pa: T) -> ValveFlows<T> {
-        let zero = T::zero();
-        let gain = self.rated_flow_m3s / self.rated_drop_pa.sqrt();
-        let spool = spool.max(-T::one()).min(T::one());
-        let extend = gain * (self.underlap + spool).max(zero);
-        let retract = gain * (self.underlap - spool).max(zero);
+        let (extend, retract) = self.edges(spool);
         let root = |drop: T| metering(drop, self.laminar_drop_pa);
         let supply_to_a = extend * root(supply_pa - pa_pa);
         let supply_to_b = retract * self.area_ratio_b * root(supply_pa - pb_pa);
@@ -87,10 +83,20 @@ impl<T: Real> Valve<T> {
         }
     }
 
-    /// Largest dQ/dP of one edge near the given opening, m³/(s·Pa): how stiff the valve is.
-    pub(crate) fn conductance_m3spa(&self, spool: T) -> T {
-        let opening = (spool.abs() + self.underlap.abs()).min(T::one());
-        T::lit(2.0) * self.rated_flow_m3s * opening * self.area_ratio_b.max(T::one())
-            / (self.rated_drop_pa * self.laminar_drop_pa).sqrt()
+    /// Upper bounds of dQ/dP at ports A and B, m³/(s·Pa): how stiff the valve is.
+    pub(crate) fn conductances_m3spa(&self, spool: T, supply_pa: T, pa_pa: T, pb_pa: T) -> (T, T) {
+        let (extend, retract) = self.edges(spool);
+        let slope = |drop: T| drop.abs().max(self.laminar_drop_pa).sqrt().recip();
+        (
+            extend * slope(supply_pa - pa_pa) + retract * slope(pa_pa),
+            self.area_ratio_b * (retract * slope(supply_pa - pb_pa) + extend * slope(pb_pa)),
+        )
+    }
+
+    /// Flow per root of pressure drop of the A edges to supply and to tank.
+    fn edges(&self, spool: T) -> (T, T) {
+        let gain = self.rated_flow_m3s / self.rated_drop_pa.sqrt();
+        let spool = spool.max(-T::one()).min(T::one());
+        (gain * (self.underlap + spool).max(T::zero()), gain * (self.underlap - spool).max(T::zero()))
     }
 }

@@ -56,10 +56,11 @@ impl<T: Real> ValvePlant<T> {
     /// finite changes nothing.
     pub fn step(&self, state: &ValvePlantState<T>, step_s: T, command: T, load_n: T) -> ValvePlantState<T> {
         let command = number_or_zero(command);
-        let edge = self.valve.conductance_m3spa(command.abs().max(state.spool.abs()));
+        let (pa_pa, pb_pa) = self.cylinder.pressures_pa(&state.cylinder);
+        let (at_a, at_b) = self.valve.conductances_m3spa(state.spool, state.supply_pa, pa_pa, pb_pa);
         let rate = self.cylinder.stiffness_ps(&state.cylinder)
-            + self.cylinder.filling_ps(&state.cylinder, edge)
-            + (self.supply.relief_slope_m3spa + edge) / self.supply.compliance_m3pa;
+            + self.cylinder.filling_ps(&state.cylinder, at_a, at_b)
+            + (self.supply.relief_slope_m3spa + at_a + at_b) / self.supply.compliance_m3pa;
         let (count, step) = substeps(step_s, rate);
         let mut next = *state;
         for _ in 0..count {

@@ -1,0 +1,273 @@
+//! The rig of the paper's Section III (Fig. 2): a pitching cylinder under position control and,
+//! back to back with it, a load cylinder under force control, both on one supply.
+
+mod controller;
+mod state;
+
+pub use controller::Gains;
+
+use crate::plant::{CylinderPlant, LeakFlows, PlantError, Supply, Valve, number_or_zero, substeps};
+use crate::{Cylinder, EffectSet, Leaks, Model, Moment, Real, rk4_step};
+use state::State;
+
+/// One hydraulic axis: a cylinder, its valve and its controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Axis<T> {
+    /// Cylinder, with its leak circuits and effects.
+    pub plant: CylinderPlant<T>,
+    /// Valve.
+    pub valve: Valve<T>,
+    /// Controller: of position, per m; of force, per N.
+    pub gains: Gains<T>,
+}
+
+/// Everything the emulator is built of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EmulatorParams<T> {
+    /// The pitching cylinder; its moving mass is that of the whole rig.
+    pub pitch: Axis<T>,
+    /// The load cylinder; it stands at x_L = L − x and pushes against extension.
+    pub load: Axis<T>,
+    /// Pump and relief valve.
+    pub supply: Supply<T>,
+    /// Longest internal step of the integration, s.
+    pub internal_step_s: T,
+}
+
+/// True signals of the rig at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EmulatorReading<T> {
+    /// Signals of the pitching cylinder; dQ/dt is left at zero. What the sensors make of them:
+    /// [`EffectSet::read`].
+    pub moment: Moment<T>,
+    /// Flows through the leak circuits (and leak effects), m³/s.
+    pub leaks: LeakFlows<T>,
+    /// Supply pressure, Pa.
+    pub supply_pa: T,
+    /// Valve command of the pitching cylinder, share of the stroke.
+    pub pitch_command: T,
+    /// Valve command of the load cylinder, share of the stroke.
+    pub load_command: T,
+}
+
+/// The running rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Emulator<T> {
+    params: EmulatorParams<T>,
+    state: State<T>,
+    position_reference_m: T,
+    load_reference_n: T,
+    position_integral: T,
+    load_integral: T,
+    commands: [T; 2],
+}
+
+impl<T: Real> EmulatorParams<T> {
+    /// The paper's rig with this pitching cylinder: 10 MPa supply, a load cylinder of the same
+    /// size with hoses of its own and a damping bypass, controllers tuned from the sizes.
+    pub fn for_model(model: Model<T>) -> Result<Self, PlantError> {
+        let supply = Supply::paper();
+        let plant = CylinderPlant::new(model)?;
+        let cylinder = model.cylinder;
+        let scale = cylinder.area_a_m2 / T::lit(1.26e-3);
+        let valve = Valve {
+            rated_flow_m3s: Valve::<T>::paper().rated_flow_m3s * scale,
+            area_ratio_b: cylinder.area_b_m2 / cylinder.area_a_m2,
+            ..Valve::paper()
+        };
+        let hose = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(0.1);
+        let load_cylinder = Cylinder { dead_volume_a_m3: hose, dead_volume_b_m3: hose, ..cylinder };
+        let bypass = Leaks { internal_m3spa: T::lit(2e-11) * scale, ..Leaks::default() };
+        let load = CylinderPlant::new(Model { cylinder: load_cylinder, fluid: model.fluid, leaks: bypass })?;
+        let supply = Supply { pump_flow_m3s: supply.pump_flow_m3s * scale, ..supply };
+        let params = Self {
+            pitch: Axis { plant, valve, gains: position_gains(&cylinder, &valve, &supply) },
+            load: Axis { plant: load, valve, gains: force_gains(&load.model, &valve, &supply) },
+            supply,
+            internal_step_s: T::lit(1e-4),
+        };
+        params.check().map(|()| params)
+    }
+
+    /// Says whether a rig like this can exist.
+    pub fn check(&self) -> Result<(), PlantError> {
+        for axis in [&self.pitch, &self.load] {
+            axis.plant.check()?;
+            if !axis.valve.is_physical() {
+                return Err(PlantError::Valve);
+            }
+            if !axis.gains.is_physical() {
+                return Err(PlantError::Controller);
+            }
+        }
+        if !self.supply.is_physical() {
+            Err(PlantError::Supply)
+        } else if !(self.internal_step_s.is_finite() && self.internal_step_s > T::zero()) {
+            Err(PlantError::Step)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Piston speed per valve command with a third of the supply pressure over each edge, m/s.
+fn speed_gain_mps<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, supply: &Supply<T>) -> T {
+    let drop = supply.relief_pressure_pa / T::lit(3.0);
+    valve.rated_flow_m3s * (drop / valve.rated_drop_pa).sqrt() / cylinder.area_a_m2
+}
+
+/// Position loop crossing over at a tenth of the valve's bandwidth, reset time five radians of it.
+fn position_gains<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, supply: &Supply<T>) -> Gains<T> {
+    let crossover = T::lit(0.1 * core::f64::consts::TAU) * valve.bandwidth_hz;
+    let proportional = crossover / speed_gain_mps(cylinder, valve, supply);
+    Gains { proportional, integral_ps: proportional * crossover / T::lit(5.0), derivative_s: T::zero() }
+}
+
+/// Force loop of the same crossover, for the load cylinder at mid-stroke: its oil spring
+/// integrates the flow, and its reset time cancels the lag of the oil behind the bypass.
+fn force_gains<T: Real>(model: &Model<T>, valve: &Valve<T>, supply: &Supply<T>) -> Gains<T> {
+    let cylinder = &model.cylinder;
+    let middle = cylinder.stroke_m / T::lit(2.0);
+    let stiffness = |volume: T| model.fluid.bulk_modulus_pa / volume;
+    let oil_a = stiffness(cylinder.volume_a_m3(middle));
+    let oil_b = stiffness(cylinder.volume_b_m3(middle));
+    let (a, b) = (cylinder.area_a_m2, cylinder.area_b_m2);
+    let spring = a * a * oil_a + b * b * oil_b;
+    let bypass_ps = model.leaks.internal_m3spa * (oil_a + oil_b);
+    let crossover = T::lit(0.1 * core::f64::consts::TAU) * valve.bandwidth_hz;
+    let proportional = crossover / (speed_gain_mps(cylinder, valve, supply) * spring);
+    Gains { proportional, integral_ps: proportional * bypass_ps, derivative_s: T::zero() }
+}
+
+impl<T: Real> Emulator<T> {
+    /// The rig at rest at a position (m) under a load (N against extension).
+    pub fn new(params: EmulatorParams<T>, position_m: T, load_n: T) -> Result<Self, PlantError> {
+        params.check()?;
+        let position_reference_m = params.pitch.clamped_m(position_m);
+        let load_reference_n = number_or_zero(load_n);
+        Ok(Self {
+            state: State::at_rest(&params, position_reference_m, load_reference_n),
+            params,
+            position_reference_m,
+            load_reference_n,
+            position_integral: T::zero(),
+            load_integral: T::zero(),
+            commands: [T::zero(); 2],
+        })
+    }
+
+    /// What the rig is built of.
+    pub fn params(&self) -> &EmulatorParams<T> {
+        &self.params
+    }
+
+    /// Turns the leak circuits of the pitching cylinder.
+    pub fn set_leaks(&mut self, leaks: Leaks<T>) -> Result<(), PlantError> {
+        if !leaks.is_physical() {
+            return Err(PlantError::Leaks);
+        }
+        self.params.pitch.plant.model.leaks = leaks;
+        Ok(())
+    }
+
+    /// Changes the effects that act on the pitching cylinder.
+    pub fn set_effects(&mut self, effects: EffectSet<T>) {
+        self.params.pitch.plant.effects = effects;
+    }
+
+    /// Runs the rig for `step_s`, the references moving in a straight line to the given ones.
+    /// A reference that is not a number stays where it was, a position outside the stroke is
+    /// brought inside; a step that is not positive and finite, or takes more than a hundred million
+    /// internal steps, is [`PlantError::Step`] and changes nothing.
+    pub fn step(
+        &mut self,
+        step_s: T,
+        position_reference_m: T,
+        load_reference_n: T,
+    ) -> Result<(), PlantError> {
+        let ticks = (step_s / self.params.internal_step_s).ceil().max(T::one());
+        let count = ticks.to_u32().filter(|n| *n <= 100_000_000).ok_or(PlantError::Step)?;
+        if !(step_s.is_finite() && step_s > T::zero()) {
+            return Err(PlantError::Step);
+        }
+        let goal = |new: T, old: T| if new.is_finite() { new } else { old };
+        let position_goal =
+            self.params.pitch.clamped_m(goal(position_reference_m, self.position_reference_m));
+        let load_goal = goal(load_reference_n, self.load_reference_n);
+        let speed_reference = (position_goal - self.position_reference_m) / step_s;
+        let load_slope = (load_goal - self.load_reference_n) / step_s;
+        let tick = step_s / T::lit(f64::from(count));
+        for _ in 0..count {
+            self.position_reference_m += speed_reference * tick;
+            self.load_reference_n = number_or_zero(self.load_reference_n + load_slope * tick);
+            self.control(tick, speed_reference);
+            self.integrate(tick);
+        }
+        self.position_reference_m = position_goal;
+        self.load_reference_n = load_goal;
+        Ok(())
+    }
+
+    /// True signals now.
+    pub fn reading(&self) -> EmulatorReading<T> {
+        let (pitch, _, _) = self.state.rates(&self.params);
+        let [pitch_command, load_command] = self.commands;
+        EmulatorReading {
+            moment: pitch.moment,
+            leaks: self.params.pitch.plant.leak_flows(&pitch.moment),
+            supply_pa: self.state.supply_pa,
+            pitch_command,
+            load_command,
+        }
+    }
+
+    /// One tick of both controllers. Either valve is fed forward the flow that the reference's
+    /// speed takes; the load cylinder gives way with the piston.
+    fn control(&mut self, tick: T, speed_reference: T) {
+        let EmulatorParams { pitch, load, supply, .. } = &self.params;
+        let v_mps = self.state.pitch.v_mps;
+        let position_error = self.position_reference_m - self.state.pitch.x_m;
+        let load_error = self.load_reference_n - self.state.load_force_n(&self.params);
+        let feed = |axis: &Axis<T>, speed: T| {
+            speed / speed_gain_mps(&axis.plant.model.cylinder, &axis.valve, supply)
+        };
+        let pitch_command = pitch.gains.command(
+            &mut self.position_integral,
+            tick,
+            position_error,
+            speed_reference - v_mps,
+            feed(pitch, speed_reference),
+        );
+        let load_command = load.gains.command(
+            &mut self.load_integral,
+            tick,
+            load_error,
+            T::zero(),
+            feed(load, -speed_reference),
+        );
+        self.commands = [pitch_command, load_command];
+    }
+
+    fn integrate(&mut self, tick: T) {
+        let (params, commands) = (&self.params, self.commands);
+        let (count, step) = substeps(tick, self.state.stiffness_ps(params));
+        for _ in 0..count {
+            let raw = rk4_step(&self.state.to_array(), step, |_, y| {
+                State::from_array(*y).derivative(params, commands)
+            });
+            self.state = State::from_array(raw).limited(params, self.state);
+        }
+    }
+}
+
+impl<T: Real> Axis<T> {
+    /// The nearest position between the end stops.
+    fn clamped_m(&self, position_m: T) -> T {
+        let (stroke, gap) = (self.plant.model.cylinder.stroke_m, self.plant.end_stop.gap_m);
+        if position_m.is_finite() { position_m.max(gap).min(stroke - gap) } else { stroke / T::lit(2.0) }
+    }
+}

@@ -1,0 +1,174 @@
+use super::{Axis, EmulatorParams};
+use crate::Real;
+use crate::plant::{CylinderRates, CylinderState, Drive, ValveFlows};
+
+/// The one state vector of the rig; x and ẋ are shared by both cylinders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct State<T> {
+    pub pitch: CylinderState<T>,
+    /// Oil in the load cylinder's chambers A and B, m³.
+    pub load_oil_m3: [T; 2],
+    /// Spool positions of the pitch and the load valve, share of the stroke.
+    pub spools: [T; 2],
+    /// Spool speeds, 1/s.
+    pub spool_speeds_ps: [T; 2],
+    pub supply_pa: T,
+}
+
+const STATES: usize = 11;
+
+impl<T: Real> State<T> {
+    /// Valves centred, chambers B at a quarter of the supply pressure, chambers A in balance.
+    pub fn at_rest(params: &EmulatorParams<T>, x_m: T, load_n: T) -> Self {
+        let supply_pa = params.supply.idle_pressure_pa();
+        let still = |axis: &Axis<T>, x_m: T| {
+            let cylinder = &axis.plant.model.cylinder;
+            let pb_pa = supply_pa / T::lit(4.0);
+            let pa_pa = (load_n + pb_pa * cylinder.area_b_m2) / cylinder.area_a_m2;
+            axis.plant.state_at(x_m, T::zero(), pa_pa.max(T::zero()).min(supply_pa), pb_pa)
+        };
+        let load = still(&params.load, params.load.plant.model.cylinder.stroke_m - x_m);
+        Self {
+            pitch: still(&params.pitch, x_m),
+            load_oil_m3: [load.oil_a_m3, load.oil_b_m3],
+            spools: [T::zero(); 2],
+            spool_speeds_ps: [T::zero(); 2],
+            supply_pa,
+        }
+    }
+
+    /// Force of the load cylinder against extension, N.
+    pub fn load_force_n(&self, params: &EmulatorParams<T>) -> T {
+        let load = self.load(params);
+        let (pa_pa, pb_pa) = params.load.plant.pressures_pa(&load);
+        let cylinder = &params.load.plant.model.cylinder;
+        pa_pa * cylinder.area_a_m2 - pb_pa * cylinder.area_b_m2
+    }
+
+    /// Rates of the pitching and the load cylinder, and the flow drawn from the supply, m³/s.
+    pub fn rates(&self, params: &EmulatorParams<T>) -> (CylinderRates<T>, CylinderRates<T>, T) {
+        let [pitch_spool, load_spool] = self.spools;
+        let load_state = self.load(params);
+        let load_flows = self.flows(&params.load, &load_state, load_spool);
+        let pitch_flows = self.flows(&params.pitch, &self.pitch, pitch_spool);
+        let load = rates(&params.load, &load_state, &load_flows, T::zero());
+        let pitch = rates(&params.pitch, &self.pitch, &pitch_flows, self.load_force_n(params));
+        (pitch, load, pitch_flows.supply_m3s + load_flows.supply_m3s)
+    }
+
+    /// The right side of the differential equation.
+    pub fn derivative(&self, params: &EmulatorParams<T>, commands: [T; 2]) -> [T; STATES] {
+        let (pitch, load, drawn_m3s) = self.rates(params);
+        let ([pitch_spool, load_spool], [pitch_speed, load_speed]) = (self.spools, self.spool_speeds_ps);
+        let [pitch_command, load_command] = commands;
+        let [dy_pitch, ddy_pitch] = params.pitch.valve.spool_rates(pitch_spool, pitch_speed, pitch_command);
+        let [dy_load, ddy_load] = params.load.valve.spool_rates(load_spool, load_speed, load_command);
+        [
+            self.pitch.v_mps,
+            pitch.moment.a_mps2,
+            pitch.oil_a_m3s,
+            pitch.oil_b_m3s,
+            load.oil_a_m3s,
+            load.oil_b_m3s,
+            dy_pitch,
+            dy_load,
+            ddy_pitch,
+            ddy_load,
+            params.supply.rate_pas(self.supply_pa, drawn_m3s),
+        ]
+    }
+
+    /// Rate of the fastest motion, 1/s.
+    pub fn stiffness_ps(&self, params: &EmulatorParams<T>) -> T {
+        let [pitch_spool, load_spool] = self.spools;
+        let axes = [(&params.pitch, self.pitch, pitch_spool), (&params.load, self.load(params), load_spool)];
+        let mut conductance = params.supply.relief_slope_m3spa;
+        let mut rate = T::zero();
+        for (axis, cylinder, spool) in axes {
+            let (pa_pa, pb_pa) = axis.plant.pressures_pa(&cylinder);
+            let (at_a, at_b) = axis.valve.conductances_m3spa(spool, self.supply_pa, pa_pa, pb_pa);
+            conductance += at_a + at_b;
+            rate += axis.plant.stiffness_ps(&cylinder) + axis.plant.filling_ps(&cylinder, at_a, at_b);
+        }
+        rate + conductance / params.supply.compliance_m3pa
+    }
+
+    /// `self` brought back to what can exist, or `last` where a number was lost.
+    pub fn limited(self, params: &EmulatorParams<T>, last: Self) -> Self {
+        let or = |value: T, fallback: T| if value.is_finite() { value } else { fallback };
+        let load = params.load.plant.limited(self.load(params), last.load(params));
+        let ([pitch_spool, load_spool], [last_pitch, last_load]) = (self.spools, last.spools);
+        Self {
+            pitch: params.pitch.plant.limited(self.pitch, last.pitch),
+            load_oil_m3: [load.oil_a_m3, load.oil_b_m3],
+            spools: [or(pitch_spool, last_pitch), or(load_spool, last_load)],
+            spool_speeds_ps: self.spool_speeds_ps.map(|speed| or(speed, T::zero())),
+            supply_pa: or(self.supply_pa, last.supply_pa).max(T::zero()),
+        }
+    }
+
+    pub fn to_array(self) -> [T; STATES] {
+        let CylinderState { x_m, v_mps, oil_a_m3, oil_b_m3 } = self.pitch;
+        let ([load_a, load_b], [pitch_spool, load_spool], [pitch_speed, load_speed]) =
+            (self.load_oil_m3, self.spools, self.spool_speeds_ps);
+        [
+            x_m,
+            v_mps,
+            oil_a_m3,
+            oil_b_m3,
+            load_a,
+            load_b,
+            pitch_spool,
+            load_spool,
+            pitch_speed,
+            load_speed,
+            self.supply_pa,
+        ]
+    }
+
+    pub fn from_array(y: [T; STATES]) -> Self {
+        let [
+            x_m,
+            v_mps,
+            oil_a_m3,
+            oil_b_m3,
+            load_a,
+            load_b,
+            pitch_spool,
+            load_spool,
+            pitch_speed,
+            load_speed,
+            supply_pa,
+        ] = y;
+        Self {
+            pitch: CylinderState { x_m, v_mps, oil_a_m3, oil_b_m3 },
+            load_oil_m3: [load_a, load_b],
+            spools: [pitch_spool, load_spool],
+            spool_speeds_ps: [pitch_speed, load_speed],
+            supply_pa,
+        }
+    }
+
+    /// The load cylinder as a cylinder of its own.
+    fn load(&self, params: &EmulatorParams<T>) -> CylinderState<T> {
+        let [oil_a_m3, oil_b_m3] = self.load_oil_m3;
+        let stroke = params.load.plant.model.cylinder.stroke_m;
+        CylinderState { x_m: stroke - self.pitch.x_m, v_mps: -self.pitch.v_mps, oil_a_m3, oil_b_m3 }
+    }
+
+    fn flows(&self, axis: &Axis<T>, cylinder: &CylinderState<T>, spool: T) -> ValveFlows<T> {
+        let (pa_pa, pb_pa) = axis.plant.pressures_pa(cylinder);
+        axis.valve.flows(spool, self.supply_pa, pa_pa, pb_pa)
+    }
+}
+
+fn rates<T: Real>(
+    axis: &Axis<T>,
+    cylinder: &CylinderState<T>,
+    flows: &ValveFlows<T>,
+    force_n: T,
+) -> CylinderRates<T> {
+    let drive = Drive { qa_m3s: flows.a_m3s, qb_m3s: flows.b_m3s, force_n };
+    axis.plant.rates(cylinder, &axis.plant.bounded(drive))
+}
