@@ -46,8 +46,9 @@ impl TracePressures {
         }
     }
 
-    /// Mean of P_L with its sign.
-    pub fn net_load(&self) -> f64 {
-        if self.time > 0.0 { self.load / self.time } else { 0.0 }
+    /// Means of P_L with its sign, P_A, P_B.
+    pub fn net(&self) -> PerLeak<f64> {
+        let load = if self.time > 0.0 { self.load / self.time } else { 0.0 };
+        PerLeak { internal: load, ..self.sizes() }
     }
 }

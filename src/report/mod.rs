@@ -43,6 +43,13 @@ pub struct ReplayReport {
     pub estimates: Estimates,
     /// Mean leak flows.
     pub leakage: PerLeak<Leakage>,
+    /// Offsets of the flow meters, where the rig file says that they may be off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flow_meter_offsets: Option<FlowMeterOffsets>,
+    /// Innovation squared over its variance, of the flow balance and of the position: about 1 where model
+    /// and declared noise explain the trace, far above where they do not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub normalised_innovation: Option<[f64; 2]>,
     /// What to make of it.
     pub verdict: Verdict,
     /// In the order of time.
@@ -168,8 +175,11 @@ impl EstimateEntry {
 /// Mean flow of one leak.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Leakage {
-    /// L/min.
+    /// Mean size of the flow, whichever way the pressure drives it, L/min.
     pub mean_lpm: f64,
+    /// Mean flow with its sign, positive out of chamber A (external B: out of chamber B), L/min.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub net_mean_lpm: Option<f64>,
     /// Standard deviation of its error, L/min; none where the estimator gives none.
     pub std_lpm: Option<f64>,
 }
@@ -178,7 +188,23 @@ impl Leakage {
     /// From a flow in m³/s.
     pub fn new(flow_m3s: Estimate<f64>) -> Self {
         let lpm = flow_m3s.scaled(LPM_PER_M3S);
-        Self { mean_lpm: lpm.value, std_lpm: Some(lpm.std) }
+        Self { mean_lpm: lpm.value, net_mean_lpm: None, std_lpm: Some(lpm.std) }
+    }
+}
+
+/// Offsets of the flow meters, reading minus truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FlowMeterOffsets {
+    /// Meter A.
+    pub a: Leakage,
+    /// Meter B.
+    pub b: Leakage,
+}
+
+impl FlowMeterOffsets {
+    /// From offsets in m³/s.
+    pub fn new([a, b]: [Estimate<f64>; 2]) -> Self {
+        Self { a: Leakage::new(a), b: Leakage::new(b) }
     }
 }
 

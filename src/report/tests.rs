@@ -32,6 +32,8 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
         },
         rig: "rig.toml".to_owned(),
         estimator: EstimatorKind::Rls,
+        flow_meter_offsets: None,
+        normalised_innovation: None,
         verdict: Verdict::new(active, &leakage, &estimates, &thresholds),
         estimates,
         leakage,

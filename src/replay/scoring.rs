@@ -1,0 +1,68 @@
+use super::leak_pressures_pa;
+use crate::score::{LeakScore, Scorer};
+use crate::trace::Record;
+use pitchleak_core::{Butterworth, Estimate, PerLeak};
+
+/// The paper's filter of measured leakage, Section IV.
+const CUTOFF_HZ: f64 = 5.0;
+
+/// Scores the estimates against the reference leak flows that a trace has, after the paper's filter on
+/// reference and pressures.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Scoring {
+    channels: Option<PerLeak<Channel>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Channel {
+    scorer: Scorer,
+    reference: Butterworth<f64>,
+    pressure: Butterworth<f64>,
+}
+
+impl Scoring {
+    /// Takes a record and the coefficients as estimated after it.
+    #[inline]
+    pub fn add(&mut self, record: &Record, coefficients: impl FnOnce() -> PerLeak<Estimate<f64>>) {
+        let reference = &record.leak_m3s;
+        if reference.internal.or(reference.external_a).or(reference.external_b).is_none() {
+            return;
+        }
+        if self.channels.is_none() && record.dt_s > 0.0 {
+            self.channels = Channel::at_rate(1.0 / record.dt_s, record);
+        }
+        if let Some(channels) = self.channels {
+            let inputs = coefficients().zip(record.leak_m3s).zip(leak_pressures_pa(record));
+            self.channels =
+                Some(channels.zip(inputs).map(|(channel, ((coefficient, reference), pressure))| {
+                    channel.after(record.t_s, coefficient.value, reference, pressure)
+                }));
+        }
+    }
+
+    /// The scores, where there is a reference.
+    pub fn scores(&self) -> Option<PerLeak<Option<LeakScore>>> {
+        self.channels.map(|channels| channels.map(|channel| channel.scorer.score()))
+    }
+}
+
+impl Channel {
+    fn at_rate(rate_hz: f64, record: &Record) -> Option<PerLeak<Self>> {
+        let filter = Butterworth::new(CUTOFF_HZ.min(0.4 * rate_hz), rate_hz).ok()?;
+        Some(leak_pressures_pa(record).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
+            let (mut reference, mut pressure) = (filter, filter);
+            reference.reset(start_m3s.unwrap_or(0.0));
+            pressure.reset(start_pa);
+            Self { scorer: Scorer::default(), reference, pressure }
+        }))
+    }
+
+    fn after(mut self, t_s: f64, coefficient: f64, reference_m3s: Option<f64>, pressure_pa: f64) -> Self {
+        let pressure = self.pressure.update(pressure_pa);
+        if let Some(reference) = reference_m3s {
+            let reference = self.reference.update(reference);
+            self.scorer.update(t_s, coefficient * pressure, coefficient, reference, pressure);
+        }
+        self
+    }
+}

@@ -1,0 +1,107 @@
+//! From a finished replay to its report.
+
+use super::Replay;
+use crate::report::{
+    EstimateEntry, Estimates, FlowMeterOffsets, LPM_PER_M3S, Leakage, ReplayReport, TraceSummary, Verdict,
+};
+use crate::trace::TraceReader;
+use pitchleak_core::{Estimate, Excitation, Parameter, PerLeak};
+
+impl Replay {
+    /// The report on the trace that `reader` has read so far.
+    pub fn report(&self, reader: &TraceReader) -> ReplayReport {
+        let estimates = self.estimates();
+        let leakage = self.leakage();
+        let active = self.detector.active();
+        ReplayReport {
+            schema: ReplayReport::SCHEMA,
+            trace: TraceSummary::new(reader.name(), reader.quality()),
+            rig: self.rig.name.clone(),
+            estimator: self.rig.estimator.kind,
+            verdict: Verdict::new(active, &leakage, &estimates, &self.rig.alarms.threshold_m3s),
+            estimates,
+            leakage,
+            flow_meter_offsets: self.estimator.flow_offsets_m3s().map(FlowMeterOffsets::new),
+            normalised_innovation: self.estimator.normalised_innovation(),
+            alarms: self.alarms.clone(),
+            score: self.scoring.scores(),
+        }
+    }
+
+    /// Flows at the trace's mean pressures, eq. (15); the internal one at the mean size of P_L, whatever
+    /// its sign.
+    fn leakage(&self) -> PerLeak<Leakage> {
+        let bias = self.rig.sensors().pressure.bias_std;
+        let bias = PerLeak { internal: std::f64::consts::SQRT_2 * bias, external_a: bias, external_b: bias };
+        let knows_spread = self.estimator.excitation().is_some();
+        self.estimator
+            .leak_coefficients()
+            .zip(self.pressures.sizes())
+            .zip(self.pressures.net())
+            .zip(bias)
+            .map(|(((coefficient, pressure), net), bias)| {
+                let value = coefficient.value * pressure;
+                let std = (coefficient.std * pressure).hypot(coefficient.value * bias);
+                let leakage = Leakage::new(Estimate { value, std });
+                Leakage {
+                    net_mean_lpm: Some(coefficient.value * net * LPM_PER_M3S),
+                    std_lpm: leakage.std_lpm.filter(|_| knows_spread),
+                    ..leakage
+                }
+            })
+    }
+
+    fn estimates(&self) -> Estimates {
+        let excitation = self.estimator.excitation();
+        let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
+        let entries = self.estimator.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
+            let unit = EstimateEntry::COEFFICIENT_UNIT;
+            match excitation {
+                None => EstimateEntry::without_spread(coefficient.value, unit),
+                Some(excitation) => judged(EstimateEntry::new(coefficient, unit), &excitation),
+            }
+        });
+        Estimates {
+            internal_leak_coefficient: entries.internal,
+            external_leak_a_coefficient: entries.external_a,
+            external_leak_b_coefficient: entries.external_b,
+            bulk_modulus: self.bulk_modulus(excitation.map(|report| report.bulk_modulus)),
+        }
+    }
+
+    fn bulk_modulus(&self, excitation: Option<Excitation<f64>>) -> EstimateEntry {
+        let found = self.estimator.bulk_modulus();
+        let bare = EstimateEntry::without_spread(found.value, EstimateEntry::BULK_MODULUS_UNIT);
+        let entry = match found.spread {
+            None => bare,
+            Some((std, ci95)) => EstimateEntry { std: Some(std), ci95: Some(ci95), ..bare },
+        };
+        excitation.map_or(entry.clone(), |excitation| judged(entry, &excitation))
+    }
+}
+
+/// The entry, marked where the trace does not identify the parameter.
+fn judged(entry: EstimateEntry, excitation: &Excitation<f64>) -> EstimateEntry {
+    if excitation.identifiable {
+        return entry;
+    }
+    entry.not_identifiable(match excitation.traded_with {
+        Some(other) => format!("trades off with {}", label(other)),
+        None if excitation.share_learnt < 0.5 => "this trace says little beyond the rig file".to_owned(),
+        None => "too little excitation".to_owned(),
+    })
+}
+
+fn label(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::Compressibility => "the bulk modulus",
+        Parameter::Internal => "the internal leak",
+        Parameter::ExternalA => "the external leak A",
+        Parameter::ExternalB => "the external leak B",
+        Parameter::OffsetA => "the offset of flow meter A",
+        Parameter::OffsetB => "the offset of flow meter B",
+        Parameter::GainA => "the gain of flow meter A",
+        Parameter::GainB => "the gain of flow meter B",
+        Parameter::GainPosition => "the gain of the position sensor",
+    }
+}
