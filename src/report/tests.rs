@@ -11,7 +11,7 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
         external_leak_b_coefficient: entry(0.0, 3e-12).not_identifiable("pressure B hardly moves"),
         bulk_modulus: EstimateEntry::without_spread(0.9e9, EstimateEntry::BULK_MODULUS_UNIT),
     };
-    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std) };
+    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None };
     let leakage = PerLeak {
         internal: lpm(0.4785, 0.0011),
         external_a: lpm(-0.0004, 0.0011),

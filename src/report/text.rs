@@ -94,7 +94,7 @@ fn fault_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> String {
 
 /// A leak that feeds oil in is evidence against the model, not a leak.
 fn impossible_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> Option<String> {
-    let Leakage { mean_lpm, std_lpm } = pick(leakage, leak);
+    let Leakage { mean_lpm, std_lpm, .. } = pick(leakage, leak);
     let impossible = std_lpm.is_some_and(|std| mean_lpm + 3.0 * std < 0.0);
     impossible.then(|| {
         let label = leak.label();
