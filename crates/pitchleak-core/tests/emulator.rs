@@ -1,4 +1,5 @@
 //! The rig of Section III follows its references and stays within numbers.
+#![allow(clippy::unwrap_used)] // helpers of tests are no tests to clippy
 
 use pitchleak_core::plant::PlantError;
 use pitchleak_core::{Emulator, EmulatorParams, Leaks, Model};

@@ -3,14 +3,16 @@
 mod chamber;
 mod cylinder_plant;
 mod end_stop;
+mod error;
 mod orifice;
 mod supply;
 mod valve;
 mod valve_plant;
 
 pub use chamber::{ATMOSPHERE_PA, LEAST_ABSOLUTE_PA};
-pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive, LeakFlows, PlantError};
+pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive, LeakFlows};
 pub use end_stop::EndStop;
+pub use error::PlantError;
 pub use orifice::{metering, signed_root};
 pub use supply::Supply;
 pub use valve::{Valve, ValveFlows};
