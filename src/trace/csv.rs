@@ -3,7 +3,7 @@
 use super::columns::{Column, Content, Layout, shorten};
 use super::error::TraceFault;
 use super::lines::{Line, Lines, Stop};
-use super::number::leading_number;
+use super::number::{leading_number, short_number};
 use super::quality::{BadReason, BadRow};
 use super::stamp::Epoch;
 use crate::rig::ColumnMap;
@@ -137,34 +137,36 @@ impl Format {
     #[inline]
     fn read(&mut self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
         *row = Row { line: line.number, ..Row::empty() };
-        if line.quoted { self.read_quoted(line.text, row) } else { self.read_plain(line.text, row) }
+        if line.quoted { self.read_quoted(line.text, row) } else { self.read_plain(line, row) }
     }
 
     /// A record without quotes, in one pass.
     #[inline]
-    fn read_plain(&mut self, text: &[u8], row: &mut Row) -> Result<(), Fault> {
-        let mut rest = Some(text);
+    fn read_plain(&mut self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
+        let mut rest = Rest { line, at: 0, ended: false };
         for (index, column) in self.layout.columns.iter().enumerate() {
-            let cell = rest.ok_or(Fault { column: None, reason: BadReason::ShortRow })?;
-            rest = match column.content {
-                Content::Number(signal, unit) => {
-                    let (value, after) = read_number(cell, self.delimiter)
-                        .map_err(|reason| Fault { column: Some(index), reason })?;
-                    row.set(signal, unit.map_or(value, |unit| unit.to_si(value)));
-                    after
+            if rest.ended {
+                return Err(Fault { column: None, reason: BadReason::ShortRow });
+            }
+            let read = match &column.content {
+                Content::Number(signal, unit) => rest
+                    .number(self.delimiter)
+                    .map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value)))),
+                Content::Ignored => {
+                    rest.cell(self.delimiter);
+                    Ok(())
                 }
-                Content::Ignored => split_cell(cell, self.delimiter).1,
-                Content::Timestamp => {
-                    let (cell, after) = split_cell(cell, self.delimiter);
-                    let seconds = self.epoch.seconds(cell);
-                    row.set(Signal::Time, seconds.map_err(|reason| Fault { column: Some(index), reason })?);
-                    after
-                }
+                Content::Timestamp => self
+                    .epoch
+                    .seconds(rest.cell(self.delimiter))
+                    .map(|seconds| row.set(Signal::Time, seconds)),
             };
+            read.map_err(|reason| Fault { column: Some(index), reason })?;
         }
-        match rest {
-            None => check_present(&self.layout.columns, row),
-            Some(_) => Err(Fault { column: None, reason: BadReason::LongRow }),
+        if rest.ended {
+            check_present(&self.layout.columns, row)
+        } else {
+            Err(Fault { column: None, reason: BadReason::LongRow })
         }
     }
 
@@ -234,20 +236,38 @@ fn blame(columns: &[Column], row: &Row) -> Fault {
     Fault { column: None, reason: BadReason::OutOfRange }
 }
 
-/// The number at the start of `text` (NaN where its cell is empty), and what follows its delimiter:
-/// nothing after the last cell.
-#[inline(always)]
-fn read_number(text: &[u8], delimiter: u8) -> Result<(f64, Option<&[u8]>), BadReason> {
-    if let Some((value, length)) = leading_number(text) {
-        let after = text.get(length..).unwrap_or_default();
-        match after.split_first() {
-            None if value.is_finite() => return Ok((value, None)),
-            Some((&next, rest)) if next == delimiter && value.is_finite() => return Ok((value, Some(rest))),
-            _ => {}
+/// What is left of a record without quotes.
+struct Rest<'a> {
+    line: Line<'a>,
+    at: usize,
+    /// The last cell has been read.
+    ended: bool,
+}
+
+impl<'a> Rest<'a> {
+    /// Reads a cell as a number; NaN where it is empty.
+    #[inline(always)]
+    fn number(&mut self, delimiter: u8) -> Result<f64, BadReason> {
+        let text = self.line.padded.get(self.at..).unwrap_or_default();
+        if let Some((value, length)) = short_number(text) {
+            let end = self.at + length;
+            self.ended = end == self.line.text.len();
+            if self.ended || text.get(length) == Some(&delimiter) {
+                self.at = end + 1;
+                return Ok(value);
+            }
         }
+        read_cell(self.cell(delimiter))
     }
-    let (cell, after) = split_cell(text, delimiter);
-    read_cell(cell).map(|value| (value, after))
+
+    /// Passes over a cell and gives its text.
+    #[inline]
+    fn cell(&mut self, delimiter: u8) -> &'a [u8] {
+        let (cell, after) = split_cell(self.line.text.get(self.at..).unwrap_or_default(), delimiter);
+        self.at += cell.len() + 1;
+        self.ended = after.is_none();
+        cell
+    }
 }
 
 /// A cell with whatever blanks around its number; NaN where it is empty.

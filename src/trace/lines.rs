@@ -1,5 +1,6 @@
 //! Records of a CSV stream out of one buffer of bounded size.
 
+use super::number::LOOK_AHEAD;
 use std::io::{self, Read};
 
 const CHUNK: usize = 256 * 1024;
@@ -8,11 +9,16 @@ const LONGEST_RECORD: usize = 1024 * 1024;
 /// How far a quoted cell may run over line ends before its quote counts as stray.
 const LONGEST_QUOTED: usize = 64 * 1024;
 
-/// One record: the line it starts on, its text without the line end, and whether it has quotes.
+/// One record.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
+    /// The line it starts on, from 1.
     pub(super) number: u64,
+    /// Its text without the line end.
     pub(super) text: &'a [u8],
+    /// Its text and [`LOOK_AHEAD`] bytes more, the first of which is a line end or a zero.
+    pub(super) padded: &'a [u8],
+    /// Whether it has quotes.
     pub(super) quoted: bool,
 }
 
@@ -39,7 +45,7 @@ pub(super) struct Lines {
 
 impl Lines {
     pub(super) fn new(source: Box<dyn Read + Send>) -> Self {
-        Self { source, buffer: vec![0; CHUNK], start: 0, filled: 0, ended: 0, finished: None }
+        Self { source, buffer: vec![0; CHUNK + LOOK_AHEAD], start: 0, filled: 0, ended: 0, finished: None }
     }
 
     /// The line that the next record starts on, from 1.
@@ -60,7 +66,8 @@ impl Lines {
             let end = end - usize::from(carriage_return);
             if end > start {
                 let text = self.buffer.get(start..end).unwrap_or_default();
-                return Ok(Line { number, text, quoted: found.quoted });
+                let padded = self.buffer.get(start..end + LOOK_AHEAD).unwrap_or_default();
+                return Ok(Line { number, text, padded, quoted: found.quoted });
             }
         }
     }
@@ -106,15 +113,19 @@ impl Lines {
         if self.filled >= LONGEST_RECORD {
             return Err(Stop::TooLong);
         }
-        if self.filled == self.buffer.len() {
-            self.buffer.resize(2 * self.filled, 0);
+        if self.filled + LOOK_AHEAD == self.buffer.len() {
+            self.buffer.resize(2 * self.filled + LOOK_AHEAD, 0);
         }
-        let free = self.buffer.get_mut(self.filled..).unwrap_or_default();
+        let end = self.buffer.len() - LOOK_AHEAD;
+        let free = self.buffer.get_mut(self.filled..end).unwrap_or_default();
         match self.source.read(free) {
             Ok(0) => self.finished = Some(None),
             Ok(count) => self.filled += count,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => self.finished = Some(Some(error)),
+        }
+        if let Some(after) = self.buffer.get_mut(self.filled) {
+            *after = 0;
         }
         Ok(())
     }
