@@ -49,7 +49,7 @@ impl<T: Real> Butterworth<T> {
             return Err(FilterError::Cutoff);
         }
         let one = T::one();
-        let warped = (T::lit(core::f64::consts::PI) * share).tan();
+        let warped = (T::lit(core::f64::consts::PI) * share).libm_tan();
         let square = warped * warped;
         let damping = T::lit(core::f64::consts::SQRT_2) * warped;
         let scale = one / (one + damping + square);

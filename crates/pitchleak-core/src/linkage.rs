@@ -71,7 +71,7 @@ impl<T: Real> Linkage<T> {
         if !(crank >= T::zero() && crank <= T::lit(core::f64::consts::PI)) {
             return Err(LinkageError::Pitch);
         }
-        let square = self.squares() - self.twice_product() * crank.cos();
+        let square = self.squares() - self.twice_product() * crank.libm_cos();
         let position = square.max(T::zero()).sqrt() - self.retracted_length_m;
         if position >= T::zero() { Ok(position) } else { Err(LinkageError::Pitch) }
     }
@@ -86,14 +86,14 @@ impl<T: Real> Linkage<T> {
         if !(cosine >= -T::one() && cosine <= T::one()) {
             return Err(LinkageError::Position);
         }
-        Ok(cosine.acos() - self.zero_angle_rad)
+        Ok(cosine.libm_acos() - self.zero_angle_rad)
     }
 
     /// Lever arm dx_p/dθ, m/rad: also the ratio of piston speed to pitch rate.
     pub fn arm_m(&self, pitch_rad: T) -> Result<T, LinkageError> {
         let length = self.position_m(pitch_rad)? + self.retracted_length_m;
         let crank = self.zero_angle_rad + pitch_rad;
-        Ok(self.pivot_distance_m * self.crank_radius_m * crank.sin() / length)
+        Ok(self.pivot_distance_m * self.crank_radius_m * crank.libm_sin() / length)
     }
 
     /// Torque T_p on the blade by cylinder force F_c, N·m: eq. (18) by virtual work,

@@ -3,31 +3,81 @@ use core::ops::{AddAssign, DivAssign, MulAssign, SubAssign};
 use num_traits::Float;
 
 /// The number type of the core: `f32` on a microcontroller, `f64` elsewhere.
+///
+/// The functions named `libm_…` come from libm on every target. [`Float`]'s own come from the
+/// platform as soon as anything in the program turns on num-traits' `std`, and then differ in the
+/// last bit from one machine to the next; the basic operations and the square root never do.
 pub trait Real: Float + Default + Debug + AddAssign + SubAssign + MulAssign + DivAssign + 'static {
     /// The constant nearest to `value`.
     fn lit(value: f64) -> Self;
     /// The value as `f64` (exact).
     fn as_f64(self) -> f64;
+    /// e to the power of `self`.
+    fn libm_exp(self) -> Self;
+    /// Natural logarithm.
+    fn libm_ln(self) -> Self;
+    /// Natural logarithm of `1 + self`, exact near zero.
+    fn libm_ln_1p(self) -> Self;
+    /// `self` to the power of `exponent`.
+    fn libm_powf(self, exponent: Self) -> Self;
+    /// Sine of an angle in rad.
+    fn libm_sin(self) -> Self;
+    /// Cosine of an angle in rad.
+    fn libm_cos(self) -> Self;
+    /// Tangent of an angle in rad.
+    fn libm_tan(self) -> Self;
+    /// Angle in rad with this cosine.
+    fn libm_acos(self) -> Self;
+    /// Hyperbolic tangent.
+    fn libm_tanh(self) -> Self;
+    /// √(self² + other²) without overflow.
+    fn libm_hypot(self, other: Self) -> Self;
 }
 
-impl Real for f32 {
-    #[inline(always)]
-    fn lit(value: f64) -> Self {
-        value as f32
-    }
-    #[inline(always)]
-    fn as_f64(self) -> f64 {
-        f64::from(self)
-    }
+macro_rules! real {
+    ($type:ty, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident, $hypot:ident) => {
+        impl Real for $type {
+            #[inline(always)]
+            fn lit(value: f64) -> Self {
+                value as $type
+            }
+            #[inline(always)]
+            fn as_f64(self) -> f64 {
+                f64::from(self)
+            }
+            fn libm_exp(self) -> Self {
+                libm::$exp(self)
+            }
+            fn libm_ln(self) -> Self {
+                libm::$ln(self)
+            }
+            fn libm_ln_1p(self) -> Self {
+                libm::$ln_1p(self)
+            }
+            fn libm_powf(self, exponent: Self) -> Self {
+                libm::$powf(self, exponent)
+            }
+            fn libm_sin(self) -> Self {
+                libm::$sin(self)
+            }
+            fn libm_cos(self) -> Self {
+                libm::$cos(self)
+            }
+            fn libm_tan(self) -> Self {
+                libm::$tan(self)
+            }
+            fn libm_acos(self) -> Self {
+                libm::$acos(self)
+            }
+            fn libm_tanh(self) -> Self {
+                libm::$tanh(self)
+            }
+            fn libm_hypot(self, other: Self) -> Self {
+                libm::$hypot(self, other)
+            }
+        }
+    };
 }
 
-impl Real for f64 {
-    #[inline(always)]
-    fn lit(value: f64) -> Self {
-        value
-    }
-    #[inline(always)]
-    fn as_f64(self) -> f64 {
-        self
-    }
-}
+real!(f32, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf, hypotf);
+real!(f64, exp, log, log1p, pow, sin, cos, tan, acos, tanh, hypot);

@@ -1,6 +1,6 @@
 //! The table of effects and the maps between truth and reading.
 
-use pitchleak_core::effects::{EffectError, EffectKind, Shape};
+use pitchleak_core::effects::{EffectError, EffectKind, LaggedFlow, Shape, ShapeParameter};
 use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment};
 use proptest::prelude::*;
 
@@ -111,4 +111,43 @@ fn a_set_refuses_what_cannot_be() {
     set.set(Effect::DeadVolumeA, 0.0, shape).unwrap();
     set.set(Effect::LoadOffset, 1.0, shape).unwrap();
     assert_eq!(set.iter().count(), 8);
+}
+
+/// A fit varies exactly the constants that an effect's term depends on.
+#[test]
+fn every_shape_parameter_that_matters_is_listed() {
+    let (model, shape) = (Model::<f64>::paper(), Shape::default());
+    let at = Moment {
+        x_m: 0.09,
+        v_mps: 5e-4,
+        a_mps2: 0.1,
+        pa_pa: 4e6,
+        pb_pa: 1e6,
+        dpa_pas: 1e6,
+        dpb_pas: -2e6,
+        temp_k: 330.0,
+        ..Moment::default()
+    };
+    for effect in Effect::ALL.iter().copied() {
+        for parameter in ShapeParameter::ALL {
+            let changed = shape.with(parameter, shape.get(parameter) * 1.1 + 1e-3);
+            let matters = effect.unit_term(&at, &model, &changed) != effect.unit_term(&at, &model, &shape);
+            assert_eq!(matters, effect.shape_parameters().contains(&parameter), "{effect} {parameter:?}");
+        }
+    }
+}
+
+/// On a slow ramp the lagging meter reads what the map between truth and reading says.
+#[test]
+fn a_lagging_meter_trails_a_ramp_by_its_lag() {
+    let (lag, slope, step) = (0.05_f64, 1e-4, 1e-4);
+    let mut meter = LaggedFlow::new(0.0);
+    let mut reading = 0.0;
+    for i in 1..=10_000 {
+        reading = meter.update(step, lag, slope * step * f64::from(i));
+    }
+    let truth = Moment { qa_m3s: slope, dqa_m3s2: slope, ..Moment::default() };
+    let mapped = Effect::FlowMeterLag.read(lag, &truth).qa_m3s;
+    assert!((reading - mapped).abs() < 1e-9 * slope, "{reading} {mapped}");
+    assert!((meter.update(step, lag, f64::NAN) - reading).abs() < 1e-30);
 }

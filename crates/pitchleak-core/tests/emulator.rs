@@ -67,6 +67,36 @@ fn readings_obey_the_declared_model() {
     }
 }
 
+/// Fine pitch at 5 m/s puts the piston 1.4 mm from the A end, with no dead volume there.
+#[test]
+fn holds_fine_pitch_next_to_the_end() {
+    let mut rig = Emulator::new(rig(Leaks::default()), 0.0014, 500.0).unwrap();
+    for i in 1..=500 {
+        let t = f64::from(i) * 0.01;
+        rig.step(0.01, 0.0014, 500.0 + 300.0 * (2.0 * t).sin()).unwrap();
+        let now = rig.reading().moment;
+        assert!((now.x_m - 0.0014).abs() < 1e-4 && now.v_mps.abs() < 0.01, "at {t} s: {now:?}");
+    }
+}
+
+/// On a microcontroller's numbers the same rig shows the same signals.
+#[test]
+fn f32_follows_f64() {
+    let mut wide = Emulator::new(rig(Leaks::default()), 0.08, 1000.0).unwrap();
+    let narrow_rig = EmulatorParams::for_model(Model::<f32>::paper()).unwrap();
+    let mut narrow = Emulator::new(narrow_rig, 0.08, 1000.0).unwrap();
+    for i in 1..=1000_u16 {
+        let t = f32::from(i) * 0.01;
+        let (x, f) = (0.08 + 0.01 * (1.5 * t).sin(), 1000.0 + 500.0 * t.sin());
+        wide.step(0.01, f64::from(x), f64::from(f)).unwrap();
+        narrow.step(0.01, x, f).unwrap();
+        let (a, b) = (wide.reading().moment, narrow.reading().moment);
+        assert!((a.x_m - f64::from(b.x_m)).abs() < 1e-4, "x at {t} s: {} {}", a.x_m, b.x_m);
+        assert!((a.pa_pa - f64::from(b.pa_pa)).abs() < 1e5, "P_A at {t} s: {} {}", a.pa_pa, b.pa_pa);
+        assert!((a.force_n - f64::from(b.force_n)).abs() < 50.0, "F at {t} s: {} {}", a.force_n, b.force_n);
+    }
+}
+
 #[test]
 fn a_step_that_is_no_step_is_refused() {
     let mut rig = Emulator::new(rig(Leaks::default()), 0.1, 0.0).unwrap();

@@ -90,22 +90,22 @@ fn accumulator<T: Real>(pressure_pa: T, shape: &Shape<T>) -> T {
 fn gas_softness<T: Real>(pressure_pa: T, from_pa: T, shape: &Shape<T>) -> T {
     let absolute = (pressure_pa + T::lit(plant::ATMOSPHERE_PA)).max(T::lit(plant::LEAST_ABSOLUTE_PA));
     let exponent = T::one() / shape.polytropic_exponent;
-    exponent * (from_pa.max(T::zero()) / absolute).powf(exponent) / absolute
+    exponent * (from_pa.max(T::zero()) / absolute).libm_powf(exponent) / absolute
 }
 
 /// How much of a worn spot the piston stands on, 0 to 1.
 fn bell<T: Real>(x_m: T, shape: &Shape<T>) -> T {
     let distance = (x_m - shape.spot_position_m) / shape.spot_width_m;
-    (-distance * distance).exp()
+    (-distance * distance).libm_exp()
 }
 
 /// A smooth sign of the speed.
 fn direction<T: Real>(at: &Moment<T>, shape: &Shape<T>) -> T {
-    (at.v_mps / shape.slip_speed_mps).tanh()
+    (at.v_mps / shape.slip_speed_mps).libm_tanh()
 }
 
 /// Armstrong-Hélouvry, Dupont and Canudas de Wit (1994), Automatica 30, eq. (6), exponent 2.
 fn stribeck<T: Real>(at: &Moment<T>, shape: &Shape<T>) -> T {
     let speed = at.v_mps / shape.stribeck_speed_mps;
-    (-speed * speed).exp()
+    (-speed * speed).libm_exp()
 }

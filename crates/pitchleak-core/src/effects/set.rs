@@ -42,7 +42,11 @@ impl core::fmt::Display for EffectError {
                 write!(f, "{effect} must lie between {} and {} {}", spec.lower, spec.upper, spec.unit)
             }
             Self::Shape(effect) => {
-                write!(f, "widths, speeds and the exponent of {effect} must be positive")
+                write!(f, "constants of {effect} out of bounds;")?;
+                effect.shape_parameters().iter().try_for_each(|parameter| {
+                    let spec = parameter.spec();
+                    write!(f, " {} lies between {} and {} {}", spec.id, spec.lower, spec.upper, spec.unit)
+                })
             }
             Self::Full => write!(f, "at most {CAPACITY} effects may act at the same time"),
         }

@@ -22,7 +22,7 @@ pub(super) struct Chamber<T> {
 
 impl<T: Real> Chamber<T> {
     pub fn pressure_pa(&self, oil_m3: T, volume_m3: T) -> T {
-        (self.bulk_modulus_pa * (oil_m3 / volume_m3).ln()).max(self.vapour_pressure_pa)
+        (self.bulk_modulus_pa * (oil_m3 / volume_m3).libm_ln()).max(self.vapour_pressure_pa)
     }
 
     pub fn oil_m3(&self, pressure_pa: T, volume_m3: T) -> T {
@@ -53,6 +53,6 @@ impl<T: Real> Chamber<T> {
 
     /// Density relative to that at zero gauge pressure.
     fn density(&self, pressure_pa: T) -> T {
-        (pressure_pa / self.bulk_modulus_pa).exp()
+        (pressure_pa / self.bulk_modulus_pa).libm_exp()
     }
 }
