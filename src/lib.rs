@@ -13,6 +13,7 @@ pub mod report;
 pub mod rig;
 pub mod score;
 pub mod signal;
+pub mod simulate;
 pub mod trace;
 pub mod units;
 pub mod wind;

@@ -1,0 +1,250 @@
+//! Traces made by the emulator: what a rig with known leaks would have measured.
+//!
+//! [`Scenario::run`] gives the truth; [`Sensing`] makes readings of it; [`TraceWriter`] puts both
+//! into a trace file. The controllers act on the truth, not on the readings.
+
+mod leak;
+mod sensing;
+mod writer;
+
+pub use leak::{LeakSize, LeakSizeError};
+pub use sensing::{Biases, Sensing};
+pub use writer::TraceWriter;
+
+use crate::Rig;
+use crate::reference::Reference;
+use pitchleak_core::effects::LaggedFlow;
+use pitchleak_core::emulator::{Emulator, EmulatorParams};
+use pitchleak_core::plant::PlantError;
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment, PerLeak, Sample};
+
+/// What is simulated: a rig, what it follows, its leaks, and for how long.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// The rig; the emulator's valve, supply and controllers follow from its cylinder.
+    pub rig: Rig,
+    /// Position and load to follow.
+    pub reference: Reference,
+    /// Laminar leaks.
+    pub leaks: PerLeak<LeakSize>,
+    /// Time into the trace at which the leaks open, s; zero or less: before it begins.
+    pub onset_s: f64,
+    /// Effects beyond the model.
+    pub effects: EffectSet<f64>,
+    /// Time of the reference at which the trace begins, s.
+    pub start_s: f64,
+    /// Time for which the loops run before the trace begins, s.
+    pub warm_up_s: f64,
+    /// Length of the trace, s.
+    pub duration_s: f64,
+    /// Samples per second.
+    pub sample_rate_hz: f64,
+}
+
+/// One instant of a simulation.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Truth {
+    /// Time since the trace began, s.
+    pub t_s: f64,
+    /// Position that was asked for, m.
+    pub position_reference_m: f64,
+    /// Load that was asked for, N.
+    pub load_reference_n: f64,
+    /// What happened.
+    pub moment: Moment<f64>,
+    /// What sensors without noise show of it: the same, but for sensor effects.
+    pub sample: Sample<f64>,
+    /// Leak flows, m³/s.
+    pub leaks_m3s: PerLeak<f64>,
+}
+
+/// Why a scenario cannot be simulated.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// Rig, leaks or references make no emulator.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// Duration, warm-up or sample rate is out of range.
+    #[error("{what} must lie between {low} and {high}")]
+    Range {
+        /// Which.
+        what: &'static str,
+        /// Least value.
+        low: f64,
+        /// Greatest value.
+        high: f64,
+    },
+    /// The supply cannot feed a leak of this mean flow.
+    #[error("no leak coefficient gives the mean leak flow asked for: the rig's pressures fall too far")]
+    LeakOutOfReach,
+}
+
+/// Longest step between two looks at the reference, s; the emulator divides it further.
+const STEP_S: f64 = 1e-3;
+/// Coefficients of a leak given by its mean flow are found on this much of a run, s.
+const CALIBRATION_S: f64 = 60.0;
+/// … from these pressures on, Pa, …
+const FIRST_GUESS_PA: PerLeak<f64> = PerLeak { internal: 1e6, external_a: 5e6, external_b: 5e6 };
+/// … to this share of the flow …
+const CALIBRATION_ACCURACY: f64 = 0.01;
+/// … in so many runs at most.
+const CALIBRATION_RUNS: usize = 12;
+
+impl Scenario {
+    /// Leak coefficients: as given, or found so that the mean |flow| over the run, its first minute
+    /// where it is longer, is as given to 1 %. A leak takes pressure away, so this takes some runs.
+    ///
+    /// # Errors
+    /// [`SimulateError`].
+    pub fn leak_coefficients(&self) -> Result<Leaks<f64>, SimulateError> {
+        let calibration =
+            Self { duration_s: self.duration_s.min(CALIBRATION_S), onset_s: 0.0, ..self.clone() };
+        let coefficients = |pressures: &PerLeak<f64>| {
+            leak::coefficients(&self.leaks, pressures).ok_or(SimulateError::LeakOutOfReach)
+        };
+        let mut leaks = coefficients(&FIRST_GUESS_PA)?;
+        if !leak::any_by_flow(&self.leaks) {
+            return Ok(leaks);
+        }
+        for _ in 0..CALIBRATION_RUNS {
+            let next = coefficients(&calibration.mean_pressures_pa(leaks)?)?;
+            if leak::differ(&next, &leaks) <= CALIBRATION_ACCURACY {
+                return Ok(leaks);
+            }
+            leaks = next;
+        }
+        Err(SimulateError::LeakOutOfReach)
+    }
+
+    /// Means of |P_L|, P_A, P_B over the run with these leaks, Pa.
+    fn mean_pressures_pa(&self, leaks: Leaks<f64>) -> Result<PerLeak<f64>, SimulateError> {
+        let (mut sum, mut count) = (PerLeak::<f64>::default(), 0.0);
+        self.run(leaks, |truth| {
+            sum.internal += (truth.moment.pa_pa - truth.moment.pb_pa).abs();
+            sum.external_a += truth.moment.pa_pa;
+            sum.external_b += truth.moment.pb_pa;
+            count += 1.0;
+        })?;
+        Ok(sum.map(|sum| sum / f64::max(count, 1.0)))
+    }
+
+    /// Runs the emulator with these leak coefficients and hands each sample to `each`.
+    ///
+    /// # Errors
+    /// [`SimulateError`].
+    pub fn run(&self, leaks: Leaks<f64>, mut each: impl FnMut(&Truth)) -> Result<(), SimulateError> {
+        self.check()?;
+        let period_s = 1.0 / self.sample_rate_hz;
+        let steps = (period_s / STEP_S).ceil().max(1.0);
+        let step_s = period_s / steps;
+        let warm_up = (self.warm_up_s / period_s).round() as i64;
+        let samples = (self.duration_s / period_s).round() as i64;
+        let onset = if self.onset_s > 0.0 { (self.onset_s / period_s).ceil() as i64 } else { -warm_up };
+        let mut rig = RunningRig::new(self, self.start_s - warm_up as f64 * period_s)?;
+        for sample in -warm_up..samples {
+            let t_s = sample as f64 * period_s;
+            if sample == onset {
+                rig.emulator.set_leaks(leaks)?;
+            }
+            if sample >= 0 {
+                each(&rig.truth(t_s, self.start_s + t_s, &self.reference));
+            }
+            for step in 0..steps as i64 {
+                let next = self.start_s + t_s + (step + 1) as f64 * step_s;
+                rig.step(step_s, self.reference.position_m.at(next), self.reference.load_n.at(next))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The whole run in memory.
+    ///
+    /// # Errors
+    /// [`SimulateError`].
+    pub fn collect(&self, leaks: Leaks<f64>) -> Result<Vec<Truth>, SimulateError> {
+        let mut truths = Vec::new();
+        self.run(leaks, |truth| truths.push(*truth))?;
+        Ok(truths)
+    }
+
+    fn check(&self) -> Result<(), SimulateError> {
+        let within = |what, value: f64, low, high| {
+            let fits = value >= low && value <= high;
+            if fits { Ok(()) } else { Err(SimulateError::Range { what, low, high }) }
+        };
+        within("the duration in s", self.duration_s, 0.01, 1e6)?;
+        within("the warm-up in s", self.warm_up_s, 0.0, 1e4)?;
+        within("the start in s", self.start_s, -1e9, 1e9)?;
+        within("the sample rate in Hz", self.sample_rate_hz, 1.0, 1e5)?;
+        within("the onset in s", self.onset_s.max(0.0), 0.0, 1e6)
+    }
+}
+
+/// The emulator, its leaks shut, with the flow meters' own lag.
+struct RunningRig {
+    emulator: Emulator<f64>,
+    effects: EffectSet<f64>,
+    lag_s: f64,
+    meters: [LaggedFlow<f64>; 2],
+}
+
+impl RunningRig {
+    fn new(scenario: &Scenario, t_s: f64) -> Result<Self, PlantError> {
+        let Scenario { rig, reference, effects, .. } = scenario;
+        let healthy = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks: Leaks::default() };
+        let mut params = EmulatorParams::for_model(healthy)?;
+        params.pitch.plant.effects = *effects;
+        params.internal_step_s = STEP_S;
+        let emulator = Emulator::new(params, reference.position_m.at(t_s), reference.load_n.at(t_s))?;
+        let lag = effects.iter().find(|active| active.effect == Effect::FlowMeterLag);
+        let flows = emulator.reading().moment;
+        Ok(Self {
+            effects: *effects,
+            lag_s: lag.map_or(0.0, |active| active.value),
+            meters: [flows.qa_m3s, flows.qb_m3s].map(LaggedFlow::new),
+            emulator,
+        })
+    }
+
+    fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
+        self.emulator.step(step_s, position_m, load_n)?;
+        if self.lag_s > 0.0 {
+            let Moment { qa_m3s, qb_m3s, .. } = self.emulator.reading().moment;
+            for (meter, flow) in self.meters.iter_mut().zip([qa_m3s, qb_m3s]) {
+                meter.update(step_s, self.lag_s, flow);
+            }
+        }
+        Ok(())
+    }
+
+    fn truth(&mut self, t_s: f64, reference_s: f64, reference: &Reference) -> Truth {
+        let reading = self.emulator.reading();
+        let moment = reading.moment;
+        let mut metered = moment;
+        if self.lag_s > 0.0 {
+            let [a, b] = &mut self.meters;
+            metered.qa_m3s = a.update(0.0, self.lag_s, moment.qa_m3s);
+            metered.qb_m3s = b.update(0.0, self.lag_s, moment.qb_m3s);
+        }
+        let shown = self.effects.read(&metered);
+        Truth {
+            t_s,
+            position_reference_m: reference.position_m.at(reference_s),
+            load_reference_n: reference.load_n.at(reference_s),
+            moment,
+            sample: Sample {
+                x_m: shown.x_m,
+                pa_pa: shown.pa_pa,
+                pb_pa: shown.pb_pa,
+                qa_m3s: Some(shown.qa_m3s),
+                qb_m3s: Some(shown.qb_m3s),
+                force_n: Some(shown.force_n),
+            },
+            leaks_m3s: PerLeak {
+                internal: reading.leaks.internal_m3s,
+                external_a: reading.leaks.external_a_m3s,
+                external_b: reading.leaks.external_b_m3s,
+            },
+        }
+    }
+}
