@@ -8,6 +8,9 @@ use crate::{Estimate, PerLeak, Real, Rls, rls::Parameter};
 pub struct ExcitationSettings<T> {
     /// A leak is identified once the 95 % interval of its flow is within ± this, m³/s …
     pub resolution_m3s: T,
+    /// … at the mean pressure that drives it, or at this one if that is lower; Pa (a leak without pressure has
+    /// no flow, and yet nothing is known of it) …
+    pub least_pressure_pa: T,
     /// … or within ± this share of the flow itself.
     pub resolution_share: T,
     /// The bulk modulus is identified once its spread is below this share of its prior's.
@@ -15,11 +18,12 @@ pub struct ExcitationSettings<T> {
 }
 
 impl<T: Real> Default for ExcitationSettings<T> {
-    /// 0.1 L/min or a tenth of the leak; half the prior's spread (three quarters of what is known about
+    /// 0.1 L/min, at 1 MPa or more, or a tenth of the leak; half the prior's spread (three quarters of what is known about
     /// the bulk modulus then comes from the trace).
     fn default() -> Self {
         Self {
             resolution_m3s: T::lit(0.1 / 60_000.0),
+            least_pressure_pa: T::lit(1e6),
             resolution_share: T::lit(0.1),
             prior_share: T::lit(0.5),
         }
@@ -58,7 +62,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
             share_learnt: self.share_learnt(parameter),
             traded_with: self.traded_with(parameter),
         };
-        let pinned = self.mean_leak_flows_m3s().map(|flow| is_resolved(&flow, settings));
+        let pinned = self.leak_coefficients().zip(self.mean_pressures_pa()).map(|(leak, pressure)| {
+            is_resolved(&leak.scaled(pressure.max(settings.least_pressure_pa)), settings)
+        });
         let compressibility = self.compressibility();
         let learnt = compressibility.std <= settings.prior_share * self.compressibility_prior_std();
         ExcitationReport {
@@ -97,6 +103,5 @@ impl<T: Real, const N: usize> Rls<T, N> {
 fn is_resolved<T: Real>(flow: &Estimate<T>, settings: &ExcitationSettings<T>) -> bool {
     let [low, high] = flow.ci95();
     let half_width = (high - low) * T::lit(0.5);
-    let pressed = flow.std > T::zero();
-    pressed && half_width <= settings.resolution_m3s.max(settings.resolution_share * flow.value.abs())
+    half_width <= settings.resolution_m3s.max(settings.resolution_share * flow.value.abs())
 }

@@ -16,6 +16,8 @@ pub(super) struct Information<T, const N: usize> {
     noise: [[T; N]; N],
     /// Σ w f y.
     vector: [T; N],
+    /// What sensor noise in column 0 adds to the normal equation of that column on average.
+    column_noise: T,
 }
 
 /// Solution of [`Information`] in prior units.
@@ -32,6 +34,8 @@ pub(super) struct BlockSums<T, const N: usize> {
     pub matrix: [[T; N]; N],
     /// Σ f y/S.
     pub vector: [T; N],
+    /// Σ (variance of sensor noise in column 0)/S.
+    pub column_noise: T,
     /// Σ y²/S.
     pub square: T,
     /// Number of terms.
@@ -40,7 +44,13 @@ pub(super) struct BlockSums<T, const N: usize> {
 
 impl<T: Real, const N: usize> BlockSums<T, N> {
     pub fn new() -> Self {
-        Self { matrix: [[T::zero(); N]; N], vector: [T::zero(); N], square: T::zero(), count: T::zero() }
+        Self {
+            matrix: [[T::zero(); N]; N],
+            vector: [T::zero(); N],
+            column_noise: T::zero(),
+            square: T::zero(),
+            count: T::zero(),
+        }
     }
 
     /// Adds one observation y = fᵀθ + noise of variance 1/`weight`.
@@ -55,14 +65,6 @@ impl<T: Real, const N: usize> BlockSums<T, N> {
         }
         self.square += weight * y * y;
         self.count += T::one();
-    }
-
-    /// Takes out what sensor noise of variance `variance` (prior units, weight included) in column 0 adds
-    /// to the normal equations on average; `mean` is the prior mean of that parameter in prior units.
-    pub fn compensate_column_0(&mut self, variance: T, mean: T) {
-        let taken = variance.min(self.matrix[0][0]);
-        self.matrix[0][0] -= taken;
-        self.vector[0] += taken * mean;
     }
 
     /// Σ (y − fᵀθ)²/S at `theta`.
@@ -96,7 +98,12 @@ impl<T: Real, const N: usize> Solution<T, N> {
 
 impl<T: Real, const N: usize> Information<T, N> {
     pub fn new() -> Self {
-        Self { matrix: [[T::zero(); N]; N], noise: [[T::zero(); N]; N], vector: [T::zero(); N] }
+        Self {
+            matrix: [[T::zero(); N]; N],
+            noise: [[T::zero(); N]; N],
+            vector: [T::zero(); N],
+            column_noise: T::zero(),
+        }
     }
 
     /// Weighs all that is known by `keep` (0 to 1).
@@ -109,6 +116,7 @@ impl<T: Real, const N: usize> Information<T, N> {
             }
             self.vector[i] *= keep;
         }
+        self.column_noise *= keep;
     }
 
     pub fn add(&mut self, block: &BlockSums<T, N>) {
@@ -119,17 +127,26 @@ impl<T: Real, const N: usize> Information<T, N> {
             }
             self.vector[i] += block.vector[i];
         }
+        self.column_noise += block.column_noise;
     }
 
     /// Posterior mean and the covariance of its error, A⁻¹ (N + I) A⁻¹ with A = M + I: forgetting weighs
     /// the samples unequally, so A⁻¹ alone would overstate the spread (White 1980, sandwich form).
-    pub fn solve(&self) -> Solution<T, N> {
-        let inverse = self.posterior_inverse();
+    ///
+    /// Noise in column 0 (errors in variables) is taken out of A and of the vector; `mean_0` is the
+    /// prior mean of that parameter in units of its prior standard deviation.
+    pub fn solve(&self, mean_0: T) -> Solution<T, N> {
+        let (factors, taken) = self.factor();
+        let inverse = factors.inverse();
+        let mut vector = self.vector;
+        if let Some(first) = vector.first_mut() {
+            *first += taken * mean_0;
+        }
         let mut mean = [T::zero(); N];
         let mut half = [[T::zero(); N]; N];
         for i in 0..N {
             for k in 0..N {
-                mean[i] += inverse[i][k] * self.vector[k];
+                mean[i] += inverse[i][k] * vector[k];
                 for j in 0..N {
                     half[i][j] += inverse[i][k] * self.noise_with_prior(k, j);
                 }
@@ -153,61 +170,76 @@ impl<T: Real, const N: usize> Information<T, N> {
         self.noise[row][column] + if i == j { T::one() } else { T::zero() }
     }
 
-    /// (M + I)⁻¹ by LDLᵀ (Golub & Van Loan, Matrix Computations, §4.1.2). A pivot is kept above the
-    /// rounding error of its diagonal, which only matters in f32.
-    fn posterior_inverse(&self) -> [[T; N]; N] {
+    /// U D Uᵀ of A = M + I, last parameter first (Bierman 1977, Factorization Methods for Discrete
+    /// Sequential Estimation, §III.4), so that the last pivot is what is known of parameter 0 beyond all
+    /// others. The column noise is taken from it, but never more than leaves the prior standing. Also returns what was
+    /// taken.
+    fn factor(&self) -> (Factors<T, N>, T) {
+        // A pivot is kept above the rounding error of its diagonal, which only matters in f32.
         let floor = T::lit(8.0) * T::epsilon();
-        let mut lower = [[T::zero(); N]; N];
+        let mut upper = [[T::zero(); N]; N];
         let mut inverse_pivot = [T::zero(); N];
-        for i in 0..N {
-            for j in 0..i {
-                let mut sum = self.matrix[i][j];
-                for k in 0..j {
-                    sum -= lower[i][k] * lower[j][k];
+        let mut taken = T::zero();
+        for back in 0..N {
+            let i = N - 1 - back;
+            for j in (i + 1..N).rev() {
+                let mut sum = self.matrix[j][i];
+                for k in j + 1..N {
+                    sum -= upper[i][k] * upper[j][k];
                 }
-                lower[i][j] = sum;
+                upper[i][j] = sum;
             }
             let diagonal = self.matrix[i][i] + T::one();
             let mut pivot = diagonal;
-            for j in 0..i {
-                // lower[i][j] holds L D here; turn it to L as it is used.
-                let l = lower[i][j] * inverse_pivot[j];
-                pivot -= l * lower[i][j];
-                lower[i][j] = l;
+            for j in i + 1..N {
+                // upper[i][j] holds U D here; turn it to U as it is used.
+                let u = upper[i][j] * inverse_pivot[j];
+                pivot -= u * upper[i][j];
+                upper[i][j] = u;
+            }
+            if i == 0 {
+                taken = self.column_noise.min(pivot - T::one()).max(T::zero());
+                pivot -= taken;
             }
             inverse_pivot[i] = T::one() / pivot.max(floor * diagonal);
         }
-        invert_factored(&lower, &inverse_pivot)
+        (Factors { upper, inverse_pivot }, taken)
     }
 }
 
-/// (L D Lᵀ)⁻¹ from the unit lower L and 1/D.
-fn invert_factored<T: Real, const N: usize>(lower: &[[T; N]; N], inverse_pivot: &[T; N]) -> [[T; N]; N] {
-    let mut inverse = [[T::zero(); N]; N];
-    for column in 0..N {
-        let mut x = [T::zero(); N];
-        for i in 0..N {
-            let mut sum = if i == column { T::one() } else { T::zero() };
-            for k in 0..i {
-                sum -= lower[i][k] * x[k];
-            }
-            x[i] = sum;
-        }
-        for back in 0..N {
-            let i = N - 1 - back;
-            let mut sum = x[i] * inverse_pivot[i];
-            for k in 0..N {
-                if k > i {
-                    sum -= lower[k][i] * x[k];
+/// Unit upper U (above the diagonal) and 1/D.
+struct Factors<T, const N: usize> {
+    upper: [[T; N]; N],
+    inverse_pivot: [T; N],
+}
+
+impl<T: Real, const N: usize> Factors<T, N> {
+    /// (U D Uᵀ)⁻¹, column by column: U z = e, then Uᵀ x = D⁻¹ z.
+    fn inverse(&self) -> [[T; N]; N] {
+        let mut inverse = [[T::zero(); N]; N];
+        for column in 0..N {
+            let mut x = [T::zero(); N];
+            for back in 0..N {
+                let i = N - 1 - back;
+                let mut sum = if i == column { T::one() } else { T::zero() };
+                for k in i + 1..N {
+                    sum -= self.upper[i][k] * x[k];
                 }
+                x[i] = sum;
             }
-            x[i] = sum;
+            for i in 0..N {
+                let mut sum = x[i] * self.inverse_pivot[i];
+                for k in 0..i {
+                    sum -= self.upper[k][i] * x[k];
+                }
+                x[i] = sum;
+            }
+            for i in 0..N {
+                inverse[i][column] = x[i];
+            }
         }
-        for i in 0..N {
-            inverse[i][column] = x[i];
-        }
+        inverse
     }
-    inverse
 }
 
 #[cfg(test)]
@@ -229,7 +261,7 @@ mod tests {
         }
         let mut information = Information::new();
         information.add(&sums);
-        let solution = information.solve();
+        let solution = information.solve(0.0);
         let inverse = expected.try_inverse().unwrap();
         for i in 0..3 {
             assert!((solution.mean[i] - truth[i]).abs() < 1e-5);
@@ -249,7 +281,7 @@ mod tests {
         for _ in 0..200 {
             information.forget(0.5);
         }
-        let solution = information.solve();
+        let solution = information.solve(0.0);
         assert!((solution.covariance[0][0] - 1.0).abs() < 1e-9);
         assert!(solution.mean[1].abs() < 1e-9);
     }

@@ -176,7 +176,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             pressure_noise_b: NoiseMeter::default(),
             memory: None,
             information: Information::new(),
-            solution: Information::new().solve(),
+            solution: Information::new().solve(T::zero()),
             surprise: Surprise::default(),
             pressures: PressureMeans::default(),
         }
@@ -265,7 +265,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.information.add(&self.sums);
         self.pressures.add_block(&self.block, keep);
         self.surprise.forget(keep);
-        self.solution = self.information.solve();
+        let scale = self.scale[Parameter::Compressibility as usize];
+        self.solution = self.information.solve(self.compressibility / scale);
         self.surprise.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
         self.reweigh();
         self.sums = BlockSums::new();
@@ -339,12 +340,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.compensate(noise * odometer.weight_sum);
     }
 
-    /// Takes noise of `variance` (SI, over the equation's own variance) out of the compressibility's
-    /// normal equation.
+    /// Takes note of noise of `variance` (SI, over the equation's own variance) in the compressibility's
+    /// column.
     fn compensate(&mut self, variance: T) {
         let scale = self.scale[Parameter::Compressibility as usize];
-        let prior_mean = self.compressibility / scale;
-        self.sums.compensate_column_0(variance * scale * scale, prior_mean);
+        self.sums.column_noise += variance * scale * scale;
     }
 
     /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given spread.

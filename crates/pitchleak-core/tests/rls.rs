@@ -1,0 +1,217 @@
+//! Laws of the default estimator: units, number types, and that nothing but numbers ever leaves it.
+
+use pitchleak_core::{
+    Cylinder, ExcitationSettings, Fluid, LeakDetector, PerLeak, Real, Rls, RlsSettings, Sample, SensorSpread,
+    Sensors,
+};
+use proptest::prelude::*;
+
+const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
+
+/// Exact readings of a leaky cylinder at time t: sines, and flows by eq. (1).
+fn reading(cylinder: &Cylinder<f64>, beta: f64, t: f64) -> Sample<f64> {
+    let (x, v) = (0.1 + 0.04 * (0.9 * t).sin(), 0.036 * (0.9 * t).cos());
+    let (pa, dpa) = (6e6 + 1e6 * (1.3 * t).sin(), 1.3e6 * (1.3 * t).cos());
+    let (pb, dpb) = (4e6 + 8e5 * (0.7 * t + 1.0).sin(), 5.6e5 * (0.7 * t + 1.0).cos());
+    let cross = LEAKS.internal * (pa - pb);
+    let qa = cylinder.volume_a_m3(x) / beta * dpa + cylinder.area_a_m2 * v + cross + LEAKS.external_a * pa;
+    let qb = cylinder.volume_b_m3(x) / beta * dpb - cylinder.area_b_m2 * v - cross + LEAKS.external_b * pb;
+    Sample { x_m: x, pa_pa: pa, pb_pa: pb, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None }
+}
+
+fn narrow<T: Real>(sample: &Sample<f64>) -> Sample<T> {
+    Sample {
+        x_m: T::lit(sample.x_m),
+        pa_pa: T::lit(sample.pa_pa),
+        pb_pa: T::lit(sample.pb_pa),
+        qa_m3s: sample.qa_m3s.map(T::lit),
+        qb_m3s: sample.qb_m3s.map(T::lit),
+        force_n: None,
+    }
+}
+
+fn estimate<T: Real, const N: usize>(
+    cylinder: Cylinder<T>,
+    fluid: Fluid<T>,
+    sensors: &Sensors<T>,
+    samples: impl Iterator<Item = Sample<T>>,
+) -> Rls<T, N> {
+    let mut rls = Rls::new(cylinder, fluid, sensors, RlsSettings::default());
+    for sample in samples {
+        rls.update(T::lit(0.01), &sample);
+    }
+    rls
+}
+
+fn as_array<V>(p: PerLeak<V>) -> [V; 3] {
+    [p.internal, p.external_a, p.external_b]
+}
+
+const BETA: f64 = 0.9e9;
+
+fn fluid<T: Real>() -> Fluid<T> {
+    Fluid { bulk_modulus_pa: T::lit(BETA), bulk_modulus_std_pa: T::lit(0.2e9) }
+}
+
+fn exact(seconds: usize) -> impl Iterator<Item = Sample<f64>> {
+    let cylinder = Cylinder::paper();
+    (0..100 * seconds).map(move |k| reading(&cylinder, BETA, k as f64 * 0.01))
+}
+
+/// f32 agrees with f64 to a fifth of the standard deviation that sensors of the paper leave, and its own
+/// standard deviations to 5 %.
+#[test]
+fn single_precision_is_good_enough() {
+    let double: Rls<f64, 4> = estimate(Cylinder::paper(), fluid(), &Sensors::paper(), exact(60));
+    let single: Rls<f32, 4> =
+        estimate(Cylinder::paper(), fluid(), &Sensors::paper(), exact(60).map(|s| narrow(&s)));
+    let pairs = double.leak_coefficients().zip(single.leak_coefficients());
+    for (double, single) in as_array(pairs) {
+        let apart = (double.value - f64::from(single.value)).abs() / double.std;
+        println!(
+            "f32 and f64 are {apart:.3} standard deviations apart, spreads {} and {}",
+            single.std, double.std
+        );
+        assert!(apart < 0.2);
+        assert!((f64::from(single.std) / double.std - 1.0).abs() < 0.05);
+    }
+}
+
+/// Lengths in units of 1/ℓ m, pressures in 1/p Pa, time in 1/τ s: the coefficients follow their dimension,
+/// m³/(s·Pa).
+#[test]
+fn estimates_do_not_depend_on_the_units() {
+    let reference: Rls<f64, 4> = estimate(Cylinder::paper(), fluid(), &Sensors::paper(), exact(20));
+    for (l, p) in [(10.0, 1.0), (1.0, 10.0), (3.0, 0.2)] {
+        let scale = |s: SensorSpread<f64>, unit: f64| SensorSpread { noise_std: s.noise_std * unit, ..s };
+        let base = Sensors::<f64>::paper();
+        let volume = l * l * l;
+        let sensors = Sensors {
+            flow_a: scale(base.flow_a, volume),
+            flow_b: scale(base.flow_b, volume),
+            pressure: scale(base.pressure, p),
+            position: scale(base.position, l),
+            force: base.force,
+        };
+        let paper = Cylinder::<f64>::paper();
+        let cylinder = Cylinder {
+            area_a_m2: paper.area_a_m2 * l * l,
+            area_b_m2: paper.area_b_m2 * l * l,
+            stroke_m: paper.stroke_m * l,
+            ..paper
+        };
+        let fluid = Fluid { bulk_modulus_pa: BETA * p, bulk_modulus_std_pa: 0.2e9 * p };
+        let samples = exact(20).map(|s| Sample {
+            x_m: s.x_m * l,
+            pa_pa: s.pa_pa * p,
+            pb_pa: s.pb_pa * p,
+            qa_m3s: s.qa_m3s.map(|q| q * volume),
+            qb_m3s: s.qb_m3s.map(|q| q * volume),
+            force_n: None,
+        });
+        let scaled: Rls<f64, 4> = estimate(cylinder, fluid, &sensors, samples);
+        for (one, other) in as_array(reference.leak_coefficients().zip(scaled.leak_coefficients())) {
+            let back = other.scaled(p / volume);
+            assert!((back.value - one.value).abs() < 1e-3 * one.std, "{back:?} and {one:?}");
+            assert!((back.std / one.std - 1.0).abs() < 1e-3);
+        }
+    }
+}
+
+/// Forgetting must not blow up: an hour of a cylinder at rest after a minute of motion.
+#[test]
+fn a_long_rest_lets_no_covariance_blow_up() {
+    let at_rest =
+        Sample { x_m: 0.1, pa_pa: 5e6, pb_pa: 5e6, qa_m3s: Some(4e-5), qb_m3s: Some(1e-5), force_n: None };
+    let samples = exact(60).chain(std::iter::repeat_n(at_rest, 360_000));
+    let rls: Rls<f64, 4> = estimate(Cylinder::paper(), fluid(), &Sensors::paper(), samples);
+    for coefficient in as_array(rls.leak_coefficients()) {
+        assert!(coefficient.std <= 1.01 * rls.leak_prior_std());
+        assert!(coefficient.value.abs() <= rls.leak_prior_std());
+    }
+    let report = rls.excitation(&ExcitationSettings::default());
+    assert!(!report.leaks.internal.identifiable, "P_L is zero: nothing drives the internal leak");
+    assert!(!report.bulk_modulus.identifiable);
+}
+
+/// A leak that starts within a trace is found within seconds, not after the forgetting time.
+#[test]
+fn a_sudden_leak_is_found_within_two_seconds() {
+    let cylinder = Cylinder::<f64>::paper();
+    let mut rls = Rls::<f64, 4>::new(cylinder, fluid(), &Sensors::paper(), RlsSettings::default());
+    let mut found_after_s = None;
+    for k in 0..9000 {
+        let t = f64::from(k) * 0.01;
+        let mut sample = reading(&cylinder, BETA, t);
+        if t >= 60.0 {
+            sample.qa_m3s = sample.qa_m3s.map(|q| q + 5e-12 * sample.pa_pa);
+        }
+        rls.update(0.01, &sample);
+        let off = (rls.leak_coefficients().external_a.value - LEAKS.external_a - 5e-12).abs();
+        if t >= 60.0 && off < 0.05 * 8e-12 {
+            found_after_s.get_or_insert(t - 60.0);
+        }
+    }
+    println!("found after {found_after_s:?} s");
+    assert!(found_after_s.is_some_and(|t| t < 5.0));
+}
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -10.0..10.0_f64,
+        3 => (-1.0..1.0_f64).prop_map(|v| v * 1e7),
+        2 => any::<f64>(),
+        1 => prop::sample::select(vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, f64::MAX, f64::MIN_POSITIVE]),
+    ]
+}
+
+prop_compose! {
+    fn any_sample()(
+        x in prop_oneof![0.0..0.2_f64, any_number()],
+        pa in any_number(), pb in any_number(),
+        qa in prop::option::of(prop_oneof![-1e-3..1e-3_f64, any_number()]),
+        qb in prop::option::of(prop_oneof![-1e-3..1e-3_f64, any_number()]),
+    ) -> Sample<f64> {
+        Sample { x_m: x, pa_pa: pa, pb_pa: pb, qa_m3s: qa, qb_m3s: qb, force_n: None }
+    }
+}
+
+fn all_finite<T: Real, const N: usize>(rls: &Rls<T, N>, detector: &mut LeakDetector<T>) -> bool {
+    let mut numbers = std::vec::Vec::new();
+    let mut take = |estimate: pitchleak_core::Estimate<T>| {
+        numbers.push(estimate.value);
+        numbers.push(estimate.std);
+    };
+    as_array(rls.leak_coefficients()).map(&mut take);
+    as_array(rls.mean_leak_flows_m3s()).map(&mut take);
+    rls.flow_offsets_m3s().map(&mut take);
+    rls.gains().map(&mut take);
+    take(rls.compressibility());
+    numbers.extend(rls.normalised_innovation());
+    detector.update(T::lit(0.25), &rls.mean_leak_flows_m3s());
+    numbers.iter().all(|n| n.is_finite())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// No NaN or infinity leaves the core, whatever goes in.
+    #[test]
+    fn nothing_but_numbers_leaves_the_core(
+        samples in prop::collection::vec((any_sample(), prop_oneof![3 => Just(0.01), 1 => any_number()]), 1..400),
+    ) {
+        let mut plain = Rls::<f64, 4>::new(Cylinder::paper(), fluid(), &Sensors::paper(), RlsSettings::default());
+        let mut gains = Rls::<f64, 9>::new(Cylinder::paper(), fluid(), &Sensors::paper(), RlsSettings::default());
+        let mut single = Rls::<f32, 6>::new(Cylinder::paper(), fluid(), &Sensors::paper(), RlsSettings::default());
+        let mut detector = LeakDetector::new(Default::default());
+        let mut detector_single = LeakDetector::new(Default::default());
+        for (sample, dt) in &samples {
+            plain.update(*dt, sample);
+            gains.update(*dt, sample);
+            single.update(*dt as f32, &narrow(sample));
+            prop_assert!(all_finite(&plain, &mut detector));
+            prop_assert!(all_finite(&gains, &mut detector));
+            prop_assert!(all_finite(&single, &mut detector_single));
+        }
+    }
+}
