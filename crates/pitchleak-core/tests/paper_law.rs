@@ -1,5 +1,7 @@
 //! Laws of the paper's estimator, eq. (6)–(13), on random states and rigs.
 
+#![allow(clippy::unwrap_used)]
+
 use pitchleak_core::{Cylinder, Fluid, PaperGains, PaperLaw, Sample, Theta, regressors};
 use proptest::prelude::*;
 

@@ -177,16 +177,13 @@ prop_compose! {
 }
 
 fn all_finite<T: Real, const N: usize>(rls: &Rls<T, N>, detector: &mut LeakDetector<T>) -> bool {
-    let mut numbers = std::vec::Vec::new();
-    let mut take = |estimate: pitchleak_core::Estimate<T>| {
-        numbers.push(estimate.value);
-        numbers.push(estimate.std);
-    };
-    as_array(rls.leak_coefficients()).map(&mut take);
-    as_array(rls.mean_leak_flows_m3s()).map(&mut take);
-    rls.flow_offsets_m3s().map(&mut take);
-    rls.gains().map(&mut take);
-    take(rls.compressibility());
+    let estimates = as_array(rls.leak_coefficients())
+        .into_iter()
+        .chain(as_array(rls.mean_leak_flows_m3s()))
+        .chain(rls.flow_offsets_m3s())
+        .chain(rls.gains())
+        .chain([rls.compressibility()]);
+    let mut numbers: Vec<T> = estimates.flat_map(|estimate| [estimate.value, estimate.std]).collect();
     numbers.extend(rls.normalised_innovation());
     detector.update(T::lit(0.25), &rls.mean_leak_flows_m3s());
     numbers.iter().all(|n| n.is_finite())
