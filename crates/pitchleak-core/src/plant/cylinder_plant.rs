@@ -241,7 +241,8 @@ impl<T: Real> CylinderPlant<T> {
         self.model.fluid.bulk_modulus_pa * (at_a / volume_a).max(at_b / volume_b)
     }
 
-    /// `next` brought back to what can exist, or `last` where a number was lost.
+    /// `next` brought back to what can exist, or `last` where a number was lost. Only here may oil
+    /// get lost: above a pressure of β, where neither the oil law nor the steel holds.
     pub(crate) fn limited(&self, next: CylinderState<T>, last: CylinderState<T>) -> CylinderState<T> {
         let or = |value: T, fallback: T| if value.is_finite() { value } else { fallback };
         let stroke = self.model.cylinder.stroke_m;
