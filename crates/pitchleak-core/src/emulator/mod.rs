@@ -6,7 +6,9 @@ mod state;
 
 pub use controller::Gains;
 
-use crate::plant::{CylinderPlant, LeakFlows, PlantError, Supply, Valve, number_or_zero, substeps};
+use crate::plant::{
+    CylinderPlant, CylinderState, LeakFlows, PlantError, Supply, Valve, number_or_zero, substeps,
+};
 use crate::{Cylinder, EffectSet, Leaks, Model, Moment, Real, rk4_step};
 use state::State;
 
@@ -84,9 +86,10 @@ impl<T: Real> EmulatorParams<T> {
         let bypass = Leaks { internal_m3spa: T::lit(2e-11) * scale, ..Leaks::default() };
         let load = CylinderPlant::new(Model { cylinder: load_cylinder, fluid: model.fluid, leaks: bypass })?;
         let supply = Supply { pump_flow_m3s: supply.pump_flow_m3s * scale, ..supply };
+        let drop = supply.relief_pressure_pa / T::lit(3.0);
         let params = Self {
-            pitch: Axis { plant, valve, gains: position_gains(&cylinder, &valve, &supply) },
-            load: Axis { plant: load, valve, gains: force_gains(&load.model, &valve, &supply) },
+            pitch: Axis { plant, valve, gains: position_gains(&cylinder, &valve, drop) },
+            load: Axis { plant: load, valve, gains: force_gains(&load.model, &valve, drop) },
             supply,
             internal_step_s: T::lit(1e-4),
         };
@@ -114,22 +117,21 @@ impl<T: Real> EmulatorParams<T> {
     }
 }
 
-/// Piston speed per valve command with a third of the supply pressure over each edge, m/s.
-fn speed_gain_mps<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, supply: &Supply<T>) -> T {
-    let drop = supply.relief_pressure_pa / T::lit(3.0);
-    valve.rated_flow_m3s * (drop / valve.rated_drop_pa).sqrt() / cylinder.area_a_m2
+/// Piston speed per valve command with this drop over each edge, m/s.
+fn speed_gain_mps<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, drop_pa: T) -> T {
+    valve.rated_flow_m3s * (drop_pa / valve.rated_drop_pa).sqrt() / cylinder.area_a_m2
 }
 
 /// Position loop crossing over at a tenth of the valve's bandwidth, reset time five radians of it.
-fn position_gains<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, supply: &Supply<T>) -> Gains<T> {
+fn position_gains<T: Real>(cylinder: &Cylinder<T>, valve: &Valve<T>, drop_pa: T) -> Gains<T> {
     let crossover = T::lit(0.1 * core::f64::consts::TAU) * valve.bandwidth_hz;
-    let proportional = crossover / speed_gain_mps(cylinder, valve, supply);
+    let proportional = crossover / speed_gain_mps(cylinder, valve, drop_pa);
     Gains { proportional, integral_ps: proportional * crossover / T::lit(5.0), derivative_s: T::zero() }
 }
 
-/// Force loop of the same crossover, for the load cylinder at mid-stroke: its oil spring
+/// Force loop of four times that crossover, for the load cylinder at mid-stroke: its oil spring
 /// integrates the flow, and its reset time cancels the lag of the oil behind the bypass.
-fn force_gains<T: Real>(model: &Model<T>, valve: &Valve<T>, supply: &Supply<T>) -> Gains<T> {
+fn force_gains<T: Real>(model: &Model<T>, valve: &Valve<T>, drop_pa: T) -> Gains<T> {
     let cylinder = &model.cylinder;
     let middle = cylinder.stroke_m / T::lit(2.0);
     let stiffness = |volume: T| model.fluid.bulk_modulus_pa / volume;
@@ -138,8 +140,8 @@ fn force_gains<T: Real>(model: &Model<T>, valve: &Valve<T>, supply: &Supply<T>) 
     let (a, b) = (cylinder.area_a_m2, cylinder.area_b_m2);
     let spring = a * a * oil_a + b * b * oil_b;
     let bypass_ps = model.leaks.internal_m3spa * (oil_a + oil_b);
-    let crossover = T::lit(0.1 * core::f64::consts::TAU) * valve.bandwidth_hz;
-    let proportional = crossover / (speed_gain_mps(cylinder, valve, supply) * spring);
+    let crossover = T::lit(0.4 * core::f64::consts::TAU) * valve.bandwidth_hz;
+    let proportional = crossover / (speed_gain_mps(cylinder, valve, drop_pa) * spring);
     Gains { proportional, integral_ps: proportional * bypass_ps, derivative_s: T::zero() }
 }
 
@@ -225,29 +227,25 @@ impl<T: Real> Emulator<T> {
         }
     }
 
-    /// One tick of both controllers. Either valve is fed forward the flow that the reference's
+    /// One tick of both controllers. Either valve is fed forward the opening that the reference's
     /// speed takes; the load cylinder gives way with the piston.
     fn control(&mut self, tick: T, speed_reference: T) {
-        let EmulatorParams { pitch, load, supply, .. } = &self.params;
-        let v_mps = self.state.pitch.v_mps;
+        let EmulatorParams { pitch, load, .. } = &self.params;
         let position_error = self.position_reference_m - self.state.pitch.x_m;
         let load_error = self.load_reference_n - self.state.load_force_n(&self.params);
-        let feed = |axis: &Axis<T>, speed: T| {
-            speed / speed_gain_mps(&axis.plant.model.cylinder, &axis.valve, supply)
-        };
         let pitch_command = pitch.gains.command(
             &mut self.position_integral,
             tick,
             position_error,
-            speed_reference - v_mps,
-            feed(pitch, speed_reference),
+            speed_reference - self.state.pitch.v_mps,
+            pitch.opening(&self.state.pitch, self.state.supply_pa, speed_reference),
         );
         let load_command = load.gains.command(
             &mut self.load_integral,
             tick,
             load_error,
             T::zero(),
-            feed(load, -speed_reference),
+            load.opening(&self.state.load(&self.params), self.state.supply_pa, -speed_reference),
         );
         self.commands = [pitch_command, load_command];
     }
@@ -265,6 +263,15 @@ impl<T: Real> Emulator<T> {
 }
 
 impl<T: Real> Axis<T> {
+    /// Valve command for a piston speed at the pressures of the moment, half of what supply and
+    /// load leave over each edge.
+    fn opening(&self, cylinder: &CylinderState<T>, supply_pa: T, speed_mps: T) -> T {
+        let (pa_pa, pb_pa) = self.plant.pressures_pa(cylinder);
+        let load_pa = if speed_mps >= T::zero() { pa_pa - pb_pa } else { pb_pa - pa_pa };
+        let drop = ((supply_pa - load_pa) / T::lit(2.0)).max(self.valve.laminar_drop_pa);
+        speed_mps / speed_gain_mps(&self.plant.model.cylinder, &self.valve, drop)
+    }
+
     /// The nearest position between the end stops.
     fn clamped_m(&self, position_m: T) -> T {
         let (stroke, gap) = (self.plant.model.cylinder.stroke_m, self.plant.end_stop.gap_m);

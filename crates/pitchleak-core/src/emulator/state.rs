@@ -151,7 +151,7 @@ impl<T: Real> State<T> {
     }
 
     /// The load cylinder as a cylinder of its own.
-    fn load(&self, params: &EmulatorParams<T>) -> CylinderState<T> {
+    pub fn load(&self, params: &EmulatorParams<T>) -> CylinderState<T> {
         let [oil_a_m3, oil_b_m3] = self.load_oil_m3;
         let stroke = params.load.plant.model.cylinder.stroke_m;
         CylinderState { x_m: stroke - self.pitch.x_m, v_mps: -self.pitch.v_mps, oil_a_m3, oil_b_m3 }

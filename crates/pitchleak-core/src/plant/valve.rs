@@ -36,15 +36,15 @@ pub struct ValveFlows<T> {
 }
 
 impl<T: Real> Valve<T> {
-    /// A valve that fits the paper's cylinder: 20 L/min at 35 bar per edge, 50 Hz, edges in the
-    /// ratio of the piston areas.
+    /// A valve that fits the paper's cylinder: 20 L/min at 35 bar per edge, 50 Hz, 3 % underlap,
+    /// edges in the ratio of the piston areas.
     pub fn paper() -> Self {
         Self {
             rated_flow_m3s: T::lit(20.0 / 60_000.0),
             rated_drop_pa: T::lit(3.5e6),
             bandwidth_hz: T::lit(50.0),
             damping: T::lit(0.8),
-            underlap: T::lit(0.01),
+            underlap: T::lit(0.03),
             area_ratio_b: T::lit(0.746),
             laminar_drop_pa: T::lit(1e5),
         }
