@@ -12,17 +12,26 @@
 //! Time and memory per sample are constant; nothing is ever differentiated.
 
 mod balance;
+mod balance_memory;
+mod estimates;
 mod information;
+mod noise;
 mod odometer;
 mod parameter;
+mod pressure_means;
+mod prior;
 mod surprise;
 mod weights;
 
-use crate::{Cylinder, Estimate, Fluid, PerLeak, Real, Sample, Sensors};
+use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use balance::{Integrals, combine};
+use balance_memory::BalanceMemory;
 use information::{BlockSums, Information, Solution};
+use noise::NoiseStd;
 use odometer::Odometer;
 pub use parameter::Parameter;
+use pressure_means::PressureMeans;
+use prior::prior_spread;
 use surprise::{NoiseMeter, Surprise};
 use weights::Weights;
 
@@ -57,35 +66,6 @@ pub enum Update {
     Rejected,
 }
 
-/// Standard deviations of the sensors' white noise, kept above zero.
-#[derive(Clone, Copy, Debug)]
-struct NoiseStd<T> {
-    flow_a_m3s: T,
-    flow_b_m3s: T,
-    pressure_pa: T,
-    position_m: T,
-}
-
-impl<T: Real> NoiseStd<T> {
-    /// A perfect sensor does not exist: its resolution is at least a millionth of the range.
-    fn of(sensors: &Sensors<T>, cylinder: &Cylinder<T>) -> Self {
-        let millionth = T::lit(1e-6);
-        let flow_floor = millionth * cylinder.area_a_m2 * cylinder.stroke_m;
-        Self {
-            flow_a_m3s: sensors.flow_a.noise_std.max(flow_floor),
-            flow_b_m3s: sensors.flow_b.noise_std.max(flow_floor),
-            pressure_pa: sensors.pressure.noise_std.max(T::one()),
-            position_m: sensors.position.noise_std.max(millionth * cylinder.stroke_m),
-        }
-    }
-
-    /// Variance of a chamber equation's error: flow noise, and the chamber's own and the other's
-    /// pressure noise through the leaks.
-    fn chamber_variance(&self, flow_std: T, own: T, cross: T) -> T {
-        flow_std * flow_std + self.pressure_pa * self.pressure_pa * (own * own + cross * cross)
-    }
-}
-
 /// Recursive generalised least squares on both chambers, with N parameters:
 /// - N = 4: 1/β and the three leak coefficients;
 /// - N = 6: also the offsets of the two flow meters;
@@ -115,35 +95,6 @@ pub struct Rls<T, const N: usize> {
     solution: Solution<T, N>,
     surprise: Surprise<T>,
     pressures: PressureMeans<T>,
-}
-
-/// Last whitened balance and its weight on the next: the pressure noise at a block's end stands in two
-/// blocks with opposite sign (a moving average of order 1, inverted recursively).
-#[derive(Clone, Copy, Debug)]
-struct BalanceMemory<T, const N: usize> {
-    left: T,
-    columns: [T; N],
-    /// Variance of the stored oil's pressure noise at the block's end.
-    stored: T,
-    /// Variance of the block's innovation.
-    variance: T,
-}
-
-impl<T: Real, const N: usize> BalanceMemory<T, N> {
-    /// Share of this block's innovation that is expected to come back in the next.
-    fn share(&self) -> T {
-        self.stored / self.variance
-    }
-}
-
-/// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
-/// block's mean, so that sensor noise does not count as pressure.
-#[derive(Clone, Copy, Debug, Default)]
-struct PressureMeans<T> {
-    time: T,
-    load: T,
-    a: T,
-    b: T,
 }
 
 impl<T: Real, const N: usize> Rls<T, N> {
@@ -388,145 +339,4 @@ impl<T: Real, const N: usize> Rls<T, N> {
             && flow_ok(sample.qa_m3s)
             && flow_ok(sample.qb_m3s)
     }
-
-    /// Estimate of a parameter's deviation from its prior mean, SI; zero with no spread where N is too
-    /// small to have it.
-    fn parameter(&self, parameter: Parameter) -> Estimate<T> {
-        let index = parameter as usize;
-        match (self.solution.mean.get(index), self.scale.get(index)) {
-            (Some(mean), Some(scale)) => {
-                Estimate { value: *mean * *scale, std: self.covariance(parameter, parameter).sqrt() * *scale }
-            }
-            _ => Estimate::default(),
-        }
-    }
-
-    /// Covariance of two parameters' errors, each in units of its prior's standard deviation; not below
-    /// what the residuals show. Zero where N is too small to have them.
-    pub fn covariance(&self, a: Parameter, b: Parameter) -> T {
-        let row = self.solution.covariance.get(a as usize);
-        let entry = row.and_then(|row| row.get(b as usize));
-        entry.map_or(T::zero(), |entry| *entry * self.surprise.inflation())
-    }
-
-    /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means
-    /// that the model lacks an effect.
-    pub fn leak_coefficients(&self) -> PerLeak<Estimate<T>> {
-        PerLeak {
-            internal: self.parameter(Parameter::Internal),
-            external_a: self.parameter(Parameter::ExternalA),
-            external_b: self.parameter(Parameter::ExternalB),
-        }
-    }
-
-    /// Compressibility κ = 1/β, 1/Pa.
-    pub fn compressibility(&self) -> Estimate<T> {
-        let deviation = self.parameter(Parameter::Compressibility);
-        Estimate { value: deviation.value + self.compressibility, std: deviation.std }
-    }
-
-    /// Offsets of the flow meters A and B, m³/s (reading minus truth); zero where N < 6.
-    pub fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
-        [self.parameter(Parameter::OffsetA), self.parameter(Parameter::OffsetB)]
-    }
-
-    /// Scale errors of flow meter A, flow meter B and the position sensor, as shares; zero where N < 9.
-    pub fn gains(&self) -> [Estimate<T>; 3] {
-        [
-            self.parameter(Parameter::GainA),
-            self.parameter(Parameter::GainB),
-            self.parameter(Parameter::GainPosition),
-        ]
-    }
-
-    /// Prior standard deviations of the leak coefficients, m³/(s·Pa).
-    pub fn leak_prior_std(&self) -> T {
-        self.scale[Parameter::Internal as usize]
-    }
-
-    /// Prior standard deviation of the compressibility, 1/Pa.
-    pub fn compressibility_prior_std(&self) -> T {
-        self.scale[Parameter::Compressibility as usize]
-    }
-
-    /// Mean leak flows over the memory, m³/s, by eq. (15): coefficient times mean |P_L|, P_A, P_B. A
-    /// declared pressure bias widens them.
-    pub fn mean_leak_flows_m3s(&self) -> PerLeak<Estimate<T>> {
-        let root_two = T::lit(core::f64::consts::SQRT_2);
-        let bias = self.pressure_bias_pa;
-        let biases = PerLeak { internal: root_two * bias, external_a: bias, external_b: bias };
-        self.leak_coefficients().zip(self.pressures.means()).zip(biases).map(|((c, pressure), bias)| {
-            Estimate { value: c.value * pressure, std: (c.std * pressure).hypot(c.value * bias) }
-        })
-    }
-
-    /// Means of |P_L|, P_A, P_B over the memory, Pa.
-    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
-        self.pressures.means()
-    }
-
-    /// Normalised innovation squared of the balance and of the odometer: 1 where the declared noise and
-    /// the model explain the data, above where they do not (Bar-Shalom, Li, Kirubarajan, Estimation with
-    /// Applications to Tracking and Navigation, §5.4).
-    pub fn normalised_innovation(&self) -> [T; 2] {
-        self.surprise.ratios()
-    }
-}
-
-impl<T: Real> PressureMeans<T> {
-    fn add_block(&mut self, block: &Integrals<T>, keep: T) {
-        self.forget(keep);
-        self.time += block.time;
-        self.load += (block.a.pressure - block.b.pressure).abs();
-        self.a += block.a.pressure;
-        self.b += block.b.pressure;
-    }
-
-    fn forget(&mut self, keep: T) {
-        self.time *= keep;
-        self.load *= keep;
-        self.a *= keep;
-        self.b *= keep;
-    }
-
-    fn means(&self) -> PerLeak<T> {
-        let per_time = if self.time > T::zero() { T::one() / self.time } else { T::zero() };
-        PerLeak {
-            internal: self.load * per_time,
-            external_a: self.a * per_time,
-            external_b: self.b * per_time,
-        }
-    }
-}
-
-/// Prior standard deviation of each parameter, SI. A leak that would empty the cylinder in a tenth of a
-/// second at 1 MPa is the widest that anyone could overlook.
-fn prior_spread<T: Real, const N: usize>(
-    cylinder: &Cylinder<T>,
-    fluid: &Fluid<T>,
-    sensors: &Sensors<T>,
-) -> [T; N] {
-    let tiny = T::lit(1e-9);
-    let leak = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(1e-5);
-    let relative = (fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa).max(T::lit(1e-6));
-    let flow_floor = tiny * cylinder.area_a_m2 * cylinder.stroke_m;
-    // A biased pressure leaks a constant flow more or less: the offset takes it up.
-    let through_leak = T::lit(1e-4) * leak * T::lit(50.0) * sensors.pressure.bias_std;
-    let offset = |bias: T| bias.hypot(through_leak).max(flow_floor);
-    let all = [
-        relative / fluid.bulk_modulus_pa,
-        leak,
-        leak,
-        leak,
-        offset(sensors.flow_a.bias_std),
-        offset(sensors.flow_b.bias_std),
-        sensors.flow_a.gain_std.max(tiny),
-        sensors.flow_b.gain_std.max(tiny),
-        sensors.position.gain_std.max(tiny),
-    ];
-    let mut spread = [T::zero(); N];
-    for (s, value) in spread.iter_mut().zip(all) {
-        *s = value;
-    }
-    spread
 }

@@ -1,4 +1,4 @@
-use super::NoiseStd;
+use super::noise::NoiseStd;
 use crate::{Cylinder, PerLeak, Real};
 
 /// How the two continuity equations of one instant are combined.

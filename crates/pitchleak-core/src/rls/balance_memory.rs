@@ -1,0 +1,20 @@
+use crate::Real;
+
+/// Last whitened balance and its weight on the next: the pressure noise at a block's end stands in two
+/// blocks with opposite sign (a moving average of order 1, inverted recursively).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BalanceMemory<T, const N: usize> {
+    pub left: T,
+    pub columns: [T; N],
+    /// Variance of the stored oil's pressure noise at the block's end.
+    pub stored: T,
+    /// Variance of the block's innovation.
+    pub variance: T,
+}
+
+impl<T: Real, const N: usize> BalanceMemory<T, N> {
+    /// Share of this block's innovation that is expected to come back in the next.
+    pub fn share(&self) -> T {
+        self.stored / self.variance
+    }
+}
