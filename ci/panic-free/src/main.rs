@@ -8,9 +8,14 @@
 use core::ptr::{read_volatile, write_volatile};
 
 use pitchleak_core::{
-    AlarmSettings, AlarmState, Cylinder, Excitation, ExcitationSettings, Fluid, LeakDetector, LoadEstimator,
-    Momentum, PaperGains, PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
-    force_imbalance_n, regressors,
+    AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Excitation, ExcitationSettings,
+    Fluid, LeakDetector, Linkage, LoadEstimator, Model, Moment, Momentum, PaperEstimator, PaperGains,
+    PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
+    effects::Shape,
+    emulator::{Emulator, EmulatorParams},
+    force_imbalance_n,
+    plant::{CylinderPlant, Drive},
+    regressors,
 };
 
 unsafe extern "C" {
@@ -87,6 +92,53 @@ fn law<T: Real>() {
     }
 }
 
+#[inline(never)]
+fn paper_chain<T: Real>() {
+    let gains =
+        PaperGains::scaled(&any(Cylinder::paper()), &any(Fluid::paper()), any(T::one()), any(T::one()));
+    let chain =
+        PaperEstimator::new(any(Cylinder::paper()), any(Fluid::paper()), gains, any(T::one()), any(T::one()));
+    if let Ok(mut chain) = chain {
+        while any(true) {
+            keep((chain.update(any(T::one()), &any_sample()), chain.leak_coefficients()));
+        }
+    }
+}
+
+#[inline(never)]
+fn filter_and_linkage<T: Real>() {
+    if let Ok(mut filter) = Butterworth::new(any(T::one()), any(T::lit(100.0))) {
+        keep(filter.update(any(T::one())));
+    }
+    let linkage: Linkage<T> = any(Linkage::paper());
+    keep((linkage.position_m(any(T::one())), linkage.pitch_rad(any(T::one())), linkage.check()));
+    keep((linkage.torque_nm(any(T::one()), any(T::one())), linkage.force_n(any(T::one()), any(T::one()))));
+}
+
+#[inline(never)]
+fn plant_and_emulator<T: Real>() {
+    let model: Model<T> = any(Model::paper());
+    let mut effects = EffectSet::default();
+    for effect in Effect::ALL {
+        keep(effects.set(any(*effect), any(T::one()), any(Shape::default())));
+    }
+    let moment: Moment<T> = any(Moment::default());
+    keep((effects.read(&moment), effects.correct(&moment), model.residual(&moment)));
+    if let Ok(plant) = CylinderPlant::new(model) {
+        let state = plant.state_at(any(T::one()), any(T::one()), any(T::one()), any(T::one()));
+        let drive = any(Drive { qa_m3s: T::one(), qb_m3s: T::one(), force_n: T::one() });
+        keep(plant.step(&state, any(T::one()), |_| drive));
+    }
+    let Ok(params) = EmulatorParams::for_model(model) else { return };
+    if let Ok(mut emulator) = Emulator::new(params, any(T::one()), any(T::one())) {
+        emulator.set_effects(effects);
+        while any(true) {
+            keep(emulator.step(any(T::one()), any(T::one()), any(T::one())).is_ok());
+            keep(emulator.reading());
+        }
+    }
+}
+
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
     loop {
@@ -100,5 +152,11 @@ extern "C" fn _start() -> ! {
         rls::<f64, 9>();
         law::<f32>();
         law::<f64>();
+        paper_chain::<f32>();
+        paper_chain::<f64>();
+        filter_and_linkage::<f32>();
+        filter_and_linkage::<f64>();
+        plant_and_emulator::<f32>();
+        plant_and_emulator::<f64>();
     }
 }

@@ -123,7 +123,7 @@ impl<T: Real> Channel<T> {
 /// Half width of the confidence sequence around an estimate of spread `std`, same unit.
 fn confidence_half_width<T: Real>(std: T, threshold: T, alpha: T) -> T {
     let r = (threshold / std).powi(2);
-    let bound = (T::one() + r.recip()) * (r.ln_1p() - T::lit(2.0) * alpha.ln());
+    let bound = (T::one() + r.recip()) * (r.libm_ln_1p() - T::lit(2.0) * alpha.libm_ln());
     if bound.is_finite() && bound > T::zero() { std * bound.sqrt() } else { T::infinity() }
 }
 

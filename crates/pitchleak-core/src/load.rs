@@ -23,7 +23,7 @@ impl<T: Real> LoadEstimator<T> {
 
     /// Takes a reading `dt_s` after the one before; returns the load F, N, against extension.
     pub fn update(&mut self, cylinder: &Cylinder<T>, dt_s: T, sample: &Sample<T>) -> T {
-        let discount = (-dt_s / self.memory_s).exp();
+        let discount = (-dt_s / self.memory_s).libm_exp();
         let acceleration = self.position.update(discount, dt_s, sample.x_m).curvature;
         let force = self.force.update(discount, dt_s, hydraulic_force_n(cylinder, sample)).value;
         force - cylinder.moving_mass_kg * acceleration

@@ -71,7 +71,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let bias = self.pressure_bias_pa;
         let biases = PerLeak { internal: root_two * bias, external_a: bias, external_b: bias };
         self.leak_coefficients().zip(self.pressures.means()).zip(biases).map(|((c, pressure), bias)| {
-            Estimate { value: c.value * pressure, std: (c.std * pressure).hypot(c.value * bias) }
+            Estimate { value: c.value * pressure, std: (c.std * pressure).libm_hypot(c.value * bias) }
         })
     }
 

@@ -14,7 +14,7 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
     // A biased pressure drives a leak a little more or less all the time, which looks like an offset of the
     // flow meter: a leak that empties the cylinder in 20 s at 1 MPa is the usual worst.
     let through_leak = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(5e-8) * sensors.pressure.bias_std;
-    let offset = |bias: T| bias.hypot(through_leak).max(flow_floor);
+    let offset = |bias: T| bias.libm_hypot(through_leak).max(flow_floor);
     let all = [
         relative / fluid.bulk_modulus_pa,
         leak,
