@@ -5,6 +5,7 @@ pub use pitchleak_core as core;
 
 pub mod cramer_rao;
 pub mod curve;
+pub mod diagnose;
 pub mod figure;
 pub mod openfast;
 pub mod reference;

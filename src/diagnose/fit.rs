@@ -1,0 +1,289 @@
+//! The declared model and the effects found so far, fitted to all traces at once.
+//!
+//! Gauss–Newton on the generalised least-squares criterion: rows are rebuilt around the last estimate,
+//! with sensor effects undone on the readings. Columns that carry the residual's own noise are corrected
+//! for it (errors in variables: Söderström 2018, "Errors-in-Variables Methods in System Identification").
+
+use super::noise::{SharedNoise, Spread, Whitening};
+use super::point::Point;
+use super::regression::{self, FOLDS, Prior, Regression, Score, Solution};
+use super::rows::{Balance, Recipe, Rows};
+use super::series::Series;
+use super::term::{self, Term};
+use super::{Declared, Progress, whiteness};
+use pitchleak_core::effects::Shape;
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Sensors};
+
+/// Usual length of a block, s: short against the machine's motion, long against a sample.
+const BLOCK_S: f64 = 0.1;
+/// Rounds of Gauss–Newton from scratch, and after a small change.
+const FIRST_ROUNDS: usize = 4;
+const NEXT_ROUNDS: usize = 3;
+
+/// Realisations of sensor noise whose mean products correct the columns that carry it.
+const NOISE_DRAWS: u64 = 4;
+/// What is left counts as noise unless its size is rarer than this.
+const CHANCE: f64 = 2e-4;
+/// A term held at a value has this share of its own standard deviation as prior.
+const HELD: f64 = 1e-4;
+
+/// A fit, and what it takes to fit again with one more effect.
+pub(super) struct Fit<'a> {
+    pub(super) traces: &'a [Series],
+    pub(super) sensors: Sensors<f64>,
+    pub(super) terms: Vec<Term>,
+    pub(super) shapes: Vec<Shape<f64>>,
+    pub(super) priors: Vec<Option<Prior>>,
+    /// Terms that are fitted, those of the declared model first.
+    pub(super) active: Vec<usize>,
+    pub(super) point: Point,
+    pub(super) rows: Rows,
+    pub(super) regression: Regression,
+    pub(super) solution: Solution,
+    /// Variance by balance of what the model cannot explain, m⁶/s² and N²: zero while what is left can be
+    /// the sensors' noise.
+    pub(super) equation_error: [f64; 3],
+    whitening: Whitening,
+}
+
+impl<'a> Fit<'a> {
+    /// Best fit of the declared model.
+    pub(super) fn declared(
+        traces: &'a [Series],
+        declared: &Declared,
+        sensors: Sensors<f64>,
+        shape: Shape<f64>,
+        progress: Progress<'_>,
+    ) -> Self {
+        let terms = term::all();
+        let priors = terms.iter().map(|term| prior(*term, declared)).collect::<Vec<_>>();
+        let is_declared = |i: &usize| term::DECLARED.contains(&terms[*i]) || priors[*i].is_some();
+        let active = (0..terms.len()).filter(is_declared).collect();
+        let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks: Leaks::default() };
+        let point = Point { model, effects: EffectSet::default() };
+        let shapes = vec![shape; terms.len()];
+        let rows = Rows { rows: vec![], entries: vec![], y: vec![], columns: vec![] };
+        let equation_error = [0.0; 3];
+        let whitening = Whitening::new(&rows, &Spread { point: &point, sensors: &sensors, equation_error });
+        let regression = Regression::new(&rows, &whitening, &[]);
+        let solution = regression.solve(&[], &priors);
+        let mut fit = Self {
+            traces,
+            sensors,
+            terms,
+            shapes,
+            priors,
+            active,
+            point,
+            rows,
+            regression,
+            solution,
+            equation_error,
+            whitening,
+        };
+        for _ in 0..FIRST_ROUNDS {
+            progress();
+            fit.round();
+        }
+        fit
+    }
+
+    /// Fits again after `active` or a shape has changed.
+    pub(super) fn refit(&mut self, progress: Progress<'_>) {
+        for _ in 0..NEXT_ROUNDS {
+            progress();
+            self.round();
+        }
+    }
+
+    /// Moves the point to the last solution and solves around it.
+    fn round(&mut self) {
+        self.move_point();
+        let rows = Rows::build(self.traces, &self.recipe(&self.terms, &self.shapes));
+        let equation_error = self.equation_error;
+        let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
+        self.whitening = Whitening::new(&rows, &spread);
+        let shared: Vec<_> =
+            (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&rows, &spread, &self.terms, number)).collect();
+        self.regression = Regression::new(&rows, &self.whitening, &shared);
+        self.solution = self.regression.solve(&self.active, &self.increments());
+        if self.is_incomplete() {
+            let spread = self.regression.jackknife(&self.active, &self.increments());
+            self.solution.std.iter_mut().zip(spread).for_each(|(std, wide)| *std = std.max(wide));
+        }
+        self.equation_error = self.updated_error(&rows, &spread);
+        self.rows = rows;
+    }
+
+    /// Equation error with which what is left would be as large as the noise says: the variance
+    /// component of an incomplete model, so that neither priors nor weak effects are overrun by it.
+    fn updated_error(&self, rows: &Rows, spread: &Spread<'_>) -> [f64; 3] {
+        Balance::ALL.map(|balance| {
+            let left = self.regression.innovations(rows, &self.solution, balance);
+            let Some(entry) = rows.entries.iter().find(|entry| entry.balance == balance) else { return 0.0 };
+            let old = spread.equation_error[balance.index()];
+            let by_chance = whiteness::level_p(&left).is_none_or(|p| p > CHANCE);
+            if left.is_empty() || (old <= 0.0 && by_chance) {
+                return old;
+            }
+            let level = left.iter().map(|e| e * e).sum::<f64>() / left.len() as f64;
+            (old + (level - 1.0) * spread.white_variance(&rows.rows[entry.row], balance)).max(0.0)
+        })
+    }
+
+    /// Whether more is left than the sensors' noise.
+    pub(super) fn is_incomplete(&self) -> bool {
+        self.equation_error.iter().any(|error| *error > 0.0)
+    }
+
+    /// Size of what is left in a balance as a multiple of the noise that the sensors bring.
+    pub(super) fn excess(&self, balance: Balance) -> f64 {
+        let of = |equation_error| {
+            let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
+            let entry = self.rows.entries.iter().find(|entry| entry.balance == balance);
+            entry.map_or(1.0, |entry| spread.white_variance(&self.rows.rows[entry.row], balance))
+        };
+        (of(self.equation_error) / of([0.0; 3])).sqrt()
+    }
+
+    fn move_point(&mut self) {
+        let found: Vec<(usize, f64)> =
+            self.solution.terms.iter().copied().zip(self.solution.value.iter().copied()).collect();
+        for (term, increment) in found {
+            let value = self.point.value(self.terms[term]) + increment;
+            self.point.set(self.terms[term], value, &self.shapes[term]);
+        }
+    }
+
+    pub(super) fn recipe<'b>(&'b self, terms: &'b [Term], shapes: &'b [Shape<f64>]) -> Recipe<'b> {
+        Recipe { point: &self.point, sensors: &self.sensors, terms, shapes, block_s: BLOCK_S }
+    }
+
+    /// The priors as increments from the point.
+    pub(super) fn increments(&self) -> Vec<Option<Prior>> {
+        let at = |(prior, term): (&Option<Prior>, &Term)| {
+            prior.map(|prior| Prior { mean: prior.mean - self.point.value(*term), ..prior })
+        };
+        self.priors.iter().zip(&self.terms).map(at).collect()
+    }
+
+    /// Value and standard deviation of a fitted term.
+    pub(super) fn estimate(&self, term: usize) -> Option<(f64, f64)> {
+        let at = self.solution.terms.iter().position(|t| *t == term)?;
+        Some((self.point.value(self.terms[term]) + self.solution.value[at], self.solution.std[at]))
+    }
+
+    /// How much larger the remainder is than the declared noise: 1 for a model that is complete.
+    pub(super) fn dispersion(&self, chi2: f64) -> f64 {
+        (chi2 / self.regression.count().max(1) as f64).max(1.0)
+    }
+
+    /// What one further term would bring; none where it can't be or would be unphysical.
+    pub(super) fn score(&self, term: usize) -> Option<Score> {
+        let score = self.regression.score(&self.solution, term)?;
+        self.allowed(&score).then_some(score)
+    }
+
+    /// The same for another shape of the term's effect.
+    pub(super) fn score_shape(&self, term: usize, shape: Shape<f64>) -> Option<Score> {
+        let (terms, shapes) = ([self.terms[term]], [shape]);
+        let rows = Rows::build(self.traces, &self.recipe(&terms, &shapes));
+        let column = rows.columns.first()?;
+        let score = self.regression.score_column(&self.solution, term, self.whitening.whiten(column))?;
+        self.allowed(&score).then_some(score)
+    }
+
+    pub(super) fn allowed(&self, score: &Score) -> bool {
+        let (lower, upper) = self.terms[score.term].bounds();
+        (lower..=upper).contains(&score.value)
+    }
+
+    /// The fit with one effect held at zero: no new pass over the data.
+    pub(super) fn solve_without(&self, term: usize) -> Solution {
+        let mut priors = self.increments();
+        let mean = -self.point.value(self.terms[term]);
+        priors[term] = self.estimate(term).map(|(_, std)| Prior { mean, std: HELD * std });
+        self.regression.solve(&self.active, &priors)
+    }
+
+    /// Takes an effect out again.
+    pub(super) fn remove(&mut self, term: usize) {
+        self.active.retain(|t| *t != term);
+        let at = self.solution.terms.iter().position(|t| *t == term);
+        if let Some(at) = at {
+            self.solution.value[at] = -self.point.value(self.terms[term]);
+        }
+    }
+
+    /// What is left of each entry when its fold is not fitted, in the balance's unit.
+    pub(super) fn held_out_leftover(&self) -> Vec<f64> {
+        let priors = self.increments();
+        let mut left = vec![0.0; self.rows.y.len()];
+        for fold in 0..FOLDS {
+            let solution = self.regression.solve_without(fold, &self.active, &priors);
+            for (i, value) in regression::leftover(&self.rows, &solution).into_iter().enumerate() {
+                if self.regression.fold_of(i) == fold {
+                    left[i] = value;
+                }
+            }
+        }
+        self.in_units(&self.rows, left)
+    }
+
+    /// What is left of traces that were not fitted.
+    pub(super) fn judge(&self, traces: &[Series]) -> (Rows, Vec<f64>) {
+        let mut point = self.point.clone();
+        for (term, increment) in self.solution.terms.iter().zip(&self.solution.value) {
+            let value = point.value(self.terms[*term]) + increment;
+            point.set(self.terms[*term], value, &self.shapes[*term]);
+        }
+        let recipe =
+            Recipe { point: &point, sensors: &self.sensors, terms: &[], shapes: &[], block_s: BLOCK_S };
+        let rows = Rows::build(traces, &recipe);
+        let left = rows.y.clone();
+        let left = self.in_units(&rows, left);
+        (rows, left)
+    }
+
+    /// From integrals over a hat to averages. While the piston stands, dry friction is whatever
+    /// balances the forces up to its own size: only what is beyond counts.
+    fn in_units(&self, rows: &Rows, mut left: Vec<f64>) -> Vec<f64> {
+        let coulomb = self.terms.iter().position(|t| *t == Term::Effect(Effect::CoulombFriction));
+        let friction = coulomb.and_then(|term| self.estimate(term)).map_or(0.0, |(value, _)| value.max(0.0));
+        for (cell, entry) in left.iter_mut().zip(&rows.entries) {
+            let row = &rows.rows[entry.row];
+            *cell /= row.block_s;
+            if entry.balance == Balance::Force {
+                let free = (cell.abs() - friction * row.stuck).max(0.0);
+                *cell = cell.signum() * free;
+            }
+        }
+        left
+    }
+}
+
+fn prior(term: Term, declared: &Declared) -> Option<Prior> {
+    let spread = |std: f64| (std > 0.0).then_some(Prior { mean: 0.0, std });
+    let sensors = &declared.sensors;
+    match term {
+        Term::InverseBulk => {
+            let bulk = declared.fluid.bulk_modulus_pa;
+            let share = (declared.fluid.bulk_modulus_std_pa / bulk).max(1e-6);
+            Some(Prior { mean: 1.0 / bulk, std: share / bulk })
+        }
+        Term::Effect(effect) => match effect {
+            Effect::FlowMeterOffsetA => spread(sensors.flow_a.bias_std),
+            Effect::FlowMeterOffsetB => spread(sensors.flow_b.bias_std),
+            Effect::FlowMeterGainA => spread(sensors.flow_a.gain_std),
+            Effect::FlowMeterGainB => spread(sensors.flow_b.gain_std),
+            Effect::PositionGain => spread(sensors.position.gain_std),
+            Effect::PositionOffset => spread(sensors.position.bias_std),
+            Effect::PressureOffsetA | Effect::PressureOffsetB => spread(sensors.pressure.bias_std),
+            Effect::PressureGainA | Effect::PressureGainB => spread(sensors.pressure.gain_std),
+            Effect::ForceGain => spread(sensors.force.gain_std),
+            Effect::LoadOffset => spread(sensors.force.bias_std),
+            _ => None,
+        },
+        _ => None,
+    }
+}

@@ -1,0 +1,131 @@
+//! The unknowns of the fit: the declared model's own four constants, every effect of the core's
+//! table, and a few shapes without a name that only serve to say "something else is there".
+
+use pitchleak_core::effects::{EffectKind, Shape};
+use pitchleak_core::{Effect, Model, Moment, Terms};
+
+/// One column of the regression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Term {
+    /// 1/β, per Pa.
+    InverseBulk,
+    /// C_ip.
+    Internal,
+    /// C_epA.
+    ExternalA,
+    /// C_epB.
+    ExternalB,
+    /// A candidate of the core's table.
+    Effect(Effect),
+    /// A product of signals that no known effect makes.
+    Nameless(Nameless),
+}
+
+/// Shapes that stand for effects nobody listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Nameless {
+    /// Leak past the piston in proportion to |ẋ| P_L.
+    SpeedLeak,
+    /// Leak past the piston in proportion to ẋ P_L.
+    DirectionLeak,
+    /// Leak past the piston in proportion to P_L |P_L|.
+    SquareLeak,
+    /// Leak past the piston in proportion to the spool's opening |ẋ|/√P times P_L.
+    SpoolLeak,
+    /// Flow of meter A in proportion to |Q_A|.
+    BentMeterA,
+    /// Flow of meter B in proportion to |Q_B|.
+    BentMeterB,
+    /// Force in proportion to ẋ |ẋ|.
+    SquareFriction,
+}
+
+impl Nameless {
+    const ALL: [Self; 7] = [
+        Self::SpeedLeak,
+        Self::DirectionLeak,
+        Self::SquareLeak,
+        Self::SpoolLeak,
+        Self::BentMeterA,
+        Self::BentMeterB,
+        Self::SquareFriction,
+    ];
+
+    fn unit_term(self, at: &Moment<f64>) -> Terms<f64> {
+        let load = at.pa_pa - at.pb_pa;
+        let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
+        let force = |force_n: f64| Terms { force_n, ..Terms::default() };
+        match self {
+            Self::SpeedLeak => past(at.v_mps.abs() * load),
+            Self::DirectionLeak => past(at.v_mps * load),
+            Self::SquareLeak => past(load * load.abs()),
+            Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
+            Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
+            Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
+            Self::SquareFriction => force(at.v_mps * at.v_mps.abs()),
+        }
+    }
+}
+
+/// The four constants of the declared model.
+pub(super) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
+
+/// Every column: the declared model's, the candidates', the nameless ones.
+pub(super) fn all() -> Vec<Term> {
+    let known = Effect::ALL.iter().copied().filter(|e| *e != Effect::ExternalLeakB).map(Term::Effect);
+    DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
+}
+
+impl Term {
+    /// What one unit leaves in the residual at an instant.
+    pub(super) fn unit_term(self, at: &Moment<f64>, model: &Model<f64>, shape: &Shape<f64>) -> Terms<f64> {
+        let load = at.pa_pa - at.pb_pa;
+        match self {
+            Self::InverseBulk => Terms {
+                chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.dpa_pas,
+                chamber_b_m3s: model.cylinder.volume_b_m3(at.x_m) * at.dpb_pas,
+                force_n: 0.0,
+            },
+            Self::Internal => Terms { chamber_a_m3s: load, chamber_b_m3s: -load, force_n: 0.0 },
+            Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
+            Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
+            Self::Effect(effect) => effect.unit_term(at, model, shape),
+            Self::Nameless(shape) => shape.unit_term(at),
+        }
+    }
+
+    /// Whether the term shows in the force balance.
+    pub(super) fn in_force(self) -> bool {
+        match self {
+            Self::Effect(effect) => {
+                effect.spec().kind == EffectKind::Force
+                    || matches!(
+                        effect,
+                        Effect::PressureOffsetA
+                            | Effect::PressureOffsetB
+                            | Effect::PressureGainA
+                            | Effect::PressureGainB
+                            | Effect::LineResistanceA
+                            | Effect::LineResistanceB
+                            | Effect::ForceGain
+                            | Effect::AddedMass
+                    )
+            }
+            Self::Nameless(shape) => shape == Nameless::SquareFriction,
+            _ => false,
+        }
+    }
+
+    /// The effect, where the term is one.
+    pub(super) fn effect(self) -> Option<Effect> {
+        if let Self::Effect(effect) = self { Some(effect) } else { None }
+    }
+
+    /// Values that physics allows; `point` is subtracted where the fit is about an increment.
+    pub(super) fn bounds(self) -> (f64, f64) {
+        match self {
+            Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Whether what is left over is nothing but the declared sensor noise.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// Lags that the portmanteau looks at.
+const LAGS: usize = 20;
+
+/// Probability that white noise of variance one shows correlations this large: Box and Pierce (1970),
+/// but with the known variance in the denominator, so that a remainder far below the noise passes.
+pub(super) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64> {
+    let n = innovations.len();
+    if n < 4 * LAGS {
+        return None;
+    }
+    let sum: f64 = (1..=LAGS)
+        .map(|lag| {
+            let later = &innovations[lag..];
+            let product: f64 = innovations.iter().zip(later).map(|(a, b)| a * b).sum();
+            product * product / later.len() as f64 / (dispersion * dispersion)
+        })
+        .sum();
+    Some(chi2_p(sum, LAGS as f64))
+}
+
+/// Probability that the sum of squares of white noise of variance one is this large.
+pub(super) fn level_p(innovations: &[f64]) -> Option<f64> {
+    let sum: f64 = innovations.iter().map(|e| e * e).sum();
+    (!innovations.is_empty()).then(|| chi2_p(sum, innovations.len() as f64))
+}
+
+/// Upper tail of the chi-squared distribution.
+pub(super) fn chi2_p(value: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(f64::NAN, |law| law.sf(value.max(0.0)))
+}
+
+/// The size in standard deviations that one of `count` tests passes by chance with probability `rate`.
+pub(super) fn bonferroni_sigma(rate: f64, count: usize) -> f64 {
+    let share = rate / count.max(1) as f64 / 2.0;
+    Normal::standard().inverse_cdf(1.0 - share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_wave_is_not_white_and_a_tiny_one_is_below_the_noise() {
+        let wave: Vec<f64> = (0..500).map(|i| (0.05 * f64::from(i)).sin()).collect();
+        assert!(portmanteau_p(&wave, 1.0).is_some_and(|p| p < 1e-9));
+        let tiny: Vec<f64> = wave.iter().map(|v| 1e-3 * v).collect();
+        assert!(portmanteau_p(&tiny, 1.0).is_some_and(|p| p > 0.99));
+    }
+
+    #[test]
+    fn thirty_tests_at_one_in_a_thousand_need_four_sigma() {
+        assert!((bonferroni_sigma(1e-3, 30) - 4.15).abs() < 0.05);
+    }
+}

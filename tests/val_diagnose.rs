@@ -1,0 +1,139 @@
+//! The diagnosis on traces of an independent simulator, with the effects its authors put in.
+//! The traces are not part of the project: without them these tests pass.
+
+use pitchleak::Rig;
+use pitchleak::diagnose::{Declared, Diagnosis, LeakEstimates, Series, Verdict, diagnose};
+use pitchleak::trace::TraceReader;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::path::Path;
+
+fn rig(mass_kg: f64, bulk_modulus_pa: f64, accuracy: f64) -> Rig {
+    let mut rig = Rig::paper();
+    rig.cylinder.moving_mass_kg = mass_kg;
+    rig.fluid.bulk_modulus_pa = bulk_modulus_pa;
+    let sheets = &mut rig.instruments;
+    for sheet in [
+        &mut sheets.flow_a,
+        &mut sheets.flow_b,
+        &mut sheets.pressure,
+        &mut sheets.position,
+        &mut sheets.force,
+    ] {
+        sheet.accuracy = accuracy;
+    }
+    rig
+}
+
+fn read(name: &str, rig: &Rig) -> Option<Series> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/hopsan").join(name);
+    if !path.exists() {
+        eprintln!("{} is not there: nothing tested", path.display());
+        return None;
+    }
+    let mut reader = TraceReader::open(path, rig).unwrap();
+    Some(Series::read(&mut reader).unwrap())
+}
+
+fn with_noise(mut series: Series, rig: &Rig, seed: u64) -> Series {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let sensors = rig.sensors();
+    for (signal, std) in [
+        (&mut series.x_m, sensors.position.noise_std),
+        (&mut series.pa_pa, sensors.pressure.noise_std),
+        (&mut series.pb_pa, sensors.pressure.noise_std),
+        (&mut series.qa_m3s, sensors.flow_a.noise_std),
+        (&mut series.qb_m3s, sensors.flow_b.noise_std),
+        (&mut series.force_n, sensors.force.noise_std),
+    ] {
+        for value in signal {
+            let unit: f64 = StandardNormal.sample(&mut random);
+            *value += std * unit;
+        }
+    }
+    series
+}
+
+/// The trace clean, declared as 0.1 % and 1 %, and with noise of these sizes.
+fn answers(name: &str, mass_kg: f64, bulk_modulus_pa: f64) -> Vec<Diagnosis> {
+    let mut answers = Vec::new();
+    for accuracy in [1e-3, 1e-2] {
+        let rig = rig(mass_kg, bulk_modulus_pa, accuracy);
+        let Some(series) = read(name, &rig) else { return vec![] };
+        let declared = Declared::of(&rig);
+        let mut ask = |series| answers.push(diagnose(&[series], &[], &declared, &|| ()));
+        ask(series.clone());
+        ask(with_noise(series, &rig, 20_111));
+    }
+    answers
+}
+
+fn ids(answer: &Diagnosis) -> Vec<&str> {
+    answer.effects.iter().map(|effect| effect.id).collect()
+}
+
+#[test]
+fn val_sound_traces_name_nothing() {
+    for answer in answers("h02.csv.gz", 30.0, 0.9e9).iter().chain(&answers("h06.csv.gz", 50.0, 1.1e9)) {
+        assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{:?}", answer.notes);
+        assert!(answer.effects.is_empty());
+    }
+}
+
+#[test]
+fn val_friction_is_named_and_mends_the_force_balance() {
+    const LOAD_SPREAD_N: f64 = 644.06;
+    let answers = answers("u04.csv.gz", 30.0, 0.9e9);
+    for answer in &answers {
+        assert_eq!(answer.verdict, Verdict::Explained, "{:?}", answer.notes);
+        let mut ids = ids(answer);
+        ids.sort_unstable();
+        assert_eq!(ids, ["coulomb_friction", "viscous_friction"]);
+    }
+    if let Some(clean) = answers.first() {
+        assert!(clean.before.rmse.force_n.unwrap() > 0.4 * LOAD_SPREAD_N);
+        assert!(clean.after.rmse.force_n.unwrap() < 0.02 * LOAD_SPREAD_N);
+    }
+}
+
+#[test]
+fn val_position_gain_is_named_and_mends_the_leaks() {
+    for answer in &answers("u07.csv.gz", 20.0, 0.9e9) {
+        assert_eq!(answer.verdict, Verdict::Explained, "{:?}", answer.notes);
+        assert_eq!(ids(answer), ["position_gain"]);
+        let effect = &answer.effects[0];
+        assert!((effect.value - 0.02).abs() < 4.0 * effect.std && (effect.value - 0.02).abs() < 2e-3);
+        let (before, after) = (&answer.leaks.before, &answer.leaks.after);
+        let off = |leaks: &LeakEstimates| leaks.external_leak_b_coefficient.value.abs();
+        assert!(off(after) < 0.5 * off(before));
+        for (leak, truth) in [
+            (after.internal_leak_coefficient, 1e-11),
+            (after.external_leak_a_coefficient, 3e-12),
+            (after.external_leak_b_coefficient, 0.0),
+        ] {
+            // The noise-free trace leaves rounding in place of noise, far below the interval.
+            assert!((leak.value - truth).abs() < 3.5 * leak.std, "{leak:?} is not {truth}");
+        }
+    }
+}
+
+#[test]
+fn a_trace_in_which_nothing_happens_is_not_judged() {
+    let rig = Rig::paper();
+    let mut series = Series::default();
+    let sample = pitchleak::core::Sample {
+        x_m: 0.1,
+        pa_pa: 5e6,
+        pb_pa: 4e6,
+        qa_m3s: Some(1e-5),
+        qb_m3s: Some(-1e-5),
+        force_n: Some(2e3),
+    };
+    (0..2000).for_each(|i| series.push(0.01 * f64::from(i), &sample, None));
+    for traces in [vec![series], vec![Series::default()], vec![]] {
+        let answer = diagnose(&traces, &[], &Declared::of(&rig), &|| ());
+        assert_eq!(answer.verdict, Verdict::InsufficientExcitation);
+        assert!(answer.effects.is_empty());
+    }
+}
