@@ -66,7 +66,10 @@ fn law(count: usize) {
 }
 
 fn nothing(count: usize) {
-    feed(count, |_| ());
+    let f = [0.1, -1e11, -1e11, 1e11, -1e3];
+    feed(count, |_| {
+        black_box(&f);
+    });
 }
 
 fn main() {

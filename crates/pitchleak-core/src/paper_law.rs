@@ -123,7 +123,14 @@ impl<T: Real> PaperLaw<T> {
     }
 }
 
+/// Sum over both halves first: the compiler then works on two numbers at a time.
 #[inline(always)]
 fn dot<T: Real>(a: &[T; 5], b: &[T; 5]) -> T {
-    a.iter().zip(b).fold(T::zero(), |sum, (a, b)| sum + *a * *b)
+    let mut product = [T::zero(); 4];
+    for ((product, a), b) in product.iter_mut().zip(a).zip(b) {
+        *product = *a * *b;
+    }
+    let [p0, p1, p2, p3] = product;
+    let pair = [p0 + p2, p1 + p3];
+    (pair[0] + pair[1]) + a[4] * b[4]
 }
