@@ -32,8 +32,8 @@ fn read(name: &str, rig: &Rig) -> Option<Series> {
         eprintln!("{} is not there: nothing tested", path.display());
         return None;
     }
-    let mut reader = TraceReader::open(path, rig).unwrap();
-    Some(Series::read(&mut reader).unwrap())
+    let mut reader = TraceReader::open(path, rig).expect("the trace opens");
+    Some(Series::read(&mut reader).expect("the trace reads"))
 }
 
 fn with_noise(mut series: Series, rig: &Rig, seed: u64) -> Series {
