@@ -1,0 +1,196 @@
+//! Figures like the paper's Fig. 5 to 8, of one window of each wind.
+
+use super::protocol::{Case, ReproduceError, Run};
+use super::search::paper_rig;
+use super::trial::Course;
+use super::{Reproduction, SAMPLE_RATE_HZ, rig};
+use crate::figure::{Ink, Line, Panel, svg};
+use crate::simulate::{Biases, Sensing, Truth};
+use pitchleak_core::PerLeak;
+use std::path::Path;
+
+/// The window drawn (30 to 50 s of each wind history) …
+const WINDOW: usize = 1;
+/// … with the noise of this seed.
+const SEED: u64 = 1;
+/// 1 m³/(s·Pa) in L/min/bar.
+const LPM_PER_BAR: f64 = 6e9;
+const LPM: f64 = 60e3;
+
+type Points = Vec<(f64, f64)>;
+
+impl Reproduction {
+    /// The figures by their file names.
+    ///
+    /// # Errors
+    /// [`ReproduceError::Figure`], [`ReproduceError::Filter`].
+    pub fn figures(&self) -> Result<Vec<(&'static str, String)>, ReproduceError> {
+        let of_case = |case: Case| -> Vec<&Run> {
+            self.runs
+                .iter()
+                .zip(Case::ALL.iter().cycle())
+                .filter(|(_, c)| **c == case)
+                .map(|(run, _)| run)
+                .collect()
+        };
+        let first = of_case(Case::One);
+        let mut figures = vec![
+            ("fig5_wind.svg", svg(&first.iter().map(|run| wind(run)).collect::<Vec<_>>(), 2)?),
+            ("fig6_tracking.svg", svg(&first.iter().flat_map(|run| followed(run)).collect::<Vec<_>>(), 2)?),
+        ];
+        let names = [
+            ("fig7a_leakage_case1.svg", "fig7b_coefficients_case1.svg"),
+            ("fig8a_leakage_case2.svg", "fig8b_coefficients_case2.svg"),
+        ];
+        for (case, (leakage, coefficients)) in Case::ALL.into_iter().zip(names) {
+            let courses =
+                of_case(case).into_iter().map(|run| self.courses(run)).collect::<Result<Vec<_>, _>>()?;
+            let panels = |draw: fn(&Courses) -> [Panel; 2]| courses.iter().flat_map(draw).collect::<Vec<_>>();
+            figures.push((leakage, svg(&panels(leak_flows), 2)?));
+            figures.push((coefficients, svg(&panels(leak_coefficients), 2)?));
+        }
+        Ok(figures)
+    }
+
+    /// Writes the figures, `table.txt` and `reproduce.json` into `directory`, which is made if need be.
+    ///
+    /// # Errors
+    /// [`ReproduceError`].
+    pub fn write(&self, directory: &Path) -> Result<(), ReproduceError> {
+        let write = |name: &str, text: &str| {
+            let path = directory.join(name);
+            std::fs::write(&path, text).map_err(|source| ReproduceError::Write { path, source })
+        };
+        std::fs::create_dir_all(directory)
+            .map_err(|source| ReproduceError::Write { path: directory.into(), source })?;
+        for (name, text) in self.figures()? {
+            write(name, &text)?;
+        }
+        write("table.txt", &self.report.to_text())?;
+        write("reproduce.json", &self.report.to_json()?)
+    }
+
+    /// Both laws on the same readings of the window that is drawn.
+    fn courses(&self, run: &Run) -> Result<Courses, ReproduceError> {
+        let best = self.report.paper_gains.first();
+        let (lambda, gamma) = best.map_or((10.0, 1.0), |best| (best.lambda_per_s, best.gamma));
+        let course = |rig| {
+            let sensing = Sensing::new(super::rig().sensors(), Biases::default(), SEED);
+            Course::run(&rig, run.window(WINDOW), sensing)
+        };
+        let mean_mps = run.wind.mean_mps();
+        Ok(Courses {
+            mean_mps,
+            truth: run.coefficients(),
+            paper: course(paper_rig(lambda, gamma))?,
+            ours: course(rig())?,
+        })
+    }
+}
+
+struct Courses {
+    mean_mps: u32,
+    truth: PerLeak<f64>,
+    paper: Course,
+    ours: Course,
+}
+
+fn over_time(truths: &[Truth], value: impl Fn(&Truth) -> f64) -> Points {
+    (0..).zip(truths).map(|(k, truth)| (f64::from(k) / SAMPLE_RATE_HZ, value(truth))).collect()
+}
+
+fn line(label: &'static str, ink: Ink, points: Points) -> Line {
+    Line { label, ink, points }
+}
+
+fn wind(run: &Run) -> Panel {
+    let start = WINDOW * super::protocol::WINDOW_SAMPLES;
+    let speeds = run.wind_mps.iter().skip(start).take(super::protocol::WINDOW_SAMPLES);
+    let points = (0..).zip(speeds).map(|(k, speed)| (f64::from(k) / SAMPLE_RATE_HZ, *speed)).collect();
+    Panel {
+        title: format!("Mean wind {} m/s", run.wind.mean_mps()),
+        y_label: "wind (m/s)",
+        lines: vec![line("", Ink::Ours, points)],
+        y_range: None,
+    }
+}
+
+fn followed(run: &Run) -> [Panel; 2] {
+    let truths = run.window(WINDOW);
+    let wind = run.wind.mean_mps();
+    let panel = |what, y_label, reference, output| Panel {
+        title: format!("{wind} m/s: {what}"),
+        y_label,
+        lines: vec![line("output", Ink::Ours, output), line("reference", Ink::Measured, reference)],
+        y_range: None,
+    };
+    let position = over_time(truths, |t| 1e3 * t.moment.x_m);
+    let mut tracking = panel(
+        "piston position",
+        "position (mm)",
+        over_time(truths, |t| 1e3 * t.position_reference_m),
+        position.clone(),
+    );
+    tracking.y_range = Some(at_least(1.0, &position));
+    [
+        tracking,
+        panel(
+            "load",
+            "load (kN)",
+            over_time(truths, |t| 1e-3 * t.load_reference_n),
+            over_time(truths, |t| 1e-3 * t.moment.force_n),
+        ),
+    ]
+}
+
+/// The range of the points, widened by a twelfth and to `least` at the least.
+fn at_least(least: f64, points: &Points) -> (f64, f64) {
+    let (low, high) =
+        points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.1), h.max(p.1)));
+    let half = (0.58 * (high - low)).max(0.5 * least);
+    (0.5 * (low + high) - half, 0.5 * (low + high) + half)
+}
+
+fn leak_flows(courses: &Courses) -> [Panel; 2] {
+    let panel = |name: &str, of: fn(&PerLeak<f64>) -> f64| {
+        let points = |flows: &[PerLeak<f64>]| -> Points {
+            courses.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM * of(q))).collect()
+        };
+        let reference = points(&courses.ours.references_m3s);
+        let (low, high) = at_least(0.1, &reference);
+        let room = 0.6 * (high - low);
+        Panel {
+            title: format!("{} m/s: {name} leakage", courses.mean_mps),
+            y_label: "leakage (L/min)",
+            y_range: Some((low - room, high + room)),
+            lines: vec![
+                line("paper's law", Ink::Paper, points(&courses.paper.flows_m3s)),
+                line("ours", Ink::Ours, points(&courses.ours.flows_m3s)),
+                line("measured", Ink::Measured, reference),
+            ],
+        }
+    };
+    [panel("internal", |q| q.internal), panel("external A", |q| q.external_a)]
+}
+
+fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
+    let panel = |name: &str, of: fn(&PerLeak<f64>) -> f64| {
+        let points = |course: &Course| -> Points {
+            let values = course.coefficients.iter().map(|c| LPM_PER_BAR * of(&c.map(|c| c.value)));
+            course.t_s.iter().copied().zip(values).collect()
+        };
+        let truth = LPM_PER_BAR * of(&courses.truth);
+        let end = courses.ours.t_s.last().copied().unwrap_or(0.0);
+        Panel {
+            title: format!("{} m/s: {name} leak coefficient", courses.mean_mps),
+            y_label: "coefficient (L/min/bar)",
+            y_range: Some((-0.2 * truth, 2.2 * truth)),
+            lines: vec![
+                line("paper's law", Ink::Paper, points(&courses.paper)),
+                line("ours", Ink::Ours, points(&courses.ours)),
+                line("measured", Ink::Measured, vec![(0.0, truth), (end, truth)]),
+            ],
+        }
+    };
+    [panel("internal", |c| c.internal), panel("external A", |c| c.external_a)]
+}

@@ -1,0 +1,343 @@
+//! The paper's experiment again (Wu et al. 2011, Section IV): four winds, two leak settings, its law
+//! and ours on the same readings, with many seeds. docs/reproduction.md explains every choice.
+
+mod figures;
+mod protocol;
+mod search;
+mod table;
+mod trial;
+
+pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
+pub use search::{Candidate, best_gains, paper_rig};
+pub use table::{Bound, Figures, Row, Scored};
+pub use trial::{Course, TrialScore};
+
+use crate::Rig;
+use crate::cramer_rao::CramerRaoModel;
+use crate::parallel;
+use crate::rig::{Instrument, Instruments};
+use crate::simulate::{Biases, Sensing};
+use crate::wind::WindCase;
+use pitchleak_core::{Butterworth, PerLeak, Sample};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
+use table::{Entry, WindowBound};
+use trial::{CUTOFF_HZ, mean};
+
+/// Greatest bias of a sensor in the runs with biases, share of full scale.
+const BIAS: f64 = 0.01;
+
+/// Samples of the first 2 s, in which the paper's law is said to converge.
+const EARLY_SAMPLES: usize = 200;
+
+/// How far the reproduction has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub stage: &'static str,
+    /// Pieces done.
+    pub done: usize,
+    /// Pieces in all.
+    pub count: usize,
+}
+
+/// How the rig followed its references in one run; the paper gives 3 % and 21.4 % as printed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tracking {
+    /// Mean wind, m/s.
+    pub wind_mps: u32,
+    /// Leak setting.
+    pub case: Case,
+    /// Root mean square position error, % of the stroke.
+    pub position_rms_percent_of_stroke: f64,
+    /// Largest position error, % of the stroke.
+    pub position_peak_percent_of_stroke: f64,
+    /// Root mean square load error, % of the largest load asked for.
+    pub load_rms_percent_of_peak: f64,
+    /// Largest load error, % of the largest load asked for.
+    pub load_peak_percent_of_peak: f64,
+    /// Mean sizes of the leak flows, L/min.
+    pub internal_mean_lpm: f64,
+    /// Mean external leak flow, L/min.
+    pub external_a_mean_lpm: f64,
+}
+
+/// Everything `pitchleak reproduce` prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// `pitchleak.reproduce/1`.
+    pub schema: &'static str,
+    /// Seeds per row: each with its own noise, in the windows one after the other.
+    pub seeds: u64,
+    /// The table, sensors with white noise of 3σ = 1 % of full scale.
+    pub rows: Vec<Row>,
+    /// The same with a constant bias of up to 1 % of full scale on every sensor as well.
+    pub rows_with_bias: Vec<Row>,
+    /// How the rig followed.
+    pub tracking: Vec<Tracking>,
+    /// Gains tried for the paper's law, the best first; `rows` use the best.
+    pub paper_gains: Vec<Candidate>,
+}
+
+/// A finished reproduction: the report, and the runs behind it for the figures.
+pub struct Reproduction {
+    /// The report.
+    pub report: Report,
+    /// One per wind and case, in the table's order.
+    pub runs: Vec<Run>,
+}
+
+/// Runs the experiment with `seeds` seeds per row. The numbers do not depend on the machine or on
+/// how many cores it has.
+///
+/// # Errors
+/// [`ReproduceError`].
+pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Reproduction, ReproduceError> {
+    let at = |stage, count| move |done| Progress { stage, done, count };
+    let settings: Vec<(WindCase, Case)> =
+        WindCase::ALL.into_iter().flat_map(|wind| Case::ALL.map(|case| (wind, case))).collect();
+    let simulating = at("simulating", settings.len());
+    let runs = parallel::map(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks()));
+    let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let paper_gains = best_gains(&runs, |done, count| {
+        progress(Progress { stage: "searching gains of the paper's law", done, count });
+    })?;
+    let best = paper_gains.first().map_or((10.0, 1.0), |best| (best.lambda_per_s, best.gamma));
+
+    let jobs: Vec<(usize, usize)> = (0..runs.len()).flat_map(|r| (0..WINDOWS).map(move |w| (r, w))).collect();
+    let estimating = at("estimating", jobs.len());
+    let laws = [Law::paper(best), Law::default_estimator(), Law::with_biases()];
+    let [paper, plain, biased] = &laws;
+    let trials = parallel::map(
+        &jobs,
+        |n| progress(estimating(n)),
+        |&(run, window)| {
+            let run = runs.get(run).ok_or(ReproduceError::Empty)?;
+            laws.iter().map(|law| law.trials(run, window, seeds)).collect::<Result<Vec<_>, _>>()
+        },
+    );
+    let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
+
+    let rows = |laws: &[(usize, &Law)]| rows(&settings, &trials, laws);
+    let report = Report {
+        schema: "pitchleak.reproduce/1",
+        seeds,
+        rows: rows(&[(0, paper), (1, plain)]),
+        rows_with_bias: rows(&[(2, biased)]),
+        tracking: settings.iter().zip(&runs).map(|((_, case), run)| tracking(*case, run)).collect(),
+        paper_gains,
+    };
+    Ok(Reproduction { report, runs })
+}
+
+/// An estimator with the sensors it is given.
+struct Law {
+    name: &'static str,
+    rig: Rig,
+    bias_share: f64,
+    /// The bound's sensors; the paper's law is held against the same bound.
+    bound_rig: Rig,
+}
+
+/// Both leaks' entries of one window, one per seed.
+type Trials = Vec<PerLeak<Entry>>;
+
+impl Law {
+    fn paper((lambda_per_s, gamma): (f64, f64)) -> Self {
+        Self { name: "paper", rig: paper_rig(lambda_per_s, gamma), bias_share: 0.0, bound_rig: rig() }
+    }
+
+    fn default_estimator() -> Self {
+        Self { name: "rls", rig: rig(), bias_share: 0.0, bound_rig: rig() }
+    }
+
+    /// The rig file then says so: a bias uniform within ± 1 % has a standard deviation of 1 %/√3.
+    fn with_biases() -> Self {
+        let mut rig = rig();
+        let biased = |sheet: &mut Instrument| sheet.bias = BIAS / f64::sqrt(3.0);
+        let Instruments { flow_a, flow_b, pressure, position, force } = &mut rig.instruments;
+        [flow_a, flow_b, pressure, position, force].into_iter().for_each(biased);
+        Self { name: "rls", bias_share: BIAS, bound_rig: rig.clone(), rig }
+    }
+
+    fn trials(&self, run: &Run, window: usize, seeds: u64) -> Result<Trials, ReproduceError> {
+        let truths = run.window(window);
+        let bounds = self.bounds(run, window);
+        let truth = run.coefficients();
+        let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
+        mine.map(|seed| {
+            let biases = drawn_biases(&self.rig.instruments, self.bias_share, seed);
+            let sensing = Sensing::new(self.rig.sensors(), biases, seed);
+            let course = Course::run(&self.rig, truths, sensing)?;
+            let entry = |coefficient, window, of: fn(&PerLeak<f64>) -> f64| Entry {
+                score: course.score(coefficient, of),
+                window,
+            };
+            Ok(PerLeak {
+                internal: entry(truth.internal, bounds.internal, |leaks| leaks.internal),
+                external_a: entry(truth.external_a, bounds.external_a, |leaks| leaks.external_a),
+                external_b: entry(1.0, bounds.external_b, |leaks| leaks.external_b),
+            })
+        })
+        .collect()
+    }
+
+    /// The bound of each leak in one window.
+    fn bounds(&self, run: &Run, window: usize) -> PerLeak<WindowBound> {
+        let truths = run.window(window);
+        let samples: Vec<Sample<f64>> = truths.iter().map(|truth| truth.sample).collect();
+        let sensors = self.bound_rig.sensors();
+        let leaks = run.coefficients();
+        let model = CramerRaoModel {
+            cylinder: &self.bound_rig.cylinder,
+            fluid: &self.bound_rig.fluid,
+            sensors: &sensors,
+            leaks: &leaks,
+        };
+        let none = PerLeak { internal: f64::INFINITY, external_a: f64::INFINITY, external_b: f64::INFINITY };
+        let leak_std = |samples| model.bound(1.0 / SAMPLE_RATE_HZ, samples).map_or(none, |b| b.leak_std);
+        let std = leak_std(&samples);
+        let early = leak_std(samples.get(..EARLY_SAMPLES).unwrap_or(&samples));
+        let pressure_std = noise_gain() * sensors.pressure.noise_std;
+        let pressure_stds = PerLeak {
+            internal: std::f64::consts::SQRT_2 * pressure_std,
+            external_a: pressure_std,
+            external_b: pressure_std,
+        };
+        let sizes = mean_pressures_pa(&samples);
+        leaks.zip(std.zip(early)).zip(pressure_stds).zip(sizes).map(
+            |(((leak, (std, early)), pressure_std), size)| {
+                let half_width_m3s = 1.96 * std * size;
+                let leakage = (std * size).hypot(leak * pressure_std) / (leak * size);
+                WindowBound {
+                    coefficient: std / leak,
+                    coefficient_early: early / leak,
+                    leakage: (2.0 / std::f64::consts::PI).sqrt() * leakage,
+                    identifiable: half_width_m3s <= f64::max(0.1 / 60e3, 0.1 * leak * size),
+                }
+            },
+        )
+    }
+}
+
+/// Means of |P_L|, P_A, P_B, Pa.
+fn mean_pressures_pa(samples: &[Sample<f64>]) -> PerLeak<f64> {
+    PerLeak {
+        internal: mean(samples.iter().map(|s| s.load_pressure_pa().abs())),
+        external_a: mean(samples.iter().map(|s| s.pa_pa)),
+        external_b: mean(samples.iter().map(|s| s.pb_pa)),
+    }
+}
+
+/// Share of white noise that passes the paper's filter: the root of the sum of its squared impulse
+/// response.
+fn noise_gain() -> f64 {
+    Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ).map_or(1.0, |mut filter| {
+        filter.reset(0.0);
+        (0..1000).map(|k| filter.update(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum::<f64>().sqrt()
+    })
+}
+
+/// Biases drawn evenly from ± `share` of each sensor's full scale.
+pub fn drawn_biases(instruments: &Instruments, share: f64, seed: u64) -> Biases {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // A stream of its own: the noise is drawn from the same seed.
+    random.set_stream(1);
+    let mut within = |sheet: &Instrument| {
+        let unit = (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0;
+        (2.0 * unit - 1.0) * share * sheet.full_scale
+    };
+    Biases {
+        x_m: within(&instruments.position),
+        pa_pa: within(&instruments.pressure),
+        pb_pa: within(&instruments.pressure),
+        qa_m3s: within(&instruments.flow_a),
+        qb_m3s: within(&instruments.flow_b),
+        force_n: within(&instruments.force),
+    }
+}
+
+/// The rows of `laws` (and their places in the trials), in the order wind, case, leak, estimator;
+/// `trials` are by run and window, then by law.
+fn rows(settings: &[(WindCase, Case)], trials: &[Vec<Trials>], laws: &[(usize, &Law)]) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for ((wind, case), windows) in settings.iter().zip(trials.chunks(WINDOWS)) {
+        for leak in ["internal", "external_a"] {
+            for (place, law) in laws {
+                let entries = windows.iter().filter_map(|window| window.get(*place)).flatten();
+                let entries: Vec<Entry> = entries
+                    .map(|entry| if leak == "internal" { entry.internal } else { entry.external_a })
+                    .collect();
+                rows.push(Row::of(wind.mean_mps(), *case, leak, law.name, &entries));
+            }
+        }
+    }
+    rows
+}
+
+fn tracking(case: Case, run: &Run) -> Tracking {
+    let stroke = rig().cylinder.stroke_m;
+    let most_load = run.truths.iter().map(|t| t.load_reference_n.abs()).fold(0.0, f64::max);
+    let position =
+        || run.truths.iter().map(|t| 100.0 * (t.moment.x_m - t.position_reference_m).abs() / stroke);
+    let load =
+        || run.truths.iter().map(|t| 100.0 * (t.moment.force_n - t.load_reference_n).abs() / most_load);
+    let rms = |errors: &mut dyn Iterator<Item = f64>| mean(errors.map(|e| e * e)).sqrt();
+    Tracking {
+        wind_mps: run.wind.mean_mps(),
+        case,
+        position_rms_percent_of_stroke: rms(&mut position()),
+        position_peak_percent_of_stroke: position().fold(0.0, f64::max),
+        load_rms_percent_of_peak: rms(&mut load()),
+        load_peak_percent_of_peak: load().fold(0.0, f64::max),
+        internal_mean_lpm: 60e3 * mean(run.truths.iter().map(|t| t.leaks_m3s.internal.abs())),
+        external_a_mean_lpm: 60e3 * mean(run.truths.iter().map(|t| t.leaks_m3s.external_a)),
+    }
+}
+
+impl Report {
+    /// The report as JSON, schema `pitchleak.reproduce/1`. Rows hold medians over all seeds.
+    ///
+    /// # Errors
+    /// Those of the JSON writer; numbers, texts and lists give none.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+
+    /// The report for people.
+    pub fn to_text(&self) -> String {
+        let mut out = table::to_text(
+            &format!("Medians of {} seeds, worst in brackets; noise 3 sigma = 1 % of full scale", self.seeds),
+            &self.rows,
+        );
+        out.push('\n');
+        out += &table::to_text(
+            "The same, each sensor with a constant bias of up to 1 % of full scale",
+            &self.rows_with_bias,
+        );
+        out += "\nTracking (position in % of the stroke, load in % of its peak; rms and peak)\n";
+        for t in &self.tracking {
+            out += &format!(
+                "{:>4} m/s case {}: position {:.2} {:.2}  load {:.2} {:.2}  leaks {:.2} and {:.2} L/min\n",
+                t.wind_mps,
+                u8::from(t.case),
+                t.position_rms_percent_of_stroke,
+                t.position_peak_percent_of_stroke,
+                t.load_rms_percent_of_peak,
+                t.load_peak_percent_of_peak,
+                t.internal_mean_lpm,
+                t.external_a_mean_lpm
+            );
+        }
+        if let Some(best) = self.paper_gains.first() {
+            out += &format!(
+                "\nPaper's law with the best of {} gains: lambda {} 1/s, gamma {}\n",
+                self.paper_gains.len(),
+                best.lambda_per_s,
+                best.gamma
+            );
+        }
+        out + "Paper: leakage 7.8 % mean, 11 % peak; coefficient 7.3 % mean, 13.3 % peak; converged within 1-2 s\n"
+    }
+}

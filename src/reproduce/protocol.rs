@@ -1,0 +1,171 @@
+//! The paper's experiment (Section IV), and what stands here for what it does not print.
+
+use crate::Rig;
+use crate::figure::FigureError;
+use crate::simulate::{LeakSize, Scenario, SimulateError, Truth};
+use crate::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
+use pitchleak_core::{Cylinder, EffectSet, FilterError, Leaks, PerLeak, Sample};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Samples per second, Section IV.
+pub const SAMPLE_RATE_HZ: f64 = 100.0;
+/// Length of a data window, s, Section IV.
+pub const WINDOW_S: f64 = 20.0;
+/// Windows taken from one after the other of each wind history.
+pub const WINDOWS: usize = 14;
+/// Time of the histories at which the first window begins, s; the loops settle before.
+const START_S: f64 = 10.0;
+/// Samples of one window.
+pub const WINDOW_SAMPLES: usize = (WINDOW_S * SAMPLE_RATE_HZ) as usize;
+
+/// 1 L/min/bar, m³/(s·Pa).
+const LPM_PER_BAR: f64 = 1.0 / 6e9;
+
+/// The two leak settings of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "u8")]
+pub enum Case {
+    /// Large internal, small external leak.
+    One,
+    /// Small internal, large external leak.
+    Two,
+}
+
+impl From<Case> for u8 {
+    fn from(case: Case) -> Self {
+        match case {
+            Case::One => 1,
+            Case::Two => 2,
+        }
+    }
+}
+
+impl Case {
+    /// Both, in the paper's order.
+    pub const ALL: [Self; 2] = [Self::One, Self::Two];
+
+    /// Leak coefficients, set once for all winds as one sets a valve. The paper prints none; these
+    /// leak 2 to 5 L/min at 13 m/s and above: ten times and more what the paper's reference meters
+    /// (1 % of 20 L/min) cannot tell, without which errors of 7 to 13 % could not have been measured.
+    pub fn leaks(self) -> Leaks<f64> {
+        let (internal, external_a) = match self {
+            Self::One => (0.3, 0.04),
+            Self::Two => (0.12, 0.1),
+        };
+        Leaks {
+            internal_m3spa: internal * LPM_PER_BAR,
+            external_a_m3spa: external_a * LPM_PER_BAR,
+            external_b_m3spa: 0.0,
+        }
+    }
+}
+
+/// The paper's rig with hoses of 50 cm³ to each chamber (the paper names none; without any the oil
+/// at 5 m/s, 1.4 mm from the end, would be 2 cm³).
+pub fn rig() -> Rig {
+    let paper = Rig::paper();
+    let hose_m3 = 50e-6;
+    Rig {
+        cylinder: Cylinder { dead_volume_a_m3: hose_m3, dead_volume_b_m3: hose_m3, ..paper.cylinder },
+        ..paper
+    }
+}
+
+/// Why the experiment cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    /// A wind history.
+    #[error(transparent)]
+    Wind(#[from] HistoryError),
+    /// The rig's references.
+    #[error(transparent)]
+    Emulation(#[from] EmulationError),
+    /// The emulator.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The paper's filter.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+    /// A run without samples.
+    #[error("a run has no samples")]
+    Empty,
+    /// A figure.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// The report as JSON.
+    #[error("cannot write JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A file of figures or the table.
+    #[error("{path}: {source}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// The truth of one wind with one leak setting, all windows in a row.
+pub struct Run {
+    /// Wind.
+    pub wind: WindCase,
+    /// Leaks, m³/(s·Pa).
+    pub leaks: Leaks<f64>,
+    /// Wind at hub height of each sample, m/s.
+    pub wind_mps: Vec<f64>,
+    /// The emulator's signals.
+    pub truths: Vec<Truth>,
+}
+
+impl Run {
+    /// Simulates all windows of `wind` with `leaks`.
+    ///
+    /// # Errors
+    /// [`ReproduceError`].
+    pub fn simulate(wind: WindCase, leaks: Leaks<f64>) -> Result<Self, ReproduceError> {
+        let rig = rig();
+        let history = History::of(&Wind::BuiltIn(wind))?;
+        let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
+        let wind_curve = reference.wind_mps.clone();
+        let scenario = Scenario {
+            rig,
+            reference,
+            leaks: PerLeak {
+                internal: LeakSize::Coefficient(leaks.internal_m3spa),
+                external_a: LeakSize::Coefficient(leaks.external_a_m3spa),
+                external_b: LeakSize::Coefficient(leaks.external_b_m3spa),
+            },
+            onset_s: 0.0,
+            effects: EffectSet::default(),
+            start_s: START_S,
+            warm_up_s: START_S,
+            duration_s: WINDOW_S * WINDOWS as f64,
+            sample_rate_hz: SAMPLE_RATE_HZ,
+        };
+        let truths = scenario.collect(leaks)?;
+        let wind_at = |truth: &Truth| wind_curve.as_ref().map_or(f64::NAN, |c| c.at(START_S + truth.t_s));
+        let wind_mps = truths.iter().map(wind_at).collect();
+        Ok(Self { wind, leaks, wind_mps, truths })
+    }
+
+    /// The samples of window `index`, counted round.
+    pub fn window(&self, index: usize) -> &[Truth] {
+        let start = (index % WINDOWS) * WINDOW_SAMPLES;
+        self.truths.get(start..start + WINDOW_SAMPLES).unwrap_or(&self.truths)
+    }
+
+    /// The true leak coefficients, m³/(s·Pa).
+    pub fn coefficients(&self) -> PerLeak<f64> {
+        PerLeak {
+            internal: self.leaks.internal_m3spa,
+            external_a: self.leaks.external_a_m3spa,
+            external_b: self.leaks.external_b_m3spa,
+        }
+    }
+}
+
+/// P_L, P_A and P_B, which drive the leaks, Pa.
+pub fn driving_pressures_pa(sample: &Sample<f64>) -> PerLeak<f64> {
+    PerLeak { internal: sample.load_pressure_pa(), external_a: sample.pa_pa, external_b: sample.pb_pa }
+}

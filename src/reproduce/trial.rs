@@ -1,0 +1,132 @@
+//! One estimator on one noisy 20 s window, and how far off it was.
+
+use super::protocol::{SAMPLE_RATE_HZ, driving_pressures_pa};
+use crate::Rig;
+use crate::replay::Estimator;
+use crate::simulate::{Sensing, Truth};
+use crate::trace::Record;
+use pitchleak_core::{Butterworth, Estimate, FilterError, PerLeak};
+
+/// Cut-off of the filter on leak flows and pressures, Hz, Section IV.
+pub const CUTOFF_HZ: f64 = 5.0;
+/// The estimate has converged once its coefficient stays within this share of the truth.
+const BAND: f64 = 0.05;
+/// Where it converges later than this, or never, s, the rest of the window counts as steady state.
+const LATEST_STEADY_S: f64 = 10.0;
+
+/// One leak in one window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrialScore {
+    /// Mean of |Q̂ − Q| in steady state over the mean of |Q|, %.
+    pub leakage_mean: f64,
+    /// Peak of |Q̂ − Q| in steady state over the mean of |Q|, %.
+    pub leakage_peak: f64,
+    /// Mean of |Ĉ/C − 1| in steady state, %.
+    pub coefficient_mean: f64,
+    /// Peak of the same, %.
+    pub coefficient_peak: f64,
+    /// Time until |Ĉ/C − 1| stays within 5 %, s; `None` if it does not.
+    pub convergence_s: Option<f64>,
+    /// Ĉ/C − 1 at the end, %.
+    pub final_error: f64,
+    /// Whether the 95 % interval at the end holds the truth; `None` from the paper's law.
+    pub covered: Option<bool>,
+}
+
+/// What was estimated over time.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// Time since the window began, s.
+    pub t_s: Vec<f64>,
+    /// Coefficients, m³/(s·Pa).
+    pub coefficients: Vec<PerLeak<Estimate<f64>>>,
+    /// Leak flows by eq. (15), from pressures through the 5 Hz filter, m³/s.
+    pub flows_m3s: Vec<PerLeak<f64>>,
+    /// True leak flows through the same filter, m³/s.
+    pub references_m3s: Vec<PerLeak<f64>>,
+}
+
+impl Course {
+    /// The rig's estimator on a window as `sensing` reads it.
+    ///
+    /// # Errors
+    /// Where the filter does not exist at the protocol's rate.
+    pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, FilterError> {
+        let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
+        let from = |start: f64| {
+            let mut filter = filter;
+            filter.reset(start);
+            filter
+        };
+        let mut estimator = Estimator::new(rig);
+        let mut course = Self::default();
+        let mut filters: Option<(Filters, Filters)> = None;
+        let dt_s = 1.0 / SAMPLE_RATE_HZ;
+        for (index, truth) in window.iter().enumerate() {
+            let sample = sensing.read(&truth.sample);
+            let t_s = index as f64 * dt_s;
+            let record =
+                Record { t_s, dt_s: if index == 0 { 0.0 } else { dt_s }, sample, ..Record::default() };
+            estimator.update(&record);
+            let read = driving_pressures_pa(&sample);
+            let (pressures, leaks) =
+                filters.get_or_insert_with(|| (read.map(from), truth.leaks_m3s.map(from)));
+            let coefficients = estimator.leak_coefficients();
+            course.t_s.push(t_s);
+            course.flows_m3s.push(coefficients.zip(advance(pressures, read)).map(|(c, p)| c.value * p));
+            course.references_m3s.push(advance(leaks, truth.leaks_m3s));
+            course.coefficients.push(coefficients);
+        }
+        Ok(course)
+    }
+
+    /// Mean of |Ĉ/C − 1| over the second half of the window.
+    pub fn late_error(&self, truth: f64, of: impl Fn(&PerLeak<f64>) -> f64) -> f64 {
+        let late = self.coefficients.iter().skip(self.coefficients.len() / 2);
+        mean(late.map(|c| (of(&c.map(|c| c.value)) / truth - 1.0).abs()))
+    }
+
+    /// Scores the leak that `of` picks, whose true coefficient is `truth`.
+    pub fn score(&self, truth: f64, of: impl Fn(&PerLeak<f64>) -> f64) -> TrialScore {
+        let coefficient = |k: usize| {
+            self.coefficients.get(k).map_or(f64::NAN, |c| (of(&c.map(|c| c.value)) / truth - 1.0).abs())
+        };
+        let count = self.t_s.len();
+        let converged =
+            (0..count).rev().find(|&k| coefficient(k).is_nan() || coefficient(k) > BAND).map_or(0, |k| k + 1);
+        let latest = ((LATEST_STEADY_S * SAMPLE_RATE_HZ) as usize).min(count);
+        let steady = converged.min(latest);
+        let mean_size = mean(self.references_m3s.iter().map(|q| of(q).abs()));
+        let leakage = self.flows_m3s.iter().zip(&self.references_m3s).skip(steady);
+        let leakage = || leakage.clone().map(|(q, r)| (of(q) - of(r)).abs() / mean_size);
+        let last = self.coefficients.last();
+        let value = last.map_or(f64::NAN, |c| of(&c.map(|c| c.value)));
+        let std = last.map_or(f64::NAN, |c| of(&c.map(|c| c.std)));
+        let [low, high] = Estimate { value, std }.ci95();
+        TrialScore {
+            leakage_mean: 100.0 * mean(leakage()),
+            leakage_peak: 100.0 * leakage().fold(0.0, f64::max),
+            coefficient_mean: 100.0 * mean((steady..count).map(coefficient)),
+            coefficient_peak: 100.0 * (steady..count).map(coefficient).fold(0.0, f64::max),
+            convergence_s: (converged < count).then(|| converged as f64 / SAMPLE_RATE_HZ),
+            final_error: 100.0 * (value / truth - 1.0),
+            covered: (std > 0.0).then_some(low <= truth && truth <= high),
+        }
+    }
+}
+
+/// One filter per leak.
+type Filters = PerLeak<Butterworth<f64>>;
+
+fn advance(filters: &mut Filters, values: PerLeak<f64>) -> PerLeak<f64> {
+    PerLeak {
+        internal: filters.internal.update(values.internal),
+        external_a: filters.external_a.update(values.external_a),
+        external_b: filters.external_b.update(values.external_b),
+    }
+}
+
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
