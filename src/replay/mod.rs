@@ -1,5 +1,6 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
+mod correction;
 mod estimator;
 mod pressures;
 mod scoring;
@@ -10,6 +11,7 @@ pub use estimator::{BulkModulus, Estimator};
 use crate::report::{Alarm, Leak, ReplayReport};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
+use correction::Correction;
 use pitchleak_core::{Estimate, LeakDetector, PerLeak, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
@@ -30,6 +32,7 @@ pub struct Point {
 /// A running replay.
 pub struct Replay {
     rig: Rig,
+    correction: Option<Correction>,
     estimator: Estimator,
     detector: LeakDetector<f64>,
     since_detection_s: f64,
@@ -42,6 +45,7 @@ impl Replay {
     /// A replay for a rig; the rig file's `[estimator]` says with which estimator.
     pub fn new(rig: &Rig) -> Self {
         Self {
+            correction: Correction::of(rig),
             estimator: Estimator::new(rig),
             detector: LeakDetector::new(rig.alarms),
             since_detection_s: 0.0,
@@ -55,6 +59,17 @@ impl Replay {
     /// Takes in one record; says whether the estimates are new.
     #[inline]
     pub fn push(&mut self, record: &Record) -> bool {
+        match &mut self.correction {
+            None => self.take(record),
+            Some(correction) => {
+                let corrected = correction.correct(record);
+                self.take(&corrected)
+            }
+        }
+    }
+
+    #[inline]
+    fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
         self.since_detection_s += record.dt_s;
         let renewed = self.estimator.update(record) == Update::Renewed;
@@ -66,13 +81,21 @@ impl Replay {
     }
 
     fn detect(&mut self, t_s: f64) {
-        let flows = self.estimator.mean_leak_flows_m3s().unwrap_or_else(|| self.exact_flows_m3s());
+        let laminar = self.estimator.mean_leak_flows_m3s().unwrap_or_else(|| self.exact_flows_m3s());
+        let flows = laminar
+            .zip(self.effect_leaks_m3s())
+            .map(|(flow, effect)| Estimate { value: flow.value + effect, ..flow });
         let changes = self.detector.update(self.since_detection_s, &flows);
         self.since_detection_s = 0.0;
         let changes = changes.zip(Leak::ALL);
         for (change, fault) in [changes.internal, changes.external_a, changes.external_b] {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
+    }
+
+    /// Mean flows of the leak effects in the rig file, m³/s.
+    fn effect_leaks_m3s(&self) -> PerLeak<f64> {
+        self.correction.as_ref().map_or_else(PerLeak::default, Correction::mean_leaks_m3s)
     }
 
     /// The paper's law knows no uncertainty: its flows are compared with the thresholds as if they were

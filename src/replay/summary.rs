@@ -34,21 +34,19 @@ impl Replay {
         let bias = self.rig.sensors().pressure.bias_std;
         let bias = PerLeak { internal: std::f64::consts::SQRT_2 * bias, external_a: bias, external_b: bias };
         let knows_spread = self.estimator.excitation().is_some();
-        self.estimator
-            .leak_coefficients()
-            .zip(self.pressures.sizes())
-            .zip(self.pressures.net())
-            .zip(bias)
-            .map(|(((coefficient, pressure), net), bias)| {
-                let value = coefficient.value * pressure;
+        let leaks = self.estimator.leak_coefficients().zip(self.effect_leaks_m3s());
+        leaks.zip(self.pressures.sizes()).zip(self.pressures.net()).zip(bias).map(
+            |((((coefficient, effect), pressure), net), bias)| {
+                let value = coefficient.value * pressure + effect;
                 let std = (coefficient.std * pressure).hypot(coefficient.value * bias);
                 let leakage = Leakage::new(Estimate { value, std });
                 Leakage {
-                    net_mean_lpm: Some(coefficient.value * net * LPM_PER_M3S),
+                    net_mean_lpm: Some((coefficient.value * net + effect) * LPM_PER_M3S),
                     std_lpm: leakage.std_lpm.filter(|_| knows_spread),
                     ..leakage
                 }
-            })
+            },
+        )
     }
 
     fn estimates(&self) -> Estimates {

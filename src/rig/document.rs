@@ -105,6 +105,11 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// Whether `key` is there.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.value(key).is_some()
+    }
+
     /// Whether `key` holds a table.
     pub(super) fn is_table(&self, key: &str) -> bool {
         self.value(key).is_some_and(|value| value.get_ref().is_table())

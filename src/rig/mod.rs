@@ -2,19 +2,21 @@
 
 mod bound;
 mod document;
+mod effects;
 mod error;
 mod instruments;
 mod settings;
 mod write;
 
+pub use effects::{EffectMap, EffectValue};
 pub use error::{Fault, Place, RigError};
 pub use instruments::{Instrument, Instruments};
-pub use settings::{ColumnMap, EffectMap, EffectValue, EstimatorKind, EstimatorSettings, ForeignColumn};
+pub use settings::{ColumnMap, EstimatorKind, EstimatorSettings, ForeignColumn};
 
 use crate::units::Dimension;
 use bound::Bound;
 use document::{Document, Section};
-use pitchleak_core::{AlarmSettings, Cylinder, Fluid, Sensors};
+use pitchleak_core::{AlarmSettings, Cylinder, EffectSet, Fluid, Sensors};
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -93,8 +95,13 @@ impl Rig {
             estimator: EstimatorSettings::read(&root.section("estimator")?)?,
             alarms: settings::read_alarms(&root.section("alarms")?, &instruments)?,
             columns: settings::read_columns(&root.section("columns")?)?,
-            effects: settings::read_effects(&root.section("effects")?)?,
+            effects: effects::read(&root.section("effects")?)?,
         })
+    }
+
+    /// The effects of `[effects]`, switched on.
+    pub fn effect_set(&self) -> EffectSet<f64> {
+        effects::effect_set(&self.effects)
     }
 
     /// The spread of every sensor as the estimators use it.

@@ -1,4 +1,4 @@
-//! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`, `[effects]`.
+//! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`.
 
 use super::bound::Bound;
 use super::document::Section;
@@ -66,18 +66,6 @@ pub struct ForeignColumn {
 
 /// `[columns]`: the foreign name of each mapped signal.
 pub type ColumnMap = BTreeMap<Signal, ForeignColumn>;
-
-/// An effect found by a diagnosis, SI.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EffectValue {
-    /// Its parameter.
-    pub value: f64,
-    /// Standard deviation of the parameter, where known.
-    pub std: Option<f64>,
-}
-
-/// `[effects]`: by id.
-pub type EffectMap = BTreeMap<String, EffectValue>;
 
 const SECONDS: Bound = Bound::above_zero(1e7);
 const GAIN: Bound = Bound::above_zero(1e12);
@@ -156,51 +144,3 @@ fn read_unit(entry: &Section<'_>, signal: Signal) -> Result<Option<Unit>, RigErr
             .map_err(|source| entry.fail("unit", super::Fault::Quantity { key: entry.path("unit"), source })),
     }
 }
-
-/// Reads `[effects]`: id = value, or id = { value, std }; bare SI numbers.
-pub(super) fn read_effects(section: &Section<'_>) -> Result<EffectMap, RigError> {
-    section.allow(EFFECT_IDS)?;
-    let any = Bound::between(-1e15, 1e15);
-    let mut effects = EffectMap::new();
-    for id in section.keys() {
-        let effect = if section.is_table(id) {
-            let entry = section.section(id)?;
-            entry.allow(&["value", "std"])?;
-            let value = entry.required("value", Dimension::Share, any)?;
-            let std = entry.quantity("std", Dimension::Share, Bound::from_zero(1e15))?;
-            EffectValue { value, std }
-        } else {
-            EffectValue { value: section.required(id, Dimension::Share, any)?, std: None }
-        };
-        effects.insert(id.to_owned(), effect);
-    }
-    Ok(effects)
-}
-
-/// Effects a rig file may carry.
-const EFFECT_IDS: &[&str] = &[
-    "dead_volume_a",
-    "dead_volume_b",
-    "internal_leak_turbulent",
-    "external_leak_a_turbulent",
-    "external_leak_b_turbulent",
-    "external_leak_b",
-    "entrained_air",
-    "accumulator_a",
-    "accumulator_b",
-    "flow_meter_offset_a",
-    "flow_meter_offset_b",
-    "flow_meter_gain_a",
-    "flow_meter_gain_b",
-    "flow_meter_lag",
-    "position_gain",
-    "position_offset",
-    "pressure_offset_a",
-    "pressure_offset_b",
-    "drag_leak",
-    "position_dependent_leak",
-    "viscous_friction",
-    "coulomb_friction",
-    "stribeck_friction",
-    "load_offset",
-];

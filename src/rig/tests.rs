@@ -1,5 +1,6 @@
 use super::*;
 use crate::signal::Signal;
+use pitchleak_core::Effect;
 use proptest::prelude::*;
 
 const PAPER: &str = r#"
@@ -65,7 +66,7 @@ load_offset = 12
     assert!((rig.alarms.threshold_m3s.external_b * 60e3 / 0.1 - 1.0).abs() < 1e-15);
     assert!((rig.alarms.clear_share - 0.75).abs() < 1e-15);
     assert_eq!(rig.columns[&Signal::PressureA].name, "Head pressure");
-    assert_eq!(rig.effects["position_gain"], EffectValue { value: 0.02, std: Some(0.001) });
+    assert_eq!(rig.effects[&Effect::PositionGain], EffectValue::new(0.02, Some(0.001)));
     let again = Rig::parse(&rig.to_toml(), "rig.toml").unwrap();
     assert_eq!(again, rig);
 }

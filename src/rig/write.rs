@@ -108,9 +108,13 @@ impl Rig {
             return;
         }
         out.push_str("\n[effects]\n");
-        for (id, effect) in &self.effects {
-            let std = effect.std.map_or(String::new(), |std| format!(", std = {std:?}"));
-            let _ = writeln!(out, "{id} = {{ value = {:?}{std} }}", effect.value);
+        for (effect, size) in &self.effects {
+            let std = size.std.map_or(String::new(), |std| format!(", std = {std:?}"));
+            let _ = write!(out, "{effect} = {{ value = {:?}{std}", size.value);
+            for parameter in effect.shape_parameters() {
+                let _ = write!(out, ", {} = {:?}", parameter.spec().id, size.shape.get(*parameter));
+            }
+            out.push_str(" }\n");
         }
     }
 }

@@ -1,0 +1,94 @@
+//! A rig file's `[effects]`, taken out of the readings before they are estimated.
+
+use crate::rig::Rig;
+use crate::trace::Record;
+use pitchleak_core::effects::EffectKind;
+use pitchleak_core::{EffectSet, FadingParabola, Leaks, Model, Moment, PerLeak, Sample};
+
+/// Memory of the derivatives that effects such as dead volume or drag ask for, s.
+const MEMORY_S: f64 = 0.05;
+/// Where a trace has no temperature, K.
+const USUAL_TEMPERATURE_K: f64 = 313.15;
+
+/// Makes of each record what a rig without the effects would have shown.
+pub(super) struct Correction {
+    effects: EffectSet<f64>,
+    model: Model<f64>,
+    rates: Rates,
+    /// Sizes of the effects' own leak flows, summed over time, m³.
+    leaked_m3: PerLeak<f64>,
+    time_s: f64,
+}
+
+/// Derivatives of the signals.
+struct Rates {
+    x: FadingParabola<f64>,
+    pa: FadingParabola<f64>,
+    pb: FadingParabola<f64>,
+    qa: FadingParabola<f64>,
+    qb: FadingParabola<f64>,
+}
+
+impl Correction {
+    /// The correction for a rig; `None` where its file has no effects.
+    pub fn of(rig: &Rig) -> Option<Self> {
+        if rig.effects.is_empty() {
+            return None;
+        }
+        let model = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks: Leaks::default() };
+        let filter = FadingParabola::new(MEMORY_S);
+        let rates = Rates { x: filter, pa: filter, pb: filter, qa: filter, qb: filter };
+        Some(Self { effects: rig.effect_set(), model, rates, leaked_m3: PerLeak::default(), time_s: 0.0 })
+    }
+
+    /// Sensor effects are undone on the readings; what physical effects take is subtracted from the flows.
+    pub fn correct(&mut self, record: &Record) -> Record {
+        let reading = self.moment(record);
+        let truth = self.effects.correct(&reading);
+        let any = self.effects.terms(&truth, &self.model, |kind| kind != EffectKind::Force);
+        let of = |kind: EffectKind| self.effects.terms(&truth, &self.model, |k| k == kind);
+        let sample = Sample {
+            x_m: truth.x_m,
+            pa_pa: truth.pa_pa,
+            pb_pa: truth.pb_pa,
+            qa_m3s: record.sample.qa_m3s.map(|_| truth.qa_m3s - any.chamber_a_m3s),
+            qb_m3s: record.sample.qb_m3s.map(|_| truth.qb_m3s - any.chamber_b_m3s),
+            force_n: record.sample.force_n.map(|_| truth.force_n),
+        };
+        let leaks = PerLeak {
+            internal: of(EffectKind::InternalLeak).chamber_a_m3s,
+            external_a: of(EffectKind::ExternalLeakA).chamber_a_m3s,
+            external_b: of(EffectKind::ExternalLeakB).chamber_b_m3s,
+        };
+        self.time_s += record.dt_s;
+        self.leaked_m3 = self.leaked_m3.zip(leaks).map(|(sum, flow)| sum + flow.abs() * record.dt_s);
+        Record { sample, ..*record }
+    }
+
+    /// Mean leak flows of the effects themselves, m³/s: what a leak of another law carries beside the laminar one.
+    pub fn mean_leaks_m3s(&self) -> PerLeak<f64> {
+        self.leaked_m3.map(|sum| if self.time_s > 0.0 { sum / self.time_s } else { 0.0 })
+    }
+
+    fn moment(&mut self, record: &Record) -> Moment<f64> {
+        let dt_s = if record.after_gap { 0.0 } else { record.dt_s };
+        let sample = &record.sample;
+        let (qa, qb) = (sample.qa_m3s.unwrap_or(0.0), sample.qb_m3s.unwrap_or(0.0));
+        let x = *self.rates.x.update(dt_s, sample.x_m);
+        Moment {
+            x_m: sample.x_m,
+            v_mps: record.speed_mps.unwrap_or(x.slope()),
+            a_mps2: x.curvature(),
+            pa_pa: sample.pa_pa,
+            pb_pa: sample.pb_pa,
+            dpa_pas: self.rates.pa.update(dt_s, sample.pa_pa).slope(),
+            dpb_pas: self.rates.pb.update(dt_s, sample.pb_pa).slope(),
+            qa_m3s: qa,
+            qb_m3s: qb,
+            dqa_m3s2: self.rates.qa.update(dt_s, qa).slope(),
+            dqb_m3s2: self.rates.qb.update(dt_s, qb).slope(),
+            force_n: sample.force_n.unwrap_or(0.0),
+            temp_k: record.temperature_k.unwrap_or(USUAL_TEMPERATURE_K),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `[effects]`: what a diagnosis found and the declared model lacks.
+
+use super::bound::Bound;
+use super::document::Section;
+use super::error::RigError;
+use crate::units::Dimension;
+use pitchleak_core::effects::{Shape, ShapeParameter};
+use pitchleak_core::{Effect, EffectSet};
+use std::collections::BTreeMap;
+
+/// The size of an effect, SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectValue {
+    /// Its parameter, in the unit of its [`EffectSpec`](pitchleak_core::effects::EffectSpec).
+    pub value: f64,
+    /// Standard deviation of the parameter, where known.
+    pub std: Option<f64>,
+    /// The constants it is not linear in.
+    pub shape: Shape<f64>,
+}
+
+impl EffectValue {
+    /// An effect of this size with the usual constants.
+    pub fn new(value: f64, std: Option<f64>) -> Self {
+        Self { value, std, shape: Shape::default() }
+    }
+}
+
+/// `[effects]`.
+pub type EffectMap = BTreeMap<Effect, EffectValue>;
+
+/// The effects of a rig, as plant and estimators switch them on; only those that [`read`] let through.
+pub(super) fn effect_set(effects: &EffectMap) -> EffectSet<f64> {
+    let mut set = EffectSet::default();
+    for (effect, size) in effects {
+        // A map built by hand may hold more or larger effects than exist; those stay off.
+        let _ = set.set(*effect, size.value, size.shape);
+    }
+    set
+}
+
+/// Reads `id = value`, or `id = { value, std, … }` with constants of the effect's shape by their names; bare
+/// numbers are SI.
+pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
+    let ids: Vec<&str> = Effect::ALL.iter().map(|effect| effect.spec().id).collect();
+    section.allow(&ids)?;
+    let mut effects = EffectMap::new();
+    let mut set = EffectSet::default();
+    for effect in Effect::ALL.iter().copied() {
+        let id = effect.spec().id;
+        if !section.has(id) {
+            continue;
+        }
+        let size = if section.is_table(id) {
+            read_table(effect, &section.section(id)?)?
+        } else {
+            EffectValue::new(section.required(id, Dimension::Share, bound(effect))?, None)
+        };
+        if set.set(effect, size.value, size.shape).is_err() {
+            return Err(section.impossible(id, &size.value.to_string(), "at most eight effects at a time"));
+        }
+        effects.insert(effect, size);
+    }
+    Ok(effects)
+}
+
+fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigError> {
+    let shape_ids = effect.shape_parameters().iter().map(|parameter| parameter.spec().id);
+    let keys: Vec<&str> = ["value", "std"].into_iter().chain(shape_ids).collect();
+    entry.allow(&keys)?;
+    let value = entry.required("value", Dimension::Share, bound(effect))?;
+    let std = entry.quantity("std", Dimension::Share, Bound::from_zero(1e15))?;
+    let mut size = EffectValue::new(value, std);
+    for parameter in effect.shape_parameters() {
+        let spec = ShapeParameter::spec(*parameter);
+        let within = Bound::between(spec.lower, spec.upper);
+        if let Some(constant) = entry.quantity(spec.id, Dimension::Share, within)? {
+            size.shape = size.shape.with(*parameter, constant);
+        }
+    }
+    Ok(size)
+}
+
+fn bound(effect: Effect) -> Bound {
+    Bound::between(effect.spec().lower, effect.spec().upper)
+}
