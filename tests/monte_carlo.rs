@@ -5,11 +5,12 @@
 
 mod synthetic;
 
-use pitchleak::core::{Fluid, LeakDetector, PerLeak, Rls, RlsSettings, Sensors, Update};
+use pitchleak::core::{Fluid, LeakDetector, PerLeak, Rls, RlsSettings, Sample, Sensors, Update};
 use pitchleak::cramer_rao::CramerRaoModel;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use synthetic::{Motion, noisy};
+use rand_distr::{Distribution, StandardNormal};
+use synthetic::Motion;
 
 const DT_S: f64 = 0.01;
 
@@ -30,6 +31,24 @@ fn sensors(accuracy_of_paper: f64) -> Sensors<f64> {
     s
 }
 
+/// A minute of exact readings.
+fn minute(motion: &Motion) -> Vec<Sample<f64>> {
+    (0..6000).map(|k| motion.sample(f64::from(k) * DT_S)).collect()
+}
+
+/// The sample as the sensors read it: white noise on every channel.
+fn noisy(sample: &Sample<f64>, sensors: &Sensors<f64>, rng: &mut ChaCha8Rng) -> Sample<f64> {
+    let mut normal = |std: f64| std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, rng);
+    Sample {
+        x_m: sample.x_m + normal(sensors.position.noise_std),
+        pa_pa: sample.pa_pa + normal(sensors.pressure.noise_std),
+        pb_pa: sample.pb_pa + normal(sensors.pressure.noise_std),
+        qa_m3s: sample.qa_m3s.map(|q| q + normal(sensors.flow_a.noise_std)),
+        qb_m3s: sample.qb_m3s.map(|q| q + normal(sensors.flow_b.noise_std)),
+        force_n: sample.force_n,
+    }
+}
+
 struct Statistics {
     covered: f64,
     efficiency: [f64; 3],
@@ -38,7 +57,7 @@ struct Statistics {
 
 fn run(motion: &Motion, sensors: &Sensors<f64>, seeds: u64) -> Statistics {
     let fluid = Fluid { bulk_modulus_pa: motion.bulk_modulus_pa, bulk_modulus_std_pa: 0.2e9 };
-    let clean = motion.trace(DT_S, 60.0);
+    let clean = minute(motion);
     let model = CramerRaoModel { cylinder: &motion.cylinder, fluid: &fluid, sensors, leaks: &motion.leaks };
     let bound = as_array(model.bound(DT_S, &clean).unwrap().leak_std);
     let truth = as_array(motion.leaks);
@@ -97,7 +116,7 @@ fn a_sound_cylinder_stays_silent() {
     declared.flow_b.bias_std = declared.flow_a.bias_std;
     declared.pressure.bias_std = 0.005 * 16e6;
     let motion = Motion::wind_like(leaks(0.0, 0.0, 0.0));
-    let clean = motion.trace(DT_S, 60.0);
+    let clean = minute(&motion);
     let fluid = Fluid { bulk_modulus_pa: motion.bulk_modulus_pa, bulk_modulus_std_pa: 0.2e9 };
     let mut alarms = 0;
     for seed in 0..200 {

@@ -1,9 +1,7 @@
 //! Exact traces for the tests: position and pressures are chosen as sums of sines, the flows then follow from
 //! eq. (1) with analytic derivatives, so nothing is approximated.
 
-use pitchleak::core::{Cylinder, PerLeak, Sample, Sensors};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use pitchleak::core::{Cylinder, PerLeak, Sample};
 
 /// Sum of sines about a mean.
 #[derive(Clone, Debug)]
@@ -66,23 +64,5 @@ impl Motion {
         let qa = store_a + self.cylinder.area_a_m2 * v + cross + self.leaks.external_a * pa;
         let qb = store_b - self.cylinder.area_b_m2 * v - cross + self.leaks.external_b * pb;
         Sample { x_m: x, pa_pa: pa, pb_pa: pb, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None }
-    }
-
-    pub fn trace(&self, dt_s: f64, duration_s: f64) -> Vec<Sample<f64>> {
-        let count = (duration_s / dt_s).round() as usize;
-        (0..count).map(|k| self.sample(k as f64 * dt_s)).collect()
-    }
-}
-
-/// The sample as the sensors read it: white noise on every channel.
-pub fn noisy(sample: &Sample<f64>, sensors: &Sensors<f64>, rng: &mut ChaCha8Rng) -> Sample<f64> {
-    let mut normal = |std: f64| std * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, rng);
-    Sample {
-        x_m: sample.x_m + normal(sensors.position.noise_std),
-        pa_pa: sample.pa_pa + normal(sensors.pressure.noise_std),
-        pb_pa: sample.pb_pa + normal(sensors.pressure.noise_std),
-        qa_m3s: sample.qa_m3s.map(|q| q + normal(sensors.flow_a.noise_std)),
-        qb_m3s: sample.qb_m3s.map(|q| q + normal(sensors.flow_b.noise_std)),
-        force_n: sample.force_n,
     }
 }
