@@ -10,7 +10,7 @@ use super::regression::{self, FOLDS, Prior, Regression, Score, Solution};
 use super::rows::{Balance, Recipe, Rows};
 use super::series::Series;
 use super::term::{self, Term};
-use super::{Declared, Progress, whiteness};
+use super::{Declared, Progress};
 use pitchleak_core::effects::Shape;
 use pitchleak_core::{Effect, EffectSet, Leaks, Model, Sensors};
 
@@ -22,8 +22,10 @@ const NEXT_ROUNDS: usize = 3;
 
 /// Realisations of sensor noise whose mean products correct the columns that carry it.
 const NOISE_DRAWS: u64 = 4;
-/// What is left counts as noise unless its size is rarer than this.
-const CHANCE: f64 = 2e-4;
+/// Halvings of the interval that holds the equation error.
+const BISECTIONS: usize = 16;
+/// What is left counts as noise unless its variance is this many standard deviations too large.
+const CHANCE_SIGMA: f64 = 3.7;
 /// A term held at a value has this share of its own standard deviation as prior.
 const HELD: f64 = 1e-4;
 
@@ -111,24 +113,50 @@ impl<'a> Fit<'a> {
             let spread = self.regression.jackknife(&self.active, &self.increments());
             self.solution.std.iter_mut().zip(spread).for_each(|(std, wide)| *std = std.max(wide));
         }
-        self.equation_error = self.updated_error(&rows, &spread);
+        self.equation_error = self.updated_error(&rows);
         self.rows = rows;
     }
 
     /// Equation error with which what is left would be as large as the noise says: the variance
     /// component of an incomplete model, so that neither priors nor weak effects are overrun by it.
-    fn updated_error(&self, rows: &Rows, spread: &Spread<'_>) -> [f64; 3] {
-        Balance::ALL.map(|balance| {
-            let left = self.regression.innovations(rows, &self.solution, balance);
-            let Some(entry) = rows.entries.iter().find(|entry| entry.balance == balance) else { return 0.0 };
-            let old = spread.equation_error[balance.index()];
-            let by_chance = whiteness::level_p(&left).is_none_or(|p| p > CHANCE);
-            if left.is_empty() || (old <= 0.0 && by_chance) {
-                return old;
+    fn updated_error(&self, rows: &Rows) -> [f64; 3] {
+        let left = regression::leftover(rows, &self.solution);
+        let count = |balance| self.regression.innovations(rows, &self.solution, balance).len().max(1) as f64;
+        let counts = Balance::ALL.map(count);
+        let levels = |equation_error: [f64; 3]| {
+            let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
+            let white = Whitening::new(rows, &spread).whiten(&left);
+            let mut squares = [0.0; 3];
+            for (entry, e) in rows.entries.iter().zip(&white).filter(|(entry, _)| rows.counts(entry)) {
+                squares[entry.balance.index()] += e * e;
             }
-            let level = left.iter().map(|e| e * e).sum::<f64>() / left.len() as f64;
-            (old + (level - 1.0) * spread.white_variance(&rows.rows[entry.row], balance)).max(0.0)
-        })
+            Balance::ALL.map(|balance| squares[balance.index()] / counts[balance.index()])
+        };
+        let mut low = [0.0; 3];
+        let mut high = Balance::ALL.map(|balance| {
+            let pairs =
+                rows.entries.iter().zip(&left).filter(|(e, _)| e.balance == balance && rows.counts(e));
+            let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error: [0.0; 3] };
+            4.0 * pairs.map(|(e, v)| spread.as_white(&rows.rows[e.row], v * v)).sum::<f64>()
+                / counts[balance.index()]
+        });
+        let sensors_only = levels([0.0; 3]);
+        for balance in Balance::ALL.map(Balance::index) {
+            let chance = CHANCE_SIGMA * (2.0 / counts[balance]).sqrt();
+            if sensors_only[balance] <= 1.0 + chance {
+                high[balance] = 0.0;
+            }
+        }
+        if high.iter().all(|error| *error <= 0.0) {
+            return high;
+        }
+        for _ in 0..BISECTIONS {
+            let middle: [f64; 3] = std::array::from_fn(|i| (low[i] + high[i]) / 2.0);
+            for (i, level) in levels(middle).into_iter().enumerate() {
+                if level > 1.0 { low[i] = middle[i] } else { high[i] = middle[i] }
+            }
+        }
+        high
     }
 
     /// Whether more is left than the sensors' noise.

@@ -40,14 +40,18 @@ pub(super) struct Spread<'a> {
 }
 
 impl Spread<'_> {
-    /// Sensitivity of a chamber's row to both pressures as flows, m³/(s·Pa).
+    /// Sensitivity of a chamber's row to both pressures as flows, m³/(s·Pa). While a missing effect drives
+    /// the leaks to absurd sizes, their noise must not hide it: it is held to that of the flow meter.
     fn leak_gain(&self, balance: Balance) -> [f64; 2] {
         let leaks = &self.point.model.leaks;
         let past = leaks.internal_m3spa;
-        match balance {
+        let gain = match balance {
             Balance::ChamberA => [past + leaks.external_a_m3spa, -past],
             _ => [-past, past + leaks.external_b_m3spa],
-        }
+        };
+        let noise = gain[0].hypot(gain[1]) * self.sensors.pressure.noise_std;
+        let held = if noise > self.flow_std(balance) { self.flow_std(balance) / noise } else { 1.0 };
+        gain.map(|g| g * held)
     }
 
     /// A_A or −A_B: how a change of position enters a chamber.
@@ -58,10 +62,14 @@ impl Spread<'_> {
 
     /// Variance of one row of a balance, as if all of it were white in the flow or force.
     pub(super) fn white_variance(&self, row: &Row, balance: Balance) -> f64 {
-        let (hat, _) = hat_weights(row.samples);
+        let own = Weights { hat: hat_weights(row.samples).0, difference: 2.0 };
+        self.as_white(row, self.covariance((row, balance), (row, balance), own))
+    }
+
+    /// The white flow or force whose variance makes this variance of a row.
+    pub(super) fn as_white(&self, row: &Row, variance: f64) -> f64 {
         let step_s = row.block_s / row.samples as f64;
-        let own = Weights { hat, difference: 2.0 };
-        self.covariance((row, balance), (row, balance), own) / (hat * step_s * step_s)
+        variance / (hat_weights(row.samples).0 * step_s * step_s)
     }
 
     fn flow_std(&self, balance: Balance) -> f64 {

@@ -22,12 +22,6 @@ pub(super) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64>
     Some(chi2_p(sum, LAGS as f64))
 }
 
-/// Probability that the sum of squares of white noise of variance one is this large.
-pub(super) fn level_p(innovations: &[f64]) -> Option<f64> {
-    let sum: f64 = innovations.iter().map(|e| e * e).sum();
-    (!innovations.is_empty()).then(|| chi2_p(sum, innovations.len() as f64))
-}
-
 /// Upper tail of the chi-squared distribution.
 pub(super) fn chi2_p(value: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(f64::NAN, |law| law.sf(value.max(0.0)))
