@@ -6,7 +6,7 @@ use plotters::prelude::*;
 /// Colours that stay apart in print and for the colour-blind (Okabe and Ito 2008).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
-    /// Black: what was measured, or asked for.
+    /// Grey and wide, as a bed for the others: what was measured, or asked for.
     Measured,
     /// Blue: our estimate, or what came out.
     Ours,
@@ -17,7 +17,7 @@ pub enum Ink {
 impl Ink {
     fn colour(self) -> RGBColor {
         match self {
-            Self::Measured => RGBColor(0, 0, 0),
+            Self::Measured => RGBColor(165, 165, 165),
             Self::Ours => RGBColor(0, 114, 178),
             Self::Paper => RGBColor(213, 94, 0),
         }
@@ -25,7 +25,7 @@ impl Ink {
 
     fn width(self) -> u32 {
         match self {
-            Self::Measured => 1,
+            Self::Measured => 5,
             Self::Ours | Self::Paper => 2,
         }
     }
@@ -62,6 +62,8 @@ pub struct FigureError(String);
 
 const PANEL_WIDTH: u32 = 560;
 const PANEL_HEIGHT: u32 = 250;
+/// Height that a legend adds to its panel, as a share.
+const LEGEND_SHARE: f64 = 0.5;
 
 /// Draws `panels` row by row, `columns` to a row.
 ///
@@ -94,7 +96,10 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
     let finite =
         || panel.lines.iter().flat_map(|line| &line.points).filter(|p| p.0.is_finite() && p.1.is_finite());
     let (left, right) = range(finite().map(|p| p.0), 0.0);
-    let (low, high) = panel.y_range.unwrap_or_else(|| range(finite().map(|p| p.1), 0.08));
+    let (low, top) = panel.y_range.unwrap_or_else(|| range(finite().map(|p| p.1), 0.08));
+    let labelled = panel.lines.iter().any(|line| !line.label.is_empty());
+    // Room for the legend above the curves.
+    let high = if labelled { top + LEGEND_SHARE * (top - low) } else { top };
     let mut chart = ChartBuilder::on(cell)
         .caption(&panel.title, ("sans-serif", 17))
         .margin(8)
@@ -112,19 +117,20 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
         .light_line_style(TRANSPARENT)
         .bold_line_style(RGBColor(220, 220, 220))
         .x_labels(6)
+        .x_label_formatter(&|value| short(*value, 10.0 * (right - left)))
         .y_labels(6)
         .y_label_formatter(&|value| short(*value, high - low))
         .draw()
         .map_err(error)?;
     for line in &panel.lines {
-        draw_line(&mut chart, line, low, high)?;
+        draw_line(&mut chart, line, low, top)?;
     }
-    if panel.lines.iter().any(|line| !line.label.is_empty()) {
+    if labelled {
         chart
             .configure_series_labels()
             .position(SeriesLabelPosition::UpperRight)
             .label_font(("sans-serif", 13))
-            .background_style(WHITE.mix(0.8))
+            .background_style(WHITE)
             .border_style(RGBColor(180, 180, 180))
             .draw()
             .map_err(error)?;

@@ -17,6 +17,8 @@ const SEED: u64 = 1;
 const LPM_PER_BAR: f64 = 6e9;
 const LPM: f64 = 60e3;
 
+const COLUMNS: usize = 2;
+
 type Points = Vec<(f64, f64)>;
 
 impl Reproduction {
@@ -35,8 +37,11 @@ impl Reproduction {
         };
         let first = of_case(Case::One);
         let mut figures = vec![
-            ("fig5_wind.svg", svg(&first.iter().map(|run| wind(run)).collect::<Vec<_>>(), 2)?),
-            ("fig6_tracking.svg", svg(&first.iter().flat_map(|run| followed(run)).collect::<Vec<_>>(), 2)?),
+            ("fig5_wind.svg", svg(&first.iter().map(|run| wind(run)).collect::<Vec<_>>(), COLUMNS)?),
+            (
+                "fig6_tracking.svg",
+                svg(&legend_once(first.iter().flat_map(|run| followed(run)).collect()), COLUMNS)?,
+            ),
         ];
         let names = [
             ("fig7a_leakage_case1.svg", "fig7b_coefficients_case1.svg"),
@@ -45,9 +50,10 @@ impl Reproduction {
         for (case, (leakage, coefficients)) in Case::ALL.into_iter().zip(names) {
             let courses =
                 of_case(case).into_iter().map(|run| self.courses(run)).collect::<Result<Vec<_>, _>>()?;
-            let panels = |draw: fn(&Courses) -> [Panel; 2]| courses.iter().flat_map(draw).collect::<Vec<_>>();
-            figures.push((leakage, svg(&panels(leak_flows), 2)?));
-            figures.push((coefficients, svg(&panels(leak_coefficients), 2)?));
+            let panels =
+                |draw: fn(&Courses) -> [Panel; 2]| legend_once(courses.iter().flat_map(draw).collect());
+            figures.push((leakage, svg(&panels(leak_flows), COLUMNS)?));
+            figures.push((coefficients, svg(&panels(leak_coefficients), COLUMNS)?));
         }
         Ok(figures)
     }
@@ -121,7 +127,7 @@ fn followed(run: &Run) -> [Panel; 2] {
     let panel = |what, y_label, reference, output| Panel {
         title: format!("{wind} m/s: {what}"),
         y_label,
-        lines: vec![line("output", Ink::Ours, output), line("reference", Ink::Measured, reference)],
+        lines: vec![line("reference", Ink::Measured, reference), line("output", Ink::Ours, output)],
         y_range: None,
     };
     let position = over_time(truths, |t| 1e3 * t.moment.x_m);
@@ -143,6 +149,14 @@ fn followed(run: &Run) -> [Panel; 2] {
     ]
 }
 
+/// A legend in the first row is enough.
+fn legend_once(mut panels: Vec<Panel>) -> Vec<Panel> {
+    for line in panels.iter_mut().skip(COLUMNS).flat_map(|panel| &mut panel.lines) {
+        line.label = "";
+    }
+    panels
+}
+
 /// The range of the points, widened by a twelfth and to `least` at the least.
 fn at_least(least: f64, points: &Points) -> (f64, f64) {
     let (low, high) =
@@ -158,15 +172,15 @@ fn leak_flows(courses: &Courses) -> [Panel; 2] {
         };
         let reference = points(&courses.ours.references_m3s);
         let (low, high) = at_least(0.1, &reference);
-        let room = 0.6 * (high - low);
+        let room = 0.3 * (high - low);
         Panel {
             title: format!("{} m/s: {name} leakage", courses.mean_mps),
             y_label: "leakage (L/min)",
             y_range: Some((low - room, high + room)),
             lines: vec![
+                line("measured", Ink::Measured, reference),
                 line("paper's law", Ink::Paper, points(&courses.paper.flows_m3s)),
                 line("ours", Ink::Ours, points(&courses.ours.flows_m3s)),
-                line("measured", Ink::Measured, reference),
             ],
         }
     };
@@ -184,11 +198,11 @@ fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
         Panel {
             title: format!("{} m/s: {name} leak coefficient", courses.mean_mps),
             y_label: "coefficient (L/min/bar)",
-            y_range: Some((-0.2 * truth, 2.2 * truth)),
+            y_range: Some((-0.2 * truth, 2.0 * truth)),
             lines: vec![
+                line("measured", Ink::Measured, vec![(0.0, truth), (end, truth)]),
                 line("paper's law", Ink::Paper, points(&courses.paper)),
                 line("ours", Ink::Ours, points(&courses.ours)),
-                line("measured", Ink::Measured, vec![(0.0, truth), (end, truth)]),
             ],
         }
     };
