@@ -1,6 +1,7 @@
 //! What the emulator is asked to follow: piston position and load force over time.
 
 use crate::curve::{Curve, CurveError};
+use crate::units::{Dimension, Unit};
 use std::path::{Path, PathBuf};
 
 /// Position and load references of the rig.
@@ -27,10 +28,10 @@ impl Reference {
         Self { position_m, load_n, wind_mps: None, clipped_share: 0.0 }
     }
 
-    /// Last time at which any of the curves still changes, s; `None` if all are constant.
-    pub fn end_s(&self) -> Option<f64> {
-        let ends = [&self.position_m, &self.load_n].map(Curve::span_s).into_iter();
-        ends.filter(|(start, end)| end > start).map(|(_, end)| end).reduce(f64::max)
+    /// First and last time between which any of the curves changes, s; `None` if all are constant.
+    pub fn span_s(&self) -> Option<(f64, f64)> {
+        let spans = [&self.position_m, &self.load_n].map(Curve::span_s).into_iter();
+        spans.filter(|(start, end)| end > start).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 }
 
@@ -46,12 +47,14 @@ pub enum ReferenceError {
         source: csv::Error,
     },
     /// A column is not there.
-    #[error("{path}: has no column {column}", path = path.display())]
+    #[error("{path}: has no column {signal} with one of the units {units}", path = path.display())]
     Missing {
         /// The file.
         path: PathBuf,
-        /// The column.
-        column: String,
+        /// The column, without its unit.
+        signal: &'static str,
+        /// The unit suffixes accepted.
+        units: String,
     },
     /// A cell is not a number.
     #[error("{path}: line {line}, column {column}: not a number", path = path.display())]
@@ -60,8 +63,8 @@ pub enum ReferenceError {
         path: PathBuf,
         /// Line, from 1.
         line: u64,
-        /// Name of the column.
-        column: String,
+        /// Number of the column, from 1.
+        column: usize,
     },
     /// The samples make no curve.
     #[error("{path}: {source}", path = path.display())]
@@ -73,35 +76,34 @@ pub enum ReferenceError {
     },
 }
 
-/// Reads the curve of `column` over `t_s` from a CSV file with a header row; values are taken times
-/// `factor`, the unit of the column in SI.
+/// Reads a reference from a CSV file with a header row, columns named as in traces: the time `t_s`
+/// and `signal` with its unit, for instance `x_mm`.
 ///
 /// # Errors
 /// [`ReferenceError`] names file, line and column.
-pub fn read_curve(path: &Path, column: &str, factor: f64) -> Result<Curve, ReferenceError> {
+pub fn read_curve(path: &Path, signal: &'static str, measures: Dimension) -> Result<Curve, ReferenceError> {
     let read = |source| ReferenceError::Read { path: path.into(), source };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(read)?;
     let headers = reader.headers().map_err(read)?.clone();
-    let find = |name: &str| {
-        headers
-            .iter()
-            .position(|h| h.eq_ignore_ascii_case(name))
-            .map(|index| (index, name.to_owned()))
-            .ok_or_else(|| ReferenceError::Missing { path: path.into(), column: name.into() })
+    let find = |signal: &'static str, measures: Dimension| {
+        let unit = |header: &str| measures.by_suffix(header.strip_prefix(signal)?.strip_prefix('_')?);
+        let found = headers.iter().enumerate().find_map(|(index, header)| Some((index, unit(header)?)));
+        found.ok_or_else(|| ReferenceError::Missing { path: path.into(), signal, units: measures.suffixes() })
     };
-    let (time, value) = (find("t_s")?, find(column)?);
+    let (time, value) = (find("t", Dimension::Time)?, find(signal, measures)?);
     let (mut t_s, mut values) = (Vec::new(), Vec::new());
     for record in reader.records() {
         let record = record.map_err(read)?;
-        let cell = |(index, column): &(usize, String)| -> Result<f64, ReferenceError> {
-            record.get(*index).and_then(|text| text.parse().ok()).ok_or_else(|| ReferenceError::Cell {
+        let cell = |(index, unit): &(usize, Unit)| -> Result<f64, ReferenceError> {
+            let number = record.get(*index).and_then(|text| text.parse().ok());
+            number.map(|number| unit.to_si(number)).ok_or_else(|| ReferenceError::Cell {
                 path: path.into(),
                 line: record.position().map_or(0, csv::Position::line),
-                column: column.clone(),
+                column: index + 1,
             })
         };
         t_s.push(cell(&time)?);
-        values.push(factor * cell(&value)?);
+        values.push(cell(&value)?);
     }
     Curve::through(&t_s, &values).map_err(|source| ReferenceError::Curve { path: path.into(), source })
 }

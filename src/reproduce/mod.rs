@@ -19,8 +19,6 @@ use crate::rig::{Instrument, Instruments};
 use crate::simulate::{Biases, Sensing};
 use crate::wind::WindCase;
 use pitchleak_core::{Butterworth, PerLeak, Sample};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 use table::{Entry, WindowBound};
 use trial::{CUTOFF_HZ, mean};
@@ -167,7 +165,7 @@ impl Law {
         let truth = run.coefficients();
         let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
         mine.map(|seed| {
-            let biases = drawn_biases(&self.rig.instruments, self.bias_share, seed);
+            let biases = Biases::drawn(&self.rig.instruments, self.bias_share, seed);
             let sensing = Sensing::new(self.rig.sensors(), biases, seed);
             let course = Course::run(&self.rig, truths, sensing)?;
             let entry = |coefficient, window, of: fn(&PerLeak<f64>) -> f64| Entry {
@@ -237,25 +235,6 @@ fn noise_gain() -> f64 {
         filter.reset(0.0);
         (0..1000).map(|k| filter.update(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum::<f64>().sqrt()
     })
-}
-
-/// Biases drawn evenly from ± `share` of each sensor's full scale.
-pub fn drawn_biases(instruments: &Instruments, share: f64, seed: u64) -> Biases {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    // A stream of its own: the noise is drawn from the same seed.
-    random.set_stream(1);
-    let mut within = |sheet: &Instrument| {
-        let unit = (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0;
-        (2.0 * unit - 1.0) * share * sheet.full_scale
-    };
-    Biases {
-        x_m: within(&instruments.position),
-        pa_pa: within(&instruments.pressure),
-        pb_pa: within(&instruments.pressure),
-        qa_m3s: within(&instruments.flow_a),
-        qb_m3s: within(&instruments.flow_b),
-        force_n: within(&instruments.force),
-    }
 }
 
 /// The rows of `laws` (and their places in the trials), in the order wind, case, leak, estimator;

@@ -1,13 +1,17 @@
 //! Traces made by the emulator: what a rig with known leaks would have measured.
 //!
-//! [`Scenario::run`] gives the truth; [`Sensing`] makes readings of it; [`TraceWriter`] puts both
-//! into a trace file. The controllers act on the truth, not on the readings.
+//! [`Scenario::run`] gives the truth; [`Sensing`] makes readings of it; [`Recording`] puts both into a
+//! trace file and the truth beside it. The controllers act on the truth, not on the readings.
 
+mod effects;
 mod leak;
+mod recording;
 mod sensing;
 mod writer;
 
+pub use effects::{EffectSize, EffectsError, effects};
 pub use leak::{LeakSize, LeakSizeError};
+pub use recording::{LeakTruth, Recording, RecordingError, TruthFile, truth_path};
 pub use sensing::{Biases, Sensing};
 pub use writer::TraceWriter;
 

@@ -1,3 +1,4 @@
+use crate::rig::{Instrument, Instruments};
 use pitchleak_core::{Sample, Sensors};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -17,6 +18,27 @@ pub struct Biases {
     pub qb_m3s: f64,
     /// Force sensor, N.
     pub force_n: f64,
+}
+
+impl Biases {
+    /// Offsets drawn evenly from ± `share` of each sensor's full scale.
+    pub fn drawn(instruments: &Instruments, share: f64, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        // A stream of its own: the noise may be drawn from the same seed.
+        random.set_stream(1);
+        let mut within = |sheet: &Instrument| {
+            let unit = (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0;
+            (2.0 * unit - 1.0) * share * sheet.full_scale
+        };
+        Self {
+            x_m: within(&instruments.position),
+            pa_pa: within(&instruments.pressure),
+            pb_pa: within(&instruments.pressure),
+            qa_m3s: within(&instruments.flow_a),
+            qb_m3s: within(&instruments.flow_b),
+            force_n: within(&instruments.force),
+        }
+    }
 }
 
 /// Sensors that show the truth plus a constant bias plus white noise.

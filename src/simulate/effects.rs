@@ -1,0 +1,77 @@
+use crate::Rig;
+use pitchleak_core::effects::{EffectError, Shape, UnknownEffect};
+use pitchleak_core::{Effect, EffectSet};
+
+/// One effect and its size, SI: `viscous_friction=1500`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectSize {
+    /// Which.
+    pub effect: Effect,
+    /// Its value in the unit of its [`pitchleak_core::effects::EffectSpec`].
+    pub value: f64,
+}
+
+/// Why effects cannot be switched on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum EffectsError {
+    /// No `=`, or no number after it.
+    #[error("`{0}` is not of the form id=value with a number in SI units")]
+    Form(String),
+    /// No effect has this id.
+    #[error("`{id}`: {source}")]
+    Unknown {
+        /// The id.
+        id: String,
+        /// The ids that are known.
+        source: UnknownEffect,
+    },
+    /// The value does not suit the effect, or there are too many.
+    #[error(transparent)]
+    Value(#[from] EffectError),
+}
+
+impl std::str::FromStr for EffectSize {
+    type Err = EffectsError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let form = || EffectsError::Form(text.to_owned());
+        let (id, value) = text.split_once('=').ok_or_else(form)?;
+        Ok(Self { effect: by_id(id.trim())?, value: value.trim().parse().map_err(|_| form())? })
+    }
+}
+
+/// The effects of a rig file, as a diagnosis left them there, and `more` that are put on top.
+///
+/// # Errors
+/// [`EffectsError`].
+pub fn effects(rig: &Rig, more: &[EffectSize]) -> Result<EffectSet<f64>, EffectsError> {
+    let mut set = EffectSet::default();
+    for (id, known) in &rig.effects {
+        set.set(by_id(id)?, known.value, Shape::default())?;
+    }
+    for EffectSize { effect, value } in more {
+        set.set(*effect, *value, Shape::default())?;
+    }
+    Ok(set)
+}
+
+fn by_id(id: &str) -> Result<Effect, EffectsError> {
+    id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_is_an_id_and_a_number() {
+        let size: EffectSize = "viscous_friction = 1500".parse().expect("an effect");
+        assert_eq!(size, EffectSize { effect: Effect::ViscousFriction, value: 1500.0 });
+        assert!(matches!("viscous_friction".parse::<EffectSize>(), Err(EffectsError::Form(_))));
+        assert!(matches!("viscous_friction=much".parse::<EffectSize>(), Err(EffectsError::Form(_))));
+        let unknown = "sand=1".parse::<EffectSize>().expect_err("no such effect").to_string();
+        assert!(unknown.starts_with("`sand`: ") && unknown.contains("position_gain"), "{unknown}");
+        let out_of_range = [EffectSize { effect: Effect::ViscousFriction, value: f64::NAN }];
+        assert!(matches!(effects(&Rig::paper(), &out_of_range), Err(EffectsError::Value(_))));
+    }
+}

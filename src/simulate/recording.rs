@@ -1,0 +1,225 @@
+use super::{Biases, Scenario, Sensing, SimulateError, TraceWriter};
+use pitchleak_core::{Leaks, PerLeak, Sensors};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A scenario with the sensors that record it.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What happens.
+    pub scenario: Scenario,
+    /// White noise of the sensors.
+    pub noise: Sensors<f64>,
+    /// Constant offsets of the sensors.
+    pub biases: Biases,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// What is true of a recorded trace: written beside it as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TruthFile {
+    /// `pitchleak.simulate/1`.
+    pub schema: &'static str,
+    /// The program and its version.
+    pub program: &'static str,
+    /// What the rig followed, as given.
+    pub reference: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// Time of the reference at which the trace begins, s.
+    pub start_s: f64,
+    /// Length of the trace, s.
+    pub duration_s: f64,
+    /// Samples per second.
+    pub sample_rate_hz: f64,
+    /// Samples written.
+    pub samples: u64,
+    /// Seed of noise and biases.
+    pub seed: u64,
+    /// Time at which the leaks open, s.
+    pub leak_onset_s: f64,
+    /// The leaks.
+    pub leaks: PerLeak<LeakTruth>,
+    /// Effects beyond the model by their ids, SI.
+    pub effects: BTreeMap<&'static str, f64>,
+    /// Standard deviations of the sensors' white noise, SI.
+    pub noise_std: BTreeMap<&'static str, f64>,
+    /// Constant offsets of the sensors, reading minus truth, SI.
+    pub biases: BTreeMap<&'static str, f64>,
+    /// Root mean square of position less its reference, m.
+    pub position_error_rms_m: f64,
+    /// Root mean square of load less its reference, N.
+    pub load_error_rms_n: f64,
+}
+
+/// One leak of a recorded trace.
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
+pub struct LeakTruth {
+    /// Laminar coefficient, m³/(s·Pa).
+    pub coefficient_m3spa: f64,
+    /// Mean size of its flow, effects included, L/min.
+    pub mean_flow_lpm: f64,
+}
+
+/// Why a recording was not made.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The simulation.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// A file.
+    #[error("{path}: {source}", path = path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// Sums over a recording.
+#[derive(Default)]
+struct Totals {
+    samples: u64,
+    flows_m3s: PerLeak<f64>,
+    position_square: f64,
+    load_square: f64,
+}
+
+impl Recording {
+    /// Writes the trace to `path` (`.csv`, `.csv.gz`, `-` for standard output) and says what is true of
+    /// it. `reference` names what the rig follows; `done` gets the share that is done.
+    ///
+    /// # Errors
+    /// [`RecordingError`].
+    pub fn write(
+        &self,
+        path: &Path,
+        reference: &str,
+        mut done: impl FnMut(f64),
+    ) -> Result<TruthFile, RecordingError> {
+        let write = |source| RecordingError::Write { path: path.to_owned(), source };
+        let leaks = self.scenario.leak_coefficients()?;
+        let mut sensing = Sensing::new(self.noise, self.biases, self.seed);
+        let mut writer = TraceWriter::new(sink(path).map_err(write)?).map_err(write)?;
+        let mut totals = Totals::default();
+        let mut failure = None;
+        self.scenario.run(leaks, |truth| {
+            let shown = sensing.read(&truth.sample);
+            if failure.is_none() {
+                failure = writer.row(truth, &shown).err();
+            }
+            totals.samples += 1;
+            totals.flows_m3s = totals.flows_m3s.zip(truth.leaks_m3s).map(|(sum, flow)| sum + flow.abs());
+            totals.position_square += (truth.moment.x_m - truth.position_reference_m).powi(2);
+            totals.load_square += (truth.moment.force_n - truth.load_reference_n).powi(2);
+            done(truth.t_s / self.scenario.duration_s);
+        })?;
+        match failure {
+            Some(source) => Err(write(source)),
+            None => writer.into_inner().finish().map_err(write),
+        }?;
+        Ok(self.truth(reference, &leaks, &totals))
+    }
+
+    fn truth(&self, reference: &str, leaks: &Leaks<f64>, totals: &Totals) -> TruthFile {
+        let Self { scenario, noise, biases, seed } = self;
+        let count = totals.samples.max(1) as f64;
+        let coefficients = PerLeak {
+            internal: leaks.internal_m3spa,
+            external_a: leaks.external_a_m3spa,
+            external_b: leaks.external_b_m3spa,
+        };
+        TruthFile {
+            schema: "pitchleak.simulate/1",
+            program: concat!("pitchleak ", env!("CARGO_PKG_VERSION")),
+            reference: reference.to_owned(),
+            rig: scenario.rig.name.clone(),
+            start_s: scenario.start_s,
+            duration_s: scenario.duration_s,
+            sample_rate_hz: scenario.sample_rate_hz,
+            samples: totals.samples,
+            seed: *seed,
+            leak_onset_s: scenario.onset_s,
+            leaks: coefficients.zip(totals.flows_m3s).map(|(coefficient_m3spa, sum)| LeakTruth {
+                coefficient_m3spa,
+                mean_flow_lpm: 60e3 * sum / count,
+            }),
+            effects: scenario.effects.iter().map(|active| (active.effect.spec().id, active.value)).collect(),
+            noise_std: BTreeMap::from([
+                ("x_m", noise.position.noise_std),
+                ("pressure_pa", noise.pressure.noise_std),
+                ("qa_m3s", noise.flow_a.noise_std),
+                ("qb_m3s", noise.flow_b.noise_std),
+                ("force_n", noise.force.noise_std),
+            ]),
+            biases: BTreeMap::from([
+                ("x_m", biases.x_m),
+                ("pa_pa", biases.pa_pa),
+                ("pb_pa", biases.pb_pa),
+                ("qa_m3s", biases.qa_m3s),
+                ("qb_m3s", biases.qb_m3s),
+                ("force_n", biases.force_n),
+            ]),
+            position_error_rms_m: (totals.position_square / count).sqrt(),
+            load_error_rms_n: (totals.load_square / count).sqrt(),
+        }
+    }
+}
+
+/// Where the truth of the trace at `path` is written: `T.csv.gz` → `T.json`.
+pub fn truth_path(path: &Path) -> PathBuf {
+    let plain = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+        path.with_extension("")
+    } else {
+        path.to_owned()
+    };
+    plain.with_extension("json")
+}
+
+/// An output that has to be closed to be whole.
+enum Sink {
+    Plain(BufWriter<Box<dyn Write>>),
+    Gzip(flate2::write::GzEncoder<BufWriter<File>>),
+}
+
+fn sink(path: &Path) -> std::io::Result<Sink> {
+    if path == Path::new("-") {
+        return Ok(Sink::Plain(BufWriter::new(Box::new(std::io::stdout()))));
+    }
+    let file = File::create(path)?;
+    Ok(if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
+        Sink::Gzip(flate2::write::GzEncoder::new(BufWriter::new(file), flate2::Compression::best()))
+    } else {
+        Sink::Plain(BufWriter::new(Box::new(file)))
+    })
+}
+
+impl Sink {
+    fn finish(self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(mut out) => out.flush(),
+            Self::Gzip(encoder) => encoder.finish()?.flush(),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::Plain(out) => out.write(bytes),
+            Self::Gzip(encoder) => encoder.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::Plain(out) => out.flush(),
+            Self::Gzip(encoder) => encoder.flush(),
+        }
+    }
+}
