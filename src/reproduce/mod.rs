@@ -1,12 +1,14 @@
 //! The paper's experiment again (Wu et al. 2011, Section IV): four winds, two leak settings, its law
 //! and ours on the same readings, with many seeds. docs/reproduction.md explains every choice.
 
+mod detection;
 mod figures;
 mod protocol;
 mod search;
 mod table;
 mod trial;
 
+pub use detection::{Delay, Detection, detection};
 pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
 pub use search::{Candidate, best_gains, paper_rig};
 pub use table::{Bound, Figures, Row, Scored};
@@ -76,6 +78,8 @@ pub struct Report {
     pub tracking: Vec<Tracking>,
     /// Gains tried for the paper's law, the best first; `rows` use the best.
     pub paper_gains: Vec<Candidate>,
+    /// What the alarms do, where that was asked for: see [`detection()`].
+    pub detection: Option<Detection>,
 }
 
 /// A finished reproduction: the report, and the runs behind it for the figures.
@@ -125,6 +129,7 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
         rows_with_bias: rows(&[(2, biased)]),
         tracking: settings.iter().zip(&runs).map(|((_, case), run)| tracking(*case, run)).collect(),
         paper_gains,
+        detection: None,
     };
     Ok(Reproduction { report, runs })
 }
@@ -317,6 +322,7 @@ impl Report {
                 best.gamma
             );
         }
-        out + "Paper: leakage 7.8 % mean, 11 % peak; coefficient 7.3 % mean, 13.3 % peak; converged within 1-2 s\n"
+        out += "Paper: leakage 7.8 % mean, 11 % peak; coefficient 7.3 % mean, 13.3 % peak; converged within 1-2 s\n";
+        out + &self.detection.as_ref().map_or_else(String::new, Detection::to_text)
     }
 }

@@ -36,7 +36,9 @@ impl std::str::FromStr for EffectSize {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let form = || EffectsError::Form(text.to_owned());
         let (id, value) = text.split_once('=').ok_or_else(form)?;
-        Ok(Self { effect: by_id(id.trim())?, value: value.trim().parse().map_err(|_| form())? })
+        let id = id.trim();
+        let effect = id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })?;
+        Ok(Self { effect, value: value.trim().parse().map_err(|_| form())? })
     }
 }
 
@@ -45,18 +47,11 @@ impl std::str::FromStr for EffectSize {
 /// # Errors
 /// [`EffectsError`].
 pub fn effects(rig: &Rig, more: &[EffectSize]) -> Result<EffectSet<f64>, EffectsError> {
-    let mut set = EffectSet::default();
-    for (id, known) in &rig.effects {
-        set.set(by_id(id)?, known.value, Shape::default())?;
-    }
+    let mut set = rig.effect_set();
     for EffectSize { effect, value } in more {
         set.set(*effect, *value, Shape::default())?;
     }
     Ok(set)
-}
-
-fn by_id(id: &str) -> Result<Effect, EffectsError> {
-    id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })
 }
 
 #[cfg(test)]

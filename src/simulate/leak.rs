@@ -54,16 +54,37 @@ impl LeakSize {
     }
 }
 
-/// The coefficients of all leaks at mean |P_L|, P_A, P_B; `None` where one has no pressure.
+/// The coefficients of all leaks at mean |P_L|, P_A, P_B, m³/(s·Pa); `None` where one has no
+/// pressure.
 pub(super) fn coefficients(
     sizes: &PerLeak<LeakSize>,
     mean_pressures_pa: &PerLeak<f64>,
-) -> Option<Leaks<f64>> {
+) -> Option<PerLeak<f64>> {
     let found = sizes.zip(*mean_pressures_pa).map(|(size, pressure)| size.coefficient(pressure));
-    Some(Leaks {
-        internal_m3spa: found.internal?,
-        external_a_m3spa: found.external_a?,
-        external_b_m3spa: found.external_b?,
+    Some(PerLeak { internal: found.internal?, external_a: found.external_a?, external_b: found.external_b? })
+}
+
+/// The coefficients as the plant takes them.
+pub(super) fn laminar(coefficients: &PerLeak<f64>) -> Leaks<f64> {
+    Leaks {
+        internal_m3spa: coefficients.internal,
+        external_a_m3spa: coefficients.external_a,
+        external_b_m3spa: coefficients.external_b,
+    }
+}
+
+/// The next coefficients to try, from the last two pairs (tried, found at its pressures): each leak by
+/// Wegstein's secant (1958, "Accelerating convergence of iterative processes"), on logarithms. A leak
+/// takes pressure away but never more than in proportion, so the slope lies between 0 and 1; other
+/// leaks that change at the same time may make it look otherwise.
+pub(super) fn next_guess(
+    last: Option<(PerLeak<f64>, PerLeak<f64>)>,
+    (tried, found): (PerLeak<f64>, PerLeak<f64>),
+) -> PerLeak<f64> {
+    let Some((tried_last, found_last)) = last else { return found };
+    tried.zip(found).zip(tried_last.zip(found_last)).map(|((c, g), (c_last, g_last))| {
+        let slope = libm::log(g / g_last) / libm::log(c / c_last);
+        if slope.is_finite() { c * libm::pow(g / c, 1.0 / (1.0 - slope.clamp(0.0, 0.8))) } else { g }
     })
 }
 
@@ -74,14 +95,10 @@ pub(super) fn any_by_flow(sizes: &PerLeak<LeakSize>) -> bool {
 }
 
 /// Greatest relative difference between two sets of coefficients.
-pub(super) fn differ(one: &Leaks<f64>, other: &Leaks<f64>) -> f64 {
-    let pairs = [
-        (one.internal_m3spa, other.internal_m3spa),
-        (one.external_a_m3spa, other.external_a_m3spa),
-        (one.external_b_m3spa, other.external_b_m3spa),
-    ];
+pub(super) fn differ(one: &PerLeak<f64>, other: &PerLeak<f64>) -> f64 {
     let relative = |(a, b): (f64, f64)| (a - b).abs() / a.abs().max(b.abs()).max(f64::MIN_POSITIVE);
-    pairs.into_iter().map(relative).fold(0.0, f64::max)
+    let all = one.zip(*other).map(relative);
+    all.internal.max(all.external_a).max(all.external_b)
 }
 
 #[cfg(test)]

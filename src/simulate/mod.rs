@@ -106,16 +106,19 @@ impl Scenario {
         let coefficients = |pressures: &PerLeak<f64>| {
             leak::coefficients(&self.leaks, pressures).ok_or(SimulateError::LeakOutOfReach)
         };
-        let mut leaks = coefficients(&FIRST_GUESS_PA)?;
+        let mut guess = coefficients(&FIRST_GUESS_PA)?;
         if !leak::any_by_flow(&self.leaks) {
-            return Ok(leaks);
+            return Ok(leak::laminar(&guess));
         }
+        let mut last = None;
         for _ in 0..CALIBRATION_RUNS {
-            let next = coefficients(&calibration.mean_pressures_pa(leaks)?)?;
-            if leak::differ(&next, &leaks) <= CALIBRATION_ACCURACY {
-                return Ok(leaks);
+            let found = coefficients(&calibration.mean_pressures_pa(leak::laminar(&guess))?)?;
+            if leak::differ(&found, &guess) <= CALIBRATION_ACCURACY {
+                return Ok(leak::laminar(&guess));
             }
-            leaks = next;
+            let next = leak::next_guess(last, (guess, found));
+            last = Some((guess, found));
+            guess = next;
         }
         Err(SimulateError::LeakOutOfReach)
     }
