@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use pitchleak_core::{Cylinder, Fluid, PaperGains, PaperLaw, Sample, Theta, regressors};
+use pitchleak_core::plant::{CylinderPlant, Drive};
+use pitchleak_core::{Cylinder, Fluid, Leaks, Model, PaperGains, PaperLaw, Sample, Theta, regressors};
 use proptest::prelude::*;
 
 fn cylinder() -> impl Strategy<Value = Cylinder<f64>> {
@@ -104,28 +105,43 @@ proptest! {
     }
 }
 
-/// Motion and pressures as sines, flows from eq. (1), load from eq. (2): dP_L/dt − Σ θ f, largest over the
-/// motion and relative to the largest dP_L/dt, with f1 as given.
+/// |dP_L/dt − Σ θ f| over a run of the plant under valve-like flows and a load, largest, relative to the
+/// largest |dP_L/dt|; `f1` combines Q_A/V_A and Q_B/V_B.
 fn identity_error(f1: impl Fn(f64, f64) -> f64) -> f64 {
-    let cylinder = Cylinder::<f64>::paper();
-    let (beta, leaks, m) = (0.9e9, [1e-11, 3e-12, 2e-12], cylinder.moving_mass_kg);
-    let truth = theta(beta, leaks, m);
+    let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 2e-12 };
+    let model = Model { leaks, ..Model::paper() };
+    let (beta, m) = (model.fluid.bulk_modulus_pa, model.cylinder.moving_mass_kg);
+    let truth = theta(beta, [1e-11, 3e-12, 2e-12], m);
+    let plant = CylinderPlant::new(model).unwrap();
+    let mut state = plant.state_at(0.1, 0.0, 5e6, 4.5e6);
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for k in 0..2000 {
         let t = f64::from(k) * 0.01;
-        let (x, v) = (0.1 + 0.04 * (0.9 * t).sin(), 0.036 * (0.9 * t).cos());
-        let (pa, dpa) = (6e6 + 1e6 * (1.3 * t).sin(), 1.3e6 * (1.3 * t).cos());
-        let (pb, dpb) = (5e6 + 8e5 * (0.7 * t + 1.0).sin(), 5.6e5 * (0.7 * t + 1.0).cos());
-        let (va, vb) = (cylinder.volume_a_m3(x), cylinder.volume_b_m3(x));
-        let qa = va / beta * dpa + cylinder.area_a_m2 * v + leaks[0] * (pa - pb) + leaks[1] * pa;
-        let qb = vb / beta * dpb - cylinder.area_b_m2 * v - leaks[0] * (pa - pb) + leaks[2] * pb;
-        let sample =
-            Sample { x_m: x, pa_pa: pa, pb_pa: pb, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None };
+        let drive = |after: f64| {
+            let wave = (1.1 * (t + after)).sin();
+            Drive {
+                qa_m3s: 5e-5 * wave + 1.5e-5,
+                qb_m3s: -3.7e-5 * wave,
+                force_n: 2e3 + 800.0 * (0.7 * t).cos(),
+            }
+        };
+        let at = plant.rates(&state, &drive(0.0)).moment;
+        let (va, vb) = (model.cylinder.volume_a_m3(at.x_m), model.cylinder.volume_b_m3(at.x_m));
+        let sample = Sample {
+            x_m: at.x_m,
+            pa_pa: at.pa_pa,
+            pb_pa: at.pb_pa,
+            qa_m3s: Some(at.qa_m3s),
+            qb_m3s: Some(at.qb_m3s),
+            force_n: None,
+        };
         // The integral of f5 is m ẋ, eq. (14).
-        let mut f = regressors(&cylinder, &sample, m * v).unwrap();
-        f[0] = f1(qa / va, qb / vb);
-        worst = worst.max((dpa - dpb - dot(&truth, &f)).abs());
-        largest = largest.max((dpa - dpb).abs());
+        let mut f = regressors(&model.cylinder, &sample, m * at.v_mps).unwrap();
+        f[0] = f1(at.qa_m3s / va, at.qb_m3s / vb);
+        let slope = at.dpa_pas - at.dpb_pas;
+        worst = worst.max((slope - dot(&truth, &f)).abs());
+        largest = largest.max(slope.abs());
+        state = plant.step(&state, 0.01, drive);
     }
     worst / largest
 }
@@ -138,11 +154,10 @@ fn identity_7_needs_the_minus() {
         "eq. (7) misses dP_L/dt by {corrected:.1e} with the minus, by a factor of {printed:.0} as printed"
     );
     assert!(corrected < 1e-9);
-    assert!(printed > 50.0);
+    assert!(printed > 10.0);
 }
 
-/// Each pair of the table is one step of the paper's gains at its largest useful rate; the explicit form of the
-/// same law diverges there, which is why the implicit one is used.
+/// At useful gains and 100 Hz the explicit form of the same law diverges, which is why the implicit one is used.
 #[test]
 fn explicit_euler_diverges_where_the_implicit_step_does_not() {
     let cylinder = Cylinder::<f64>::paper();
