@@ -12,7 +12,7 @@ use super::series::Series;
 use super::term::{self, Term};
 use super::{Declared, Progress};
 use pitchleak_core::effects::Shape;
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Sensors};
+use pitchleak_core::{Effect, Leaks, Model, Sensors};
 
 /// Usual length of a block, s: short against the machine's motion, long against a sample.
 const BLOCK_S: f64 = 0.1;
@@ -62,7 +62,7 @@ impl<'a> Fit<'a> {
         let is_declared = |i: &usize| term::DECLARED.contains(&terms[*i]) || priors[*i].is_some();
         let active = (0..terms.len()).filter(is_declared).collect();
         let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks: Leaks::default() };
-        let point = Point { model, effects: EffectSet::default() };
+        let point = Point { model, effects: declared.effects };
         let shapes = vec![shape; terms.len()];
         let rows = Rows { rows: vec![], entries: vec![], y: vec![], columns: vec![] };
         let equation_error = [0.0; 3];

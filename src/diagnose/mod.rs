@@ -20,19 +20,21 @@ mod rows;
 mod select;
 mod series;
 mod term;
+mod text;
 mod whiteness;
 
 pub use outcome::{
-    Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality, Rmse,
+    Calibration, Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality, Rmse,
     Shape as RemainderShape, Size, Verdict, WhitenessP,
 };
 pub use series::Series;
 
 use crate::Rig;
+use crate::rig::EffectValue;
 use fit::Fit;
 use motion::Motion;
-use pitchleak_core::effects::Shape;
-use pitchleak_core::{Cylinder, Effect, Fluid, Leaks, Model, SensorSpread, Sensors};
+use pitchleak_core::effects::{Shape, ShapeParameter};
+use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, Leaks, Model, SensorSpread, Sensors};
 use select::Named;
 use std::collections::BTreeMap;
 use term::Term;
@@ -49,6 +51,8 @@ pub struct Declared {
     pub fluid: Fluid<f64>,
     /// Noise, offsets and gains of the sensors.
     pub sensors: Sensors<f64>,
+    /// Effects that are known already.
+    pub effects: EffectSet<f64>,
 }
 
 /// Below this share of full scale nothing is an effect: the resolution of a good converter (16 bit).
@@ -80,7 +84,7 @@ impl Declared {
         ] {
             spread.noise_std = spread.noise_std.max(RESOLUTION * sheet.full_scale);
         }
-        Self { cylinder: rig.cylinder, fluid: rig.fluid, sensors }
+        Self { cylinder: rig.cylinder, fluid: rig.fluid, sensors, effects: rig.effect_set() }
     }
 
     /// With the noise of means over `count` samples.
@@ -143,6 +147,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         before,
         effects: named.iter().filter_map(|one| found(&fit, one, mended.get(&one.term).copied())).collect(),
         after: adequacy::quality(&fit, &test),
+        calibration: calibration(&fit),
         leaks: LeaksBeforeAfter { before: leaks_before, after: leaks_after },
         not_detectable_below: if excited { reach(&fit) } else { BTreeMap::new() },
         verdict,
@@ -185,9 +190,17 @@ fn friction_shape(traces: &[Series], declared: &Declared) -> Shape<f64> {
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
     let speeds: Vec<(f64, f64)> =
         traces.iter().map(|series| least(&Motion::of(series, &model, &declared.sensors))).collect();
-    let slip = speeds.iter().map(|s| s.0).fold(1e-6, f64::max);
-    let usual = speeds.iter().map(|s| s.1).fold(1e-6, f64::max);
-    Shape { slip_speed_mps: slip, stribeck_speed_mps: usual / 2.0, ..Shape::default() }
+    let within = |parameter: ShapeParameter, speed: f64| {
+        let spec = parameter.spec();
+        speed.clamp(spec.lower, spec.upper)
+    };
+    let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
+    let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);
+    Shape {
+        slip_speed_mps: within(ShapeParameter::SlipSpeed, slip),
+        stribeck_speed_mps: within(ShapeParameter::StribeckSpeed, usual / 2.0),
+        ..Shape::default()
+    }
 }
 
 fn estimate(fit: &Fit<'_>, term: Term) -> (f64, f64) {
@@ -244,13 +257,7 @@ fn found(fit: &Fit<'_>, one: &Named, mended: Option<f64>) -> Option<FoundEffect>
     let spec = effect.spec();
     let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
     let shape = &fit.shapes[one.term];
-    let shape = match effect {
-        Effect::PositionDependentLeak => {
-            [("spot_position_m", shape.spot_position_m), ("spot_width_m", shape.spot_width_m)].into()
-        }
-        Effect::StribeckFriction => [("stribeck_speed_mps", shape.stribeck_speed_mps)].into(),
-        _ => BTreeMap::new(),
-    };
+    let shape = effect.shape_parameters().iter().map(|p| (p.spec().id, shape.get(*p))).collect();
     Some(FoundEffect {
         id: spec.id,
         value,
@@ -264,6 +271,39 @@ fn found(fit: &Fit<'_>, one: &Named, mended: Option<f64>) -> Option<FoundEffect>
         cause: spec.cause,
         remedy: spec.remedy,
     })
+}
+
+fn calibration(fit: &Fit<'_>) -> Vec<Calibration> {
+    let known =
+        |term: &usize| Some((fit.terms[*term].effect()?, fit.priors[*term].and(fit.estimate(*term))?));
+    let found = fit.active.iter().filter_map(known);
+    found
+        .map(|(effect, (value, std))| Calibration {
+            id: effect.spec().id,
+            value,
+            std,
+            unit: effect.spec().unit,
+        })
+        .collect()
+}
+
+impl Diagnosis {
+    /// The rig file with the effects in it, so that replay and simulation use them.
+    pub fn rig(&self, rig: &Rig) -> Rig {
+        let mut with = rig.clone();
+        let sizes = self.calibration.iter().map(|c| (c.id, c.value, c.std, None));
+        let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.shape))));
+        for (id, value, std, constants) in sizes {
+            let Ok(effect) = id.parse::<Effect>() else { continue };
+            let mut shape = Shape::default();
+            for parameter in effect.shape_parameters() {
+                let found = constants.and_then(|constants| constants.get(parameter.spec().id));
+                shape = found.map_or(shape, |value| shape.with(*parameter, *value));
+            }
+            with.effects.insert(effect, EffectValue { value, std: Some(std), shape });
+        }
+        with
+    }
 }
 
 /// What would tell an effect from its rivals.

@@ -70,13 +70,26 @@ pub struct FoundEffect {
     /// What else would tell them apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separated_by: Option<&'static str>,
-    /// Constants of a nonlinear effect that were fitted with it.
+    /// Constants in which the effect is not linear.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub shape: BTreeMap<&'static str, f64>,
     /// When this is the cause.
     pub cause: &'static str,
     /// What to do about it.
     pub remedy: &'static str,
+}
+
+/// A sensor's error that the rig file declares possible, as these traces show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Name as in the table of effects.
+    pub id: &'static str,
+    /// Its size and standard deviation in `unit`.
+    pub value: f64,
+    /// See `value`.
+    pub std: f64,
+    /// SI; 1 for a share.
+    pub unit: &'static str,
 }
 
 /// An estimate with its spread.
@@ -153,6 +166,9 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// With the effects.
     pub after: Quality,
+    /// Offsets and gains that the rig file declares possible, as found with the effects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calibration: Vec<Calibration>,
     /// Leaks before and after.
     pub leaks: LeaksBeforeAfter,
     /// Smallest size of each further effect that these traces would have shown at five standard deviations.

@@ -1,0 +1,85 @@
+//! A diagnosis as text for people.
+
+use super::outcome::{Diagnosis, FoundEffect, LeakEstimates, Verdict};
+use std::fmt::Write;
+
+/// L/min per m³/s.
+const LPM: f64 = 60e3;
+
+impl Verdict {
+    /// What it says, in a sentence.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::Explained => "explained: with the effects below, what is left is sensor noise",
+            Self::PartlyExplained => "partly explained: the effects below mend much, but not all",
+            Self::NoMissingEffect => "no missing effect: what the declared model leaves over is sensor noise",
+            Self::Unexplained => "unexplained: something is missing, and no known effect fits",
+            Self::InsufficientExcitation => {
+                "insufficient excitation: too little happens in these traces to tell"
+            }
+        }
+    }
+}
+
+impl Diagnosis {
+    /// A few lines for people.
+    pub fn to_text(&self) -> String {
+        let mut out = format!("{}\n", self.verdict.sentence());
+        self.effects.iter().for_each(|effect| write_effect(&mut out, effect));
+        if self.verdict != Verdict::InsufficientExcitation {
+            self.write_errors(&mut out);
+            self.write_leaks(&mut out);
+        }
+        for note in &self.notes {
+            let _ = writeln!(out, "note: {note}");
+        }
+        out
+    }
+
+    fn write_errors(&self, out: &mut String) {
+        let (before, after) = (&self.before.rmse, &self.after.rmse);
+        let rows = [
+            ("chamber A", before.chamber_a_m3s, after.chamber_a_m3s, LPM, "L/min"),
+            ("chamber B", before.chamber_b_m3s, after.chamber_b_m3s, LPM, "L/min"),
+            ("force", before.force_n, after.force_n, 1.0, "N"),
+        ];
+        out.push_str("\nerror on held-out samples   before      after\n");
+        for (name, before, after, factor, unit) in rows {
+            if let (Some(before), Some(after)) = (before, after) {
+                let (before, after) = (before * factor, after * factor);
+                let _ = writeln!(out, "  {name:<22} {before:>10.4} {after:>10.4} {unit}");
+            }
+        }
+    }
+
+    fn write_leaks(&self, out: &mut String) {
+        out.push_str("\nleak coefficients, 1e-12 m3/(s Pa)      before                 after\n");
+        let rows = |leaks: &LeakEstimates| {
+            [
+                leaks.internal_leak_coefficient,
+                leaks.external_leak_a_coefficient,
+                leaks.external_leak_b_coefficient,
+            ]
+        };
+        let names = ["internal", "external A", "external B"];
+        for ((name, before), after) in names.iter().zip(rows(&self.leaks.before)).zip(rows(&self.leaks.after))
+        {
+            let text = |leak: super::LeakEstimate| {
+                let mark = if leak.physical { "" } else { " (impossible)" };
+                format!("{:.3} ± {:.3}{mark}", leak.value * 1e12, leak.std * 1e12)
+            };
+            let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
+        }
+    }
+}
+
+fn write_effect(out: &mut String, effect: &FoundEffect) {
+    let unit = if effect.unit == "1" { String::new() } else { format!(" {}", effect.unit) };
+    let _ = writeln!(out, "\n{}: {:.4e} ± {:.1e}{unit}", effect.id, effect.value, effect.std);
+    let _ = writeln!(out, "  {}", effect.cause);
+    let _ = writeln!(out, "  To do: {}", effect.remedy);
+    if let (false, Some(separation)) = (effect.confusable_with.is_empty(), effect.separated_by) {
+        let rivals = effect.confusable_with.join(", ");
+        let _ = writeln!(out, "  These traces cannot tell it from: {rivals}. Would tell: {separation}.");
+    }
+}
