@@ -19,6 +19,7 @@ mod regression;
 mod rows;
 mod select;
 mod series;
+mod shape;
 mod term;
 mod text;
 mod whiteness;

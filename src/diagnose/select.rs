@@ -4,6 +4,7 @@
 use super::Progress;
 use super::fit::Fit;
 use super::regression::{FOLDS, Score};
+use super::shape;
 use super::term::Term;
 use super::whiteness;
 use pitchleak_core::Effect;
@@ -13,10 +14,6 @@ use pitchleak_core::effects::Shape;
 const FALSE_EFFECT_RATE: f64 = 1e-3;
 /// A shape fitted to the data counts as this many candidates.
 const SHAPE_TRIALS: usize = 20;
-/// The search for a shape ends after so many steps, and steps must gain this much.
-const START_WIDTH: f64 = 0.15;
-const MOST_STEPS: usize = 24;
-const LEAST_CLIMB: f64 = 0.5;
 /// Effects that one diagnosis names at most.
 const MOST_EFFECTS: usize = 5;
 /// While the remainder is larger than the noise, an effect must mend this share of it to be named.
@@ -45,7 +42,7 @@ pub(super) fn candidates(fit: &Fit<'_>) -> Vec<usize> {
 /// The size in σ that a candidate's score needs.
 pub(super) fn critical_sigma(fit: &Fit<'_>, term: usize) -> f64 {
     let count = fit.terms.iter().filter(|term| term.effect().is_some()).count();
-    let trials = if starts(fit, term).is_empty() { 1 } else { SHAPE_TRIALS };
+    let trials = if shape::is_fitted(fit, term) { SHAPE_TRIALS } else { 1 };
     whiteness::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
 }
 
@@ -57,7 +54,7 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
         return None;
     }
     let mut scores: Vec<(Score, Shape<f64>)> =
-        candidates(fit).into_iter().filter_map(|term| best_shape(fit, term)).collect();
+        candidates(fit).into_iter().filter_map(|term| shape::best_score(fit, term)).collect();
     scores.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
     let nameless = nameless_gain(fit);
     for (score, shape) in scores {
@@ -125,111 +122,4 @@ pub(super) fn find_confusable(fit: &Fit<'_>, named: &mut [Named]) {
 pub(super) fn nameless_gain(fit: &Fit<'_>) -> f64 {
     let nameless = (0..fit.terms.len()).filter(|i| matches!(fit.terms[*i], Term::Nameless(_)));
     nameless.filter_map(|i| fit.score(i)).map(|score| score.gain).fold(0.0, f64::max)
-}
-
-/// Shapes from which the fit of a nonlinear effect starts; none for a linear effect.
-fn starts(fit: &Fit<'_>, term: usize) -> Vec<Shape<f64>> {
-    let shape = fit.shapes[term];
-    match fit.terms[term] {
-        Term::Effect(Effect::PositionDependentLeak) => {
-            let (low, high) = fit.rows.rows.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), row| {
-                (l.min(row.mean.x_m), h.max(row.mean.x_m))
-            });
-            let range = high - low;
-            if range.is_nan() || range <= 0.0 {
-                return vec![];
-            }
-            let place = |share: f64| Shape {
-                spot_position_m: low + share * range,
-                spot_width_m: START_WIDTH * range,
-                ..shape
-            };
-            [0.1, 0.3, 0.5, 0.7, 0.9].map(place).to_vec()
-        }
-        Term::Effect(Effect::StribeckFriction) => [0.3, 1.0, 3.0]
-            .map(|f| Shape { stribeck_speed_mps: f * shape.stribeck_speed_mps, ..shape })
-            .to_vec(),
-        _ => vec![],
-    }
-}
-
-/// The numbers of a shape that are fitted, and the shape with other such numbers.
-fn free_numbers(term: Term, shape: &Shape<f64>) -> Vec<f64> {
-    match term {
-        Term::Effect(Effect::PositionDependentLeak) => vec![shape.spot_position_m, shape.spot_width_m],
-        Term::Effect(Effect::StribeckFriction) => vec![shape.stribeck_speed_mps],
-        _ => vec![],
-    }
-}
-
-fn with_numbers(term: Term, shape: &Shape<f64>, numbers: &[f64]) -> Shape<f64> {
-    match (term, numbers) {
-        (Term::Effect(Effect::PositionDependentLeak), [position, width]) => {
-            Shape { spot_position_m: *position, spot_width_m: *width, ..*shape }
-        }
-        (Term::Effect(Effect::StribeckFriction), [speed]) => Shape { stribeck_speed_mps: *speed, ..*shape },
-        _ => *shape,
-    }
-}
-
-/// Shapes that these traces can tell from a constant: a spot on the path and narrower than it, a
-/// Stribeck speed that is passed.
-fn within(fit: &Fit<'_>, term: usize, numbers: &[f64]) -> bool {
-    let starts = starts(fit, term);
-    let Some(first) = starts.first() else { return false };
-    match (fit.terms[term], numbers) {
-        (Term::Effect(Effect::PositionDependentLeak), [position, width]) => {
-            let range = first.spot_width_m / START_WIDTH;
-            let low = first.spot_position_m - 0.1 * range;
-            (low..=low + range).contains(position) && (0.03 * range..=0.5 * range).contains(width)
-        }
-        (Term::Effect(Effect::StribeckFriction), [speed]) => {
-            (0.3 * first.stribeck_speed_mps..=10.0 * first.stribeck_speed_mps).contains(speed)
-        }
-        _ => false,
-    }
-}
-
-/// The candidate's best score over its shape.
-fn best_shape(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64>)> {
-    let plain = fit.score(term).map(|score| (score, fit.shapes[term]));
-    let tried =
-        starts(fit, term).into_iter().filter_map(|shape| Some((fit.score_shape(term, shape)?, shape)));
-    let best = tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
-    let dispersion = fit.dispersion(fit.solution.chi2 - best.0.gain);
-    // Far from significant: not worth the search.
-    if free_numbers(fit.terms[term], &best.1).is_empty() || best.0.gain / dispersion < 9.0 {
-        return Some(best);
-    }
-    Some(climb(fit, term, best))
-}
-
-/// Pattern search from a start: steps of a share of the width, halved when none helps
-/// (Hooke and Jeeves 1961).
-fn climb(fit: &Fit<'_>, term: usize, start: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
-    let mut best = start;
-    let mut share = 0.4;
-    for _ in 0..MOST_STEPS {
-        if share < 0.02 {
-            break;
-        }
-        let numbers = free_numbers(fit.terms[term], &best.1);
-        // A position moves by shares of the width, a width or speed by shares of itself.
-        let unit = *numbers.last().unwrap_or(&0.0);
-        let steps = (0..numbers.len()).flat_map(|i| [(i, share * unit), (i, -share * unit)]);
-        let tried = steps.filter_map(|(i, step)| {
-            let mut numbers = numbers.clone();
-            numbers[i] += step;
-            if !within(fit, term, &numbers) {
-                return None;
-            }
-            let shape = with_numbers(fit.terms[term], &best.1, &numbers);
-            Some((fit.score_shape(term, shape)?, shape))
-        });
-        match tried.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain)) {
-            Some(better) if better.0.gain > best.0.gain + LEAST_CLIMB => best = better,
-            _ => share /= 2.0,
-        }
-    }
-    best
 }

@@ -1,0 +1,108 @@
+//! Constants in which an effect is not linear, fitted by the score they give.
+
+use super::fit::Fit;
+use super::regression::Score;
+use pitchleak_core::effects::{Shape, ShapeParameter};
+
+/// Steps of the search, its first and last step as shares of a constant's range, and what a step must gain.
+const MOST_STEPS: usize = 24;
+const FIRST_STEP: f64 = 0.2;
+const LAST_STEP: f64 = 0.01;
+const LEAST_CLIMB: f64 = 0.5;
+/// A score below this (three standard deviations) is not worth the search.
+const WORTH_SEARCHING: f64 = 9.0;
+/// Places along the range of each constant from which the search starts.
+const STARTS: [f64; 3] = [0.15, 0.5, 0.85];
+
+/// A constant and the values of it that these traces can tell apart.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    parameter: ShapeParameter,
+    low: f64,
+    high: f64,
+}
+
+impl Range {
+    fn at(&self, share: f64) -> f64 {
+        self.low + share * (self.high - self.low)
+    }
+}
+
+/// The constants of an effect that are fitted: not those that the sensors set (the speed within which
+/// friction turns) nor those that only fix a reference.
+fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
+    let Some(effect) = fit.terms[term].effect() else { return vec![] };
+    effect.shape_parameters().iter().filter_map(|parameter| range(fit, *parameter)).collect()
+}
+
+fn range(fit: &Fit<'_>, parameter: ShapeParameter) -> Option<Range> {
+    let rows = &fit.rows.rows;
+    let span = |value: &dyn Fn(&super::rows::Row) -> f64| {
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        rows.iter().map(value).fold(ends, |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (low, high) = match parameter {
+        ShapeParameter::SpotPosition => span(&|row| row.mean.x_m),
+        ShapeParameter::SpotWidth => {
+            let (low, high) = span(&|row| row.mean.x_m);
+            (0.05 * (high - low), 0.7 * (high - low))
+        }
+        ShapeParameter::StribeckSpeed => {
+            let (_, high) = span(&|row| row.mean.v_mps.abs());
+            (0.02 * high, 0.7 * high)
+        }
+        ShapeParameter::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
+        // Slow to fast.
+        ShapeParameter::PolytropicExponent => (1.0, 1.4),
+        ShapeParameter::SlipSpeed | ShapeParameter::ReferenceTemp => return None,
+    };
+    let spec = parameter.spec();
+    let (low, high) = (low.max(spec.lower), high.min(spec.upper));
+    (high > low).then_some(Range { parameter, low, high })
+}
+
+/// Whether the effect's score depends on a fitted constant.
+pub(super) fn is_fitted(fit: &Fit<'_>, term: usize) -> bool {
+    !free(fit, term).is_empty()
+}
+
+/// The best score of a candidate over its constants, with their values.
+pub(super) fn best_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64>)> {
+    let plain = fit.score(term).map(|score| (score, fit.shapes[term]));
+    let ranges = free(fit, term);
+    let starts = ranges.iter().flat_map(|range| STARTS.map(|share| (range, share)));
+    let tried = starts.filter_map(|(range, share)| {
+        let middle =
+            ranges.iter().fold(fit.shapes[term], |shape, other| shape.with(other.parameter, other.at(0.3)));
+        let shape = middle.with(range.parameter, range.at(share));
+        Some((fit.score_shape(term, shape)?, shape))
+    });
+    let best = tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
+    let dispersion = fit.dispersion(fit.solution.chi2 - best.0.gain);
+    if best.0.gain / dispersion < WORTH_SEARCHING {
+        return Some(best);
+    }
+    Some(climb(fit, term, &ranges, best))
+}
+
+/// Pattern search (Hooke and Jeeves 1961): a step along each constant, halved when none helps.
+fn climb(fit: &Fit<'_>, term: usize, ranges: &[Range], start: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
+    let mut best = start;
+    let mut share = FIRST_STEP;
+    for _ in 0..MOST_STEPS {
+        if share < LAST_STEP || ranges.is_empty() {
+            break;
+        }
+        let steps = ranges.iter().flat_map(|range| [(range, share), (range, -share)]);
+        let tried = steps.filter_map(|(range, share)| {
+            let value = best.1.get(range.parameter) + share * (range.high - range.low);
+            let shape = best.1.with(range.parameter, value.clamp(range.low, range.high));
+            Some((fit.score_shape(term, shape)?, shape))
+        });
+        match tried.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain)) {
+            Some(better) if better.0.gain > best.0.gain + LEAST_CLIMB => best = better,
+            _ => share /= 2.0,
+        }
+    }
+    best
+}
