@@ -1,0 +1,188 @@
+//! The diagnosis on traces of the project's own plant.
+
+use pitchleak::Rig;
+use pitchleak::core::effects::Shape;
+use pitchleak::core::{Effect, EffectSet, PerLeak};
+use pitchleak::curve::Curve;
+use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
+use pitchleak::reference::Reference;
+use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing};
+use std::f64::consts::TAU;
+
+const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 1e-12 };
+
+fn rig() -> Rig {
+    let mut rig = Rig::paper();
+    let sheets = &mut rig.instruments;
+    for sheet in [
+        &mut sheets.flow_a,
+        &mut sheets.flow_b,
+        &mut sheets.pressure,
+        &mut sheets.position,
+        &mut sheets.force,
+    ] {
+        sheet.accuracy = 1e-3;
+    }
+    rig
+}
+
+fn wave(lines: &[f64], amplitude: f64, offset: f64) -> Curve {
+    let t: Vec<f64> = (0..=5000).map(|i| 0.01 * f64::from(i)).collect();
+    let value =
+        |t: &f64| offset + lines.iter().map(|f| amplitude * (TAU * f * t + 7.0 * f * f).sin()).sum::<f64>();
+    let values: Vec<f64> = t.iter().map(value).collect();
+    Curve::through(&t, &values).expect("is a curve")
+}
+
+/// 40 s of a rig with this effect, through sensors of 0.1 % of full scale.
+fn trace(effect: Option<(Effect, f64)>) -> Series {
+    let mut effects = EffectSet::default();
+    if let Some((effect, size)) = effect {
+        effects.set(effect, size, Shape::default()).expect("is within bounds");
+    }
+    let rig = rig();
+    let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 7);
+    let scenario = Scenario {
+        rig,
+        reference: Reference::of(
+            wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
+            wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
+        ),
+        leaks: LEAKS.map(LeakSize::Coefficient),
+        onset_s: 0.0,
+        effects,
+        start_s: 4.0,
+        warm_up_s: 2.0,
+        duration_s: 40.0,
+        sample_rate_hz: 100.0,
+    };
+    let mut series = Series::default();
+    let leaks = scenario.leak_coefficients().expect("given");
+    scenario
+        .run(leaks, |truth| series.push(truth.t_s, &sensing.read(&truth.sample), None))
+        .expect("the plant runs");
+    series
+}
+
+fn ask(series: Series, rig: &Rig) -> Diagnosis {
+    diagnose(&[series], &[], &Declared::of(rig), &|| ())
+}
+
+fn first(answer: &Diagnosis) -> &str {
+    answer.effects.first().map_or("", |effect| effect.id)
+}
+
+#[test]
+fn a_sound_rig_is_called_sound() {
+    let answer = ask(trace(None), &rig());
+    assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{:?}", answer.notes);
+    let leaks = &answer.leaks.after;
+    for (leak, truth) in [
+        (leaks.internal_leak_coefficient, LEAKS.internal),
+        (leaks.external_leak_a_coefficient, LEAKS.external_a),
+        (leaks.external_leak_b_coefficient, LEAKS.external_b),
+    ] {
+        assert!((leak.value - truth).abs() < 4.0 * leak.std, "{leak:?} is not {truth}");
+        assert!(leak.identifiable);
+    }
+}
+
+#[test]
+fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
+    let series = trace(Some((Effect::FlowMeterGainA, 0.03)));
+    let answer = ask(series.clone(), &rig());
+    assert_eq!((first(&answer), answer.verdict), ("flow_meter_gain_a", Verdict::Explained));
+    let saved = answer.rig(&rig()).to_toml();
+    let saved = Rig::parse(&saved, "saved.toml").expect("what was written can be read");
+    let again = ask(series, &saved);
+    assert_eq!(again.verdict, Verdict::NoMissingEffect, "{:?}", again.notes);
+    let leak = again.leaks.after.internal_leak_coefficient;
+    assert!((leak.value - LEAKS.internal).abs() < 4.0 * leak.std);
+}
+
+#[test]
+fn effects_of_each_balance_are_named() {
+    for (effect, size) in [
+        (Effect::DeadVolumeB, 2e-4),
+        (Effect::DragLeak, 0.02),
+        (Effect::PositionGain, -0.01),
+        (Effect::ViscousFriction, 1500.0),
+        (Effect::AddedMass, 100.0),
+    ] {
+        let answer = ask(trace(Some((effect, size))), &rig());
+        assert_eq!(first(&answer), effect.spec().id, "{:?}", answer.notes);
+        let found = &answer.effects[0];
+        assert!((found.value - size).abs() < 4.0 * found.std, "{effect}: {} ± {}", found.value, found.std);
+        assert_eq!(answer.verdict, Verdict::Explained, "{effect}: {:?}", answer.notes);
+    }
+}
+
+#[test]
+fn a_ripple_in_one_pressure_sensor_stays_unexplained() {
+    let mut series = trace(None);
+    for (pressure, t) in series.pa_pa.iter_mut().zip(&series.t_s) {
+        *pressure += 1e5 * (TAU * 233.7 * t).sin();
+    }
+    let answer = ask(series, &rig());
+    assert_eq!(answer.verdict, Verdict::Unexplained);
+    assert!(!answer.remainder.is_empty());
+}
+
+#[test]
+fn a_chamber_without_a_meter_is_left_out() {
+    let mut series = trace(None);
+    series.qb_m3s.fill(f64::NAN);
+    series.force_n.fill(f64::NAN);
+    let answer = ask(series, &rig());
+    assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{:?}", answer.notes);
+    let rmse = answer.after.rmse;
+    assert!(rmse.chamber_a_m3s.is_some());
+    assert_eq!((rmse.chamber_b_m3s, rmse.force_n), (None, None));
+}
+
+#[test]
+fn traces_to_judge_on_are_not_fitted() {
+    let (train, mut test) = (trace(None), trace(None));
+    test.qa_m3s.iter_mut().for_each(|flow| *flow += 1e-5);
+    let declared = Declared::of(&rig());
+    let answer = diagnose(std::slice::from_ref(&train), &[test], &declared, &|| ());
+    assert_eq!(answer.verdict, Verdict::NoMissingEffect);
+    assert!((answer.after.rmse.chamber_a_m3s.unwrap() - 1e-5).abs() < 2e-6);
+}
+
+#[test]
+fn the_json_has_the_fields_of_the_interface() {
+    let json = serde_json::to_value(ask(trace(Some((Effect::LoadOffset, 200.0))), &rig())).unwrap();
+    assert_eq!(json["schema"], "pitchleak.diagnose/1");
+    for side in ["before", "after"] {
+        for key in ["chamber_a_m3s", "chamber_b_m3s", "force_n"] {
+            assert!(json[side]["rmse"][key].is_number(), "{side} {key}");
+        }
+        assert!(json[side]["whiteness_p"].is_object());
+        assert!(json["leaks"][side]["internal_leak_coefficient"]["ci95"].is_array());
+    }
+    for key in ["id", "value", "std", "unit", "rmse_reduction_percent", "p_value", "confusable_with"] {
+        assert!(!json["effects"][0][key].is_null(), "{key}");
+    }
+    assert!(json["not_detectable_below"]["dead_volume_a"]["value"].is_number());
+    assert_eq!(json["verdict"], "explained");
+}
+
+#[test]
+fn nothing_that_a_trace_may_hold_makes_it_panic() {
+    let base = trace(None);
+    let spoil: [fn(&mut Series); 6] = [
+        |s| s.x_m.fill(0.0),
+        |s| s.pa_pa.iter_mut().step_by(7).for_each(|p| *p = f64::NAN),
+        |s| s.t_s.iter_mut().for_each(|t| *t = 0.0),
+        |s| s.qa_m3s.iter_mut().for_each(|q| *q *= 1e12),
+        |s| s.t_s.iter_mut().enumerate().for_each(|(i, t)| *t += 10.0 * (i / 9) as f64),
+        |s| s.x_m.iter_mut().for_each(|x| *x = f64::INFINITY),
+    ];
+    for spoil in spoil {
+        let mut series = base.clone();
+        spoil(&mut series);
+        let answer = ask(series, &rig());
+        assert!(answer.effects.iter().all(|effect| effect.value.is_finite()));
+    }
+}
