@@ -28,7 +28,7 @@ impl Biases {
         random.set_stream(1);
         let mut within = |sheet: &Instrument| {
             let unit = (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0;
-            (2.0 * unit - 1.0) * share * sheet.full_scale
+            (2.0 * unit - 1.0) * share * sheet.full_scale + 0.0
         };
         Self {
             x_m: within(&instruments.position),
