@@ -3,6 +3,7 @@
 
 pub use pitchleak_core as core;
 
+pub mod check;
 pub mod cramer_rao;
 pub mod curve;
 pub mod diagnose;

@@ -10,7 +10,7 @@ use pitchleak::Rig;
 use pitchleak::core::PerLeak;
 use pitchleak::replay::replay;
 use pitchleak::report::{Leak, ReplayReport};
-use pitchleak::trace::TraceReader;
+use pitchleak::trace::{TraceError, TraceReader};
 use synthetic::Motion;
 
 const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 0.0 };
@@ -29,7 +29,7 @@ fn run(rig: &str, trace: String) -> ReplayReport {
     let rig = Rig::parse(rig, "test").unwrap();
     let stream = Box::new(std::io::Cursor::new(trace.into_bytes()));
     let mut reader = TraceReader::from_stream("test", stream, &rig).unwrap();
-    replay(&mut reader, &rig, |_, _, _| Ok(())).unwrap()
+    replay(&mut reader, &rig, |_, _, _| Ok::<(), TraceError>(())).unwrap()
 }
 
 /// A 30 s trace; `row` gives the cells of one instant.

@@ -1,11 +1,13 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
 mod correction;
+mod estimate_file;
 mod estimator;
 mod pressures;
 mod scoring;
 mod summary;
 
+pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
 
 use crate::report::{Alarm, Leak, ReplayReport};
@@ -133,12 +135,12 @@ pub fn leak_pressures_pa(record: &Record) -> PerLeak<f64> {
 /// new.
 ///
 /// # Errors
-/// Where the trace cannot be read on, or a bad row is fatal.
-pub fn replay(
+/// Where the trace cannot be read on, or a bad row is fatal, or `each` fails.
+pub fn replay<E: From<TraceError>>(
     reader: &mut TraceReader,
     rig: &Rig,
-    mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), TraceError>,
-) -> Result<ReplayReport, TraceError> {
+    mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
+) -> Result<ReplayReport, E> {
     let mut replay = Replay::new(rig);
     let mut record = Record::default();
     while reader.next_record(&mut record)? {

@@ -3,7 +3,7 @@ use pitchleak_core::PerLeak;
 
 /// Pressures across each leak, averaged over a whole trace, Pa.
 ///
-/// The size of the internal leak goes with |P_L|: it is taken of means over a quarter of a second, so that
+/// The size of the internal leak goes with |P_L|: it is taken of means over a tenth of a second, so that
 /// sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TracePressures {
@@ -16,7 +16,7 @@ pub(super) struct TracePressures {
     b: f64,
 }
 
-const BLOCK_S: f64 = 0.25;
+const BLOCK_S: f64 = 0.1;
 
 impl TracePressures {
     #[inline]

@@ -2,6 +2,7 @@
 
 mod text;
 
+pub(crate) use text::rig_line;
 pub use text::{Palette, data_line};
 
 use crate::rig::EstimatorKind;

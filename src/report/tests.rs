@@ -74,6 +74,17 @@ fn no_alarm_is_not_sound_where_the_trace_cannot_tell() {
 }
 
 #[test]
+fn a_negative_leak_is_evidence_against_the_model() {
+    let mut report = report(INTERNAL);
+    report.leakage.external_a.mean_lpm = -0.2;
+    let threshold = PerLeak { internal: 1e-6, external_a: 1e-6, external_b: 1e-6 };
+    report.verdict = Verdict::new(INTERNAL, &report.leakage, &report.estimates, &threshold);
+    let text = report.to_text(&Palette::PLAIN);
+    assert!(text.starts_with("DOUBTFUL  The external A leak comes out negative"), "{text}");
+    assert!(text.contains("Internal leak of 0.4785"), "{text}");
+}
+
+#[test]
 fn json_has_the_contracts_fields_and_no_number_that_is_not_finite() {
     let mut report = report(INTERNAL);
     report.leakage.external_b.mean_lpm = f64::NAN;

@@ -33,6 +33,16 @@ impl Palette {
     };
 }
 
+impl Palette {
+    pub(crate) fn faint(&self) -> (&'static str, &'static str) {
+        (self.faint, self.reset)
+    }
+
+    pub(crate) fn caution(&self) -> (&'static str, &'static str) {
+        (self.caution, self.reset)
+    }
+}
+
 impl Leak {
     /// For people.
     pub fn label(self) -> &'static str {
@@ -73,7 +83,9 @@ pub(super) fn verdict(
     let identified = estimates.leaks().map(|entry| entry.identifiable);
     let (open, judged): (Vec<_>, Vec<_>) =
         LEAKS.into_iter().filter(|leak| !faults.contains(leak)).partition(|leak| !pick(&identified, *leak));
-    let mut sentences: Vec<_> = faults.iter().map(|leak| fault_sentence(*leak, leakage)).collect();
+    let impossible = LEAKS.into_iter().filter_map(|leak| impossible_sentence(leak, leakage));
+    let mut sentences: Vec<_> = impossible.collect();
+    sentences.extend(faults.iter().map(|leak| fault_sentence(*leak, leakage)));
     if !judged.is_empty() {
         let limit = judged.iter().map(|leak| pick(threshold_m3s, *leak)).fold(0.0, f64::max) * LPM_PER_M3S;
         sentences.push(format!("No {} leak above {limit:.2} L/min.", join(&judged, "or")));
@@ -81,7 +93,6 @@ pub(super) fn verdict(
     if !open.is_empty() {
         sentences.push(format!("This trace cannot tell about {} leaks.", join(&open, "and")));
     }
-    sentences.extend(LEAKS.into_iter().filter_map(|leak| impossible_sentence(leak, leakage)));
     sentences.join(" ")
 }
 
@@ -92,13 +103,19 @@ fn fault_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> String {
     format!("{capital} leak of {flow} L/min: {}.", leak.advice())
 }
 
-/// A leak that feeds oil in is evidence against the model, not a leak.
+/// A leak that feeds oil in is evidence against the model, not a leak: nothing else that the model says
+/// can then be trusted.
+fn is_impossible(leakage: &Leakage) -> bool {
+    leakage.std_lpm.is_some_and(|std| leakage.mean_lpm + 3.0 * std < 0.0)
+}
+
 fn impossible_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> Option<String> {
-    let Leakage { mean_lpm, std_lpm, .. } = pick(leakage, leak);
-    let impossible = std_lpm.is_some_and(|std| mean_lpm + 3.0 * std < 0.0);
-    impossible.then(|| {
+    is_impossible(&pick(leakage, leak)).then(|| {
         let label = leak.label();
-        format!("The {label} leak comes out negative, which is impossible: the rig file lacks an effect (see `pitchleak diagnose`).")
+        format!(
+            "The {label} leak comes out negative, which cannot be: the rig file misstates the rig or lacks an \
+             effect (see `pitchleak diagnose`), so take the other figures with doubt."
+        )
     })
 }
 
@@ -113,13 +130,20 @@ fn join(leaks: &[Leak], word: &str) -> String {
     }
 }
 
-/// Value and half width of the 95 % interval, with as many decimals as the half width carries.
+/// Value and half width of the 95 % interval, to two digits of the half width.
 fn with_interval(value: f64, std: Option<f64>) -> String {
     let Some(half) = std.map(|std| Z95 * std).filter(|half| half.is_finite()) else {
         return format!("{value:.4}");
     };
     let decimals = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
-    format!("{value:.decimals$} ± {half:.decimals$}")
+    let text = format!("{value:.decimals$} ± {half:.decimals$}");
+    // No minus before a zero.
+    match text.strip_prefix('-') {
+        Some(rest) if !rest.split(' ').next().is_some_and(|v| v.contains(|c| ('1'..='9').contains(&c))) => {
+            rest.to_owned()
+        }
+        _ => text,
+    }
 }
 
 fn flow_text(leakage: &Leakage) -> String {
@@ -137,7 +161,7 @@ pub fn data_line(trace: &TraceSummary) -> String {
 }
 
 /// Which rig a report rests on.
-fn rig_line(rig: &str) -> String {
+pub(crate) fn rig_line(rig: &str) -> String {
     if rig == Rig::PAPER_NAME {
         "wu2011, built in (no rig.toml beside the trace; --rig FILE for your own)".to_owned()
     } else {
@@ -161,11 +185,13 @@ impl ReplayReport {
 
     fn write_verdict(&self, out: &mut String, palette: &Palette) {
         let Verdict { faults, text } = &self.verdict;
-        let all_identified = LEAKS.into_iter().all(|leak| pick(&self.identified(), leak));
-        let (word, colour) = match (faults.is_empty(), all_identified) {
-            (false, _) => ("LEAK", palette.fault),
-            (true, true) => ("SOUND", palette.sound),
-            (true, false) => ("NOT SURE", palette.caution),
+        let doubtful = LEAKS.into_iter().any(|leak| is_impossible(&pick(&self.leakage, leak)));
+        let judged = LEAKS.into_iter().all(|leak| pick(&self.identified(), leak));
+        let (word, colour) = match (doubtful, faults.is_empty(), judged) {
+            (true, _, _) => ("DOUBTFUL", palette.caution),
+            (false, false, _) => ("LEAK", palette.fault),
+            (false, true, true) => ("SOUND", palette.sound),
+            (false, true, false) => ("NOT SURE", palette.caution),
         };
         let _ = writeln!(out, "{colour}{word}{}  {text}\n", palette.reset);
     }

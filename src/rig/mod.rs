@@ -69,10 +69,11 @@ impl Rig {
         }
     }
 
-    /// The rig for a trace: `rig.toml` beside it, else the built-in one.
+    /// The rig for a trace: `rig.toml` beside it, else the built-in one. Beside standard input (`-`)
+    /// there is nothing.
     pub fn beside(trace: &Path) -> Result<Self, RigError> {
         let neighbour = trace.with_file_name("rig.toml");
-        if neighbour.is_file() { Self::load(neighbour) } else { Ok(Self::paper()) }
+        if trace != Path::new("-") && neighbour.is_file() { Self::load(neighbour) } else { Ok(Self::paper()) }
     }
 
     /// Reads the text of a rig file; `file` is its name for messages.

@@ -201,7 +201,12 @@ impl Format {
             reason => {
                 let cell = fault.column.and_then(|index| cells.get(index));
                 let cell = cell.map(|cell| String::from_utf8_lossy(cell)).unwrap_or_default();
-                format!("`{}` is {}", shorten(cell.trim(), 40), reason.text())
+                let cell = cell.trim();
+                match cell.parse::<f64>() {
+                    // Not quoted, so that no output of ours ever holds such a word.
+                    Ok(value) if !value.is_finite() => "not a finite number".to_owned(),
+                    _ => format!("`{}` is {}", shorten(cell, 40), reason.text()),
+                }
             }
         };
         let column = fault.column.and_then(|index| columns.get(index));

@@ -19,6 +19,7 @@ use clock::{Clock, Step};
 use csv::{CsvRows, Next, Row};
 use pitchleak_core::{PerLeak, Sample};
 use range::Ranges;
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -74,18 +75,33 @@ impl TraceReader {
     /// Where the file cannot be read, is no trace, or its header lacks a signal, gives one twice or
     /// in an unknown unit.
     pub fn open(path: impl AsRef<Path>, rig: &Rig) -> Result<Self, TraceError> {
+        Self::open_through(path, rig, |file| Box::new(file))
+    }
+
+    /// As [`open`](Self::open), with the file read through what `wrap` makes of it, e.g. a progress bar.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_through(
+        path: impl AsRef<Path>,
+        rig: &Rig,
+        wrap: impl FnOnce(File) -> Box<dyn Read + Send>,
+    ) -> Result<Self, TraceError> {
         let path = path.as_ref();
         if path == Path::new("-") {
             return Self::from_stream("standard input", Box::new(std::io::stdin()), rig);
         }
         let name = path.display().to_string();
-        match std::fs::File::open(path) {
-            Ok(file) => Self::from_stream(&name, Box::new(file), rig),
+        match File::open(path) {
+            Ok(file) => Self::from_stream(&name, wrap(file), rig),
             Err(error) => Err(TraceError { trace: name, fault: TraceFault::Open(error) }),
         }
     }
 
     /// As [`open`](Self::open), from any stream; `name` is for messages.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
     pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
         let rows = csv::decompress(stream)
             .and_then(|(stream, compressed)| CsvRows::open(stream, compressed, &rig.columns))

@@ -121,11 +121,14 @@ impl TraceQuality {
         }
         warnings.extend(self.cut_off.as_ref().map(|why| format!("{why}: the rows before are used")));
         if self.clock_restarts > 0 {
-            warnings.push(format!("time starts anew {} times", self.clock_restarts));
+            warnings.push(format!("the clock was set back ({} times)", self.clock_restarts));
         }
         if self.gaps > 0 {
-            let (gaps, longest) = (self.gaps, self.longest_gap_s);
-            warnings.push(format!("{gaps} gaps in time, the longest {longest:.3} s"));
+            let longest = self.longest_gap_s;
+            warnings.push(match self.gaps {
+                1 => format!("1 gap in time, {longest:.3} s"),
+                gaps => format!("{gaps} gaps in time, the longest {longest:.3} s"),
+            });
         }
         if !self.absent_columns.is_empty() {
             warnings.push(format!("mapped but not in the trace: {}", self.absent_columns.join(", ")));

@@ -1,2 +1,55 @@
-//! The program `pitchleak`.
-fn main() {}
+//! The program `pitchleak`: arguments in, text out, no numerics of its own.
+
+mod check;
+mod completions;
+mod failure;
+mod input;
+mod output;
+mod replay;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Says how much oil leaks where in a hydraulic pitch cylinder.
+#[derive(Parser)]
+#[command(name = "pitchleak", version, about, after_help = EXIT_STATUS)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_STATUS: &str = "\
+Exit status: 0 done; 1 a fault was found and --fail-on-fault was given; 2 bad input or usage.
+Every command explains itself: pitchleak replay --help";
+
+#[derive(Subcommand)]
+enum Command {
+    Replay(replay::Arguments),
+    Check(check::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// What a command that ran to its end has to say by its exit status.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Done,
+    FaultFound,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Completions(arguments) => completions::run(&arguments),
+    };
+    match outcome {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::FaultFound) => ExitCode::from(1),
+        // Whoever read our output has had enough: not an error of ours.
+        Err(failure) if failure.is_broken_pipe() => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::complain("error", &failure);
+            ExitCode::from(2)
+        }
+    }
+}

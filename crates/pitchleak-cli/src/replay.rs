@@ -1,0 +1,60 @@
+use crate::failure::Failure;
+use crate::input::Input;
+use crate::{Outcome, output};
+use clap::Args;
+use pitchleak::replay::{EstimateFile, replay};
+use pitchleak::rig::EstimatorKind;
+use std::path::PathBuf;
+
+/// Replay a trace: estimate its leaks and say what to do
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    #[command(flatten)]
+    input: Input,
+
+    /// Estimator [default: as in the rig file, else rls]
+    #[arg(long, value_name = "NAME", value_parser = estimator)]
+    estimator: Option<EstimatorKind>,
+
+    /// Write the estimates over time, a row per sample: .csv or .csv.gz
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Print the report as JSON (schema pitchleak.replay/1)
+    #[arg(long)]
+    json: bool,
+
+    /// Exit with status 1 if a fault is found
+    #[arg(long)]
+    fail_on_fault: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  pitchleak replay trace.csv.gz
+  pitchleak replay trace.csv --rig turbine7.toml --json | jq .verdict
+  zcat log.csv.gz | pitchleak replay - --rig turbine7.toml --fail-on-fault";
+
+fn estimator(name: &str) -> Result<EstimatorKind, String> {
+    let names = || format!("one of: {}", EstimatorKind::NAMES.join(", "));
+    EstimatorKind::by_name(name).ok_or_else(names)
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let mut rig = arguments.input.rig()?;
+    rig.estimator.kind = arguments.estimator.unwrap_or(rig.estimator.kind);
+    let (mut reader, bar) = arguments.input.open(&rig)?;
+    let mut file = arguments.out.as_deref().map(EstimateFile::create).transpose()?;
+    let report = replay(&mut reader, &rig, |replay, record, _| match &mut file {
+        None => Ok(()),
+        Some(file) => file.write(&replay.point(record)).map_err(Failure::from),
+    })?;
+    file.map(EstimateFile::finish).transpose()?;
+    bar.finish_and_clear();
+    output::warn(&report.trace.warnings);
+    let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };
+    output::print(&text)?;
+    let fault = arguments.fail_on_fault && !report.verdict.faults.is_empty();
+    Ok(if fault { Outcome::FaultFound } else { Outcome::Done })
+}

@@ -1,0 +1,94 @@
+//! What a trace is worth before anybody believes its leaks: data quality, excitation, and what it can
+//! and cannot identify.
+
+mod readings;
+mod text;
+
+pub use readings::Reading;
+
+use crate::replay::replay;
+use crate::report::{EstimateEntry, Leakage, TraceSummary};
+use crate::rig::{EstimatorKind, Rig};
+use crate::trace::{TraceError, TraceReader};
+use pitchleak_core::PerLeak;
+use readings::Extremes;
+use serde::Serialize;
+
+/// The result of a check, as `check --json` prints it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckReport {
+    /// `pitchleak.check/1`.
+    pub schema: &'static str,
+    /// What was read.
+    pub trace: TraceSummary,
+    /// `wu2011`, or the rig file's path.
+    pub rig: String,
+    /// What each signal did.
+    pub readings: Vec<Reading>,
+    /// What the trace tells about each leak.
+    pub leaks: PerLeak<Reach>,
+    /// What the trace tells about the bulk modulus.
+    pub bulk_modulus: Reach,
+    /// Innovation squared over its variance, of the flow balance and of the position: about 1 where
+    /// model and declared noise explain the trace.
+    pub normalised_innovation: Option<[f64; 2]>,
+}
+
+/// How well a trace pins one parameter down.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reach {
+    /// Whether it does.
+    pub identifiable: bool,
+    /// Half width of the 95 % interval: L/min for a leak, Pa for the bulk modulus.
+    pub resolution: Option<f64>,
+    /// Why it does not, in a few words.
+    pub reason: Option<String>,
+}
+
+impl Reach {
+    fn new(entry: &EstimateEntry, std: Option<f64>) -> Self {
+        Self {
+            identifiable: entry.identifiable,
+            resolution: std.map(|std| 1.959_963_984_540_054 * std),
+            reason: entry.reason.clone(),
+        }
+    }
+}
+
+impl CheckReport {
+    /// Name and version of the JSON form.
+    pub const SCHEMA: &'static str = "pitchleak.check/1";
+
+    /// One line of JSON.
+    ///
+    /// # Errors
+    /// None in practice: every field has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+}
+
+/// Checks a whole trace with the default estimator, which knows what it does not know.
+///
+/// # Errors
+/// As [`replay`].
+pub fn check(reader: &mut TraceReader, rig: &Rig) -> Result<CheckReport, TraceError> {
+    let mut rig = rig.clone();
+    rig.estimator.kind = EstimatorKind::Rls;
+    let mut extremes = Extremes::default();
+    let replayed = replay(reader, &rig, |_, record, _| {
+        extremes.add(record);
+        Ok::<_, TraceError>(())
+    })?;
+    let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
+    let bulk_modulus = &replayed.estimates.bulk_modulus;
+    Ok(CheckReport {
+        schema: CheckReport::SCHEMA,
+        rig: rig.name,
+        readings: extremes.readings(),
+        leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
+        bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
+        normalised_innovation: replayed.normalised_innovation,
+        trace: replayed.trace,
+    })
+}

@@ -1,0 +1,82 @@
+use super::{CheckReport, Reach};
+use crate::report::{Leak, Palette, data_line, rig_line};
+use std::fmt::Write;
+
+/// Innovations this many times the declared noise are no noise.
+const SUSPICIOUS: f64 = 2.0;
+
+impl CheckReport {
+    /// The result for people, in the colours of `palette`.
+    pub fn to_text(&self, palette: &Palette) -> String {
+        let mut out = String::new();
+        let _ = writeln!(out, "trace  {}: {}", self.trace.path, data_line(&self.trace));
+        let _ = writeln!(out, "rig    {}\n", rig_line(&self.rig));
+        self.write_readings(&mut out, palette);
+        self.write_reach(&mut out, palette);
+        self.write_consistency(&mut out, palette);
+        out
+    }
+
+    fn write_readings(&self, out: &mut String, palette: &Palette) {
+        let (faint, reset) = palette.faint();
+        let _ = writeln!(out, "{faint}{:<12}{:>14}{:>14}   rows{reset}", "signal", "from", "to");
+        for reading in &self.readings {
+            let _ = writeln!(
+                out,
+                "{:<12}{:>14}{:>14}   {:.0} %",
+                format!("{}, {}", reading.signal, reading.unit),
+                short(reading.least),
+                short(reading.most),
+                reading.present_percent,
+            );
+        }
+    }
+
+    fn write_reach(&self, out: &mut String, palette: &Palette) {
+        let (faint, reset) = palette.faint();
+        let _ = writeln!(out, "\n{faint}{:<12}this trace shows it to (95 %){reset}", "leak");
+        let leaks = Leak::ALL.zip(self.leaks.clone());
+        for (leak, reach) in [leaks.internal, leaks.external_a, leaks.external_b] {
+            write_reach(out, leak.label(), &reach, 1.0, "L/min", palette);
+        }
+        write_reach(out, "bulk modulus", &self.bulk_modulus, 1e-9, "GPa", palette);
+    }
+
+    fn write_consistency(&self, out: &mut String, palette: &Palette) {
+        let Some([balance, position]) = self.normalised_innovation else { return };
+        let (caution, reset) = palette.caution();
+        let worst = balance.max(position);
+        let _ = if worst > SUSPICIOUS {
+            writeln!(
+                out,
+                "\n{caution}Model and declared noise do not explain this trace{reset}: its residuals are {:.1} times the noise \
+                 of [sensors]. Either the sensors are worse than declared, or the model lacks an effect (see `pitchleak diagnose`).",
+                worst.sqrt()
+            )
+        } else {
+            writeln!(out, "\nModel and declared noise explain this trace.")
+        };
+    }
+}
+
+fn write_reach(out: &mut String, label: &str, reach: &Reach, factor: f64, unit: &str, palette: &Palette) {
+    let (caution, reset) = palette.caution();
+    let resolution = reach.resolution.filter(|resolution| resolution.is_finite());
+    let resolution = resolution.map(|resolution| format!("± {} {unit}", short(resolution * factor)));
+    let resolution = resolution.unwrap_or_default();
+    let _ = if reach.identifiable {
+        writeln!(out, "{label:<14}{resolution}")
+    } else {
+        let reason = reach.reason.as_deref().unwrap_or("too little excitation");
+        writeln!(out, "{label:<14}{resolution:<20}{caution}not identifiable: {reason}{reset}")
+    };
+}
+
+/// Three significant digits or so.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if (1e-3..1e4).contains(&size) => format!("{value:.4}"),
+        _ => format!("{value:.3e}"),
+    }
+}
