@@ -1,9 +1,6 @@
 use super::{CheckReport, Reach};
-use crate::report::{Leak, Palette, data_line, rig_line};
+use crate::report::{Leak, Palette, data_line, misfit, rig_line};
 use std::fmt::Write;
-
-/// Innovations this many times the declared noise are no noise.
-const SUSPICIOUS: f64 = 2.0;
 
 impl CheckReport {
     /// The result for people, in the colours of `palette`.
@@ -43,18 +40,11 @@ impl CheckReport {
     }
 
     fn write_consistency(&self, out: &mut String, palette: &Palette) {
-        let Some([balance, position]) = self.normalised_innovation else { return };
+        let Some(ratios) = self.normalised_innovation else { return };
         let (caution, reset) = palette.caution();
-        let worst = balance.max(position);
-        let _ = if worst > SUSPICIOUS {
-            writeln!(
-                out,
-                "\n{caution}Model and declared noise do not explain this trace{reset}: its residuals are {:.1} times the noise \
-                 of [sensors]. Either the sensors are worse than declared, or the model lacks an effect (see `pitchleak diagnose`).",
-                worst.sqrt()
-            )
-        } else {
-            writeln!(out, "\nModel and declared noise explain this trace.")
+        let _ = match misfit(ratios) {
+            Some(sentence) => writeln!(out, "\n{caution}{sentence}{reset}"),
+            None => writeln!(out, "\nModel and declared noise explain this trace."),
         };
     }
 }

@@ -74,7 +74,27 @@ impl Replay {
             None => bare,
             Some((std, ci95)) => EstimateEntry { std: Some(std), ci95: Some(ci95), ..bare },
         };
+        if let Some(reason) = self.contradiction(found.value) {
+            return entry.not_identifiable(reason);
+        }
         excitation.map_or(entry.clone(), |excitation| judged(entry, &excitation))
+    }
+}
+
+impl Replay {
+    /// Says so where the trace asks for a bulk modulus that the rig file rules out, by three of its standard
+    /// deviations: then something else in the chambers gives way.
+    fn contradiction(&self, bulk_modulus_pa: f64) -> Option<String> {
+        let declared = &self.rig.fluid;
+        let relative = declared.bulk_modulus_std_pa / declared.bulk_modulus_pa;
+        let deviation = (declared.bulk_modulus_pa / bulk_modulus_pa - 1.0) / relative;
+        (deviation.abs() > 3.0).then(|| {
+            format!(
+                "the trace contradicts the rig file's {:.2} ± {:.2} GPa",
+                declared.bulk_modulus_pa / 1e9,
+                declared.bulk_modulus_std_pa / 1e9
+            )
+        })
     }
 }
 

@@ -2,8 +2,8 @@
 
 mod text;
 
-pub(crate) use text::rig_line;
 pub use text::{Palette, data_line};
+pub(crate) use text::{misfit, rig_line};
 
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;

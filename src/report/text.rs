@@ -160,6 +160,22 @@ pub fn data_line(trace: &TraceSummary) -> String {
     line
 }
 
+/// Innovations this many times the declared noise are no noise.
+const SUSPICIOUS: f64 = 2.0;
+
+/// Says so where the residuals are larger than the declared noise can make them.
+pub(crate) fn misfit(normalised_innovation: [f64; 2]) -> Option<String> {
+    let worst = normalised_innovation.into_iter().fold(0.0, f64::max);
+    (worst > SUSPICIOUS).then(|| {
+        format!(
+            "Model and declared noise do not explain this trace: its residuals are {:.1} times the noise of \
+             [sensors]. Either the sensors are worse than declared, or the model lacks an effect (see `pitchleak \
+             diagnose`).",
+            worst.sqrt()
+        )
+    })
+}
+
 /// Which rig a report rests on.
 pub(crate) fn rig_line(rig: &str) -> String {
     if rig == Rig::PAPER_NAME {
@@ -175,6 +191,7 @@ impl ReplayReport {
         let mut out = String::new();
         self.write_verdict(&mut out, palette);
         self.write_leaks(&mut out, palette);
+        self.write_misfit(&mut out, palette);
         self.write_alarms(&mut out);
         self.write_scores(&mut out);
         let _ = writeln!(out, "\ntrace      {}: {}", self.trace.path, data_line(&self.trace));
@@ -215,6 +232,13 @@ impl ReplayReport {
         let gpa = with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9));
         let line = format!("{:<12}{:<48}", "oil", format!("bulk modulus {gpa} GPa"));
         write_row(out, &line, bulk, caution, reset);
+    }
+
+    fn write_misfit(&self, out: &mut String, palette: &Palette) {
+        let Palette { caution, reset, .. } = palette;
+        if let Some(sentence) = self.normalised_innovation.and_then(misfit) {
+            let _ = writeln!(out, "\n{caution}{sentence}{reset}");
+        }
     }
 
     fn write_alarms(&self, out: &mut String) {
