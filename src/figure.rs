@@ -62,6 +62,8 @@ pub struct FigureError(String);
 
 const PANEL_WIDTH: u32 = 560;
 const PANEL_HEIGHT: u32 = 250;
+/// Points of one curve that are drawn at most: two to a pixel.
+const MOST_POINTS: usize = 1000;
 /// Height that a legend adds to its panel, as a share.
 const LEGEND_SHARE: f64 = 0.5;
 
@@ -143,8 +145,10 @@ fn draw_line(chart: &mut Chart, line: &Line, low: f64, high: f64) -> Result<(), 
     // A curve that leaves the panel stops at its edge.
     let inside = |p: &(f64, f64)| p.1.is_finite() && p.1 >= low && p.1 <= high;
     let mut label = line.label;
+    let stride = line.points.len().div_ceil(MOST_POINTS).max(1);
     for piece in line.points.split(|p| !inside(p)).filter(|piece| piece.len() > 1) {
-        let drawn = chart.draw_series(LineSeries::new(piece.iter().copied(), style)).map_err(error)?;
+        let points = piece.iter().step_by(stride).copied();
+        let drawn = chart.draw_series(LineSeries::new(points, style)).map_err(error)?;
         if !label.is_empty() {
             drawn.label(label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
             label = "";

@@ -63,6 +63,21 @@ pub struct Tracking {
     pub external_a_mean_lpm: f64,
 }
 
+/// What noise lets a window tell about the oil.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BulkModulusBound {
+    /// Mean wind, m/s.
+    pub wind_mps: u32,
+    /// Leak setting.
+    pub case: Case,
+    /// Spread of the bulk modulus before the window, %.
+    pub prior_std_percent: f64,
+    /// Cramér–Rao bound on its spread after the window, prior included, %: median over the windows.
+    pub bound_std_percent: f64,
+    /// Whether the window halves the spread.
+    pub identifiable: bool,
+}
+
 /// Everything `pitchleak reproduce` prints.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -76,6 +91,8 @@ pub struct Report {
     pub rows_with_bias: Vec<Row>,
     /// How the rig followed.
     pub tracking: Vec<Tracking>,
+    /// What can be known of the bulk modulus, the parameter that no estimator finds at 5 m/s.
+    pub bulk_modulus: Vec<BulkModulusBound>,
     /// Gains tried for the paper's law, the best first; `rows` use the best.
     pub paper_gains: Vec<Candidate>,
     /// What the alarms do, where that was asked for: see [`detection()`].
@@ -122,12 +139,14 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
 
     let rows = |laws: &[(usize, &Law)]| rows(&settings, &trials, laws);
+    let cases: Vec<(Case, &Run)> = settings.iter().map(|(_, case)| *case).zip(&runs).collect();
     let report = Report {
         schema: "pitchleak.reproduce/1",
         seeds,
         rows: rows(&[(0, paper), (1, plain)]),
         rows_with_bias: rows(&[(2, biased)]),
-        tracking: settings.iter().zip(&runs).map(|((_, case), run)| tracking(*case, run)).collect(),
+        tracking: cases.iter().map(|(case, run)| tracking(*case, run)).collect(),
+        bulk_modulus: parallel::map(&cases, |_| (), |(case, run)| bulk_modulus(*case, run)),
         paper_gains,
         detection: None,
     };
@@ -260,6 +279,28 @@ fn rows(settings: &[(WindCase, Case)], trials: &[Vec<Trials>], laws: &[(usize, &
     rows
 }
 
+fn bulk_modulus(case: Case, run: &Run) -> BulkModulusBound {
+    let rig = rig();
+    let sensors = rig.sensors();
+    let leaks = run.coefficients();
+    let model =
+        CramerRaoModel { cylinder: &rig.cylinder, fluid: &rig.fluid, sensors: &sensors, leaks: &leaks };
+    let spread = |window: usize| {
+        let samples: Vec<Sample<f64>> = run.window(window).iter().map(|truth| truth.sample).collect();
+        let bound = model.bound(1.0 / SAMPLE_RATE_HZ, &samples);
+        bound.map_or(f64::INFINITY, |b| b.compressibility_std * rig.fluid.bulk_modulus_pa)
+    };
+    let prior = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+    let bound = table::median((0..WINDOWS).map(spread).collect());
+    BulkModulusBound {
+        wind_mps: run.wind.mean_mps(),
+        case,
+        prior_std_percent: 100.0 * prior,
+        bound_std_percent: 100.0 * bound,
+        identifiable: bound <= 0.5 * prior,
+    }
+}
+
 fn tracking(case: Case, run: &Run) -> Tracking {
     let stroke = rig().cylinder.stroke_m;
     let most_load = run.truths.iter().map(|t| t.load_reference_n.abs()).fold(0.0, f64::max);
@@ -312,6 +353,17 @@ impl Report {
                 t.load_peak_percent_of_peak,
                 t.internal_mean_lpm,
                 t.external_a_mean_lpm
+            );
+        }
+        out += "\nBulk modulus: what 20 s can tell, spread before and after (Cramer-Rao)\n";
+        for b in &self.bulk_modulus {
+            out += &format!(
+                "{:>4} m/s case {}: {:.1} % -> {:.1} %{}\n",
+                b.wind_mps,
+                u8::from(b.case),
+                b.prior_std_percent,
+                b.bound_std_percent,
+                if b.identifiable { "" } else { "  not identifiable" }
             );
         }
         if let Some(best) = self.paper_gains.first() {
