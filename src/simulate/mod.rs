@@ -101,6 +101,7 @@ impl Scenario {
     /// # Errors
     /// [`SimulateError`].
     pub fn leak_coefficients(&self) -> Result<Leaks<f64>, SimulateError> {
+        self.check()?;
         let calibration =
             Self { duration_s: self.duration_s.min(CALIBRATION_S), onset_s: 0.0, ..self.clone() };
         let coefficients = |pressures: &PerLeak<f64>| {

@@ -6,6 +6,8 @@ mod failure;
 mod input;
 mod output;
 mod replay;
+mod reproduce;
+mod simulate;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -26,6 +28,8 @@ Every command explains itself: pitchleak replay --help";
 enum Command {
     Replay(replay::Arguments),
     Check(check::Arguments),
+    Simulate(Box<simulate::Arguments>),
+    Reproduce(reproduce::Arguments),
     Completions(completions::Arguments),
 }
 
@@ -40,6 +44,8 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
     };
     match outcome {

@@ -1,0 +1,243 @@
+use crate::failure::Failure;
+use crate::{Outcome, output};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use pitchleak::Rig;
+use pitchleak::core::PerLeak;
+use pitchleak::core::Sensors;
+use pitchleak::curve::Curve;
+use pitchleak::reference::{Reference, read_curve};
+use pitchleak::rig::Instrument;
+use pitchleak::simulate::{Biases, EffectSize, LeakSize, Recording, Scenario, effects, truth_path};
+use pitchleak::units::{self, Dimension};
+use pitchleak::wind::{Emulation, History, Wind};
+use std::path::{Path, PathBuf};
+
+/// Simulate a rig with known leaks and write what its sensors would have recorded
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// What the rig follows: 5, 13, 21 or 30 (m/s, built in), OpenFAST output (.out, .outb), or CSV with
+    /// t_s, pitch_deg, pitch_moment_Nm
+    #[arg(long, value_name = "CASE|FILE", conflicts_with_all = ["position", "load"])]
+    wind: Option<Wind>,
+
+    /// Instead of wind: piston position, constant ("100 mm") or a CSV file with t_s and x_mm
+    #[arg(long, value_name = "X|FILE", required_unless_present = "wind", requires = "load")]
+    position: Option<String>,
+
+    /// Instead of wind: load against extension, constant ("2 kN") or a CSV file with t_s and force_n
+    #[arg(long, value_name = "F|FILE", requires = "position")]
+    load: Option<String>,
+
+    /// Rig file [default: the built-in rig wu2011]
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+
+    /// Leak past the piston: mean flow over the run ("0.5 L/min") or coefficient ("0.02 L/min/bar")
+    #[arg(long, value_name = "Q", default_value = "0")]
+    leak_internal: LeakSize,
+
+    /// Leak out of chamber A
+    #[arg(long, value_name = "Q", default_value = "0")]
+    leak_external_a: LeakSize,
+
+    /// Leak out of chamber B
+    #[arg(long, value_name = "Q", default_value = "0")]
+    leak_external_b: LeakSize,
+
+    /// Time into the trace at which the leaks open [default: before it begins]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    onset: Option<f64>,
+
+    /// Effect beyond the model and its size in SI units; may be given more than once
+    #[arg(long, value_name = "ID=VALUE")]
+    effect: Vec<EffectSize>,
+
+    /// White noise of every sensor, 3 sigma: `none`, `rig` (as the rig file says), or a share of full scale
+    #[arg(long, value_name = "NOISE", default_value = "none")]
+    noise: Noise,
+
+    /// Constant offset of every sensor, drawn evenly within this share of full scale
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0")]
+    bias: f64,
+
+    /// Seed of noise and offsets
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+
+    /// Length of the trace [default: 60 s, or what the wind or reference has]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    duration: Option<f64>,
+
+    /// Where in the wind or reference the trace begins [default: 10 s after its beginning]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    start: Option<f64>,
+
+    /// Samples per second, or a frequency ("1 kHz")
+    #[arg(long, value_name = "RATE", value_parser = frequency, default_value = "100")]
+    sample_rate: f64,
+
+    /// Loads of the turbine are divided by this (the paper: 1000)
+    #[arg(long, value_name = "FACTOR", default_value_t = Emulation::paper().load_scale)]
+    load_scale: f64,
+
+    /// Positions of the turbine are divided by this
+    #[arg(long, value_name = "FACTOR", default_value_t = Emulation::paper().position_scale)]
+    position_scale: f64,
+
+    /// Inertia of the blade about its pitch axis, kg m^2
+    #[arg(long, value_name = "J", default_value_t = Emulation::paper().blade_inertia_kgm2)]
+    blade_inertia: f64,
+
+    /// Trace to write: .csv or .csv.gz, `-` for standard output; the truth goes beside it as .json
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  pitchleak simulate --wind 13 --leak-internal '0.5 L/min' --noise '1 %' --seed 7 --out trace.csv.gz
+  pitchleak simulate --wind run.outb --rig turbine7.toml --effect viscous_friction=1500 --out trace.csv
+  pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
+
+/// Time for which the loops run before the trace begins, s.
+const WARM_UP_S: f64 = 10.0;
+const DEFAULT_DURATION_S: f64 = 60.0;
+
+#[derive(Clone, Copy)]
+enum Noise {
+    None,
+    Rig,
+    Share(f64),
+}
+
+impl std::str::FromStr for Noise {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "none" => Ok(Self::None),
+            "rig" => Ok(Self::Rig),
+            _ => share(text).map(Self::Share).map_err(|error| format!("{error}; or `none`, or `rig`")),
+        }
+    }
+}
+
+fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
+    let value = units::parse(text, dimension).map_err(|error| error.to_string())?;
+    if value < 0.0 { Err("must not be negative".into()) } else { Ok(value) }
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Time)
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Frequency)
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Share)
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let rig = arguments.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
+    let (reference, name) = arguments.reference(&rig)?;
+    if reference.clipped_share > 0.0 {
+        let percent = 100.0 * reference.clipped_share;
+        output::warn(&[format!(
+            "{name}: the position was held off the end stops for {percent:.1} % of the time"
+        )]);
+    }
+    let recording = Recording {
+        noise: arguments.noise.sensors(&rig),
+        biases: Biases::drawn(&rig.instruments, arguments.bias, arguments.seed),
+        seed: arguments.seed,
+        scenario: arguments.scenario(rig, reference)?,
+    };
+    let bar = progress();
+    let truth = recording.write(&arguments.out, &name, |share| bar.set_position((1000.0 * share) as u64))?;
+    bar.finish_and_clear();
+    if arguments.out != Path::new("-") {
+        let path = truth_path(&arguments.out);
+        let text = serde_json::to_string_pretty(&truth)? + "\n";
+        std::fs::write(&path, text).map_err(|source| Failure::Write { path, source })?;
+    }
+    Ok(Outcome::Done)
+}
+
+impl Arguments {
+    /// What the rig follows, and its name.
+    fn reference(&self, rig: &Rig) -> Result<(Reference, String), Failure> {
+        if let Some(wind) = &self.wind {
+            let emulation = Emulation {
+                load_scale: self.load_scale,
+                position_scale: self.position_scale,
+                blade_inertia_kgm2: self.blade_inertia,
+                ..Emulation::paper()
+            };
+            let reference = emulation.reference(&History::of(wind)?, rig.cylinder.stroke_m)?;
+            return Ok((reference, format!("wind {wind}")));
+        }
+        let (position, load) =
+            (self.position.as_deref().unwrap_or_default(), self.load.as_deref().unwrap_or_default());
+        let reference =
+            Reference::of(curve(position, "x", Dimension::Length)?, curve(load, "force", Dimension::Force)?);
+        Ok((reference, format!("position {position}, load {load}")))
+    }
+
+    fn scenario(&self, rig: Rig, reference: Reference) -> Result<Scenario, Failure> {
+        let (begin, end) = reference.span_s().unwrap_or((0.0, f64::INFINITY));
+        let start_s = self.start.map_or(begin + WARM_UP_S.min(0.5 * (end - begin)), |start| begin + start);
+        Ok(Scenario {
+            effects: effects(&rig, &self.effect)?,
+            rig,
+            leaks: PerLeak {
+                internal: self.leak_internal,
+                external_a: self.leak_external_a,
+                external_b: self.leak_external_b,
+            },
+            onset_s: self.onset.unwrap_or(0.0),
+            start_s,
+            warm_up_s: WARM_UP_S,
+            duration_s: self.duration.unwrap_or(DEFAULT_DURATION_S.min(end - start_s)),
+            sample_rate_hz: self.sample_rate,
+            reference,
+        })
+    }
+}
+
+impl Noise {
+    fn sensors(self, rig: &Rig) -> Sensors<f64> {
+        let accuracy = match self {
+            Self::Rig => return rig.sensors(),
+            Self::None => 0.0,
+            Self::Share(share) => share,
+        };
+        let mut sheets = rig.instruments;
+        let all: [&mut Instrument; 5] = [
+            &mut sheets.flow_a,
+            &mut sheets.flow_b,
+            &mut sheets.pressure,
+            &mut sheets.position,
+            &mut sheets.force,
+        ];
+        all.into_iter().for_each(|sheet| sheet.accuracy = accuracy);
+        sheets.spread()
+    }
+}
+
+/// A constant, or the curve in a file.
+fn curve(text: &str, signal: &'static str, dimension: Dimension) -> Result<Curve, Failure> {
+    match units::parse(text, dimension) {
+        Ok(value) => Ok(Curve::constant(value)),
+        Err(_) if Path::new(text).is_file() => Ok(read_curve(text.as_ref(), signal, dimension)?),
+        Err(error) => Err(Failure::Quantity { text: text.into(), error }),
+    }
+}
+
+fn progress() -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  simulating, {eta} left");
+    ProgressBar::new(1000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
