@@ -1,8 +1,8 @@
 //! Whether what is left can be the sensors' noise, and if not, where it shows.
 
 use super::fit::Fit;
-use super::outcome::{Quality, Rmse, Shape, WhitenessP};
-use super::rows::{Balance, Rows};
+use super::outcome::WhitenessP;
+use super::rows::Balance;
 use super::select;
 use super::series::{FastNoise, Series};
 use super::whiteness;
@@ -14,7 +14,6 @@ const LEAST_P: f64 = 2e-4;
 const NOISIER: f64 = 1.25;
 /// Correlation of fast noise beyond which it is a ripple.
 const RIPPLE: f64 = 0.25;
-const BINS: usize = 12;
 
 /// How the noise of one kind of sensor compares with its data sheet.
 pub(super) struct SensorCheck {
@@ -100,74 +99,4 @@ pub(super) fn whiteness_p(fit: &Fit<'_>) -> WhitenessP {
         whiteness::portmanteau_p(&left, 1.0)
     };
     WhitenessP { chamber_a: p(Balance::ChamberA), chamber_b: p(Balance::ChamberB), force: p(Balance::Force) }
-}
-
-/// Root mean square per balance of what is left.
-pub(super) fn rmse(rows: &Rows, left: &[f64]) -> Rmse {
-    let of = |balance: Balance| {
-        let squares: Vec<f64> =
-            rows.entries.iter().zip(left).filter(|(e, _)| e.balance == balance).map(|(_, v)| v * v).collect();
-        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
-    };
-    Rmse {
-        chamber_a_m3s: of(Balance::ChamberA),
-        chamber_b_m3s: of(Balance::ChamberB),
-        force_n: of(Balance::Force),
-    }
-}
-
-/// Held-out error and whiteness of a fit.
-pub(super) fn quality(fit: &Fit<'_>, test: &[Series]) -> Quality {
-    let rmse = if test.is_empty() {
-        rmse(&fit.rows, &fit.held_out_leftover())
-    } else {
-        let (rows, left) = fit.judge(test);
-        rmse(&rows, &left)
-    };
-    Quality { rmse, whiteness_p: whiteness_p(fit) }
-}
-
-/// What is left against each variable, in bins of equal count.
-pub(super) fn remainder(fit: &Fit<'_>) -> Vec<Shape> {
-    let left = fit.held_out_leftover();
-    let mut shapes = Vec::new();
-    for (balance, name) in Balance::ALL.into_iter().zip(["chamber_a", "chamber_b", "force"]) {
-        let entries = || fit.rows.entries.iter().enumerate().filter(|(_, e)| e.balance == balance);
-        if entries().count() < 2 * BINS {
-            continue;
-        }
-        type Variable = fn(&super::rows::Row) -> f64;
-        let variables: [(&'static str, Variable); 7] = [
-            ("load_pressure_pa", |r| r.mean.pa_pa - r.mean.pb_pa),
-            ("pa_pa", |r| r.mean.pa_pa),
-            ("pb_pa", |r| r.mean.pb_pa),
-            ("x_m", |r| r.mean.x_m),
-            ("v_mps", |r| r.mean.v_mps),
-            ("direction", |r| r.mean.v_mps.signum()),
-            ("t_s", |r| r.t_s),
-        ];
-        for (against, variable) in variables {
-            let pairs = entries().map(|(i, e)| (variable(&fit.rows.rows[e.row]), left[i])).collect();
-            shapes.push(binned(name, against, pairs));
-        }
-    }
-    shapes
-}
-
-fn binned(balance: &'static str, against: &'static str, mut pairs: Vec<(f64, f64)>) -> Shape {
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let n = pairs.len() as f64;
-    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
-    let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
-    let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));
-    let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
-    let scale = (xx * yy).sqrt();
-    let (at, means) = pairs
-        .chunks(pairs.len().div_ceil(BINS))
-        .map(|bin| {
-            let sum = bin.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
-            (sum.0 / bin.len() as f64, sum.1 / bin.len() as f64)
-        })
-        .unzip();
-    Shape { balance, against, at, mean: means, correlation: if scale > 0.0 { xy / scale } else { 0.0 } }
 }

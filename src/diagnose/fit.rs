@@ -105,9 +105,7 @@ impl<'a> Fit<'a> {
         let equation_error = self.equation_error;
         let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
         self.whitening = Whitening::new(&rows, &spread);
-        let shared: Vec<_> =
-            (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&rows, &spread, &self.terms, number)).collect();
-        self.regression = Regression::new(&rows, &self.whitening, &shared);
+        self.regression = self.regress(&rows);
         self.solution = self.regression.solve(&self.active, &self.increments());
         if self.is_incomplete() {
             let spread = self.regression.jackknife(&self.active, &self.increments());
@@ -115,6 +113,26 @@ impl<'a> Fit<'a> {
         }
         self.equation_error = self.updated_error(&rows);
         self.rows = rows;
+    }
+
+    fn regress(&self, rows: &Rows) -> Regression {
+        let spread =
+            Spread { point: &self.point, sensors: &self.sensors, equation_error: self.equation_error };
+        let draw = |number| SharedNoise::draw(rows, &spread, &self.terms, number);
+        let shared: Vec<_> = (0..NOISE_DRAWS).map(draw).collect();
+        Regression::new(rows, &self.whitening, &shared)
+    }
+
+    /// Gives a candidate's column another shape, at the same point.
+    pub(super) fn reshape(&mut self, term: usize, shape: Shape<f64>) {
+        if self.shapes[term] == shape {
+            return;
+        }
+        self.shapes[term] = shape;
+        let (terms, shapes) = ([self.terms[term]], [shape]);
+        let column = Rows::build(self.traces, &self.recipe(&terms, &shapes)).columns.pop();
+        self.rows.columns[term] = column.unwrap_or_default();
+        self.regression = self.regress(&self.rows);
     }
 
     /// Equation error with which what is left would be as large as the noise says: the variance
@@ -232,6 +250,15 @@ impl<'a> Fit<'a> {
         let mean = -self.point.value(self.terms[term]);
         priors[term] = self.estimate(term).map(|(_, std)| Prior { mean, std: HELD * std });
         self.regression.solve(&self.active, &priors)
+    }
+
+    /// Takes an effect out for a while: the noise stays that of the fit with it.
+    pub(super) fn set_aside(&mut self, term: usize, progress: Progress<'_>) {
+        let equation_error = self.equation_error;
+        self.remove(term);
+        progress();
+        self.round();
+        self.equation_error = equation_error;
     }
 
     /// Takes an effect out again.

@@ -11,6 +11,7 @@
 
 mod adequacy;
 mod fit;
+mod held_out;
 mod motion;
 mod noise;
 mod outcome;
@@ -25,14 +26,15 @@ mod text;
 mod whiteness;
 
 pub use outcome::{
-    Calibration, Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality, Rmse,
-    Shape as RemainderShape, Size, Verdict, WhitenessP,
+    Calibration, Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality, Residual,
+    Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
 };
 pub use series::Series;
 
 use crate::Rig;
 use crate::rig::EffectValue;
 use fit::Fit;
+use held_out::HeldOut;
 use motion::Motion;
 use pitchleak_core::effects::{Shape, ShapeParameter};
 use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, Leaks, Model, SensorSpread, Sensors};
@@ -113,14 +115,15 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let sensors = adequacy::effective(&declared.sensors, &checks);
     let shape = friction_shape(&train, &declared);
     let mut fit = Fit::declared(&train, &declared, sensors, shape, progress);
-    let before = adequacy::quality(&fit, &test);
+    let left_before = HeldOut::of(&fit, &test);
+    let before = Quality { rmse: left_before.rmse(), whiteness_p: adequacy::whiteness_p(&fit) };
     let leaks_before = leaks(&fit);
     let (mut named, mut mended) = (Vec::<Named>::new(), BTreeMap::new());
     let excited = is_excited(&fit);
     let mut last = before.rmse;
     for _ in 0..if excited { MOST_STEPS } else { 0 } {
         let Some(one) = select::add_next(&mut fit, progress) else { break };
-        let now = adequacy::quality(&fit, &test).rmse;
+        let now = HeldOut::of(&fit, &test).rmse();
         mended.insert(one.term, reduction_percent(&last, &now));
         last = now;
         named.push(one);
@@ -142,19 +145,22 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     if !named.is_empty() {
         notes.extend(negative_leaks(&leaks_after, "the model with the effects"));
     }
-    let incomplete = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    let left = HeldOut::of(&fit, &test);
     Diagnosis {
         schema: "pitchleak.diagnose/1",
         before,
         effects: named.iter().filter_map(|one| found(&fit, one, mended.get(&one.term).copied())).collect(),
-        after: adequacy::quality(&fit, &test),
+        after: Quality { rmse: left.rmse(), whiteness_p: adequacy::whiteness_p(&fit) },
         calibration: calibration(&fit),
         leaks: LeaksBeforeAfter { before: leaks_before, after: leaks_after },
         not_detectable_below: if excited { reach(&fit) } else { BTreeMap::new() },
         verdict,
         notes,
         excess: rows::Balance::ALL.map(|balance| fit.excess(balance)),
-        remainder: if incomplete { adequacy::remainder(&fit) } else { vec![] },
+        remainder_before: left_before.shapes(),
+        remainder: left.shapes(),
+        residual_before: left_before.residual(),
+        residual: left.residual(),
     }
 }
 

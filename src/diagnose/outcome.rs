@@ -44,7 +44,7 @@ pub struct WhitenessP {
 /// How well a model fits: on samples it did not see (`rmse`), and as noise (`whiteness_p`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
-    /// Root mean square of what is left, averaged over 0.1 s, on held-out samples.
+    /// Root mean square of what is left, averaged over hats of 0.2 s, on held-out samples.
     pub rmse: Rmse,
     /// Portmanteau test.
     pub whiteness_p: WhitenessP,
@@ -140,6 +140,17 @@ pub struct Size {
     pub unit: &'static str,
 }
 
+/// What is left of each balance over time (s), averaged over hats of 0.2 s.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Residual {
+    /// Chamber A, m³/s.
+    pub chamber_a_m3s: Vec<(f64, f64)>,
+    /// Chamber B, m³/s.
+    pub chamber_b_m3s: Vec<(f64, f64)>,
+    /// Forces, N.
+    pub force_n: Vec<(f64, f64)>,
+}
+
 /// What is left against one variable: means in bins of equal count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shape {
@@ -179,7 +190,14 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Size of what is left as a multiple of the sensors' noise: chamber A, chamber B, force.
     pub excess: [f64; 3],
-    /// Where more than noise is left: its shape.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// What the declared model leaves over, against each variable.
+    pub remainder_before: Vec<Shape>,
+    /// What is left with the effects.
     pub remainder: Vec<Shape>,
+    /// The same over time.
+    #[serde(skip)]
+    pub residual_before: Residual,
+    /// The same over time.
+    #[serde(skip)]
+    pub residual: Residual,
 }

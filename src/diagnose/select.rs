@@ -64,17 +64,34 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
             continue;
         }
         let mended = score.gain / fit.solution.chi2;
-        if fit.is_incomplete() && mended < LEAST_MENDED_SHARE || !holds_out(fit, &score) {
+        if fit.is_incomplete() && mended < LEAST_MENDED_SHARE {
+            continue;
+        }
+        fit.reshape(score.term, shape);
+        if !holds_out(fit, &score) {
             continue;
         }
         let outdone = nameless > score.gain + CONFUSABLE_GAIN * dispersion;
-        fit.shapes[score.term] = shape;
         fit.active.push(score.term);
         fit.refit(progress);
+        polish(fit, score.term, progress);
         let p_value = whiteness::chi2_p(significance, 1.0);
         return Some(Named { term: score.term, p_value, confusable_with: vec![], outdone });
     }
     None
+}
+
+/// Fits the constants of a new effect again, now that what it leaves is no longer in the way.
+fn polish(fit: &mut Fit<'_>, term: usize, progress: Progress<'_>) {
+    if !shape::is_fitted(fit, term) {
+        return;
+    }
+    fit.set_aside(term, progress);
+    if let Some((_, shape)) = shape::best_score(fit, term) {
+        fit.reshape(term, shape);
+    }
+    fit.active.push(term);
+    fit.refit(progress);
 }
 
 /// Whether the effect also helps where it was not fitted.

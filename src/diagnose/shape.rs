@@ -5,9 +5,9 @@ use super::regression::Score;
 use pitchleak_core::effects::{Shape, ShapeParameter};
 
 /// Steps of the search, its first and last step as shares of a constant's range, and what a step must gain.
-const MOST_STEPS: usize = 24;
+const MOST_STEPS: usize = 40;
 const FIRST_STEP: f64 = 0.2;
-const LAST_STEP: f64 = 0.01;
+const LAST_STEP: f64 = 0.002;
 const LEAST_CLIMB: f64 = 0.5;
 /// A score below this (three standard deviations) is not worth the search.
 const WORTH_SEARCHING: f64 = 9.0;

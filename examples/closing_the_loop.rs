@@ -1,0 +1,101 @@
+//! From a residual to the missing effect, with a figure of what is left before and after.
+//!
+//! ```text
+//! cargo run --release --example closing_the_loop -- OUT.svg                    a worn spot, simulated
+//! cargo run --release --example closing_the_loop -- OUT.svg RIG.toml TRACE…    your own traces
+//! ```
+
+use pitchleak::Rig;
+use pitchleak::core::effects::Shape;
+use pitchleak::core::{Effect, EffectSet, PerLeak};
+use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
+use pitchleak::figure::{Ink, Line, Panel, svg};
+use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing};
+use pitchleak::trace::TraceReader;
+use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use std::error::Error;
+
+/// A minute of wind on a cylinder with a worn spot, through sensors of 0.3 % of full scale.
+fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
+    let mut rig = Rig::paper();
+    let sheets = &mut rig.instruments;
+    for sheet in [
+        &mut sheets.flow_a,
+        &mut sheets.flow_b,
+        &mut sheets.pressure,
+        &mut sheets.position,
+        &mut sheets.force,
+    ] {
+        sheet.accuracy = 3e-3;
+    }
+    let mut effects = EffectSet::default();
+    let shape = Shape { spot_position_m: 0.09, spot_width_m: 0.01, ..Shape::default() };
+    effects.set(Effect::PositionDependentLeak, 1e-11, shape)?;
+    let history = History::of(&Wind::BuiltIn(WindCase::Mps21))?;
+    let scenario = Scenario {
+        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m)?,
+        leaks: PerLeak { internal: 5e-12, external_a: 1e-12, external_b: 0.0 }.map(LeakSize::Coefficient),
+        rig: rig.clone(),
+        onset_s: 0.0,
+        effects,
+        start_s: 5.0,
+        warm_up_s: 3.0,
+        duration_s: 60.0,
+        sample_rate_hz: 100.0,
+    };
+    let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 1);
+    let mut series = Series::default();
+    let leaks = scenario.leak_coefficients()?;
+    scenario.run(leaks, |truth| series.push(truth.t_s, &sensing.read(&truth.sample), None))?;
+    Ok((rig, vec![series]))
+}
+
+fn read(rig: &str, traces: &[String]) -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
+    let rig = Rig::load(rig)?;
+    let read = |path: &String| Ok(Series::read(&mut TraceReader::open(path, &rig)?)?);
+    let series = traces.iter().map(read).collect::<Result<_, Box<dyn Error>>>()?;
+    Ok((rig, series))
+}
+
+/// What is left over time, before in grey and after in blue.
+fn panels(diagnosis: &Diagnosis) -> Vec<Panel> {
+    let (before, after) = (&diagnosis.residual_before, &diagnosis.residual);
+    let balances = [
+        ("Chamber A", "left over, L/min", &before.chamber_a_m3s, &after.chamber_a_m3s, 60e3),
+        ("Chamber B", "left over, L/min", &before.chamber_b_m3s, &after.chamber_b_m3s, 60e3),
+        ("Forces", "left over, N", &before.force_n, &after.force_n, 1.0),
+    ];
+    let line = |label, ink, points: &[(f64, f64)], factor: f64| Line {
+        label,
+        ink,
+        points: points.iter().map(|(t, v)| (*t, v * factor)).collect(),
+    };
+    balances
+        .into_iter()
+        .filter(|(_, _, before, _, _)| !before.is_empty())
+        .map(|(title, y_label, before, after, factor)| Panel {
+            title: title.to_owned(),
+            y_label,
+            lines: vec![
+                line("declared model", Ink::Measured, before, factor),
+                line("with the effects found", Ink::Ours, after, factor),
+            ],
+            y_range: None,
+        })
+        .collect()
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (out, (rig, traces)) = match arguments.as_slice() {
+        [out] => (out, worn_spot()?),
+        [out, rig, traces @ ..] => (out, read(rig, traces)?),
+        [] => return Err("say where the figure goes: OUT.svg [RIG.toml TRACE…]".into()),
+    };
+    // The last of several traces is judged, not fitted.
+    let (train, test) = traces.split_at(traces.len().saturating_sub(1).max(1));
+    let diagnosis = diagnose(train, test, &Declared::of(&rig), &|| ());
+    print!("{}", diagnosis.to_text());
+    std::fs::write(out, svg(&panels(&diagnosis), 1)?)?;
+    Ok(())
+}
