@@ -24,6 +24,14 @@ pub enum Failure {
     /// The file of estimates.
     #[error(transparent)]
     Estimates(#[from] EstimateFileError),
+    /// A rig file.
+    #[error("cannot write {file}: {source}")]
+    Save {
+        /// As named by the user.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
     /// The report as JSON.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -2,6 +2,7 @@
 
 mod check;
 mod completions;
+mod diagnose;
 mod failure;
 mod input;
 mod output;
@@ -27,6 +28,7 @@ Every command explains itself: pitchleak replay --help";
 #[derive(Subcommand)]
 enum Command {
     Replay(replay::Arguments),
+    Diagnose(diagnose::Arguments),
     Check(check::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
@@ -43,6 +45,7 @@ enum Outcome {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),

@@ -1,0 +1,88 @@
+use crate::failure::Failure;
+use crate::{Outcome, output};
+use clap::Args;
+use indicatif::ProgressBar;
+use pitchleak::Rig;
+use pitchleak::diagnose::{Declared, Series, diagnose};
+use pitchleak::trace::{BadRows, TraceReader};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Find the physical effect that the model lacks: traces of one rig, fitted together
+///
+/// Tells what the declared model leaves unexplained, which known effect explains it, and the error
+/// before and after on samples that were not fitted.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  pitchleak diagnose trace.csv.gz --rig turbine7.toml
+  pitchleak diagnose monday/*.csv --test tuesday/*.csv --save-rig corrected.toml
+  pitchleak replay trace.csv.gz --rig corrected.toml")]
+pub struct Arguments {
+    /// Traces to fit: .csv or .csv.gz, `-` for standard input
+    #[arg(value_name = "TRACE", required = true)]
+    traces: Vec<PathBuf>,
+
+    /// Traces to judge on [default: blocks of the fitted traces that each fit leaves out]
+    #[arg(long, value_name = "TRACE", num_args = 1..)]
+    test: Vec<PathBuf>,
+
+    /// Rig file [default: rig.toml beside the first trace, else the built-in rig wu2011]
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+
+    /// End at the first bad row instead of skipping it
+    #[arg(long)]
+    strict: bool,
+
+    /// Print the result as JSON (schema pitchleak.diagnose/1)
+    #[arg(long)]
+    json: bool,
+
+    /// Write the rig file with the effects found in it
+    #[arg(long, value_name = "FILE")]
+    save_rig: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let rig = match (&arguments.rig, arguments.traces.first()) {
+        (Some(path), _) => Rig::load(path)?,
+        (None, Some(trace)) => Rig::beside(trace)?,
+        (None, None) => Rig::paper(),
+    };
+    let bar = ProgressBar::new_spinner();
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let bad_rows = if arguments.strict { BadRows::Fatal } else { BadRows::Skip };
+    let read_all = |paths: &[PathBuf]| -> Result<Vec<Series>, Failure> {
+        paths.iter().map(|path| read(path, &rig, bad_rows, &bar)).collect()
+    };
+    let (train, test) = (read_all(&arguments.traces)?, read_all(&arguments.test)?);
+    bar.set_message("fitting");
+    let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
+    bar.finish_and_clear();
+    if let Some(path) = &arguments.save_rig {
+        save(&diagnosis.rig(&rig), path)?;
+    }
+    let text = if arguments.json {
+        serde_json::to_string_pretty(&diagnosis)? + "\n"
+    } else {
+        format!("rig {}\n{}", rig.name, diagnosis.to_text())
+    };
+    output::print(&text)?;
+    Ok(Outcome::Done)
+}
+
+fn read(path: &Path, rig: &Rig, bad_rows: BadRows, bar: &ProgressBar) -> Result<Series, Failure> {
+    bar.set_message(format!("reading {}", path.display()));
+    let mut reader = TraceReader::open(path, rig)?.with_bad_rows(bad_rows);
+    let series = Series::read(&mut reader)?;
+    let named = |warning: String| format!("{}: {warning}", reader.name());
+    let warnings: Vec<String> = reader.quality().warnings().into_iter().map(named).collect();
+    bar.suspend(|| output::warn(&warnings));
+    Ok(series)
+}
+
+fn save(rig: &Rig, path: &Path) -> Result<(), Failure> {
+    std::fs::write(path, rig.to_toml())
+        .map_err(|source| Failure::Save { file: path.display().to_string(), source })
+}

@@ -1,0 +1,95 @@
+//! `pitchleak diagnose` from outside.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const RIG: &str = r#"
+[cylinder]
+area_a = "12.6 cm^2"
+area_b = "9.4 cm^2"
+stroke = "0.2 m"
+moving_mass = "20 kg"
+[fluid]
+bulk_modulus = "0.8 GPa"
+bulk_modulus_std = "0.2 GPa"
+[sensors]
+flow = { full_scale = "20 L/min", accuracy = "0.1 %" }
+pressure = { full_scale = "16 MPa", accuracy = "0.1 %" }
+position = { full_scale = "0.2 m", accuracy = "0.1 %" }
+"#;
+
+/// 40 s of the paper's cylinder, flow meter A reading `gain` too much.
+fn trace(gain: f64) -> String {
+    let row = |i: i32| {
+        let t = f64::from(i) * 0.01;
+        let (x, v) = (0.1 + 0.03 * (0.8 * t).sin(), 0.03 * 0.8 * (0.8 * t).cos());
+        let (pa, pb) = (5e6 + 1e6 * (1.5 * t).sin(), 3e6 + 5e5 * (1.9 * t).cos());
+        let (pa_rate, pb_rate) = (1.5e6 * (1.5 * t).cos(), -9.5e5 * (1.9 * t).sin());
+        let leak = 1.2e-11 * (pa - pb);
+        let qa = 1.26e-3 * v + leak + 1.26e-3 * x / 0.8e9 * pa_rate;
+        let qb = -0.94e-3 * v - leak + 0.94e-3 * (0.2 - x) / 0.8e9 * pb_rate;
+        format!("{t:.2},{x:.9},{pa:.3},{pb:.3},{:.9e},{qb:.9e}\n", qa * (1.0 + gain))
+    };
+    "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s\n".to_owned() + &(0..4000).map(row).collect::<String>()
+}
+
+fn pitchleak(folder: &TempDir, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_pitchleak")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+fn folder(gain: f64) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    fs::write(folder.path().join("trace.csv"), trace(gain)).unwrap();
+    folder
+}
+
+fn json(output: &Output) -> serde_json::Value {
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn it_names_the_effect_and_saves_a_rig_that_replay_uses() {
+    let folder = folder(0.02);
+    let found = json(&pitchleak(&folder, &["diagnose", "trace.csv", "--json", "--save-rig", "new.toml"]));
+    assert_eq!(found["verdict"], "explained");
+    assert_eq!(found["effects"][0]["id"], "flow_meter_gain_a");
+    assert!((found["effects"][0]["value"].as_f64().unwrap() - 0.02).abs() < 1e-3);
+    assert!(folder.path().join("new.toml").is_file());
+    let replayed = json(&pitchleak(&folder, &["replay", "trace.csv", "--json", "--rig", "new.toml"]));
+    let leak = replayed["estimates"]["internal_leak_coefficient"]["value"].as_f64().unwrap();
+    assert!((leak / 1.2e-11 - 1.0).abs() < 0.02, "{leak}");
+    let again = json(&pitchleak(&folder, &["diagnose", "trace.csv", "--json", "--rig", "new.toml"]));
+    assert_eq!(again["verdict"], "no_missing_effect");
+}
+
+#[test]
+fn several_traces_are_fitted_together_and_others_judged() {
+    let folder = folder(0.0);
+    let arguments = ["diagnose", "trace.csv", "trace.csv", "--test", "trace.csv", "--json"];
+    let found = json(&pitchleak(&folder, &arguments));
+    assert_eq!(found["verdict"], "no_missing_effect");
+    assert!(found["after"]["rmse"]["force_n"].is_null());
+    let text = pitchleak(&folder, &["diagnose", "trace.csv"]);
+    assert!(String::from_utf8_lossy(&text.stdout).contains("no missing effect"));
+}
+
+#[test]
+fn bad_input_is_one_clear_line() {
+    let folder = folder(0.0);
+    fs::write(folder.path().join("header.csv"), "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s\n").unwrap();
+    for arguments in [
+        vec!["diagnose", "absent.csv"],
+        vec!["diagnose", "header.csv"],
+        vec!["diagnose", "trace.csv", "--rig", "absent.toml"],
+        vec!["diagnose", "trace.csv", "--save-rig", "no/such/folder/rig.toml"],
+    ] {
+        let output = pitchleak(&folder, &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert_eq!(String::from_utf8_lossy(&output.stderr).lines().count(), 1, "{arguments:?}");
+    }
+}
