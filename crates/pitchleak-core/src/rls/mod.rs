@@ -198,7 +198,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Closes the block: both whitened equations go into the information, and the estimates are renewed.
     fn renew(&mut self) {
-        let travelled = self.sums;
+        let mut travelled = self.sums;
         self.compensate_odometer();
         let balance = self.whitened_balance();
         if let Some(equation) = balance {
@@ -208,9 +208,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
         if self.surprise.take_change() {
-            // The leak has changed: what was learnt before it counts for next to nothing.
-            self.information.forget(T::lit(1e-4));
-            self.pressures.forget(T::lit(1e-4));
+            self.begin_anew();
+            travelled = self.sums;
         }
         self.information.forget(keep);
         self.information.add(&self.sums);
@@ -225,6 +224,20 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.fed = Integrals::default();
         if let Some(odometer) = &mut self.odometer {
             odometer.weight_sum = T::zero();
+        }
+    }
+
+    /// The leak has changed: what was learnt before it counts for nothing, and neither the odometer
+    /// nor the block just closed may carry the old leak on.
+    fn begin_anew(&mut self) {
+        let nothing = T::lit(1e-8);
+        self.information.forget(nothing);
+        self.pressures.forget(nothing);
+        self.sums = BlockSums::new();
+        self.memory = None;
+        let variance = self.noise.position_m * self.noise.position_m;
+        if let (Some(odometer), Some(last)) = (&mut self.odometer, &self.last) {
+            odometer.anchor(last.x_m, variance);
         }
     }
 
