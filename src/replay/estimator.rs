@@ -8,7 +8,7 @@ use pitchleak_core::{
 /// Gains of the paper's law where the rig file gives none: a search over simulated wind traces
 /// (docs/reproduction.md).
 const PAPER_LAMBDA_PER_S: f64 = 10.0;
-const PAPER_GAMMA: f64 = 1.0;
+const PAPER_GAMMA: f64 = 3e-5;
 const PAPER_CUTOFF_HZ: f64 = 5.0;
 
 /// The estimator that a rig file asks for.
