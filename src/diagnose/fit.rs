@@ -4,6 +4,7 @@
 //! with sensor effects undone on the readings. Columns that carry the residual's own noise are corrected
 //! for it (errors in variables: Söderström 2018, "Errors-in-Variables Methods in System Identification").
 
+use super::motion::Motion;
 use super::noise::{SharedNoise, Spread, Whitening};
 use super::point::Point;
 use super::regression::{self, FOLDS, Prior, Regression, Score, Solution};
@@ -12,7 +13,7 @@ use super::series::Series;
 use super::term::{self, Term};
 use super::{Declared, Progress};
 use pitchleak_core::effects::Shape;
-use pitchleak_core::{Effect, Leaks, Model, Sensors};
+use pitchleak_core::{Effect, Sensors};
 
 /// Usual length of a block, s: short against the machine's motion, long against a sample.
 const BLOCK_S: f64 = 0.1;
@@ -29,6 +30,9 @@ const CHANCE_SIGMA: f64 = 3.7;
 /// A term held at a value has this share of its own standard deviation as prior.
 const HELD: f64 = 1e-4;
 
+/// Place of 1/β among the terms.
+const SOFTNESS: usize = 0;
+
 /// A fit, and what it takes to fit again with one more effect.
 pub(super) struct Fit<'a> {
     pub(super) traces: &'a [Series],
@@ -39,12 +43,15 @@ pub(super) struct Fit<'a> {
     /// Terms that are fitted, those of the declared model first.
     pub(super) active: Vec<usize>,
     pub(super) point: Point,
+    motions: Vec<Motion>,
     pub(super) rows: Rows,
     pub(super) regression: Regression,
     pub(super) solution: Solution,
     /// Variance by balance of what the model cannot explain, m⁶/s² and N²: zero while what is left can be
     /// the sensors' noise.
     pub(super) equation_error: [f64; 3],
+    /// The end of the oil's range at which 1/β is held, because the data would take it further.
+    pub(super) held_softness: Option<f64>,
     whitening: Whitening,
 }
 
@@ -61,10 +68,9 @@ impl<'a> Fit<'a> {
         let priors = terms.iter().map(|term| prior(*term, declared)).collect::<Vec<_>>();
         let is_declared = |i: &usize| term::DECLARED.contains(&terms[*i]) || priors[*i].is_some();
         let active = (0..terms.len()).filter(is_declared).collect();
-        let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks: Leaks::default() };
-        let point = Point { model, effects: declared.effects };
+        let point = Point::declared(declared);
         let shapes = vec![shape; terms.len()];
-        let rows = Rows { rows: vec![], entries: vec![], y: vec![], columns: vec![] };
+        let rows = Rows::empty(0);
         let equation_error = [0.0; 3];
         let whitening = Whitening::new(&rows, &Spread { point: &point, sensors: &sensors, equation_error });
         let regression = Regression::new(&rows, &whitening, &[]);
@@ -77,10 +83,12 @@ impl<'a> Fit<'a> {
             priors,
             active,
             point,
+            motions: vec![],
             rows,
             regression,
             solution,
             equation_error,
+            held_softness: None,
             whitening,
         };
         for _ in 0..FIRST_ROUNDS {
@@ -101,18 +109,31 @@ impl<'a> Fit<'a> {
     /// Moves the point to the last solution and solves around it.
     fn round(&mut self) {
         self.move_point();
-        let rows = Rows::build(self.traces, &self.recipe(&self.terms, &self.shapes));
+        self.motions = motions(self.traces, &self.point, &self.sensors);
+        let rows = Rows::build(self.traces, &self.motions, &self.recipe(&self.terms, &self.shapes));
         let equation_error = self.equation_error;
         let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
         self.whitening = Whitening::new(&rows, &spread);
         self.regression = self.regress(&rows);
+        self.held_softness = None;
         self.solution = self.regression.solve(&self.active, &self.increments());
+        self.hold_softness();
         if self.is_incomplete() {
             let spread = self.regression.jackknife(&self.active, &self.increments());
             self.solution.std.iter_mut().zip(spread).for_each(|(std, wide)| *std = std.max(wide));
         }
         self.equation_error = self.updated_error(&rows);
         self.rows = rows;
+    }
+
+    /// Solves again with 1/β at the end of its range where it would leave it.
+    fn hold_softness(&mut self) {
+        let Some((value, _)) = self.estimate(SOFTNESS) else { return };
+        let (low, high) = self.point.softness;
+        if !(low..=high).contains(&value) {
+            self.held_softness = Some(value.clamp(low, high));
+            self.solution = self.regression.solve(&self.active, &self.increments());
+        }
     }
 
     fn regress(&self, rows: &Rows) -> Regression {
@@ -130,7 +151,7 @@ impl<'a> Fit<'a> {
         }
         self.shapes[term] = shape;
         let (terms, shapes) = ([self.terms[term]], [shape]);
-        let column = Rows::build(self.traces, &self.recipe(&terms, &shapes)).columns.pop();
+        let column = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes)).columns.pop();
         self.rows.columns[term] = column.unwrap_or_default();
         self.regression = self.regress(&self.rows);
     }
@@ -202,7 +223,7 @@ impl<'a> Fit<'a> {
     }
 
     pub(super) fn recipe<'b>(&'b self, terms: &'b [Term], shapes: &'b [Shape<f64>]) -> Recipe<'b> {
-        Recipe { point: &self.point, sensors: &self.sensors, terms, shapes, block_s: BLOCK_S }
+        Recipe { point: &self.point, terms, shapes, block_s: BLOCK_S }
     }
 
     /// The priors as increments from the point.
@@ -210,7 +231,12 @@ impl<'a> Fit<'a> {
         let at = |(prior, term): (&Option<Prior>, &Term)| {
             prior.map(|prior| Prior { mean: prior.mean - self.point.value(*term), ..prior })
         };
-        self.priors.iter().zip(&self.terms).map(at).collect()
+        let mut increments: Vec<_> = self.priors.iter().zip(&self.terms).map(at).collect();
+        if let Some(held) = self.held_softness {
+            let mean = held - self.point.value(Term::InverseBulk);
+            increments[SOFTNESS] = Some(Prior { mean, std: HELD * held });
+        }
+        increments
     }
 
     /// Value and standard deviation of a fitted term.
@@ -233,7 +259,7 @@ impl<'a> Fit<'a> {
     /// The same for another shape of the term's effect.
     pub(super) fn score_shape(&self, term: usize, shape: Shape<f64>) -> Option<Score> {
         let (terms, shapes) = ([self.terms[term]], [shape]);
-        let rows = Rows::build(self.traces, &self.recipe(&terms, &shapes));
+        let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
         let column = rows.columns.first()?;
         let score = self.regression.score_column(&self.solution, term, self.whitening.whiten(column))?;
         self.allowed(&score).then_some(score)
@@ -292,9 +318,8 @@ impl<'a> Fit<'a> {
             let value = point.value(self.terms[*term]) + increment;
             point.set(self.terms[*term], value, &self.shapes[*term]);
         }
-        let recipe =
-            Recipe { point: &point, sensors: &self.sensors, terms: &[], shapes: &[], block_s: BLOCK_S };
-        let rows = Rows::build(traces, &recipe);
+        let recipe = Recipe { point: &point, terms: &[], shapes: &[], block_s: BLOCK_S };
+        let rows = Rows::build(traces, &motions(traces, &point, &self.sensors), &recipe);
         let left = rows.y.clone();
         let left = self.in_units(&rows, left);
         (rows, left)
@@ -315,6 +340,10 @@ impl<'a> Fit<'a> {
         }
         left
     }
+}
+
+fn motions(traces: &[Series], point: &Point, sensors: &Sensors<f64>) -> Vec<Motion> {
+    traces.iter().map(|series| Motion::of(series, &point.model, sensors)).collect()
 }
 
 fn prior(term: Term, declared: &Declared) -> Option<Prior> {

@@ -229,6 +229,7 @@ fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     let (softness, std) = estimate(fit, Term::InverseBulk);
     let bulk = 1.0 / softness;
     let prior = fit.priors.first().copied().flatten().map_or(f64::INFINITY, |prior| prior.std);
+    let std = if fit.held_softness.is_some() { prior } else { std };
     LeakEstimates {
         internal_leak_coefficient: leak(Term::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
         external_leak_a_coefficient: leak(Term::ExternalA, mean(&|row| row.mean.pa_pa)),

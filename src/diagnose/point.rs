@@ -1,8 +1,9 @@
 //! Where the model stands: its constants and the effects found so far.
 
+use super::Declared;
 use super::term::Term;
 use pitchleak_core::effects::{EffectKind, Shape};
-use pitchleak_core::{Effect, EffectSet, Model, Moment, Terms};
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment, Terms};
 
 /// The values around which the regression is linear.
 #[derive(Clone, Debug)]
@@ -10,9 +11,28 @@ pub(super) struct Point {
     pub(super) model: Model<f64>,
     /// Sensor effects are undone on the readings; physical ones are subtracted.
     pub(super) effects: EffectSet<f64>,
+    /// Values of 1/β that the rig file leaves possible, per Pa.
+    pub(super) softness: (f64, f64),
 }
 
+/// The oil stays within so many standard deviations of its prior, and at this share of it at least: what
+/// is softer or stiffer is not oil but an effect.
+const OIL_SIGMA: f64 = 3.0;
+const LEAST_SOFTNESS: f64 = 0.3;
+
 impl Point {
+    /// The declared model without leaks.
+    pub(super) fn declared(declared: &Declared) -> Self {
+        let fluid = declared.fluid;
+        let softness = 1.0 / fluid.bulk_modulus_pa;
+        let share = OIL_SIGMA * fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
+        Self {
+            model: Model { cylinder: declared.cylinder, fluid, leaks: Leaks::default() },
+            effects: declared.effects,
+            softness: (softness * (1.0 - share).max(LEAST_SOFTNESS), softness * (1.0 + share)),
+        }
+    }
+
     /// What is left of the three equations at corrected readings.
     pub(super) fn residual(&self, at: &Moment<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
@@ -38,7 +58,9 @@ impl Point {
     pub(super) fn set(&mut self, term: Term, value: f64, shape: &Shape<f64>) {
         let leaks = &mut self.model.leaks;
         match term {
-            Term::InverseBulk => self.model.fluid.bulk_modulus_pa = 1.0 / value.clamp(1e-12, 1e-6),
+            Term::InverseBulk => {
+                self.model.fluid.bulk_modulus_pa = 1.0 / value.clamp(self.softness.0, self.softness.1)
+            }
             Term::Internal => leaks.internal_m3spa = value,
             Term::ExternalA => leaks.external_a_m3spa = value,
             Term::ExternalB => leaks.external_b_m3spa = value,

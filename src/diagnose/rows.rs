@@ -9,8 +9,8 @@ use super::motion::Motion;
 use super::point::Point;
 use super::series::Series;
 use super::term::Term;
+use pitchleak_core::Moment;
 use pitchleak_core::effects::Shape;
-use pitchleak_core::{Moment, Sensors};
 use std::ops::Range;
 
 /// One of the three equations.
@@ -68,7 +68,6 @@ pub(super) struct Rows {
 /// What the rows are computed with.
 pub(super) struct Recipe<'a> {
     pub(super) point: &'a Point,
-    pub(super) sensors: &'a Sensors<f64>,
     pub(super) terms: &'a [Term],
     pub(super) shapes: &'a [Shape<f64>],
     /// Length of a block, s.
@@ -111,23 +110,63 @@ impl Hats {
 
 /// Numbers that are integrated beside y and the columns: time, stuck time, what is missing, means.
 const EXTRA: usize = 11;
+/// Numbers set aside for the stretches of one trace.
+const MOST_STRETCHES: usize = 1 << 32;
 /// A share of a hat that is rounding, not time.
 const SLIVER: f64 = 1e-6;
 
 impl Rows {
-    pub(super) fn build(traces: &[Series], recipe: &Recipe<'_>) -> Self {
-        let mut rows =
-            Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; recipe.terms.len()] };
-        let mut stretch = 0;
-        for series in traces {
-            let motion = Motion::of(series, &recipe.point.model, recipe.sensors);
-            let samples = ((recipe.block_s / series.step_s().max(1e-9)).round() as usize).max(1);
-            for range in series.stretches() {
-                rows.add_stretch(series, &motion, range, (stretch, samples), recipe);
-                stretch += 1;
-            }
+    /// The rows of all traces, in their order; `motions` has one entry per trace. Traces are shared out
+    /// over the cores; the result does not depend on how many there are.
+    pub(super) fn build(traces: &[Series], motions: &[Motion], recipe: &Recipe<'_>) -> Self {
+        let numbered: Vec<_> = traces.iter().zip(motions).enumerate().collect();
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let shares = numbered.chunks(numbered.len().div_ceil(cores).max(1));
+        let of_share = |share: &[(usize, (&Series, &Motion))]| -> Vec<Self> {
+            share
+                .iter()
+                .map(|(number, (series, motion))| Self::of_trace(*number, series, motion, recipe))
+                .collect()
+        };
+        let parts: Vec<Vec<Self>> = if numbered.len() < 2 {
+            shares.map(of_share).collect()
+        } else {
+            std::thread::scope(|scope| {
+                let workers: Vec<_> = shares.map(|share| scope.spawn(move || of_share(share))).collect();
+                let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
+                    worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+                };
+                workers.into_iter().map(join).collect()
+            })
+        };
+        let mut all = Self::empty(recipe.terms.len());
+        parts.into_iter().flatten().for_each(|part| all.append(part));
+        all
+    }
+
+    /// No row, but a place for each term's column.
+    pub(super) fn empty(terms: usize) -> Self {
+        Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
+    }
+
+    fn of_trace(number: usize, series: &Series, motion: &Motion, recipe: &Recipe<'_>) -> Self {
+        let mut rows = Self::empty(recipe.terms.len());
+        let samples = ((recipe.block_s / series.step_s().max(1e-9)).round() as usize).max(1);
+        for (stretch, range) in series.stretches().into_iter().enumerate() {
+            let stretch = number * MOST_STRETCHES + stretch;
+            rows.add_stretch(series, motion, range, (stretch, samples), recipe);
         }
         rows
+    }
+
+    fn append(&mut self, part: Self) {
+        let first = self.rows.len();
+        self.rows.extend(part.rows);
+        self.entries.extend(part.entries.into_iter().map(|entry| Entry { row: first + entry.row, ..entry }));
+        self.y.extend(part.y);
+        for (column, more) in self.columns.iter_mut().zip(part.columns) {
+            column.extend(more);
+        }
     }
 
     fn add_stretch(

@@ -18,6 +18,8 @@ const SHAPE_TRIALS: usize = 20;
 const MOST_EFFECTS: usize = 5;
 /// While the remainder is larger than the noise, an effect must mend this share of it to be named.
 const LEAST_MENDED_SHARE: f64 = 0.02;
+/// A candidate below this share of the best is not worth a search for its shape.
+const IN_THE_RUNNING: f64 = 0.4;
 /// Candidates whose fit is this close (three standard deviations) cannot be told apart.
 const CONFUSABLE_GAIN: f64 = 9.0;
 
@@ -54,7 +56,11 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
         return None;
     }
     let mut scores: Vec<(Score, Shape<f64>)> =
-        candidates(fit).into_iter().filter_map(|term| shape::best_score(fit, term)).collect();
+        candidates(fit).into_iter().filter_map(|term| shape::first_score(fit, term)).collect();
+    let best = scores.iter().map(|(score, _)| score.gain).fold(0.0, f64::max);
+    for entry in scores.iter_mut().filter(|(score, _)| score.gain > IN_THE_RUNNING * best) {
+        *entry = shape::best_score(fit, entry.0.term, *entry);
+    }
     scores.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
     let nameless = nameless_gain(fit);
     for (score, shape) in scores {
@@ -87,7 +93,8 @@ fn polish(fit: &mut Fit<'_>, term: usize, progress: Progress<'_>) {
         return;
     }
     fit.set_aside(term, progress);
-    if let Some((_, shape)) = shape::best_score(fit, term) {
+    if let Some(first) = shape::first_score(fit, term) {
+        let (_, shape) = shape::best_score(fit, term, first);
         fit.reshape(term, shape);
     }
     fit.active.push(term);

@@ -66,8 +66,8 @@ pub(super) fn is_fitted(fit: &Fit<'_>, term: usize) -> bool {
     !free(fit, term).is_empty()
 }
 
-/// The best score of a candidate over its constants, with their values.
-pub(super) fn best_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64>)> {
+/// The best score of a candidate over a few places of its constants, with their values.
+pub(super) fn first_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64>)> {
     let plain = fit.score(term).map(|score| (score, fit.shapes[term]));
     let ranges = free(fit, term);
     let starts = ranges.iter().flat_map(|range| STARTS.map(|share| (range, share)));
@@ -77,12 +77,16 @@ pub(super) fn best_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64
         let shape = middle.with(range.parameter, range.at(share));
         Some((fit.score_shape(term, shape)?, shape))
     });
-    let best = tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
-    let dispersion = fit.dispersion(fit.solution.chi2 - best.0.gain);
-    if best.0.gain / dispersion < WORTH_SEARCHING {
-        return Some(best);
+    tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))
+}
+
+/// The best score over its constants, from there on.
+pub(super) fn best_score(fit: &Fit<'_>, term: usize, first: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
+    let dispersion = fit.dispersion(fit.solution.chi2 - first.0.gain);
+    if first.0.gain / dispersion < WORTH_SEARCHING {
+        return first;
     }
-    Some(climb(fit, term, &ranges, best))
+    climb(fit, term, &free(fit, term), first)
 }
 
 /// Pattern search (Hooke and Jeeves 1961): a step along each constant, halved when none helps.

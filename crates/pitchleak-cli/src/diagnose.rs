@@ -5,6 +5,7 @@ use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::trace::{BadRows, TraceReader};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -53,10 +54,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(Duration::from_millis(200));
     let bad_rows = if arguments.strict { BadRows::Fatal } else { BadRows::Skip };
-    let read_all = |paths: &[PathBuf]| -> Result<Vec<Series>, Failure> {
-        paths.iter().map(|path| read(path, &rig, bad_rows, &bar)).collect()
+    let mut warnings = Warnings::default();
+    let mut read_all = |paths: &[PathBuf]| -> Result<Vec<Series>, Failure> {
+        paths.iter().map(|path| read(path, &rig, bad_rows, &bar, &mut warnings)).collect()
     };
     let (train, test) = (read_all(&arguments.traces)?, read_all(&arguments.test)?);
+    bar.suspend(|| output::warn(&in_lines(warnings)));
     bar.set_message("fitting");
     let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
     bar.finish_and_clear();
@@ -72,13 +75,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-fn read(path: &Path, rig: &Rig, bad_rows: BadRows, bar: &ProgressBar) -> Result<Series, Failure> {
+/// Each warning with the traces that it is about.
+type Warnings = BTreeMap<String, Vec<String>>;
+
+fn in_lines(warnings: Warnings) -> Vec<String> {
+    let line = |(warning, traces): (String, Vec<String>)| match traces.as_slice() {
+        [first, _, ..] => format!("{first} and {} more: {warning}", traces.len() - 1),
+        _ => format!("{}: {warning}", traces.concat()),
+    };
+    warnings.into_iter().map(line).collect()
+}
+
+fn read(
+    path: &Path,
+    rig: &Rig,
+    bad_rows: BadRows,
+    bar: &ProgressBar,
+    warnings: &mut Warnings,
+) -> Result<Series, Failure> {
     bar.set_message(format!("reading {}", path.display()));
     let mut reader = TraceReader::open(path, rig)?.with_bad_rows(bad_rows);
     let series = Series::read(&mut reader)?;
-    let named = |warning: String| format!("{}: {warning}", reader.name());
-    let warnings: Vec<String> = reader.quality().warnings().into_iter().map(named).collect();
-    bar.suspend(|| output::warn(&warnings));
+    for warning in reader.quality().warnings() {
+        warnings.entry(warning).or_default().push(reader.name().to_owned());
+    }
     Ok(series)
 }
 
