@@ -47,6 +47,9 @@ pub(super) struct Fit<'a> {
     pub(super) rows: Rows,
     pub(super) regression: Regression,
     pub(super) solution: Solution,
+    /// The same with 1/β free to leave its range: what candidates are scored against, since the right one
+    /// takes it back.
+    pub(super) scoring: Solution,
     /// Variance by balance of what the model cannot explain, m⁶/s² and N²: zero while what is left can be
     /// the sensors' noise.
     pub(super) equation_error: [f64; 3],
@@ -75,6 +78,7 @@ impl<'a> Fit<'a> {
         let whitening = Whitening::new(&rows, &Spread { point: &point, sensors: &sensors, equation_error });
         let regression = Regression::new(&rows, &whitening, &[]);
         let solution = regression.solve(&[], &priors);
+        let scoring = regression.solve(&[], &priors);
         let mut fit = Self {
             traces,
             sensors,
@@ -87,6 +91,7 @@ impl<'a> Fit<'a> {
             rows,
             regression,
             solution,
+            scoring,
             equation_error,
             held_softness: None,
             whitening,
@@ -115,25 +120,23 @@ impl<'a> Fit<'a> {
         let spread = Spread { point: &self.point, sensors: &self.sensors, equation_error };
         self.whitening = Whitening::new(&rows, &spread);
         self.regression = self.regress(&rows);
-        self.held_softness = None;
-        self.solution = self.regression.solve(&self.active, &self.increments());
-        self.hold_softness();
+        self.scoring = self.regression.solve(&self.active, &self.increments());
+        self.held_softness = self.softness_beyond_range();
+        self.solution = self.regression.solve(&self.active, &self.held_increments());
         if self.is_incomplete() {
-            let spread = self.regression.jackknife(&self.active, &self.increments());
+            let spread = self.regression.jackknife(&self.active, &self.held_increments());
             self.solution.std.iter_mut().zip(spread).for_each(|(std, wide)| *std = std.max(wide));
         }
         self.equation_error = self.updated_error(&rows);
         self.rows = rows;
     }
 
-    /// Solves again with 1/β at the end of its range where it would leave it.
-    fn hold_softness(&mut self) {
-        let Some((value, _)) = self.estimate(SOFTNESS) else { return };
+    /// The end of the oil's range beyond which the data alone would take 1/β.
+    fn softness_beyond_range(&self) -> Option<f64> {
+        let at = self.scoring.terms.iter().position(|term| *term == SOFTNESS)?;
+        let value = self.point.value(Term::InverseBulk) + self.scoring.value[at];
         let (low, high) = self.point.softness;
-        if !(low..=high).contains(&value) {
-            self.held_softness = Some(value.clamp(low, high));
-            self.solution = self.regression.solve(&self.active, &self.increments());
-        }
+        (!(low..=high).contains(&value)).then(|| value.clamp(low, high))
     }
 
     fn regress(&self, rows: &Rows) -> Regression {
@@ -231,7 +234,12 @@ impl<'a> Fit<'a> {
         let at = |(prior, term): (&Option<Prior>, &Term)| {
             prior.map(|prior| Prior { mean: prior.mean - self.point.value(*term), ..prior })
         };
-        let mut increments: Vec<_> = self.priors.iter().zip(&self.terms).map(at).collect();
+        self.priors.iter().zip(&self.terms).map(at).collect()
+    }
+
+    /// The same with 1/β held where it would leave its range.
+    fn held_increments(&self) -> Vec<Option<Prior>> {
+        let mut increments = self.increments();
         if let Some(held) = self.held_softness {
             let mean = held - self.point.value(Term::InverseBulk);
             increments[SOFTNESS] = Some(Prior { mean, std: HELD * held });
@@ -252,7 +260,7 @@ impl<'a> Fit<'a> {
 
     /// What one further term would bring; none where it can't be or would be unphysical.
     pub(super) fn score(&self, term: usize) -> Option<Score> {
-        let score = self.regression.score(&self.solution, term)?;
+        let score = self.regression.score(&self.scoring, term)?;
         self.allowed(&score).then_some(score)
     }
 
@@ -261,7 +269,7 @@ impl<'a> Fit<'a> {
         let (terms, shapes) = ([self.terms[term]], [shape]);
         let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
         let column = rows.columns.first()?;
-        let score = self.regression.score_column(&self.solution, term, self.whitening.whiten(column))?;
+        let score = self.regression.score_column(&self.scoring, term, self.whitening.whiten(column))?;
         self.allowed(&score).then_some(score)
     }
 
@@ -298,7 +306,7 @@ impl<'a> Fit<'a> {
 
     /// What is left of each entry when its fold is not fitted, in the balance's unit.
     pub(super) fn held_out_leftover(&self) -> Vec<f64> {
-        let priors = self.increments();
+        let priors = self.held_increments();
         let mut left = vec![0.0; self.rows.y.len()];
         for fold in 0..FOLDS {
             let solution = self.regression.solve_without(fold, &self.active, &priors);

@@ -352,7 +352,7 @@ fn reach(fit: &Fit<'_>) -> BTreeMap<&'static str, Size> {
     let mut sizes = BTreeMap::new();
     for term in select::candidates(fit) {
         let (Some(effect), Some(score)) =
-            (fit.terms[term].effect(), fit.regression.score(&fit.solution, term))
+            (fit.terms[term].effect(), fit.regression.score(&fit.scoring, term))
         else {
             continue;
         };

@@ -64,12 +64,12 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
     scores.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
     let nameless = nameless_gain(fit);
     for (score, shape) in scores {
-        let dispersion = fit.dispersion(fit.solution.chi2 - score.gain);
+        let dispersion = fit.dispersion(fit.scoring.chi2 - score.gain);
         let significance = score.gain / dispersion;
         if significance < critical_sigma(fit, score.term).powi(2) {
             continue;
         }
-        let mended = score.gain / fit.solution.chi2;
+        let mended = score.gain / fit.scoring.chi2;
         if fit.is_incomplete() && mended < LEAST_MENDED_SHARE {
             continue;
         }
@@ -115,9 +115,9 @@ fn holds_out(fit: &Fit<'_>, score: &Score) -> bool {
 
 /// Drops effects that those added later have made needless.
 pub(super) fn drop_needless(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress: Progress<'_>) {
-    let dispersion = fit.dispersion(fit.solution.chi2);
+    let dispersion = fit.dispersion(fit.scoring.chi2);
     let needless = |fit: &Fit<'_>, term: usize| {
-        let loss = fit.solve_without(term).chi2 - fit.solution.chi2;
+        let loss = fit.solve_without(term).chi2 - fit.scoring.chi2;
         loss / dispersion < critical_sigma(fit, term).powi(2)
     };
     let Some(at) = named.iter().position(|n| needless(fit, n.term)) else { return };
@@ -128,11 +128,11 @@ pub(super) fn drop_needless(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress:
 
 /// Names for each effect those candidates that would explain the data nearly as well in its place.
 pub(super) fn find_confusable(fit: &Fit<'_>, named: &mut [Named]) {
-    let dispersion = fit.dispersion(fit.solution.chi2);
+    let dispersion = fit.dispersion(fit.scoring.chi2);
     let open = candidates(fit);
     for one in named {
         let without = fit.solve_without(one.term);
-        let lost = without.chi2 - fit.solution.chi2;
+        let lost = without.chi2 - fit.scoring.chi2;
         let close = |term: &usize| {
             let score = fit.regression.score(&without, *term).filter(|score| fit.allowed(score));
             score.is_some_and(|score| lost - score.gain < CONFUSABLE_GAIN * dispersion)

@@ -82,7 +82,7 @@ pub(super) fn first_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f6
 
 /// The best score over its constants, from there on.
 pub(super) fn best_score(fit: &Fit<'_>, term: usize, first: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
-    let dispersion = fit.dispersion(fit.solution.chi2 - first.0.gain);
+    let dispersion = fit.dispersion(fit.scoring.chi2 - first.0.gain);
     if first.0.gain / dispersion < WORTH_SEARCHING {
         return first;
     }
