@@ -258,18 +258,18 @@ impl<'a> Fit<'a> {
         (chi2 / self.regression.count().max(1) as f64).max(1.0)
     }
 
-    /// What one further term would bring; none where it can't be or would be unphysical.
-    pub(super) fn score(&self, term: usize) -> Option<Score> {
-        let score = self.regression.score(&self.scoring, term)?;
+    /// What one further term would bring to a model; none where it can't be or would be unphysical.
+    pub(super) fn score(&self, model: &Solution, term: usize) -> Option<Score> {
+        let score = self.regression.score(model, term)?;
         self.allowed(&score).then_some(score)
     }
 
     /// The same for another shape of the term's effect.
-    pub(super) fn score_shape(&self, term: usize, shape: Shape<f64>) -> Option<Score> {
+    pub(super) fn score_shape(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Score> {
         let (terms, shapes) = ([self.terms[term]], [shape]);
         let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
         let column = rows.columns.first()?;
-        let score = self.regression.score_column(&self.scoring, term, self.whitening.whiten(column))?;
+        let score = self.regression.score_column(model, term, self.whitening.whiten(column))?;
         self.allowed(&score).then_some(score)
     }
 

@@ -56,7 +56,7 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
         return None;
     }
     let mut scores: Vec<(Score, Shape<f64>)> =
-        candidates(fit).into_iter().filter_map(|term| shape::first_score(fit, term)).collect();
+        candidates(fit).into_iter().filter_map(|term| shape::first_score(fit, &fit.scoring, term)).collect();
     let best = scores.iter().map(|(score, _)| score.gain).fold(0.0, f64::max);
     for entry in scores.iter_mut().filter(|(score, _)| score.gain > IN_THE_RUNNING * best) {
         *entry = shape::best_score(fit, entry.0.term, *entry);
@@ -93,7 +93,7 @@ fn polish(fit: &mut Fit<'_>, term: usize, progress: Progress<'_>) {
         return;
     }
     fit.set_aside(term, progress);
-    if let Some(first) = shape::first_score(fit, term) {
+    if let Some(first) = shape::first_score(fit, &fit.scoring, term) {
         let (_, shape) = shape::best_score(fit, term, first);
         fit.reshape(term, shape);
     }
@@ -134,7 +134,7 @@ pub(super) fn find_confusable(fit: &Fit<'_>, named: &mut [Named]) {
         let without = fit.solve_without(one.term);
         let lost = without.chi2 - fit.scoring.chi2;
         let close = |term: &usize| {
-            let score = fit.regression.score(&without, *term).filter(|score| fit.allowed(score));
+            let score = shape::first_score(fit, &without, *term).map(|(score, _)| score);
             score.is_some_and(|score| lost - score.gain < CONFUSABLE_GAIN * dispersion)
         };
         let groups = open.iter().copied().filter(close);
@@ -145,5 +145,5 @@ pub(super) fn find_confusable(fit: &Fit<'_>, named: &mut [Named]) {
 /// Largest gain of a shape that has no name.
 pub(super) fn nameless_gain(fit: &Fit<'_>) -> f64 {
     let nameless = (0..fit.terms.len()).filter(|i| matches!(fit.terms[*i], Term::Nameless(_)));
-    nameless.filter_map(|i| fit.score(i)).map(|score| score.gain).fold(0.0, f64::max)
+    nameless.filter_map(|i| fit.score(&fit.scoring, i)).map(|score| score.gain).fold(0.0, f64::max)
 }

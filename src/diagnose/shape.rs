@@ -1,7 +1,7 @@
 //! Constants in which an effect is not linear, fitted by the score they give.
 
 use super::fit::Fit;
-use super::regression::Score;
+use super::regression::{Score, Solution};
 use pitchleak_core::effects::{Shape, ShapeParameter};
 
 /// Steps of the search, its first and last step as shares of a constant's range, and what a step must gain.
@@ -67,15 +67,15 @@ pub(super) fn is_fitted(fit: &Fit<'_>, term: usize) -> bool {
 }
 
 /// The best score of a candidate over a few places of its constants, with their values.
-pub(super) fn first_score(fit: &Fit<'_>, term: usize) -> Option<(Score, Shape<f64>)> {
-    let plain = fit.score(term).map(|score| (score, fit.shapes[term]));
+pub(super) fn first_score(fit: &Fit<'_>, model: &Solution, term: usize) -> Option<(Score, Shape<f64>)> {
+    let plain = fit.score(model, term).map(|score| (score, fit.shapes[term]));
     let ranges = free(fit, term);
     let starts = ranges.iter().flat_map(|range| STARTS.map(|share| (range, share)));
     let tried = starts.filter_map(|(range, share)| {
         let middle =
             ranges.iter().fold(fit.shapes[term], |shape, other| shape.with(other.parameter, other.at(0.3)));
         let shape = middle.with(range.parameter, range.at(share));
-        Some((fit.score_shape(term, shape)?, shape))
+        Some((fit.score_shape(model, term, shape)?, shape))
     });
     tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))
 }
@@ -101,7 +101,7 @@ fn climb(fit: &Fit<'_>, term: usize, ranges: &[Range], start: (Score, Shape<f64>
         let tried = steps.filter_map(|(range, share)| {
             let value = best.1.get(range.parameter) + share * (range.high - range.low);
             let shape = best.1.with(range.parameter, value.clamp(range.low, range.high));
-            Some((fit.score_shape(term, shape)?, shape))
+            Some((fit.score_shape(&fit.scoring, term, shape)?, shape))
         });
         match tried.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain)) {
             Some(better) if better.0.gain > best.0.gain + LEAST_CLIMB => best = better,
