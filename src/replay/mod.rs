@@ -76,9 +76,10 @@ impl Replay {
         self.since_detection_s += record.dt_s;
         let renewed = self.estimator.update(record) == Update::Renewed;
         if renewed {
+            self.scoring.renew(self.estimator.leak_coefficients());
             self.detect(record.t_s);
         }
-        self.scoring.add(record, || self.estimator.leak_coefficients());
+        self.scoring.add(record);
         renewed
     }
 

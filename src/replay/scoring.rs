@@ -10,6 +10,7 @@ const CUTOFF_HZ: f64 = 5.0;
 /// reference and pressures.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Scoring {
+    coefficients: PerLeak<f64>,
     channels: Option<PerLeak<Channel>>,
 }
 
@@ -21,9 +22,14 @@ struct Channel {
 }
 
 impl Scoring {
-    /// Takes a record and the coefficients as estimated after it.
+    /// The coefficients that stand from now on.
+    pub fn renew(&mut self, coefficients: PerLeak<Estimate<f64>>) {
+        self.coefficients = coefficients.map(|coefficient| coefficient.value);
+    }
+
+    /// Takes a record, after the estimates were renewed by it.
     #[inline]
-    pub fn add(&mut self, record: &Record, coefficients: impl FnOnce() -> PerLeak<Estimate<f64>>) {
+    pub fn add(&mut self, record: &Record) {
         let reference = &record.leak_m3s;
         if reference.internal.or(reference.external_a).or(reference.external_b).is_none() {
             return;
@@ -31,13 +37,11 @@ impl Scoring {
         if self.channels.is_none() && record.dt_s > 0.0 {
             self.channels = Channel::at_rate(1.0 / record.dt_s, record);
         }
-        if let Some(channels) = self.channels {
-            let inputs = coefficients().zip(record.leak_m3s).zip(leak_pressures_pa(record));
-            self.channels =
-                Some(channels.zip(inputs).map(|(channel, ((coefficient, reference), pressure))| {
-                    channel.after(record.t_s, coefficient.value, reference, pressure)
-                }));
-        }
+        let Some(PerLeak { internal, external_a, external_b }) = &mut self.channels else { return };
+        let (c, q, p) = (self.coefficients, reference, leak_pressures_pa(record));
+        internal.add(record.t_s, c.internal, q.internal, p.internal);
+        external_a.add(record.t_s, c.external_a, q.external_a, p.external_a);
+        external_b.add(record.t_s, c.external_b, q.external_b, p.external_b);
     }
 
     /// The scores, where there is a reference.
@@ -57,12 +61,11 @@ impl Channel {
         }))
     }
 
-    fn after(mut self, t_s: f64, coefficient: f64, reference_m3s: Option<f64>, pressure_pa: f64) -> Self {
+    fn add(&mut self, t_s: f64, coefficient: f64, reference_m3s: Option<f64>, pressure_pa: f64) {
         let pressure = self.pressure.update(pressure_pa);
         if let Some(reference) = reference_m3s {
             let reference = self.reference.update(reference);
             self.scorer.update(t_s, coefficient * pressure, coefficient, reference, pressure);
         }
-        self
     }
 }
