@@ -108,11 +108,6 @@ impl TraceQuality {
         (self.regular_steps > 0).then(|| self.regular_steps as f64 / self.regular_time_s)
     }
 
-    /// Share of the duration that is not in gaps.
-    pub fn share_covered(&self) -> f64 {
-        if self.duration_s > 0.0 { 1.0 - self.gap_time_s / self.duration_s } else { 1.0 }
-    }
-
     /// One line each on what a reader of results should know.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();

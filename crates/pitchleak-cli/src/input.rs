@@ -40,8 +40,14 @@ impl Input {
     }
 }
 
+/// A smaller file is read before anyone sees a bar.
+const WORTH_A_BAR: u64 = 8 << 20;
+
 /// On standard error; hidden where that is no terminal.
 fn progress(bytes: u64) -> ProgressBar {
+    if bytes < WORTH_A_BAR {
+        return ProgressBar::hidden();
+    }
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {bytes_per_sec}, {eta} left");
     ProgressBar::new(bytes).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
