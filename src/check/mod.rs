@@ -72,7 +72,7 @@ impl CheckReport {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn check(reader: &mut TraceReader, rig: &Rig) -> Result<CheckReport, TraceError> {
+pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, TraceError> {
     let mut rig = rig.clone();
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();

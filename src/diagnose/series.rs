@@ -46,7 +46,7 @@ impl Series {
     ///
     /// # Errors
     /// Those of [`TraceReader::next_record`].
-    pub fn read(reader: &mut TraceReader) -> Result<Self, TraceError> {
+    pub fn read(reader: &mut TraceReader<'_>) -> Result<Self, TraceError> {
         let mut series = Self { name: reader.name().to_owned(), ..Self::default() };
         let mut record = Record::default();
         // Time goes on over a restart of the clock, with a gap there.

@@ -138,7 +138,7 @@ pub fn leak_pressures_pa(record: &Record) -> PerLeak<f64> {
 /// # Errors
 /// Where the trace cannot be read on, or a bad row is fatal, or `each` fails.
 pub fn replay<E: From<TraceError>>(
-    reader: &mut TraceReader,
+    reader: &mut TraceReader<'_>,
     rig: &Rig,
     mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
 ) -> Result<ReplayReport, E> {

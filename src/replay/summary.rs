@@ -9,7 +9,7 @@ use pitchleak_core::{Estimate, Excitation, Parameter, PerLeak};
 
 impl Replay {
     /// The report on the trace that `reader` has read so far.
-    pub fn report(&self, reader: &TraceReader) -> ReplayReport {
+    pub fn report(&self, reader: &TraceReader<'_>) -> ReplayReport {
         let estimates = self.estimates();
         let leakage = self.leakage();
         let active = self.detector.active();

@@ -26,7 +26,7 @@ pub(super) enum Step {
 }
 
 /// Follows the time column in constant memory.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Clock {
     last_s: Option<f64>,
     usual_s: Option<f64>,

@@ -1,6 +1,7 @@
 //! Which column of a header row holds which signal, and in which unit.
 
 use super::error::TraceFault;
+use super::quality::Counted;
 use crate::rig::ColumnMap;
 use crate::signal::Signal;
 use crate::units::Unit;
@@ -37,6 +38,8 @@ pub(super) struct Layout {
     pub(super) columns: Vec<Column>,
     /// Mapped columns of optional signals that the header does not have.
     pub(super) absent: Vec<String>,
+    /// How rows are numbered in messages.
+    pub(super) counted: Counted,
 }
 
 impl Layout {
@@ -44,7 +47,7 @@ impl Layout {
     pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
         let mut columns: Vec<_> = headers.iter().map(|header| bind(header.trim(), map)).collect();
         prefer_time(&mut columns);
-        let layout = Self { columns, absent: absent(headers, map) };
+        let layout = Self { columns, absent: absent(headers, map), counted: Counted::Lines };
         layout.check_doubled()?;
         layout.check_units()?;
         layout.check_missing(map)?;

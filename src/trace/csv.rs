@@ -4,7 +4,7 @@ use super::columns::{Column, Content, Layout, shorten};
 use super::error::TraceFault;
 use super::lines::{Line, Lines, Stop};
 use super::number::{leading_number, short_number};
-use super::quality::{BadReason, BadRow};
+use super::quality::{BadReason, BadRow, Counted};
 use super::stamp::Epoch;
 use crate::rig::ColumnMap;
 use crate::signal::Signal;
@@ -15,7 +15,7 @@ use std::io::{self, Read};
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     pub(super) line: u64,
-    cells: [f64; Signal::ALL.len()],
+    pub(super) cells: [f64; Signal::ALL.len()],
 }
 
 impl Row {
@@ -29,7 +29,7 @@ impl Row {
     }
 
     #[inline(always)]
-    fn set(&mut self, signal: Signal, value: f64) {
+    pub(super) fn set(&mut self, signal: Signal, value: f64) {
         if let Some(cell) = self.cells.get_mut(signal as usize) {
             *cell = value;
         }
@@ -46,9 +46,9 @@ pub(super) enum Next {
 }
 
 /// What is wrong with a record, before words are put to it.
-struct Fault {
-    column: Option<usize>,
-    reason: BadReason,
+pub(super) struct Fault {
+    pub(super) column: Option<usize>,
+    pub(super) reason: BadReason,
 }
 
 pub(super) struct CsvRows {
@@ -211,13 +211,13 @@ impl Format {
         };
         let column = fault.column.and_then(|index| columns.get(index));
         let column = column.map(|column| shorten(&column.header, 40));
-        BadRow { line: line.number, column, reason: fault.reason, detail }
+        BadRow { line: line.number, counted: Counted::Lines, column, reason: fault.reason, detail }
     }
 }
 
 /// An empty cell is a missing value only where every row must have one.
 #[inline]
-fn check_present(columns: &[Column], row: &Row) -> Result<(), Fault> {
+pub(super) fn check_present(columns: &[Column], row: &Row) -> Result<(), Fault> {
     let time = row.get(Signal::Time);
     let needed = time + row.get(Signal::Position) + row.get(Signal::PressureA) + row.get(Signal::PressureB);
     if needed.is_finite() {

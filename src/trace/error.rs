@@ -63,6 +63,18 @@ pub enum TraceFault {
         /// The suffixes accepted.
         allowed: String,
     },
+    /// Columns in memory of different lengths.
+    #[error("column `{column}` has {rows} rows, `{other}` has {other_rows}: all must be of one length")]
+    Length {
+        /// The header.
+        column: String,
+        /// Its rows.
+        rows: usize,
+        /// A header before it.
+        other: String,
+        /// The rows of that.
+        other_rows: usize,
+    },
     /// A line that does not end.
     #[error("line {0} is longer than a megabyte: not a trace of numbers")]
     TooLong(u64),

@@ -4,29 +4,34 @@ mod clock;
 mod columns;
 mod csv;
 mod error;
+mod intake;
 mod lines;
 mod number;
 mod quality;
 mod range;
 mod stamp;
+mod table;
 
 pub use error::{TraceError, TraceFault};
-pub use quality::{BadReason, BadRow, TraceQuality};
+pub use intake::Intake;
+pub use quality::{BadReason, BadRow, Counted, TraceQuality};
+pub use stamp::seconds_between;
+pub use table::{Batch, ColumnContent, TableLayout};
 
 use crate::rig::Rig;
 use crate::signal::Signal;
-use clock::{Clock, Step};
+use columns::Layout;
 use csv::{CsvRows, Next, Row};
 use pitchleak_core::{PerLeak, Sample};
-use range::Ranges;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use table::TableRows;
 
 /// One good row of a trace, in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Record {
-    /// Line of the file, from 1.
+    /// Line of the file, from 1; of columns in memory the row, from 0.
     pub line: u64,
     /// Time as in the file, s; since the first row where the file has time stamps.
     pub t_s: f64,
@@ -55,19 +60,40 @@ pub enum BadRows {
     Fatal,
 }
 
-/// Reads a trace row by row.
-pub struct TraceReader {
+/// Reads a trace row by row: a file, a stream, or columns in memory.
+pub struct TraceReader<'a> {
     name: String,
-    rows: CsvRows,
+    rows: Rows<'a>,
     row: Row,
-    ranges: Ranges,
-    clock: Clock,
-    bad_rows: BadRows,
-    quality: TraceQuality,
+    intake: Intake,
     done: bool,
 }
 
-impl TraceReader {
+/// Where rows come from.
+enum Rows<'a> {
+    Csv(CsvRows),
+    Table(TableRows<'a>),
+}
+
+impl Rows<'_> {
+    fn layout(&self) -> &Layout {
+        match self {
+            Self::Csv(rows) => rows.layout(),
+            Self::Table(rows) => rows.layout(),
+        }
+    }
+
+    /// Reads the next row into `row`.
+    #[inline]
+    fn next(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
+        match self {
+            Self::Csv(rows) => rows.next(row),
+            Self::Table(rows) => Ok(rows.next(row)),
+        }
+    }
+}
+
+impl TraceReader<'static> {
     /// Opens a trace file, `.csv` or `.csv.gz`, or standard input where `path` is `-`, and reads its
     /// header. The rig gives foreign column names and the ranges that readings must lie in.
     ///
@@ -106,28 +132,53 @@ impl TraceReader {
         let rows = csv::decompress(stream)
             .and_then(|(stream, compressed)| CsvRows::open(stream, compressed, &rig.columns))
             .map_err(|fault| TraceError { trace: name.to_owned(), fault })?;
-        let layout = rows.layout();
-        let quality = TraceQuality {
-            ignored_columns: layout.ignored(),
-            absent_columns: layout.absent.clone(),
-            ..TraceQuality::default()
-        };
-        Ok(Self {
-            name: name.to_owned(),
-            rows,
-            row: Row::empty(),
-            ranges: Ranges::of(rig),
-            clock: Clock::default(),
-            bad_rows: BadRows::Skip,
-            quality,
-            done: false,
-        })
+        Ok(Self::over(name, Rows::Csv(rows), rig))
+    }
+}
+
+impl<'a> TraceReader<'a> {
+    /// Reads columns in memory without copying them: `layout` says what they hold, `batches` are their
+    /// values, in SI or in the units that the headers name. A reading that is missing is NaN.
+    ///
+    /// # Errors
+    /// Where the columns of a batch are not of one length.
+    pub fn from_table(
+        name: &str,
+        layout: &TableLayout,
+        batches: Vec<Batch<'a>>,
+        rig: &Rig,
+    ) -> Result<Self, TraceError> {
+        match TableRows::new(layout, batches) {
+            Ok(rows) => Ok(Self::over(name, Rows::Table(rows), rig)),
+            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
+        }
+    }
+
+    fn over(name: &str, rows: Rows<'a>, rig: &Rig) -> Self {
+        let intake = Intake::new(rig, rows.layout());
+        Self { name: name.to_owned(), rows, row: Row::empty(), intake, done: false }
+    }
+
+    /// Goes on where another part of the same trace ended; rows of columns in memory count on from there.
+    #[must_use]
+    pub fn resuming(mut self, before: Intake) -> Self {
+        if let Rows::Table(rows) = &mut self.rows {
+            rows.count_from(before.rows_seen());
+        }
+        self.intake = before;
+        self
+    }
+
+    /// What has to be kept for the next part of the trace.
+    pub fn into_intake(self) -> Intake {
+        self.intake
     }
 
     /// Says what becomes of bad rows.
     #[must_use]
-    pub fn with_bad_rows(self, bad_rows: BadRows) -> Self {
-        Self { bad_rows, ..self }
+    pub fn with_bad_rows(mut self, bad_rows: BadRows) -> Self {
+        self.intake.set_bad_rows(bad_rows);
+        self
     }
 
     /// The trace as the user named it.
@@ -142,7 +193,7 @@ impl TraceReader {
 
     /// What was noticed so far.
     pub fn quality(&self) -> &TraceQuality {
-        &self.quality
+        self.intake.quality()
     }
 
     /// Reads the next good row into `record`; `false` at the end of the trace, and from then on.
@@ -153,124 +204,28 @@ impl TraceReader {
     #[inline]
     pub fn next_record(&mut self, record: &mut Record) -> Result<bool, TraceError> {
         while !self.done {
-            match self.rows.next(&mut self.row).map_err(|fault| self.error(fault))? {
-                Next::Row => {
-                    if self.take_row(record)? {
-                        return Ok(true);
-                    }
+            let taken = match self.rows.next(&mut self.row).map_err(|fault| self.error(fault))? {
+                Next::Row => self.intake.take(&self.row, self.rows.layout(), record),
+                Next::Bad(bad) => self.intake.skip(bad).map(|()| false),
+                Next::CutOff(why) => {
+                    self.done = true;
+                    self.intake.cut_off(why).map(|()| false)
                 }
-                Next::Bad(bad) => self.skip(bad)?,
-                Next::CutOff(why) => self.cut_off(why)?,
-                Next::End => self.done = true,
+                Next::End => {
+                    self.done = true;
+                    Ok(false)
+                }
+            };
+            match taken {
+                Ok(true) => return Ok(true),
+                Ok(false) => {}
+                Err(fault) => {
+                    self.done = true;
+                    return Err(self.error(fault));
+                }
             }
         }
-        if self.quality.rows > 0 {
-            return Ok(false);
-        }
-        if let Some(why) = &self.quality.cut_off {
-            return Err(self.error(TraceFault::CutOff(why.clone())));
-        }
-        let first = self.quality.first_bad.first().cloned();
-        Err(self.error(TraceFault::NoRows { skipped: self.quality.skipped, first }))
-    }
-
-    /// Whether the row just read is good; then it is in `record`.
-    #[inline]
-    fn take_row(&mut self, record: &mut Record) -> Result<bool, TraceError> {
-        if let Some(signal) = self.ranges.broken_by(&self.row) {
-            let bad = self.out_of_range(signal);
-            self.skip(bad)?;
-            return Ok(false);
-        }
-        let t_s = self.row.get(Signal::Time);
-        let (dt_s, after_gap) = match self.clock.step(t_s) {
-            Step::First => {
-                self.quality.count_from(t_s);
-                (0.0, false)
-            }
-            Step::Next { dt_s, regular, gap } => {
-                self.quality.count_step(dt_s, regular, gap);
-                (dt_s, gap)
-            }
-            Step::Restart { usual_s } => {
-                self.quality.clock_restarts += 1;
-                self.quality.count_from(t_s);
-                (usual_s, true)
-            }
-            Step::Back { last_s } => {
-                let bad = self.time_back(t_s, last_s);
-                self.skip(bad)?;
-                return Ok(false);
-            }
-        };
-        self.fill(record, dt_s, after_gap);
-        self.quality.count_row(record);
-        Ok(true)
-    }
-
-    #[inline]
-    fn fill(&self, record: &mut Record, dt_s: f64, after_gap: bool) {
-        let row = &self.row;
-        let reading = |signal| Some(row.get(signal)).filter(|value| !value.is_nan());
-        *record = Record {
-            line: row.line,
-            t_s: row.get(Signal::Time),
-            dt_s,
-            after_gap,
-            sample: Sample {
-                x_m: row.get(Signal::Position),
-                pa_pa: row.get(Signal::PressureA),
-                pb_pa: row.get(Signal::PressureB),
-                qa_m3s: reading(Signal::FlowA),
-                qb_m3s: reading(Signal::FlowB),
-                force_n: reading(Signal::Force),
-            },
-            speed_mps: reading(Signal::Speed),
-            temperature_k: reading(Signal::Temperature),
-            leak_m3s: PerLeak {
-                internal: reading(Signal::LeakInternal),
-                external_a: reading(Signal::LeakExternalA),
-                external_b: reading(Signal::LeakExternalB),
-            },
-        };
-    }
-
-    #[cold]
-    fn skip(&mut self, bad: BadRow) -> Result<(), TraceError> {
-        if self.bad_rows == BadRows::Fatal {
-            self.done = true;
-            return Err(self.error(TraceFault::BadRow(bad)));
-        }
-        self.quality.count_bad(bad);
-        Ok(())
-    }
-
-    #[cold]
-    fn cut_off(&mut self, why: String) -> Result<(), TraceError> {
-        self.done = true;
-        if self.bad_rows == BadRows::Fatal {
-            return Err(self.error(TraceFault::CutOff(why)));
-        }
-        self.quality.cut_off = Some(why);
-        Ok(())
-    }
-
-    #[cold]
-    fn out_of_range(&self, signal: Signal) -> BadRow {
-        let detail = self.ranges.describe(signal, self.row.get(signal));
-        self.bad_cell(signal, BadReason::OutOfRange, detail)
-    }
-
-    #[cold]
-    fn time_back(&self, t_s: f64, last_s: f64) -> BadRow {
-        let detail = format!("{t_s} s is not after {last_s} s");
-        self.bad_cell(Signal::Time, BadReason::TimeBack, detail)
-    }
-
-    fn bad_cell(&self, signal: Signal, reason: BadReason, detail: String) -> BadRow {
-        let layout = self.rows.layout();
-        let header = layout.header_of(signal).or_else(|| layout.header_of(Signal::Timestamp));
-        BadRow { line: self.row.line, column: header.map(|h| columns::shorten(h, 40)), reason, detail }
+        self.intake.end().map(|()| false).map_err(|fault| self.error(fault))
     }
 
     fn error(&self, fault: TraceFault) -> TraceError {

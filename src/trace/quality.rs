@@ -42,11 +42,24 @@ impl BadReason {
     }
 }
 
+/// How the rows of a trace are numbered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Counted {
+    /// A file: lines, from 1.
+    #[default]
+    Lines,
+    /// Columns in memory: rows, from 0.
+    Rows,
+}
+
 /// One bad row.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BadRow {
-    /// Line of the file, from 1.
+    /// Number of the line or row.
     pub line: u64,
+    /// Which of the two it is.
+    pub counted: Counted,
     /// Header of the column, where one cell is to blame.
     pub column: Option<String>,
     /// Why.
@@ -57,7 +70,10 @@ pub struct BadRow {
 
 impl fmt::Display for BadRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}", self.line)?;
+        match self.counted {
+            Counted::Lines => write!(f, "line {}", self.line)?,
+            Counted::Rows => write!(f, "row {}", self.line)?,
+        }
         if let Some(column) = &self.column {
             write!(f, ", column `{column}`")?;
         }

@@ -20,6 +20,7 @@ struct Range {
 }
 
 /// The possible range of every reading that has one.
+#[derive(Clone)]
 pub(super) struct Ranges([Range; 8]);
 
 impl Ranges {

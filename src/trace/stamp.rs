@@ -22,11 +22,16 @@ impl Epoch {
         let text = std::str::from_utf8(cell).map_err(|_| BadReason::NotATime)?;
         let stamp = parse(text).ok_or(BadReason::NotATime)?;
         let first = *self.first.get_or_insert(stamp);
-        let nanoseconds = stamp.as_nanosecond() - first.as_nanosecond();
-        // Whole seconds apart, so that a trace of a year still has its nanoseconds.
-        let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
-        Ok(whole as f64 + rest as f64 / 1e9)
+        Ok(seconds_between(first.as_nanosecond(), stamp.as_nanosecond()))
     }
+}
+
+/// Seconds from one time to another, both in ns since any one instant.
+pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
+    let nanoseconds = to_ns - from_ns;
+    // Whole seconds apart, so that a trace of a year still has its nanoseconds.
+    let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+    whole as f64 + rest as f64 / 1e9
 }
 
 fn parse(text: &str) -> Option<Timestamp> {

@@ -4,11 +4,11 @@ use std::io::Write;
 
 const HEADER: &str = "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s";
 
-fn open(text: impl Into<Vec<u8>>, rig: &Rig) -> Result<TraceReader, TraceError> {
+fn open(text: impl Into<Vec<u8>>, rig: &Rig) -> Result<TraceReader<'static>, TraceError> {
     TraceReader::from_stream("trace.csv", Box::new(std::io::Cursor::new(text.into())), rig)
 }
 
-fn read_all(mut reader: TraceReader) -> Result<(Vec<Record>, TraceQuality), TraceError> {
+fn read_all(mut reader: TraceReader<'_>) -> Result<(Vec<Record>, TraceQuality), TraceError> {
     let (mut records, mut record) = (Vec::new(), Record::default());
     while reader.next_record(&mut record)? {
         records.push(record);
@@ -297,4 +297,89 @@ proptest! {
             }
         }
     }
+}
+
+const TABLE: [[f64; 4]; 6] = [
+    [0.0, 10.0, 20.0, 30.0],
+    [100.0, 101.0, 102.0, 103.0],
+    [50.0, 51.0, 52.0, 53.0],
+    [40.0, 41.0, 42.0, 43.0],
+    [6.0, 6.5, f64::NAN, 7.0],
+    [-3.0, -3.5, -4.0, -4.5],
+];
+const TABLE_HEADER: &str = "t_ms,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm";
+
+fn layout() -> TableLayout {
+    let headers: Vec<_> = TABLE_HEADER.split(',').map(str::to_owned).collect();
+    TableLayout::new("table", &headers, &Rig::paper()).unwrap()
+}
+
+/// The rows `rows` of [`TABLE`].
+fn batch(rows: std::ops::Range<usize>) -> Batch<'static> {
+    TABLE.iter().map(|column| &column[rows.clone()]).collect()
+}
+
+fn read_table(batches: Vec<Batch<'_>>) -> Result<(Vec<Record>, TraceQuality), TraceError> {
+    TraceReader::from_table("table", &layout(), batches, &Rig::paper()).and_then(read_all)
+}
+
+#[test]
+fn columns_in_memory_are_read_as_a_file() {
+    let mut text = TABLE_HEADER.to_owned();
+    for row in 0..4 {
+        let cell = |column: &[f64; 4]| Some(column[row]).filter(|v| !v.is_nan()).map(|v| v.to_string());
+        let cells = TABLE.iter().map(|column| cell(column).unwrap_or_default());
+        text += &format!("\n{}", cells.collect::<Vec<_>>().join(","));
+    }
+    let (file, file_quality) = read(text).unwrap();
+    for batches in [vec![batch(0..4)], vec![batch(0..1), batch(1..1), batch(1..4)]] {
+        let (table, quality) = read_table(batches).unwrap();
+        assert_eq!(quality, file_quality);
+        for (row, (ours, theirs)) in table.iter().zip(&file).enumerate() {
+            assert_eq!(*ours, Record { line: row as u64, ..*theirs });
+        }
+    }
+}
+
+#[test]
+fn a_trace_in_parts_is_one_trace() {
+    let (whole, whole_quality) = read_table(vec![batch(0..4)]).unwrap();
+    let rig = Rig::paper();
+    let part = |rows| TraceReader::from_table("table", &layout(), vec![batch(rows)], &rig).unwrap();
+    let (mut records, mut record) = (Vec::new(), Record::default());
+    let mut first = part(0..3);
+    while first.next_record(&mut record).unwrap() {
+        records.push(record);
+    }
+    let mut second = part(3..4).resuming(first.into_intake());
+    while second.next_record(&mut record).unwrap() {
+        records.push(record);
+    }
+    assert_eq!((records, second.quality()), (whole, &whole_quality));
+}
+
+#[test]
+fn bad_cells_of_a_table_are_named() {
+    let message = |column: usize, row: usize, value: f64| {
+        let mut table = TABLE.map(|column| column.to_vec());
+        table[column][row] = value;
+        let batch = table.iter().map(Vec::as_slice).collect();
+        let reader = TraceReader::from_table("table", &layout(), vec![batch], &Rig::paper()).unwrap();
+        read_all(reader.with_bad_rows(BadRows::Fatal)).unwrap_err().to_string()
+    };
+    assert_eq!(message(1, 2, f64::NAN), "table: row 2, column `x_mm`: missing");
+    assert_eq!(message(4, 1, f64::INFINITY), "table: row 1, column `qa_lpm`: not a finite number");
+    assert_eq!(message(0, 3, 5.0), "table: row 3, column `t_ms`: 0.005 s is not after 0.02 s");
+    assert!(message(2, 0, 900.0).starts_with("table: row 0, column `pa_bar`: 90000000 Pa is outside"));
+    assert!(message(2, 3, 1e305).starts_with("table: row 3, column `pa_bar`: out of physical range"));
+}
+
+#[test]
+fn columns_of_a_table_are_of_one_length() {
+    let mut short = batch(0..4);
+    short[2] = &[50.0];
+    let message = read_table(vec![short]).unwrap_err().to_string();
+    assert_eq!(message, "table: column `pa_bar` has 1 rows, `t_ms` has 4: all must be of one length");
+    let message = read_table(vec![batch(0..0)]).unwrap_err().to_string();
+    assert_eq!(message, "table: no usable row: the trace has only a header");
 }

@@ -31,7 +31,7 @@ impl Input {
     }
 
     /// The trace, and a bar that follows the reading on a terminal.
-    pub fn open(&self, rig: &Rig) -> Result<(TraceReader, ProgressBar), Failure> {
+    pub fn open(&self, rig: &Rig) -> Result<(TraceReader<'static>, ProgressBar), Failure> {
         let size = std::fs::metadata(&self.trace).map_or(0, |metadata| metadata.len());
         let bar = progress(size);
         let reader = TraceReader::open_through(&self.trace, rig, |file| Box::new(bar.wrap_read(file)))?;

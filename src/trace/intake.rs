@@ -1,0 +1,146 @@
+use super::clock::{Clock, Step};
+use super::columns::{Layout, shorten};
+use super::csv::Row;
+use super::error::TraceFault;
+use super::quality::{BadReason, BadRow, TraceQuality};
+use super::range::Ranges;
+use super::{BadRows, Record};
+use crate::rig::Rig;
+use crate::signal::Signal;
+use pitchleak_core::{PerLeak, Sample};
+
+/// From rows to records: what is possible, what time it is, and what was noticed so far. It does not
+/// know where the rows come from, so that a trace may come in parts.
+#[derive(Clone)]
+pub struct Intake {
+    ranges: Ranges,
+    clock: Clock,
+    bad_rows: BadRows,
+    quality: TraceQuality,
+}
+
+impl Intake {
+    pub(super) fn new(rig: &Rig, layout: &Layout) -> Self {
+        let quality = TraceQuality {
+            ignored_columns: layout.ignored(),
+            absent_columns: layout.absent.clone(),
+            ..TraceQuality::default()
+        };
+        Self { ranges: Ranges::of(rig), clock: Clock::default(), bad_rows: BadRows::Skip, quality }
+    }
+
+    /// What was noticed so far.
+    pub fn quality(&self) -> &TraceQuality {
+        &self.quality
+    }
+
+    pub(super) fn set_bad_rows(&mut self, bad_rows: BadRows) {
+        self.bad_rows = bad_rows;
+    }
+
+    /// Rows taken or skipped.
+    pub(super) fn rows_seen(&self) -> u64 {
+        self.quality.rows + self.quality.skipped
+    }
+
+    /// Whether `row` is good; then it is in `record`.
+    #[inline]
+    pub(super) fn take(
+        &mut self,
+        row: &Row,
+        layout: &Layout,
+        record: &mut Record,
+    ) -> Result<bool, TraceFault> {
+        if let Some(signal) = self.ranges.broken_by(row) {
+            let detail = self.ranges.describe(signal, row.get(signal));
+            self.skip(bad_cell(row, layout, signal, BadReason::OutOfRange, detail))?;
+            return Ok(false);
+        }
+        let t_s = row.get(Signal::Time);
+        let (dt_s, after_gap) = match self.clock.step(t_s) {
+            Step::First => {
+                self.quality.count_from(t_s);
+                (0.0, false)
+            }
+            Step::Next { dt_s, regular, gap } => {
+                self.quality.count_step(dt_s, regular, gap);
+                (dt_s, gap)
+            }
+            Step::Restart { usual_s } => {
+                self.quality.clock_restarts += 1;
+                self.quality.count_from(t_s);
+                (usual_s, true)
+            }
+            Step::Back { last_s } => {
+                let detail = format!("{t_s} s is not after {last_s} s");
+                self.skip(bad_cell(row, layout, Signal::Time, BadReason::TimeBack, detail))?;
+                return Ok(false);
+            }
+        };
+        *record = Record { dt_s, after_gap, ..readings(row) };
+        self.quality.count_row(record);
+        Ok(true)
+    }
+
+    #[cold]
+    pub(super) fn skip(&mut self, bad: BadRow) -> Result<(), TraceFault> {
+        if self.bad_rows == BadRows::Fatal {
+            return Err(TraceFault::BadRow(bad));
+        }
+        self.quality.count_bad(bad);
+        Ok(())
+    }
+
+    #[cold]
+    pub(super) fn cut_off(&mut self, why: String) -> Result<(), TraceFault> {
+        if self.bad_rows == BadRows::Fatal {
+            return Err(TraceFault::CutOff(why));
+        }
+        self.quality.cut_off = Some(why);
+        Ok(())
+    }
+
+    /// The end of a trace, which must have had a good row.
+    pub(super) fn end(&self) -> Result<(), TraceFault> {
+        if self.quality.rows > 0 {
+            return Ok(());
+        }
+        if let Some(why) = &self.quality.cut_off {
+            return Err(TraceFault::CutOff(why.clone()));
+        }
+        let first = self.quality.first_bad.first().cloned();
+        Err(TraceFault::NoRows { skipped: self.quality.skipped, first })
+    }
+}
+
+#[inline]
+fn readings(row: &Row) -> Record {
+    let reading = |signal| Some(row.get(signal)).filter(|value| !value.is_nan());
+    Record {
+        line: row.line,
+        t_s: row.get(Signal::Time),
+        sample: Sample {
+            x_m: row.get(Signal::Position),
+            pa_pa: row.get(Signal::PressureA),
+            pb_pa: row.get(Signal::PressureB),
+            qa_m3s: reading(Signal::FlowA),
+            qb_m3s: reading(Signal::FlowB),
+            force_n: reading(Signal::Force),
+        },
+        speed_mps: reading(Signal::Speed),
+        temperature_k: reading(Signal::Temperature),
+        leak_m3s: PerLeak {
+            internal: reading(Signal::LeakInternal),
+            external_a: reading(Signal::LeakExternalA),
+            external_b: reading(Signal::LeakExternalB),
+        },
+        ..Record::default()
+    }
+}
+
+#[cold]
+fn bad_cell(row: &Row, layout: &Layout, signal: Signal, reason: BadReason, detail: String) -> BadRow {
+    let header = layout.header_of(signal).or_else(|| layout.header_of(Signal::Timestamp));
+    let column = header.map(|header| shorten(header, 40));
+    BadRow { line: row.line, counted: layout.counted, column, reason, detail }
+}
