@@ -22,7 +22,7 @@ fn main() {
     let mut detector = LeakDetector::new(AlarmSettings::default());
     for k in 0..3000_u16 {
         let t_s = f32::from(k) * 0.01;
-        if rls.update(0.01, &read_sensors(t_s)) == Update::Renewed {
+        if matches!(rls.update(0.01, &read_sensors(t_s)), Update::Renewed | Update::Changed) {
             let flow = rls.mean_leak_flows_m3s();
             if let Some(state) = detector.update(0.25, &flow).internal {
                 let internal = flow.internal.scaled(60e3);

@@ -7,16 +7,22 @@
 //! Models, §3.1; S. Kay 1993, Fundamentals of Statistical Signal Processing, §3.9). It is computed by block
 //! elimination and shares nothing with the estimator whose efficiency it judges.
 
-use nalgebra::{Matrix2, Matrix2x5, Matrix6, OMatrix, U2, U6, Vector5};
+use nalgebra::{Matrix2, Matrix2x5, SMatrix, SVector, Vector5};
 use pitchleak_core::{Cylinder, Fluid, PerLeak, Sample, Sensors};
 
-/// Smallest standard deviations that an unbiased estimator can reach on a trace.
+/// Parameters of the bound: 1/β, C_ip, C_epA, C_epB, biases of flow meters A and B, of pressure sensors A and
+/// B, and of the position sensor.
+pub const PARAMETERS: usize = 9;
+
+/// Smallest covariance that an unbiased estimator can reach on a trace.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CramerRao {
     /// Leak coefficients, m³/(s·Pa).
     pub leak_std: PerLeak<f64>,
     /// Compressibility 1/β, 1/Pa.
     pub compressibility_std: f64,
+    /// Of all parameters, each in its [`units`](CramerRaoModel::units).
+    pub covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
 }
 
 /// What the bound is computed for: the rig, and the truth.
@@ -26,16 +32,17 @@ pub struct CramerRaoModel<'a> {
     pub cylinder: &'a Cylinder<f64>,
     /// True bulk modulus, and the spread of its prior.
     pub fluid: &'a Fluid<f64>,
-    /// Noise and, as priors of the meters' offsets, biases of the sensors.
+    /// Noise and, as priors of their offsets, biases of the sensors.
     pub sensors: &'a Sensors<f64>,
     /// True leak coefficients, m³/(s·Pa).
     pub leaks: &'a PerLeak<f64>,
 }
 
-type Columns = OMatrix<f64, U2, U6>;
+type Columns = SMatrix<f64, 2, PARAMETERS>;
+type Information = SMatrix<f64, PARAMETERS, PARAMETERS>;
+type Units = SVector<f64, PARAMETERS>;
 
-/// One step's equations: how they respond to the noise at both ends and to the parameters
-/// (1/β, C_ip, C_epA, C_epB, offset A, offset B).
+/// One step's equations: how they respond to the noise at both ends and to the parameters, each in its unit.
 struct StepModel {
     left: Matrix2x5<f64>,
     right: Matrix2x5<f64>,
@@ -46,12 +53,20 @@ impl CramerRaoModel<'_> {
     /// The bound for noise-free `samples`, `dt_s` apart; `None` where a flow is missing or nothing at all
     /// can be learnt.
     pub fn bound(&self, dt_s: f64, samples: &[Sample<f64>]) -> Option<CramerRao> {
+        self.course(dt_s, samples, samples.len().saturating_sub(1).max(1))?.pop()
+    }
+
+    /// The bound after every `stride` samples of noise-free `samples`, `dt_s` apart; `None` as in
+    /// [`bound`](Self::bound).
+    pub fn course(&self, dt_s: f64, samples: &[Sample<f64>], stride: usize) -> Option<Vec<CramerRao>> {
+        let units = self.units();
         let noise = self.noise_variance();
-        let mut information = self.prior_information();
+        let mut information = self.prior_information(&units);
         let mut before: Option<(Matrix2<f64>, StepModel, Columns)> = None;
-        for pair in samples.windows(2) {
+        let mut course = Vec::new();
+        for (index, pair) in samples.windows(2).enumerate() {
             let [first, second] = pair else { continue };
-            let step = self.step(dt_s, first, second)?;
+            let step = self.step(dt_s, first, second, &units)?;
             let spread =
                 |m: &Matrix2x5<f64>, n: &Matrix2x5<f64>| m * Matrix5::from_diagonal(&noise) * n.transpose();
             let mut own = spread(&step.left, &step.left) + spread(&step.right, &step.right);
@@ -64,14 +79,11 @@ impl CramerRaoModel<'_> {
             let inverse = own.try_inverse()?;
             information += columns.transpose() * inverse * columns;
             before = Some((inverse, step, columns));
+            if (index + 1) % stride == 0 {
+                course.push(CramerRao::of(&information, &units)?);
+            }
         }
-        let scale = self.units();
-        let covariance = (scale * information * scale).try_inverse()?;
-        let std = |i: usize| scale[(i, i)] * covariance[(i, i)].sqrt();
-        Some(CramerRao {
-            compressibility_std: std(0),
-            leak_std: PerLeak { internal: std(1), external_a: std(2), external_b: std(3) },
-        })
+        Some(course)
     }
 
     /// Variances of x, P_A, P_B, Q_A, Q_B.
@@ -81,36 +93,37 @@ impl CramerRaoModel<'_> {
         Vector5::from(std).map(|std| std * std)
     }
 
-    fn prior_information(&self) -> Matrix6<f64> {
+    /// Of the leaks next to nothing is known beforehand.
+    fn prior_information(&self, units: &Units) -> Information {
         let relative = self.fluid.bulk_modulus_std_pa / self.fluid.bulk_modulus_pa;
-        let of = |std: f64| std.max(1e-30).powi(-2);
+        let sensors = self.sensors;
         let flow_floor = 1e-9 * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
-        Matrix6::from_diagonal(&nalgebra::Vector6::new(
-            of(relative / self.fluid.bulk_modulus_pa),
-            0.0,
-            0.0,
-            0.0,
-            of(self.sensors.flow_a.bias_std.max(flow_floor)),
-            of(self.sensors.flow_b.bias_std.max(flow_floor)),
-        ))
+        let leak = 1e3 * LEAK_UNIT_M3SPA;
+        let spread = Units::from([
+            relative / self.fluid.bulk_modulus_pa,
+            leak,
+            leak,
+            leak,
+            sensors.flow_a.bias_std.max(flow_floor),
+            sensors.flow_b.bias_std.max(flow_floor),
+            sensors.pressure.bias_std.max(1.0),
+            sensors.pressure.bias_std.max(1.0),
+            sensors.position.bias_std.max(1e-9 * self.cylinder.stroke_m),
+        ]);
+        Information::from_diagonal(&units.component_div(&spread).map(|share| share * share))
     }
 
-    /// Sizes of the parameters, to invert a matrix of order one.
-    fn units(&self) -> Matrix6<f64> {
-        let leak = 1e-11;
-        let flow = 1e-6;
-        Matrix6::from_diagonal(&nalgebra::Vector6::new(
-            0.1 / self.fluid.bulk_modulus_pa,
-            leak,
-            leak,
-            leak,
-            flow,
-            flow,
-        ))
+    /// Units of the parameters in [`CramerRao::covariance`], SI: near their sizes, so that matrices are well
+    /// scaled.
+    pub fn units(&self) -> SVector<f64, PARAMETERS> {
+        let (leak, flow, pressure) = (LEAK_UNIT_M3SPA, 1e-6, 1e4);
+        let compressibility = 0.1 / self.fluid.bulk_modulus_pa;
+        let position = 0.01 * self.cylinder.stroke_m;
+        Units::from([compressibility, leak, leak, leak, flow, flow, pressure, pressure, position])
     }
 
     /// Equations Q_A − A_A ẋ − κ V_A Ṗ_A − leaks = 0 and Q_B + A_B ẋ − … = 0, integrated over one step.
-    fn step(&self, dt_s: f64, first: &Sample<f64>, second: &Sample<f64>) -> Option<StepModel> {
+    fn step(&self, dt_s: f64, first: &Sample<f64>, second: &Sample<f64>, units: &Units) -> Option<StepModel> {
         let kappa = 1.0 / self.fluid.bulk_modulus_pa;
         let half = 0.5 * dt_s;
         let x = 0.5 * (first.x_m + second.x_m);
@@ -138,22 +151,46 @@ impl CramerRaoModel<'_> {
         let pressure_b = half * (first.pb_pa + second.pb_pa);
         let load = pressure_a - pressure_b;
         first.qa_m3s.and(first.qb_m3s).and(second.qa_m3s).and(second.qb_m3s)?;
+        // Readings that are b too high: the true pressures are lower, and so are the leaks they drive.
+        let (own_a, own_b, cross) = (-own_a * dt_s, -own_b * dt_s, leaks.internal * dt_s);
+        let (stroke_a, stroke_b) = (-kappa * aa * rise_a, kappa * ab * rise_b);
         let columns = Columns::from_row_slice(&[
             va * rise_a,
             load,
             pressure_a,
             0.0,
             dt_s,
-            0.0, //
+            0.0,
+            own_a,
+            cross,
+            stroke_a, //
             vb * rise_b,
             -load,
             0.0,
             pressure_b,
             0.0,
             dt_s,
-        ]);
+            cross,
+            own_b,
+            stroke_b,
+        ]) * Information::from_diagonal(units);
         Some(StepModel { left: noise_at(-1.0), right: noise_at(1.0), columns })
     }
 }
+
+impl CramerRao {
+    fn of(information: &Information, units: &Units) -> Option<Self> {
+        let covariance = information.try_inverse()?;
+        let std = |i: usize| units[i] * covariance[(i, i)].sqrt();
+        Some(Self {
+            compressibility_std: std(0),
+            leak_std: PerLeak { internal: std(1), external_a: std(2), external_b: std(3) },
+            covariance,
+        })
+    }
+}
+
+/// Size of a leak coefficient, m³/(s·Pa).
+const LEAK_UNIT_M3SPA: f64 = 1e-11;
 
 type Matrix5 = nalgebra::Matrix5<f64>;

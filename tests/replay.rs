@@ -118,3 +118,32 @@ fn the_papers_law_runs_and_is_scored() {
     assert!(report.estimates.internal_leak_coefficient.std.is_none());
     assert!(report.score.unwrap().internal.is_some());
 }
+
+/// Flows of a leak that opens within the trace are those since then: the pressures of before never drove it.
+#[test]
+fn a_leak_that_opens_counts_from_then_on() {
+    let mut since = (0.0, 0.0);
+    let motion = Motion::wind_like(LEAKS);
+    let mut text = String::from("t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s");
+    for k in 0..6000 {
+        let t = f64::from(k) * 0.01;
+        let mut s = motion.sample(t);
+        if t < 30.0 {
+            // The pump held P_A up before the hose burst.
+            s.pa_pa += 5e6;
+            let leak = LEAKS.internal + LEAKS.external_a;
+            s.qa_m3s = s.qa_m3s.map(|q| q + leak * 5e6);
+            s.qb_m3s = s.qb_m3s.map(|q| q - LEAKS.internal * 5e6);
+        } else {
+            s.qa_m3s = s.qa_m3s.map(|q| q + 2e-11 * s.pa_pa);
+            since = (since.0 + 60e3 * (LEAKS.external_a + 2e-11) * s.pa_pa, since.1 + 1.0);
+        }
+        let signals = [t, s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap(), s.qb_m3s.unwrap()];
+        let cells: Vec<String> = signals.iter().map(|c| format!("{c:e}")).collect();
+        write!(text, "\n{}", cells.join(",")).unwrap();
+    }
+    let report = run(RIG, text);
+    assert!((30.0..32.0).contains(&report.changed_at_s.unwrap()), "{:?}", report.changed_at_s);
+    let found = report.leakage.external_a.mean_lpm;
+    assert!((found / (since.0 / since.1) - 1.0).abs() < 0.02, "{found} for {}", since.0 / since.1);
+}

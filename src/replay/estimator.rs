@@ -1,8 +1,8 @@
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
 use pitchleak_core::{
-    Estimate, ExcitationReport, ExcitationSettings, PaperEstimator, PaperGains, PerLeak, Rls, RlsSettings,
-    Sensors, Update,
+    Estimate, ExcitationReport, ExcitationSettings, LeakPressures, PaperEstimator, PaperGains, PerLeak, Rls,
+    RlsSettings, Sensors, Update,
 };
 
 /// Gains of the paper's law where the rig file gives none: a search over simulated wind traces
@@ -85,6 +85,25 @@ impl Estimator {
             Self::WithOffsets(rls) => Some(rls.mean_leak_flows_m3s()),
             Self::WithGains(rls) => Some(rls.mean_leak_flows_m3s()),
             Self::Paper(_) => None,
+        }
+    }
+
+    /// Leak flows at `pressures`, m³/s; `None` for the paper's law.
+    pub fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> Option<PerLeak<Estimate<f64>>> {
+        match self {
+            Self::Plain(rls) => Some(rls.leak_flows_m3s(pressures)),
+            Self::WithOffsets(rls) => Some(rls.leak_flows_m3s(pressures)),
+            Self::WithGains(rls) => Some(rls.leak_flows_m3s(pressures)),
+            Self::Paper(_) => None,
+        }
+    }
+
+    /// Biases found of the pressure sensors A and B, Pa; zero where the rig file declares none.
+    pub fn pressure_biases_pa(&self) -> [f64; 2] {
+        match self {
+            Self::WithOffsets(rls) => rls.pressure_biases_pa().map(|bias| bias.value),
+            Self::WithGains(rls) => rls.pressure_biases_pa().map(|bias| bias.value),
+            Self::Plain(_) | Self::Paper(_) => [0.0; 2],
         }
     }
 

@@ -14,7 +14,7 @@ use crate::report::{Alarm, Leak, ReplayReport};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use correction::Correction;
-use pitchleak_core::{Estimate, LeakDetector, PerLeak, Update};
+use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
 
@@ -38,7 +38,9 @@ pub struct Replay {
     estimator: Estimator,
     detector: LeakDetector<f64>,
     since_detection_s: f64,
+    /// Over the trace, or since the leak changed.
     pressures: TracePressures,
+    changed_at_s: Option<f64>,
     scoring: Scoring,
     alarms: Vec<Alarm>,
 }
@@ -52,6 +54,7 @@ impl Replay {
             detector: LeakDetector::new(rig.alarms),
             since_detection_s: 0.0,
             pressures: TracePressures::default(),
+            changed_at_s: None,
             scoring: Scoring::default(),
             alarms: Vec::new(),
             rig: rig.clone(),
@@ -74,9 +77,14 @@ impl Replay {
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
         self.since_detection_s += record.dt_s;
-        let renewed = self.estimator.update(record) == Update::Renewed;
+        let update = self.estimator.update(record);
+        if update == Update::Changed {
+            self.pressures = TracePressures::default();
+            self.changed_at_s = Some(record.t_s);
+        }
+        let renewed = matches!(update, Update::Renewed | Update::Changed);
         if renewed {
-            self.scoring.renew(self.estimator.leak_coefficients());
+            self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
             self.detect(record.t_s);
         }
         self.scoring.add(record);
@@ -84,7 +92,8 @@ impl Replay {
     }
 
     fn detect(&mut self, t_s: f64) {
-        let laminar = self.estimator.mean_leak_flows_m3s().unwrap_or_else(|| self.exact_flows_m3s());
+        let laminar = self.estimator.mean_leak_flows_m3s();
+        let laminar = laminar.unwrap_or_else(|| self.exact_flows_m3s(&self.pressures.sizes()));
         let flows = laminar
             .zip(self.effect_leaks_m3s())
             .map(|(flow, effect)| Estimate { value: flow.value + effect, ..flow });
@@ -101,11 +110,16 @@ impl Replay {
         self.correction.as_ref().map_or_else(PerLeak::default, Correction::mean_leaks_m3s)
     }
 
+    /// Leak flows at `pressures`, eq. (15), m³/s.
+    fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> PerLeak<Estimate<f64>> {
+        self.estimator.leak_flows_m3s(pressures).unwrap_or_else(|| self.exact_flows_m3s(pressures))
+    }
+
     /// The paper's law knows no uncertainty: its flows are compared with the thresholds as if they were
     /// known to a hundredth of them.
-    fn exact_flows_m3s(&self) -> PerLeak<Estimate<f64>> {
+    fn exact_flows_m3s(&self, pressures: &LeakPressures<f64>) -> PerLeak<Estimate<f64>> {
         let threshold = self.rig.alarms.threshold_m3s;
-        self.estimator.leak_coefficients().zip(self.pressures.sizes()).zip(threshold).map(
+        self.estimator.leak_coefficients().zip(pressures.sizes_pa).zip(threshold).map(
             |((coefficient, pressure), threshold)| Estimate {
                 value: coefficient.value * pressure,
                 std: threshold / 100.0,
@@ -116,7 +130,8 @@ impl Replay {
     /// The estimates as they stand after `record`.
     pub fn point(&self, record: &Record) -> Point {
         let coefficients = self.estimator.leak_coefficients();
-        let flows_m3s = coefficients.zip(leak_pressures_pa(record)).map(|(c, pressure)| c.value * pressure);
+        let pressures = leak_pressures_pa(record, self.estimator.pressure_biases_pa());
+        let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
         Point { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
@@ -126,10 +141,10 @@ impl Replay {
     }
 }
 
-/// Pressure across each leak, Pa: P_L, P_A, P_B.
-pub fn leak_pressures_pa(record: &Record) -> PerLeak<f64> {
-    let sample = &record.sample;
-    PerLeak { internal: sample.load_pressure_pa(), external_a: sample.pa_pa, external_b: sample.pb_pa }
+/// Pressure across each leak, Pa: P_L, P_A, P_B as read less the biases found of the sensors A and B.
+pub fn leak_pressures_pa(record: &Record, [bias_a, bias_b]: [f64; 2]) -> PerLeak<f64> {
+    let (pa, pb) = (record.sample.pa_pa - bias_a, record.sample.pb_pa - bias_b);
+    PerLeak { internal: pa - pb, external_a: pa, external_b: pb }
 }
 
 /// Replays a whole trace; `each` sees every record after it was taken in, and whether the estimates are

@@ -1,5 +1,5 @@
 use crate::trace::Record;
-use pitchleak_core::PerLeak;
+use pitchleak_core::{LeakPressures, PerLeak};
 
 /// Pressures across each leak, averaged over a whole trace, Pa.
 ///
@@ -11,6 +11,7 @@ pub(super) struct TracePressures {
     block_load: f64,
     time: f64,
     load_size: f64,
+    load_sign: f64,
     load: f64,
     a: f64,
     b: f64,
@@ -32,23 +33,28 @@ impl TracePressures {
         self.block_load += (pa - pb) * dt;
         if self.block_time >= BLOCK_S {
             self.load_size += self.block_load.abs();
+            self.load_sign += self.block_time.copysign(self.block_load);
             (self.block_time, self.block_load) = (0.0, 0.0);
         }
     }
 
-    /// Means of |P_L|, P_A, P_B.
-    pub fn sizes(&self) -> PerLeak<f64> {
+    /// Means of |P_L|, P_A, P_B, as read.
+    pub fn sizes(&self) -> LeakPressures<f64> {
         let mean = |sum: f64| if self.time > 0.0 { sum / self.time } else { 0.0 };
-        PerLeak {
-            internal: mean(self.load_size + self.block_load.abs()),
-            external_a: mean(self.a),
-            external_b: mean(self.b),
+        LeakPressures {
+            sizes_pa: PerLeak {
+                internal: mean(self.load_size + self.block_load.abs()),
+                external_a: mean(self.a),
+                external_b: mean(self.b),
+            },
+            load_sign: mean(self.load_sign + self.block_time.copysign(self.block_load)),
         }
     }
 
-    /// Means of P_L with its sign, P_A, P_B.
-    pub fn net(&self) -> PerLeak<f64> {
+    /// Mean of P_L with its sign, as read, and of P_A and P_B.
+    pub fn net(&self) -> LeakPressures<f64> {
         let load = if self.time > 0.0 { self.load / self.time } else { 0.0 };
-        PerLeak { internal: load, ..self.sizes() }
+        let sizes = self.sizes();
+        LeakPressures { sizes_pa: PerLeak { internal: load, ..sizes.sizes_pa }, load_sign: 1.0 }
     }
 }

@@ -11,6 +11,7 @@ const CUTOFF_HZ: f64 = 5.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Scoring {
     coefficients: PerLeak<f64>,
+    pressure_biases_pa: [f64; 2],
     channels: Option<PerLeak<Channel>>,
 }
 
@@ -22,8 +23,9 @@ struct Channel {
 }
 
 impl Scoring {
-    /// The coefficients that stand from now on.
-    pub fn renew(&mut self, coefficients: PerLeak<Estimate<f64>>) {
+    /// The coefficients and biases of the pressure sensors that stand from now on.
+    pub fn renew(&mut self, coefficients: PerLeak<Estimate<f64>>, pressure_biases_pa: [f64; 2]) {
+        self.pressure_biases_pa = pressure_biases_pa;
         self.coefficients = coefficients.map(|coefficient| coefficient.value);
     }
 
@@ -38,7 +40,8 @@ impl Scoring {
             self.channels = Channel::at_rate(1.0 / record.dt_s, record);
         }
         let Some(PerLeak { internal, external_a, external_b }) = &mut self.channels else { return };
-        let (c, q, p) = (self.coefficients, reference, leak_pressures_pa(record));
+        let p = leak_pressures_pa(record, self.pressure_biases_pa);
+        let (c, q) = (self.coefficients, reference);
         internal.add(record.t_s, c.internal, q.internal, p.internal);
         external_a.add(record.t_s, c.external_a, q.external_a, p.external_a);
         external_b.add(record.t_s, c.external_b, q.external_b, p.external_b);
@@ -53,7 +56,7 @@ impl Scoring {
 impl Channel {
     fn at_rate(rate_hz: f64, record: &Record) -> Option<PerLeak<Self>> {
         let filter = Butterworth::new(CUTOFF_HZ.min(0.4 * rate_hz), rate_hz).ok()?;
-        Some(leak_pressures_pa(record).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
+        Some(leak_pressures_pa(record, [0.0; 2]).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
             let (mut reference, mut pressure) = (filter, filter);
             reference.reset(start_m3s.unwrap_or(0.0));
             pressure.reset(start_pa);

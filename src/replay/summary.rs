@@ -23,30 +23,26 @@ impl Replay {
             leakage,
             flow_meter_offsets: self.estimator.flow_offsets_m3s().map(FlowMeterOffsets::new),
             normalised_innovation: self.estimator.normalised_innovation(),
+            changed_at_s: self.changed_at_s,
             alarms: self.alarms.clone(),
             score: self.scoring.scores(),
         }
     }
 
-    /// Flows at the trace's mean pressures, eq. (15); the internal one at the mean size of P_L, whatever
+    /// Flows at the mean pressures of the trace, or since the leak changed, eq. (15); the internal one at the mean size of P_L, whatever
     /// its sign.
     fn leakage(&self) -> PerLeak<Leakage> {
-        let bias = self.rig.sensors().pressure.bias_std;
-        let bias = PerLeak { internal: std::f64::consts::SQRT_2 * bias, external_a: bias, external_b: bias };
         let knows_spread = self.estimator.excitation().is_some();
-        let leaks = self.estimator.leak_coefficients().zip(self.effect_leaks_m3s());
-        leaks.zip(self.pressures.sizes()).zip(self.pressures.net()).zip(bias).map(
-            |((((coefficient, effect), pressure), net), bias)| {
-                let value = coefficient.value * pressure + effect;
-                let std = (coefficient.std * pressure).hypot(coefficient.value * bias);
-                let leakage = Leakage::new(Estimate { value, std });
-                Leakage {
-                    net_mean_lpm: Some((coefficient.value * net + effect) * LPM_PER_M3S),
-                    std_lpm: leakage.std_lpm.filter(|_| knows_spread),
-                    ..leakage
-                }
-            },
-        )
+        let sizes = self.leak_flows_m3s(&self.pressures.sizes());
+        let net = self.leak_flows_m3s(&self.pressures.net());
+        sizes.zip(net).zip(self.effect_leaks_m3s()).map(|((size, net), effect)| {
+            let leakage = Leakage::new(Estimate { value: size.value + effect, ..size });
+            Leakage {
+                net_mean_lpm: Some((net.value + effect) * LPM_PER_M3S),
+                std_lpm: leakage.std_lpm.filter(|_| knows_spread),
+                ..leakage
+            }
+        })
     }
 
     fn estimates(&self) -> Estimates {

@@ -42,7 +42,7 @@ pub struct ReplayReport {
     pub estimator: EstimatorKind,
     /// At the end of the trace.
     pub estimates: Estimates,
-    /// Mean leak flows.
+    /// Mean leak flows: over the trace, or since `changed_at_s`.
     pub leakage: PerLeak<Leakage>,
     /// Offsets of the flow meters, where the rig file says that they may be off.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,6 +53,9 @@ pub struct ReplayReport {
     pub normalised_innovation: Option<[f64; 2]>,
     /// What to make of it.
     pub verdict: Verdict,
+    /// When the leak last changed at once, s: the estimates then began anew.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changed_at_s: Option<f64>,
     /// In the order of time.
     pub alarms: Vec<Alarm>,
     /// Only where the trace has reference leak flows; none for a leak without one.

@@ -37,6 +37,7 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
         verdict: Verdict::new(active, &leakage, &estimates, &thresholds),
         estimates,
         leakage,
+        changed_at_s: None,
         alarms: vec![Alarm { time_s: 3.25, fault: Leak::Internal, state: AlarmState::Raised }],
         score: None,
     }

@@ -242,10 +242,13 @@ impl ReplayReport {
     }
 
     fn write_alarms(&self, out: &mut String) {
-        if self.alarms.is_empty() {
+        if self.alarms.is_empty() && self.changed_at_s.is_none() {
             return;
         }
         out.push('\n');
+        if let Some(t_s) = self.changed_at_s {
+            let _ = writeln!(out, "at {t_s:.2} s the leak changed at once: all figures are those since then");
+        }
         for alarm in &self.alarms {
             let state = match alarm.state {
                 AlarmState::Raised => "raised",

@@ -2,6 +2,7 @@
 //! and ours on the same readings, with many seeds. docs/reproduction.md explains every choice.
 
 mod detection;
+mod efficient;
 mod figures;
 mod protocol;
 mod search;
@@ -18,18 +19,22 @@ use crate::Rig;
 use crate::cramer_rao::CramerRaoModel;
 use crate::parallel;
 use crate::rig::{Instrument, Instruments};
-use crate::simulate::{Biases, Sensing};
+use crate::simulate::{Biases, Normal, Sensing};
 use crate::wind::WindCase;
-use pitchleak_core::{Butterworth, PerLeak, Sample};
+use efficient::Efficient;
+use pitchleak_core::{PerLeak, Sample};
 use serde::Serialize;
 use table::{Entry, WindowBound};
-use trial::{CUTOFF_HZ, mean};
+use trial::mean;
 
 /// Greatest bias of a sensor in the runs with biases, share of full scale.
 const BIAS: f64 = 0.01;
 
 /// Samples of the first 2 s, in which the paper's law is said to converge.
 const EARLY_SAMPLES: usize = 200;
+
+/// Stream of a seed's random numbers from which the efficient estimator's errors are drawn.
+const EFFICIENT_STREAM: u64 = 2;
 
 /// How far the reproduction has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,61 +190,36 @@ impl Law {
 
     fn trials(&self, run: &Run, window: usize, seeds: u64) -> Result<Trials, ReproduceError> {
         let truths = run.window(window);
-        let bounds = self.bounds(run, window);
         let truth = run.coefficients();
-        let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
-        mine.map(|seed| {
-            let biases = Biases::drawn(&self.rig.instruments, self.bias_share, seed);
-            let sensing = Sensing::new(self.rig.sensors(), biases, seed);
-            let course = Course::run(&self.rig, truths, sensing)?;
-            let entry = |coefficient, window, of: fn(&PerLeak<f64>) -> f64| Entry {
-                score: course.score(coefficient, of),
-                window,
-            };
-            Ok(PerLeak {
-                internal: entry(truth.internal, bounds.internal, |leaks| leaks.internal),
-                external_a: entry(truth.external_a, bounds.external_a, |leaks| leaks.external_a),
-                external_b: entry(1.0, bounds.external_b, |leaks| leaks.external_b),
-            })
-        })
-        .collect()
-    }
-
-    /// The bound of each leak in one window.
-    fn bounds(&self, run: &Run, window: usize) -> PerLeak<WindowBound> {
-        let truths = run.window(window);
         let samples: Vec<Sample<f64>> = truths.iter().map(|truth| truth.sample).collect();
         let sensors = self.bound_rig.sensors();
-        let leaks = run.coefficients();
         let model = CramerRaoModel {
             cylinder: &self.bound_rig.cylinder,
             fluid: &self.bound_rig.fluid,
             sensors: &sensors,
-            leaks: &leaks,
+            leaks: &truth,
         };
-        let none = PerLeak { internal: f64::INFINITY, external_a: f64::INFINITY, external_b: f64::INFINITY };
-        let leak_std = |samples| model.bound(1.0 / SAMPLE_RATE_HZ, samples).map_or(none, |b| b.leak_std);
-        let std = leak_std(&samples);
-        let early = leak_std(samples.get(..EARLY_SAMPLES).unwrap_or(&samples));
-        let pressure_std = noise_gain() * sensors.pressure.noise_std;
-        let pressure_stds = PerLeak {
-            internal: std::f64::consts::SQRT_2 * pressure_std,
-            external_a: pressure_std,
-            external_b: pressure_std,
-        };
+        let efficient = Efficient::new(&model, &samples).ok_or(ReproduceError::Empty)?;
+        let stds = efficient.leak_std(samples.len()).zip(efficient.leak_std(EARLY_SAMPLES));
         let sizes = mean_pressures_pa(&samples);
-        leaks.zip(std.zip(early)).zip(pressure_stds).zip(sizes).map(
-            |(((leak, (std, early)), pressure_std), size)| {
-                let half_width_m3s = 1.96 * std * size;
-                let leakage = (std * size).hypot(leak * pressure_std) / (leak * size);
-                WindowBound {
-                    coefficient: std / leak,
-                    coefficient_early: early / leak,
-                    leakage: (2.0 / std::f64::consts::PI).sqrt() * leakage,
-                    identifiable: half_width_m3s <= f64::max(0.1 / 60e3, 0.1 * leak * size),
-                }
-            },
-        )
+        let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
+        mine.map(|seed| {
+            let biases = Biases::drawn(&self.rig.instruments, self.bias_share, seed);
+            let course = Course::run(&self.rig, truths, Sensing::new(self.rig.sensors(), biases, seed))?;
+            let unbiased = Sensing::new(sensors, Biases::default(), seed);
+            let best = efficient.course(truths, unbiased, &mut Normal::stream(seed, EFFICIENT_STREAM))?;
+            let entry = |coefficient: f64, stds: (f64, f64), size_pa, of: fn(&PerLeak<f64>) -> f64| Entry {
+                score: course.score(coefficient, of),
+                efficient: best.score(coefficient, of),
+                window: WindowBound::new(coefficient, stds, size_pa),
+            };
+            Ok(PerLeak {
+                internal: entry(truth.internal, stds.internal, sizes.internal, |leaks| leaks.internal),
+                external_a: entry(truth.external_a, stds.external_a, sizes.external_a, |l| l.external_a),
+                external_b: entry(1.0, stds.external_b, sizes.external_b, |leaks| leaks.external_b),
+            })
+        })
+        .collect()
     }
 }
 
@@ -250,15 +230,6 @@ fn mean_pressures_pa(samples: &[Sample<f64>]) -> PerLeak<f64> {
         external_a: mean(samples.iter().map(|s| s.pa_pa)),
         external_b: mean(samples.iter().map(|s| s.pb_pa)),
     }
-}
-
-/// Share of white noise that passes the paper's filter: the root of the sum of its squared impulse
-/// response.
-fn noise_gain() -> f64 {
-    Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ).map_or(1.0, |mut filter| {
-        filter.reset(0.0);
-        (0..1000).map(|k| filter.update(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum::<f64>().sqrt()
-    })
 }
 
 /// The rows of `laws` (and their places in the trials), in the order wind, case, leak, estimator;

@@ -19,17 +19,17 @@ pub struct Figures {
     pub convergence_time_s: Option<f64>,
 }
 
-/// What physics allows, from sensor noise alone.
+/// What noise alone allows: the figures of an efficient estimator in the same windows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
+    /// Its medians over all seeds.
+    #[serde(flatten)]
+    pub median: Scored,
     /// Cramér–Rao bound on the coefficient's standard deviation at the end of a window, %: median
     /// over the windows.
     pub coefficient_std_percent: f64,
     /// The same 2 s after the window's start.
     pub coefficient_std_after_2s_percent: f64,
-    /// Mean |error| of the leak flow that remains at the end of a window with an efficient
-    /// coefficient and pressures through the 5 Hz filter, % of the window's mean |Q|.
-    pub leakage_mean_error_percent: f64,
     /// Root mean square of (error at the end of the window / bound of that window): 1 is as good as
     /// any unbiased estimator.
     pub error_over_bound: f64,
@@ -82,6 +82,8 @@ pub struct Scored {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub score: TrialScore,
+    /// The same of an efficient estimator.
+    pub efficient: TrialScore,
     pub window: WindowBound,
 }
 
@@ -92,10 +94,34 @@ pub(super) struct WindowBound {
     pub coefficient: f64,
     /// The same after the first 2 s.
     pub coefficient_early: f64,
-    /// Mean |error| of the leak flow, share of the mean |Q|.
-    pub leakage: f64,
-    /// Whether the leak is identifiable in it.
+    /// Whether the leak is identifiable in it: 95 % within 0.1 L/min or a tenth of itself.
     pub identifiable: bool,
+}
+
+impl WindowBound {
+    /// From the bounds on the coefficient `leak` at the end and early on, m³/(s·Pa), and the mean size of
+    /// the pressure that drives it.
+    pub fn new(leak: f64, (std, early): (f64, f64), pressure_pa: f64) -> Self {
+        let half_width_m3s = 1.96 * std * pressure_pa;
+        Self {
+            coefficient: std / leak,
+            coefficient_early: early / leak,
+            identifiable: half_width_m3s <= f64::max(0.1 / 60e3, 0.1 * leak * pressure_pa),
+        }
+    }
+}
+
+/// The five figures of all seeds, by `pick`.
+fn figures<'a>(scores: impl Iterator<Item = &'a TrialScore> + Clone, pick: fn(Vec<f64>) -> f64) -> Figures {
+    let all = |of: fn(&TrialScore) -> f64| pick(scores.clone().map(of).collect());
+    let time = all(|s| s.convergence_s.unwrap_or(f64::INFINITY));
+    Figures {
+        leakage_mean_error_percent: all(|s| s.leakage_mean),
+        leakage_peak_error_percent: all(|s| s.leakage_peak),
+        coefficient_mean_error_percent: all(|s| s.coefficient_mean),
+        coefficient_peak_error_percent: all(|s| s.coefficient_peak),
+        convergence_time_s: Some(time).filter(|t| t.is_finite()),
+    }
 }
 
 impl Row {
@@ -107,16 +133,8 @@ impl Row {
         entries: &[Entry],
     ) -> Self {
         let identifiable = 2 * entries.iter().filter(|e| e.window.identifiable).count() >= entries.len();
-        let all = |of: fn(&TrialScore) -> f64| entries.iter().map(|e| of(&e.score)).collect::<Vec<_>>();
-        let times: Vec<f64> =
-            entries.iter().map(|e| e.score.convergence_s.unwrap_or(f64::INFINITY)).collect();
-        let figures = |pick: fn(Vec<f64>) -> f64| Figures {
-            leakage_mean_error_percent: pick(all(|s| s.leakage_mean)),
-            leakage_peak_error_percent: pick(all(|s| s.leakage_peak)),
-            coefficient_mean_error_percent: pick(all(|s| s.coefficient_mean)),
-            coefficient_peak_error_percent: pick(all(|s| s.coefficient_peak)),
-            convergence_time_s: Some(pick(times.clone())).filter(|t| t.is_finite()),
-        };
+        let scores = entries.iter().map(|e| &e.score);
+        let best = figures(entries.iter().map(|e| &e.efficient), median);
         let covered: Vec<f64> = entries
             .iter()
             .filter_map(|e| e.score.covered)
@@ -131,14 +149,14 @@ impl Row {
             leak,
             estimator,
             identifiable,
-            median: if identifiable { figures(median).into() } else { Scored::default() },
-            worst: identifiable.then(|| figures(worst)),
-            converged_percent: 100.0 * mean(times.iter().map(|t| f64::from(u8::from(t.is_finite())))),
+            median: if identifiable { figures(scores.clone(), median).into() } else { Scored::default() },
+            worst: identifiable.then(|| figures(scores.clone(), worst)),
+            converged_percent: 100.0 * mean(scores.map(|s| f64::from(u8::from(s.convergence_s.is_some())))),
             coverage_percent: (!covered.is_empty()).then(|| mean(covered.into_iter())),
             bound: Bound {
+                median: if identifiable { best.into() } else { Scored::default() },
                 coefficient_std_percent: 100.0 * of_windows(|w| w.coefficient),
                 coefficient_std_after_2s_percent: 100.0 * of_windows(|w| w.coefficient_early),
-                leakage_mean_error_percent: 100.0 * of_windows(|w| w.leakage),
                 error_over_bound: mean(entries.iter().map(ratio)).sqrt(),
             },
         }
@@ -166,11 +184,11 @@ fn worst(values: Vec<f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The table for people: medians, worst case in brackets.
+/// The table for people: medians, worst case in brackets; below each leak the efficient estimator.
 pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
     let mut out = format!(
-        "{title}\n{:33}| {:^29} | {:^29} | {:^13} | what noise alone allows\n\
-         {:>4} {:>4}  {:<10}  {:<9}| {:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>7} {:>6}\n",
+        "{title}\n{:33}| {:^29} | {:^29} | {:^13} | coefficient's bound\n\
+         {:>4} {:>4}  {:<10}  {:<9}| {:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
         "",
         "leakage error %",
         "coefficient error %",
@@ -184,13 +202,13 @@ pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
         "mean",
         "peak",
         "after s",
-        "leakage",
         "1s, 2 s",
         "1s, end",
         "ratio"
     );
-    for row in rows {
-        out += &line(row);
+    for leak in rows.chunk_by(|a, b| (a.wind_mps, a.case, a.leak) == (b.wind_mps, b.case, b.leak)) {
+        leak.iter().for_each(|row| out += &line(row));
+        leak.last().into_iter().filter(|row| row.identifiable).for_each(|row| out += &limit_line(row));
     }
     out
 }
@@ -198,29 +216,43 @@ pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
 fn line(row: &Row) -> String {
     let head =
         format!("{:>4} {:>4}  {:<10}  {:<9}| ", row.wind_mps, u8::from(row.case), row.leak, row.estimator);
-    let Some(worst) = row.worst else {
-        return format!("{head}not identifiable: bound {:.1} %\n", row.bound.coefficient_std_percent);
-    };
-    let pair = |median: Option<f64>, worst: Option<f64>| {
-        let one = |value: Option<f64>| value.map_or_else(|| "-".into(), short);
-        format!("{} ({})", one(median), one(worst))
-    };
-    let cells = [
-        pair(row.median.leakage_mean_error_percent, Some(worst.leakage_mean_error_percent)),
-        pair(row.median.leakage_peak_error_percent, Some(worst.leakage_peak_error_percent)),
-        pair(row.median.coefficient_mean_error_percent, Some(worst.coefficient_mean_error_percent)),
-        pair(row.median.coefficient_peak_error_percent, Some(worst.coefficient_peak_error_percent)),
-        pair(row.median.convergence_time_s, worst.convergence_time_s),
-    ];
-    let [a, b, c, d, e] = cells;
     let bound = &row.bound;
+    let Some(worst) = row.worst else {
+        return format!("{head}not identifiable: bound {:.1} %\n", bound.coefficient_std_percent);
+    };
+    let [a, b, c, d, e] = row.median.cells();
+    let [wa, wb, wc, wd, we] = Scored::from(worst).cells();
+    let pair = |median: String, worst: String| format!("{median} ({worst})");
     format!(
-        "{head}{a:>14} {b:>14} | {c:>14} {d:>14} | {e:>13} | {:>7} {:>7} {:>7} {:>6}\n",
-        short(bound.leakage_mean_error_percent),
+        "{head}{:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
+        pair(a, wa),
+        pair(b, wb),
+        pair(c, wc),
+        pair(d, wd),
+        pair(e, we),
         short(bound.coefficient_std_after_2s_percent),
         short(bound.coefficient_std_percent),
         short(bound.error_over_bound)
     )
+}
+
+/// What an efficient estimator would show.
+fn limit_line(row: &Row) -> String {
+    let [a, b, c, d, e] = row.bound.median.cells();
+    format!("{:>24}{:<9}| {a:>7}{b:>15}        | {c:>7}{d:>15}        | {e:>6}\n", "", "limit")
+}
+
+impl Scored {
+    fn cells(&self) -> [String; 5] {
+        [
+            self.leakage_mean_error_percent,
+            self.leakage_peak_error_percent,
+            self.coefficient_mean_error_percent,
+            self.coefficient_peak_error_percent,
+            self.convergence_time_s,
+        ]
+        .map(|value| value.map_or_else(|| "-".into(), short))
+    }
 }
 
 /// A number in at most five characters.

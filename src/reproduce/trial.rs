@@ -8,7 +8,7 @@ use crate::trace::Record;
 use pitchleak_core::{Butterworth, Estimate, FilterError, PerLeak};
 
 /// Cut-off of the filter on leak flows and pressures, Hz, Section IV.
-pub const CUTOFF_HZ: f64 = 5.0;
+const CUTOFF_HZ: f64 = 5.0;
 /// The estimate has converged once its coefficient stays within this share of the truth.
 const BAND: f64 = 0.05;
 /// Where it converges later than this, or never, s, the rest of the window counts as steady state.
@@ -52,15 +52,9 @@ impl Course {
     /// # Errors
     /// Where the filter does not exist at the protocol's rate.
     pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, FilterError> {
-        let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
-        let from = |start: f64| {
-            let mut filter = filter;
-            filter.reset(start);
-            filter
-        };
         let mut estimator = Estimator::new(rig);
         let mut course = Self::default();
-        let mut filters: Option<(Filters, Filters)> = None;
+        let mut filters = Filters::default();
         let dt_s = 1.0 / SAMPLE_RATE_HZ;
         for (index, truth) in window.iter().enumerate() {
             let sample = sensing.read(&truth.sample);
@@ -68,16 +62,28 @@ impl Course {
             let record =
                 Record { t_s, dt_s: if index == 0 { 0.0 } else { dt_s }, sample, ..Record::default() };
             estimator.update(&record);
-            let read = driving_pressures_pa(&sample);
-            let (pressures, leaks) =
-                filters.get_or_insert_with(|| (read.map(from), truth.leaks_m3s.map(from)));
+            let (read, references) = filters.advance(driving_pressures_pa(&sample), truth.leaks_m3s)?;
             let coefficients = estimator.leak_coefficients();
-            course.t_s.push(t_s);
-            course.flows_m3s.push(coefficients.zip(advance(pressures, read)).map(|(c, p)| c.value * p));
-            course.references_m3s.push(advance(leaks, truth.leaks_m3s));
-            course.coefficients.push(coefficients);
+            let [bias_a, bias_b] = estimator.pressure_biases_pa();
+            let found = PerLeak { internal: bias_a - bias_b, external_a: bias_a, external_b: bias_b };
+            let flows = coefficients.zip(read.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
+            course.push(index, coefficients, flows, references);
         }
         Ok(course)
+    }
+
+    /// Adds what stands after sample `index`.
+    pub(super) fn push(
+        &mut self,
+        index: usize,
+        coefficients: PerLeak<Estimate<f64>>,
+        flows_m3s: PerLeak<f64>,
+        references_m3s: PerLeak<f64>,
+    ) {
+        self.t_s.push(index as f64 / SAMPLE_RATE_HZ);
+        self.coefficients.push(coefficients);
+        self.flows_m3s.push(flows_m3s);
+        self.references_m3s.push(references_m3s);
     }
 
     /// Mean of |Ĉ/C − 1| over the second half of the window.
@@ -115,10 +121,38 @@ impl Course {
     }
 }
 
-/// One filter per leak.
-type Filters = PerLeak<Butterworth<f64>>;
+/// The paper's filter on the pressures that drive the leaks and on the true leak flows; it starts settled on
+/// the first values.
+#[derive(Default)]
+pub(super) struct Filters(Option<(PerLeakFilter, PerLeakFilter)>);
 
-fn advance(filters: &mut Filters, values: PerLeak<f64>) -> PerLeak<f64> {
+type PerLeakFilter = PerLeak<Butterworth<f64>>;
+
+impl Filters {
+    /// Pressures, Pa, and leak flows, m³/s, behind the filter.
+    pub fn advance(
+        &mut self,
+        pressures: PerLeak<f64>,
+        leaks: PerLeak<f64>,
+    ) -> Result<(PerLeak<f64>, PerLeak<f64>), FilterError> {
+        let (of_pressures, of_leaks) = match &mut self.0 {
+            Some(filters) => filters,
+            none => none.insert((settled(pressures)?, settled(leaks)?)),
+        };
+        Ok((advance(of_pressures, pressures), advance(of_leaks, leaks)))
+    }
+}
+
+fn settled(start: PerLeak<f64>) -> Result<PerLeakFilter, FilterError> {
+    let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
+    Ok(start.map(|start| {
+        let mut filter = filter;
+        filter.reset(start);
+        filter
+    }))
+}
+
+fn advance(filters: &mut PerLeakFilter, values: PerLeak<f64>) -> PerLeak<f64> {
     PerLeak {
         internal: filters.internal.update(values.internal),
         external_a: filters.external_a.update(values.external_a),

@@ -12,6 +12,7 @@ mod writer;
 pub use effects::{EffectSize, EffectsError, effects};
 pub use leak::{LeakSize, LeakSizeError};
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile, truth_path};
+pub(crate) use sensing::Normal;
 pub use sensing::{Biases, Sensing};
 pub use writer::TraceWriter;
 

@@ -62,7 +62,7 @@ impl Sensing {
     /// missing does not shift the others' noise.
     pub fn read(&mut self, truth: &Sample<f64>) -> Sample<f64> {
         let Self { noise, biases, normal } = self;
-        let mut shown = |value: f64, bias: f64, std: f64| value + bias + std * normal.next();
+        let mut shown = |value: f64, bias: f64, std: f64| value + bias + std * normal.draw();
         let x_m = shown(truth.x_m, biases.x_m, noise.position.noise_std);
         let pa_pa = shown(truth.pa_pa, biases.pa_pa, noise.pressure.noise_std);
         let pb_pa = shown(truth.pb_pa, biases.pb_pa, noise.pressure.noise_std);
@@ -82,14 +82,21 @@ impl Sensing {
 
 /// Normal random numbers by the transform of Box and Muller (1958).
 #[derive(Clone, Debug)]
-struct Normal {
+pub(crate) struct Normal {
     uniform: ChaCha8Rng,
     spare: Option<f64>,
 }
 
 impl Normal {
     fn seeded(seed: u64) -> Self {
-        Self { uniform: ChaCha8Rng::seed_from_u64(seed), spare: None }
+        Self::stream(seed, 0)
+    }
+
+    /// The numbers of one of the streams that a seed has; the sensors' noise is stream 0.
+    pub fn stream(seed: u64, stream: u64) -> Self {
+        let mut uniform = ChaCha8Rng::seed_from_u64(seed);
+        uniform.set_stream(stream);
+        Self { uniform, spare: None }
     }
 
     /// A number in 0 < u <= 1.
@@ -97,7 +104,8 @@ impl Normal {
         ((self.uniform.next_u64() >> 11) + 1) as f64 * f64::EPSILON / 2.0
     }
 
-    fn next(&mut self) -> f64 {
+    /// The next number.
+    pub fn draw(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
@@ -115,7 +123,7 @@ mod tests {
     #[test]
     fn numbers_are_normal() {
         let mut normal = Normal::seeded(7);
-        let draws: Vec<f64> = (0..200_000).map(|_| normal.next()).collect();
+        let draws: Vec<f64> = (0..200_000).map(|_| normal.draw()).collect();
         let moment = |p: i32| draws.iter().map(|x| x.powi(p)).sum::<f64>() / draws.len() as f64;
         assert!(moment(1).abs() < 0.01 && (moment(2) - 1.0).abs() < 0.02);
         assert!(moment(3).abs() < 0.05 && (moment(4) - 3.0).abs() < 0.1);

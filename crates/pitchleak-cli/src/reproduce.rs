@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Rerun the paper's experiment: four winds, two leak settings, its law and ours on the same readings
 #[derive(Args)]
-#[command(after_help = "Example: pitchleak reproduce --out reproduction --seeds 56")]
+#[command(after_help = "Example: pitchleak reproduce --out reproduction --seeds 280")]
 pub struct Arguments {
     /// Write the figures (SVG), the table and the report into this directory
     #[arg(long, value_name = "DIR")]
@@ -18,7 +18,7 @@ pub struct Arguments {
     json: bool,
 
     /// Seeds per row, each with its own noise; 14 windows of 20 s take turns
-    #[arg(long, value_name = "N", default_value_t = 56, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 280, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
 
     /// Also measure the alarms: delays, and false alarms over so many hours of sound operation

@@ -50,3 +50,12 @@ impl<V> PerLeak<V> {
         }
     }
 }
+
+/// Mean pressures that drive the leaks, as the sensors read them.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct LeakPressures<T> {
+    /// Means of |P_L|, P_A, P_B, Pa.
+    pub sizes_pa: PerLeak<T>,
+    /// Mean sign of P_L, −1 to 1: how much of a bias of P_L stays in the mean of |P_L|.
+    pub load_sign: T,
+}

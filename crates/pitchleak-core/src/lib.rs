@@ -38,7 +38,7 @@ pub use cylinder::{Cylinder, CylinderError, Fluid};
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use effects::{Effect, EffectSet};
 pub use emulator::{Emulator, EmulatorParams, EmulatorReading};
-pub use estimate::{Estimate, PerLeak};
+pub use estimate::{Estimate, LeakPressures, PerLeak};
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
 pub use fading_parabola::FadingParabola;
 pub use linkage::{Linkage, LinkageError};

@@ -2,7 +2,7 @@
 
 use pitchleak_core::{
     Cylinder, ExcitationSettings, Fluid, LeakDetector, PerLeak, Real, Rls, RlsSettings, Sample, SensorSpread,
-    Sensors,
+    Sensors, Update,
 };
 use proptest::prelude::*;
 
@@ -139,14 +139,16 @@ fn a_long_rest_lets_no_covariance_blow_up() {
 fn a_sudden_leak_is_found_within_two_seconds() {
     let cylinder = Cylinder::<f64>::paper();
     let mut rls = Rls::<f64, 4>::new(cylinder, fluid(), &Sensors::paper(), RlsSettings::default());
-    let mut found_after_s = None;
+    let (mut found_after_s, mut changed_at_s) = (None, None);
     for k in 0..9000 {
         let t = f64::from(k) * 0.01;
         let mut sample = reading(&cylinder, BETA, t);
         if t >= 60.0 {
             sample.qa_m3s = sample.qa_m3s.map(|q| q + 5e-12 * sample.pa_pa);
         }
-        rls.update(0.01, &sample);
+        if rls.update(0.01, &sample) == Update::Changed {
+            changed_at_s = Some(t);
+        }
         let off = (rls.leak_coefficients().external_a.value - LEAKS.external_a - 5e-12).abs();
         if t >= 60.0 && off < 0.05 * 8e-12 {
             found_after_s.get_or_insert(t - 60.0);
@@ -154,6 +156,7 @@ fn a_sudden_leak_is_found_within_two_seconds() {
     }
     println!("found after {found_after_s:?} s");
     assert!(found_after_s.is_some_and(|t| t < 5.0));
+    assert!(changed_at_s.is_some_and(|t: f64| (60.0..62.0).contains(&t)), "{changed_at_s:?}");
 }
 
 fn any_number() -> impl Strategy<Value = f64> {

@@ -1,7 +1,9 @@
 //! What the estimator has found so far.
 
 use super::{Parameter, Rls};
-use crate::{Estimate, PerLeak, Real};
+use crate::{Estimate, LeakPressures, PerLeak, Real};
+
+const OFFSETS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 
 impl<T: Real, const N: usize> Rls<T, N> {
     /// Estimate of a parameter's deviation from its prior mean, SI; zero with no spread where N is too
@@ -40,9 +42,16 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Estimate { value: deviation.value + self.compressibility, std: deviation.std }
     }
 
-    /// Offsets of the flow meters A and B, m³/s (reading minus truth); zero where N < 6.
+    /// Offsets of the flow meters A and B, m³/s (reading minus truth), apart from what biased pressures drive
+    /// through the leaks. Zero where N < 6.
     pub fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
-        [self.parameter(Parameter::OffsetA), self.parameter(Parameter::OffsetB)]
+        let (one, none) = (T::one(), T::zero());
+        let leaks = self.leak_coefficients().map(|c| c.value.max(none));
+        let c = leaks.internal;
+        [
+            self.offset_sum([one, none], [c + leaks.external_a, -c]),
+            self.offset_sum([none, one], [-c, c + leaks.external_b]),
+        ]
     }
 
     /// Scale errors of flow meter A, flow meter B and the position sensor, as shares; zero where N < 9.
@@ -64,20 +73,77 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.scale[Parameter::Compressibility as usize]
     }
 
-    /// Mean leak flows over the memory, m³/s, by eq. (15): coefficient times mean |P_L|, P_A, P_B. A
-    /// declared pressure bias widens them.
-    pub fn mean_leak_flows_m3s(&self) -> PerLeak<Estimate<T>> {
-        let root_two = T::lit(core::f64::consts::SQRT_2);
-        let bias = self.pressure_bias_pa;
-        let biases = PerLeak { internal: root_two * bias, external_a: bias, external_b: bias };
-        self.leak_coefficients().zip(self.pressures.means()).zip(biases).map(|((c, pressure), bias)| {
-            Estimate { value: c.value * pressure, std: (c.std * pressure).libm_hypot(c.value * bias) }
-        })
+    /// Biases of the pressure sensors A and B, Pa (reading minus truth), as far as the offsets found tell:
+    /// a biased pressure drives a leak a little more all the time. Zero, as wide as declared, where N < 6.
+    pub fn pressure_biases_pa(&self) -> [Estimate<T>; 2] {
+        let (one, none) = (T::one(), T::zero());
+        [[one, none], [none, one]].map(|shares| self.offset_sum([none, none], shares))
     }
 
-    /// Means of |P_L|, P_A, P_B over the memory, Pa.
+    /// Weights of the offsets found in `flows`·offsets + `pressures`·biases (SI), m³/s or Pa per prior unit.
+    fn per_offset(&self, [flow_a, flow_b]: [T; 2], [share_a, share_b]: [T; 2]) -> [T; 2] {
+        let [[aa, ab], [ba, bb]] = self.offsets.pressure_per_offset;
+        let bias_pa = self.sensors.pressure.bias_std;
+        let [unit_a, unit_b] = OFFSETS.map(|o| self.scale.get(o as usize).copied().unwrap_or(T::zero()));
+        [
+            flow_a * unit_a + bias_pa * (share_a * aa + share_b * ba),
+            flow_b * unit_b + bias_pa * (share_a * ab + share_b * bb),
+        ]
+    }
+
+    /// `flows`·offsets + `pressures`·biases, SI.
+    fn offset_sum(&self, flows: [T; 2], pressures: [T; 2]) -> Estimate<T> {
+        let [per_a, per_b] = self.per_offset(flows, pressures);
+        let [a, b] = OFFSETS;
+        let [mean_a, mean_b] =
+            OFFSETS.map(|o| self.solution.mean.get(o as usize).copied().unwrap_or(T::zero()));
+        let found = per_a * per_a * self.covariance(a, a)
+            + T::lit(2.0) * per_a * per_b * self.covariance(a, b)
+            + per_b * per_b * self.covariance(b, b);
+        let [[aa, ab], [ba, bb]] = self.offsets.pressure_spread;
+        let [share_a, share_b] = pressures;
+        let hidden = share_a * share_a * aa + share_a * share_b * (ab + ba) + share_b * share_b * bb;
+        let bias_pa = self.sensors.pressure.bias_std;
+        let variance = found.max(T::zero()) + bias_pa * bias_pa * hidden.max(T::zero());
+        Estimate { value: per_a * mean_a + per_b * mean_b, std: variance.sqrt() }
+    }
+
+    /// Leak flows, m³/s, by eq. (15): coefficients times `pressures` as read, less the biases found. What a
+    /// declared pressure bias leaves uncertain widens them.
+    pub fn leak_flows_m3s(&self, pressures: &LeakPressures<T>) -> PerLeak<Estimate<T>> {
+        let (one, none) = (T::one(), T::zero());
+        let sign = pressures.load_sign;
+        let sizes = pressures.sizes_pa;
+        PerLeak {
+            internal: self.leak_flow(Parameter::Internal, sizes.internal, [sign, -sign]),
+            external_a: self.leak_flow(Parameter::ExternalA, sizes.external_a, [one, none]),
+            external_b: self.leak_flow(Parameter::ExternalB, sizes.external_b, [none, one]),
+        }
+    }
+
+    /// One leak at the pressure read, of which the biases make up `shares`.
+    fn leak_flow(&self, leak: Parameter, pressure_pa: T, shares: [T; 2]) -> Estimate<T> {
+        let none = [T::zero(), T::zero()];
+        let bias = self.offset_sum(none, shares);
+        let coefficient = self.parameter(leak);
+        let pressure = pressure_pa - bias.value;
+        let [per_a, per_b] = self.per_offset(none, shares);
+        let [a, b] = OFFSETS.map(|offset| self.covariance(leak, offset));
+        let scale = self.scale.get(leak as usize).copied().unwrap_or(T::zero());
+        let together = scale * (per_a * a + per_b * b);
+        let (own, through) = (coefficient.std * pressure, coefficient.value * bias.std);
+        let variance = own * own + through * through - T::lit(2.0) * coefficient.value * pressure * together;
+        Estimate { value: coefficient.value * pressure, std: variance.max(T::zero()).sqrt() }
+    }
+
+    /// Mean leak flows over the memory, m³/s: [`leak_flows_m3s`](Self::leak_flows_m3s) at its pressures.
+    pub fn mean_leak_flows_m3s(&self) -> PerLeak<Estimate<T>> {
+        self.leak_flows_m3s(&self.pressures.means())
+    }
+
+    /// Means of |P_L|, P_A, P_B over the memory, less the biases found, Pa.
     pub fn mean_pressures_pa(&self) -> PerLeak<T> {
-        self.pressures.means()
+        self.pressures.means().sizes_pa
     }
 
     /// Normalised innovation squared of the balance and of the odometer: 1 where the declared noise and

@@ -1,6 +1,7 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
+use super::Parameter;
 use crate::Real;
 
 /// Weighted normal equations of a linear regression with exponential forgetting and a unit prior.
@@ -130,25 +131,27 @@ impl<T: Real, const N: usize> Information<T, N> {
         self.column_noise += block.column_noise;
     }
 
-    /// Posterior mean and the covariance of its error, A⁻¹ (N + I) A⁻¹ with A = M + I: forgetting weighs
+    /// Posterior mean and the covariance of its error, A⁻¹ (N + prior) A⁻¹ with A = M + prior: forgetting weighs
     /// the samples unequally, so A⁻¹ alone would overstate the spread (White 1980, sandwich form).
     ///
     /// Noise in column 0 (errors in variables) is taken out of A and of the vector; `mean_0` is the
-    /// prior mean of that parameter in units of its prior standard deviation.
-    pub fn solve(&self, mean_0: T) -> Solution<T, N> {
-        let (factors, taken) = self.factor();
+    /// prior mean of that parameter in units of its prior standard deviation. `offsets` is the prior
+    /// information of the two flow offsets; that of all other parameters is one.
+    pub fn solve(&self, mean_0: T, offsets: &[[T; 2]; 2]) -> Solution<T, N> {
+        let (factors, taken) = self.factor(offsets);
         let inverse = factors.inverse();
         let mut vector = self.vector;
         if let Some(first) = vector.first_mut() {
             *first += taken * mean_0;
         }
+        let noise = self.noise_with_prior(offsets);
         let mut mean = [T::zero(); N];
         let mut half = [[T::zero(); N]; N];
         for i in 0..N {
             for k in 0..N {
                 mean[i] += inverse[i][k] * vector[k];
                 for j in 0..N {
-                    half[i][j] += inverse[i][k] * self.noise_with_prior(k, j);
+                    half[i][j] += inverse[i][k] * noise[k][j];
                 }
             }
         }
@@ -165,16 +168,22 @@ impl<T: Real, const N: usize> Information<T, N> {
     }
 
     #[inline]
-    fn noise_with_prior(&self, i: usize, j: usize) -> T {
-        let (row, column) = if i >= j { (i, j) } else { (j, i) };
-        self.noise[row][column] + if i == j { T::one() } else { T::zero() }
+    fn noise_with_prior(&self, offsets: &[[T; 2]; 2]) -> [[T; N]; N] {
+        let mut whole = [[T::zero(); N]; N];
+        for i in 0..N {
+            for j in 0..=i {
+                whole[i][j] = self.noise[i][j] + prior(offsets, i, j);
+                whole[j][i] = whole[i][j];
+            }
+        }
+        whole
     }
 
-    /// U D Uᵀ of A = M + I, last parameter first (Bierman 1977, Factorization Methods for Discrete
+    /// U D Uᵀ of A = M + prior, last parameter first (Bierman 1977, Factorization Methods for Discrete
     /// Sequential Estimation, §III.4), so that the last pivot is what is known of parameter 0 beyond all
     /// others. The column noise is taken from it, but never more than leaves the prior standing. Also returns what was
     /// taken.
-    fn factor(&self) -> (Factors<T, N>, T) {
+    fn factor(&self, offsets: &[[T; 2]; 2]) -> (Factors<T, N>, T) {
         // A pivot is kept above the rounding error of its diagonal, which only matters in f32.
         let floor = T::lit(8.0) * T::epsilon();
         let mut upper = [[T::zero(); N]; N];
@@ -183,13 +192,13 @@ impl<T: Real, const N: usize> Information<T, N> {
         for back in 0..N {
             let i = N - 1 - back;
             for j in (i + 1..N).rev() {
-                let mut sum = self.matrix[j][i];
+                let mut sum = self.matrix[j][i] + prior(offsets, j, i);
                 for k in j + 1..N {
                     sum -= upper[i][k] * upper[j][k];
                 }
                 upper[i][j] = sum;
             }
-            let diagonal = self.matrix[i][i] + T::one();
+            let diagonal = self.matrix[i][i] + prior(offsets, i, i);
             let mut pivot = diagonal;
             for j in i + 1..N {
                 // upper[i][j] holds U D here; turn it to U as it is used.
@@ -204,6 +213,20 @@ impl<T: Real, const N: usize> Information<T, N> {
             inverse_pivot[i] = T::one() / pivot.max(floor * diagonal);
         }
         (Factors { upper, inverse_pivot }, taken)
+    }
+}
+
+/// Entry of the prior information, `i` >= `j`.
+#[inline]
+fn prior<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
+    const A: usize = Parameter::OffsetA as usize;
+    const B: usize = Parameter::OffsetB as usize;
+    match (i, j) {
+        (A, A) => offsets[0][0],
+        (B, B) => offsets[1][1],
+        (B, A) => offsets[1][0],
+        _ if i == j => T::one(),
+        _ => T::zero(),
     }
 }
 
@@ -261,7 +284,7 @@ mod tests {
         }
         let mut information = Information::new();
         information.add(&sums);
-        let solution = information.solve(0.0);
+        let solution = information.solve(0.0, &[[1.0, 0.0], [0.0, 1.0]]);
         let inverse = expected.try_inverse().unwrap();
         for i in 0..3 {
             assert!((solution.mean[i] - truth[i]).abs() < 1e-5);
@@ -281,7 +304,7 @@ mod tests {
         for _ in 0..200 {
             information.forget(0.5);
         }
-        let solution = information.solve(0.0);
+        let solution = information.solve(0.0, &[[1.0, 0.0], [0.0, 1.0]]);
         assert!((solution.covariance[0][0] - 1.0).abs() < 1e-9);
         assert!(solution.mean[1].abs() < 1e-9);
     }

@@ -17,6 +17,7 @@ mod estimates;
 mod information;
 mod noise;
 mod odometer;
+mod offset_prior;
 mod parameter;
 mod pressure_means;
 mod prior;
@@ -29,6 +30,7 @@ use balance_memory::BalanceMemory;
 use information::{BlockSums, Information, Solution};
 use noise::NoiseStd;
 use odometer::Odometer;
+use offset_prior::OffsetPrior;
 pub use parameter::Parameter;
 use pressure_means::PressureMeans;
 use prior::prior_spread;
@@ -62,6 +64,8 @@ pub enum Update {
     Accepted,
     /// The sample completed a block: the estimates are new.
     Renewed,
+    /// So did this one, and the leak has changed: what was learnt before counts for nothing any more.
+    Changed,
     /// Not a number, or beyond what a cylinder can do: the sample was left out.
     Rejected,
 }
@@ -75,9 +79,10 @@ pub struct Rls<T, const N: usize> {
     cylinder: Cylinder<T>,
     noise: NoiseStd<T>,
     settings: RlsSettings<T>,
-    pressure_bias_pa: T,
+    sensors: Sensors<T>,
     compressibility: T,
     scale: [T; N],
+    offsets: OffsetPrior<T>,
     last: Option<Sample<T>>,
     both: Weights<T>,
     only_a: Weights<T>,
@@ -108,13 +113,15 @@ impl<T: Real, const N: usize> Rls<T, N> {
     ) -> Self {
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
+        let offsets = OffsetPrior::new(&cylinder, sensors, &no_leak);
         Self {
             cylinder,
             noise,
             settings,
-            pressure_bias_pa: sensors.pressure.bias_std,
+            sensors: *sensors,
             compressibility: T::one() / fluid.bulk_modulus_pa,
             scale: prior_spread(&cylinder, &fluid, sensors),
+            offsets,
             last: None,
             both: Weights::both(&cylinder, &noise, &no_leak),
             only_a: Weights::only_a(&cylinder, &noise, &no_leak),
@@ -127,7 +134,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             pressure_noise_b: NoiseMeter::default(),
             memory: None,
             information: Information::new(),
-            solution: Information::new().solve(T::zero()),
+            solution: Information::new().solve(T::zero(), &offsets.information),
             surprise: Surprise::default(),
             pressures: PressureMeans::default(),
         }
@@ -152,12 +159,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.block.add(&step);
         self.advance(&step, &last, sample);
         let full = self.block.time >= self.settings.block_time_s && self.block.steps >= T::lit(8.0);
-        if full {
-            self.renew();
-            Update::Renewed
-        } else {
-            Update::Accepted
-        }
+        if full { self.renew() } else { Update::Accepted }
     }
 
     /// Odometer step, by whichever flows both ends of the step have.
@@ -197,7 +199,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     /// Closes the block: both whitened equations go into the information, and the estimates are renewed.
-    fn renew(&mut self) {
+    fn renew(&mut self) -> Update {
         let mut travelled = self.sums;
         self.compensate_odometer();
         let balance = self.whitened_balance();
@@ -207,7 +209,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
             self.memory = None;
         }
         let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
-        if self.surprise.take_change() {
+        let changed = self.surprise.take_change();
+        if changed {
             self.begin_anew();
             travelled = self.sums;
         }
@@ -216,7 +219,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.pressures.add_block(&self.block, keep);
         self.surprise.forget(keep);
         let scale = self.scale[Parameter::Compressibility as usize];
-        self.solution = self.information.solve(self.compressibility / scale);
+        self.solution = self.information.solve(self.compressibility / scale, &self.offsets.information);
         self.surprise.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
         self.reweigh();
         self.sums = BlockSums::new();
@@ -225,6 +228,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if let Some(odometer) = &mut self.odometer {
             odometer.weight_sum = T::zero();
         }
+        if changed { Update::Changed } else { Update::Renewed }
     }
 
     /// The leak has changed: what was learnt before it counts for nothing, and neither the odometer
@@ -319,12 +323,16 @@ impl<T: Real, const N: usize> Rls<T, N> {
         a * a + b * b
     }
 
-    /// The leaks found decide how much pressure noise the equations carry.
+    /// The leaks found decide how much pressure noise the equations carry, and how much of the pressures'
+    /// bias.
     fn reweigh(&mut self) {
         let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
         self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
         self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
         self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);
+        if N > Parameter::OffsetB as usize {
+            self.offsets = OffsetPrior::new(&self.cylinder, &self.sensors, &leaks);
+        }
     }
 
     fn restart(&mut self, sample: &Sample<T>) -> Update {

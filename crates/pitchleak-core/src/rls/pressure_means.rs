@@ -1,5 +1,5 @@
 use super::balance::Integrals;
-use crate::{PerLeak, Real};
+use crate::{LeakPressures, PerLeak, Real};
 
 /// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
 /// block's mean, so that sensor noise does not count as pressure.
@@ -7,6 +7,7 @@ use crate::{PerLeak, Real};
 pub(super) struct PressureMeans<T> {
     time: T,
     load: T,
+    load_sign: T,
     a: T,
     b: T,
 }
@@ -15,7 +16,9 @@ impl<T: Real> PressureMeans<T> {
     pub fn add_block(&mut self, block: &Integrals<T>, keep: T) {
         self.forget(keep);
         self.time += block.time;
-        self.load += (block.a.pressure - block.b.pressure).abs();
+        let load = block.a.pressure - block.b.pressure;
+        self.load += load.abs();
+        self.load_sign += if load < T::zero() { -block.time } else { block.time };
         self.a += block.a.pressure;
         self.b += block.b.pressure;
     }
@@ -23,16 +26,21 @@ impl<T: Real> PressureMeans<T> {
     pub fn forget(&mut self, keep: T) {
         self.time *= keep;
         self.load *= keep;
+        self.load_sign *= keep;
         self.a *= keep;
         self.b *= keep;
     }
 
-    pub fn means(&self) -> PerLeak<T> {
+    pub fn means(&self) -> LeakPressures<T> {
         let per_time = if self.time > T::zero() { T::one() / self.time } else { T::zero() };
-        PerLeak {
-            internal: self.load * per_time,
-            external_a: self.a * per_time,
-            external_b: self.b * per_time,
+        let mean = |sum: T| sum * per_time;
+        LeakPressures {
+            sizes_pa: PerLeak {
+                internal: mean(self.load),
+                external_a: mean(self.a),
+                external_b: mean(self.b),
+            },
+            load_sign: mean(self.load_sign),
         }
     }
 }
