@@ -13,12 +13,13 @@ impl Replay {
         let estimates = self.estimates();
         let leakage = self.leakage();
         let active = self.detector.active();
+        let trace = TraceSummary::new(reader.name(), reader.quality());
         ReplayReport {
             schema: ReplayReport::SCHEMA,
-            trace: TraceSummary::new(reader.name(), reader.quality()),
             rig: self.rig.name.clone(),
             estimator: self.rig.estimator.kind,
-            verdict: Verdict::new(active, &leakage, &estimates, &self.rig.alarms.threshold_m3s),
+            verdict: Verdict::new(active, &leakage, &estimates, &self.rig.alarms.threshold_m3s, &trace),
+            trace,
             estimates,
             leakage,
             flow_meter_offsets: self.estimator.flow_offsets_m3s().map(FlowMeterOffsets::new),

@@ -239,17 +239,18 @@ pub struct Verdict {
 
 impl Verdict {
     /// The verdict on leak flows `leakage` of which `active` are above their alarm `threshold_m3s`, and
-    /// of which the trace can judge only those that `estimates` calls identifiable.
+    /// of which `trace` can judge only those that `estimates` calls identifiable.
     pub fn new(
         active: PerLeak<bool>,
         leakage: &PerLeak<Leakage>,
         estimates: &Estimates,
         threshold_m3s: &PerLeak<f64>,
+        trace: &TraceSummary,
     ) -> Self {
         let faults = Leak::ALL.zip(active).map(|(leak, active)| active.then_some(leak));
         let faults: Vec<_> =
             [faults.internal, faults.external_a, faults.external_b].into_iter().flatten().collect();
-        Self { text: text::verdict(&faults, leakage, estimates, threshold_m3s), faults }
+        Self { text: text::verdict(&faults, leakage, estimates, threshold_m3s, trace), faults }
     }
 }
 

@@ -19,22 +19,23 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
     };
     let threshold = 0.1 / LPM_PER_M3S;
     let thresholds = PerLeak { internal: threshold, external_a: threshold, external_b: threshold };
+    let trace = TraceSummary {
+        path: "h02.csv.gz".to_owned(),
+        samples: 6001,
+        skipped: 0,
+        duration_s: 60.0,
+        sample_rate_hz: Some(100.000_000_001),
+        gaps: 0,
+        warnings: Vec::new(),
+    };
     ReplayReport {
         schema: ReplayReport::SCHEMA,
-        trace: TraceSummary {
-            path: "h02.csv.gz".to_owned(),
-            samples: 6001,
-            skipped: 0,
-            duration_s: 60.0,
-            sample_rate_hz: Some(100.000_000_001),
-            gaps: 0,
-            warnings: Vec::new(),
-        },
+        verdict: Verdict::new(active, &leakage, &estimates, &thresholds, &trace),
+        trace,
         rig: "rig.toml".to_owned(),
         estimator: EstimatorKind::Rls,
         flow_meter_offsets: None,
         normalised_innovation: None,
-        verdict: Verdict::new(active, &leakage, &estimates, &thresholds),
         estimates,
         leakage,
         changed_at_s: None,
@@ -79,7 +80,7 @@ fn a_negative_leak_is_evidence_against_the_model() {
     let mut report = report(INTERNAL);
     report.leakage.external_a.mean_lpm = -0.2;
     let threshold = PerLeak { internal: 1e-6, external_a: 1e-6, external_b: 1e-6 };
-    report.verdict = Verdict::new(INTERNAL, &report.leakage, &report.estimates, &threshold);
+    report.verdict = Verdict::new(INTERNAL, &report.leakage, &report.estimates, &threshold, &report.trace);
     let text = report.to_text(&Palette::PLAIN);
     assert!(text.starts_with("DOUBTFUL  The external A leak comes out negative"), "{text}");
     assert!(text.contains("Internal leak of 0.4785"), "{text}");
@@ -103,4 +104,19 @@ fn json_has_the_contracts_fields_and_no_number_that_is_not_finite() {
     assert_eq!(json["alarms"][0]["fault"], "internal");
     assert_eq!(json["alarms"][0]["state"], "raised");
     assert!(json.get("score").is_none());
+}
+
+#[test]
+fn with_more_bad_rows_than_good_nothing_is_certain() {
+    let mut report = report(INTERNAL);
+    report.trace.skipped = 7000;
+    report.verdict = Verdict::new(
+        INTERNAL,
+        &report.leakage,
+        &report.estimates,
+        &PerLeak { internal: 1e-6, external_a: 1e-6, external_b: 1e-6 },
+        &report.trace,
+    );
+    let text = report.to_text(&Palette::PLAIN);
+    assert!(text.starts_with("DOUBTFUL  7000 of 13001 rows are bad"), "{text}");
 }

@@ -79,12 +79,13 @@ pub(super) fn verdict(
     leakage: &PerLeak<Leakage>,
     estimates: &Estimates,
     threshold_m3s: &PerLeak<f64>,
+    trace: &TraceSummary,
 ) -> String {
     let identified = estimates.leaks().map(|entry| entry.identifiable);
     let (open, judged): (Vec<_>, Vec<_>) =
         LEAKS.into_iter().filter(|leak| !faults.contains(leak)).partition(|leak| !pick(&identified, *leak));
     let impossible = LEAKS.into_iter().filter_map(|leak| impossible_sentence(leak, leakage));
-    let mut sentences: Vec<_> = impossible.collect();
+    let mut sentences: Vec<_> = mostly_bad_sentence(trace).into_iter().chain(impossible).collect();
     sentences.extend(faults.iter().map(|leak| fault_sentence(*leak, leakage)));
     if !judged.is_empty() {
         let limit = judged.iter().map(|leak| pick(threshold_m3s, *leak)).fold(0.0, f64::max) * LPM_PER_M3S;
@@ -101,6 +102,14 @@ fn fault_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> String {
     let capital = label[..1].to_uppercase() + &label[1..];
     let flow = flow_text(&pick(leakage, leak));
     format!("{capital} leak of {flow} L/min: {}.", leak.advice())
+}
+
+/// Where more rows are bad than good, what remains may not stand for the cylinder.
+fn mostly_bad_sentence(trace: &TraceSummary) -> Option<String> {
+    let rows = trace.samples + trace.skipped;
+    (trace.skipped > trace.samples).then(|| {
+        format!("{} of {rows} rows are bad and were skipped: take the figures with doubt.", trace.skipped)
+    })
 }
 
 /// A leak that feeds oil in is evidence against the model, not a leak: nothing else that the model says
@@ -202,7 +211,8 @@ impl ReplayReport {
 
     fn write_verdict(&self, out: &mut String, palette: &Palette) {
         let Verdict { faults, text } = &self.verdict;
-        let doubtful = LEAKS.into_iter().any(|leak| is_impossible(&pick(&self.leakage, leak)));
+        let impossible = LEAKS.into_iter().any(|leak| is_impossible(&pick(&self.leakage, leak)));
+        let doubtful = impossible || mostly_bad_sentence(&self.trace).is_some();
         let judged = LEAKS.into_iter().all(|leak| pick(&self.identified(), leak));
         let (word, colour) = match (doubtful, faults.is_empty(), judged) {
             (true, _, _) => ("DOUBTFUL", palette.caution),
