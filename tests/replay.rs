@@ -111,6 +111,24 @@ fn declared_effects_are_corrected() {
     );
 }
 
+/// An effect that is a standard deviation larger than the file says throws the leaks off by as much as their
+/// intervals then hold.
+#[test]
+fn uncertain_effects_widen_the_intervals() {
+    let text = trace("t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s", |t, [x, pa, pb, qa, qb], _| {
+        vec![t, x, pa, pb, qa + 1.5e-9 * pa.sqrt(), qb]
+    });
+    let effects = "[effects]\nexternal_leak_a_turbulent = { value = 1e-9, std = 0.5e-9 }\n";
+    let report = run(&format!("{RIG}{effects}"), text.clone());
+    let certain = run(&format!("{RIG}[effects]\nexternal_leak_a_turbulent = 1e-9\n"), text);
+    let leak = |report: &ReplayReport| report.estimates.leaks().external_a.clone();
+    let (wide, narrow) = (leak(&report), leak(&certain));
+    let error = (wide.value - 3e-12).abs();
+    let (wide, narrow) = (wide.std.unwrap(), narrow.std.unwrap());
+    assert!(error > 3.0 * narrow, "the effect matters here: {error} with {narrow}");
+    assert!((wide / error - 1.0).abs() < 0.1, "{wide} for {error}");
+}
+
 #[test]
 fn the_papers_law_runs_and_is_scored() {
     let report = run(&format!("{RIG}[estimator]\nkind = \"paper\"\n"), plain());

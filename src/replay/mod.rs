@@ -1,6 +1,7 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
 mod correction;
+mod effect_doubt;
 mod estimate_file;
 mod estimator;
 mod pressures;
@@ -14,6 +15,7 @@ use crate::report::{Alarm, Leak, ReplayReport};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use correction::Correction;
+use effect_doubt::EffectDoubt;
 use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
@@ -36,6 +38,7 @@ pub struct Replay {
     rig: Rig,
     correction: Option<Correction>,
     estimator: Estimator,
+    doubt: EffectDoubt,
     detector: LeakDetector<f64>,
     since_detection_s: f64,
     /// Over the trace, or since the leak changed.
@@ -51,6 +54,7 @@ impl Replay {
         Self {
             correction: Correction::of(rig),
             estimator: Estimator::new(rig),
+            doubt: EffectDoubt::of(rig),
             detector: LeakDetector::new(rig.alarms),
             since_detection_s: 0.0,
             pressures: TracePressures::default(),
@@ -64,6 +68,7 @@ impl Replay {
     /// Takes in one record; says whether the estimates are new.
     #[inline]
     pub fn push(&mut self, record: &Record) -> bool {
+        self.doubt.push(record);
         match &mut self.correction {
             None => self.take(record),
             Some(correction) => {
@@ -92,11 +97,15 @@ impl Replay {
     }
 
     fn detect(&mut self, t_s: f64) {
-        let laminar = self.estimator.mean_leak_flows_m3s();
-        let laminar = laminar.unwrap_or_else(|| self.exact_flows_m3s(&self.pressures.sizes()));
-        let flows = laminar
-            .zip(self.effect_leaks_m3s())
-            .map(|(flow, effect)| Estimate { value: flow.value + effect, ..flow });
+        let flows = self.estimator.mean_leak_flows_m3s().map(|flows| {
+            self.doubt.widen(with_effects(self.correction.as_ref(), flows), |correction, estimator| {
+                let flows = estimator.mean_leak_flows_m3s().unwrap_or_default();
+                with_effects(Some(correction), flows)
+            })
+        });
+        let flows = flows.unwrap_or_else(|| {
+            with_effects(self.correction.as_ref(), self.exact_flows_m3s(&self.pressures.sizes()))
+        });
         let changes = self.detector.update(self.since_detection_s, &flows);
         self.since_detection_s = 0.0;
         let changes = changes.zip(Leak::ALL);
@@ -105,14 +114,18 @@ impl Replay {
         }
     }
 
-    /// Mean flows of the leak effects in the rig file, m³/s.
-    fn effect_leaks_m3s(&self) -> PerLeak<f64> {
-        self.correction.as_ref().map_or_else(PerLeak::default, Correction::mean_leaks_m3s)
+    /// Leak coefficients, m³/(s·Pa); the uncertainty of the rig file's effects widens them.
+    pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
+        self.doubt.widen(self.estimator.leak_coefficients(), |_, estimator| estimator.leak_coefficients())
     }
 
-    /// Leak flows at `pressures`, eq. (15), m³/s.
+    /// Leak flows at `pressures`, eq. (15), and those of the rig file's effects, m³/s.
     fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> PerLeak<Estimate<f64>> {
-        self.estimator.leak_flows_m3s(pressures).unwrap_or_else(|| self.exact_flows_m3s(pressures))
+        let flows = self.estimator.leak_flows_m3s(pressures);
+        let flows = flows.unwrap_or_else(|| self.exact_flows_m3s(pressures));
+        self.doubt.widen(with_effects(self.correction.as_ref(), flows), |correction, estimator| {
+            with_effects(Some(correction), estimator.leak_flows_m3s(pressures).unwrap_or_default())
+        })
     }
 
     /// The paper's law knows no uncertainty: its flows are compared with the thresholds as if they were
@@ -129,7 +142,7 @@ impl Replay {
 
     /// The estimates as they stand after `record`.
     pub fn point(&self, record: &Record) -> Point {
-        let coefficients = self.estimator.leak_coefficients();
+        let coefficients = self.leak_coefficients();
         let pressures = leak_pressures_pa(record, self.estimator.pressure_biases_pa());
         let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
         Point { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
@@ -139,6 +152,12 @@ impl Replay {
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
     }
+}
+
+/// Leak flows with those that the rig file's effects carry themselves, m³/s.
+fn with_effects(correction: Option<&Correction>, flows: PerLeak<Estimate<f64>>) -> PerLeak<Estimate<f64>> {
+    let own = correction.map_or_else(PerLeak::default, Correction::mean_leaks_m3s);
+    flows.zip(own).map(|(flow, own)| Estimate { value: flow.value + own, ..flow })
 }
 
 /// Pressure across each leak, Pa: P_L, P_A, P_B as read less the biases found of the sensors A and B.

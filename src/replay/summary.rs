@@ -5,7 +5,7 @@ use crate::report::{
     EstimateEntry, Estimates, FlowMeterOffsets, LPM_PER_M3S, Leakage, ReplayReport, TraceSummary, Verdict,
 };
 use crate::trace::TraceReader;
-use pitchleak_core::{Estimate, Excitation, Parameter, PerLeak};
+use pitchleak_core::{Excitation, Parameter, PerLeak};
 
 impl Replay {
     /// The report on the trace that `reader` has read so far.
@@ -36,10 +36,10 @@ impl Replay {
         let knows_spread = self.estimator.excitation().is_some();
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
-        sizes.zip(net).zip(self.effect_leaks_m3s()).map(|((size, net), effect)| {
-            let leakage = Leakage::new(Estimate { value: size.value + effect, ..size });
+        sizes.zip(net).map(|(size, net)| {
+            let leakage = Leakage::new(size);
             Leakage {
-                net_mean_lpm: Some((net.value + effect) * LPM_PER_M3S),
+                net_mean_lpm: Some(net.value * LPM_PER_M3S),
                 std_lpm: leakage.std_lpm.filter(|_| knows_spread),
                 ..leakage
             }
@@ -49,7 +49,7 @@ impl Replay {
     fn estimates(&self) -> Estimates {
         let excitation = self.estimator.excitation();
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
-        let entries = self.estimator.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
+        let entries = self.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
             let unit = EstimateEntry::COEFFICIENT_UNIT;
             match excitation {
                 None => EstimateEntry::without_spread(coefficient.value, unit),
