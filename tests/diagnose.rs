@@ -2,7 +2,7 @@
 
 use pitchleak::Rig;
 use pitchleak::core::effects::Shape;
-use pitchleak::core::{Effect, EffectSet, PerLeak};
+use pitchleak::core::{Effect, EffectSet, Moment, PerLeak, Sample};
 use pitchleak::curve::Curve;
 use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
@@ -36,6 +36,11 @@ fn wave(lines: &[f64], amplitude: f64, offset: f64) -> Curve {
 
 /// 40 s of a rig with this effect, through sensors of 0.1 % of full scale.
 fn trace(effect: Option<(Effect, f64)>) -> Series {
+    trace_with(effect, |_| 0.0)
+}
+
+/// The same with a further force on the piston, which the load cell does not feel.
+fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Moment<f64>) -> f64) -> Series {
     let mut effects = EffectSet::default();
     if let Some((effect, size)) = effect {
         effects.set(effect, size, Shape::default()).expect("is within bounds");
@@ -59,7 +64,10 @@ fn trace(effect: Option<(Effect, f64)>) -> Series {
     let mut series = Series::default();
     let leaks = scenario.leak_coefficients().expect("given");
     scenario
-        .run(leaks, |truth| series.push(truth.t_s, &sensing.read(&truth.sample), None))
+        .run(leaks, |truth| {
+            let force_n = truth.sample.force_n.map(|force| force - resists_n(&truth.moment));
+            series.push(truth.t_s, &sensing.read(&Sample { force_n, ..truth.sample }), None);
+        })
         .expect("the plant runs");
     series
 }
@@ -115,6 +123,36 @@ fn effects_of_each_balance_are_named() {
         assert!((found.value - size).abs() < 4.0 * found.std, "{effect}: {} ± {}", found.value, found.std);
         assert_eq!(answer.verdict, Verdict::Explained, "{effect}: {:?}", answer.notes);
     }
+}
+
+/// A spring whose friction grows along the stroke: the product of two effects.
+#[test]
+fn effects_that_act_on_each_other_are_reported() {
+    for (product, expected) in [(0.0, 0), (4e4, 1)] {
+        let series = trace_with(None, |at| {
+            2e3 * at.v_mps + 3e3 * at.x_m + product * at.v_mps * at.x_m
+        });
+        let answer = ask(series, &rig());
+        let mut ids: Vec<_> = answer.effects.iter().map(|effect| effect.id).collect();
+        ids.sort_unstable();
+        assert_eq!(ids, ["load_stiffness", "viscous_friction"], "{:?}", answer.notes);
+        assert_eq!(answer.interactions.len(), expected, "{:?}", answer.interactions);
+    }
+}
+
+/// A leak that follows the valve, which no effect of the table does: what is named must not be believed.
+#[test]
+fn effects_beside_an_unexplained_remainder_are_doubted() {
+    let mut series = trace(None);
+    for at in 0..series.len() {
+        let leak = 2e-7 * series.qa_m3s[at].abs() * (series.pa_pa[at] - series.pb_pa[at]);
+        series.qa_m3s[at] += leak;
+        series.qb_m3s[at] -= leak;
+    }
+    let answer = ask(series, &rig());
+    assert_eq!(answer.verdict, Verdict::PartlyExplained, "{:?}", answer.notes);
+    assert!(answer.effects.iter().all(|effect| !effect.confident && effect.doubt.is_some()));
+    assert!(answer.to_text().contains("Doubtful"));
 }
 
 #[test]

@@ -7,7 +7,7 @@
 use super::motion::Motion;
 use super::noise::{SharedNoise, Spread, Whitening};
 use super::point::Point;
-use super::regression::{self, FOLDS, Prior, Regression, Score, Solution};
+use super::regression::{self, FOLDS, Prepared, Prior, Regression, Score, Solution};
 use super::rows::{Balance, Recipe, Rows};
 use super::series::Series;
 use super::term::{self, Term};
@@ -39,6 +39,8 @@ pub(super) struct Fit<'a> {
     pub(super) sensors: Sensors<f64>,
     pub(super) terms: Vec<Term>,
     pub(super) shapes: Vec<Shape<f64>>,
+    /// The constants that every effect starts from.
+    pub(super) plain_shape: Shape<f64>,
     pub(super) priors: Vec<Option<Prior>>,
     /// Terms that are fitted, those of the declared model first.
     pub(super) active: Vec<usize>,
@@ -84,6 +86,7 @@ impl<'a> Fit<'a> {
             sensors,
             terms,
             shapes,
+            plain_shape: shape,
             priors,
             active,
             point,
@@ -216,6 +219,11 @@ impl<'a> Fit<'a> {
         (of(self.equation_error) / of([0.0; 3])).sqrt()
     }
 
+    /// Power of what is left beyond the sensors' noise, as a multiple of that, over the balances.
+    pub(super) fn excess_power(&self) -> f64 {
+        Balance::ALL.map(|balance| self.excess(balance).powi(2) - 1.0).iter().sum()
+    }
+
     fn move_point(&mut self) {
         let found: Vec<(usize, f64)> =
             self.solution.terms.iter().copied().zip(self.solution.value.iter().copied()).collect();
@@ -266,11 +274,26 @@ impl<'a> Fit<'a> {
 
     /// The same for another shape of the term's effect.
     pub(super) fn score_shape(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Score> {
-        let (terms, shapes) = ([self.terms[term]], [shape]);
-        let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
-        let column = rows.columns.first()?;
-        let score = self.regression.score_column(model, term, self.whitening.whiten(column))?;
+        let column = self.regression.prepare(model, self.white_column(self.terms[term], shape))?;
+        let score = self.regression.score_column(model, term, &column)?;
         self.allowed(&score).then_some(score)
+    }
+
+    /// Fall of the sum of squares by a term that is not among the candidates.
+    pub(super) fn gain_of(&self, term: Term, shape: Shape<f64>) -> Option<f64> {
+        let column = self.regression.prepare(&self.scoring, self.white_column(term, shape))?;
+        Some(self.regression.gain(&self.scoring, &column))
+    }
+
+    /// The column of a term with this shape, with what a model's terms explain of it.
+    pub(super) fn prepare(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Prepared> {
+        self.regression.prepare(model, self.white_column(self.terms[term], shape))
+    }
+
+    fn white_column(&self, term: Term, shape: Shape<f64>) -> Vec<f64> {
+        let (terms, shapes) = ([term], [shape]);
+        let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
+        rows.columns.first().map(|column| self.whitening.whiten(column)).unwrap_or_default()
     }
 
     pub(super) fn allowed(&self, score: &Score) -> bool {
@@ -278,11 +301,13 @@ impl<'a> Fit<'a> {
         (lower..=upper).contains(&score.value)
     }
 
-    /// The fit with one effect held at zero: no new pass over the data.
-    pub(super) fn solve_without(&self, term: usize) -> Solution {
+    /// The fit with some effects held at zero: no new pass over the data.
+    pub(super) fn solve_without(&self, terms: &[usize]) -> Solution {
         let mut priors = self.increments();
-        let mean = -self.point.value(self.terms[term]);
-        priors[term] = self.estimate(term).map(|(_, std)| Prior { mean, std: HELD * std });
+        for term in terms {
+            let mean = -self.point.value(self.terms[*term]);
+            priors[*term] = self.estimate(*term).map(|(_, std)| Prior { mean, std: HELD * std });
+        }
         self.regression.solve(&self.active, &priors)
     }
 

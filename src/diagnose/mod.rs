@@ -10,8 +10,11 @@
 //! The derivation is in `docs/closing-the-loop.md`.
 
 mod adequacy;
+mod exchange;
 mod fit;
 mod held_out;
+mod interaction;
+mod likeness;
 mod motion;
 mod noise;
 mod outcome;
@@ -25,9 +28,10 @@ mod term;
 mod text;
 mod whiteness;
 
+pub use likeness::{Likeness, Look};
 pub use outcome::{
-    Calibration, Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality, Residual,
-    Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
+    Calibration, Diagnosis, FoundEffect, Interaction, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality,
+    Residual, Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
 };
 pub use series::Series;
 
@@ -68,6 +72,9 @@ const FEWEST_ROWS: usize = 30;
 const DETECTABLE_SIGMA: f64 = 5.0;
 /// Additions, counting those that are taken back.
 const MOST_STEPS: usize = 8;
+/// Effects that leave more than this share of the excess over the sensors' noise are not to be believed.
+const UNMENDED: f64 = 0.1;
+const DOUBT: &str = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be believed without a measurement of its own";
 /// A leak this many standard deviations below zero is evidence against the model.
 const NEGATIVE_SIGMA: f64 = 3.0;
 /// A leak known to within this flow at the mean pressure is identified, m³/s (0.1 L/min).
@@ -104,31 +111,28 @@ impl Declared {
 /// Fits all of `train` as traces of one rig and judges on `test`, or, where that is empty, on blocks
 /// of `train` that each fit leaves out.
 pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress: Progress<'_>) -> Diagnosis {
-    let thin = |traces: &[Series]| -> (Vec<Series>, usize) {
-        let thinned: Vec<_> = traces.iter().map(|series| series.thinned(LEAST_STEP_S)).collect();
-        let count = thinned.iter().map(|(_, count)| *count).min().unwrap_or(1);
-        (thinned.into_iter().map(|(series, _)| series).collect(), count)
-    };
-    let ((train, count), (test, _)) = (thin(train), thin(test));
-    let declared = declared.averaged(count);
+    let (test, _) = thinned(test, declared);
+    let (train, declared) = thinned(train, declared);
     let checks = adequacy::check_sensors(&train, &declared.sensors);
-    let sensors = adequacy::effective(&declared.sensors, &checks);
-    let shape = friction_shape(&train, &declared);
-    let mut fit = Fit::declared(&train, &declared, sensors, shape, progress);
+    let mut fit = declared_fit(&train, &declared, &checks, progress);
     let left_before = HeldOut::of(&fit, &test);
     let before = Quality { rmse: left_before.rmse(), whiteness_p: adequacy::whiteness_p(&fit) };
     let leaks_before = leaks(&fit);
-    let (mut named, mut mended) = (Vec::<Named>::new(), BTreeMap::new());
+    let mut named = Vec::<Named>::new();
     let excited = is_excited(&fit);
+    let excess_before = fit.excess_power();
     let mut last = before.rmse;
     for _ in 0..if excited { MOST_STEPS } else { 0 } {
         let Some(one) = select::add_next(&mut fit, progress) else { break };
-        let now = HeldOut::of(&fit, &test).rmse();
-        mended.insert(one.term, reduction_percent(&last, &now));
-        last = now;
         named.push(one);
         select::drop_needless(&mut fit, &mut named, progress);
+        exchange::settle(&mut fit, &mut named, progress);
+        let now = HeldOut::of(&fit, &test).rmse();
+        let mended = reduction_percent(&last, &now);
+        named.iter_mut().for_each(|one| _ = one.mended_percent.get_or_insert(mended));
+        last = now;
     }
+    select::drop_doubtful(&mut fit, &mut named, progress);
     select::find_confusable(&fit, &mut named);
     let ripples: Vec<_> = checks.iter().filter(|check| check.is_ripple()).collect();
     let mut notes: Vec<String> = adequacy::complaints(&fit);
@@ -136,11 +140,19 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         let ratio = check.found.std / check.declared_std;
         format!("{}: fast, regular noise {ratio:.1} times the declared one (a ripple)", check.name)
     }));
-    if named.iter().any(|one| one.outdone) {
+    let outdone = named.iter().any(|one| one.outdone);
+    if outdone {
         notes.push("a product of signals without a name fits better than any known effect".to_owned());
     }
     let verdict = verdict(excited, named.is_empty(), notes.is_empty());
+    let mends_nearly_all = !outdone && fit.excess_power() < UNMENDED * excess_before;
+    let confident = verdict == Verdict::Explained || mends_nearly_all;
     notes.extend(negative_leaks(&leaks_before, "the declared model"));
+    let interactions = interaction::interactions(&fit, &named);
+    notes.extend(interactions.iter().map(|found| {
+        let Interaction { effects: [one, other], sigma, mended_percent } = found;
+        format!("{one} and {other} act on each other: the product of their terms shows at {sigma:.1} sigma and would mend {mended_percent:.1} %")
+    }));
     let leaks_after = leaks(&fit);
     if !named.is_empty() {
         notes.extend(negative_leaks(&leaks_after, "the model with the effects"));
@@ -149,7 +161,8 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     Diagnosis {
         schema: "pitchleak.diagnose/1",
         before,
-        effects: named.iter().filter_map(|one| found(&fit, one, mended.get(&one.term).copied())).collect(),
+        effects: named.iter().filter_map(|one| found(&fit, one, confident)).collect(),
+        interactions,
         after: Quality { rmse: left.rmse(), whiteness_p: adequacy::whiteness_p(&fit) },
         calibration: calibration(&fit),
         leaks: LeaksBeforeAfter { before: leaks_before, after: leaks_after },
@@ -162,6 +175,24 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         residual_before: left_before.residual(),
         residual: left.residual(),
     }
+}
+
+/// Traces at the speed of the machine, and what is declared of their means.
+fn thinned(traces: &[Series], declared: &Declared) -> (Vec<Series>, Declared) {
+    let thin: Vec<_> = traces.iter().map(|series| series.thinned(LEAST_STEP_S)).collect();
+    let count = thin.iter().map(|(_, count)| *count).min().unwrap_or(1);
+    (thin.into_iter().map(|(series, _)| series).collect(), declared.averaged(count))
+}
+
+/// Best fit of the declared model, with the noise that the sensors really carry.
+fn declared_fit<'a>(
+    traces: &'a [Series],
+    declared: &Declared,
+    checks: &[adequacy::SensorCheck],
+    progress: Progress<'_>,
+) -> Fit<'a> {
+    let sensors = adequacy::effective(&declared.sensors, checks);
+    Fit::declared(traces, declared, sensors, friction_shape(traces, declared), progress)
 }
 
 fn verdict(excited: bool, none_named: bool, complete: bool) -> Verdict {
@@ -259,7 +290,7 @@ fn negative_leaks(leaks: &LeakEstimates, model: &str) -> Vec<String> {
     .collect()
 }
 
-fn found(fit: &Fit<'_>, one: &Named, mended: Option<f64>) -> Option<FoundEffect> {
+fn found(fit: &Fit<'_>, one: &Named, confident: bool) -> Option<FoundEffect> {
     let effect = fit.terms[one.term].effect()?;
     let (value, std) = fit.estimate(one.term)?;
     let spec = effect.spec();
@@ -271,14 +302,23 @@ fn found(fit: &Fit<'_>, one: &Named, mended: Option<f64>) -> Option<FoundEffect>
         value,
         std: std * fit.dispersion(fit.solution.chi2).sqrt(),
         unit: spec.unit,
-        rmse_reduction_percent: mended.unwrap_or(0.0),
+        confident,
+        doubt: (!confident).then_some(DOUBT),
+        rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
         p_value: one.p_value,
-        separated_by: (!confusable_with.is_empty()).then(|| separation(effect)),
+        separated_by: separation(effect, &one.confusable_with),
         confusable_with,
         shape,
         cause: spec.cause,
         remedy: spec.remedy,
     })
+}
+
+/// The measurements that tell an effect from its rivals: what shows each of them alone.
+fn separation(effect: Effect, rivals: &[Effect]) -> Option<String> {
+    let group = std::iter::once(&effect).chain(rivals);
+    let measurements: Vec<_> = group.map(|one| one.spec().measurement).collect();
+    (!rivals.is_empty()).then(|| measurements.join(" "))
 }
 
 fn calibration(fit: &Fit<'_>) -> Vec<Calibration> {
@@ -311,28 +351,6 @@ impl Diagnosis {
             with.effects.insert(effect, EffectValue { value, std: Some(std), shape });
         }
         with
-    }
-}
-
-/// What would tell an effect from its rivals.
-fn separation(effect: Effect) -> &'static str {
-    match effect {
-        Effect::FlowMeterOffsetA
-        | Effect::FlowMeterOffsetB
-        | Effect::PressureOffsetA
-        | Effect::PressureOffsetB => {
-            "a minute with the valves shut and the lines vented: an offset stays, a leak does not"
-        }
-        Effect::PositionGain | Effect::FlowMeterGainA | Effect::FlowMeterGainB | Effect::DragLeak => {
-            "a full stroke between the end stops, whose swept volume is known"
-        }
-        Effect::DeadVolumeA
-        | Effect::DeadVolumeB
-        | Effect::PositionOffset
-        | Effect::EntrainedAir
-        | Effect::AccumulatorA
-        | Effect::AccumulatorB => "pressure steps at both ends of the stroke, at low and at high pressure",
-        _ => "a trace with a wider range of pressure, speed and position",
     }
 }
 

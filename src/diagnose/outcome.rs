@@ -61,15 +61,20 @@ pub struct FoundEffect {
     pub std: f64,
     /// SI; 1 for a share.
     pub unit: &'static str,
+    /// Whether the name can be believed: false while much is left that no effect explains.
+    pub confident: bool,
+    /// Why not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<&'static str>,
     /// By how much the held-out error of the balance it mends most falls when it is added.
     pub rmse_reduction_percent: f64,
     /// Chance of so large a score without the effect.
     pub p_value: f64,
     /// Effects that these traces cannot tell from it.
     pub confusable_with: Vec<&'static str>,
-    /// What else would tell them apart.
+    /// The measurements that would tell them apart.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub separated_by: Option<&'static str>,
+    pub separated_by: Option<String>,
     /// Constants in which the effect is not linear.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub shape: BTreeMap<&'static str, f64>,
@@ -77,6 +82,17 @@ pub struct FoundEffect {
     pub cause: &'static str,
     /// What to do about it.
     pub remedy: &'static str,
+}
+
+/// Two effects that act on each other: the product of their terms explains more than chance would.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Interaction {
+    /// The two.
+    pub effects: [&'static str; 2],
+    /// Score of the product, in standard deviations.
+    pub sigma: f64,
+    /// Share of the whitened sum of squares that it would mend, percent.
+    pub mended_percent: f64,
 }
 
 /// A sensor's error that the rig file declares possible, as these traces show it.
@@ -175,6 +191,9 @@ pub struct Diagnosis {
     pub before: Quality,
     /// Strongest first.
     pub effects: Vec<FoundEffect>,
+    /// Pairs of these effects that act on each other.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub interactions: Vec<Interaction>,
     /// With the effects.
     pub after: Quality,
     /// Offsets and gains that the rig file declares possible, as found with the effects.

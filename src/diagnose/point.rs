@@ -50,7 +50,7 @@ impl Point {
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
             }
-            Term::Nameless(_) => 0.0,
+            Term::Nameless(_) | Term::Product(..) => 0.0,
         }
     }
 
@@ -65,7 +65,7 @@ impl Point {
             Term::ExternalA => leaks.external_a_m3spa = value,
             Term::ExternalB => leaks.external_b_m3spa = value,
             Term::Effect(effect) => self.set_effect(effect, value, shape),
-            Term::Nameless(_) => {}
+            Term::Nameless(_) | Term::Product(..) => {}
         }
     }
 

@@ -57,6 +57,28 @@ pub(super) struct Score {
     pub(super) std: f64,
 }
 
+/// A column outside the regression, and what a solution's terms explain of it.
+pub(super) struct Prepared {
+    unit: Vec<f64>,
+    scale: f64,
+    cross: DVector<f64>,
+    explained: DVector<f64>,
+    fresh: f64,
+}
+
+impl Prepared {
+    /// Standard deviation of its size beside the solution's terms.
+    pub(super) fn std(&self) -> f64 {
+        1.0 / self.fresh.sqrt() / self.scale
+    }
+
+    /// Correlation of what is new in two columns.
+    pub(super) fn correlation(&self, other: &Self) -> f64 {
+        let product = self.unit.iter().zip(&other.unit).map(|(a, b)| a * b).sum::<f64>();
+        (product - self.cross.dot(&other.explained)) / (self.fresh * other.fresh).sqrt()
+    }
+}
+
 impl Regression {
     /// `shared` are realisations of the noise that columns share with the residual. Their mean products
     /// are taken off the Gram matrices, so that on average only the signals are left in them (corrected
@@ -221,7 +243,22 @@ impl Regression {
     }
 
     /// The same for a column that is not part of the regression.
-    pub(super) fn score_column(&self, solution: &Solution, term: usize, white: Vec<f64>) -> Option<Score> {
+    pub(super) fn score_column(&self, solution: &Solution, term: usize, column: &Prepared) -> Option<Score> {
+        self.score_of(solution, term, &column.cross, (1.0, self.with_y(column)), column.scale)
+    }
+
+    /// By how much the sum of squares falls with such a column.
+    pub(super) fn gain(&self, solution: &Solution, column: &Prepared) -> f64 {
+        let pull = self.with_y(column) - column.cross.dot(&solution.scaled);
+        pull * pull / column.fresh
+    }
+
+    fn with_y(&self, column: &Prepared) -> f64 {
+        column.unit.iter().zip(&self.y).map(|(a, b)| a * b).sum()
+    }
+
+    /// A whitened column and its products with a solution's terms; none where it does not show.
+    pub(super) fn prepare(&self, solution: &Solution, white: Vec<f64>) -> Option<Prepared> {
         let white =
             white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect();
         let (unit, scale) = normalised(white);
@@ -233,7 +270,9 @@ impl Regression {
             solution.terms.len(),
             solution.terms.iter().map(|other| dot(&self.columns[*other])),
         );
-        self.score_of(solution, term, &cross, (1.0, dot(&self.y)), scale)
+        let explained = &solution.inverse * &cross;
+        let fresh = 1.0 - cross.dot(&explained);
+        (fresh >= LEAST_NEW_SHARE).then_some(Prepared { unit, scale, cross, explained, fresh })
     }
 
     fn score_of(

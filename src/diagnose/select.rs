@@ -3,7 +3,7 @@
 
 use super::Progress;
 use super::fit::Fit;
-use super::regression::{FOLDS, Score};
+use super::regression::{FOLDS, Score, Solution};
 use super::shape;
 use super::term::Term;
 use super::whiteness;
@@ -20,8 +20,10 @@ const MOST_EFFECTS: usize = 5;
 const LEAST_MENDED_SHARE: f64 = 0.02;
 /// A candidate below this share of the best is not worth a search for its shape.
 const IN_THE_RUNNING: f64 = 0.4;
+/// Standard deviations by the jackknife that an effect must have beside an unexplained remainder.
+const AGREED_SIGMA: f64 = 3.0;
 /// Candidates whose fit is this close (three standard deviations) cannot be told apart.
-const CONFUSABLE_GAIN: f64 = 9.0;
+pub(super) const CONFUSABLE_GAIN: f64 = 9.0;
 
 /// One effect of the answer, as an index into the fit's terms.
 #[derive(Clone, Debug)]
@@ -29,9 +31,30 @@ pub(super) struct Named {
     pub(super) term: usize,
     /// Chance of so large a score without the effect.
     pub(super) p_value: f64,
+    /// Fall of the held-out error when it was added, percent; none before that is known.
+    pub(super) mended_percent: Option<f64>,
     pub(super) confusable_with: Vec<Effect>,
     /// A shape without a name would have fitted better.
     pub(super) outdone: bool,
+}
+
+/// A candidate at its best: with the constants it starts from, or with fitted ones, which have to be paid for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trial {
+    pub(super) score: Score,
+    pub(super) shape: Shape<f64>,
+    critical_sigma: f64,
+}
+
+impl Trial {
+    fn of(fit: &Fit<'_>, (score, shape): (Score, Shape<f64>)) -> Self {
+        Self { score, shape, critical_sigma: critical_sigma(fit, shape) }
+    }
+
+    /// By how much its gain passes what chance could bring: the measure by which candidates compete.
+    pub(super) fn beyond(&self, dispersion: f64) -> f64 {
+        self.score.gain / dispersion - self.critical_sigma.powi(2)
+    }
 }
 
 /// Indices of the candidates that can be named.
@@ -41,11 +64,29 @@ pub(super) fn candidates(fit: &Fit<'_>) -> Vec<usize> {
     (0..fit.terms.len()).filter(open).collect()
 }
 
-/// The size in σ that a candidate's score needs.
-pub(super) fn critical_sigma(fit: &Fit<'_>, term: usize) -> f64 {
+/// The size in σ that the score of a candidate with these constants needs.
+pub(super) fn critical_sigma(fit: &Fit<'_>, shape: Shape<f64>) -> f64 {
     let count = fit.terms.iter().filter(|term| term.effect().is_some()).count();
-    let trials = if shape::is_fitted(fit, term) { SHAPE_TRIALS } else { 1 };
+    let trials = if shape == fit.plain_shape { 1 } else { SHAPE_TRIALS };
     whiteness::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
+}
+
+/// Every candidate at its best against the present model, the best first.
+pub(super) fn trials(fit: &Fit<'_>, model: &Solution) -> Vec<Trial> {
+    let starts: Vec<Vec<(Score, Shape<f64>)>> =
+        candidates(fit).into_iter().map(|term| shape::first_scores(fit, model, term)).collect();
+    let gains = starts.iter().flatten().map(|(score, _)| score.gain);
+    let worth = IN_THE_RUNNING * gains.fold(0.0, f64::max);
+    let dispersion = fit.dispersion(model.chi2);
+    let best = |starts: Vec<(Score, Shape<f64>)>| {
+        let top = starts.iter().copied().max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
+        let climbed = (top.0.gain > worth).then(|| shape::best_score(fit, model, top));
+        let all = starts.into_iter().chain(climbed).map(|one| Trial::of(fit, one));
+        all.max_by(|a, b| a.beyond(dispersion).total_cmp(&b.beyond(dispersion)))
+    };
+    let mut trials: Vec<Trial> = starts.into_iter().filter_map(best).collect();
+    trials.sort_by(|a, b| b.beyond(dispersion).total_cmp(&a.beyond(dispersion)));
+    trials
 }
 
 /// Adds the next effect and fits again; none when nothing further is significant.
@@ -55,46 +96,53 @@ pub(super) fn add_next(fit: &mut Fit<'_>, progress: Progress<'_>) -> Option<Name
     if added >= MOST_EFFECTS {
         return None;
     }
-    let mut scores: Vec<(Score, Shape<f64>)> =
-        candidates(fit).into_iter().filter_map(|term| shape::first_score(fit, &fit.scoring, term)).collect();
-    let best = scores.iter().map(|(score, _)| score.gain).fold(0.0, f64::max);
-    for entry in scores.iter_mut().filter(|(score, _)| score.gain > IN_THE_RUNNING * best) {
-        *entry = shape::best_score(fit, entry.0.term, *entry);
-    }
-    scores.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
     let nameless = nameless_gain(fit);
-    for (score, shape) in scores {
+    for trial in trials(fit, &fit.scoring) {
+        let score = trial.score;
         let dispersion = fit.dispersion(fit.scoring.chi2 - score.gain);
-        let significance = score.gain / dispersion;
-        if significance < critical_sigma(fit, score.term).powi(2) {
+        if trial.beyond(dispersion) < 0.0 {
             continue;
         }
         let mended = score.gain / fit.scoring.chi2;
         if fit.is_incomplete() && mended < LEAST_MENDED_SHARE {
             continue;
         }
-        fit.reshape(score.term, shape);
+        fit.reshape(score.term, trial.shape);
         if !holds_out(fit, &score) {
+            fit.reshape(score.term, fit.plain_shape);
             continue;
         }
         let outdone = nameless > score.gain + CONFUSABLE_GAIN * dispersion;
-        fit.active.push(score.term);
-        fit.refit(progress);
-        polish(fit, score.term, progress);
-        let p_value = whiteness::chi2_p(significance, 1.0);
-        return Some(Named { term: score.term, p_value, confusable_with: vec![], outdone });
+        let p_value = whiteness::chi2_p(score.gain / dispersion, 1.0);
+        take(fit, &trial, progress);
+        return Some(Named {
+            term: score.term,
+            p_value,
+            mended_percent: None,
+            confusable_with: vec![],
+            outdone,
+        });
     }
     None
 }
 
+/// Takes a candidate into the model and fits again, its constants too.
+pub(super) fn take(fit: &mut Fit<'_>, trial: &Trial, progress: Progress<'_>) {
+    let term = trial.score.term;
+    fit.reshape(term, trial.shape);
+    fit.active.push(term);
+    fit.refit(progress);
+    if trial.shape != fit.plain_shape {
+        polish(fit, term, progress);
+    }
+}
+
 /// Fits the constants of a new effect again, now that what it leaves is no longer in the way.
 fn polish(fit: &mut Fit<'_>, term: usize, progress: Progress<'_>) {
-    if !shape::is_fitted(fit, term) {
-        return;
-    }
     fit.set_aside(term, progress);
-    if let Some(first) = shape::first_score(fit, &fit.scoring, term) {
-        let (_, shape) = shape::best_score(fit, term, first);
+    let starts = shape::first_scores(fit, &fit.scoring, term);
+    if let Some(first) = starts.into_iter().max_by(|a, b| a.0.gain.total_cmp(&b.0.gain)) {
+        let (_, shape) = shape::best_score(fit, &fit.scoring, first);
         fit.reshape(term, shape);
     }
     fit.active.push(term);
@@ -117,8 +165,7 @@ fn holds_out(fit: &Fit<'_>, score: &Score) -> bool {
 pub(super) fn drop_needless(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress: Progress<'_>) {
     let dispersion = fit.dispersion(fit.scoring.chi2);
     let needless = |fit: &Fit<'_>, term: usize| {
-        let loss = fit.solve_without(term).chi2 - fit.scoring.chi2;
-        loss / dispersion < critical_sigma(fit, term).powi(2)
+        loss(fit, &[term]) / dispersion < critical_sigma(fit, fit.shapes[term]).powi(2)
     };
     let Some(at) = named.iter().position(|n| needless(fit, n.term)) else { return };
     let gone = named.remove(at).term;
@@ -126,20 +173,36 @@ pub(super) fn drop_needless(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress:
     fit.refit(progress);
 }
 
-/// Names for each effect those candidates that would explain the data nearly as well in its place.
+/// Drops effects that the pieces of the data do not agree upon: where the model stays incomplete, a good score alone
+/// may be the work of something else.
+pub(super) fn drop_doubtful(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress: Progress<'_>) {
+    while fit.is_incomplete() {
+        let ratio = |one: &Named| fit.estimate(one.term).map_or(0.0, |(value, std)| value.abs() / std);
+        let weakest = named.iter().enumerate().min_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)));
+        let Some((at, one)) = weakest.filter(|(_, one)| ratio(one) < AGREED_SIGMA) else { return };
+        fit.remove(one.term);
+        fit.refit(progress);
+        named.remove(at);
+    }
+}
+
+/// By how much the sum of squares rises without some of the effects.
+pub(super) fn loss(fit: &Fit<'_>, terms: &[usize]) -> f64 {
+    fit.solve_without(terms).chi2 - fit.scoring.chi2
+}
+
+/// Names for each effect those candidates that would explain the data nearly as well in its place, and
+/// orders the effects by what the fit loses without them.
 pub(super) fn find_confusable(fit: &Fit<'_>, named: &mut [Named]) {
     let dispersion = fit.dispersion(fit.scoring.chi2);
-    let open = candidates(fit);
-    for one in named {
-        let without = fit.solve_without(one.term);
+    for one in named.iter_mut() {
+        let without = fit.solve_without(&[one.term]);
         let lost = without.chi2 - fit.scoring.chi2;
-        let close = |term: &usize| {
-            let score = shape::first_score(fit, &without, *term).map(|(score, _)| score);
-            score.is_some_and(|score| lost - score.gain < CONFUSABLE_GAIN * dispersion)
-        };
-        let groups = open.iter().copied().filter(close);
-        one.confusable_with = groups.filter_map(|term| fit.terms[term].effect()).collect();
+        let close = |trial: &Trial| lost - trial.score.gain < CONFUSABLE_GAIN * dispersion;
+        let rivals = trials(fit, &without).into_iter().filter(close);
+        one.confusable_with = rivals.filter_map(|trial| fit.terms[trial.score.term].effect()).collect();
     }
+    named.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
 }
 
 /// Largest gain of a shape that has no name.

@@ -132,29 +132,35 @@ pub(super) struct FastNoise {
 const THIRD_DIFFERENCE_GAIN: f64 = 20.0;
 
 /// Noise by third differences: what the machine does within three samples is smooth, so that only
-/// noise (and ripple faster than that) is left. Variances are averaged over `signals`.
+/// noise (and ripple faster than that) is left. The middle size of all `signals` counts: a few jolts, as where
+/// a valve switches, are motion and no noise.
 pub(super) fn fast_noise<'a>(signals: impl Iterator<Item = &'a [f64]>) -> FastNoise {
     const LAGS: std::ops::RangeInclusive<usize> = 4..=12;
     let mut power = 0.0;
-    let mut count = 0_usize;
+    let mut sizes = Vec::new();
     let mut products = [0.0; 13];
     for signal in signals {
         let third: Vec<f64> =
             signal.windows(4).map(|w| w[3] - w[0] + 3.0 * (w[1] - w[2])).filter(|d| d.is_finite()).collect();
         power += third.iter().map(|d| d * d).sum::<f64>();
-        count += third.len();
         for lag in LAGS {
             if let Some(later) = third.get(lag..) {
                 products[lag] += third.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
             }
         }
+        sizes.extend(third.into_iter().map(f64::abs));
     }
-    if count == 0 || power <= 0.0 {
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() || power <= 0.0 {
         return FastNoise::default();
     }
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
     let colour = LAGS.map(|lag| (products[lag] / power).abs()).fold(0.0, f64::max);
-    FastNoise { std: (power / count as f64 / THIRD_DIFFERENCE_GAIN).sqrt(), colour }
+    FastNoise { std: median / NORMAL_MEDIAN / THIRD_DIFFERENCE_GAIN.sqrt(), colour }
 }
+
+/// Median of the size of a standard normal number.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_082;
 
 #[cfg(test)]
 mod tests {

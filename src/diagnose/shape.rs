@@ -28,8 +28,7 @@ impl Range {
     }
 }
 
-/// The constants of an effect that are fitted: not those that the sensors set (the speed within which
-/// friction turns) nor those that only fix a reference.
+/// The constants of an effect that are fitted: not those that only fix a reference.
 fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     let Some(effect) = fit.terms[term].effect() else { return vec![] };
     effect.shape_parameters().iter().filter_map(|parameter| range(fit, *parameter)).collect()
@@ -54,43 +53,63 @@ fn range(fit: &Fit<'_>, parameter: ShapeParameter) -> Option<Range> {
         ShapeParameter::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
         // Slow to fast.
         ShapeParameter::PolytropicExponent => (1.0, 1.4),
-        ShapeParameter::SlipSpeed | ShapeParameter::ReferenceTemp => return None,
+        ShapeParameter::SlipSpeed => {
+            let (_, high) = span(&|row| row.mean.v_mps.abs());
+            (fit.plain_shape.slip_speed_mps, 0.3 * high)
+        }
+        ShapeParameter::ReferenceTemp => return None,
     };
     let spec = parameter.spec();
     let (low, high) = (low.max(spec.lower), high.min(spec.upper));
     (high > low).then_some(Range { parameter, low, high })
 }
 
-/// Whether the effect's score depends on a fitted constant.
-pub(super) fn is_fitted(fit: &Fit<'_>, term: usize) -> bool {
-    !free(fit, term).is_empty()
+/// The constants with which the search for a candidate's begins: the present ones and a few places of each range.
+fn starts(fit: &Fit<'_>, term: usize) -> Vec<Shape<f64>> {
+    let ranges = free(fit, term);
+    let middle =
+        ranges.iter().fold(fit.shapes[term], |shape, other| shape.with(other.parameter, other.at(0.3)));
+    let places = ranges.iter().flat_map(|range| STARTS.map(|share| (range, share)));
+    let plain = (fit.shapes[term] != fit.plain_shape).then_some(fit.plain_shape);
+    plain
+        .into_iter()
+        .chain(places.map(|(range, share)| middle.with(range.parameter, range.at(share))))
+        .collect()
 }
 
-/// The best score of a candidate over a few places of its constants, with their values.
-pub(super) fn first_score(fit: &Fit<'_>, model: &Solution, term: usize) -> Option<(Score, Shape<f64>)> {
+/// The scores of a candidate with its present constants and over a few places of their ranges.
+pub(super) fn first_scores(fit: &Fit<'_>, model: &Solution, term: usize) -> Vec<(Score, Shape<f64>)> {
     let plain = fit.score(model, term).map(|score| (score, fit.shapes[term]));
-    let ranges = free(fit, term);
-    let starts = ranges.iter().flat_map(|range| STARTS.map(|share| (range, share)));
-    let tried = starts.filter_map(|(range, share)| {
-        let middle =
-            ranges.iter().fold(fit.shapes[term], |shape, other| shape.with(other.parameter, other.at(0.3)));
-        let shape = middle.with(range.parameter, range.at(share));
-        Some((fit.score_shape(model, term, shape)?, shape))
-    });
-    tried.chain(plain).max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))
+    let tried = starts(fit, term).into_iter();
+    let tried = tried.filter_map(|shape| Some((fit.score_shape(model, term, shape)?, shape)));
+    plain.into_iter().chain(tried).collect()
+}
+
+/// Constants that stand for all a candidate can have: its own if it has none that are fitted.
+pub(super) fn places(fit: &Fit<'_>, term: usize, also: &[Shape<f64>]) -> Vec<Shape<f64>> {
+    let present = std::iter::once(fit.shapes[term]);
+    let has_constants = fit.terms[term].effect().is_some_and(|effect| !effect.shape_parameters().is_empty());
+    let shaped = if has_constants { also } else { &[] };
+    present.chain(starts(fit, term)).chain(shaped.iter().copied()).collect()
 }
 
 /// The best score over its constants, from there on.
-pub(super) fn best_score(fit: &Fit<'_>, term: usize, first: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
-    let dispersion = fit.dispersion(fit.scoring.chi2 - first.0.gain);
+pub(super) fn best_score(fit: &Fit<'_>, model: &Solution, first: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
+    let dispersion = fit.dispersion(model.chi2 - first.0.gain);
     if first.0.gain / dispersion < WORTH_SEARCHING {
         return first;
     }
-    climb(fit, term, &free(fit, term), first)
+    climb(fit, model, &free(fit, first.0.term), first)
 }
 
 /// Pattern search (Hooke and Jeeves 1961): a step along each constant, halved when none helps.
-fn climb(fit: &Fit<'_>, term: usize, ranges: &[Range], start: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
+fn climb(
+    fit: &Fit<'_>,
+    model: &Solution,
+    ranges: &[Range],
+    start: (Score, Shape<f64>),
+) -> (Score, Shape<f64>) {
+    let term = start.0.term;
     let mut best = start;
     let mut share = FIRST_STEP;
     for _ in 0..MOST_STEPS {
@@ -101,7 +120,7 @@ fn climb(fit: &Fit<'_>, term: usize, ranges: &[Range], start: (Score, Shape<f64>
         let tried = steps.filter_map(|(range, share)| {
             let value = best.1.get(range.parameter) + share * (range.high - range.low);
             let shape = best.1.with(range.parameter, value.clamp(range.low, range.high));
-            Some((fit.score_shape(&fit.scoring, term, shape)?, shape))
+            Some((fit.score_shape(model, term, shape)?, shape))
         });
         match tried.max_by(|a, b| a.0.gain.total_cmp(&b.0.gain)) {
             Some(better) if better.0.gain > best.0.gain + LEAST_CLIMB => best = better,

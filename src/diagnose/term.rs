@@ -19,6 +19,8 @@ pub(super) enum Term {
     Effect(Effect),
     /// A product of signals that no known effect makes.
     Nameless(Nameless),
+    /// The product of two effects' terms, balance by balance: one acts on the other.
+    Product(Effect, Effect),
 }
 
 /// Shapes that stand for effects nobody listed.
@@ -91,6 +93,9 @@ impl Term {
             Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
             Self::Effect(effect) => effect.unit_term(at, model, shape),
             Self::Nameless(shape) => shape.unit_term(at),
+            Self::Product(one, other) => {
+                one.unit_term(at, model, shape).zip(other.unit_term(at, model, shape), |a, b| a * b)
+            }
         }
     }
 
@@ -112,6 +117,7 @@ impl Term {
                     )
             }
             Self::Nameless(shape) => shape == Nameless::SquareFriction,
+            Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
             _ => false,
         }
     }

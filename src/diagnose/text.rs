@@ -78,8 +78,11 @@ fn write_effect(out: &mut String, effect: &FoundEffect) {
     let _ = writeln!(out, "\n{}: {:.4e} ± {:.1e}{unit}", effect.id, effect.value, effect.std);
     let _ = writeln!(out, "  {}", effect.cause);
     let _ = writeln!(out, "  To do: {}", effect.remedy);
-    if let (false, Some(separation)) = (effect.confusable_with.is_empty(), effect.separated_by) {
+    if let Some(doubt) = effect.doubt {
+        let _ = writeln!(out, "  Doubtful: {doubt}.");
+    }
+    if let Some(separation) = &effect.separated_by {
         let rivals = effect.confusable_with.join(", ");
-        let _ = writeln!(out, "  These traces cannot tell it from: {rivals}. Would tell: {separation}.");
+        let _ = writeln!(out, "  These traces cannot tell it from: {rivals}. Would tell: {separation}");
     }
 }

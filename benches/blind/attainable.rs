@@ -1,0 +1,75 @@
+//! How often the exact likelihood itself would put the true effect first.
+
+use pitchleak::core::Effect;
+use pitchleak::core::effects::Shape;
+use pitchleak::diagnose::Likeness;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const DRAWS: u64 = 2000;
+/// Added to the correlations' diagonal, which fitted constants leave nearly singular.
+const WHIFF: f64 = 1e-9;
+
+/// What could be expected of one effect of one size.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Attainable {
+    /// Share of draws in which its score is the largest and large enough to be named.
+    pub first: f64,
+    /// Standard deviations between it and its nearest rival.
+    pub apart_sigma: f64,
+    pub rival: &'static str,
+}
+
+/// Lower Cholesky factor.
+fn factor(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = matrix.len();
+    let mut lower = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            lower[i][j] = if i == j {
+                (matrix[i][i] + WHIFF - sum).max(WHIFF).sqrt()
+            } else {
+                (matrix[i][j] - sum) / lower[j][j]
+            };
+        }
+    }
+    lower
+}
+
+/// Draws the scores of all candidates: their mean follows from the correlation with the truth's column, their
+/// covariance is the correlation itself. Sizes that physics forbids do not compete, and fitted constants
+/// pay for their trials as in the diagnosis.
+pub fn attainable(likeness: &Likeness, truth: Effect, shape: Shape<f64>, size: f64) -> Option<Attainable> {
+    let looks = &likeness.looks;
+    let at = looks.iter().rposition(|look| look.effect == truth && look.shape == shape);
+    let at = at.or_else(|| looks.iter().position(|look| look.effect == truth))?;
+    let sigma = size / looks[at].std;
+    let toward = &likeness.correlation[at];
+    let rivals = looks.iter().zip(toward).filter(|(look, _)| look.effect != truth);
+    let (nearest, r) = rivals.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let lower = factor(&likeness.correlation);
+    let mut random = ChaCha8Rng::seed_from_u64(truth as u64);
+    let first = (0..DRAWS)
+        .filter(|_| {
+            let unit: Vec<f64> = looks.iter().map(|_| StandardNormal.sample(&mut random)).collect();
+            let scores = lower.iter().zip(toward).map(|(row, r)| {
+                let noise: f64 = row.iter().zip(&unit).map(|(l, u)| l * u).sum();
+                r * sigma + noise
+            });
+            let named = looks
+                .iter()
+                .zip(scores)
+                .filter(|(look, z)| look.effect.spec().lower < 0.0 || *z > 0.0)
+                .map(|(look, z)| (look.effect, z * z - look.critical_sigma.powi(2)))
+                .max_by(|a, b| a.1.total_cmp(&b.1));
+            named.is_some_and(|(effect, beyond)| effect == truth && beyond > 0.0)
+        })
+        .count();
+    Some(Attainable {
+        first: first as f64 / DRAWS as f64,
+        apart_sigma: sigma * (1.0 - r * r).max(0.0).sqrt(),
+        rival: nearest.effect.spec().id,
+    })
+}
