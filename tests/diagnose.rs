@@ -129,9 +129,7 @@ fn effects_of_each_balance_are_named() {
 #[test]
 fn effects_that_act_on_each_other_are_reported() {
     for (product, expected) in [(0.0, 0), (4e4, 1)] {
-        let series = trace_with(None, |at| {
-            2e3 * at.v_mps + 3e3 * at.x_m + product * at.v_mps * at.x_m
-        });
+        let series = trace_with(None, |at| 2e3 * at.v_mps + 3e3 * at.x_m + product * at.v_mps * at.x_m);
         let answer = ask(series, &rig());
         let mut ids: Vec<_> = answer.effects.iter().map(|effect| effect.id).collect();
         ids.sort_unstable();
