@@ -1,7 +1,7 @@
 //! What the emulator is asked to follow: piston position and load force over time.
 
 use crate::curve::{Curve, CurveError};
-use crate::units::{Dimension, Unit};
+use crate::units::{self, Dimension, Unit, UnitError};
 use std::path::{Path, PathBuf};
 
 /// Position and load references of the rig.
@@ -74,6 +74,30 @@ pub enum ReferenceError {
         /// What is wrong with them.
         source: CurveError,
     },
+    /// Neither a quantity nor a file.
+    #[error("`{text}` is no file, and as a quantity: {error}")]
+    Quantity {
+        /// As given.
+        text: String,
+        /// Why it is no quantity.
+        error: UnitError,
+    },
+}
+
+/// A constant, as `100 mm`, or the curve in a file: see [`read_curve`].
+///
+/// # Errors
+/// [`ReferenceError`].
+pub fn constant_or_file(
+    text: &str,
+    signal: &'static str,
+    measures: Dimension,
+) -> Result<Curve, ReferenceError> {
+    match units::parse(text, measures) {
+        Ok(value) => Ok(Curve::constant(value)),
+        Err(_) if Path::new(text).is_file() => read_curve(text.as_ref(), signal, measures),
+        Err(error) => Err(ReferenceError::Quantity { text: text.into(), error }),
+    }
 }
 
 /// Reads a reference from a CSV file with a header row, columns named as in traces: the time `t_s`

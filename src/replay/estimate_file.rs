@@ -1,17 +1,9 @@
 use super::Point;
-use crate::report::LPM_PER_M3S;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-
-const HEADER: &str = "t_s,\
-    internal_leak_coefficient,internal_leak_coefficient_std,\
-    external_leak_a_coefficient,external_leak_a_coefficient_std,\
-    external_leak_b_coefficient,external_leak_b_coefficient_std,\
-    internal_leak_lpm,external_leak_a_lpm,external_leak_b_lpm,\
-    internal_alarm,external_a_alarm,external_b_alarm";
 
 /// Error returned by [`EstimateFile`].
 #[derive(Debug, thiserror::Error)]
@@ -62,7 +54,7 @@ impl EstimateFile {
             Sink::Plain(writer)
         };
         let mut created = Self { file, sink };
-        let header = created.sink.write_line(format_args!("{HEADER}"));
+        let header = created.sink.write_line(format_args!("{}", Point::COLUMNS.join(",")));
         header.map_err(|source| created.error(source))?;
         Ok(created)
     }
@@ -72,24 +64,10 @@ impl EstimateFile {
     /// # Errors
     /// Where the file cannot be written on.
     pub fn write(&mut self, point: &Point) -> Result<(), EstimateFileError> {
-        let c = point.coefficients;
-        let flow = point.flows_m3s.map(|flow| flow * LPM_PER_M3S);
-        let alarm = point.active.map(u8::from);
+        let [t_s, numbers @ .., internal, external_a, external_b] = point.values();
+        let [a, b, c, d, e, f, g, h, i] = numbers;
         let written = self.sink.write_line(format_args!(
-            "{},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{},{},{}",
-            point.t_s,
-            c.internal.value,
-            c.internal.std,
-            c.external_a.value,
-            c.external_a.std,
-            c.external_b.value,
-            c.external_b.std,
-            flow.internal,
-            flow.external_a,
-            flow.external_b,
-            alarm.internal,
-            alarm.external_a,
-            alarm.external_b,
+            "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
         ));
         written.map_err(|source| self.error(source))
     }

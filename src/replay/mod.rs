@@ -6,12 +6,14 @@ mod estimate_file;
 mod estimator;
 mod pressures;
 mod scoring;
+mod stream;
 mod summary;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
+pub use stream::Stream;
 
-use crate::report::{Alarm, Leak, ReplayReport};
+use crate::report::{Alarm, LPM_PER_M3S, Leak, ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use correction::Correction;
@@ -31,6 +33,48 @@ pub struct Point {
     pub flows_m3s: PerLeak<f64>,
     /// Active alarms.
     pub active: PerLeak<bool>,
+}
+
+impl Point {
+    /// What [`values`](Self::values) are, as column headers: coefficients and their standard deviations in
+    /// m³/(s·Pa), flows in L/min, active alarms as 1.
+    pub const COLUMNS: [&str; 13] = [
+        "t_s",
+        "internal_leak_coefficient",
+        "internal_leak_coefficient_std",
+        "external_leak_a_coefficient",
+        "external_leak_a_coefficient_std",
+        "external_leak_b_coefficient",
+        "external_leak_b_coefficient_std",
+        "internal_leak_lpm",
+        "external_leak_a_lpm",
+        "external_leak_b_lpm",
+        "internal_alarm",
+        "external_a_alarm",
+        "external_b_alarm",
+    ];
+
+    /// A row of [`COLUMNS`](Self::COLUMNS).
+    pub fn values(&self) -> [f64; 13] {
+        let c = &self.coefficients;
+        let flow = self.flows_m3s.map(|flow| flow * LPM_PER_M3S);
+        let alarm = self.active.map(|active| f64::from(u8::from(active)));
+        [
+            self.t_s,
+            c.internal.value,
+            c.internal.std,
+            c.external_a.value,
+            c.external_a.std,
+            c.external_b.value,
+            c.external_b.std,
+            flow.internal,
+            flow.external_a,
+            flow.external_b,
+            alarm.internal,
+            alarm.external_a,
+            alarm.external_b,
+        ]
+    }
 }
 
 /// A running replay.
@@ -182,5 +226,5 @@ pub fn replay<E: From<TraceError>>(
         let renewed = replay.push(&record);
         each(&replay, &record, renewed)?;
     }
-    Ok(replay.report(reader))
+    Ok(replay.report(TraceSummary::new(reader.name(), reader.quality())))
 }

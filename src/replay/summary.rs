@@ -4,16 +4,14 @@ use super::Replay;
 use crate::report::{
     EstimateEntry, Estimates, FlowMeterOffsets, LPM_PER_M3S, Leakage, ReplayReport, TraceSummary, Verdict,
 };
-use crate::trace::TraceReader;
 use pitchleak_core::{Excitation, Parameter, PerLeak};
 
 impl Replay {
-    /// The report on the trace that `reader` has read so far.
-    pub fn report(&self, reader: &TraceReader<'_>) -> ReplayReport {
+    /// The report on the trace so far.
+    pub fn report(&self, trace: TraceSummary) -> ReplayReport {
         let estimates = self.estimates();
         let leakage = self.leakage();
         let active = self.detector.active();
-        let trace = TraceSummary::new(reader.name(), reader.quality());
         ReplayReport {
             schema: ReplayReport::SCHEMA,
             rig: self.rig.name.clone(),

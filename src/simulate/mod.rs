@@ -5,12 +5,14 @@
 
 mod effects;
 mod leak;
+mod plan;
 mod recording;
 mod sensing;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
 pub use leak::{LeakSize, LeakSizeError};
+pub use plan::{Noise, Plan};
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile, truth_path};
 pub(crate) use sensing::Normal;
 pub use sensing::{Biases, Sensing};

@@ -100,12 +100,30 @@ impl Recording {
         &self,
         path: &Path,
         reference: &str,
-        mut done: impl FnMut(f64),
+        done: impl FnMut(f64),
     ) -> Result<TruthFile, RecordingError> {
+        let write = |source| RecordingError::Write { path: path.to_owned(), source };
+        let (sink, truth) = self.record(|| sink(path), path, reference, done)?;
+        sink.finish().map_err(write)?;
+        Ok(truth)
+    }
+
+    /// As [`write`](Self::write), to any output, opened once the simulation is known to run and given back
+    /// at its end; `path` is its name for messages.
+    ///
+    /// # Errors
+    /// [`RecordingError`].
+    pub fn record<W: Write>(
+        &self,
+        open: impl FnOnce() -> std::io::Result<W>,
+        path: &Path,
+        reference: &str,
+        mut done: impl FnMut(f64),
+    ) -> Result<(W, TruthFile), RecordingError> {
         let write = |source| RecordingError::Write { path: path.to_owned(), source };
         let leaks = self.scenario.leak_coefficients()?;
         let mut sensing = Sensing::new(self.noise, self.biases, self.seed);
-        let mut writer = TraceWriter::new(sink(path).map_err(write)?).map_err(write)?;
+        let mut writer = open().and_then(TraceWriter::new).map_err(write)?;
         let mut totals = Totals::default();
         let mut failure = None;
         self.scenario.run(leaks, |truth| {
@@ -121,9 +139,8 @@ impl Recording {
         })?;
         match failure {
             Some(source) => Err(write(source)),
-            None => writer.into_inner().finish().map_err(write),
-        }?;
-        Ok(self.truth(reference, &leaks, &totals))
+            None => Ok((writer.into_inner(), self.truth(reference, &leaks, &totals))),
+        }
     }
 
     fn truth(&self, reference: &str, leaks: &Leaks<f64>, totals: &Totals) -> TruthFile {

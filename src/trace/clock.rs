@@ -36,6 +36,11 @@ pub(super) struct Clock {
 }
 
 impl Clock {
+    /// Time of the last good row, s.
+    pub(super) fn last_s(&self) -> Option<f64> {
+        self.last_s
+    }
+
     #[inline]
     pub(super) fn step(&mut self, t_s: f64) -> Step {
         let Some(last_s) = self.last_s else {

@@ -34,6 +34,11 @@ impl Intake {
         &self.quality
     }
 
+    /// Time of the last good row, s.
+    pub fn time_s(&self) -> Option<f64> {
+        self.clock.last_s()
+    }
+
     pub(super) fn set_bad_rows(&mut self, bad_rows: BadRows) {
         self.bad_rows = bad_rows;
     }

@@ -7,6 +7,7 @@ use super::quality::{BadReason, BadRow, Counted};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Unit;
+use std::sync::Arc;
 
 /// Neighbouring rows: a slice per header, empty where the column is
 /// [ignored](ColumnContent::Ignored). NaN is a missing reading.
@@ -26,7 +27,7 @@ pub enum ColumnContent {
 
 /// What the columns of a table hold, by their headers.
 #[derive(Clone, Debug)]
-pub struct TableLayout(Layout);
+pub struct TableLayout(Arc<Layout>);
 
 impl TableLayout {
     /// Reads headers as those of a trace file; `name` is for messages.
@@ -35,7 +36,7 @@ impl TableLayout {
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
         match Layout::new(headers, &rig.columns) {
-            Ok(layout) => Ok(Self(Layout { counted: Counted::Rows, ..layout })),
+            Ok(layout) => Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout }))),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }
     }
@@ -63,7 +64,7 @@ struct Cells<'a> {
 
 /// The rows of batches of columns, one after the other.
 pub(super) struct TableRows<'a> {
-    layout: Layout,
+    layout: Arc<Layout>,
     /// The last comes first.
     batches: Vec<Vec<Cells<'a>>>,
     current: Vec<Cells<'a>>,
@@ -77,7 +78,7 @@ impl<'a> TableRows<'a> {
     pub(super) fn new(layout: &TableLayout, batches: Vec<Batch<'a>>) -> Result<Self, TraceFault> {
         let bound = batches.into_iter().rev().map(|batch| bind(&layout.0, &batch));
         Ok(Self {
-            layout: layout.0.clone(),
+            layout: Arc::clone(&layout.0),
             batches: bound.collect::<Result<_, _>>()?,
             current: Vec::new(),
             at: 0,

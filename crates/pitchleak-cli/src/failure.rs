@@ -4,7 +4,6 @@ use pitchleak::reproduce::ReproduceError;
 use pitchleak::rig::RigError;
 use pitchleak::simulate::{EffectsError, RecordingError};
 use pitchleak::trace::TraceError;
-use pitchleak::units::UnitError;
 use pitchleak::wind::{EmulationError, HistoryError};
 use std::io;
 use std::path::PathBuf;
@@ -44,14 +43,6 @@ pub enum Failure {
     /// Position or load to follow.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
-    /// Neither a quantity nor a file.
-    #[error("`{text}` is no file, and as a quantity: {error}")]
-    Quantity {
-        /// As given.
-        text: String,
-        /// Why it is no quantity.
-        error: UnitError,
-    },
     /// Effects beyond the model.
     #[error(transparent)]
     Effects(#[from] EffectsError),

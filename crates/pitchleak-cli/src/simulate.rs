@@ -4,11 +4,8 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
-use pitchleak::core::Sensors;
-use pitchleak::curve::Curve;
-use pitchleak::reference::{Reference, read_curve};
-use pitchleak::rig::Instrument;
-use pitchleak::simulate::{Biases, EffectSize, LeakSize, Recording, Scenario, effects, truth_path};
+use pitchleak::reference::{Reference, constant_or_file};
+use pitchleak::simulate::{EffectSize, LeakSize, Noise, Plan, truth_path};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, History, Wind};
 use std::path::{Path, PathBuf};
@@ -101,29 +98,6 @@ Examples:
   pitchleak simulate --wind run.outb --rig turbine7.toml --effect viscous_friction=1500 --out trace.csv
   pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
 
-/// Time for which the loops run before the trace begins, s.
-const WARM_UP_S: f64 = 10.0;
-const DEFAULT_DURATION_S: f64 = 60.0;
-
-#[derive(Clone, Copy)]
-enum Noise {
-    None,
-    Rig,
-    Share(f64),
-}
-
-impl std::str::FromStr for Noise {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "none" => Ok(Self::None),
-            "rig" => Ok(Self::Rig),
-            _ => share(text).map(Self::Share).map_err(|error| format!("{error}; or `none`, or `rig`")),
-        }
-    }
-}
-
 fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
     let value = units::parse(text, dimension).map_err(|error| error.to_string())?;
     if value < 0.0 { Err("must not be negative".into()) } else { Ok(value) }
@@ -150,12 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             "{name}: the position was held off the end stops for {percent:.1} % of the time"
         )]);
     }
-    let recording = Recording {
-        noise: arguments.noise.sensors(&rig),
-        biases: Biases::drawn(&rig.instruments, arguments.bias, arguments.seed),
-        seed: arguments.seed,
-        scenario: arguments.scenario(rig, reference)?,
-    };
+    let recording = arguments.plan().recording(rig, reference)?;
     let bar = progress();
     let truth = recording.write(&arguments.out, &name, |share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
@@ -182,58 +151,29 @@ impl Arguments {
         }
         let (position, load) =
             (self.position.as_deref().unwrap_or_default(), self.load.as_deref().unwrap_or_default());
-        let reference =
-            Reference::of(curve(position, "x", Dimension::Length)?, curve(load, "force", Dimension::Force)?);
+        let reference = Reference::of(
+            constant_or_file(position, "x", Dimension::Length)?,
+            constant_or_file(load, "force", Dimension::Force)?,
+        );
         Ok((reference, format!("position {position}, load {load}")))
     }
 
-    fn scenario(&self, rig: Rig, reference: Reference) -> Result<Scenario, Failure> {
-        let (begin, end) = reference.span_s().unwrap_or((0.0, f64::INFINITY));
-        let start_s = self.start.map_or(begin + WARM_UP_S.min(0.5 * (end - begin)), |start| begin + start);
-        Ok(Scenario {
-            effects: effects(&rig, &self.effect)?,
-            rig,
+    fn plan(&self) -> Plan {
+        Plan {
             leaks: PerLeak {
                 internal: self.leak_internal,
                 external_a: self.leak_external_a,
                 external_b: self.leak_external_b,
             },
             onset_s: self.onset.unwrap_or(0.0),
-            start_s,
-            warm_up_s: WARM_UP_S,
-            duration_s: self.duration.unwrap_or(DEFAULT_DURATION_S.min(end - start_s)),
+            effects: self.effect.clone(),
+            noise: self.noise,
+            bias_share: self.bias,
+            seed: self.seed,
+            start_s: self.start,
+            duration_s: self.duration,
             sample_rate_hz: self.sample_rate,
-            reference,
-        })
-    }
-}
-
-impl Noise {
-    fn sensors(self, rig: &Rig) -> Sensors<f64> {
-        let accuracy = match self {
-            Self::Rig => return rig.sensors(),
-            Self::None => 0.0,
-            Self::Share(share) => share,
-        };
-        let mut sheets = rig.instruments;
-        let all: [&mut Instrument; 5] = [
-            &mut sheets.flow_a,
-            &mut sheets.flow_b,
-            &mut sheets.pressure,
-            &mut sheets.position,
-            &mut sheets.force,
-        ];
-        all.into_iter().for_each(|sheet| sheet.accuracy = accuracy);
-        sheets.spread()
-    }
-}
-
-/// A constant, or the curve in a file.
-fn curve(text: &str, signal: &'static str, dimension: Dimension) -> Result<Curve, Failure> {
-    match units::parse(text, dimension) {
-        Ok(value) => Ok(Curve::constant(value)),
-        Err(_) if Path::new(text).is_file() => Ok(read_curve(text.as_ref(), signal, dimension)?),
-        Err(error) => Err(Failure::Quantity { text: text.into(), error }),
+        }
     }
 }
 

@@ -1,0 +1,108 @@
+"""Check: what a trace is worth before anybody believes its leaks."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _html, _inputs, _pitchleak
+from ._pitchleak import Rig
+from ._records import record
+from ._report import LABELS
+from ._results import PerLeak, Trace
+from ._tabular import Tabular
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What one signal did, in SI."""
+
+    signal: str
+    """Name as in the column headers."""
+    unit: str
+    """SI unit."""
+    least: float
+    """Lowest reading."""
+    most: float
+    """Highest reading."""
+    present_percent: float
+    """Share of the rows that have it, %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How well the trace pins one parameter down."""
+
+    identifiable: bool
+    """Whether it does."""
+    resolution: float | None
+    """Half width of the 95 % interval: L/min for a leak, Pa for the bulk modulus."""
+    reason: str | None = None
+    """Why it does not."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Check(Tabular):
+    """Data quality, excitation, what the trace can and cannot identify. As a table: the signals."""
+
+    trace: Trace
+    """What was read."""
+    rig: str
+    """Path of the rig file, or ``wu2011``."""
+    readings: tuple[Reading, ...]
+    """What each signal did."""
+    leaks: PerLeak[Reach]
+    """What the trace tells about each leak."""
+    bulk_modulus: Reach
+    """What it tells about the bulk modulus."""
+    normalised_innovation: tuple[float, ...] | None = None
+    """About 1 each where model and declared noise explain the trace, far above where they do not."""
+    raw: dict[str, Any] = field(init=False, default_factory=dict)
+    """Every field of ``pitchleak check --json``."""
+    _text: str = field(init=False, default="")
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """A row per signal."""
+        names = ("signal", "unit", "least", "most", "present_percent")
+        return {name: [getattr(reading, name) for reading in self.readings] for name in names}
+
+    def __str__(self) -> str:
+        return self._text.rstrip()
+
+    def __repr__(self) -> str:
+        found = [LABELS[leak] for leak, reach in self.leaks.items() if reach.identifiable]
+        return f"<Check of {self.trace.path}: identifiable leaks: {', '.join(found) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        headers = ("signal", "from", "to", "rows")
+        signals = [
+            (f"{r.signal}, {r.unit}", f"{r.least:.4g}", f"{r.most:.4g}", f"{r.present_percent:.0f} %")
+            for r in self.readings
+        ]
+        reach = [
+            (LABELS[leak], f"± {r.resolution:.4f} L/min" if r.resolution is not None else "–", r.reason or "yes")
+            for leak, r in self.leaks.items()
+        ]
+        shown = _html.table(("leak", "this trace shows it to (95 %)", "identifiable"), reach)
+        return _html.page(repr(self)[1:-1], _html.table(headers, signals), shown)
+
+
+def check(data: Any, rig: Rig | _inputs.Path | None = None, *, strict: bool = False) -> Check:
+    """Checks a trace: data quality, excitation, what it can and cannot identify.
+
+    Takes what :func:`replay` takes, and raises what it raises.
+
+    >>> import pitchleak as pl
+    >>> trace = pl.simulate(wind=13, duration=20)
+    >>> pl.check(trace.columns).leaks.external_a.identifiable
+    True
+    """
+    rig = _inputs.rig_for(data, rig)
+    report, text = _pitchleak.check(_inputs.source(data, rig), rig, strict)
+    raw = json.loads(report)
+    result = record(Check, raw)
+    object.__setattr__(result, "raw", raw)
+    object.__setattr__(result, "_text", text)
+    _inputs.warn(result.trace.warnings)
+    return result

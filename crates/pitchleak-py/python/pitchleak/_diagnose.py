@@ -1,0 +1,243 @@
+"""Diagnose: from what the model leaves over to the effect that it lacks."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from . import _html, _inputs, _pitchleak
+from ._pitchleak import Rig
+from ._records import record
+from ._tabular import Tabular, optional
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Rmse:
+    """Held-out error of each balance; None where the traces lack it."""
+
+    chamber_a_m3s: float | None
+    """Continuity of chamber A, m³/s."""
+    chamber_b_m3s: float | None
+    """Continuity of chamber B, m³/s."""
+    force_n: float | None
+    """Force balance, N."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How well a model fits."""
+
+    rmse: Rmse
+    """On samples that were not fitted."""
+    whiteness_p: dict[str, float | None]
+    """Probability per balance that what is left is white noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """An effect that the declared model lacks."""
+
+    id: str
+    """Name as in the table of effects."""
+    value: float
+    """Its size, in ``unit``."""
+    std: float
+    """Standard deviation of it."""
+    unit: str
+    """SI; 1 for a share."""
+    rmse_reduction_percent: float | None = None
+    """By how much the held-out error of the balance it mends most falls, %."""
+    p_value: float | None = None
+    """Chance of so large a score without the effect."""
+    confusable_with: tuple[str, ...] = ()
+    """Effects that these traces cannot tell from it."""
+    separated_by: str | None = None
+    """What would tell them apart."""
+    cause: str = ""
+    """When this is the cause."""
+    remedy: str = ""
+    """What to do about it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeakEstimate:
+    """A constant of the declared model as fitted."""
+
+    value: float | None
+    """Best value, in ``unit``."""
+    std: float | None
+    """Standard deviation."""
+    ci95: tuple[float | None, ...] | None
+    """Holds the truth with 95 % probability."""
+    unit: str
+    """SI."""
+    identifiable: bool
+    """Whether these traces tell more than the rig file did."""
+    physical: bool = True
+    """Whether physics allows the value."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeakEstimates:
+    """The declared model's constants."""
+
+    internal_leak_coefficient: LeakEstimate
+    """C_ip, m³/(s·Pa)."""
+    external_leak_a_coefficient: LeakEstimate
+    """C_epA, m³/(s·Pa)."""
+    external_leak_b_coefficient: LeakEstimate
+    """C_epB, m³/(s·Pa)."""
+    bulk_modulus: LeakEstimate
+    """β, Pa."""
+
+
+@dataclass(frozen=True, slots=True)
+class BeforeAfter:
+    """The same with the declared model alone and with the effects found."""
+
+    before: LeakEstimates
+    """Declared model."""
+    after: LeakEstimates
+    """With the effects."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A size with its unit."""
+
+    value: float
+    """In ``unit``."""
+    unit: str
+    """SI; 1 for a share."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What is left of one balance over time."""
+
+    t_s: np.ndarray[Any, np.dtype[np.float64]]
+    """Time, s."""
+    residual: np.ndarray[Any, np.dtype[np.float64]]
+    """What is left, in the balance's unit."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Tabular):
+    """What a diagnosis found. As a table: the effects, strongest first."""
+
+    before: Quality
+    """Best fit of the declared model."""
+    effects: tuple[Effect, ...]
+    """Strongest first."""
+    after: Quality
+    """With the effects."""
+    leaks: BeforeAfter
+    """Leaks before and after."""
+    not_detectable_below: dict[str, Size]
+    """Smallest size of each further effect that these traces would have shown."""
+    verdict: Literal[
+        "explained", "partly_explained", "no_missing_effect", "unexplained", "insufficient_excitation"
+    ]
+    """The answer."""
+    notes: tuple[str, ...] = ()
+    """What speaks for it."""
+    raw: dict[str, Any] = field(init=False, default_factory=dict)
+    """Every field of ``pitchleak diagnose --json``."""
+    rig: Rig = field(init=False)
+    """The rig with the effects in it: what ``--save-rig`` writes."""
+    residuals_before: dict[str, Course] = field(init=False, default_factory=dict)
+    """What the declared model leaves over: ``chamber_a_m3s``, ``chamber_b_m3s``, ``force_n``."""
+    residuals_after: dict[str, Course] = field(init=False, default_factory=dict)
+    """What is left with the effects."""
+    _text: str = field(init=False, default="")
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """A row per effect."""
+        names = ("id", "value", "std", "unit", "rmse_reduction_percent", "p_value")
+        columns: dict[str, Any] = {name: [getattr(e, name) for e in self.effects] for name in names}
+        return columns | {"confusable_with": [", ".join(effect.confusable_with) for effect in self.effects]}
+
+    def plot(self, figure: "Figure | None" = None) -> "Figure":
+        """Draws what is left of each balance over time, before and after (needs matplotlib)."""
+        pyplot = optional("matplotlib.pyplot", "plot")
+        present = [name for name, course in self.residuals_before.items() if np.isfinite(course.residual).any()]
+        figure = pyplot.figure(figsize=(8, 2.2 * max(len(present), 1))) if figure is None else figure
+        units = {"chamber_a_m3s": (60e3, "A, L/min"), "chamber_b_m3s": (60e3, "B, L/min"), "force_n": (1.0, "force, N")}
+        axes = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0] if present else []
+        for ax, name in zip(axes, present, strict=True):
+            factor, label = units.get(name, (1.0, name))
+            for course, when in ((self.residuals_before[name], "before"), (self.residuals_after[name], "after")):
+                ax.plot(course.t_s, factor * course.residual, linewidth=0.8, label=when)
+            ax.set_ylabel(label)
+        if present:
+            axes[0].legend(loc="upper right", ncols=2, title=self.verdict.replace("_", " "))
+            axes[-1].set_xlabel("time, s")
+        return figure
+
+    def __str__(self) -> str:
+        return self._text.rstrip()
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{e.id} {e.value:.4g} {e.unit}".rstrip() for e in self.effects)
+        return f"<Diagnosis: {self.verdict}{': ' + found if found else ''}>"
+
+    def _repr_html_(self) -> str:
+        effects = [
+            (e.id, f"{_html.number(e.value, e.std)} {e.unit}", ", ".join(e.confusable_with) or "–", e.cause)
+            for e in self.effects
+        ]
+        errors = []
+        for name in ("chamber_a_m3s", "chamber_b_m3s", "force_n"):
+            before, after = getattr(self.before.rmse, name), getattr(self.after.rmse, name)
+            errors.append((name, _html.number(before), _html.number(after)))
+        return _html.page(
+            self.verdict.replace("_", " "),
+            _html.table(("effect", "size, 95 %", "not told from", "cause"), effects),
+            _html.table(("held-out rms error", "before", "after"), errors),
+            footer=" ".join(self.notes),
+        )
+
+
+def diagnose(
+    data: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    test: Any = (),
+    strict: bool = False,
+) -> Diagnosis:
+    """Finds the physical effect that the model lacks.
+
+    ``data`` is a trace as :func:`replay` takes it, or a list of traces of one rig that are fitted
+    together; ``test`` are the traces to judge on, else blocks that each fit leaves out.
+
+    >>> import pitchleak as pl
+    >>> trace = pl.simulate(wind=13, effects={"viscous_friction": 3000.0}, noise="0.1 %", duration=60)
+    >>> rig = pl.Rig.parse(pl.Rig.paper().to_toml().replace("accuracy = 0.01", "accuracy = 0.001"))
+    >>> found = pl.diagnose(trace.columns, rig)
+    >>> found.effects[0].id
+    'viscous_friction'
+    """
+    train = list(data) if isinstance(data, (list, tuple)) else [data]
+    judged_on = list(test) if isinstance(test, (list, tuple)) else [test]
+    if not train:
+        raise ValueError("no trace to fit")
+    rig = _inputs.rig_for(train[0], rig)
+    fitted = [_inputs.source(trace, rig) for trace in train]
+    judged = [_inputs.source(trace, rig) for trace in judged_on]
+    report, text, found_rig, before, after = _pitchleak.diagnose(fitted, judged, rig, strict)
+    raw = json.loads(report)
+    result = record(Diagnosis, raw)
+    courses = [
+        {name: Course(np.asarray(t_s), np.asarray(left)) for name, t_s, left in residuals}
+        for residuals in (before, after)
+    ]
+    filled = {"raw": raw, "rig": found_rig, "residuals_before": courses[0], "residuals_after": courses[1]}
+    for name, value in {**filled, "_text": text}.items():
+        object.__setattr__(result, name, value)
+    return result

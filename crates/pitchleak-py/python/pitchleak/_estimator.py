@@ -1,0 +1,59 @@
+"""Live: samples in, estimates out."""
+
+from typing import Any
+
+from . import _inputs, _pitchleak
+from ._pitchleak import Rig, Table
+from ._report import Report, parse
+
+
+class Estimator(_pitchleak.Estimator):
+    """The estimator of :func:`replay` for a trace that comes bit by bit.
+
+    :meth:`update` takes one sample or arrays of samples in SI, :meth:`extend` anything that ``replay``
+    takes, :meth:`state` gives the report as it stands. However the trace is cut, the numbers are those of
+    ``replay`` on the whole, to the last bit. An estimator may be used from several threads, each call at a
+    time.
+
+    ``rig`` is a :class:`Rig` or the path of a rig file, the built-in one where left out; ``estimator`` is
+    ``rls`` or ``paper``; ``strict`` makes bad samples raise instead of being skipped.
+
+    >>> import pitchleak as pl
+    >>> trace = pl.simulate(wind=13, leak_external_a="0.5 L/min", duration=10)
+    >>> est = pl.Estimator(pl.Rig.paper())
+    >>> est.extend(trace.columns)
+    39
+    >>> est.state().estimates == pl.replay(trace.columns).estimates
+    True
+    """
+
+    _first_ns: int | None = None
+    """Where a column ``timestamp`` counts from, ns since 1970."""
+
+    def __new__(
+        cls, rig: Rig | _inputs.Path | None = None, *, estimator: str | None = None, strict: bool = False
+    ) -> "Estimator":
+        return super().__new__(cls, _inputs.rig_for(None, rig), estimator=estimator, strict=strict)
+
+    def extend(self, data: Any) -> int:
+        """Takes in the next part of the trace, with columns as :func:`replay` takes them.
+
+        Returns how often the estimates were renewed. A column ``timestamp`` counts from its first time in
+        the first part.
+        """
+        source = _inputs.source(data, self.rig, self._first_ns)
+        if isinstance(source, Table) and self._first_ns is None:
+            self._first_ns = source.first_ns
+        return self.extend_source(source)
+
+    def state(self) -> Report:
+        """The report as it stands. Raises ``ValueError`` before the first sample."""
+        report = self.report()
+        if report is None:
+            raise ValueError("no sample yet")
+        return parse(Report, *report)
+
+    def __repr__(self) -> str:
+        time_s = self.time_s
+        when = "no sample yet" if time_s is None else f"at {time_s:.3f} s"
+        return f"<Estimator of rig {self.rig.name}, {when}>"

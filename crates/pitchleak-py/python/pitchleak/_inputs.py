@@ -1,0 +1,81 @@
+"""What a user may hand over as a trace or a rig, made ready for the engine."""
+
+import os
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+from ._columns import nanoseconds, numbers
+from ._pitchleak import Layout, Rig, Table
+
+Path: TypeAlias = str | os.PathLike[str]
+Source: TypeAlias = str | Table
+
+
+class TraceWarning(UserWarning):
+    """Something about a trace that a reader of the results should know, as the program prints it."""
+
+
+def warn(messages: Sequence[str], name: str = "") -> None:
+    """Gives each message at the line of the user's call."""
+    for message in messages:
+        text = f"{name}: {message}" if name else message
+        warnings.warn(text, TraceWarning, stacklevel=_depth())
+
+
+def _depth() -> int:
+    """How many calls lie between the caller of this and the first line outside of the package."""
+    here = os.path.dirname(__file__)
+    frame, depth = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(here):
+        frame, depth = frame.f_back, depth + 1
+    return depth
+
+
+def is_path(data: Any) -> bool:
+    return isinstance(data, (str, os.PathLike))
+
+
+def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
+    """A path as it is; columns as a table that borrows them."""
+    if is_path(data):
+        return str(os.fspath(data))
+    if isinstance(data, Mapping) or _is_pandas(data):
+        return _from_columns(data, rig, first_ns)
+    if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
+        return Table.from_arrow(data, rig, first_ns)
+    raise TypeError(
+        f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path"
+    )
+
+
+def rig_for(data: Any, rig: Rig | Path | None) -> Rig:
+    """The rig given, else the one beside a file, else the built-in one."""
+    if isinstance(rig, Rig):
+        return rig
+    if rig is not None:
+        return Rig.load(rig)
+    return Rig.beside(data) if is_path(data) else Rig.paper()
+
+
+def _is_pandas(data: Any) -> bool:
+    """Its columns are borrowed one by one: no pyarrow needed, and missing values stay NaN."""
+    return type(data).__module__.partition(".")[0] == "pandas" and hasattr(data, "columns")
+
+
+def _from_columns(data: Any, rig: Rig, first_ns: int | None) -> Table:
+    headers = list(data.keys())
+    for header in headers:
+        if not isinstance(header, str):
+            raise TypeError(f"column names are texts such as `t_s`; {header!r} is none")
+    if len(set(headers)) < len(headers):
+        double = next(header for header in headers if headers.count(header) > 1)
+        raise ValueError(f"two columns are named `{double}`: keep one")
+    layout = Layout(headers, rig)
+    read: dict[str, Any] = {"numbers": numbers, "timestamps": nanoseconds}
+    columns = [
+        read[content](header, data[header]) if content in read else None
+        for header, content in zip(headers, layout.contents, strict=True)
+    ]
+    return Table.from_arrays(layout, columns, first_ns)

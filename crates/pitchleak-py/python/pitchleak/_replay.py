@@ -1,0 +1,226 @@
+"""Replay: a trace in, its leaks out."""
+
+import importlib
+import os
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
+
+import numpy as np
+
+from . import _html, _inputs, _pitchleak
+from ._groups import split
+from ._pitchleak import Rig
+from ._report import LABELS, Report, parse
+from ._tabular import Tabular, optional
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_Columns: TypeAlias = list[tuple[str, Any]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Replay(Report, Tabular):
+    """What a replay found. As a table: the estimates after each sample, with the columns of
+    ``pitchleak replay --out``: coefficients in m³/(s·Pa), flows in L/min, alarms as booleans.
+
+    The table is made when it is first asked for, by running the replay again over the same data, so that
+    a replay itself needs no memory of its own. The data must not have changed in between.
+    """
+
+    _again: Callable[[], tuple[str, _Columns]] = field(init=False, repr=False)
+
+    @cached_property
+    def table(self) -> Mapping[str, Any]:
+        """The estimates after each sample, numpy arrays by column."""
+        text, columns = self._again()
+        if text != self._json:
+            raise RuntimeError("the data changed since the replay: replay it again")
+        return {name: values > 0.0 if name.endswith("_alarm") else values for name, values in columns}
+
+    _json: str = field(init=False, repr=False, default="")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws the leak flows over time with their 95 % intervals and alarms (needs matplotlib).
+
+        The flows are the coefficients at the mean pressures of the trace, so that their course shows what
+        is learnt and not how the pressures move. Returns the axes.
+        """
+        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+        table, t = self.table, self.table["t_s"]
+        prefixes = {"internal": "internal", "external_a": "external_leak_a", "external_b": "external_leak_b"}
+        for leak, flow in self.leakage.items():
+            name = f"{prefixes[leak]}_leak_coefficient" if leak == "internal" else f"{prefixes[leak]}_coefficient"
+            last = table[name][-1]
+            scale = (flow.mean_lpm or 0.0) / last if last else 0.0
+            mean, half = table[name] * scale, 1.96 * table[f"{name}_std"] * abs(scale)
+            (line,) = axes.plot(t, mean, label=LABELS[leak], linewidth=1.5)
+            axes.fill_between(t, mean - half, mean + half, color=line.get_color(), alpha=0.2, linewidth=0)
+            for alarm in self.alarms:
+                if alarm.fault == leak:
+                    style = "-" if alarm.state == "raised" else ":"
+                    axes.axvline(alarm.time_s, color=line.get_color(), linestyle=style, linewidth=1)
+        settled = t - t[0] > 0.1 * (t[-1] - t[0])
+        flows = [flow.mean_lpm or 0.0 for _, flow in self.leakage.items()]
+        if settled.any():
+            span = max(max(flows) - min(flows), 0.1)
+            axes.set_ylim(min(0.0, *flows) - 0.5 * span, max(0.0, *flows) + 0.5 * span)
+        axes.set_xlabel("time, s")
+        axes.set_ylabel("leak flow, L/min")
+        axes.legend(loc="best", title="leak (line: alarm raised)" if self.alarms else "leak")
+        return axes
+
+
+class Replays(Mapping[Hashable, Replay], Tabular):
+    """Replays of many cylinders, by their keys. As a table: a row per cylinder."""
+
+    __slots__ = ("_replays",)
+
+    def __init__(self, replays: Mapping[Hashable, Replay]) -> None:
+        self._replays = dict(replays)
+
+    def __getitem__(self, key: Hashable) -> Replay:
+        return self._replays[key]
+
+    def __iter__(self) -> Iterator[Hashable]:
+        return iter(self._replays)
+
+    def __len__(self) -> int:
+        return len(self._replays)
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """A row per cylinder: verdict, mean leak flows and their standard deviations in L/min."""
+        replays = self._replays.values()
+        columns: dict[str, Any] = {
+            "key": [str(key) for key in self._replays],
+            "faults": [", ".join(replay.verdict.faults) for replay in replays],
+            "samples": [replay.trace.samples for replay in replays],
+            "skipped": [replay.trace.skipped for replay in replays],
+        }
+        for leak in LABELS:
+            flows = [getattr(replay.leakage, leak) for replay in replays]
+            columns[f"{leak}_lpm"] = np.array([flow.mean_lpm for flow in flows], np.float64)
+            columns[f"{leak}_std_lpm"] = np.array([flow.std_lpm for flow in flows], np.float64)
+        return columns
+
+    def __repr__(self) -> str:
+        leaking = [str(key) for key, replay in self._replays.items() if replay.verdict.faults]
+        return f"<Replays of {len(self)} cylinders, leaks in {', '.join(leaking) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for key, replay in self._replays.items():
+            flows = [_html.number(flow.mean_lpm, flow.std_lpm) for _, flow in replay.leakage.items()]
+            rows.append((str(key), ", ".join(replay.verdict.faults) or "–", *flows))
+        headers = ("cylinder", "leaks", *(f"{label}, L/min" for label in LABELS.values()))
+        return _html.page(repr(self)[1:-1], _html.table(headers, rows))
+
+
+@overload
+def replay(
+    data: list[Any] | tuple[Any, ...],
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    estimator: str | None = None,
+    strict: bool = False,
+    group: None = None,
+) -> Replays: ...
+@overload
+def replay(
+    data: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    estimator: str | None = None,
+    strict: bool = False,
+    group: str,
+) -> Replays: ...
+@overload
+def replay(
+    data: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    estimator: str | None = None,
+    strict: bool = False,
+    group: None = None,
+) -> Replay: ...
+def replay(
+    data: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    estimator: str | None = None,
+    strict: bool = False,
+    group: str | None = None,
+) -> Replay | Replays:
+    """Estimates the leaks of a recorded trace.
+
+    ``data`` is a pandas, polars or pyarrow table, anything with the Arrow PyCapsule interface, a dict of
+    arrays, or the path of a trace file. Columns are named ``<signal>_<unit>`` as in trace files; float64
+    ones are not copied. NaN is a missing reading. ``rig`` is a :class:`Rig` or the path of a rig file;
+    left out, it is ``rig.toml`` beside a file, else the built-in one (``out.rig`` says which).
+    ``estimator`` is ``rls`` (both chamber equations, docs/estimators.md) or ``paper`` (the law of Wu et
+    al. 2011, eq. 8 to 13). Bad rows are skipped and counted (:class:`TraceWarning`), or, where
+    ``strict``, raise :class:`TraceError` with ``column`` and ``row``.
+
+    Many cylinders at once, on all cores: a list of such data, or the name of the column that tells them
+    apart as ``group``; the result is then a :class:`Replays`.
+
+    >>> import pitchleak as pl
+    >>> trace = pl.simulate(wind=13, leak_internal="0.5 L/min", duration=20)
+    >>> out = pl.replay(trace.columns)
+    >>> out.verdict.faults, round(out.leakage.internal.mean_lpm, 2)
+    (('internal',), 0.5)
+    >>> out.table["t_s"].shape
+    (2000,)
+    """
+    if group is not None:
+        return _many(split(data, group), rig, estimator, strict)
+    if isinstance(data, (list, tuple)):
+        return _many(dict(enumerate(data)), rig, estimator, strict)
+    out = _one(data, _inputs.rig_for(data, rig), estimator, strict)
+    _inputs.warn(out.trace.warnings)
+    return out
+
+
+def _one(data: Any, rig: Rig, estimator: str | None, strict: bool) -> Replay:
+    source = _inputs.source(data, rig)
+    report, text = _pitchleak.replay(source, rig, estimator, strict)
+    out = parse(Replay, report, text)
+    object.__setattr__(out, "_json", report)
+    object.__setattr__(out, "_again", lambda: _pitchleak.over_time(source, rig, estimator, strict))
+    return out
+
+
+def _many(
+    traces: Mapping[Hashable, Any], rig: Rig | _inputs.Path | None, estimator: str | None, strict: bool
+) -> Replays:
+    rig = None if rig is None else _inputs.rig_for(None, rig)
+
+    def work(item: tuple[Hashable, Any]) -> tuple[Hashable, Replay]:
+        key, data = item
+        try:
+            return key, _one(data, _inputs.rig_for(data, rig), estimator, strict)
+        except Exception as error:
+            error.add_note(f"in cylinder {key!r}")
+            raise
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        done = dict(_progress(pool.map(work, traces.items()), len(traces)))
+    for key, out in done.items():
+        _inputs.warn(out.trace.warnings, str(key))
+    return Replays(done)
+
+
+def _progress(items: Iterator[Any], total: int) -> Iterator[Any]:
+    """With a bar where tqdm is installed and somebody watches."""
+    try:
+        tqdm = importlib.import_module("tqdm.auto").tqdm
+    except ImportError:
+        return items
+    return iter(tqdm(items, total=total, unit="cylinder", disable=None))
+
+
+__all__: Sequence[str] = ("Replay", "Replays", "replay")

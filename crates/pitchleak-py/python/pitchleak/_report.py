@@ -1,0 +1,95 @@
+"""The report on a trace, as ``pitchleak replay --json`` prints it."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from . import _html
+from ._records import record
+from ._results import (
+    LPM_PER_BAR,
+    Alarm,
+    Estimates,
+    Leakage,
+    PerLeak,
+    Score,
+    Trace,
+    Verdict,
+)
+
+R = TypeVar("R", bound="Report")
+
+LABELS = {"internal": "internal", "external_a": "external A", "external_b": "external B"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Report:
+    """What is known of the leaks of one cylinder at the end of its trace."""
+
+    trace: Trace
+    """What was read."""
+    rig: str
+    """Path of the rig file, or ``wu2011``, the built-in one."""
+    estimator: str
+    """``rls`` or ``paper``."""
+    estimates: Estimates
+    """Parameters of eq. (1) with intervals."""
+    leakage: PerLeak[Leakage]
+    """Mean leak flows, L/min."""
+    verdict: Verdict
+    """What to make of it."""
+    alarms: tuple[Alarm, ...] = ()
+    """In the order of time."""
+    score: PerLeak[Score] | None = None
+    """Against reference leak flows, where the trace has them; None for a leak without one."""
+    flow_meter_offsets: dict[str, Leakage] | None = None
+    """Offsets of the meters ``a`` and ``b``, where the rig file says that they may be off, L/min."""
+    normalised_innovation: tuple[float, ...] | None = None
+    """About 1 each where model and declared noise explain the trace, far above where they do not."""
+    changed_at_s: float | None = None
+    """When a leak last changed suddenly, s; flows are means since then."""
+    raw: dict[str, Any] = field(init=False, default_factory=dict)
+    """Every field of the JSON."""
+    _text: str = field(init=False, default="")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every field, as ``pitchleak replay --json`` prints it."""
+        return dict(self.raw)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Report) and self.raw == other.raw
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        return self._text.rstrip()
+
+    def __repr__(self) -> str:
+        trace = self.trace
+        size = f"{trace.samples} samples, {trace.duration_s:.1f} s"
+        return f"<{type(self).__name__} {trace.path} ({size}): {self.verdict.text}>"
+
+    def _repr_html_(self) -> str:
+        coefficients = dict(self.estimates.leaks.items())
+        rows = []
+        for leak, flow in self.leakage.items():
+            entry = coefficients[leak]
+            scaled = [None if v is None else v * LPM_PER_BAR for v in (entry.value, entry.std)]
+            judged = "yes" if entry.identifiable else f"no: {entry.reason or 'too little excitation'}"
+            rows.append((LABELS[leak], _html.number(flow.mean_lpm, flow.std_lpm), _html.number(*scaled), judged))
+        headers = ("leak", "L/min, 95 %", "L/min/bar, 95 %", "identifiable")
+        trace = self.trace
+        footer = (
+            f"{trace.path}: {trace.samples} samples over {trace.duration_s:.1f} s, {trace.skipped} rows skipped; "
+            f"rig {self.rig}; estimator {self.estimator}"
+        )
+        return _html.page(self.verdict.text, _html.table(headers, rows), footer=footer)
+
+
+def parse(cls: type[R], text_json: str, text: str) -> R:
+    """A report from the engine's JSON and its text for people."""
+    raw = json.loads(text_json)
+    report = record(cls, raw)
+    object.__setattr__(report, "raw", raw)
+    object.__setattr__(report, "_text", text)
+    return report

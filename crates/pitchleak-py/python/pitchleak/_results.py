@@ -1,0 +1,140 @@
+"""What replay and estimator find: the fields of ``pitchleak replay --json``."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+Leak = Literal["internal", "external_a", "external_b"]
+
+#: 1 m³/(s·Pa) in L/min/bar.
+LPM_PER_BAR = 6e9
+
+
+@dataclass(frozen=True, slots=True)
+class PerLeak(Generic[T]):
+    """One thing for each way that oil can leak."""
+
+    internal: T
+    """Past the piston seal, chamber A to chamber B."""
+    external_a: T
+    """Out of chamber A."""
+    external_b: T
+    """Out of chamber B."""
+
+    def items(self) -> Iterator[tuple[Leak, T]]:
+        """Names and values."""
+        yield "internal", self.internal
+        yield "external_a", self.external_a
+        yield "external_b", self.external_b
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What was read."""
+
+    path: str
+    """As given; ``data`` for columns in memory."""
+    samples: int
+    """Good rows."""
+    skipped: int
+    """Bad rows."""
+    duration_s: float
+    """From the first to the last good row, s."""
+    sample_rate_hz: float | None
+    """Samples per second where they come regularly."""
+    gaps: int = 0
+    """Pauses much longer than the usual step."""
+    warnings: tuple[str, ...] = ()
+    """What to know of the data before believing the results."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One parameter at the end of the trace."""
+
+    value: float | None
+    """Best value, in ``unit``."""
+    std: float | None
+    """Standard deviation of its error; None where the estimator gives none."""
+    ci95: tuple[float | None, ...] | None
+    """The interval that holds the true value with 95 % probability; None for an open end."""
+    unit: str
+    """SI."""
+    identifiable: bool
+    """Whether this trace pins the parameter down."""
+    reason: str | None = None
+    """Why it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """The parameters of eq. (1)."""
+
+    internal_leak_coefficient: Estimate
+    """C_ip, m³/(s·Pa)."""
+    external_leak_a_coefficient: Estimate
+    """C_epA, m³/(s·Pa)."""
+    external_leak_b_coefficient: Estimate
+    """C_epB, m³/(s·Pa)."""
+    bulk_modulus: Estimate
+    """β, Pa."""
+
+    @property
+    def leaks(self) -> PerLeak[Estimate]:
+        """The coefficients by leak."""
+        return PerLeak(
+            self.internal_leak_coefficient, self.external_leak_a_coefficient, self.external_leak_b_coefficient
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Leakage:
+    """Mean flow of one leak."""
+
+    mean_lpm: float | None
+    """Mean size, whichever way the pressure drives it, L/min."""
+    std_lpm: float | None
+    """Standard deviation of its error, L/min; None where the estimator gives none."""
+    net_mean_lpm: float | None = None
+    """Mean with its sign, positive out of the chamber that leaks, L/min."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """An alarm raised or cleared."""
+
+    time_s: float
+    """Time in the trace, s."""
+    fault: Leak
+    """Which leak."""
+    state: Literal["raised", "cleared"]
+    """What happened."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What an operator acts on."""
+
+    faults: tuple[Leak, ...]
+    """The leaks whose alarm stands at the end of the trace."""
+    text: str
+    """In a sentence or two."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """One leak against its reference flow in steady state, eq. (15) and (16)."""
+
+    leakage_mean_error_percent: float | None
+    """Mean of |Q̂ − Q_ref| / |Q_ref|, %."""
+    leakage_peak_error_percent: float | None
+    """Peak of the same, %."""
+    coefficient_mean_error_percent: float | None
+    """Mean error of the coefficient, %."""
+    coefficient_peak_error_percent: float | None
+    """Peak of the same, %."""
+    convergence_time_s: float | None
+    """Time until the leakage error stays within 5 %, s; None if it never does."""

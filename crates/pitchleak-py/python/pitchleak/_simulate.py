@@ -1,0 +1,150 @@
+"""Simulate: what the sensors of a rig with known leaks would have recorded."""
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from . import _html, _inputs, _pitchleak
+from ._pitchleak import Rig
+from ._records import record
+from ._results import PerLeak
+from ._tabular import Tabular, optional
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class LeakTruth:
+    """One leak of a simulated trace."""
+
+    coefficient_m3spa: float
+    """Laminar coefficient, m³/(s·Pa)."""
+    mean_flow_lpm: float
+    """Mean size of its flow, L/min."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Tabular):
+    """A simulated trace and what is true of it. As a table: the trace."""
+
+    reference: str
+    """What the rig followed."""
+    rig: str
+    """Name of the rig."""
+    duration_s: float
+    """Length, s."""
+    sample_rate_hz: float
+    """Samples per second."""
+    samples: int
+    """Number of rows."""
+    seed: int
+    """Seed of noise and offsets."""
+    leaks: PerLeak[LeakTruth]
+    """The true leaks."""
+    effects: dict[str, float]
+    """Effects beyond the model, SI, by id."""
+    noise_std: dict[str, float]
+    """Standard deviation of the sensors' noise, SI."""
+    biases: dict[str, float]
+    """Constant offsets of the sensors, SI."""
+    raw: dict[str, Any] = field(init=False, default_factory=dict)
+    """Every field of the truth file of ``pitchleak simulate``."""
+    columns: Mapping[str, Any] = field(init=False, default_factory=dict)
+    """The trace as numpy arrays by header, ready for :func:`replay`; empty where it went into a file."""
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """The same as ``columns``."""
+        return self.columns
+
+    def plot(self, figure: "Figure | None" = None) -> "Figure":
+        """Draws position, pressures and flows over time (needs matplotlib)."""
+        pyplot = optional("matplotlib.pyplot", "plot")
+        figure = pyplot.figure(figsize=(8, 6)) if figure is None else figure
+        rows = (("x_mm",), ("pa_bar", "pb_bar"), ("qa_lpm", "qb_lpm"))
+        axes = figure.subplots(len(rows), 1, sharex=True)
+        for ax, names in zip(axes, rows, strict=True):
+            for name in names:
+                ax.plot(self.columns["t_s"], self.columns[name], linewidth=0.9, label=name)
+            ax.legend(loc="upper right", ncols=2)
+        axes[-1].set_xlabel("time, s")
+        return figure
+
+    def __repr__(self) -> str:
+        size = f"{self.samples} samples, {self.duration_s:.1f} s"
+        flows = ", ".join(f"{leak} {truth.mean_flow_lpm:.3g}" for leak, truth in self.leaks.items())
+        return f"<Simulation of rig {self.rig}, {self.reference} ({size}), leaks in L/min: {flows}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(leak, f"{t.mean_flow_lpm:.4g}", f"{t.coefficient_m3spa:.4g}") for leak, t in self.leaks.items()]
+        return _html.page(repr(self)[1:-1], _html.table(("leak", "L/min", "m³/(s·Pa)"), rows))
+
+
+def simulate(
+    wind: int | str | None = None,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    position: float | str | None = None,
+    load: float | str | None = None,
+    leak_internal: float | str = 0.0,
+    leak_external_a: float | str = 0.0,
+    leak_external_b: float | str = 0.0,
+    onset: float | str = 0.0,
+    effects: Mapping[str, float] | None = None,
+    noise: float | str = "none",
+    bias: float | str = 0.0,
+    seed: int = 1,
+    duration: float | str | None = None,
+    start: float | str | None = None,
+    sample_rate: float | str = 100.0,
+    load_scale: float | None = None,
+    position_scale: float | None = None,
+    blade_inertia: float | None = None,
+    out: _inputs.Path | None = None,
+) -> Simulation:
+    """Simulates a rig with known leaks, sampled as its sensors would.
+
+    A quantity is a number in SI or a text with its unit (``"0.5 L/min"``, ``"1 %"``). The rig follows
+    ``wind`` (5, 13, 21 or 30 m/s, built in; OpenFAST output; CSV) or ``position`` and ``load`` (a constant
+    or a CSV file). A leak is its mean flow, or its coefficient (``"0.02 L/min/bar"``), and opens at
+    ``onset`` (s into the trace; 0: before it begins). ``effects`` are sizes by id in SI. ``noise`` is 3 σ
+    of every sensor as a share of full scale, ``"none"`` or ``"rig"``; ``bias`` the greatest constant
+    offset. ``out`` writes the trace (.csv, .csv.gz) and the truth beside it (.json) instead of keeping it.
+
+    Raises ``ValueError`` naming the argument.
+
+    >>> import pitchleak as pl
+    >>> trace = pl.simulate(position="100 mm", load="2 kN", leak_internal="0.3 L/min", duration=2)
+    >>> trace.samples, list(trace.columns)[:4]
+    (200, ['t_s', 'x_mm', 'pa_bar', 'pb_bar'])
+    """
+    order = {
+        "wind": None if wind is None else str(wind),
+        "position": position,
+        "load": load,
+        "leak_internal": leak_internal,
+        "leak_external_a": leak_external_a,
+        "leak_external_b": leak_external_b,
+        "onset": onset,
+        "effects": dict(effects or {}),
+        "noise": noise,
+        "bias": bias,
+        "seed": seed,
+        "duration": duration,
+        "start": start,
+        "sample_rate": sample_rate,
+        "load_scale": load_scale,
+        "position_scale": position_scale,
+        "blade_inertia": blade_inertia,
+    }
+    path = None if out is None else os.fspath(out)
+    truth, warnings, columns = _pitchleak.simulate(order, _inputs.rig_for(None, rig), path)
+    _inputs.warn(warnings)
+    raw = json.loads(truth)
+    result = record(Simulation, raw)
+    object.__setattr__(result, "raw", raw)
+    object.__setattr__(result, "columns", dict(columns))
+    return result

@@ -1,0 +1,183 @@
+use crate::errors::{trace_error, value_error};
+use crate::rig::Rig;
+use crate::source::Source;
+use crate::table::{NAME, is_plain};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use pitchleak::Rig as EngineRig;
+use pitchleak::replay::Stream;
+use pitchleak::report::Palette;
+use pitchleak::trace::{BadRows, TableLayout, TraceError, TraceReader};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use std::sync::Mutex;
+
+/// The running estimator under `pitchleak.Estimator`.
+#[pyclass(frozen, subclass, module = "pitchleak._pitchleak")]
+pub struct Estimator {
+    rig: Rig,
+    strict: bool,
+    /// Without the rig file's foreign names: here the arguments are the columns.
+    bare_rig: EngineRig,
+    running: Mutex<Running>,
+}
+
+struct Running {
+    stream: Stream,
+    /// Which optional signals the last samples had, and the layout for it.
+    layout: Option<([bool; 5], TableLayout)>,
+}
+
+/// A sample's reading, or those of many samples.
+#[derive(FromPyObject)]
+enum Readings<'py> {
+    Number(f64),
+    Array(PyReadonlyArray1<'py, f64>),
+    Other(Bound<'py, PyAny>),
+}
+
+impl<'py> Readings<'py> {
+    /// What is no contiguous f64 array is made one.
+    fn contiguous(self, py: Python<'py>, name: &str) -> PyResult<Self> {
+        let other = match self {
+            Self::Number(_) => return Ok(self),
+            Self::Array(array) if is_plain(&array) => return Ok(Self::Array(array)),
+            Self::Array(array) => array.as_any().clone(),
+            Self::Other(any) => any,
+        };
+        let numbers = py.import("pitchleak._columns")?.call_method1("numbers", (name, other))?;
+        Ok(Self::Array(numbers.cast::<PyArray1<f64>>()?.readonly()))
+    }
+
+    fn slice(&self) -> PyResult<&[f64]> {
+        match self {
+            Self::Number(value) => Ok(std::slice::from_ref(value)),
+            Self::Array(array) => Ok(array.as_slice()?),
+            Self::Other(_) => Ok(&[]),
+        }
+    }
+}
+
+const REQUIRED: [&str; 4] = ["t_s", "x_m", "pa_pa", "pb_pa"];
+const OPTIONAL: [&str; 5] = ["qa_m3s", "qb_m3s", "force_n", "v_mps", "temp_k"];
+
+#[pymethods]
+impl Estimator {
+    #[new]
+    #[pyo3(signature = (rig, *, estimator = None, strict = false))]
+    fn new(rig: &Rig, estimator: Option<&str>, strict: bool) -> PyResult<Self> {
+        let rig = Rig(rig.with_estimator(estimator)?);
+        let mut bare_rig = rig.0.clone();
+        bare_rig.columns.clear();
+        let running = Mutex::new(Running { stream: Stream::new(&rig.0), layout: None });
+        Ok(Self { rig, strict, bare_rig, running })
+    }
+
+    /// Takes in one sample, or many as arrays of one length; in SI whatever the rig file's columns are.
+    ///
+    /// Time ``t`` in s; position ``x`` in m from the A end; chamber pressures ``pa``, ``pb`` in Pa gauge;
+    /// flows into the chambers ``qa``, ``qb`` in m³/s, left out or NaN where they are not measured; load
+    /// ``force`` against extension in N; piston speed ``v`` in m/s; oil temperature ``temp`` in K.
+    /// Samples that no estimate can use (not finite, out of range, time going back) are skipped and
+    /// counted, or raise :class:`TraceError` where the estimator is strict.
+    ///
+    /// Returns how often the estimates were renewed, about four times a second.
+    ///
+    /// >>> import pitchleak as pl
+    /// >>> est = pl.Estimator(pl.Rig.paper())
+    /// >>> est.update(0.0, 0.1, 5e6, 4e6, 1e-5, -1e-5)
+    /// 0
+    #[pyo3(signature = (t, x, pa, pb, qa = None, qb = None, *, force = None, v = None, temp = None))]
+    #[expect(clippy::too_many_arguments, reason = "the signals of a sample")]
+    fn update<'py>(
+        &self,
+        py: Python<'py>,
+        t: Readings<'py>,
+        x: Readings<'py>,
+        pa: Readings<'py>,
+        pb: Readings<'py>,
+        qa: Option<Readings<'py>>,
+        qb: Option<Readings<'py>>,
+        force: Option<Readings<'py>>,
+        v: Option<Readings<'py>>,
+        temp: Option<Readings<'py>>,
+    ) -> PyResult<u64> {
+        let optional = [qa, qb, force, v, temp];
+        let given = optional.each_ref().map(Option::is_some);
+        let named =
+            REQUIRED.into_iter().zip([t, x, pa, pb].map(Some)).chain(OPTIONAL.into_iter().zip(optional));
+        let readings = named.filter_map(|(name, readings)| Some(readings?.contiguous(py, name)));
+        let readings = readings.collect::<PyResult<Vec<_>>>()?;
+        let batch = readings.iter().map(Readings::slice).collect::<PyResult<Vec<_>>>()?;
+        let done = if batch.iter().all(|column| column.len() == 1) {
+            self.lock(py)?.take(given, batch, self)
+        } else {
+            py.detach(|| match self.running.lock() {
+                Ok(mut running) => running.take(given, batch, self),
+                // Only a panic in here could have poisoned it.
+                Err(poisoned) => poisoned.into_inner().take(given, batch, self),
+            })
+        };
+        done.map_err(|error| trace_error(py, &error))
+    }
+
+    /// Takes in a part of a trace.
+    fn extend_source(&self, py: Python<'_>, source: Source<'_>) -> PyResult<u64> {
+        source.read(py, &self.rig.0, self.strict, |reader| match self.running.lock() {
+            Ok(mut running) => running.stream.extend(reader),
+            Err(poisoned) => poisoned.into_inner().stream.extend(reader),
+        })
+    }
+
+    /// JSON and text of the report as it stands; None before the first sample.
+    fn report(&self, py: Python<'_>) -> PyResult<Option<(String, String)>> {
+        let Some(report) = self.lock(py)?.stream.report(NAME) else { return Ok(None) };
+        Ok(Some((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN))))
+    }
+
+    /// Time of the last sample taken in, s; None before the first.
+    #[getter]
+    fn time_s(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        Ok(self.lock(py)?.stream.time_s())
+    }
+
+    /// The rig.
+    #[getter]
+    fn rig(&self) -> Rig {
+        self.rig.clone()
+    }
+
+    /// Whether bad samples raise.
+    #[getter]
+    fn strict(&self) -> bool {
+        self.strict
+    }
+}
+
+impl Estimator {
+    fn lock(&self, py: Python<'_>) -> PyResult<std::sync::MutexGuard<'_, Running>> {
+        self.running.lock_py_attached(py).map_err(value_error)
+    }
+}
+
+impl Running {
+    fn take(
+        &mut self,
+        given: [bool; 5],
+        batch: Vec<&[f64]>,
+        estimator: &Estimator,
+    ) -> Result<u64, TraceError> {
+        let layout = match &self.layout {
+            Some((last, layout)) if *last == given => layout.clone(),
+            _ => {
+                let optional =
+                    OPTIONAL.into_iter().zip(given).filter_map(|(name, given)| given.then_some(name));
+                let headers: Vec<_> = REQUIRED.into_iter().chain(optional).map(str::to_owned).collect();
+                TableLayout::new(NAME, &headers, &estimator.bare_rig)?
+            }
+        };
+        let bad_rows = if estimator.strict { BadRows::Fatal } else { BadRows::Skip };
+        let reader = TraceReader::from_table(NAME, &layout, vec![batch], &estimator.rig.0)?;
+        self.layout = Some((given, layout));
+        self.stream.extend(reader.with_bad_rows(bad_rows))
+    }
+}

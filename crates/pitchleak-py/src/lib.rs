@@ -1,0 +1,45 @@
+//! The engine for Python: `pitchleak._pitchleak`, under the package `pitchleak`. Data in, JSON and arrays
+//! out; what Python makes of them is in `python/pitchleak`.
+
+mod diagnose;
+mod errors;
+mod estimator;
+mod linkage;
+mod replay;
+mod reproduce;
+mod rig;
+mod simulate;
+mod source;
+mod table;
+
+use pyo3::prelude::*;
+
+/// The compiled part of pitchleak.
+#[pymodule(gil_used = false)]
+mod _pitchleak {
+    #[pymodule_export]
+    use crate::diagnose::diagnose;
+    #[pymodule_export]
+    use crate::errors::{RigError, TraceError};
+    #[pymodule_export]
+    use crate::estimator::Estimator;
+    #[pymodule_export]
+    use crate::linkage::Linkage;
+    #[pymodule_export]
+    use crate::replay::{check, over_time, replay};
+    #[pymodule_export]
+    use crate::reproduce::reproduce;
+    #[pymodule_export]
+    use crate::rig::Rig;
+    #[pymodule_export]
+    use crate::simulate::simulate;
+    #[pymodule_export]
+    use crate::table::{Layout, Table};
+
+    use super::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

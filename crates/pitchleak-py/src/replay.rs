@@ -1,0 +1,63 @@
+//! Whole traces: replay, its estimates over time, check.
+
+use crate::errors::value_error;
+use crate::rig::Rig;
+use crate::source::Source;
+use numpy::{IntoPyArray, PyArray1};
+use pitchleak::replay::Point;
+use pitchleak::report::Palette;
+use pitchleak::trace::TraceError;
+use pyo3::prelude::*;
+
+/// A report for programs (JSON) and for people.
+pub type Report = (String, String);
+
+/// Replays a trace.
+#[pyfunction]
+pub fn replay(
+    py: Python<'_>,
+    source: Source<'_>,
+    rig: &Rig,
+    estimator: Option<&str>,
+    strict: bool,
+) -> PyResult<Report> {
+    let rig = rig.with_estimator(estimator)?;
+    let report = source.read(py, &rig, strict, |mut reader| {
+        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, TraceError>(()))
+    })?;
+    Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
+}
+
+/// Columns of estimates over time, as `replay --out` writes them.
+type Columns<'py> = Vec<(&'static str, Bound<'py, PyArray1<f64>>)>;
+
+/// Replays a trace again and keeps the estimates after each sample; the report's JSON comes with them.
+#[pyfunction]
+pub fn over_time<'py>(
+    py: Python<'py>,
+    source: Source<'py>,
+    rig: &Rig,
+    estimator: Option<&str>,
+    strict: bool,
+) -> PyResult<(String, Columns<'py>)> {
+    let rig = rig.with_estimator(estimator)?;
+    let mut columns: [Vec<f64>; Point::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
+    let report = source.read(py, &rig, strict, |mut reader| {
+        pitchleak::replay::replay(&mut reader, &rig, |replay, record, _| {
+            for (column, value) in columns.iter_mut().zip(replay.point(record).values()) {
+                column.push(value);
+            }
+            Ok::<_, TraceError>(())
+        })
+    })?;
+    let columns = Point::COLUMNS.into_iter().zip(columns.map(|column| column.into_pyarray(py))).collect();
+    Ok((report.to_json().map_err(value_error)?, columns))
+}
+
+/// Data quality, excitation, what a trace can and cannot identify.
+#[pyfunction]
+pub fn check(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyResult<Report> {
+    let report =
+        source.read(py, &rig.0, strict, |mut reader| pitchleak::check::check(&mut reader, &rig.0))?;
+    Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
+}

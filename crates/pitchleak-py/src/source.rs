@@ -1,0 +1,41 @@
+use crate::errors::trace_error;
+use crate::table::{NAME, Table};
+use pitchleak::Rig;
+use pitchleak::trace::{BadRows, TraceError, TraceReader};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// Where a trace comes from.
+#[derive(FromPyObject)]
+pub enum Source<'py> {
+    Table(Bound<'py, Table>),
+    Path(PathBuf),
+}
+
+impl Source<'_> {
+    /// Gives `work` a reader of the trace, with the interpreter released.
+    pub fn read<T: Send>(
+        &self,
+        py: Python<'_>,
+        rig: &Rig,
+        strict: bool,
+        work: impl FnOnce(TraceReader<'_>) -> Result<T, TraceError> + Send,
+    ) -> PyResult<T> {
+        let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
+        let done = match self {
+            Self::Path(path) => py.detach(|| {
+                TraceReader::open(path, rig).and_then(|reader| work(reader.with_bad_rows(bad_rows)))
+            }),
+            Self::Table(table) => {
+                let table = table.get();
+                let lent = table.lend(py);
+                let batches = table.slices(&lent)?;
+                py.detach(|| {
+                    let reader = TraceReader::from_table(NAME, table.layout(), batches, rig)?;
+                    work(reader.with_bad_rows(bad_rows))
+                })
+            }
+        };
+        done.map_err(|error| trace_error(py, &error))
+    }
+}

@@ -1,0 +1,223 @@
+//! Columns that Python holds, lent to the engine without a copy where they are f64 already.
+
+use crate::errors::trace_error;
+use crate::rig::Rig;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float64Type, TimestampNanosecondType};
+use arrow_array::{Array, RecordBatch};
+use arrow_buffer::ScalarBuffer;
+use arrow_cast::cast;
+use arrow_schema::{DataType, TimeUnit};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
+use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3_arrow::input::AnyRecordBatch;
+
+/// What the columns of a table are read as, by their headers.
+#[pyclass(frozen, module = "pitchleak._pitchleak")]
+pub struct Layout(TableLayout);
+
+#[pymethods]
+impl Layout {
+    /// Reads headers as those of a trace file.
+    #[new]
+    fn new(py: Python<'_>, headers: Vec<String>, rig: &Rig) -> PyResult<Self> {
+        TableLayout::new(NAME, &headers, &rig.0).map(Self).map_err(|error| trace_error(py, &error))
+    }
+
+    /// ``numbers``, ``timestamps`` or ``ignored`` for each header.
+    #[getter]
+    fn contents(&self) -> Vec<&'static str> {
+        let word = |content| match content {
+            ColumnContent::Numbers => "numbers",
+            ColumnContent::Timestamps => "timestamps",
+            ColumnContent::Ignored => "ignored",
+        };
+        self.0.contents().map(word).collect()
+    }
+}
+
+/// How columns in memory are called in messages.
+pub const NAME: &str = "data";
+
+/// Time that is not a time, ns: as numpy and pandas write it.
+const NOT_A_TIME: i64 = i64::MIN;
+
+/// Columns in memory, and what they hold.
+#[pyclass(frozen, module = "pitchleak._pitchleak")]
+pub struct Table {
+    layout: TableLayout,
+    batches: Vec<Vec<Column>>,
+    first_ns: Option<i64>,
+}
+
+enum Column {
+    Ignored,
+    Numpy(Py<PyArray1<f64>>),
+    Arrow(ScalarBuffer<f64>),
+    Converted(Vec<f64>),
+}
+
+/// An array as the Python side hands it over.
+#[derive(FromPyObject)]
+enum Given<'py> {
+    Numbers(Bound<'py, PyArray1<f64>>),
+    Nanoseconds(PyReadonlyArray1<'py, i64>),
+}
+
+#[pymethods]
+impl Table {
+    /// Contiguous float64 arrays, int64 nanoseconds for timestamps, None where ignored. ``first_ns`` is
+    /// where timestamps count from, else their own first.
+    #[staticmethod]
+    #[pyo3(signature = (layout, columns, first_ns = None))]
+    fn from_arrays(
+        layout: &Layout,
+        columns: Vec<Option<Given<'_>>>,
+        first_ns: Option<i64>,
+    ) -> PyResult<Self> {
+        let mut first_ns = first_ns;
+        let hold = |column: Option<Given<'_>>| match column {
+            None => Ok(Column::Ignored),
+            Some(Given::Numbers(array)) if is_plain(&array) => Ok(Column::Numpy(array.unbind())),
+            Some(Given::Numbers(_)) => Err(PyValueError::new_err("arrays must be contiguous")),
+            Some(Given::Nanoseconds(array)) => {
+                let times = array.as_array();
+                Ok(Column::Converted(seconds(times.iter().copied(), &mut first_ns)))
+            }
+        };
+        let columns = columns.into_iter().map(hold).collect::<PyResult<_>>()?;
+        Ok(Self { layout: layout.0.clone(), batches: vec![columns], first_ns })
+    }
+
+    /// Anything with the Arrow PyCapsule interface.
+    #[staticmethod]
+    #[pyo3(signature = (data, rig, first_ns = None))]
+    fn from_arrow(py: Python<'_>, data: AnyRecordBatch, rig: &Rig, first_ns: Option<i64>) -> PyResult<Self> {
+        let (batches, schema) = data.into_table()?.into_inner();
+        let headers: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
+        let layout = Layout::new(py, headers, rig)?.0;
+        let mut first_ns = first_ns;
+        let batches = batches.iter().map(|batch| arrow_columns(batch, &layout, &mut first_ns));
+        Ok(Self { batches: batches.collect::<PyResult<_>>()?, layout, first_ns })
+    }
+
+    /// Where its timestamps count from, ns since 1970; None where it has none.
+    #[getter]
+    fn first_ns(&self) -> Option<i64> {
+        self.first_ns
+    }
+
+    /// Bytes of the columns that had to be converted; the others are not copied.
+    #[getter]
+    fn converted_bytes(&self) -> usize {
+        let size = |column: &Column| match column {
+            Column::Converted(values) => size_of_val(values.as_slice()),
+            _ => 0,
+        };
+        self.batches.iter().flatten().map(size).sum()
+    }
+}
+
+impl Table {
+    pub fn layout(&self) -> &TableLayout {
+        &self.layout
+    }
+
+    /// What keeps the arrays as they are while they are read.
+    pub fn lend<'py>(&self, py: Python<'py>) -> Vec<Vec<Option<PyReadonlyArray1<'py, f64>>>> {
+        let lend = |column: &Column| match column {
+            Column::Numpy(array) => Some(array.bind(py).readonly()),
+            _ => None,
+        };
+        self.batches.iter().map(|batch| batch.iter().map(lend).collect()).collect()
+    }
+
+    /// The values, those of numpy arrays from `lent`.
+    pub fn slices<'a>(
+        &'a self,
+        lent: &'a [Vec<Option<PyReadonlyArray1<'_, f64>>>],
+    ) -> PyResult<Vec<Vec<&'a [f64]>>> {
+        let slice = |(column, lent): (&'a Column, &'a Option<PyReadonlyArray1<'_, f64>>)| match (column, lent)
+        {
+            (Column::Numpy(_), Some(array)) => Ok(array.as_slice()?),
+            (Column::Arrow(buffer), _) => Ok(&buffer[..]),
+            (Column::Converted(values), _) => Ok(&values[..]),
+            (Column::Ignored | Column::Numpy(_), _) => Ok(&[][..]),
+        };
+        self.batches
+            .iter()
+            .zip(lent)
+            .map(|(batch, lent)| batch.iter().zip(lent).map(slice).collect())
+            .collect()
+    }
+}
+
+/// Whether an array's memory is a slice of f64.
+pub fn is_plain(array: &Bound<'_, PyArray1<f64>>) -> bool {
+    array.is_contiguous() && array.data().is_aligned()
+}
+
+/// Seconds since the first of `times_ns`.
+fn seconds(times_ns: impl Iterator<Item = i64>, first_ns: &mut Option<i64>) -> Vec<f64> {
+    let mut since_first = |time: i64| {
+        if time == NOT_A_TIME {
+            return f64::NAN;
+        }
+        seconds_between(i128::from(*first_ns.get_or_insert(time)), i128::from(time))
+    };
+    times_ns.map(&mut since_first).collect()
+}
+
+fn arrow_columns(
+    batch: &RecordBatch,
+    layout: &TableLayout,
+    first_ns: &mut Option<i64>,
+) -> PyResult<Vec<Column>> {
+    let schema = batch.schema();
+    let columns = layout.contents().zip(batch.columns()).zip(schema.fields());
+    let read =
+        |((content, array), field): ((ColumnContent, &arrow_array::ArrayRef), &arrow_schema::FieldRef)| {
+            match content {
+                ColumnContent::Ignored => Ok(Column::Ignored),
+                ColumnContent::Numbers => numbers(field.name(), array),
+                ColumnContent::Timestamps => timestamps(field.name(), array, first_ns),
+            }
+        };
+    columns.map(read).collect()
+}
+
+/// A column without nulls and of f64 is taken as it is.
+fn numbers(name: &str, array: &dyn Array) -> PyResult<Column> {
+    let kind = array.data_type();
+    let whole = matches!(kind, DataType::Null) || kind.is_floating() || kind.is_integer();
+    if !whole {
+        return Err(wrong_type(name, kind, "numbers"));
+    }
+    let floats = cast(array, &DataType::Float64).map_err(|_| wrong_type(name, kind, "numbers"))?;
+    let floats = floats.as_primitive::<Float64Type>();
+    if floats.null_count() == 0 {
+        return Ok(Column::Arrow(floats.values().clone()));
+    }
+    Ok(Column::Converted(floats.iter().map(|value| value.unwrap_or(f64::NAN)).collect()))
+}
+
+fn timestamps(name: &str, array: &dyn Array, first_ns: &mut Option<i64>) -> PyResult<Column> {
+    let kind = array.data_type();
+    if !matches!(kind, DataType::Timestamp(..)) {
+        return Err(wrong_type(name, kind, "timestamps"));
+    }
+    let zone = match kind {
+        DataType::Timestamp(_, zone) => zone.clone(),
+        _ => None,
+    };
+    let times = cast(array, &DataType::Timestamp(TimeUnit::Nanosecond, zone))
+        .map_err(|_| wrong_type(name, kind, "timestamps"))?;
+    let times = times.as_primitive::<TimestampNanosecondType>();
+    Ok(Column::Converted(seconds(times.iter().map(|time| time.unwrap_or(NOT_A_TIME)), first_ns)))
+}
+
+fn wrong_type(name: &str, found: &DataType, wanted: &str) -> PyErr {
+    PyTypeError::new_err(format!("column `{name}` holds {found}; {wanted} are expected"))
+}

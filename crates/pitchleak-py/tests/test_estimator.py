@@ -1,0 +1,116 @@
+"""A trace in parts is the trace."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import pitchleak as pl
+
+
+@pytest.fixture(scope="module")
+def si(columns):
+    """The trace in SI, as `update` takes it."""
+    return {
+        "t": columns["t_s"],
+        "x": columns["x_mm"] / 1e3,
+        "pa": columns["pa_bar"] * 1e5,
+        "pb": columns["pb_bar"] * 1e5,
+        "qa": columns["qa_lpm"] / 60e3,
+        "qb": columns["qb_lpm"] / 60e3,
+        "force": columns["force_n"],
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(si, rig):
+    headers = ("t_s", "x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s", "force_n")
+    return pl.replay(dict(zip(headers, si.values(), strict=True)), rig)
+
+
+def test_samples_one_by_one(si, rig, whole):
+    est = pl.Estimator(rig)
+    renewals = sum(est.update(*row[:6], force=row[6]) for row in zip(*si.values(), strict=True))
+    assert est.state() == whole
+    assert renewals == len(np.flatnonzero(np.diff(whole.table["internal_leak_coefficient"])))
+    assert est.time_s == si["t"][-1]
+
+
+@pytest.mark.parametrize("part", [1, 2, 7, 1000, 10**6])
+def test_arrays_of_any_length(part, si, rig, whole):
+    est = pl.Estimator(rig)
+    for start in range(0, len(si["t"]), part):
+        rows = {name: values[start : start + part] for name, values in si.items()}
+        est.update(**rows)
+    assert est.state() == whole
+
+
+def test_frames(columns, rig):
+    est = pl.Estimator(rig)
+    for rows in (slice(0, 100), slice(100, 101), slice(101, None)):
+        est.extend({name: values[rows] for name, values in columns.items()})
+    assert est.state() == pl.replay(columns, rig)
+    assert repr(est).endswith("at 39.990 s>")
+
+
+def test_time_stamps_count_from_the_first_part(columns, rig):
+    stamps = np.datetime64("2026-11-20T22:10:31") + np.arange(len(columns["t_s"])) * np.timedelta64(10, "ms")
+    frame = {"timestamp": stamps} | {name: values for name, values in columns.items() if name != "t_s"}
+    est = pl.Estimator(rig)
+    for rows in (slice(0, 100), slice(100, None)):
+        est.extend({name: values[rows] for name, values in frame.items()})
+    assert est.state() == pl.replay(frame, rig)
+
+
+def test_what_is_not_plain_is_made_so(si, rig, whole):
+    est = pl.Estimator(rig)
+    est.update(**{name: values.tolist() for name, values in si.items()})
+    assert est.state() == whole
+    est = pl.Estimator(rig)
+    est.update(**{name: np.repeat(values, 3)[::3] for name, values in si.items()})
+    assert est.state() == whole
+    unaligned = {}
+    for name, values in si.items():
+        memory = np.zeros(8 * len(values) + 1, np.uint8)
+        shifted = memory[1:].view(np.float64)
+        shifted[:] = values
+        unaligned[name] = shifted
+    est = pl.Estimator(rig)
+    est.update(**unaligned)
+    assert est.state() == whole
+
+
+def test_bad_samples(rig):
+    est = pl.Estimator(rig)
+    with pytest.raises(ValueError, match="no sample yet"):
+        est.state()
+    est.update(0.0, np.nan, 5e6, 4e6)
+    est.update(0.01, 0.1, 5e6, 4e6)
+    assert (est.state().trace.samples, est.state().trace.skipped) == (1, 1)
+    strict = pl.Estimator(rig, strict=True)
+    strict.update(0.0, 0.1, 5e6, 4e6, 1e-5, 1e-5)
+    with pytest.raises(pl.TraceError, match="row 1, column `t_s`: 0 s is not after 0 s") as error:
+        strict.update(0.0, 0.1, 5e6, 4e6, 1e-5, 1e-5)
+    assert (error.value.column, error.value.row, error.value.line) == ("t_s", 1, None)
+    with pytest.raises(pl.TraceError, match="column `x_m` has 2 rows, `t_s` has 3"):
+        strict.update(np.arange(3.0), np.zeros(2), np.zeros(3), np.zeros(3))
+    with pytest.raises(TypeError, match="column `x_m`, row 0: str where a number is expected"):
+        strict.update([0.1], np.array(["much"], object), [5e6], [4e6])
+
+
+def test_an_estimator_is_shared_by_threads(si, rig):
+    est = pl.Estimator(rig)
+    rows = {name: values[:1000] for name, values in si.items()}
+
+    def work():
+        for _ in range(20):
+            est.update(**rows)
+            est.state()
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    trace = est.state().trace
+    assert trace.samples + trace.skipped == 80 * 1000
