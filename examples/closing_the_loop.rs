@@ -75,6 +75,7 @@ fn panels(diagnosis: &Diagnosis) -> Vec<Panel> {
         .filter(|(_, _, before, _, _)| !before.is_empty())
         .map(|(title, y_label, before, after, factor)| Panel {
             title: title.to_owned(),
+            x_label: "time (s)",
             y_label,
             lines: vec![
                 line("declared model", Ink::Measured, before, factor),

@@ -12,6 +12,8 @@ pub enum Ink {
     Ours,
     /// Vermilion: the paper's estimate.
     Paper,
+    /// Thin and dark: what chance allows, or theory says.
+    Limit,
 }
 
 impl Ink {
@@ -20,6 +22,7 @@ impl Ink {
             Self::Measured => RGBColor(165, 165, 165),
             Self::Ours => RGBColor(0, 114, 178),
             Self::Paper => RGBColor(213, 94, 0),
+            Self::Limit => RGBColor(60, 60, 60),
         }
     }
 
@@ -27,6 +30,7 @@ impl Ink {
         match self {
             Self::Measured => 5,
             Self::Ours | Self::Paper => 2,
+            Self::Limit => 1,
         }
     }
 }
@@ -47,7 +51,9 @@ pub struct Line {
 pub struct Panel {
     /// Heading.
     pub title: String,
-    /// Quantity and unit of the vertical axis; the horizontal one is time in seconds.
+    /// Quantity and unit of the horizontal axis.
+    pub x_label: &'static str,
+    /// Quantity and unit of the vertical axis.
     pub y_label: &'static str,
     /// The curves, drawn in this order.
     pub lines: Vec<Line>,
@@ -112,14 +118,14 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
         .map_err(error)?;
     chart
         .configure_mesh()
-        .x_desc("time (s)")
+        .x_desc(panel.x_label)
         .y_desc(panel.y_label)
         .axis_desc_style(("sans-serif", 15))
         .label_style(("sans-serif", 13))
         .light_line_style(TRANSPARENT)
         .bold_line_style(RGBColor(220, 220, 220))
         .x_labels(6)
-        .x_label_formatter(&|value| short(*value, 10.0 * (right - left)))
+        .x_label_formatter(&|value| short(*value, right - left))
         .y_labels(6)
         .y_label_formatter(&|value| short(*value, high - low))
         .draw()
@@ -176,7 +182,13 @@ mod tests {
 
     fn panel(points: Vec<(f64, f64)>) -> Panel {
         let line = Line { label: "ours", ink: Ink::Ours, points };
-        Panel { title: "A title".into(), y_label: "leak (L/min)", lines: vec![line], y_range: None }
+        Panel {
+            title: "A title".into(),
+            x_label: "time (s)",
+            y_label: "leak (L/min)",
+            lines: vec![line],
+            y_range: None,
+        }
     }
 
     #[test]

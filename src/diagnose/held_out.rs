@@ -2,7 +2,8 @@
 
 use super::fit::Fit;
 use super::outcome::{Residual, Rmse, Shape};
-use super::rows::{Balance, Row, Rows};
+use super::residual::VARIABLES;
+use super::rows::{Balance, Entry, Row, Rows};
 use super::series::Series;
 
 /// Bins of equal count against each variable.
@@ -10,7 +11,16 @@ const BINS: usize = 12;
 
 /// What is left of each hat, in m³/s or N.
 pub(super) struct HeldOut {
-    points: Vec<(Balance, Row, f64)>,
+    points: Vec<Point>,
+}
+
+/// What is left of one hat.
+struct Point {
+    balance: Balance,
+    t_s: f64,
+    /// What the machine did then, from other samples.
+    beside: Option<Row>,
+    left: f64,
 }
 
 impl HeldOut {
@@ -18,7 +28,13 @@ impl HeldOut {
     pub(super) fn of(fit: &Fit<'_>, test: &[Series]) -> Self {
         let collect = |rows: &Rows, left: Vec<f64>| {
             let entries = rows.entries.iter().zip(left);
-            Self { points: entries.map(|(e, v)| (e.balance, rows.rows[e.row], v)).collect() }
+            let point = |(entry, left): (&Entry, f64)| Point {
+                balance: entry.balance,
+                t_s: rows.rows[entry.row].t_s,
+                beside: rows.beside(entry.row).copied(),
+                left,
+            };
+            Self { points: entries.map(point).collect() }
         };
         if test.is_empty() {
             return collect(&fit.rows, fit.held_out_leftover());
@@ -27,13 +43,14 @@ impl HeldOut {
         collect(&rows, left)
     }
 
-    fn of_balance(&self, balance: Balance) -> impl Iterator<Item = &(Balance, Row, f64)> {
-        self.points.iter().filter(move |point| point.0 == balance)
+    fn of_balance(&self, balance: Balance) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(move |point| point.balance == balance)
     }
 
     pub(super) fn rmse(&self) -> Rmse {
         let of = |balance| {
-            let (sum, count) = self.of_balance(balance).fold((0.0, 0), |(s, n), p| (s + p.2 * p.2, n + 1));
+            let (sum, count) =
+                self.of_balance(balance).fold((0.0, 0), |(s, n), p| (s + p.left * p.left, n + 1));
             (count > 0).then(|| (sum / f64::from(count)).sqrt())
         };
         Rmse {
@@ -44,7 +61,7 @@ impl HeldOut {
     }
 
     pub(super) fn residual(&self) -> Residual {
-        let of = |balance| self.of_balance(balance).map(|(_, row, v)| (row.t_s, *v)).collect();
+        let of = |balance| self.of_balance(balance).map(|point| (point.t_s, point.left)).collect();
         Residual {
             chamber_a_m3s: of(Balance::ChamberA),
             chamber_b_m3s: of(Balance::ChamberB),
@@ -54,26 +71,15 @@ impl HeldOut {
 
     /// What is left against each variable, in bins of equal count.
     pub(super) fn shapes(&self) -> Vec<Shape> {
-        type Variable = fn(&Row) -> f64;
-        let variables: [(&'static str, Variable); 9] = [
-            ("load_pressure_pa", |r| r.mean.pa_pa - r.mean.pb_pa),
-            ("pa_pa", |r| r.mean.pa_pa),
-            ("pb_pa", |r| r.mean.pb_pa),
-            ("x_m", |r| r.mean.x_m),
-            ("v_mps", |r| r.mean.v_mps),
-            ("direction", |r| r.mean.v_mps.signum()),
-            ("qa_m3s", |r| r.mean.qa_m3s),
-            ("qb_m3s", |r| r.mean.qb_m3s),
-            ("t_s", |r| r.t_s),
-        ];
         let mut shapes = Vec::new();
         for (balance, name) in Balance::ALL.into_iter().zip(["chamber_a", "chamber_b", "force"]) {
             if self.of_balance(balance).count() < 2 * BINS {
                 continue;
             }
-            for (against, variable) in variables {
-                let pairs = self.of_balance(balance).map(|(_, row, v)| (variable(row), *v)).collect();
-                shapes.push(binned(name, against, pairs));
+            for variable in &VARIABLES {
+                let pair = |point: &Point| Some(((variable.of)(point.beside.as_ref()?), point.left));
+                let pairs = self.of_balance(balance).filter_map(pair).collect();
+                shapes.push(binned(name, variable.name, pairs));
             }
         }
         shapes
@@ -88,12 +94,29 @@ fn binned(balance: &'static str, against: &'static str, mut pairs: Vec<(f64, f64
     let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));
     let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
     let scale = (xx * yy).sqrt();
-    let (at, means) = pairs
-        .chunks(pairs.len().div_ceil(BINS))
-        .map(|bin| {
-            let sum = bin.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
-            (sum.0 / bin.len() as f64, sum.1 / bin.len() as f64)
-        })
-        .unzip();
-    Shape { balance, against, at, mean: means, correlation: if scale > 0.0 { xy / scale } else { 0.0 } }
+    let bins = pairs.chunks(pairs.len().div_ceil(BINS)).map(Bin::of);
+    let (mut at, mut mean, mut std_error) = (vec![], vec![], vec![]);
+    for bin in bins {
+        at.push(bin.at);
+        mean.push(bin.mean);
+        std_error.push(bin.std_error);
+    }
+    Shape { balance, against, at, mean, std_error, correlation: if scale > 0.0 { xy / scale } else { 0.0 } }
+}
+
+/// Means of one bin.
+struct Bin {
+    at: f64,
+    mean: f64,
+    std_error: f64,
+}
+
+impl Bin {
+    fn of(pairs: &[(f64, f64)]) -> Self {
+        let n = pairs.len() as f64;
+        let sum = pairs.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let (at, mean) = (sum.0 / n, sum.1 / n);
+        let variance = pairs.iter().map(|p| (p.1 - mean).powi(2)).sum::<f64>() / n;
+        Self { at, mean, std_error: (variance / n).sqrt() }
+    }
 }

@@ -11,6 +11,7 @@
 
 mod adequacy;
 mod exchange;
+mod figures;
 mod fit;
 mod held_out;
 mod interaction;
@@ -20,6 +21,8 @@ mod noise;
 mod outcome;
 mod point;
 mod regression;
+mod residual;
+mod residual_text;
 mod rows;
 mod select;
 mod series;
@@ -31,8 +34,9 @@ mod whiteness;
 pub use likeness::{Likeness, Look};
 pub use outcome::{
     Calibration, Diagnosis, FoundEffect, Interaction, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality,
-    Residual, Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
+    Residual, ResidualsBeforeAfter, Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
 };
+pub use residual::{BalanceResidual, Correlation, Residuals};
 pub use series::Series;
 
 use crate::Rig;
@@ -118,6 +122,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let left_before = HeldOut::of(&fit, &test);
     let before = Quality { rmse: left_before.rmse(), whiteness_p: adequacy::whiteness_p(&fit) };
     let leaks_before = leaks(&fit);
+    let residuals_before = Residuals::of(&fit);
     let mut named = Vec::<Named>::new();
     let excited = is_excited(&fit);
     let excess_before = fit.excess_power();
@@ -172,6 +177,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         excess: rows::Balance::ALL.map(|balance| fit.excess(balance)),
         remainder_before: left_before.shapes(),
         remainder: left.shapes(),
+        residuals: ResidualsBeforeAfter { before: residuals_before, after: Residuals::of(&fit) },
         residual_before: left_before.residual(),
         residual: left.residual(),
     }

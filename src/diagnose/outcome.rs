@@ -1,5 +1,6 @@
 //! What a diagnosis says, field by field as `diagnose --json` prints it.
 
+use super::residual::Residuals;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -147,6 +148,15 @@ pub struct LeaksBeforeAfter {
     pub after: LeakEstimates,
 }
 
+/// What the declared model leaves over, and what is left with the effects found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ResidualsBeforeAfter {
+    /// Best fit of the declared model.
+    pub before: Residuals,
+    /// With the effects.
+    pub after: Residuals,
+}
+
 /// A size with its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Size {
@@ -178,6 +188,8 @@ pub struct Shape {
     pub at: Vec<f64>,
     /// Mean of what is left there, SI.
     pub mean: Vec<f64>,
+    /// Standard error of each mean, as if the hats were independent, SI.
+    pub std_error: Vec<f64>,
     /// Correlation of the two.
     pub correlation: f64,
 }
@@ -209,6 +221,8 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Size of what is left as a multiple of the sensors' noise: chamber A, chamber B, force.
     pub excess: [f64; 3],
+    /// What is left of the fitted samples, whitened and tested.
+    pub residuals: ResidualsBeforeAfter,
     /// What the declared model leaves over, against each variable.
     pub remainder_before: Vec<Shape>,
     /// What is left with the effects.

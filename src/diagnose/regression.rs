@@ -315,13 +315,21 @@ impl Regression {
 
     /// Whitened residuals of one balance, in order of time.
     pub(super) fn innovations(&self, rows: &Rows, solution: &Solution, balance: Balance) -> Vec<f64> {
-        (0..self.y.len())
-            .filter(|i| rows.entries[*i].balance == balance && self.counted[*i])
-            .map(|i| {
-                let fit = solution.terms.iter().zip(solution.scaled.iter());
-                self.y[i] - fit.map(|(term, v)| v * self.columns[*term][i]).sum::<f64>()
-            })
-            .collect()
+        self.innovations_by_entry(rows, solution, balance).map(|(_, value)| value).collect()
+    }
+
+    /// The same with the entry that each belongs to.
+    pub(super) fn innovations_by_entry<'a>(
+        &'a self,
+        rows: &'a Rows,
+        solution: &'a Solution,
+        balance: Balance,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let counted = move |i: &usize| rows.entries[*i].balance == balance && self.counted[*i];
+        (0..self.y.len()).filter(counted).map(|i| {
+            let fit = solution.terms.iter().zip(solution.scaled.iter());
+            (i, self.y[i] - fit.map(|(term, v)| v * self.columns[*term][i]).sum::<f64>())
+        })
     }
 }
 

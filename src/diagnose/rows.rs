@@ -109,7 +109,7 @@ impl Hats {
 }
 
 /// Numbers that are integrated beside y and the columns: time, stuck time, what is missing, means.
-const EXTRA: usize = 11;
+const EXTRA: usize = 13;
 /// Numbers set aside for the stretches of one trace.
 const MOST_STRETCHES: usize = 1 << 32;
 /// A share of a hat that is rounding, not time.
@@ -225,6 +225,13 @@ impl Rows {
     }
 
     /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown.
+    /// What the machine does at `row`, read from the second hat after it: that shares no sample with it, so
+    /// that the noise of what is left at `row` does not show in what it is held against.
+    pub(super) fn beside(&self, row: usize) -> Option<&Row> {
+        let (own, later) = (self.rows.get(row)?, self.rows.get(row + 2)?);
+        (own.stretch == later.stretch).then_some(later)
+    }
+
     pub(super) fn counts(&self, entry: &Entry) -> bool {
         entry.balance != Balance::Force || self.rows[entry.row].stuck <= SLIVER
     }
@@ -256,7 +263,16 @@ fn step(series: &Series, motion: &Motion, at: usize, recipe: &Recipe<'_>, out: &
     out[width + 2] = missing(reading.qa_m3s);
     out[width + 3] = missing(reading.qb_m3s);
     out[width + 4] = missing(reading.force_n);
-    let means = [reading.x_m, reading.v_mps, reading.pa_pa, reading.pb_pa, reading.qa_m3s, reading.qb_m3s];
+    let means = [
+        reading.x_m,
+        reading.v_mps,
+        reading.pa_pa,
+        reading.pb_pa,
+        reading.qa_m3s,
+        reading.qb_m3s,
+        reading.force_n,
+        reading.temp_k,
+    ];
     for (cell, value) in out[width + 5..].iter_mut().zip(means) {
         *cell = value * dt;
     }
@@ -276,6 +292,8 @@ fn means(hat: &[f64], block_s: f64) -> Moment<f64> {
         pb_pa: mean(3),
         qa_m3s: mean(4),
         qb_m3s: mean(5),
+        force_n: mean(6),
+        temp_k: mean(7),
         ..Moment::default()
     }
 }

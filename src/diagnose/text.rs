@@ -28,6 +28,8 @@ impl Diagnosis {
         self.effects.iter().for_each(|effect| write_effect(&mut out, effect));
         if self.verdict != Verdict::InsufficientExcitation {
             self.write_errors(&mut out);
+            self.write_residuals(&mut out);
+            self.write_shapes(&mut out);
             self.write_leaks(&mut out);
         }
         for note in &self.notes {

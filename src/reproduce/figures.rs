@@ -115,6 +115,7 @@ fn wind(run: &Run) -> Panel {
     let points = (0..).zip(speeds).map(|(k, speed)| (f64::from(k) / SAMPLE_RATE_HZ, *speed)).collect();
     Panel {
         title: format!("Mean wind {} m/s", run.wind.mean_mps()),
+        x_label: "time (s)",
         y_label: "wind (m/s)",
         lines: vec![line("", Ink::Ours, points)],
         y_range: None,
@@ -126,6 +127,7 @@ fn followed(run: &Run) -> [Panel; 2] {
     let wind = run.wind.mean_mps();
     let panel = |what, y_label, reference, output| Panel {
         title: format!("{wind} m/s: {what}"),
+        x_label: "time (s)",
         y_label,
         lines: vec![line("reference", Ink::Measured, reference), line("output", Ink::Ours, output)],
         y_range: None,
@@ -175,6 +177,7 @@ fn leak_flows(courses: &Courses) -> [Panel; 2] {
         let room = 0.3 * (high - low);
         Panel {
             title: format!("{} m/s: {name} leakage", courses.mean_mps),
+            x_label: "time (s)",
             y_label: "leakage (L/min)",
             y_range: Some((low - room, high + room)),
             lines: vec![
@@ -197,6 +200,7 @@ fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
         let end = courses.ours.t_s.last().copied().unwrap_or(0.0);
         Panel {
             title: format!("{} m/s: {name} leak coefficient", courses.mean_mps),
+            x_label: "time (s)",
             y_label: "coefficient (L/min/bar)",
             y_range: Some((-0.2 * truth, 2.0 * truth)),
             lines: vec![

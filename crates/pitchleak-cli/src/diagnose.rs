@@ -3,7 +3,7 @@ use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Series, diagnose};
+use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
 use pitchleak::trace::{BadRows, TraceReader};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,8 @@ use std::time::Duration;
 Examples:
   pitchleak diagnose trace.csv.gz --rig turbine7.toml
   pitchleak diagnose monday/*.csv --test tuesday/*.csv --save-rig corrected.toml
-  pitchleak replay trace.csv.gz --rig corrected.toml")]
+  pitchleak replay trace.csv.gz --rig corrected.toml
+  pitchleak diagnose trace.csv.gz --out figures")]
 pub struct Arguments {
     /// Traces to fit: .csv or .csv.gz, `-` for standard input
     #[arg(value_name = "TRACE", required = true)]
@@ -39,6 +40,11 @@ pub struct Arguments {
     /// Print the result as JSON (schema pitchleak.diagnose/1)
     #[arg(long)]
     json: bool,
+
+    /// Write figures (SVG) of what is left of each balance before and after into this directory: over time, its
+    /// autocorrelation and distribution, and against each variable
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 
     /// Write the rig file with the effects found in it
     #[arg(long, value_name = "FILE")]
@@ -65,6 +71,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     bar.finish_and_clear();
     if let Some(path) = &arguments.save_rig {
         save(&diagnosis.rig(&rig), path)?;
+    }
+    if let Some(folder) = &arguments.out {
+        draw(&diagnosis, folder)?;
     }
     let text = if arguments.json {
         serde_json::to_string_pretty(&diagnosis)? + "\n"
@@ -100,6 +109,20 @@ fn read(
         warnings.entry(warning).or_default().push(reader.name().to_owned());
     }
     Ok(series)
+}
+
+/// Figures of what is left.
+fn draw(diagnosis: &Diagnosis, folder: &Path) -> Result<(), Failure> {
+    let failed = |path: &Path| {
+        let file = path.display().to_string();
+        move |source| Failure::Save { file, source }
+    };
+    std::fs::create_dir_all(folder).map_err(failed(folder))?;
+    for (name, figure) in diagnosis.figures()? {
+        let path = folder.join(name);
+        std::fs::write(&path, figure).map_err(failed(&path))?;
+    }
+    Ok(())
 }
 
 fn save(rig: &Rig, path: &Path) -> Result<(), Failure> {

@@ -1,3 +1,4 @@
+use pitchleak::figure::FigureError;
 use pitchleak::reference::ReferenceError;
 use pitchleak::replay::EstimateFileError;
 use pitchleak::reproduce::ReproduceError;
@@ -23,7 +24,10 @@ pub enum Failure {
     /// The file of estimates.
     #[error(transparent)]
     Estimates(#[from] EstimateFileError),
-    /// A rig file.
+    /// A figure.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A rig file or a figure.
     #[error("cannot write {file}: {source}")]
     Save {
         /// As named by the user.

@@ -67,6 +67,23 @@ fn it_names_the_effect_and_saves_a_rig_that_replay_uses() {
     assert_eq!(again["verdict"], "no_missing_effect");
 }
 
+/// What is left is white and normal once the effect is in, and follows the flow before.
+#[test]
+fn residuals_are_tested_and_drawn() {
+    let folder = folder(0.02);
+    let found = json(&pitchleak(&folder, &["diagnose", "trace.csv", "--json", "--out", "figures/here"]));
+    let of = |side: &str| found["residuals"][side]["chamber_a"].clone();
+    let sigma = of("before")["correlations"]["qa_m3s"]["sigma"].as_f64().unwrap();
+    assert!(sigma.abs() > 4.0, "{sigma}");
+    assert!(of("after")["count"].as_u64().unwrap() > 300);
+    assert!(found["residuals"]["after"]["force"].is_null());
+    assert!(found["remainder"][0]["std_error"][0].is_number());
+    for name in ["residual_chamber_a.svg", "residual_chamber_b.svg"] {
+        let figure = fs::read_to_string(folder.path().join("figures/here").join(name)).unwrap();
+        assert!(figure.contains("autocorrelation") && figure.contains("against P_L"), "{name}");
+    }
+}
+
 #[test]
 fn several_traces_are_fitted_together_and_others_judged() {
     let folder = folder(0.0);
