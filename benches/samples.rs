@@ -3,14 +3,17 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use pitchleak::Rig;
 use pitchleak::core::{
     Cylinder, Fluid, PaperEstimator, PaperGains, PaperLaw, Rls, RlsSettings, Sample, Sensors, regressors,
 };
+use pitchleak::replay::replay;
+use pitchleak::trace::{TableLayout, TraceError, TraceReader};
 
 const SAMPLES: usize = 10_000;
 
-fn samples() -> Vec<Sample<f64>> {
-    (0..SAMPLES)
+fn samples(count: usize) -> Vec<Sample<f64>> {
+    (0..count)
         .map(|k| {
             let t = k as f64 * 0.01;
             Sample {
@@ -75,12 +78,38 @@ fn paper(c: &mut Criterion, samples: &[Sample<f64>]) {
     });
 }
 
+/// A whole replay of columns in memory: their checks, the estimator, the alarms.
+fn columns(c: &mut Criterion, samples: &[Sample<f64>]) {
+    let rig = Rig::paper();
+    let headers = ["t_s", "x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s"].map(str::to_owned);
+    let Ok(layout) = TableLayout::new("columns", &headers, &rig) else { return };
+    let of = |value: fn(&Sample<f64>) -> f64| samples.iter().map(value).collect::<Vec<_>>();
+    let columns = [
+        (0..samples.len()).map(|k| k as f64 * 0.01).collect(),
+        of(|s| s.x_m),
+        of(|s| s.pa_pa),
+        of(|s| s.pb_pa),
+        of(|s| s.qa_m3s.unwrap_or(f64::NAN)),
+        of(|s| s.qb_m3s.unwrap_or(f64::NAN)),
+    ];
+    let mut group = c.benchmark_group("per sample");
+    group.sample_size(10).throughput(Throughput::Elements(samples.len() as u64));
+    group.bench_function("replay of columns", |b| {
+        b.iter(|| {
+            let batch = columns.iter().map(Vec::as_slice).collect();
+            let mut reader = TraceReader::from_table("columns", &layout, vec![batch], &rig)?;
+            replay(&mut reader, &rig, |_, _, _| Ok::<_, TraceError>(()))
+        });
+    });
+}
+
 fn per_sample(c: &mut Criterion) {
-    let samples = samples();
+    let samples = samples(SAMPLES);
     rls::<4>(c, "rls", &samples);
     rls::<6>(c, "rls with offsets", &samples);
     rls::<9>(c, "rls with offsets and gains", &samples);
     paper(c, &samples);
+    columns(c, &self::samples(1_000_000));
 }
 
 criterion_group!(benches, per_sample);

@@ -28,7 +28,7 @@ pub struct LeakScore {
 }
 
 /// Scores one leak over a stream in constant memory.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Scorer {
     first_s: Option<f64>,
     last_s: f64,
@@ -39,7 +39,7 @@ pub struct Scorer {
     steady: Option<(f64, Errors)>,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Mean {
     sum: f64,
     count: f64,
@@ -56,7 +56,7 @@ impl Mean {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Errors {
     leakage: Mean,
     leakage_peak: f64,
@@ -127,7 +127,7 @@ impl Scorer {
 
 /// C_m of eq. (16) from a reference flow and the pressure that drives it: P near zero says nothing about
 /// it, so samples count by P².
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct MeasuredCoefficient {
     flow_pressure: f64,
     pressure_square: f64,

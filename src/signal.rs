@@ -3,7 +3,7 @@
 use crate::units::Dimension;
 
 /// One signal of a trace; the names are those of the column headers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Signal {
     /// `t`: time.
     Time,

@@ -11,6 +11,7 @@ const MEMORY_S: f64 = 0.05;
 const USUAL_TEMPERATURE_K: f64 = 313.15;
 
 /// Makes of each record what a rig without the effects would have shown.
+#[derive(serde::Serialize, serde::Deserialize)]
 pub(super) struct Correction {
     effects: EffectSet<f64>,
     model: Model<f64>,
@@ -21,6 +22,7 @@ pub(super) struct Correction {
 }
 
 /// Derivatives of the signals.
+#[derive(serde::Serialize, serde::Deserialize)]
 struct Rates {
     x: FadingParabola<f64>,
     pa: FadingParabola<f64>,

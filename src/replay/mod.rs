@@ -11,7 +11,7 @@ mod summary;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
-pub use stream::Stream;
+pub use stream::{RestoreError, Stream};
 
 use crate::report::{Alarm, LPM_PER_M3S, Leak, ReplayReport, TraceSummary};
 use crate::rig::Rig;
@@ -78,6 +78,7 @@ impl Point {
 }
 
 /// A running replay.
+#[derive(serde::Serialize, serde::Deserialize)]
 pub struct Replay {
     rig: Rig,
     correction: Option<Correction>,
@@ -190,6 +191,11 @@ impl Replay {
         let pressures = leak_pressures_pa(record, self.estimator.pressure_biases_pa());
         let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
         Point { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
     }
 
     /// The estimator.

@@ -5,7 +5,7 @@ use pitchleak_core::{LeakPressures, PerLeak};
 ///
 /// The size of the internal leak goes with |P_L|: it is taken of means over a tenth of a second, so that
 /// sensor noise does not count as pressure.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct TracePressures {
     block_time: f64,
     block_load: f64,

@@ -8,14 +8,14 @@ const CUTOFF_HZ: f64 = 5.0;
 
 /// Scores the estimates against the reference leak flows that a trace has, after the paper's filter on
 /// reference and pressures.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Scoring {
     coefficients: PerLeak<f64>,
     pressure_biases_pa: [f64; 2],
     channels: Option<PerLeak<Channel>>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Channel {
     scorer: Scorer,
     reference: Butterworth<f64>,

@@ -1,19 +1,72 @@
 use super::Replay;
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
-use crate::trace::{Intake, Record, TraceError, TraceFault, TraceReader};
+use crate::trace::{BadRows, Intake, Record, TraceError, TraceFault, TraceReader};
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
 /// would, to the last bit.
+#[derive(serde::Serialize, serde::Deserialize)]
 pub struct Stream {
     replay: Replay,
     intake: Option<Intake>,
+    bad_rows: BadRows,
+    /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
+    pub epoch_ns: Option<i64>,
 }
 
+/// Error returned by [`Stream::restore`].
+#[derive(Debug, thiserror::Error)]
+pub enum RestoreError {
+    /// Not what [`Stream::save`] wrote, or cut short.
+    #[error("not a saved estimator: {0}")]
+    Content(String),
+    /// Written by a version that keeps other things.
+    #[error("saved by another version (`{0}`, this one reads `{SCHEMA}`): start the estimator anew")]
+    Version(String),
+}
+
+/// Name and version of the saved form.
+const SCHEMA: &str = "pitchleak.state/1";
+
 impl Stream {
+    /// All that the stream knows, to the last bit, rig included: CBOR (RFC 8949) of a name and the state.
+    ///
+    /// # Errors
+    /// None in practice: every part has its form.
+    pub fn save(&self) -> Result<Vec<u8>, RestoreError> {
+        let mut bytes = Vec::new();
+        let content = |error: ciborium::ser::Error<std::io::Error>| RestoreError::Content(error.to_string());
+        ciborium::into_writer(SCHEMA, &mut bytes).map_err(content)?;
+        ciborium::into_writer(self, &mut bytes).map_err(content)?;
+        Ok(bytes)
+    }
+
+    /// The stream that [`save`](Self::save) wrote.
+    ///
+    /// # Errors
+    /// [`RestoreError`].
+    pub fn restore(mut bytes: &[u8]) -> Result<Self, RestoreError> {
+        let content = |error: ciborium::de::Error<std::io::Error>| RestoreError::Content(error.to_string());
+        let schema: String = ciborium::from_reader(&mut bytes).map_err(content)?;
+        if schema != SCHEMA {
+            return Err(RestoreError::Version(schema.chars().take(40).collect()));
+        }
+        ciborium::from_reader(&mut bytes).map_err(content)
+    }
+
+    /// The rig that the stream runs for.
+    pub fn rig(&self) -> &Rig {
+        self.replay.rig()
+    }
+
     /// A stream for a rig.
-    pub fn new(rig: &Rig) -> Self {
-        Self { replay: Replay::new(rig), intake: None }
+    pub fn new(rig: &Rig, bad_rows: BadRows) -> Self {
+        Self { replay: Replay::new(rig), intake: None, bad_rows, epoch_ns: None }
+    }
+
+    /// What becomes of bad rows.
+    pub fn bad_rows(&self) -> BadRows {
+        self.bad_rows
     }
 
     /// Takes in the next part of the trace; says how often the estimates were renewed.
@@ -24,7 +77,7 @@ impl Stream {
     pub fn extend(&mut self, part: TraceReader<'_>) -> Result<u64, TraceError> {
         let mut reader = match self.intake.take() {
             Some(before) => part.resuming(before),
-            None => part,
+            None => part.with_bad_rows(self.bad_rows),
         };
         let mut record = Record::default();
         let mut renewals = 0;

@@ -12,7 +12,7 @@ use pitchleak_core::{AlarmState, Estimate, PerLeak};
 use serde::Serialize;
 
 /// Where oil can leak.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Leak {
     /// Past the piston seal, chamber A to chamber B.
@@ -218,7 +218,7 @@ pub const LPM_PER_M3S: f64 = 60e3;
 pub const LPM_PER_BAR: f64 = 6e9;
 
 /// An alarm raised or cleared.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Alarm {
     /// Time in the trace, s.
     pub time_s: f64,

@@ -126,3 +126,17 @@ fn put(out: &mut String, keys: &[(&str, Option<String>)]) {
         }
     }
 }
+
+/// A rig travels as its name and the text of its file.
+impl serde::Serialize for Rig {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (&self.name, self.to_toml()).serialize(serializer)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for Rig {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (name, text) = <(String, String)>::deserialize(deserializer)?;
+        Self::parse(&text, &name).map_err(serde::de::Error::custom)
+    }
+}

@@ -26,7 +26,7 @@ pub(super) enum Step {
 }
 
 /// Follows the time column in constant memory.
-#[derive(Clone, Default)]
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Clock {
     last_s: Option<f64>,
     usual_s: Option<f64>,

@@ -11,7 +11,7 @@ use pitchleak_core::{PerLeak, Sample};
 
 /// From rows to records: what is possible, what time it is, and what was noticed so far. It does not
 /// know where the rows come from, so that a trace may come in parts.
-#[derive(Clone)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Intake {
     ranges: Ranges,
     clock: Clock,

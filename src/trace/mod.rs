@@ -29,7 +29,7 @@ use std::path::Path;
 use table::TableRows;
 
 /// One good row of a trace, in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Record {
     /// Line of the file, from 1; of columns in memory the row, from 0.
     pub line: u64,
@@ -51,7 +51,7 @@ pub struct Record {
 }
 
 /// What becomes of a bad row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum BadRows {
     /// Counted, the first few kept with their place, and skipped.
     #[default]

@@ -8,7 +8,7 @@ use std::fmt;
 const KEPT: usize = 5;
 
 /// Why a row is of no use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BadReason {
     /// A cell is not a finite number.
@@ -43,7 +43,7 @@ impl BadReason {
 }
 
 /// How the rows of a trace are numbered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Counted {
     /// A file: lines, from 1.
@@ -54,7 +54,7 @@ pub enum Counted {
 }
 
 /// One bad row.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BadRow {
     /// Number of the line or row.
     pub line: u64,
@@ -83,7 +83,7 @@ impl fmt::Display for BadRow {
 
 /// What a reader noticed so far; whole once [`next_record`](super::TraceReader::next_record) has
 /// given its last.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TraceQuality {
     /// Good rows.
     pub rows: u64,

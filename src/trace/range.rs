@@ -12,7 +12,7 @@ const SLACK: f64 = 0.05;
 /// No sensor reads more than this many times its full scale.
 const OVERRANGE: f64 = 2.0;
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Range {
     signal: Signal,
     least: f64,
@@ -20,7 +20,7 @@ struct Range {
 }
 
 /// The possible range of every reading that has one.
-#[derive(Clone)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Ranges([Range; 8]);
 
 impl Ranges {

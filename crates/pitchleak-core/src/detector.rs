@@ -62,12 +62,14 @@ pub enum AlarmState {
 
 /// Alarms of the three leaks.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LeakDetector<T> {
     settings: AlarmSettings<T>,
     channels: PerLeak<Channel<T>>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Channel<T> {
     active: bool,
     evidence_time_s: T,

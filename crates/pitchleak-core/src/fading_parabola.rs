@@ -7,6 +7,7 @@ use crate::Real;
 /// Prediction, ch. 13; E. Brookner 1998, Tracking and Kalman Filtering Made Easy, §1.3, "critically
 /// damped g-h-k filter"). Exact on a parabola, without lag.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FadingParabola<T> {
     memory_s: T,
     value: T,

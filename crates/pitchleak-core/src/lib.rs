@@ -10,6 +10,8 @@
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+#[cfg(feature = "serde")]
+mod arrays;
 mod balance;
 mod butterworth;
 mod cylinder;

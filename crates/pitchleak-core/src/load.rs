@@ -6,6 +6,7 @@ use crate::{Cylinder, FadingParabola, Real, Sample, momentum::hydraulic_force_n}
 /// ẍ is the curvature of the [`FadingParabola`] through the positions; the hydraulic force is smoothed by
 /// the same filter, so that both sides lag alike.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadEstimator<T> {
     position: FadingParabola<T>,
     force: FadingParabola<T>,

@@ -14,6 +14,7 @@ use crate::{Cylinder, Real, Sample};
 /// error 2 ζ ε/ω of p̂ instead of a ramp, and on exact data p̂ = m ẋ for every ω (Luenberger observer with a
 /// double pole; complementary filter). The step is implicit, hence stable for every dt.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Momentum<T> {
     bandwidth_rad_s: T,
     mass_kg: T,

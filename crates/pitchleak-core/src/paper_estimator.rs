@@ -7,6 +7,7 @@ use crate::{
 /// by least squares where none is measured, momentum, regressors (6), adaptive law (8), (12) in its implicit
 /// form.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PaperEstimator<T> {
     cylinder: Cylinder<T>,
     fluid: Fluid<T>,
@@ -20,6 +21,7 @@ pub struct PaperEstimator<T> {
 
 /// One filter per signal.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Filters<T> {
     x: Butterworth<T>,
     pa: Butterworth<T>,

@@ -9,13 +9,13 @@ use pitchleak::report::Palette;
 use pitchleak::trace::{BadRows, TableLayout, TraceError, TraceReader};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
+use pyo3::types::PyBytes;
 use std::sync::Mutex;
 
 /// The running estimator under `pitchleak.Estimator`.
 #[pyclass(frozen, subclass, module = "pitchleak._pitchleak")]
 pub struct Estimator {
     rig: Rig,
-    strict: bool,
     /// Without the rig file's foreign names: here the arguments are the columns.
     bare_rig: EngineRig,
     running: Mutex<Running>,
@@ -65,11 +65,36 @@ impl Estimator {
     #[new]
     #[pyo3(signature = (rig, *, estimator = None, strict = false))]
     fn new(rig: &Rig, estimator: Option<&str>, strict: bool) -> PyResult<Self> {
-        let rig = Rig(rig.with_estimator(estimator)?);
-        let mut bare_rig = rig.0.clone();
-        bare_rig.columns.clear();
-        let running = Mutex::new(Running { stream: Stream::new(&rig.0), layout: None });
-        Ok(Self { rig, strict, bare_rig, running })
+        let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
+        Ok(Self::over(Stream::new(&rig.with_estimator(estimator)?, bad_rows)))
+    }
+
+    /// What `save` writes.
+    fn saved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.lock(py)?.stream.save().map_err(value_error)?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Takes over the stream that `saved` gave, of an estimator of the same rig.
+    fn restore(&self, py: Python<'_>, saved: &[u8]) -> PyResult<()> {
+        let stream = Stream::restore(saved).map_err(value_error)?;
+        if *stream.rig() != self.rig.0 {
+            return Err(value_error("the saved estimator has another rig"));
+        }
+        *self.lock(py)? = Running { stream, layout: None };
+        Ok(())
+    }
+
+    /// The rig in what `saved` gave.
+    #[staticmethod]
+    fn saved_rig(saved: &[u8]) -> PyResult<Rig> {
+        Stream::restore(saved).map(|stream| Rig(stream.rig().clone())).map_err(value_error)
+    }
+
+    /// Where a column ``timestamp`` counts from, ns since 1970; None before the first.
+    #[getter]
+    fn epoch_ns(&self, py: Python<'_>) -> PyResult<Option<i64>> {
+        Ok(self.lock(py)?.stream.epoch_ns)
     }
 
     /// Takes in one sample, or many as arrays of one length; in SI whatever the rig file's columns are.
@@ -122,7 +147,11 @@ impl Estimator {
 
     /// Takes in a part of a trace.
     fn extend_source(&self, py: Python<'_>, source: Source<'_>) -> PyResult<u64> {
-        source.read(py, &self.rig.0, self.strict, |reader| match self.running.lock() {
+        if let Source::Table(table) = &source {
+            let mut running = self.lock(py)?;
+            running.stream.epoch_ns = running.stream.epoch_ns.or(table.get().first_ns());
+        }
+        source.read(py, &self.rig.0, false, |reader| match self.running.lock() {
             Ok(mut running) => running.stream.extend(reader),
             Err(poisoned) => poisoned.into_inner().stream.extend(reader),
         })
@@ -148,12 +177,19 @@ impl Estimator {
 
     /// Whether bad samples raise.
     #[getter]
-    fn strict(&self) -> bool {
-        self.strict
+    fn strict(&self, py: Python<'_>) -> PyResult<bool> {
+        Ok(self.lock(py)?.stream.bad_rows() == BadRows::Fatal)
     }
 }
 
 impl Estimator {
+    fn over(stream: Stream) -> Self {
+        let rig = Rig(stream.rig().clone());
+        let mut bare_rig = rig.0.clone();
+        bare_rig.columns.clear();
+        Self { rig, bare_rig, running: Mutex::new(Running { stream, layout: None }) }
+    }
+
     fn lock(&self, py: Python<'_>) -> PyResult<std::sync::MutexGuard<'_, Running>> {
         self.running.lock_py_attached(py).map_err(value_error)
     }
@@ -175,9 +211,8 @@ impl Running {
                 TableLayout::new(NAME, &headers, &estimator.bare_rig)?
             }
         };
-        let bad_rows = if estimator.strict { BadRows::Fatal } else { BadRows::Skip };
         let reader = TraceReader::from_table(NAME, &layout, vec![batch], &estimator.rig.0)?;
         self.layout = Some((given, layout));
-        self.stream.extend(reader.with_bad_rows(bad_rows))
+        self.stream.extend(reader)
     }
 }

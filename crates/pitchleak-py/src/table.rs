@@ -105,7 +105,7 @@ impl Table {
 
     /// Where its timestamps count from, ns since 1970; None where it has none.
     #[getter]
-    fn first_ns(&self) -> Option<i64> {
+    pub fn first_ns(&self) -> Option<i64> {
         self.first_ns
     }
 

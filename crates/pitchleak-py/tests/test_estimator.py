@@ -1,5 +1,6 @@
 """A trace in parts is the trace."""
 
+import pickle
 import threading
 
 import numpy as np
@@ -60,6 +61,36 @@ def test_time_stamps_count_from_the_first_part(columns, rig):
     for rows in (slice(0, 100), slice(100, None)):
         est.extend({name: values[rows] for name, values in frame.items()})
     assert est.state() == pl.replay(frame, rig)
+
+
+@pytest.mark.parametrize("estimator", ["rls", "paper"])
+@pytest.mark.parametrize("sensors", ["", "bias = 0.01", "bias = 0.01, gain = 0.01"])
+def test_a_saved_estimator_goes_on_as_if_nothing_had_been(estimator, sensors, columns, tmp_path):
+    text = pl.Rig.paper().to_toml()
+    if sensors:
+        text = text.replace("bias = 0.0, gain = 0.0", sensors)
+    rig = pl.Rig.parse(text + "[effects]\nposition_gain = { value = 0.01, std = 0.002 }\n")
+    whole = pl.replay(columns, rig, estimator=estimator)
+    path = tmp_path / "blade1.state"
+    pl.Estimator(rig, estimator=estimator, strict=True).save(path)
+    for start in range(0, 4000, 617):
+        est = pl.Estimator.load(path)
+        est.extend({name: values[start : start + 617] for name, values in columns.items()})
+        est.save(path)
+    assert pl.Estimator.load(path).state() == whole
+    assert pickle.loads(pickle.dumps(est)).state() == whole
+    assert est.strict and [file.name for file in tmp_path.iterdir()] == ["blade1.state"]
+
+
+def test_a_file_that_is_no_state_is_refused(rig, tmp_path):
+    est = pl.Estimator(rig)
+    est.update(0.0, 0.1, 5e6, 4e6)
+    saved = est.saved()
+    for bad in (b"", b"hello", saved[:100], saved[:-1], saved.replace(b"state/1", b"state/9")):
+        with pytest.raises(ValueError, match="saved"):
+            pl.Estimator.from_bytes(bad)
+    with pytest.raises(ValueError, match="another rig"):
+        pl.Estimator(pl.Rig.paper()).restore(saved)
 
 
 def test_what_is_not_plain_is_made_so(si, rig, whole):

@@ -5,6 +5,7 @@ use crate::{Cylinder, Real, Sample};
 ///
 /// No derivative is taken of a noisy signal: ∫ V Ṗ dt is V at mid-step times the pressure's rise.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ChamberIntegral<T> {
     /// ∫ Q dt, m³.
     pub flow: T,
@@ -16,6 +17,7 @@ pub(super) struct ChamberIntegral<T> {
 
 /// Both chambers over the same time.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Integrals<T> {
     pub a: ChamberIntegral<T>,
     pub b: ChamberIntegral<T>,

@@ -10,12 +10,23 @@ use crate::Real;
 /// prior is the identity. The prior is never forgotten: when excitation stops, the covariance grows back
 /// to the prior and no further (no blow-up).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Information<T, const N: usize> {
     /// Σ w f fᵀ, lower triangle.
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
     matrix: [[T; N]; N],
     /// Σ w² f fᵀ, lower triangle: what the weighted sum's own noise amounts to.
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
     noise: [[T; N]; N],
     /// Σ w f y.
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
     vector: [T; N],
     /// What sensor noise in column 0 adds to the normal equation of that column on average.
     column_noise: T,
@@ -23,17 +34,37 @@ pub(super) struct Information<T, const N: usize> {
 
 /// Solution of [`Information`] in prior units.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Solution<T, const N: usize> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
     pub mean: [T; N],
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
     pub covariance: [[T; N]; N],
 }
 
 /// Sums over one block: what is forgotten as one.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct BlockSums<T, const N: usize> {
     /// Σ f fᵀ/S, lower triangle.
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
     pub matrix: [[T; N]; N],
     /// Σ f y/S.
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
     pub vector: [T; N],
     /// Σ (variance of sensor noise in column 0)/S.
     pub column_noise: T,

@@ -75,12 +75,21 @@ pub enum Update {
 /// - N = 6: also the offsets of the two flow meters;
 /// - N = 9: also the gains of both flow meters and of the position sensor.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub struct Rls<T, const N: usize> {
     cylinder: Cylinder<T>,
     noise: NoiseStd<T>,
     settings: RlsSettings<T>,
     sensors: Sensors<T>,
     compressibility: T,
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
     scale: [T; N],
     offsets: OffsetPrior<T>,
     last: Option<Sample<T>>,

@@ -2,6 +2,7 @@ use crate::{Cylinder, Real, Sensors};
 
 /// Standard deviations of the sensors' white noise, kept above zero.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct NoiseStd<T> {
     pub flow_a_m3s: T,
     pub flow_b_m3s: T,

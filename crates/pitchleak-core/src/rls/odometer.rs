@@ -8,9 +8,18 @@ use crate::Real;
 /// is kept as x̂ − gᵀθ: x̂ as if θ stood at its prior mean, g the sensitivity to θ (Friedland 1969,
 /// "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14, separate-bias form).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Odometer<T, const N: usize> {
     position_m: T,
     variance_m2: T,
+    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
     sensitivity: [T; N],
     /// Σ 1/S over the block, to compensate pressure noise in the compressibility column.
     pub weight_sum: T,

@@ -10,6 +10,7 @@ use crate::{Cylinder, PerLeak, Real, Sensors};
 ///
 /// Offsets are counted in their prior units, pressure biases in units of σ_P.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct OffsetPrior<T> {
     /// (D + J Jᵀ)⁻¹.
     pub information: [[T; 2]; 2],

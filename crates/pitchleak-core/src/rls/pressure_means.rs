@@ -4,6 +4,7 @@ use crate::{LeakPressures, PerLeak, Real};
 /// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
 /// block's mean, so that sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PressureMeans<T> {
     time: T,
     load: T,

@@ -2,6 +2,7 @@ use crate::Real;
 
 /// Watches the innovations: are they as large as the declared noise says, and did the leak change?
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Surprise<T> {
     balance_sum: T,
     balance_count: T,
@@ -77,6 +78,7 @@ fn significant_ratio<T: Real>(sum: T, count: T) -> T {
 /// Variance of a sensor's white noise from second differences of the signal, which cancel its slope:
 /// E (p₂ − 2 p₁ + p₀)² = 6 σ² (von Neumann et al. 1941 use first differences).
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct NoiseMeter<T> {
     last_rise: Option<T>,
     sum: T,

@@ -8,6 +8,7 @@ use crate::{Cylinder, PerLeak, Real};
 /// - the *balance* A_B·(A) + A_A·(B), in which the piston speed cancels;
 /// - the *odometer* ẋ = w_A·(A) + w_B·(B), the best speed that the flows can tell.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Weights<T> {
     /// w_A, 1/m².
     pub odometer_a: T,

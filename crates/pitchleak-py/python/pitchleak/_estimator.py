@@ -1,9 +1,10 @@
 """Live: samples in, estimates out."""
 
+import os
 from typing import Any
 
 from . import _inputs, _pitchleak
-from ._pitchleak import Rig, Table
+from ._pitchleak import Rig
 from ._report import Report, parse
 
 
@@ -25,10 +26,9 @@ class Estimator(_pitchleak.Estimator):
     39
     >>> est.state().estimates == pl.replay(trace.columns).estimates
     True
+    >>> pl.Estimator.from_bytes(est.saved()).state() == est.state()
+    True
     """
-
-    _first_ns: int | None = None
-    """Where a column ``timestamp`` counts from, ns since 1970."""
 
     def __new__(
         cls, rig: Rig | _inputs.Path | None = None, *, estimator: str | None = None, strict: bool = False
@@ -41,10 +41,7 @@ class Estimator(_pitchleak.Estimator):
         Returns how often the estimates were renewed. A column ``timestamp`` counts from its first time in
         the first part.
         """
-        source = _inputs.source(data, self.rig, self._first_ns)
-        if isinstance(source, Table) and self._first_ns is None:
-            self._first_ns = source.first_ns
-        return self.extend_source(source)
+        return self.extend_source(_inputs.source(data, self.rig, self.epoch_ns))
 
     def state(self) -> Report:
         """The report as it stands. Raises ``ValueError`` before the first sample."""
@@ -52,6 +49,34 @@ class Estimator(_pitchleak.Estimator):
         if report is None:
             raise ValueError("no sample yet")
         return parse(Report, *report)
+
+    def save(self, path: _inputs.Path) -> None:
+        """Writes all that the estimator knows, rig included, so that :meth:`load` goes on from here.
+
+        The file is replaced as a whole: a crash leaves the old one.
+        """
+        partial = f"{os.fspath(path)}.partial"
+        with open(partial, "wb") as file:
+            file.write(self.saved())
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+
+    @classmethod
+    def load(cls, path: _inputs.Path) -> "Estimator":
+        """The estimator that :meth:`save` wrote. Raises ``ValueError`` where the file is none."""
+        with open(path, "rb") as file:
+            return cls.from_bytes(file.read())
+
+    @classmethod
+    def from_bytes(cls, saved: bytes) -> "Estimator":
+        """The estimator that gave these bytes as ``saved()``."""
+        estimator = cls(cls.saved_rig(saved))
+        estimator.restore(saved)
+        return estimator
+
+    def __reduce__(self) -> tuple[Any, tuple[bytes]]:
+        return type(self).from_bytes, (self.saved(),)
 
     def __repr__(self) -> str:
         time_s = self.time_s
