@@ -116,6 +116,7 @@ fn effects_of_each_balance_are_named() {
         (Effect::PositionGain, -0.01),
         (Effect::ViscousFriction, 1500.0),
         (Effect::AddedMass, 100.0),
+        (Effect::PressureLagA, 0.01),
     ] {
         let answer = ask(trace(Some((effect, size))), &rig());
         assert_eq!(first(&answer), effect.spec().id, "{:?}", answer.notes);

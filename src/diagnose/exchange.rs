@@ -46,7 +46,7 @@ fn is_contested(fit: &Fit<'_>, term: usize) -> bool {
     let without = fit.solve_without(&[term]);
     let own = (without.chi2 - fit.scoring.chi2) / dispersion;
     let own = own - select::critical_sigma(fit, fit.shapes[term]).powi(2);
-    let best = select::trials(fit, &without).first().map(|trial| trial.beyond(dispersion));
+    let best = select::rough_trials(fit, &without).first().map(|trial| trial.beyond(dispersion));
     best.is_some_and(|best| best > own - CONFUSABLE_GAIN)
 }
 
@@ -60,7 +60,7 @@ fn merge_two(fit: &mut Fit<'_>, named: &mut Vec<Named>, progress: Progress<'_>) 
         let lost = without.chi2 - fit.scoring.chi2;
         let needed = terms.map(|term| select::critical_sigma(fit, fit.shapes[term]).powi(2));
         let spare = dispersion * needed[0].max(needed[1]);
-        let Some(best) = select::trials(fit, &without).into_iter().next() else { continue };
+        let Some(best) = select::rough_trials(fit, &without).into_iter().next() else { continue };
         if lost - best.score.gain > spare {
             continue;
         }

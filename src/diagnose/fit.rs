@@ -14,6 +14,7 @@ use super::term::{self, Term};
 use super::{Declared, Progress};
 use pitchleak_core::effects::Shape;
 use pitchleak_core::{Effect, Sensors};
+use std::cell::RefCell;
 
 /// Usual length of a block, s: short against the machine's motion, long against a sample.
 const BLOCK_S: f64 = 0.1;
@@ -58,6 +59,15 @@ pub(super) struct Fit<'a> {
     /// The end of the oil's range at which 1/β is held, because the data would take it further.
     pub(super) held_softness: Option<f64>,
     whitening: Whitening,
+    /// Whitened columns of other shapes at this point, as they were asked for.
+    shaped: RefCell<Vec<Shaped>>,
+}
+
+/// A whitened column of a term with constants that are not its present ones.
+struct Shaped {
+    term: usize,
+    shape: Shape<f64>,
+    white: Vec<f64>,
 }
 
 impl<'a> Fit<'a> {
@@ -98,6 +108,7 @@ impl<'a> Fit<'a> {
             equation_error,
             held_softness: None,
             whitening,
+            shaped: RefCell::default(),
         };
         for _ in 0..FIRST_ROUNDS {
             progress();
@@ -117,6 +128,7 @@ impl<'a> Fit<'a> {
     /// Moves the point to the last solution and solves around it.
     fn round(&mut self) {
         self.move_point();
+        self.shaped.get_mut().clear();
         self.motions = motions(self.traces, &self.point, &self.sensors);
         let rows = Rows::build(self.traces, &self.motions, &self.recipe(&self.terms, &self.shapes));
         let equation_error = self.equation_error;
@@ -274,20 +286,26 @@ impl<'a> Fit<'a> {
 
     /// The same for another shape of the term's effect.
     pub(super) fn score_shape(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Score> {
-        let column = self.regression.prepare(model, self.white_column(self.terms[term], shape))?;
-        let score = self.regression.score_column(model, term, &column)?;
+        let score = self.regression.score_column(model, term, &self.prepare(model, term, shape)?)?;
         self.allowed(&score).then_some(score)
     }
 
     /// Fall of the sum of squares by a term that is not among the candidates.
     pub(super) fn gain_of(&self, term: Term, shape: Shape<f64>) -> Option<f64> {
-        let column = self.regression.prepare(&self.scoring, self.white_column(term, shape))?;
+        let column = self.regression.prepare(&self.scoring, &self.white_column(term, shape))?;
         Some(self.regression.gain(&self.scoring, &column))
     }
 
     /// The column of a term with this shape, with what a model's terms explain of it.
     pub(super) fn prepare(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Prepared> {
-        self.regression.prepare(model, self.white_column(self.terms[term], shape))
+        let known = |one: &&Shaped| one.term == term && one.shape == shape;
+        if let Some(one) = self.shaped.borrow().iter().find(known) {
+            return self.regression.prepare(model, &one.white);
+        }
+        let white = self.white_column(self.terms[term], shape);
+        let prepared = self.regression.prepare(model, &white);
+        self.shaped.borrow_mut().push(Shaped { term, shape, white });
+        prepared
     }
 
     fn white_column(&self, term: Term, shape: Shape<f64>) -> Vec<f64> {

@@ -75,7 +75,7 @@ const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable.
 const DETECTABLE_SIGMA: f64 = 5.0;
 /// Additions, counting those that are taken back.
-const MOST_STEPS: usize = 8;
+const MOST_STEPS: usize = 10;
 /// Effects that leave more than this share of the excess over the sensors' noise are not to be believed.
 const UNMENDED: f64 = 0.1;
 const DOUBT: &str = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be believed without a measurement of its own";

@@ -20,6 +20,16 @@ pub(super) struct Point {
 const OIL_SIGMA: f64 = 3.0;
 const LEAST_SOFTNESS: f64 = 0.3;
 
+/// Step of a derivative, as a share of an effect's usual size.
+const SMALL: f64 = 1e-2;
+
+/// Whether two moments agree in all that physical effects depend on.
+fn is_same(one: &Moment<f64>, other: &Moment<f64>) -> bool {
+    let motion = |m: &Moment<f64>| [m.x_m, m.v_mps, m.a_mps2, m.temp_k].map(f64::to_bits);
+    let oil = |m: &Moment<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas].map(f64::to_bits);
+    motion(one) == motion(other) && oil(one) == oil(other)
+}
+
 impl Point {
     /// The declared model without leaks.
     pub(super) fn declared(declared: &Declared) -> Self {
@@ -37,6 +47,24 @@ impl Point {
     pub(super) fn residual(&self, at: &Moment<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         self.model.residual(at).plus(-1.0, known)
+    }
+
+    /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what
+    /// the physical effects found so far are computed from.
+    pub(super) fn unit_term(&self, term: Term, at: &Moment<f64>, shape: &Shape<f64>) -> Terms<f64> {
+        let own = term.unit_term(at, &self.model, shape);
+        let Some(effect) = term.effect().filter(|effect| effect.spec().kind == EffectKind::Sensor) else {
+            return own;
+        };
+        let step = SMALL * effect.spec().default_size;
+        let read = |value: f64| effect.read(value, at);
+        if self.effects.iter().all(|one| one.effect.spec().kind == EffectKind::Sensor)
+            || is_same(&read(step), at)
+        {
+            return own;
+        }
+        let known = |at: &Moment<f64>| self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
+        own.plus(-0.5 / step, known(&read(step)).plus(-1.0, known(&read(-step))))
     }
 
     /// Value of a term here; what the point does not know is zero.

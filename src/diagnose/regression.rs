@@ -258,9 +258,9 @@ impl Regression {
     }
 
     /// A whitened column and its products with a solution's terms; none where it does not show.
-    pub(super) fn prepare(&self, solution: &Solution, white: Vec<f64>) -> Option<Prepared> {
+    pub(super) fn prepare(&self, solution: &Solution, white: &[f64]) -> Option<Prepared> {
         let white =
-            white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect();
+            white.iter().zip(&self.counted).map(|(v, counts)| if *counts { *v } else { 0.0 }).collect();
         let (unit, scale) = normalised(white);
         if unit.is_empty() {
             return None;

@@ -251,10 +251,10 @@ fn step(series: &Series, motion: &Motion, at: usize, recipe: &Recipe<'_>, out: &
     out[2] = force * dt;
     for ((term, shape), cell) in recipe.terms.iter().zip(recipe.shapes).zip(out[3..width].chunks_exact_mut(3))
     {
-        let unit = term.unit_term(&seen, &point.model, shape);
+        let unit = point.unit_term(*term, &seen, shape);
         cell[0] = unit.chamber_a_m3s * dt;
         cell[1] = unit.chamber_b_m3s * dt;
-        cell[2] = if term.in_force() { term.unit_term(&felt, &point.model, shape).force_n * dt } else { 0.0 };
+        cell[2] = if term.in_force() { point.unit_term(*term, &felt, shape).force_n * dt } else { 0.0 };
     }
     let missing = |value: f64| if value.is_finite() { 0.0 } else { dt };
     let unsure = felt.v_mps.is_nan() || felt.v_mps.abs() < motion.least_sure_mps();
@@ -306,6 +306,14 @@ fn step_mean(values: &[f64], at: usize, even: bool) -> f64 {
     if outer.is_finite() { (13.0 * inner - outer) / 24.0 } else { inner / 2.0 }
 }
 
+/// Second derivative in the middle of the step that ends at sample `at`; none where the steps are not even.
+fn curvature(values: &[f64], at: usize, dt: f64, even: bool) -> f64 {
+    if !even {
+        return 0.0;
+    }
+    (values[at + 1] - values[at] - values[at - 1] + values[at - 2]) / (2.0 * dt * dt)
+}
+
 /// Whether the steps before and after are as long as this one.
 fn is_even(series: &Series, at: usize, dt: f64) -> bool {
     let t = &series.t_s;
@@ -326,6 +334,8 @@ fn moments(series: &Series, motion: &Motion, at: usize, dt: f64) -> (Moment<f64>
         pb_pa: middle(&series.pb_pa),
         dpa_pas: rate(&series.pa_pa),
         dpb_pas: rate(&series.pb_pa),
+        d2pa_pas2: curvature(&series.pa_pa, at, dt, even),
+        d2pb_pas2: curvature(&series.pb_pa, at, dt, even),
         qa_m3s: middle(&series.qa_m3s),
         qb_m3s: middle(&series.qb_m3s),
         dqa_m3s2: rate(&series.qa_m3s),

@@ -15,7 +15,7 @@ const FALSE_EFFECT_RATE: f64 = 1e-3;
 /// A shape fitted to the data counts as this many candidates.
 const SHAPE_TRIALS: usize = 20;
 /// Effects that one diagnosis names at most.
-const MOST_EFFECTS: usize = 5;
+const MOST_EFFECTS: usize = 6;
 /// While the remainder is larger than the noise, an effect must mend this share of it to be named.
 const LEAST_MENDED_SHARE: f64 = 0.02;
 /// A candidate below this share of the best is not worth a search for its shape.
@@ -71,22 +71,38 @@ pub(super) fn critical_sigma(fit: &Fit<'_>, shape: Shape<f64>) -> f64 {
     whiteness::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
 }
 
-/// Every candidate at its best against the present model, the best first.
-pub(super) fn trials(fit: &Fit<'_>, model: &Solution) -> Vec<Trial> {
-    let starts: Vec<Vec<(Score, Shape<f64>)>> =
-        candidates(fit).into_iter().map(|term| shape::first_scores(fit, model, term)).collect();
-    let gains = starts.iter().flatten().map(|(score, _)| score.gain);
-    let worth = IN_THE_RUNNING * gains.fold(0.0, f64::max);
+/// The scores of each candidate with its usual constants and at a few places of their ranges.
+fn starts(fit: &Fit<'_>, model: &Solution) -> Vec<Vec<(Score, Shape<f64>)>> {
+    candidates(fit).into_iter().map(|term| shape::first_scores(fit, model, term)).collect()
+}
+
+/// One trial of each candidate, the best first.
+fn ranked(fit: &Fit<'_>, model: &Solution, scores: Vec<Vec<(Score, Shape<f64>)>>) -> Vec<Trial> {
     let dispersion = fit.dispersion(model.chi2);
-    let best = |starts: Vec<(Score, Shape<f64>)>| {
-        let top = starts.iter().copied().max_by(|a, b| a.0.gain.total_cmp(&b.0.gain))?;
-        let climbed = (top.0.gain > worth).then(|| shape::best_score(fit, model, top));
-        let all = starts.into_iter().chain(climbed).map(|one| Trial::of(fit, one));
-        all.max_by(|a, b| a.beyond(dispersion).total_cmp(&b.beyond(dispersion)))
+    let best = |scores: Vec<(Score, Shape<f64>)>| {
+        let trials = scores.into_iter().map(|one| Trial::of(fit, one));
+        trials.max_by(|a, b| a.beyond(dispersion).total_cmp(&b.beyond(dispersion)))
     };
-    let mut trials: Vec<Trial> = starts.into_iter().filter_map(best).collect();
+    let mut trials: Vec<Trial> = scores.into_iter().filter_map(best).collect();
     trials.sort_by(|a, b| b.beyond(dispersion).total_cmp(&a.beyond(dispersion)));
     trials
+}
+
+/// Every candidate against a model, its constants only tried at a few places.
+pub(super) fn rough_trials(fit: &Fit<'_>, model: &Solution) -> Vec<Trial> {
+    ranked(fit, model, starts(fit, model))
+}
+
+/// Every candidate at its best against a model.
+pub(super) fn trials(fit: &Fit<'_>, model: &Solution) -> Vec<Trial> {
+    let mut scores = starts(fit, model);
+    let worth = IN_THE_RUNNING * scores.iter().flatten().map(|(score, _)| score.gain).fold(0.0, f64::max);
+    for of_one in &mut scores {
+        let top = of_one.iter().copied().max_by(|a, b| a.0.gain.total_cmp(&b.0.gain));
+        let top = top.filter(|top| top.0.gain > worth);
+        of_one.extend(top.map(|top| shape::best_score(fit, model, top)));
+    }
+    ranked(fit, model, scores)
 }
 
 /// Adds the next effect and fits again; none when nothing further is significant.

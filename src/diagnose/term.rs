@@ -110,6 +110,8 @@ impl Term {
                             | Effect::PressureOffsetB
                             | Effect::PressureGainA
                             | Effect::PressureGainB
+                            | Effect::PressureLagA
+                            | Effect::PressureLagB
                             | Effect::LineResistanceA
                             | Effect::LineResistanceB
                             | Effect::ForceGain

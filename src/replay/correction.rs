@@ -77,14 +77,18 @@ impl Correction {
         let sample = &record.sample;
         let (qa, qb) = (sample.qa_m3s.unwrap_or(0.0), sample.qb_m3s.unwrap_or(0.0));
         let x = *self.rates.x.update(dt_s, sample.x_m);
+        let pa = *self.rates.pa.update(dt_s, sample.pa_pa);
+        let pb = *self.rates.pb.update(dt_s, sample.pb_pa);
         Moment {
             x_m: sample.x_m,
             v_mps: record.speed_mps.unwrap_or(x.slope()),
             a_mps2: x.curvature(),
             pa_pa: sample.pa_pa,
             pb_pa: sample.pb_pa,
-            dpa_pas: self.rates.pa.update(dt_s, sample.pa_pa).slope(),
-            dpb_pas: self.rates.pb.update(dt_s, sample.pb_pa).slope(),
+            dpa_pas: pa.slope(),
+            dpb_pas: pb.slope(),
+            d2pa_pas2: pa.curvature(),
+            d2pb_pas2: pb.curvature(),
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: self.rates.qa.update(dt_s, qa).slope(),

@@ -20,7 +20,7 @@ pub use writer::TraceWriter;
 
 use crate::Rig;
 use crate::reference::Reference;
-use pitchleak_core::effects::LaggedFlow;
+use pitchleak_core::effects::LaggedReading;
 use pitchleak_core::emulator::{Emulator, EmulatorParams};
 use pitchleak_core::plant::PlantError;
 use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment, PerLeak, Sample};
@@ -191,12 +191,37 @@ impl Scenario {
     }
 }
 
-/// The emulator, its leaks shut, with the flow meters' own lag.
+/// The emulator, its leaks shut, with the sensors' own lags.
 struct RunningRig {
     emulator: Emulator<f64>,
-    effects: EffectSet<f64>,
+    /// What the sensors do to the readings beside their lags.
+    prompt: EffectSet<f64>,
+    lagging: Vec<Lagging>,
+}
+
+/// A signal that is shown late.
+struct Lagging {
+    signal: fn(&mut Moment<f64>) -> &mut f64,
     lag_s: f64,
-    meters: [LaggedFlow<f64>; 2],
+    reading: LaggedReading<f64>,
+}
+
+impl Lagging {
+    /// The signals that an effect delays.
+    fn of(effect: Effect) -> &'static [fn(&mut Moment<f64>) -> &mut f64] {
+        match effect {
+            Effect::FlowMeterLag => &[|m| &mut m.qa_m3s, |m| &mut m.qb_m3s],
+            Effect::PressureLagA => &[|m| &mut m.pa_pa],
+            Effect::PressureLagB => &[|m| &mut m.pb_pa],
+            _ => &[],
+        }
+    }
+
+    /// Puts the late reading in the signal's place.
+    fn show(&mut self, step_s: f64, moment: &mut Moment<f64>) {
+        let signal = (self.signal)(moment);
+        *signal = self.reading.update(step_s, self.lag_s, *signal);
+    }
 }
 
 impl RunningRig {
@@ -207,37 +232,36 @@ impl RunningRig {
         params.pitch.plant.effects = *effects;
         params.internal_step_s = STEP_S;
         let emulator = Emulator::new(params, reference.position_m.at(t_s), reference.load_n.at(t_s))?;
-        let lag = effects.iter().find(|active| active.effect == Effect::FlowMeterLag);
-        let flows = emulator.reading().moment;
-        Ok(Self {
-            effects: *effects,
-            lag_s: lag.map_or(0.0, |active| active.value),
-            meters: [flows.qa_m3s, flows.qb_m3s].map(LaggedFlow::new),
-            emulator,
-        })
+        let (mut prompt, mut lagging) = (EffectSet::default(), Vec::new());
+        let mut now = emulator.reading().moment;
+        for active in
+            effects.iter().filter(|active| active.value > 0.0 || Lagging::of(active.effect).is_empty())
+        {
+            for signal in Lagging::of(active.effect) {
+                let reading = LaggedReading::new(*signal(&mut now));
+                lagging.push(Lagging { signal: *signal, lag_s: active.value, reading });
+            }
+            if Lagging::of(active.effect).is_empty() {
+                // As many fit as there were, and they were within their bounds.
+                let _ = prompt.set(active.effect, active.value, active.shape);
+            }
+        }
+        Ok(Self { emulator, prompt, lagging })
     }
 
     fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
         self.emulator.step(step_s, position_m, load_n)?;
-        if self.lag_s > 0.0 {
-            let Moment { qa_m3s, qb_m3s, .. } = self.emulator.reading().moment;
-            for (meter, flow) in self.meters.iter_mut().zip([qa_m3s, qb_m3s]) {
-                meter.update(step_s, self.lag_s, flow);
-            }
-        }
+        let mut moment = self.emulator.reading().moment;
+        self.lagging.iter_mut().for_each(|one| one.show(step_s, &mut moment));
         Ok(())
     }
 
     fn truth(&mut self, t_s: f64, reference_s: f64, reference: &Reference) -> Truth {
         let reading = self.emulator.reading();
         let moment = reading.moment;
-        let mut metered = moment;
-        if self.lag_s > 0.0 {
-            let [a, b] = &mut self.meters;
-            metered.qa_m3s = a.update(0.0, self.lag_s, moment.qa_m3s);
-            metered.qb_m3s = b.update(0.0, self.lag_s, moment.qb_m3s);
-        }
-        let shown = self.effects.read(&metered);
+        let mut seen = moment;
+        self.lagging.iter_mut().for_each(|one| one.show(0.0, &mut seen));
+        let shown = self.prompt.read(&seen);
         Truth {
             t_s,
             position_reference_m: reference.position_m.at(reference_s),

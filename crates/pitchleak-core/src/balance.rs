@@ -31,6 +31,10 @@ pub struct Moment<T> {
     pub dpa_pas: T,
     /// Ṗ_B, Pa/s.
     pub dpb_pas: T,
+    /// P̈_A, Pa/s².
+    pub d2pa_pas2: T,
+    /// P̈_B, Pa/s².
+    pub d2pb_pas2: T,
     /// Flow Q_A, m³/s.
     pub qa_m3s: T,
     /// Flow Q_B, m³/s.
@@ -144,6 +148,8 @@ impl<T: Real> Moment<T> {
             pb_pa: f(self.pb_pa, other.pb_pa),
             dpa_pas: f(self.dpa_pas, other.dpa_pas),
             dpb_pas: f(self.dpb_pas, other.dpb_pas),
+            d2pa_pas2: f(self.d2pa_pas2, other.d2pa_pas2),
+            d2pb_pas2: f(self.d2pb_pas2, other.d2pb_pas2),
             qa_m3s: f(self.qa_m3s, other.qa_m3s),
             qb_m3s: f(self.qb_m3s, other.qb_m3s),
             dqa_m3s2: f(self.dqa_m3s2, other.dqa_m3s2),

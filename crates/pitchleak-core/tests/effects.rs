@@ -1,6 +1,6 @@
 //! The table of effects and the maps between truth and reading.
 
-use pitchleak_core::effects::{EffectError, EffectKind, LaggedFlow, Shape, ShapeParameter};
+use pitchleak_core::effects::{EffectError, EffectKind, LaggedReading, Shape, ShapeParameter};
 use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment};
 use proptest::prelude::*;
 
@@ -8,8 +8,9 @@ fn moment() -> impl Strategy<Value = Moment<f64>> {
     let motion = (0.01..0.19, -0.1..0.1, -2.0..2.0);
     let oil = (1e5..8e6, 1e5..8e6, -1e7..1e7, -1e7..1e7);
     let flow = (-3e-4..3e-4, -3e-4..3e-4, -1e-3..1e-3, -1e-3..1e-3);
-    (motion, oil, flow, -5e3..5e3).prop_map(|((x, v, a), (pa, pb, dpa, dpb), (qa, qb, dqa, dqb), force)| {
-        Moment {
+    let jerk = (-1e9..1e9, -1e9..1e9);
+    (motion, oil, jerk, flow, -5e3..5e3).prop_map(
+        |((x, v, a), (pa, pb, dpa, dpb), (d2pa, d2pb), (qa, qb, dqa, dqb), force)| Moment {
             x_m: x,
             v_mps: v,
             a_mps2: a,
@@ -17,14 +18,16 @@ fn moment() -> impl Strategy<Value = Moment<f64>> {
             pb_pa: pb,
             dpa_pas: dpa,
             dpb_pas: dpb,
+            d2pa_pas2: d2pa,
+            d2pb_pas2: d2pb,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: dqa,
             dqb_m3s2: dqb,
             force_n: force,
             temp_k: 320.0,
-        }
-    })
+        },
+    )
 }
 
 fn numbers(m: Moment<f64>) -> [f64; 9] {
@@ -141,7 +144,7 @@ fn every_shape_parameter_that_matters_is_listed() {
 #[test]
 fn a_lagging_meter_trails_a_ramp_by_its_lag() {
     let (lag, slope, step) = (0.05_f64, 1e-4, 1e-4);
-    let mut meter = LaggedFlow::new(0.0);
+    let mut meter = LaggedReading::new(0.0);
     let mut reading = 0.0;
     for i in 1..=10_000 {
         reading = meter.update(step, lag, slope * step * f64::from(i));

@@ -7,7 +7,7 @@ mod set;
 mod shape;
 mod table;
 
-pub use sensor::LaggedFlow;
+pub use sensor::LaggedReading;
 pub use set::{ActiveEffect, EffectError, EffectSet};
 pub use shape::{Shape, ShapeParameter, ShapeParameterSpec};
 pub use table::{Effect, EffectKind, EffectSpec, UnknownEffect};

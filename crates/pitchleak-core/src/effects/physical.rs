@@ -42,6 +42,8 @@ pub(super) fn unit_term<T: Real>(
         | Effect::PressureOffsetB
         | Effect::PressureGainA
         | Effect::PressureGainB
+        | Effect::PressureLagA
+        | Effect::PressureLagB
         | Effect::LineResistanceA
         | Effect::LineResistanceB
         | Effect::ForceGain => Terms::default(),

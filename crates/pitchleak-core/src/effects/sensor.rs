@@ -14,21 +14,29 @@ fn distortion<T: Real>(effect: Effect, at: &Moment<T>) -> Distortion<T> {
     let (one, none) = (T::one(), Moment::default());
     let scale = |scale| Distortion { scale, shift: none };
     let shift = |shift| Distortion { scale: none, shift };
+    // A flow that is not measured is none: the pressure stays as it was read.
+    let known = |flow: T| if flow.is_finite() { flow } else { T::zero() };
     match effect {
         Effect::FlowMeterOffsetA => shift(Moment { qa_m3s: one, ..none }),
         Effect::FlowMeterOffsetB => shift(Moment { qb_m3s: one, ..none }),
         Effect::FlowMeterGainA => scale(Moment { qa_m3s: one, dqa_m3s2: one, ..none }),
         Effect::FlowMeterGainB => scale(Moment { qb_m3s: one, dqb_m3s2: one, ..none }),
-        // First order in the lag; the simulation filters, see `LaggedFlow`.
+        // First order in the lag; the simulation filters, see `LaggedReading`.
         Effect::FlowMeterLag => shift(Moment { qa_m3s: -at.dqa_m3s2, qb_m3s: -at.dqb_m3s2, ..none }),
         Effect::PositionGain => scale(Moment { x_m: one, v_mps: one, a_mps2: one, ..none }),
         Effect::PositionOffset => shift(Moment { x_m: one, ..none }),
         Effect::PressureOffsetA => shift(Moment { pa_pa: one, ..none }),
         Effect::PressureOffsetB => shift(Moment { pb_pa: one, ..none }),
-        Effect::PressureGainA => scale(Moment { pa_pa: one, dpa_pas: one, ..none }),
-        Effect::PressureGainB => scale(Moment { pb_pa: one, dpb_pas: one, ..none }),
-        Effect::LineResistanceA => shift(Moment { pa_pa: at.qa_m3s, dpa_pas: at.dqa_m3s2, ..none }),
-        Effect::LineResistanceB => shift(Moment { pb_pa: at.qb_m3s, dpb_pas: at.dqb_m3s2, ..none }),
+        Effect::PressureGainA => scale(Moment { pa_pa: one, dpa_pas: one, d2pa_pas2: one, ..none }),
+        Effect::PressureGainB => scale(Moment { pb_pa: one, dpb_pas: one, d2pb_pas2: one, ..none }),
+        Effect::PressureLagA => shift(Moment { pa_pa: -at.dpa_pas, dpa_pas: -at.d2pa_pas2, ..none }),
+        Effect::PressureLagB => shift(Moment { pb_pa: -at.dpb_pas, dpb_pas: -at.d2pb_pas2, ..none }),
+        Effect::LineResistanceA => {
+            shift(Moment { pa_pa: known(at.qa_m3s), dpa_pas: known(at.dqa_m3s2), ..none })
+        }
+        Effect::LineResistanceB => {
+            shift(Moment { pb_pa: known(at.qb_m3s), dpb_pas: known(at.dqb_m3s2), ..none })
+        }
         Effect::ForceGain => scale(Moment { force_n: one, ..none }),
         _ => Distortion { scale: none, shift: none },
     }
@@ -58,26 +66,26 @@ pub(super) fn unit_term<T: Real>(effect: Effect, at: &Moment<T>, model: &Model<T
     above.zip(below, |above, below| (above - below) / (step + step))
 }
 
-/// The dynamic form of [`Effect::FlowMeterLag`]: τ y' + y = u by backward Euler, stable for every
-/// step; [`Effect::read`]'s `−τ dQ/dt` is its first-order part.
+/// The dynamic form of [`Effect::FlowMeterLag`] and [`Effect::PressureLagA`]: τ y' + y = u by backward Euler,
+/// stable for every step; [`Effect::read`]'s `−τ du/dt` is its first-order part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LaggedFlow<T> {
-    reading_m3s: T,
+pub struct LaggedReading<T> {
+    reading: T,
 }
 
-impl<T: Real> LaggedFlow<T> {
-    /// A meter that has shown `flow_m3s` for long.
-    pub fn new(flow_m3s: T) -> Self {
-        Self { reading_m3s: flow_m3s }
+impl<T: Real> LaggedReading<T> {
+    /// A sensor that has shown `signal` for long.
+    pub fn new(signal: T) -> Self {
+        Self { reading: signal }
     }
 
     /// The reading `step_s` later; `lag_s` is τ. What is not a number is passed over.
-    pub fn update(&mut self, step_s: T, lag_s: T, flow_m3s: T) -> T {
-        let reading = self.reading_m3s + (flow_m3s - self.reading_m3s) * step_s / (step_s + lag_s);
+    pub fn update(&mut self, step_s: T, lag_s: T, signal: T) -> T {
+        let reading = self.reading + (signal - self.reading) * step_s / (step_s + lag_s);
         if reading.is_finite() {
-            self.reading_m3s = reading;
+            self.reading = reading;
         }
-        self.reading_m3s
+        self.reading
     }
 }

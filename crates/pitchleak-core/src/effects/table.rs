@@ -67,11 +67,11 @@ macro_rules! effects {
 }
 
 effects! {
-    DeadVolumeA "dead_volume_a" ["m3"] Storage 0.0 .. 5e-3, 1e-4;
+    DeadVolumeA "dead_volume_a" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
         "Hose, port or manifold volume at chamber A, or a hose that swells, takes oil in step with the pressure slope."
         "Measure hose length and bore and declare dead_volume_a in the rig file."
         "Pressure steps on side A with the piston at the A end, at low and at high pressure: a volume takes the same oil at both."
-    DeadVolumeB "dead_volume_b" ["m3"] Storage 0.0 .. 5e-3, 1e-4;
+    DeadVolumeB "dead_volume_b" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
         "Hose, port or manifold volume at chamber B, or a hose that swells, takes oil in step with the pressure slope."
         "Measure hose length and bore and declare dead_volume_b in the rig file."
         "Pressure steps on side B with the piston at the B end, at low and at high pressure: a volume takes the same oil at both."
@@ -147,6 +147,14 @@ effects! {
         "Pressure sensor B reads a constant share too much or too little; the force balance shows it."
         "Calibrate pressure sensor B against a reference gauge."
         "A reference gauge at port B at high pressure."
+    PressureLagA "pressure_lag_a" ["s"] Sensor 0.0 .. 1.0, 2e-2;
+        "Pressure sensor A answers late: a thin or air-filled gauge line, a snubber, or a filter in its electronics."
+        "Bleed or shorten the gauge line, take the snubber out, or declare the lag."
+        "A step of the valve: how long pressure sensor A answers after the piston and the flow."
+    PressureLagB "pressure_lag_b" ["s"] Sensor 0.0 .. 1.0, 2e-2;
+        "Pressure sensor B answers late: a thin or air-filled gauge line, a snubber, or a filter in its electronics."
+        "Bleed or shorten the gauge line, take the snubber out, or declare the lag."
+        "A step of the valve: how long pressure sensor B answers after the piston and the flow."
     LineResistanceA "line_resistance_a" ["Pa*s/m3"] Sensor 0.0 .. 1e12, 1e9;
         "Pressure sensor A sits at the valve, a line away from the cylinder, and reads the line's loss on top while oil flows."
         "Move the sensor to the cylinder port, or declare the line's resistance."
