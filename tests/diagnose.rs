@@ -108,6 +108,21 @@ fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
     assert!((leak.value - LEAKS.internal).abs() < 4.0 * leak.std);
 }
 
+/// A volume is measured only over the bulk modulus, so both are saved.
+#[test]
+fn the_saved_rig_has_the_oil_that_its_volumes_were_found_with() {
+    let series = trace(Some((Effect::DeadVolumeA, 4e-4)));
+    let mut declared = rig();
+    declared.fluid.bulk_modulus_pa *= 1.3;
+    let answer = ask(series.clone(), &declared);
+    assert_eq!(first(&answer), "dead_volume_a", "{:?}", answer.notes);
+    let saved = answer.rig(&declared);
+    let bulk = answer.leaks.after.bulk_modulus.value;
+    assert!((saved.fluid.bulk_modulus_pa - bulk).abs() < 1e-6 * bulk);
+    let again = ask(series, &saved);
+    assert_eq!(again.verdict, Verdict::NoMissingEffect, "{:?}", again.notes);
+}
+
 #[test]
 fn effects_of_each_balance_are_named() {
     for (effect, size) in [

@@ -342,9 +342,16 @@ fn calibration(fit: &Fit<'_>) -> Vec<Calibration> {
 }
 
 impl Diagnosis {
-    /// The rig file with the effects in it, so that replay and simulation use them.
+    /// The rig file with the effects in it, so that replay and simulation use them. The bulk modulus is that of
+    /// the fit too: volumes and hoses are measured only as V/β.
     pub fn rig(&self, rig: &Rig) -> Rig {
         let mut with = rig.clone();
+        if !self.effects.is_empty() {
+            let bulk = &self.leaks.after.bulk_modulus;
+            let relative = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+            let std = bulk.std.min(relative * bulk.value);
+            with.fluid = Fluid { bulk_modulus_pa: bulk.value, bulk_modulus_std_pa: std };
+        }
         let sizes = self.calibration.iter().map(|c| (c.id, c.value, c.std, None));
         let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.shape))));
         for (id, value, std, constants) in sizes {
