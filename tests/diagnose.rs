@@ -111,7 +111,7 @@ fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
 /// A volume is measured only over the bulk modulus, so both are saved.
 #[test]
 fn the_saved_rig_has_the_oil_that_its_volumes_were_found_with() {
-    let series = trace(Some((Effect::DeadVolumeA, 4e-4)));
+    let series = trace(Some((Effect::DeadVolumeA, 1e-4)));
     let mut declared = rig();
     declared.fluid.bulk_modulus_pa *= 1.3;
     let answer = ask(series.clone(), &declared);
