@@ -104,7 +104,8 @@ impl<'a> TableRows<'a> {
                 return Next::End;
             }
         }
-        *row = Row { line: self.before + self.at as u64, ..Row::empty() };
+        // Signals without a column were NaN before and stay so.
+        row.line = self.before + self.at as u64;
         let mut finite = true;
         for cells in &self.current {
             let value = cells.values.get(self.at).copied().unwrap_or(f64::NAN);

@@ -7,8 +7,10 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from hypothesis import settings
 
 matplotlib.use("Agg")
+settings.register_profile("ci", derandomize=True)
 
 ROOT = Path(__file__).parents[3]
 TRACES = sorted((ROOT / "data" / "traces").glob("*.csv.gz"))

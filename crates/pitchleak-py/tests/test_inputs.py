@@ -15,6 +15,7 @@ import pitchleak as pl
 
 HEADERS = ("t_s", "x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s")
 SOUND = {"t_s": 0.0, "x_m": 0.1, "pa_pa": 5e6, "pb_pa": 4e6, "qa_m3s": 1e-5, "qb_m3s": -1e-5}
+SIGNALS = {"t", "timestamp", "x", "v", "pa", "pb", "qa", "qb", "force", "temp", "q"}
 EXPECTED = (TypeError, ValueError)  # TraceError is a ValueError
 
 
@@ -103,9 +104,11 @@ def test_views_give_what_their_copies_give(data):
 @given(st.lists(st.text(max_size=6), max_size=5, unique=True))
 def test_any_headers(names):
     columns = {name: np.zeros(3) for name in names}
-    with pytest.raises(pl.TraceError, match="no column for time"):
+    with pytest.raises(pl.TraceError, match="no column for time|unknown unit"):
         pl.replay(columns)
-    assert try_all(sound(3) | {name: np.zeros(1) for name in names if name not in SOUND}) is not None
+    others = {name: np.zeros(1) for name in names if name not in SOUND}
+    if not SIGNALS & {name.partition("_")[0] for name in others}:
+        assert try_all(sound(3) | others) is not None
 
 
 @settings(max_examples=200, deadline=None)
