@@ -6,7 +6,7 @@
 
 use super::point::Point;
 use super::rows::{Balance, Entry, Row, Rows};
-use super::term::Term;
+use super::term::{Nameless, Term};
 use pitchleak_core::{Effect, Sensors};
 
 /// Entries to the left of the diagonal that can be correlated: three of the row before, two of the own.
@@ -241,30 +241,38 @@ impl SharedNoise {
             chamber => spread.swept_area(chamber) * moved(entry),
         };
         let area_a = spread.point.model.cylinder.area_a_m2;
-        let column = |effect: Effect, entry: &Entry| match (effect, entry.balance) {
-            (Effect::PositionGain, _) => -swept(entry),
-            (Effect::DragLeak, Balance::ChamberA) => area_a * moved(entry),
-            (Effect::DragLeak, Balance::ChamberB) => -area_a * moved(entry),
-            (Effect::FlowMeterGainA, Balance::ChamberA) | (Effect::FlowMeterGainB, Balance::ChamberB) => {
-                metered(entry)
-            }
+        let load = |entry: &Entry| {
+            let mean = &rows.rows[entry.row].mean;
+            mean.pa_pa - mean.pb_pa
+        };
+        let column = |term: Term, entry: &Entry| match (term, entry.balance) {
+            (Term::Effect(Effect::PositionGain), _) => -swept(entry),
+            (Term::Effect(Effect::DragLeak), Balance::ChamberA) => area_a * moved(entry),
+            (Term::Effect(Effect::DragLeak), Balance::ChamberB) => -area_a * moved(entry),
+            (Term::Effect(Effect::FlowMeterGainA), Balance::ChamberA)
+            | (Term::Effect(Effect::FlowMeterGainB), Balance::ChamberB) => metered(entry),
+            (Term::Nameless(Nameless::DirectionLeak), Balance::ChamberA) => load(entry) * moved(entry),
+            (Term::Nameless(Nameless::DirectionLeak), Balance::ChamberB) => -load(entry) * moved(entry),
             _ => 0.0,
         };
-        let shares = |effect: &Effect| SHARING.contains(effect);
-        let columns =
-            terms.iter().enumerate().filter_map(|(i, term)| Some((i, term.effect().filter(shares)?)));
+        let sharing = terms.iter().enumerate().filter(|(_, term)| SHARING.contains(term));
         Self {
             rows: rows.entries.iter().map(|entry| metered(entry) - swept(entry)).collect(),
-            columns: columns
-                .map(|(i, effect)| (i, rows.entries.iter().map(|entry| column(effect, entry)).collect()))
+            columns: sharing
+                .map(|(i, term)| (i, rows.entries.iter().map(|entry| column(*term, entry)).collect()))
                 .collect(),
         }
     }
 }
 
-/// Effects whose column is the left side of the equation, and so carries the residual's own noise.
-const SHARING: [Effect; 4] =
-    [Effect::PositionGain, Effect::DragLeak, Effect::FlowMeterGainA, Effect::FlowMeterGainB];
+/// Terms whose column is the left side of the equation, or a multiple of it, and so carries the residual's own noise.
+const SHARING: [Term; 5] = [
+    Term::Effect(Effect::PositionGain),
+    Term::Effect(Effect::DragLeak),
+    Term::Effect(Effect::FlowMeterGainA),
+    Term::Effect(Effect::FlowMeterGainB),
+    Term::Nameless(Nameless::DirectionLeak),
+];
 
 #[cfg(test)]
 mod tests {
