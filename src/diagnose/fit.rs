@@ -8,12 +8,12 @@ use super::motion::Motion;
 use super::noise::{SharedNoise, Spread, Whitening};
 use super::point::Point;
 use super::regression::{self, FOLDS, Prepared, Prior, Regression, Score, Solution};
-use super::rows::{Balance, Recipe, Rows};
+use super::rows::{Balance, Recipe, Row, Rows};
 use super::series::Series;
 use super::term::{self, Term};
 use super::{Declared, Progress};
-use pitchleak_core::effects::Shape;
-use pitchleak_core::{Effect, Sensors};
+use pitchleak_core::effects::{EffectKind, Shape};
+use pitchleak_core::{Effect, Moment, Sensors};
 use std::cell::RefCell;
 
 /// Usual length of a block, s: short against the machine's motion, long against a sample.
@@ -364,16 +364,66 @@ impl<'a> Fit<'a> {
 
     /// What is left of traces that were not fitted.
     pub(super) fn judge(&self, traces: &[Series]) -> (Rows, Vec<f64>) {
-        let mut point = self.point.clone();
-        for (term, increment) in self.solution.terms.iter().zip(&self.solution.value) {
-            let value = point.value(self.terms[*term]) + increment;
-            point.set(self.terms[*term], value, &self.shapes[*term]);
-        }
+        let point = self.solved_point();
         let recipe = Recipe { point: &point, terms: &[], shapes: &[], block_s: BLOCK_S };
         let rows = Rows::build(traces, &motions(traces, &point, &self.sensors), &recipe);
         let left = rows.y.clone();
         let left = self.in_units(&rows, left);
         (rows, left)
+    }
+
+    /// What leaves each chamber along `traces`, in hats over blocks of `block_s`: balance, hat, flow and standard
+    /// deviation of its noise, m³/s. The model without its leaks leaves that over.
+    pub(super) fn leak_flows(&self, traces: &[Series], block_s: f64) -> Vec<(Balance, Row, f64, f64)> {
+        let mut point = self.solved_point();
+        for (term, shape) in self.terms.iter().zip(&self.shapes) {
+            if term.is_leak() && point.value(*term).abs() > 0.0 {
+                point.set(*term, 0.0, shape);
+            }
+        }
+        let recipe = Recipe { point: &point, terms: &[], shapes: &[], block_s };
+        let rows = Rows::build(traces, &motions(traces, &point, &self.sensors), &recipe);
+        let solved = self.solved_point();
+        let spread = Spread { point: &solved, sensors: &self.sensors, equation_error: [0.0; 3] };
+        let entries = rows.entries.iter().zip(&rows.y).filter(|(entry, _)| entry.balance != Balance::Force);
+        entries
+            .map(|(entry, left)| {
+                let row = rows.rows[entry.row];
+                let std = spread.mean_flow_std(&row, entry.balance);
+                (entry.balance, row, left / row.block_s, std)
+            })
+            .collect()
+    }
+
+    /// Σ factor × value over `terms`, and its standard deviation by the jackknife, which holds their correlation.
+    pub(super) fn sum(&self, terms: &[(Term, f64)]) -> (f64, f64) {
+        let of = |solution: &Solution| {
+            let one = |(term, factor): &(Term, f64)| {
+                let own = |at: &usize| self.terms[*at] == *term;
+                let at = solution.terms.iter().position(own);
+                factor * (self.point.value(*term) + at.map_or(0.0, |at| solution.value[at]))
+            };
+            terms.iter().map(one).sum::<f64>()
+        };
+        let pieces = self.regression.leave_one_out(&self.active, &self.held_increments());
+        (of(&self.solution), regression::jackknife_std(pieces.iter().map(of)))
+    }
+
+    /// Flow out of a chamber by the leak effects that are fitted, m³/s.
+    pub(super) fn effect_leak(&self, at: &Moment<f64>, balance: Balance) -> f64 {
+        let point = self.solved_point();
+        let leaks = point.effects.terms(at, &point.model, EffectKind::is_leak);
+        if balance == Balance::ChamberA { leaks.chamber_a_m3s } else { leaks.chamber_b_m3s }
+    }
+
+    /// The point moved to the solution.
+    fn solved_point(&self) -> Point {
+        let mut point = self.point.clone();
+        for (term, increment) in self.solution.terms.iter().zip(&self.solution.value) {
+            let value = point.value(self.terms[*term]) + increment;
+            point.set(self.terms[*term], value, &self.shapes[*term]);
+        }
+        point
     }
 
     /// From integrals over a hat to averages. While the piston stands, dry friction is whatever

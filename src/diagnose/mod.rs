@@ -14,6 +14,7 @@ mod exchange;
 mod figures;
 mod fit;
 mod held_out;
+mod holds;
 mod interaction;
 mod likeness;
 mod motion;
@@ -31,6 +32,7 @@ mod term;
 mod text;
 mod whiteness;
 
+pub use holds::{HoldLeak, Holds};
 pub use likeness::{Likeness, Look};
 pub use outcome::{
     Calibration, Diagnosis, FoundEffect, Interaction, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality,
@@ -163,6 +165,8 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         notes.extend(negative_leaks(&leaks_after, "the model with the effects"));
     }
     let left = HeldOut::of(&fit, &test);
+    let judged = if test.is_empty() { &train } else { &test };
+    let holds = holds::check(&fit, &named, (&train, judged), &declared, &checks, progress);
     Diagnosis {
         schema: "pitchleak.diagnose/1",
         before,
@@ -177,6 +181,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         excess: rows::Balance::ALL.map(|balance| fit.excess(balance)),
         remainder_before: left_before.shapes(),
         remainder: left.shapes(),
+        holds,
         residuals: ResidualsBeforeAfter { before: residuals_before, after: Residuals::of(&fit) },
         residual_before: left_before.residual(),
         residual: left.residual(),

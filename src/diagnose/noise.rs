@@ -72,6 +72,12 @@ impl Spread<'_> {
         variance / (hat_weights(row.samples).0 * step_s * step_s)
     }
 
+    /// Standard deviation of a chamber's row as a mean flow, m³/s.
+    pub(super) fn mean_flow_std(&self, row: &Row, balance: Balance) -> f64 {
+        let own = Weights { hat: hat_weights(row.samples).0, difference: 2.0 };
+        self.covariance((row, balance), (row, balance), own).sqrt() / row.block_s
+    }
+
     fn flow_std(&self, balance: Balance) -> f64 {
         let meter = if balance == Balance::ChamberA { &self.sensors.flow_a } else { &self.sensors.flow_b };
         meter.noise_std

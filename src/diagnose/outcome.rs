@@ -1,5 +1,6 @@
 //! What a diagnosis says, field by field as `diagnose --json` prints it.
 
+use super::holds::Holds;
 use super::residual::Residuals;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -221,6 +222,9 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Size of what is left as a multiple of the sensors' noise: chamber A, chamber B, force.
     pub excess: [f64; 3],
+    /// Leaks while the piston stands, against those found in motion; none without such holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub holds: Option<Holds>,
     /// What is left of the fitted samples, whitened and tested.
     pub residuals: ResidualsBeforeAfter,
     /// What the declared model leaves over, against each variable.

@@ -188,18 +188,14 @@ impl Regression {
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
     /// where what is left is neither white nor of known size.
     pub(super) fn jackknife(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
-        let fits: Vec<Vec<f64>> = self
-            .grams
-            .iter()
-            .map(|gram| self.solve_gram(&(&self.total - gram), terms, priors).value)
-            .collect();
-        let n = PIECES as f64;
-        (0..fits.first().map_or(0, Vec::len))
-            .map(|i| {
-                let mean = fits.iter().map(|fit| fit[i]).sum::<f64>() / n;
-                ((n - 1.0) / n * fits.iter().map(|fit| (fit[i] - mean).powi(2)).sum::<f64>()).sqrt()
-            })
-            .collect()
+        let fits = self.leave_one_out(terms, priors);
+        let of = |i: usize| jackknife_std(fits.iter().map(|fit| fit.value[i]));
+        (0..fits.first().map_or(0, |fit| fit.value.len())).map(of).collect()
+    }
+
+    /// Fits without one piece each.
+    pub(super) fn leave_one_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<Solution> {
+        self.grams.iter().map(|gram| self.solve_gram(&(&self.total - gram), terms, priors)).collect()
     }
 
     fn solve_gram(&self, gram: &DMatrix<f64>, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
@@ -340,6 +336,13 @@ fn normalised(mut column: Vec<f64>) -> (Vec<f64>, f64) {
     }
     column.iter_mut().for_each(|v| *v /= length);
     (column, length)
+}
+
+/// Standard deviation of an estimate from its values without one piece each.
+pub(super) fn jackknife_std(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = PIECES as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    ((n - 1.0) / n * values.map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
 fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {

@@ -99,6 +99,15 @@ impl Term {
         }
     }
 
+    /// Whether it is a leak.
+    pub(super) fn is_leak(self) -> bool {
+        match self {
+            Self::Internal | Self::ExternalA | Self::ExternalB => true,
+            Self::Effect(effect) => effect.spec().kind.is_leak(),
+            Self::InverseBulk | Self::Nameless(_) | Self::Product(..) => false,
+        }
+    }
+
     /// Whether the term shows in the force balance.
     pub(super) fn in_force(self) -> bool {
         match self {

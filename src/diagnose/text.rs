@@ -31,6 +31,7 @@ impl Diagnosis {
             self.write_residuals(&mut out);
             self.write_shapes(&mut out);
             self.write_leaks(&mut out);
+            self.write_holds(&mut out);
         }
         for note in &self.notes {
             let _ = writeln!(out, "note: {note}");
@@ -51,6 +52,25 @@ impl Diagnosis {
                 let (before, after) = (before * factor, after * factor);
                 let _ = writeln!(out, "  {name:<22} {before:>10.4} {after:>10.4} {unit}");
             }
+        }
+    }
+
+    fn write_holds(&self, out: &mut String) {
+        let Some(holds) = self.holds else { return };
+        for (name, held) in [("A", holds.chamber_a), ("B", holds.chamber_b)] {
+            let Some(held) = held else { continue };
+            let flow = |value: f64, std: f64| format!("{:.3} ± {:.3}", value * LPM, 1.96 * std * LPM);
+            let [before, after] = held.apart_sigma();
+            let _ = writeln!(
+                out,
+                "\nat rest under {:.0} bar ({} holds of 1 s) {} L/min leave chamber {name}; what moves predicts {} before \
+                 ({before:.1} sigma apart), {} after ({after:.1} sigma apart)",
+                held.mean_pressure_pa / 1e5,
+                held.count,
+                flow(held.leak_m3s, held.std_m3s),
+                flow(held.predicted_before_m3s, held.predicted_before_std_m3s),
+                flow(held.predicted_after_m3s, held.predicted_after_std_m3s)
+            );
         }
     }
 

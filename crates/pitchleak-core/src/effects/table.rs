@@ -17,6 +17,13 @@ pub enum EffectKind {
     Sensor,
 }
 
+impl EffectKind {
+    /// Whether oil leaves a chamber for good.
+    pub fn is_leak(self) -> bool {
+        matches!(self, Self::InternalLeak | Self::ExternalLeakA | Self::ExternalLeakB)
+    }
+}
+
 /// One row of the table of effects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectSpec {
