@@ -162,7 +162,7 @@ fn against(before: &Shape, after: &Shape) -> Panel {
 
 impl Shape {
     /// Whether the traces have the variable, and it moves.
-    fn varies(&self) -> bool {
+    pub(super) fn varies(&self) -> bool {
         let ends = self.at.first().zip(self.at.last());
         ends.is_some_and(|(first, last)| last - first > 1e-9 * last.abs().max(first.abs()))
     }

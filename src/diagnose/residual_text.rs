@@ -52,7 +52,8 @@ impl Diagnosis {
             if left.excess <= 1.0 && left.goes_with(beyond).is_empty() {
                 continue;
             }
-            let mut shapes: Vec<&Shape> = self.remainder.iter().filter(|s| s.balance == name).collect();
+            let mut shapes: Vec<&Shape> =
+                self.remainder.iter().filter(|s| s.balance == name && s.varies()).collect();
             shapes.sort_by(|a, b| b.strength().total_cmp(&a.strength()));
             for shape in shapes.into_iter().take(MOST_NAMED) {
                 let _ = writeln!(out, "{}", shape.line());
