@@ -135,7 +135,7 @@ struct MeasuredCoefficient {
 
 impl MeasuredCoefficient {
     fn add(&mut self, dt_s: f64, reference_m3s: f64, pressure_pa: f64) {
-        let keep = libm::exp(-dt_s.max(0.0) / COEFFICIENT_MEMORY_S);
+        let keep = 1.0 / (1.0 + dt_s.max(0.0) / COEFFICIENT_MEMORY_S);
         self.flow_pressure = keep * self.flow_pressure + reference_m3s * pressure_pa;
         self.pressure_square = keep * self.pressure_square + pressure_pa * pressure_pa;
     }
