@@ -6,7 +6,7 @@
 //! ```
 
 use pitchleak::Rig;
-use pitchleak::core::effects::Shape;
+use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
 use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
 use pitchleak::figure::{Ink, Line, Panel, svg};
@@ -29,8 +29,9 @@ fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
         sheet.accuracy = 3e-3;
     }
     let mut effects = EffectSet::default();
-    let shape = Shape { spot_position_m: 0.09, spot_width_m: 0.01, ..Shape::default() };
-    effects.set(Effect::PositionDependentLeak, 1e-11, shape)?;
+    let constants =
+        EffectConstants { spot_position_m: 0.09, spot_width_m: 0.01, ..EffectConstants::default() };
+    effects.set(Effect::PositionDependentLeak, 1e-11, constants)?;
     let history = History::of(&Wind::BuiltIn(WindCase::Mps21))?;
     let scenario = Scenario {
         reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m)?,

@@ -1,8 +1,8 @@
 //! The diagnosis on traces of the project's own plant.
 
 use pitchleak::Rig;
-use pitchleak::core::effects::Shape;
-use pitchleak::core::{Effect, EffectSet, Moment, PerLeak, Sample};
+use pitchleak::core::effects::EffectConstants;
+use pitchleak::core::{Effect, EffectSet, PerLeak, Sample, Signals};
 use pitchleak::curve::Curve;
 use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
@@ -40,10 +40,10 @@ fn trace(effect: Option<(Effect, f64)>) -> Series {
 }
 
 /// The same with a further force on the piston, which the load cell does not feel.
-fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Moment<f64>) -> f64) -> Series {
+fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Signals<f64>) -> f64) -> Series {
     let mut effects = EffectSet::default();
     if let Some((effect, size)) = effect {
-        effects.set(effect, size, Shape::default()).expect("is within bounds");
+        effects.set(effect, size, EffectConstants::default()).expect("is within bounds");
     }
     let rig = rig();
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 7);
@@ -65,7 +65,7 @@ fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Moment<f64>) ->
     let leaks = scenario.leak_coefficients().expect("given");
     scenario
         .run(leaks, |truth| {
-            let force_n = truth.sample.force_n.map(|force| force - resists_n(&truth.moment));
+            let force_n = truth.sample.force_n.map(|force| force - resists_n(&truth.signals));
             series.push(truth.t_s, &sensing.read(&Sample { force_n, ..truth.sample }), None);
         })
         .expect("the plant runs");

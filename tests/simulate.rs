@@ -1,7 +1,7 @@
 //! Simulated scenarios: they follow, leak and show what they were told to.
 
 use pitchleak::Rig;
-use pitchleak::core::effects::Shape;
+use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{LeakSize, Scenario, SimulateError, TraceWriter, Truth};
@@ -40,8 +40,8 @@ fn the_rig_follows_the_wind() {
     let truths = run(&scenario());
     assert_eq!(truths.len(), 400);
     for truth in &truths {
-        assert!((truth.moment.x_m - truth.position_reference_m).abs() < 1e-3, "position at {} s", truth.t_s);
-        assert!((truth.moment.force_n - truth.load_reference_n).abs() < 500.0, "load at {} s", truth.t_s);
+        assert!((truth.signals.x_m - truth.position_reference_m).abs() < 1e-3, "position at {} s", truth.t_s);
+        assert!((truth.signals.force_n - truth.load_reference_n).abs() < 500.0, "load at {} s", truth.t_s);
         assert_eq!(truth.leaks_m3s, PerLeak::default());
     }
 }
@@ -81,14 +81,14 @@ fn a_leak_that_no_supply_feeds_is_an_error() {
 #[test]
 fn lagging_meters_show_an_older_flow_and_the_rig_does_not_notice() {
     let mut effects = EffectSet::default();
-    effects.set(Effect::FlowMeterLag, 0.03, Shape::default()).expect("a lag");
+    effects.set(Effect::FlowMeterLag, 0.03, EffectConstants::default()).expect("a lag");
     let (plain, lagging) = (run(&scenario()), run(&Scenario { effects, ..scenario() }));
     let error = |lag: usize| -> f64 {
         let shown = lagging.iter().skip(lag).map(|t| t.sample.qa_m3s.unwrap_or(f64::NAN));
-        shown.zip(&plain).map(|(shown, truth)| (shown - truth.moment.qa_m3s).powi(2)).sum()
+        shown.zip(&plain).map(|(shown, truth)| (shown - truth.signals.qa_m3s).powi(2)).sum()
     };
     assert!(error(3) < 0.5 * error(0), "{} now, {} three samples ago", error(0), error(3));
-    assert!(lagging.iter().zip(&plain).all(|(a, b)| a.moment == b.moment));
+    assert!(lagging.iter().zip(&plain).all(|(a, b)| a.signals == b.signals));
 }
 
 #[test]

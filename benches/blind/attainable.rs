@@ -1,7 +1,7 @@
 //! How often the exact likelihood itself would put the true effect first.
 
 use pitchleak::core::Effect;
-use pitchleak::core::effects::Shape;
+use pitchleak::core::effects::EffectConstants;
 use pitchleak::diagnose::Likeness;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -41,9 +41,14 @@ fn factor(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// Draws the scores of all candidates: their mean follows from the correlation with the truth's column, their
 /// covariance is the correlation itself. Sizes that physics forbids do not compete, and fitted constants
 /// pay for their trials as in the diagnosis.
-pub fn attainable(likeness: &Likeness, truth: Effect, shape: Shape<f64>, size: f64) -> Option<Attainable> {
+pub fn attainable(
+    likeness: &Likeness,
+    truth: Effect,
+    constants: EffectConstants<f64>,
+    size: f64,
+) -> Option<Attainable> {
     let looks = &likeness.looks;
-    let at = looks.iter().rposition(|look| look.effect == truth && look.shape == shape);
+    let at = looks.iter().rposition(|look| look.effect == truth && look.shape == constants);
     let at = at.or_else(|| looks.iter().position(|look| look.effect == truth))?;
     let sigma = size / looks[at].std;
     let toward = &likeness.correlation[at];

@@ -2,7 +2,7 @@
 
 use crate::attainable::{Attainable, attainable};
 use pitchleak::Rig;
-use pitchleak::core::effects::Shape;
+use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak, Sensors};
 use pitchleak::curve::Curve;
 use pitchleak::diagnose::{Declared, Diagnosis, Likeness, Series, diagnose};
@@ -99,7 +99,7 @@ pub fn rig(accuracy: f64) -> Rig {
 pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<Truth>> {
     let mut effects = EffectSet::default();
     if let Ailment::Known(effect) = ailment {
-        effects.set(effect, size, shape()).ok()?;
+        effects.set(effect, size, constants()).ok()?;
     }
     let scenario = Scenario {
         rig: rig(1e-2),
@@ -114,12 +114,12 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
     };
     let mut truths = scenario.collect(scenario.leak_coefficients().ok()?).ok()?;
     for truth in &mut truths {
-        let (moment, sample) = (&truth.moment, &mut truth.sample);
+        let (signals, sample) = (&truth.signals, &mut truth.sample);
         match ailment {
             Ailment::SpoolLeak => {
-                let drop_pa = (10e6 - moment.pa_pa).max(1e5);
-                let opening = moment.qa_m3s.abs() / drop_pa.sqrt() / 3e-8;
-                let leak = size * opening * (moment.pa_pa - moment.pb_pa);
+                let drop_pa = (10e6 - signals.pa_pa).max(1e5);
+                let opening = signals.qa_m3s.abs() / drop_pa.sqrt() / 3e-8;
+                let leak = size * opening * (signals.pa_pa - signals.pb_pa);
                 sample.qa_m3s = sample.qa_m3s.map(|q| q + leak);
                 sample.qb_m3s = sample.qb_m3s.map(|q| q - leak);
             }
@@ -130,8 +130,8 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
     Some(truths)
 }
 
-fn shape() -> Shape<f64> {
-    Shape { spot_position_m: 0.09, spot_width_m: 0.015, ..Shape::default() }
+fn constants() -> EffectConstants<f64> {
+    EffectConstants { spot_position_m: 0.09, spot_width_m: 0.015, ..EffectConstants::default() }
 }
 
 pub fn seen(truths: &[Truth], sensors: Sensors<f64>, seed: u64) -> Series {
@@ -156,14 +156,14 @@ pub fn cases(excitation: Excitation, accuracies: &[f64], multiples: &[f64]) -> V
         cases.push(case(Ailment::None, 0.0, 0.0));
         let rig = rig(accuracy);
         let (series, declared) = (seen(&sound, rig.sensors(), 1), Declared::of(&rig));
-        let likeness = Likeness::of(std::slice::from_ref(&series), &declared, &[shape()]);
+        let likeness = Likeness::of(std::slice::from_ref(&series), &declared, &[constants()]);
         let reach = diagnose(&[series], &[], &declared, &|| ()).not_detectable_below;
         for effect in Effect::ALL {
             let Some(limit) = reach.get(effect.spec().id) else { continue };
             for multiple in multiples {
                 let size = multiple * limit.value;
                 if size < 0.8 * effect.spec().upper {
-                    let expected = attainable(&likeness, *effect, shape(), size);
+                    let expected = attainable(&likeness, *effect, constants(), size);
                     cases.push(Case { expected, ..case(Ailment::Known(*effect), *multiple, size) });
                 }
             }

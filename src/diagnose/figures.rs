@@ -1,6 +1,6 @@
 //! Figures of what is left: over time, its autocorrelation and distribution, and against each variable.
 
-use super::outcome::{Diagnosis, Shape};
+use super::outcome::{BinnedResidual, Diagnosis};
 use super::residual::BalanceResidual;
 use super::residual_text::{balance_name, people, symbol};
 use crate::figure::{FigureError, Ink, Line, Panel, svg};
@@ -139,10 +139,10 @@ fn histogram(white: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// Means in bins; thin lines: two standard errors about what is left with the effects.
-fn against(before: &Shape, after: &Shape) -> Panel {
+fn against(before: &BinnedResidual, after: &BinnedResidual) -> Panel {
     let (factor, y_label) = unit(after.balance);
     let (scale, _) = people(after.against);
-    let points = |shape: &Shape, errors: f64| {
+    let points = |shape: &BinnedResidual, errors: f64| {
         let values = shape.at.iter().zip(&shape.mean).zip(&shape.std_error);
         values.map(|((at, mean), error)| (at * scale, (mean + errors * error) * factor)).collect()
     };
@@ -160,7 +160,7 @@ fn against(before: &Shape, after: &Shape) -> Panel {
     }
 }
 
-impl Shape {
+impl BinnedResidual {
     /// Whether the traces have the variable, and it moves.
     pub(super) fn varies(&self) -> bool {
         let ends = self.at.first().zip(self.at.last());

@@ -12,8 +12,8 @@ use super::rows::{Balance, Recipe, Row, Rows};
 use super::series::Series;
 use super::term::{self, Term};
 use super::{Declared, Progress};
-use pitchleak_core::effects::{EffectKind, Shape};
-use pitchleak_core::{Effect, Moment, Sensors};
+use pitchleak_core::effects::{EffectConstants, EffectKind};
+use pitchleak_core::{Effect, Sensors, Signals};
 use std::cell::RefCell;
 
 /// Usual length of a block, s: short against the machine's motion, long against a sample.
@@ -39,9 +39,9 @@ pub(super) struct Fit<'a> {
     pub(super) traces: &'a [Series],
     pub(super) sensors: Sensors<f64>,
     pub(super) terms: Vec<Term>,
-    pub(super) shapes: Vec<Shape<f64>>,
+    pub(super) shapes: Vec<EffectConstants<f64>>,
     /// The constants that every effect starts from.
-    pub(super) plain_shape: Shape<f64>,
+    pub(super) plain_shape: EffectConstants<f64>,
     pub(super) priors: Vec<Option<Prior>>,
     /// Terms that are fitted, those of the declared model first.
     pub(super) active: Vec<usize>,
@@ -66,7 +66,7 @@ pub(super) struct Fit<'a> {
 /// A whitened column of a term with constants that are not its present ones.
 struct Shaped {
     term: usize,
-    shape: Shape<f64>,
+    shape: EffectConstants<f64>,
     white: Vec<f64>,
 }
 
@@ -76,7 +76,7 @@ impl<'a> Fit<'a> {
         traces: &'a [Series],
         declared: &Declared,
         sensors: Sensors<f64>,
-        shape: Shape<f64>,
+        shape: EffectConstants<f64>,
         progress: Progress<'_>,
     ) -> Self {
         let terms = term::all();
@@ -163,7 +163,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Gives a candidate's column another shape, at the same point.
-    pub(super) fn reshape(&mut self, term: usize, shape: Shape<f64>) {
+    pub(super) fn reshape(&mut self, term: usize, shape: EffectConstants<f64>) {
         if self.shapes[term] == shape {
             return;
         }
@@ -245,7 +245,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    pub(super) fn recipe<'b>(&'b self, terms: &'b [Term], shapes: &'b [Shape<f64>]) -> Recipe<'b> {
+    pub(super) fn recipe<'b>(&'b self, terms: &'b [Term], shapes: &'b [EffectConstants<f64>]) -> Recipe<'b> {
         Recipe { point: &self.point, terms, shapes, block_s: BLOCK_S }
     }
 
@@ -285,19 +285,29 @@ impl<'a> Fit<'a> {
     }
 
     /// The same for another shape of the term's effect.
-    pub(super) fn score_shape(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Score> {
+    pub(super) fn score_shape(
+        &self,
+        model: &Solution,
+        term: usize,
+        shape: EffectConstants<f64>,
+    ) -> Option<Score> {
         let score = self.regression.score_column(model, term, &self.prepare(model, term, shape)?)?;
         self.allowed(&score).then_some(score)
     }
 
     /// Fall of the sum of squares by a term that is not among the candidates.
-    pub(super) fn gain_of(&self, term: Term, shape: Shape<f64>) -> Option<f64> {
+    pub(super) fn gain_of(&self, term: Term, shape: EffectConstants<f64>) -> Option<f64> {
         let column = self.regression.prepare(&self.scoring, &self.white_column(term, shape))?;
         Some(self.regression.gain(&self.scoring, &column))
     }
 
     /// The column of a term with this shape, with what a model's terms explain of it.
-    pub(super) fn prepare(&self, model: &Solution, term: usize, shape: Shape<f64>) -> Option<Prepared> {
+    pub(super) fn prepare(
+        &self,
+        model: &Solution,
+        term: usize,
+        shape: EffectConstants<f64>,
+    ) -> Option<Prepared> {
         let known = |one: &&Shaped| one.term == term && one.shape == shape;
         if let Some(one) = self.shaped.borrow().iter().find(known) {
             return self.regression.prepare(model, &one.white);
@@ -308,7 +318,7 @@ impl<'a> Fit<'a> {
         prepared
     }
 
-    fn white_column(&self, term: Term, shape: Shape<f64>) -> Vec<f64> {
+    fn white_column(&self, term: Term, shape: EffectConstants<f64>) -> Vec<f64> {
         let (terms, shapes) = ([term], [shape]);
         let rows = Rows::build(self.traces, &self.motions, &self.recipe(&terms, &shapes));
         rows.columns.first().map(|column| self.whitening.whiten(column)).unwrap_or_default()
@@ -410,7 +420,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Flow out of a chamber by the leak effects that are fitted, m³/s.
-    pub(super) fn effect_leak(&self, at: &Moment<f64>, balance: Balance) -> f64 {
+    pub(super) fn effect_leak(&self, at: &Signals<f64>, balance: Balance) -> f64 {
         let point = self.solved_point();
         let leaks = point.effects.terms(at, &point.model, EffectKind::is_leak);
         if balance == Balance::ChamberA { leaks.chamber_a_m3s } else { leaks.chamber_b_m3s }

@@ -1,7 +1,7 @@
 //! What is left of samples that were not fitted: its size, its course, its shape.
 
 use super::fit::Fit;
-use super::outcome::{Residual, Rmse, Shape};
+use super::outcome::{BinnedResidual, Residual, Rmse};
 use super::residual::VARIABLES;
 use super::rows::{Balance, Entry, Row, Rows};
 use super::series::Series;
@@ -70,7 +70,7 @@ impl HeldOut {
     }
 
     /// What is left against each variable, in bins of equal count.
-    pub(super) fn shapes(&self) -> Vec<Shape> {
+    pub(super) fn shapes(&self) -> Vec<BinnedResidual> {
         let mut shapes = Vec::new();
         for (balance, name) in Balance::ALL.into_iter().zip(["chamber_a", "chamber_b", "force"]) {
             if self.of_balance(balance).count() < 2 * BINS {
@@ -86,7 +86,7 @@ impl HeldOut {
     }
 }
 
-fn binned(balance: &'static str, against: &'static str, mut pairs: Vec<(f64, f64)>) -> Shape {
+fn binned(balance: &'static str, against: &'static str, mut pairs: Vec<(f64, f64)>) -> BinnedResidual {
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let n = pairs.len() as f64;
     let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
@@ -101,7 +101,14 @@ fn binned(balance: &'static str, against: &'static str, mut pairs: Vec<(f64, f64
         mean.push(bin.mean);
         std_error.push(bin.std_error);
     }
-    Shape { balance, against, at, mean, std_error, correlation: if scale > 0.0 { xy / scale } else { 0.0 } }
+    BinnedResidual {
+        balance,
+        against,
+        at,
+        mean,
+        std_error,
+        correlation: if scale > 0.0 { xy / scale } else { 0.0 },
+    }
 }
 
 /// Means of one bin.

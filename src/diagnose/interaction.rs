@@ -20,10 +20,8 @@ pub(super) fn interactions(fit: &Fit<'_>, named: &[Named]) -> Vec<Interaction> {
     let test = |(a, b): &(usize, usize)| {
         let (one, other) = (fit.terms[*a].effect()?, fit.terms[*b].effect()?);
         // Constants that both have are alike in friction, the only ones that are shared.
-        let shape = one
-            .shape_parameters()
-            .iter()
-            .fold(fit.shapes[*b], |shape, p| shape.with(*p, fit.shapes[*a].get(*p)));
+        let shape =
+            one.constants().iter().fold(fit.shapes[*b], |shape, p| shape.with(*p, fit.shapes[*a].get(*p)));
         let gain = fit.gain_of(Term::Product(one, other), shape)?;
         let sigma = (gain / dispersion).sqrt();
         let mended = 100.0 * gain / fit.scoring.chi2;

@@ -3,7 +3,7 @@
 use super::regression::Prepared;
 use super::{Declared, Series, adequacy, declared_fit, select, shape, thinned};
 use pitchleak_core::Effect;
-use pitchleak_core::effects::Shape;
+use pitchleak_core::effects::EffectConstants;
 
 /// A candidate with the constants in which it is not linear.
 #[derive(Clone, Copy, Debug)]
@@ -11,7 +11,7 @@ pub struct Look {
     /// The effect.
     pub effect: Effect,
     /// Its constants.
-    pub shape: Shape<f64>,
+    pub shape: EffectConstants<f64>,
     /// Standard deviation of its size with the declared model's constants free, in the effect's unit.
     pub std: f64,
     /// The size in standard deviations at which the diagnosis would name it.
@@ -34,7 +34,7 @@ pub struct Likeness {
 impl Likeness {
     /// Compares all candidates on `traces` of a sound rig. Constants that are fitted are taken from a few places of
     /// their range, and from `also`.
-    pub fn of(traces: &[Series], declared: &Declared, also: &[Shape<f64>]) -> Self {
+    pub fn of(traces: &[Series], declared: &Declared, also: &[EffectConstants<f64>]) -> Self {
         let (traces, declared) = thinned(traces, declared);
         let checks = adequacy::check_sensors(&traces, &declared.sensors);
         let fit = declared_fit(&traces, &declared, &checks, &|| ());

@@ -35,8 +35,8 @@ mod whiteness;
 pub use holds::{HoldLeak, Holds};
 pub use likeness::{Likeness, Look};
 pub use outcome::{
-    Calibration, Diagnosis, FoundEffect, Interaction, LeakEstimate, LeakEstimates, LeaksBeforeAfter, Quality,
-    Residual, ResidualsBeforeAfter, Rmse, Shape as RemainderShape, Size, Verdict, WhitenessP,
+    BinnedResidual, Calibration, Diagnosis, FoundEffect, Interaction, LeakEstimate, LeakEstimates,
+    LeaksBeforeAfter, Quality, Residual, ResidualsBeforeAfter, Rmse, Size, Verdict, WhitenessP,
 };
 pub use residual::{BalanceResidual, Correlation, Residuals};
 pub use series::Series;
@@ -46,7 +46,7 @@ use crate::rig::EffectValue;
 use fit::Fit;
 use held_out::HeldOut;
 use motion::Motion;
-use pitchleak_core::effects::{Shape, ShapeParameter};
+use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, Leaks, Model, SensorSpread, Sensors};
 use select::Named;
 use std::collections::BTreeMap;
@@ -234,21 +234,21 @@ fn is_excited(fit: &Fit<'_>) -> bool {
 }
 
 /// Friction turns within the speed that these traces can resolve.
-fn friction_shape(traces: &[Series], declared: &Declared) -> Shape<f64> {
+fn friction_shape(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
     let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks: Leaks::default() };
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
     let speeds: Vec<(f64, f64)> =
         traces.iter().map(|series| least(&Motion::of(series, &model, &declared.sensors))).collect();
-    let within = |parameter: ShapeParameter, speed: f64| {
+    let within = |parameter: EffectConstant, speed: f64| {
         let spec = parameter.spec();
         speed.clamp(spec.lower, spec.upper)
     };
     let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
     let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);
-    Shape {
-        slip_speed_mps: within(ShapeParameter::SlipSpeed, slip),
-        stribeck_speed_mps: within(ShapeParameter::StribeckSpeed, usual / 2.0),
-        ..Shape::default()
+    EffectConstants {
+        slip_speed_mps: within(EffectConstant::SlipSpeed, slip),
+        stribeck_speed_mps: within(EffectConstant::StribeckSpeed, usual / 2.0),
+        ..EffectConstants::default()
     }
 }
 
@@ -307,7 +307,7 @@ fn found(fit: &Fit<'_>, one: &Named, confident: bool) -> Option<FoundEffect> {
     let spec = effect.spec();
     let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
     let shape = &fit.shapes[one.term];
-    let shape = effect.shape_parameters().iter().map(|p| (p.spec().id, shape.get(*p))).collect();
+    let shape = effect.constants().iter().map(|p| (p.spec().id, shape.get(*p))).collect();
     Some(FoundEffect {
         id: spec.id,
         value,
@@ -361,12 +361,12 @@ impl Diagnosis {
         let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.shape))));
         for (id, value, std, constants) in sizes {
             let Ok(effect) = id.parse::<Effect>() else { continue };
-            let mut shape = Shape::default();
-            for parameter in effect.shape_parameters() {
+            let mut shape = EffectConstants::default();
+            for parameter in effect.constants() {
                 let found = constants.and_then(|constants| constants.get(parameter.spec().id));
                 shape = found.map_or(shape, |value| shape.with(*parameter, *value));
             }
-            with.effects.insert(effect, EffectValue { value, std: Some(std), shape });
+            with.effects.insert(effect, EffectValue { value, std: Some(std), constants: shape });
         }
         with
     }

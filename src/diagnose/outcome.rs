@@ -180,7 +180,7 @@ pub struct Residual {
 
 /// What is left against one variable: means in bins of equal count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Shape {
+pub struct BinnedResidual {
     /// `chamber_a`, `chamber_b` or `force`.
     pub balance: &'static str,
     /// The variable.
@@ -228,9 +228,9 @@ pub struct Diagnosis {
     /// What is left of the fitted samples, whitened and tested.
     pub residuals: ResidualsBeforeAfter,
     /// What the declared model leaves over, against each variable.
-    pub remainder_before: Vec<Shape>,
+    pub remainder_before: Vec<BinnedResidual>,
     /// What is left with the effects.
-    pub remainder: Vec<Shape>,
+    pub remainder: Vec<BinnedResidual>,
     /// The same over time.
     #[serde(skip)]
     pub residual_before: Residual,

@@ -2,8 +2,8 @@
 
 use super::Declared;
 use super::term::Term;
-use pitchleak_core::effects::{EffectKind, Shape};
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment, Terms};
+use pitchleak_core::effects::{EffectConstants, EffectKind};
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Signals, Terms};
 
 /// The values around which the regression is linear.
 #[derive(Clone, Debug)]
@@ -24,9 +24,9 @@ const LEAST_SOFTNESS: f64 = 0.3;
 const SMALL: f64 = 1e-2;
 
 /// Whether two moments agree in all that physical effects depend on.
-fn is_same(one: &Moment<f64>, other: &Moment<f64>) -> bool {
-    let motion = |m: &Moment<f64>| [m.x_m, m.v_mps, m.a_mps2, m.temp_k].map(f64::to_bits);
-    let oil = |m: &Moment<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas].map(f64::to_bits);
+fn is_same(one: &Signals<f64>, other: &Signals<f64>) -> bool {
+    let motion = |m: &Signals<f64>| [m.x_m, m.v_mps, m.a_mps2, m.temp_k].map(f64::to_bits);
+    let oil = |m: &Signals<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas].map(f64::to_bits);
     motion(one) == motion(other) && oil(one) == oil(other)
 }
 
@@ -44,14 +44,19 @@ impl Point {
     }
 
     /// What is left of the three equations at corrected readings.
-    pub(super) fn residual(&self, at: &Moment<f64>) -> Terms<f64> {
+    pub(super) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         self.model.residual(at).plus(-1.0, known)
     }
 
     /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what
     /// the physical effects found so far are computed from.
-    pub(super) fn unit_term(&self, term: Term, at: &Moment<f64>, shape: &Shape<f64>) -> Terms<f64> {
+    pub(super) fn unit_term(
+        &self,
+        term: Term,
+        at: &Signals<f64>,
+        shape: &EffectConstants<f64>,
+    ) -> Terms<f64> {
         let own = term.unit_term(at, &self.model, shape);
         let Some(effect) = term.effect().filter(|effect| effect.spec().kind == EffectKind::Sensor) else {
             return own;
@@ -63,7 +68,8 @@ impl Point {
         {
             return own;
         }
-        let known = |at: &Moment<f64>| self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
+        let known =
+            |at: &Signals<f64>| self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         own.plus(-0.5 / step, known(&read(step)).plus(-1.0, known(&read(-step))))
     }
 
@@ -83,7 +89,7 @@ impl Point {
     }
 
     /// The same point with one term at another value, held within what physics allows.
-    pub(super) fn set(&mut self, term: Term, value: f64, shape: &Shape<f64>) {
+    pub(super) fn set(&mut self, term: Term, value: f64, shape: &EffectConstants<f64>) {
         let leaks = &mut self.model.leaks;
         match term {
             Term::InverseBulk => {
@@ -97,7 +103,7 @@ impl Point {
         }
     }
 
-    fn set_effect(&mut self, effect: Effect, value: f64, shape: &Shape<f64>) {
+    fn set_effect(&mut self, effect: Effect, value: f64, shape: &EffectConstants<f64>) {
         let spec = effect.spec();
         // Full or unphysical: the effect stays as it was, and the regression goes on around that.
         let _ = self.effects.set(effect, value.clamp(spec.lower, spec.upper), *shape);

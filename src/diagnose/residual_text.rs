@@ -1,6 +1,6 @@
 //! What is left, in a few lines for people.
 
-use super::outcome::{Diagnosis, Shape};
+use super::outcome::{BinnedResidual, Diagnosis};
 use super::residual::BalanceResidual;
 use super::whiteness;
 use crate::report::LPM_PER_M3S;
@@ -52,7 +52,7 @@ impl Diagnosis {
             if left.excess <= 1.0 && left.goes_with(beyond).is_empty() {
                 continue;
             }
-            let mut shapes: Vec<&Shape> =
+            let mut shapes: Vec<&BinnedResidual> =
                 self.remainder.iter().filter(|s| s.balance == name && s.varies()).collect();
             shapes.sort_by(|a, b| b.strength().total_cmp(&a.strength()));
             for shape in shapes.into_iter().take(MOST_NAMED) {
@@ -62,7 +62,7 @@ impl Diagnosis {
     }
 }
 
-impl Shape {
+impl BinnedResidual {
     /// How far the bins' means are from one another, in their standard errors: what a correlation cannot see
     /// of a hump.
     fn strength(&self) -> f64 {

@@ -9,8 +9,8 @@ use super::motion::Motion;
 use super::point::Point;
 use super::series::Series;
 use super::term::Term;
-use pitchleak_core::Moment;
-use pitchleak_core::effects::Shape;
+use pitchleak_core::Signals;
+use pitchleak_core::effects::EffectConstants;
 use std::ops::Range;
 
 /// One of the three equations.
@@ -43,7 +43,7 @@ pub(super) struct Row {
     pub(super) block_s: f64,
     pub(super) samples: usize,
     /// Averages over both blocks.
-    pub(super) mean: Moment<f64>,
+    pub(super) mean: Signals<f64>,
     /// Share of the hat during which the direction of motion is unknown.
     pub(super) stuck: f64,
 }
@@ -69,7 +69,7 @@ pub(super) struct Rows {
 pub(super) struct Recipe<'a> {
     pub(super) point: &'a Point,
     pub(super) terms: &'a [Term],
-    pub(super) shapes: &'a [Shape<f64>],
+    pub(super) shapes: &'a [EffectConstants<f64>],
     /// Length of a block, s.
     pub(super) block_s: f64,
 }
@@ -283,9 +283,9 @@ fn step(series: &Series, motion: &Motion, at: usize, recipe: &Recipe<'_>, out: &
     }
 }
 
-fn means(hat: &[f64], block_s: f64) -> Moment<f64> {
+fn means(hat: &[f64], block_s: f64) -> Signals<f64> {
     let mean = |i: usize| hat.get(i).map_or(0.0, |sum| sum / block_s);
-    Moment {
+    Signals {
         x_m: mean(0),
         v_mps: mean(1),
         pa_pa: mean(2),
@@ -294,7 +294,7 @@ fn means(hat: &[f64], block_s: f64) -> Moment<f64> {
         qb_m3s: mean(5),
         force_n: mean(6),
         temp_k: mean(7),
-        ..Moment::default()
+        ..Signals::default()
     }
 }
 
@@ -322,11 +322,11 @@ fn is_even(series: &Series, at: usize, dt: f64) -> bool {
 }
 
 /// The mean over a step as the chambers see it (speed from the position) and as friction feels it.
-fn moments(series: &Series, motion: &Motion, at: usize, dt: f64) -> (Moment<f64>, Moment<f64>) {
+fn moments(series: &Series, motion: &Motion, at: usize, dt: f64) -> (Signals<f64>, Signals<f64>) {
     let even = is_even(series, at, dt);
     let middle = |values: &[f64]| step_mean(values, at, even);
     let rate = |values: &[f64]| (values[at] - values[at - 1]) / dt;
-    let chambers = Moment {
+    let chambers = Signals {
         x_m: middle(&series.x_m),
         v_mps: rate(&series.x_m),
         a_mps2: rate(&motion.v_mps),
@@ -343,6 +343,6 @@ fn moments(series: &Series, motion: &Motion, at: usize, dt: f64) -> (Moment<f64>
         force_n: middle(&series.force_n),
         temp_k: middle(&series.temp_k),
     };
-    let felt = Moment { v_mps: middle(&motion.v_mps), ..chambers };
+    let felt = Signals { v_mps: middle(&motion.v_mps), ..chambers };
     (chambers, felt)
 }

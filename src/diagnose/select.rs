@@ -8,7 +8,7 @@ use super::shape;
 use super::term::Term;
 use super::whiteness;
 use pitchleak_core::Effect;
-use pitchleak_core::effects::Shape;
+use pitchleak_core::effects::EffectConstants;
 
 /// Share of sound rigs on which the search may name anything, shared out over all candidates (Bonferroni).
 const FALSE_EFFECT_RATE: f64 = 1e-3;
@@ -42,12 +42,12 @@ pub(super) struct Named {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trial {
     pub(super) score: Score,
-    pub(super) shape: Shape<f64>,
+    pub(super) shape: EffectConstants<f64>,
     critical_sigma: f64,
 }
 
 impl Trial {
-    fn of(fit: &Fit<'_>, (score, shape): (Score, Shape<f64>)) -> Self {
+    fn of(fit: &Fit<'_>, (score, shape): (Score, EffectConstants<f64>)) -> Self {
         Self { score, shape, critical_sigma: critical_sigma(fit, shape) }
     }
 
@@ -65,21 +65,21 @@ pub(super) fn candidates(fit: &Fit<'_>) -> Vec<usize> {
 }
 
 /// The size in σ that the score of a candidate with these constants needs.
-pub(super) fn critical_sigma(fit: &Fit<'_>, shape: Shape<f64>) -> f64 {
+pub(super) fn critical_sigma(fit: &Fit<'_>, shape: EffectConstants<f64>) -> f64 {
     let count = fit.terms.iter().filter(|term| term.effect().is_some()).count();
     let trials = if shape == fit.plain_shape { 1 } else { SHAPE_TRIALS };
     whiteness::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
 }
 
 /// The scores of each candidate with its usual constants and at a few places of their ranges.
-fn starts(fit: &Fit<'_>, model: &Solution) -> Vec<Vec<(Score, Shape<f64>)>> {
+fn starts(fit: &Fit<'_>, model: &Solution) -> Vec<Vec<(Score, EffectConstants<f64>)>> {
     candidates(fit).into_iter().map(|term| shape::first_scores(fit, model, term)).collect()
 }
 
 /// One trial of each candidate, the best first.
-fn ranked(fit: &Fit<'_>, model: &Solution, scores: Vec<Vec<(Score, Shape<f64>)>>) -> Vec<Trial> {
+fn ranked(fit: &Fit<'_>, model: &Solution, scores: Vec<Vec<(Score, EffectConstants<f64>)>>) -> Vec<Trial> {
     let dispersion = fit.dispersion(model.chi2);
-    let best = |scores: Vec<(Score, Shape<f64>)>| {
+    let best = |scores: Vec<(Score, EffectConstants<f64>)>| {
         let trials = scores.into_iter().map(|one| Trial::of(fit, one));
         trials.max_by(|a, b| a.beyond(dispersion).total_cmp(&b.beyond(dispersion)))
     };

@@ -2,7 +2,7 @@
 
 use super::fit::Fit;
 use super::regression::{Score, Solution};
-use pitchleak_core::effects::{Shape, ShapeParameter};
+use pitchleak_core::effects::{EffectConstant, EffectConstants};
 
 /// Steps of the search, its first and last step as shares of a constant's range, and what a step must gain.
 const MOST_STEPS: usize = 40;
@@ -17,7 +17,7 @@ const STARTS: [f64; 3] = [0.15, 0.5, 0.85];
 /// A constant and the values of it that these traces can tell apart.
 #[derive(Clone, Copy, Debug)]
 struct Range {
-    parameter: ShapeParameter,
+    parameter: EffectConstant,
     low: f64,
     high: f64,
 }
@@ -31,33 +31,33 @@ impl Range {
 /// The constants of an effect that are fitted: not those that only fix a reference.
 fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     let Some(effect) = fit.terms[term].effect() else { return vec![] };
-    effect.shape_parameters().iter().filter_map(|parameter| range(fit, *parameter)).collect()
+    effect.constants().iter().filter_map(|parameter| range(fit, *parameter)).collect()
 }
 
-fn range(fit: &Fit<'_>, parameter: ShapeParameter) -> Option<Range> {
+fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
     let rows = &fit.rows.rows;
     let span = |value: &dyn Fn(&super::rows::Row) -> f64| {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         rows.iter().map(value).fold(ends, |(low, high), v| (low.min(v), high.max(v)))
     };
     let (low, high) = match parameter {
-        ShapeParameter::SpotPosition => span(&|row| row.mean.x_m),
-        ShapeParameter::SpotWidth => {
+        EffectConstant::SpotPosition => span(&|row| row.mean.x_m),
+        EffectConstant::SpotWidth => {
             let (low, high) = span(&|row| row.mean.x_m);
             (0.05 * (high - low), 0.7 * (high - low))
         }
-        ShapeParameter::StribeckSpeed => {
+        EffectConstant::StribeckSpeed => {
             let (_, high) = span(&|row| row.mean.v_mps.abs());
             (0.02 * high, 0.7 * high)
         }
-        ShapeParameter::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
+        EffectConstant::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
         // Slow to fast.
-        ShapeParameter::PolytropicExponent => (1.0, 1.4),
-        ShapeParameter::SlipSpeed => {
+        EffectConstant::PolytropicExponent => (1.0, 1.4),
+        EffectConstant::SlipSpeed => {
             let (_, high) = span(&|row| row.mean.v_mps.abs());
             (fit.plain_shape.slip_speed_mps, 0.3 * high)
         }
-        ShapeParameter::ReferenceTemp => return None,
+        EffectConstant::ReferenceTemp => return None,
     };
     let spec = parameter.spec();
     let (low, high) = (low.max(spec.lower), high.min(spec.upper));
@@ -65,7 +65,7 @@ fn range(fit: &Fit<'_>, parameter: ShapeParameter) -> Option<Range> {
 }
 
 /// The constants with which the search for a candidate's begins: the present ones and a few places of each range.
-fn starts(fit: &Fit<'_>, term: usize) -> Vec<Shape<f64>> {
+fn starts(fit: &Fit<'_>, term: usize) -> Vec<EffectConstants<f64>> {
     let ranges = free(fit, term);
     let middle =
         ranges.iter().fold(fit.shapes[term], |shape, other| shape.with(other.parameter, other.at(0.3)));
@@ -78,7 +78,11 @@ fn starts(fit: &Fit<'_>, term: usize) -> Vec<Shape<f64>> {
 }
 
 /// The scores of a candidate with its present constants and over a few places of their ranges.
-pub(super) fn first_scores(fit: &Fit<'_>, model: &Solution, term: usize) -> Vec<(Score, Shape<f64>)> {
+pub(super) fn first_scores(
+    fit: &Fit<'_>,
+    model: &Solution,
+    term: usize,
+) -> Vec<(Score, EffectConstants<f64>)> {
     let plain = fit.score(model, term).map(|score| (score, fit.shapes[term]));
     let tried = starts(fit, term).into_iter();
     let tried = tried.filter_map(|shape| Some((fit.score_shape(model, term, shape)?, shape)));
@@ -86,15 +90,19 @@ pub(super) fn first_scores(fit: &Fit<'_>, model: &Solution, term: usize) -> Vec<
 }
 
 /// Constants that stand for all a candidate can have: its own if it has none that are fitted.
-pub(super) fn places(fit: &Fit<'_>, term: usize, also: &[Shape<f64>]) -> Vec<Shape<f64>> {
+pub(super) fn places(fit: &Fit<'_>, term: usize, also: &[EffectConstants<f64>]) -> Vec<EffectConstants<f64>> {
     let present = std::iter::once(fit.shapes[term]);
-    let has_constants = fit.terms[term].effect().is_some_and(|effect| !effect.shape_parameters().is_empty());
+    let has_constants = fit.terms[term].effect().is_some_and(|effect| !effect.constants().is_empty());
     let shaped = if has_constants { also } else { &[] };
     present.chain(starts(fit, term)).chain(shaped.iter().copied()).collect()
 }
 
 /// The best score over its constants, from there on.
-pub(super) fn best_score(fit: &Fit<'_>, model: &Solution, first: (Score, Shape<f64>)) -> (Score, Shape<f64>) {
+pub(super) fn best_score(
+    fit: &Fit<'_>,
+    model: &Solution,
+    first: (Score, EffectConstants<f64>),
+) -> (Score, EffectConstants<f64>) {
     let dispersion = fit.dispersion(model.chi2 - first.0.gain);
     if first.0.gain / dispersion < WORTH_SEARCHING {
         return first;
@@ -107,8 +115,8 @@ fn climb(
     fit: &Fit<'_>,
     model: &Solution,
     ranges: &[Range],
-    start: (Score, Shape<f64>),
-) -> (Score, Shape<f64>) {
+    start: (Score, EffectConstants<f64>),
+) -> (Score, EffectConstants<f64>) {
     let term = start.0.term;
     let mut best = start;
     let mut share = FIRST_STEP;

@@ -1,8 +1,8 @@
 //! The unknowns of the fit: the declared model's own four constants, every effect of the core's
 //! table, and a few shapes without a name that only serve to say "something else is there".
 
-use pitchleak_core::effects::{EffectKind, Shape};
-use pitchleak_core::{Effect, Model, Moment, Terms};
+use pitchleak_core::effects::{EffectConstants, EffectKind};
+use pitchleak_core::{Effect, Model, Signals, Terms};
 
 /// One column of the regression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +53,7 @@ impl Nameless {
         Self::SquareFriction,
     ];
 
-    fn unit_term(self, at: &Moment<f64>) -> Terms<f64> {
+    fn unit_term(self, at: &Signals<f64>) -> Terms<f64> {
         let load = at.pa_pa - at.pb_pa;
         let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
         let force = |force_n: f64| Terms { force_n, ..Terms::default() };
@@ -80,7 +80,12 @@ pub(super) fn all() -> Vec<Term> {
 
 impl Term {
     /// What one unit leaves in the residual at an instant.
-    pub(super) fn unit_term(self, at: &Moment<f64>, model: &Model<f64>, shape: &Shape<f64>) -> Terms<f64> {
+    pub(super) fn unit_term(
+        self,
+        at: &Signals<f64>,
+        model: &Model<f64>,
+        shape: &EffectConstants<f64>,
+    ) -> Terms<f64> {
         let load = at.pa_pa - at.pb_pa;
         match self {
             Self::InverseBulk => Terms {

@@ -3,7 +3,7 @@
 use crate::rig::Rig;
 use crate::trace::Record;
 use pitchleak_core::effects::EffectKind;
-use pitchleak_core::{EffectSet, FadingParabola, Leaks, Model, Moment, PerLeak, Sample};
+use pitchleak_core::{EffectSet, FadingMemoryFilter, Leaks, Model, PerLeak, Sample, Signals};
 
 /// Memory of the derivatives that effects such as dead volume or drag ask for, s.
 const MEMORY_S: f64 = 0.05;
@@ -24,11 +24,11 @@ pub(super) struct Correction {
 /// Derivatives of the signals.
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Rates {
-    x: FadingParabola<f64>,
-    pa: FadingParabola<f64>,
-    pb: FadingParabola<f64>,
-    qa: FadingParabola<f64>,
-    qb: FadingParabola<f64>,
+    x: FadingMemoryFilter<f64>,
+    pa: FadingMemoryFilter<f64>,
+    pb: FadingMemoryFilter<f64>,
+    qa: FadingMemoryFilter<f64>,
+    qb: FadingMemoryFilter<f64>,
 }
 
 impl Correction {
@@ -38,14 +38,14 @@ impl Correction {
             return None;
         }
         let model = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks: Leaks::default() };
-        let filter = FadingParabola::new(MEMORY_S);
+        let filter = FadingMemoryFilter::new(MEMORY_S);
         let rates = Rates { x: filter, pa: filter, pb: filter, qa: filter, qb: filter };
         Some(Self { effects: rig.effect_set(), model, rates, leaked_m3: PerLeak::default(), time_s: 0.0 })
     }
 
     /// Sensor effects are undone on the readings; what physical effects take is subtracted from the flows.
     pub fn correct(&mut self, record: &Record) -> Record {
-        let reading = self.moment(record);
+        let reading = self.signals(record);
         let truth = self.effects.correct(&reading);
         let any = self.effects.terms(&truth, &self.model, |kind| kind != EffectKind::Force);
         let of = |kind: EffectKind| self.effects.terms(&truth, &self.model, |k| k == kind);
@@ -72,14 +72,14 @@ impl Correction {
         self.leaked_m3.map(|sum| if self.time_s > 0.0 { sum / self.time_s } else { 0.0 })
     }
 
-    fn moment(&mut self, record: &Record) -> Moment<f64> {
+    fn signals(&mut self, record: &Record) -> Signals<f64> {
         let dt_s = if record.after_gap { 0.0 } else { record.dt_s };
         let sample = &record.sample;
         let (qa, qb) = (sample.qa_m3s.unwrap_or(0.0), sample.qb_m3s.unwrap_or(0.0));
         let x = *self.rates.x.update(dt_s, sample.x_m);
         let pa = *self.rates.pa.update(dt_s, sample.pa_pa);
         let pb = *self.rates.pb.update(dt_s, sample.pb_pa);
-        Moment {
+        Signals {
             x_m: sample.x_m,
             v_mps: record.speed_mps.unwrap_or(x.slope()),
             a_mps2: x.curvature(),

@@ -1,7 +1,7 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
 mod correction;
-mod effect_doubt;
+mod effect_uncertainty;
 mod estimate_file;
 mod estimator;
 mod pressures;
@@ -17,7 +17,7 @@ use crate::report::{Alarm, LPM_PER_M3S, Leak, ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use correction::Correction;
-use effect_doubt::EffectDoubt;
+use effect_uncertainty::EffectUncertainty;
 use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
@@ -83,7 +83,7 @@ pub struct Replay {
     rig: Rig,
     correction: Option<Correction>,
     estimator: Estimator,
-    doubt: EffectDoubt,
+    doubt: EffectUncertainty,
     detector: LeakDetector<f64>,
     since_detection_s: f64,
     /// Over the trace, or since the leak changed.
@@ -99,7 +99,7 @@ impl Replay {
         Self {
             correction: Correction::of(rig),
             estimator: Estimator::new(rig),
-            doubt: EffectDoubt::of(rig),
+            doubt: EffectUncertainty::of(rig),
             detector: LeakDetector::new(rig.alarms),
             since_detection_s: 0.0,
             pressures: TracePressures::default(),

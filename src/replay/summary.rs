@@ -100,7 +100,9 @@ fn judged(entry: EstimateEntry, excitation: &Excitation<f64>) -> EstimateEntry {
     }
     entry.not_identifiable(match excitation.traded_with {
         Some(other) => format!("trades off with {}", label(other)),
-        None if excitation.share_learnt < 0.5 => "this trace says little beyond the rig file".to_owned(),
+        None if excitation.variance_reduction < 0.5 => {
+            "this trace says little beyond the rig file".to_owned()
+        }
         None => "too little excitation".to_owned(),
     })
 }

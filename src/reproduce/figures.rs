@@ -132,7 +132,7 @@ fn followed(run: &Run) -> [Panel; 2] {
         lines: vec![line("reference", Ink::Measured, reference), line("output", Ink::Ours, output)],
         y_range: None,
     };
-    let position = over_time(truths, |t| 1e3 * t.moment.x_m);
+    let position = over_time(truths, |t| 1e3 * t.signals.x_m);
     let mut tracking = panel(
         "piston position",
         "position (mm)",
@@ -146,7 +146,7 @@ fn followed(run: &Run) -> [Panel; 2] {
             "load",
             "load (kN)",
             over_time(truths, |t| 1e-3 * t.load_reference_n),
-            over_time(truths, |t| 1e-3 * t.moment.force_n),
+            over_time(truths, |t| 1e-3 * t.signals.force_n),
         ),
     ]
 }

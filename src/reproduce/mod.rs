@@ -276,9 +276,9 @@ fn tracking(case: Case, run: &Run) -> Tracking {
     let stroke = rig().cylinder.stroke_m;
     let most_load = run.truths.iter().map(|t| t.load_reference_n.abs()).fold(0.0, f64::max);
     let position =
-        || run.truths.iter().map(|t| 100.0 * (t.moment.x_m - t.position_reference_m).abs() / stroke);
+        || run.truths.iter().map(|t| 100.0 * (t.signals.x_m - t.position_reference_m).abs() / stroke);
     let load =
-        || run.truths.iter().map(|t| 100.0 * (t.moment.force_n - t.load_reference_n).abs() / most_load);
+        || run.truths.iter().map(|t| 100.0 * (t.signals.force_n - t.load_reference_n).abs() / most_load);
     let rms = |errors: &mut dyn Iterator<Item = f64>| mean(errors.map(|e| e * e)).sqrt();
     Tracking {
         wind_mps: run.wind.mean_mps(),

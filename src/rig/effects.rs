@@ -4,7 +4,7 @@ use super::bound::Bound;
 use super::document::Section;
 use super::error::RigError;
 use crate::units::Dimension;
-use pitchleak_core::effects::{Shape, ShapeParameter};
+use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Effect, EffectSet};
 use std::collections::BTreeMap;
 
@@ -16,13 +16,13 @@ pub struct EffectValue {
     /// Standard deviation of the parameter, where known.
     pub std: Option<f64>,
     /// The constants it is not linear in.
-    pub shape: Shape<f64>,
+    pub constants: EffectConstants<f64>,
 }
 
 impl EffectValue {
     /// An effect of this size with the usual constants.
     pub fn new(value: f64, std: Option<f64>) -> Self {
-        Self { value, std, shape: Shape::default() }
+        Self { value, std, constants: EffectConstants::default() }
     }
 }
 
@@ -34,12 +34,12 @@ pub(super) fn effect_set(effects: &EffectMap) -> EffectSet<f64> {
     let mut set = EffectSet::default();
     for (effect, size) in effects {
         // A map built by hand may hold more or larger effects than exist; those stay off.
-        let _ = set.set(*effect, size.value, size.shape);
+        let _ = set.set(*effect, size.value, size.constants);
     }
     set
 }
 
-/// Reads `id = value`, or `id = { value, std, … }` with constants of the effect's shape by their names; bare
+/// Reads `id = value`, or `id = { value, std, … }` with constants of the effect's constants by their names; bare
 /// numbers are SI.
 pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
     let ids: Vec<&str> = Effect::ALL.iter().map(|effect| effect.spec().id).collect();
@@ -56,7 +56,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
         } else {
             EffectValue::new(section.required(id, Dimension::Share, bound(effect))?, None)
         };
-        if set.set(effect, size.value, size.shape).is_err() {
+        if set.set(effect, size.value, size.constants).is_err() {
             return Err(section.impossible(id, &size.value.to_string(), "at most eight effects at a time"));
         }
         effects.insert(effect, size);
@@ -65,17 +65,17 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
 }
 
 fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigError> {
-    let shape_ids = effect.shape_parameters().iter().map(|parameter| parameter.spec().id);
+    let shape_ids = effect.constants().iter().map(|parameter| parameter.spec().id);
     let keys: Vec<&str> = ["value", "std"].into_iter().chain(shape_ids).collect();
     entry.allow(&keys)?;
     let value = entry.required("value", Dimension::Share, bound(effect))?;
     let std = entry.quantity("std", Dimension::Share, Bound::from_zero(1e15))?;
     let mut size = EffectValue::new(value, std);
-    for parameter in effect.shape_parameters() {
-        let spec = ShapeParameter::spec(*parameter);
+    for parameter in effect.constants() {
+        let spec = EffectConstant::spec(*parameter);
         let within = Bound::between(spec.lower, spec.upper);
         if let Some(constant) = entry.quantity(spec.id, Dimension::Share, within)? {
-            size.shape = size.shape.with(*parameter, constant);
+            size.constants = size.constants.with(*parameter, constant);
         }
     }
     Ok(size)

@@ -111,8 +111,8 @@ impl Rig {
         for (effect, size) in &self.effects {
             let std = size.std.map_or(String::new(), |std| format!(", std = {std:?}"));
             let _ = write!(out, "{effect} = {{ value = {:?}{std}", size.value);
-            for parameter in effect.shape_parameters() {
-                let _ = write!(out, ", {} = {:?}", parameter.spec().id, size.shape.get(*parameter));
+            for parameter in effect.constants() {
+                let _ = write!(out, ", {} = {:?}", parameter.spec().id, size.constants.get(*parameter));
             }
             out.push_str(" }\n");
         }

@@ -1,5 +1,5 @@
 use crate::Rig;
-use pitchleak_core::effects::{EffectError, Shape, UnknownEffect};
+use pitchleak_core::effects::{EffectConstants, EffectError, UnknownEffect};
 use pitchleak_core::{Effect, EffectSet};
 
 /// One effect and its size, SI: `viscous_friction=1500`.
@@ -49,7 +49,7 @@ impl std::str::FromStr for EffectSize {
 pub fn effects(rig: &Rig, more: &[EffectSize]) -> Result<EffectSet<f64>, EffectsError> {
     let mut set = rig.effect_set();
     for EffectSize { effect, value } in more {
-        set.set(*effect, *value, Shape::default())?;
+        set.set(*effect, *value, EffectConstants::default())?;
     }
     Ok(set)
 }

@@ -23,7 +23,7 @@ use crate::reference::Reference;
 use pitchleak_core::effects::LaggedReading;
 use pitchleak_core::emulator::{Emulator, EmulatorParams};
 use pitchleak_core::plant::PlantError;
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment, PerLeak, Sample};
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, PerLeak, Sample, Signals};
 
 /// What is simulated: a rig, what it follows, its leaks, and for how long.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub struct Truth {
     /// Load that was asked for, N.
     pub load_reference_n: f64,
     /// What happened.
-    pub moment: Moment<f64>,
+    pub signals: Signals<f64>,
     /// What sensors without noise show of it: the same, but for sensor effects.
     pub sample: Sample<f64>,
     /// Leak flows, m³/s.
@@ -131,9 +131,9 @@ impl Scenario {
     fn mean_pressures_pa(&self, leaks: Leaks<f64>) -> Result<PerLeak<f64>, SimulateError> {
         let (mut sum, mut count) = (PerLeak::<f64>::default(), 0.0);
         self.run(leaks, |truth| {
-            sum.internal += (truth.moment.pa_pa - truth.moment.pb_pa).abs();
-            sum.external_a += truth.moment.pa_pa;
-            sum.external_b += truth.moment.pb_pa;
+            sum.internal += (truth.signals.pa_pa - truth.signals.pb_pa).abs();
+            sum.external_a += truth.signals.pa_pa;
+            sum.external_b += truth.signals.pb_pa;
             count += 1.0;
         })?;
         Ok(sum.map(|sum| sum / f64::max(count, 1.0)))
@@ -201,14 +201,14 @@ struct RunningRig {
 
 /// A signal that is shown late.
 struct Lagging {
-    signal: fn(&mut Moment<f64>) -> &mut f64,
+    signal: fn(&mut Signals<f64>) -> &mut f64,
     lag_s: f64,
     reading: LaggedReading<f64>,
 }
 
 impl Lagging {
     /// The signals that an effect delays.
-    fn of(effect: Effect) -> &'static [fn(&mut Moment<f64>) -> &mut f64] {
+    fn of(effect: Effect) -> &'static [fn(&mut Signals<f64>) -> &mut f64] {
         match effect {
             Effect::FlowMeterLag => &[|m| &mut m.qa_m3s, |m| &mut m.qb_m3s],
             Effect::PressureLagA => &[|m| &mut m.pa_pa],
@@ -218,8 +218,8 @@ impl Lagging {
     }
 
     /// Puts the late reading in the signal's place.
-    fn show(&mut self, step_s: f64, moment: &mut Moment<f64>) {
-        let signal = (self.signal)(moment);
+    fn show(&mut self, step_s: f64, signals: &mut Signals<f64>) {
+        let signal = (self.signal)(signals);
         *signal = self.reading.update(step_s, self.lag_s, *signal);
     }
 }
@@ -233,7 +233,7 @@ impl RunningRig {
         params.internal_step_s = STEP_S;
         let emulator = Emulator::new(params, reference.position_m.at(t_s), reference.load_n.at(t_s))?;
         let (mut prompt, mut lagging) = (EffectSet::default(), Vec::new());
-        let mut now = emulator.reading().moment;
+        let mut now = emulator.reading().signals;
         for active in
             effects.iter().filter(|active| active.value > 0.0 || Lagging::of(active.effect).is_empty())
         {
@@ -243,7 +243,7 @@ impl RunningRig {
             }
             if Lagging::of(active.effect).is_empty() {
                 // As many fit as there were, and they were within their bounds.
-                let _ = prompt.set(active.effect, active.value, active.shape);
+                let _ = prompt.set(active.effect, active.value, active.constants);
             }
         }
         Ok(Self { emulator, prompt, lagging })
@@ -251,22 +251,22 @@ impl RunningRig {
 
     fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
         self.emulator.step(step_s, position_m, load_n)?;
-        let mut moment = self.emulator.reading().moment;
-        self.lagging.iter_mut().for_each(|one| one.show(step_s, &mut moment));
+        let mut signals = self.emulator.reading().signals;
+        self.lagging.iter_mut().for_each(|one| one.show(step_s, &mut signals));
         Ok(())
     }
 
     fn truth(&mut self, t_s: f64, reference_s: f64, reference: &Reference) -> Truth {
         let reading = self.emulator.reading();
-        let moment = reading.moment;
-        let mut seen = moment;
+        let signals = reading.signals;
+        let mut seen = signals;
         self.lagging.iter_mut().for_each(|one| one.show(0.0, &mut seen));
         let shown = self.prompt.read(&seen);
         Truth {
             t_s,
             position_reference_m: reference.position_m.at(reference_s),
             load_reference_n: reference.load_n.at(reference_s),
-            moment,
+            signals,
             sample: Sample {
                 x_m: shown.x_m,
                 pa_pa: shown.pa_pa,

@@ -133,8 +133,8 @@ impl Recording {
             }
             totals.samples += 1;
             totals.flows_m3s = totals.flows_m3s.zip(truth.leaks_m3s).map(|(sum, flow)| sum + flow.abs());
-            totals.position_square += (truth.moment.x_m - truth.position_reference_m).powi(2);
-            totals.load_square += (truth.moment.force_n - truth.load_reference_n).powi(2);
+            totals.position_square += (truth.signals.x_m - truth.position_reference_m).powi(2);
+            totals.load_square += (truth.signals.force_n - truth.load_reference_n).powi(2);
             done(truth.t_s / self.scenario.duration_s);
         })?;
         match failure {

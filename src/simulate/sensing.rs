@@ -124,9 +124,9 @@ mod tests {
     fn numbers_are_normal() {
         let mut normal = Normal::seeded(7);
         let draws: Vec<f64> = (0..200_000).map(|_| normal.draw()).collect();
-        let moment = |p: i32| draws.iter().map(|x| x.powi(p)).sum::<f64>() / draws.len() as f64;
-        assert!(moment(1).abs() < 0.01 && (moment(2) - 1.0).abs() < 0.02);
-        assert!(moment(3).abs() < 0.05 && (moment(4) - 3.0).abs() < 0.1);
+        let signals = |p: i32| draws.iter().map(|x| x.powi(p)).sum::<f64>() / draws.len() as f64;
+        assert!(signals(1).abs() < 0.01 && (signals(2) - 1.0).abs() < 0.02);
+        assert!(signals(3).abs() < 0.05 && (signals(4) - 3.0).abs() < 0.1);
         let lagged: f64 = draws.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / draws.len() as f64;
         assert!(lagged.abs() < 0.01);
     }

@@ -9,9 +9,9 @@ use core::ptr::{read_volatile, write_volatile};
 
 use pitchleak_core::{
     AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Excitation, ExcitationSettings,
-    Fluid, LeakDetector, Linkage, LoadEstimator, Model, Moment, Momentum, PaperEstimator, PaperGains,
+    Fluid, LeakDetector, Linkage, LoadEstimator, Model, Signals, Momentum, PaperEstimator, PaperGains,
     PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
-    effects::Shape,
+    effects::EffectConstants,
     emulator::{Emulator, EmulatorParams},
     force_imbalance_n,
     plant::{CylinderPlant, Drive},
@@ -120,10 +120,10 @@ fn plant_and_emulator<T: Real>() {
     let model: Model<T> = any(Model::paper());
     let mut effects = EffectSet::default();
     for effect in Effect::ALL {
-        keep(effects.set(any(*effect), any(T::one()), any(Shape::default())));
+        keep(effects.set(any(*effect), any(T::one()), any(EffectConstants::default())));
     }
-    let moment: Moment<T> = any(Moment::default());
-    keep((effects.read(&moment), effects.correct(&moment), model.residual(&moment)));
+    let signals: Signals<T> = any(Signals::default());
+    keep((effects.read(&signals), effects.correct(&signals), model.residual(&signals)));
     if let Ok(plant) = CylinderPlant::new(model) {
         let state = plant.state_at(any(T::one()), any(T::one()), any(T::one()), any(T::one()));
         let drive = any(Drive { qa_m3s: T::one(), qb_m3s: T::one(), force_n: T::one() });

@@ -10,47 +10,29 @@
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
-#[cfg(feature = "serde")]
-mod arrays;
-mod balance;
-mod butterworth;
-mod cylinder;
 mod detector;
 pub mod effects;
 pub mod emulator;
-mod estimate;
-mod excitation;
-mod fading_parabola;
-mod linkage;
-mod load;
-mod momentum;
-mod paper_estimator;
-mod paper_law;
+mod filter;
+mod model;
+mod number;
+mod paper;
 pub mod plant;
-mod real;
-mod regressors;
-mod rk4;
 mod rls;
-mod sample;
-mod sensors;
 
-pub use balance::{Leaks, Model, Moment, Terms};
-pub use butterworth::{Butterworth, FilterError};
-pub use cylinder::{Cylinder, CylinderError, Fluid};
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use effects::{Effect, EffectSet};
 pub use emulator::{Emulator, EmulatorParams, EmulatorReading};
-pub use estimate::{Estimate, LeakPressures, PerLeak};
-pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
-pub use fading_parabola::FadingParabola;
-pub use linkage::{Linkage, LinkageError};
-pub use load::LoadEstimator;
-pub use momentum::{Momentum, force_imbalance_n, hydraulic_force_n};
-pub use paper_estimator::PaperEstimator;
-pub use paper_law::{PaperGains, PaperLaw, PaperLawRate, Theta};
-pub use real::Real;
-pub use regressors::regressors;
-pub use rk4::rk4_step;
-pub use rls::{Parameter, Rls, RlsSettings, Update};
-pub use sample::Sample;
-pub use sensors::{SensorSpread, Sensors};
+pub use filter::{
+    Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n,
+    hydraulic_force_n,
+};
+pub use model::{
+    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, LeakPressures, Leaks,
+    Linkage, LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering,
+    signed_root,
+};
+pub use number::Real;
+pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
+pub use plant::rk4_step;
+pub use rls::{Excitation, ExcitationReport, ExcitationSettings, Parameter, Rls, RlsSettings, Update};

@@ -1,16 +1,16 @@
 //! The table of effects and the maps between truth and reading.
 
-use pitchleak_core::effects::{EffectError, EffectKind, LaggedReading, Shape, ShapeParameter};
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Moment};
+use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectError, EffectKind, LaggedReading};
+use pitchleak_core::{Effect, EffectSet, Leaks, Model, Signals};
 use proptest::prelude::*;
 
-fn moment() -> impl Strategy<Value = Moment<f64>> {
+fn signals() -> impl Strategy<Value = Signals<f64>> {
     let motion = (0.01..0.19, -0.1..0.1, -2.0..2.0);
     let oil = (1e5..8e6, 1e5..8e6, -1e7..1e7, -1e7..1e7);
     let flow = (-3e-4..3e-4, -3e-4..3e-4, -1e-3..1e-3, -1e-3..1e-3);
     let jerk = (-1e9..1e9, -1e9..1e9);
     (motion, oil, jerk, flow, -5e3..5e3).prop_map(
-        |((x, v, a), (pa, pb, dpa, dpb), (d2pa, d2pb), (qa, qb, dqa, dqb), force)| Moment {
+        |((x, v, a), (pa, pb, dpa, dpb), (d2pa, d2pb), (qa, qb, dqa, dqb), force)| Signals {
             x_m: x,
             v_mps: v,
             a_mps2: a,
@@ -30,17 +30,17 @@ fn moment() -> impl Strategy<Value = Moment<f64>> {
     )
 }
 
-fn numbers(m: Moment<f64>) -> [f64; 9] {
+fn numbers(m: Signals<f64>) -> [f64; 9] {
     [m.x_m, m.v_mps, m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas, m.qa_m3s, m.qb_m3s, m.force_n]
 }
 
 proptest! {
     #[test]
-    fn correcting_undoes_reading(truth in moment()) {
+    fn correcting_undoes_reading(truth in signals()) {
         let mut all = EffectSet::default();
         for effect in [Effect::PositionGain, Effect::PressureOffsetA, Effect::LineResistanceB,
             Effect::FlowMeterGainA, Effect::FlowMeterOffsetA, Effect::ForceGain, Effect::FlowMeterLag] {
-            all.set(effect, effect.spec().default_size, Shape::default()).unwrap();
+            all.set(effect, effect.spec().default_size, EffectConstants::default()).unwrap();
         }
         for (back, truth) in numbers(all.correct(&all.read(&truth))).into_iter().zip(numbers(truth)) {
             prop_assert!((back - truth).abs() <= 1e-9 * truth.abs().max(1e-9), "{back} {truth}");
@@ -49,13 +49,13 @@ proptest! {
 
     /// A sensor's regressor is the slope of the residual in the effect's value.
     #[test]
-    fn sensor_term_is_the_slope_of_the_residual(truth in moment()) {
+    fn sensor_term_is_the_slope_of_the_residual(truth in signals()) {
         let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 1e-12 };
         let model = Model { leaks, ..Model::paper() };
         for effect in Effect::ALL.iter().copied().filter(|e| e.spec().kind == EffectKind::Sensor) {
             let value = effect.spec().default_size * 1e-2;
             let change = model.residual(&effect.read(value, &truth)).plus(-1.0, model.residual(&truth));
-            let unit = effect.unit_term(&truth, &model, &Shape::default());
+            let unit = effect.unit_term(&truth, &model, &EffectConstants::default());
             for (change, term, scale) in [(change.chamber_a_m3s, unit.chamber_a_m3s, 1e-4),
                 (change.chamber_b_m3s, unit.chamber_b_m3s, 1e-4), (change.force_n, unit.force_n, 1e4)] {
                 prop_assert!((change - value * term).abs() < 1e-3 * (value * term).abs() + 1e-12 * scale,
@@ -67,9 +67,9 @@ proptest! {
 
 #[test]
 fn signs_of_the_terms_an_operator_would_check_by_hand() {
-    let (model, shape) = (Model::<f64>::paper(), Shape::default());
-    let at = Moment { x_m: 0.1, v_mps: 0.05, pa_pa: 4e6, pb_pa: 1e6, qa_m3s: 2e-4, ..Moment::default() };
-    let term = |effect: Effect| effect.unit_term(&at, &model, &shape);
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    let at = Signals { x_m: 0.1, v_mps: 0.05, pa_pa: 4e6, pb_pa: 1e6, qa_m3s: 2e-4, ..Signals::default() };
+    let term = |effect: Effect| effect.unit_term(&at, &model, &constants);
     let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
     assert!(close(term(Effect::FlowMeterOffsetA).chamber_a_m3s, 1.0));
     assert!(close(term(Effect::FlowMeterGainA).chamber_a_m3s, 2e-4));
@@ -99,28 +99,28 @@ fn every_id_names_its_effect() {
 
 #[test]
 fn a_set_refuses_what_cannot_be() {
-    let (mut set, shape) = (EffectSet::<f64>::default(), Shape::default());
+    let (mut set, constants) = (EffectSet::<f64>::default(), EffectConstants::default());
     for bad in [-1e-5, f64::NAN, f64::INFINITY] {
-        let error = set.set(Effect::DeadVolumeA, bad, shape);
+        let error = set.set(Effect::DeadVolumeA, bad, constants);
         assert_eq!(error, Err(EffectError::Value(Effect::DeadVolumeA)));
     }
-    let flat = Shape { spot_width_m: 0.0, ..shape };
+    let flat = EffectConstants { spot_width_m: 0.0, ..constants };
     let error = set.set(Effect::PositionDependentLeak, 1e-12, flat);
-    assert_eq!(error, Err(EffectError::Shape(Effect::PositionDependentLeak)));
+    assert_eq!(error, Err(EffectError::Constants(Effect::PositionDependentLeak)));
     for effect in &Effect::ALL[..8] {
-        set.set(*effect, effect.spec().default_size, shape).unwrap();
+        set.set(*effect, effect.spec().default_size, constants).unwrap();
     }
-    assert_eq!(set.set(Effect::LoadOffset, 1.0, shape), Err(EffectError::Full));
-    set.set(Effect::DeadVolumeA, 0.0, shape).unwrap();
-    set.set(Effect::LoadOffset, 1.0, shape).unwrap();
+    assert_eq!(set.set(Effect::LoadOffset, 1.0, constants), Err(EffectError::Full));
+    set.set(Effect::DeadVolumeA, 0.0, constants).unwrap();
+    set.set(Effect::LoadOffset, 1.0, constants).unwrap();
     assert_eq!(set.iter().count(), 8);
 }
 
 /// A fit varies exactly the constants that an effect's term depends on.
 #[test]
 fn every_shape_parameter_that_matters_is_listed() {
-    let (model, shape) = (Model::<f64>::paper(), Shape::default());
-    let at = Moment {
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    let at = Signals {
         x_m: 0.09,
         v_mps: 5e-4,
         a_mps2: 0.1,
@@ -129,13 +129,14 @@ fn every_shape_parameter_that_matters_is_listed() {
         dpa_pas: 1e6,
         dpb_pas: -2e6,
         temp_k: 330.0,
-        ..Moment::default()
+        ..Signals::default()
     };
     for effect in Effect::ALL.iter().copied() {
-        for parameter in ShapeParameter::ALL {
-            let changed = shape.with(parameter, shape.get(parameter) * 1.1 + 1e-3);
-            let matters = effect.unit_term(&at, &model, &changed) != effect.unit_term(&at, &model, &shape);
-            assert_eq!(matters, effect.shape_parameters().contains(&parameter), "{effect} {parameter:?}");
+        for parameter in EffectConstant::ALL {
+            let changed = constants.with(parameter, constants.get(parameter) * 1.1 + 1e-3);
+            let matters =
+                effect.unit_term(&at, &model, &changed) != effect.unit_term(&at, &model, &constants);
+            assert_eq!(matters, effect.constants().contains(&parameter), "{effect} {parameter:?}");
         }
     }
 }
@@ -149,7 +150,7 @@ fn a_lagging_meter_trails_a_ramp_by_its_lag() {
     for i in 1..=10_000 {
         reading = meter.update(step, lag, slope * step * f64::from(i));
     }
-    let truth = Moment { qa_m3s: slope, dqa_m3s2: slope, ..Moment::default() };
+    let truth = Signals { qa_m3s: slope, dqa_m3s2: slope, ..Signals::default() };
     let mapped = Effect::FlowMeterLag.read(lag, &truth).qa_m3s;
     assert!((reading - mapped).abs() < 1e-9 * slope, "{reading} {mapped}");
     assert!((meter.update(step, lag, f64::NAN) - reading).abs() < 1e-30);

@@ -22,7 +22,7 @@ fn tracking(leaks: Leaks<f64>, amplitude_m: f64, hertz: f64) -> (f64, f64, [f64;
     for i in 1..=2000 {
         let t = f64::from(i) * 0.01;
         rig.step(0.01, position(t), load(t)).unwrap();
-        let now = rig.reading().moment;
+        let now = rig.reading().signals;
         if i > 1000 {
             position_square += (now.x_m - position(t)).powi(2) / 1000.0;
             load_square += (now.force_n - load(t)).powi(2) / 1000.0;
@@ -59,10 +59,10 @@ fn readings_obey_the_declared_model() {
         let t = f64::from(i) * 0.01;
         rig.step(0.01, 0.05 + 0.01 * t, 1000.0 + 200.0 * t).unwrap();
         let now = rig.reading();
-        let residual = rig.params().pitch.plant.model.residual(&now.moment);
+        let residual = rig.params().pitch.plant.model.residual(&now.signals);
         assert!(residual.chamber_a_m3s.abs() < 1e-12 && residual.chamber_b_m3s.abs() < 1e-12, "{residual:?}");
         assert!(residual.force_n.abs() < 1e-6, "{residual:?}");
-        let expected = 1e-11 * (now.moment.pa_pa - now.moment.pb_pa);
+        let expected = 1e-11 * (now.signals.pa_pa - now.signals.pb_pa);
         assert!((now.leaks.internal_m3s - expected).abs() < 1e-15);
     }
 }
@@ -74,7 +74,7 @@ fn holds_fine_pitch_next_to_the_end() {
     for i in 1..=500 {
         let t = f64::from(i) * 0.01;
         rig.step(0.01, 0.0014, 500.0 + 300.0 * (2.0 * t).sin()).unwrap();
-        let now = rig.reading().moment;
+        let now = rig.reading().signals;
         assert!((now.x_m - 0.0014).abs() < 1e-4 && now.v_mps.abs() < 0.01, "at {t} s: {now:?}");
     }
 }
@@ -90,7 +90,7 @@ fn f32_follows_f64() {
         let (x, f) = (0.08 + 0.01 * (1.5 * t).sin(), 1000.0 + 500.0 * t.sin());
         wide.step(0.01, f64::from(x), f64::from(f)).unwrap();
         narrow.step(0.01, x, f).unwrap();
-        let (a, b) = (wide.reading().moment, narrow.reading().moment);
+        let (a, b) = (wide.reading().signals, narrow.reading().signals);
         assert!((a.x_m - f64::from(b.x_m)).abs() < 1e-4, "x at {t} s: {} {}", a.x_m, b.x_m);
         assert!((a.pa_pa - f64::from(b.pa_pa)).abs() < 1e5, "P_A at {t} s: {} {}", a.pa_pa, b.pa_pa);
         assert!((a.force_n - f64::from(b.force_n)).abs() < 50.0, "F at {t} s: {} {}", a.force_n, b.force_n);
@@ -121,7 +121,7 @@ proptest! {
             let (x, f) = if wild { (wild_x, wild_f) } else { (x, f) };
             rig.step(0.02, x, f).unwrap();
             let now = rig.reading();
-            let m = now.moment;
+            let m = now.signals;
             for value in [m.x_m, m.v_mps, m.a_mps2, m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas, m.qa_m3s, m.qb_m3s,
                 m.force_n, now.supply_pa, now.pitch_command, now.load_command, now.leaks.internal_m3s] {
                 prop_assert!(value.is_finite(), "{now:?}");

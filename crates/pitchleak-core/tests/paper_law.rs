@@ -125,7 +125,7 @@ fn identity_error(f1: impl Fn(f64, f64) -> f64) -> f64 {
                 force_n: 2e3 + 800.0 * (0.7 * t).cos(),
             }
         };
-        let at = plant.rates(&state, &drive(0.0)).moment;
+        let at = plant.rates(&state, &drive(0.0)).signals;
         let (va, vb) = (model.cylinder.volume_a_m3(at.x_m), model.cylinder.volume_b_m3(at.x_m));
         let sample = Sample {
             x_m: at.x_m,

@@ -1,6 +1,6 @@
 //! Properties of the simulated cylinder.
 
-use pitchleak_core::effects::{EffectKind, Shape};
+use pitchleak_core::effects::{EffectConstants, EffectKind};
 use pitchleak_core::plant::{CylinderPlant, CylinderState, Drive, Supply, Valve, ValvePlant};
 use pitchleak_core::{Cylinder, Effect, Fluid, Leaks, Model};
 use proptest::prelude::*;
@@ -55,8 +55,8 @@ proptest! {
         };
         let seen = |state: &CylinderState<f64>, t: f64| {
             let rates = plant.rates(state, &drive(t));
-            let leaks = plant.leak_flows(&rates.moment);
-            let m = rates.moment;
+            let leaks = plant.leak_flows(&rates.signals);
+            let m = rates.signals;
             let c = &model.cylinder;
             let vapour = plant.vapour_m3(state);
             [
@@ -126,7 +126,7 @@ proptest! {
     ) {
         let mut cylinder = CylinderPlant::new(Model::paper()).unwrap();
         let effect = Effect::ALL[which];
-        cylinder.effects.set(effect, effect.spec().upper, Shape::default()).unwrap();
+        cylinder.effects.set(effect, effect.spec().upper, EffectConstants::default()).unwrap();
         let plant = ValvePlant { cylinder, valve: Valve::paper(), supply: Supply::paper() };
         let mut free = cylinder.state_at(x, v, pa, pb);
         let mut driven = plant.state_at(free);
@@ -198,11 +198,11 @@ fn residual_of_the_plain_model_is_the_effects_term() {
         let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 0.0 };
         let mut plant = CylinderPlant::new(Model::<f64> { leaks, ..Model::paper() }).unwrap();
         plant.temp_k = 323.0;
-        plant.effects.set(effect, spec.default_size, Shape::default()).unwrap();
+        plant.effects.set(effect, spec.default_size, EffectConstants::default()).unwrap();
         let state = plant.state_at(0.09, 0.02, 4e6, 2e6);
-        let moment = plant.rates(&state, &Drive { qa_m3s: 5e-5, qb_m3s: -1e-5, force_n: 2e3 }).moment;
-        let residual = plant.model.residual(&moment);
-        let term = effect.unit_term(&moment, &plant.model, &Shape::default());
+        let signals = plant.rates(&state, &Drive { qa_m3s: 5e-5, qb_m3s: -1e-5, force_n: 2e3 }).signals;
+        let residual = plant.model.residual(&signals);
+        let term = effect.unit_term(&signals, &plant.model, &EffectConstants::default());
         let expected = term.zip(term, |unit, _| unit * spec.default_size);
         let scale = [1e-4, 1e-4, 5e3];
         let pairs = [

@@ -1,39 +1,44 @@
 //! Effects that the plain model of eq. (1)–(2) lacks. Each is written once: the plant adds its
 //! term when it simulates, the diagnosis takes the same term as a regressor.
 
+mod constants;
 mod physical;
 mod sensor;
 mod set;
-mod shape;
 mod table;
 
+pub use constants::{EffectConstant, EffectConstantSpec, EffectConstants};
 pub use sensor::LaggedReading;
 pub use set::{ActiveEffect, EffectError, EffectSet};
-pub use shape::{Shape, ShapeParameter, ShapeParameterSpec};
 pub use table::{Effect, EffectKind, EffectSpec, UnknownEffect};
 
-use crate::{Model, Moment, Real, Terms};
+use crate::{Model, Real, Signals, Terms};
 
 impl Effect {
     /// The effect's regressor: what one unit of it leaves in [`Model::residual`] at the instant
     /// `at`. The term itself is its value times this; a sensor's term holds to first order.
     #[inline]
-    pub fn unit_term<T: Real>(self, at: &Moment<T>, model: &Model<T>, shape: &Shape<T>) -> Terms<T> {
+    pub fn unit_term<T: Real>(
+        self,
+        at: &Signals<T>,
+        model: &Model<T>,
+        constants: &EffectConstants<T>,
+    ) -> Terms<T> {
         match self.spec().kind {
             EffectKind::Sensor => sensor::unit_term(self, at, model),
-            _ => physical::unit_term(self, at, model, shape),
+            _ => physical::unit_term(self, at, model, constants),
         }
     }
 
     /// What the sensors show when this effect has size `value`; physical effects change nothing.
-    pub fn read<T: Real>(self, value: T, truth: &Moment<T>) -> Moment<T> {
+    pub fn read<T: Real>(self, value: T, truth: &Signals<T>) -> Signals<T> {
         sensor::read(self, value, truth)
     }
 
     /// The truth behind a reading when this effect has size `value`.
     ///
     /// For a lag, the derivative is that of the reading, which makes the inverse exact.
-    pub fn correct<T: Real>(self, value: T, reading: &Moment<T>) -> Moment<T> {
+    pub fn correct<T: Real>(self, value: T, reading: &Signals<T>) -> Signals<T> {
         sensor::correct(self, value, reading)
     }
 }

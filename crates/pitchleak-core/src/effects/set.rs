@@ -1,5 +1,5 @@
-use super::{Effect, EffectKind, Shape};
-use crate::{Model, Moment, Real, Terms};
+use super::{Effect, EffectConstants, EffectKind};
+use crate::{Model, Real, Signals, Terms};
 
 /// Effects that may act at the same time.
 const CAPACITY: usize = 8;
@@ -13,7 +13,7 @@ pub struct ActiveEffect<T> {
     /// How large, in the unit of its [`super::EffectSpec`].
     pub value: T,
     /// The constants it is not linear in.
-    pub shape: Shape<T>,
+    pub constants: EffectConstants<T>,
 }
 
 /// The effects that are switched on, at most eight.
@@ -28,8 +28,8 @@ pub struct EffectSet<T> {
 pub enum EffectError {
     /// The value is not a number or lies outside the bounds of this effect.
     Value(Effect),
-    /// A constant of the effect's shape is not usable.
-    Shape(Effect),
+    /// A constant of the effect's constants is not usable.
+    Constants(Effect),
     /// No room for another effect.
     Full,
 }
@@ -41,9 +41,9 @@ impl core::fmt::Display for EffectError {
                 let spec = effect.spec();
                 write!(f, "{effect} must lie between {} and {} {}", spec.lower, spec.upper, spec.unit)
             }
-            Self::Shape(effect) => {
+            Self::Constants(effect) => {
                 write!(f, "constants of {effect} out of bounds;")?;
-                effect.shape_parameters().iter().try_for_each(|parameter| {
+                effect.constants().iter().try_for_each(|parameter| {
                     let spec = parameter.spec();
                     write!(f, " {} lies between {} and {} {}", spec.id, spec.lower, spec.upper, spec.unit)
                 })
@@ -63,15 +63,20 @@ impl<T> Default for EffectSet<T> {
 
 impl<T: Real> EffectSet<T> {
     /// Switches an effect on, or changes it; zero switches it off.
-    pub fn set(&mut self, effect: Effect, value: T, shape: Shape<T>) -> Result<(), EffectError> {
+    pub fn set(
+        &mut self,
+        effect: Effect,
+        value: T,
+        constants: EffectConstants<T>,
+    ) -> Result<(), EffectError> {
         let spec = effect.spec();
         if !(value >= T::lit(spec.lower) && value <= T::lit(spec.upper)) {
             return Err(EffectError::Value(effect));
         }
-        if !shape.is_physical() {
-            return Err(EffectError::Shape(effect));
+        if !constants.is_physical() {
+            return Err(EffectError::Constants(effect));
         }
-        let entry = (value != T::zero()).then_some(ActiveEffect { effect, value, shape });
+        let entry = (value != T::zero()).then_some(ActiveEffect { effect, value, constants });
         let own = |slot: &Option<ActiveEffect<T>>| slot.is_some_and(|active| active.effect == effect);
         let place = self.active.iter().position(own).or(self.active.iter().position(Option::is_none));
         let slot = place.and_then(|i| self.active.get_mut(i)).ok_or(EffectError::Full)?;
@@ -86,23 +91,23 @@ impl<T: Real> EffectSet<T> {
 
     /// The terms of all physical effects whose kind passes `counts`.
     #[inline]
-    pub fn terms(&self, at: &Moment<T>, model: &Model<T>, counts: impl Fn(EffectKind) -> bool) -> Terms<T> {
+    pub fn terms(&self, at: &Signals<T>, model: &Model<T>, counts: impl Fn(EffectKind) -> bool) -> Terms<T> {
         self.iter()
             .map(|active| (active, active.effect.spec().kind))
             .filter(|(_, kind)| *kind != EffectKind::Sensor && counts(*kind))
             .fold(Terms::default(), |sum, (active, _)| {
-                sum.plus(active.value, active.effect.unit_term(at, model, &active.shape))
+                sum.plus(active.value, active.effect.unit_term(at, model, &active.constants))
             })
     }
 
     /// What the sensors show of the truth, all sensor effects one after the other.
-    pub fn read(&self, truth: &Moment<T>) -> Moment<T> {
+    pub fn read(&self, truth: &Signals<T>) -> Signals<T> {
         self.iter().fold(*truth, |seen, active| active.effect.read(active.value, &seen))
     }
 
     /// The truth behind a reading: [`EffectSet::read`] undone, last effect first.
-    pub fn correct(&self, reading: &Moment<T>) -> Moment<T> {
-        let known = |seen: Moment<T>, active: &ActiveEffect<T>| active.effect.correct(active.value, &seen);
+    pub fn correct(&self, reading: &Signals<T>) -> Signals<T> {
+        let known = |seen: Signals<T>, active: &ActiveEffect<T>| active.effect.correct(active.value, &seen);
         self.active.iter().rev().flatten().fold(*reading, known)
     }
 }

@@ -9,7 +9,7 @@ pub use controller::Gains;
 use crate::plant::{
     CylinderPlant, CylinderState, LeakFlows, PlantError, Supply, Valve, number_or_zero, substeps,
 };
-use crate::{Cylinder, EffectSet, Leaks, Model, Moment, Real, rk4_step};
+use crate::{Cylinder, EffectSet, Leaks, Model, Real, Signals, rk4_step};
 use state::State;
 
 /// One hydraulic axis: a cylinder, its valve and its controller.
@@ -44,7 +44,7 @@ pub struct EmulatorParams<T> {
 pub struct EmulatorReading<T> {
     /// Signals of the pitching cylinder; dQ/dt is left at zero. What the sensors make of them:
     /// [`EffectSet::read`].
-    pub moment: Moment<T>,
+    pub signals: Signals<T>,
     /// Flows through the leak circuits (and leak effects), m³/s.
     pub leaks: LeakFlows<T>,
     /// Supply pressure, Pa.
@@ -219,8 +219,8 @@ impl<T: Real> Emulator<T> {
         let (pitch, _, _) = self.state.rates(&self.params);
         let [pitch_command, load_command] = self.commands;
         EmulatorReading {
-            moment: pitch.moment,
-            leaks: self.params.pitch.plant.leak_flows(&pitch.moment),
+            signals: pitch.signals,
+            leaks: self.params.pitch.plant.leak_flows(&pitch.signals),
             supply_pa: self.state.supply_pa,
             pitch_command,
             load_command,
@@ -252,7 +252,7 @@ impl<T: Real> Emulator<T> {
 
     fn integrate(&mut self, tick: T) {
         let (params, commands) = (&self.params, self.commands);
-        let (count, step) = substeps(tick, self.state.stiffness_ps(params));
+        let (count, step) = substeps(tick, self.state.fastest_rate_ps(params));
         for _ in 0..count {
             let raw = rk4_step(&self.state.to_array(), step, |_, y| {
                 State::from_array(*y).derivative(params, commands)

@@ -66,7 +66,7 @@ impl<T: Real> State<T> {
         let [dy_load, ddy_load] = params.load.valve.spool_rates(load_spool, load_speed, load_command);
         [
             self.pitch.v_mps,
-            pitch.moment.a_mps2,
+            pitch.signals.a_mps2,
             pitch.oil_a_m3s,
             pitch.oil_b_m3s,
             load.oil_a_m3s,
@@ -80,7 +80,7 @@ impl<T: Real> State<T> {
     }
 
     /// Rate of the fastest motion, 1/s.
-    pub fn stiffness_ps(&self, params: &EmulatorParams<T>) -> T {
+    pub fn fastest_rate_ps(&self, params: &EmulatorParams<T>) -> T {
         let [pitch_spool, load_spool] = self.spools;
         let axes = [(&params.pitch, self.pitch, pitch_spool), (&params.load, self.load(params), load_spool)];
         let mut conductance = params.supply.relief_slope_m3spa;
@@ -89,7 +89,7 @@ impl<T: Real> State<T> {
             let (pa_pa, pb_pa) = axis.plant.pressures_pa(&cylinder);
             let (at_a, at_b) = axis.valve.conductances_m3spa(spool, self.supply_pa, pa_pa, pb_pa);
             conductance += at_a + at_b;
-            rate += axis.plant.stiffness_ps(&cylinder) + axis.plant.filling_ps(&cylinder, at_a, at_b);
+            rate += axis.plant.fastest_rate_ps(&cylinder) + axis.plant.filling_ps(&cylinder, at_a, at_b);
         }
         rate + conductance / params.supply.compliance_m3pa
     }

@@ -1,11 +1,5 @@
 use crate::Real;
 
-/// Standard atmosphere, Pa: gauge pressures count from here.
-pub const ATMOSPHERE_PA: f64 = 101_325.0;
-
-/// Absolute pressure below which no gas law is evaluated, Pa.
-pub const LEAST_ABSOLUTE_PA: f64 = 1_000.0;
-
 /// One chamber of compressible oil that may cavitate. Its state is the oil it holds, counted at
 /// zero gauge pressure, `W = V exp(P/β)`; d/dt of it is eq. (1) exactly:
 /// `Q − leaks = V̇ + (V/β) Ṗ`.

@@ -1,7 +1,7 @@
 use super::chamber::Chamber;
 use super::{EndStop, PlantError};
 use crate::effects::{EffectKind, EffectSet};
-use crate::{Model, Moment, Real, Terms, rk4_step};
+use crate::{Model, Real, Signals, Terms, rk4_step};
 
 /// Numbers in the state vector of one cylinder: x, ẋ, oil in A, oil in B.
 pub(crate) const STATES: usize = 4;
@@ -68,7 +68,7 @@ pub struct LeakFlows<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CylinderRates<T> {
     /// Signals at this instant; dQ/dt is left at zero.
-    pub moment: Moment<T>,
+    pub signals: Signals<T>,
     /// dW_A/dt, m³/s.
     pub oil_a_m3s: T,
     /// dW_B/dt, m³/s.
@@ -101,7 +101,7 @@ impl<T: Real> CylinderPlant<T> {
             Err(PlantError::Leaks)
         } else if !self.end_stop.is_physical(self.model.cylinder.stroke_m) {
             Err(PlantError::EndStop)
-        } else if !(vapour >= T::lit(-super::ATMOSPHERE_PA) && vapour <= T::zero()) {
+        } else if !(vapour >= T::lit(-crate::ATMOSPHERE_PA) && vapour <= T::zero()) {
             Err(PlantError::VapourPressure)
         } else if !(self.temp_k.is_finite() && self.temp_k > T::zero()) {
             Err(PlantError::Temperature)
@@ -135,7 +135,7 @@ impl<T: Real> CylinderPlant<T> {
     }
 
     /// Leak flows at an instant, those of effects included.
-    pub fn leak_flows(&self, at: &Moment<T>) -> LeakFlows<T> {
+    pub fn leak_flows(&self, at: &Signals<T>) -> LeakFlows<T> {
         let leaks = &self.model.leaks;
         let by = |kind| self.effects.terms(at, &self.model, |other| other == kind);
         LeakFlows {
@@ -152,7 +152,7 @@ impl<T: Real> CylinderPlant<T> {
         let chamber = self.chamber();
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let (pa_pa, pb_pa) = self.pressures_pa(state);
-        let mut moment = Moment {
+        let mut signals = Signals {
             x_m: self.end_stop.guarded_m(state.x_m, cylinder.stroke_m),
             v_mps: state.v_mps,
             pa_pa,
@@ -161,30 +161,30 @@ impl<T: Real> CylinderPlant<T> {
             qb_m3s: drive.qb_m3s,
             force_n: drive.force_n,
             temp_k: self.temp_k,
-            ..Moment::default()
+            ..Signals::default()
         };
-        let effects = self.effects.terms(&moment, &self.model, |kind| kind != EffectKind::Storage);
-        let net = self.model.residual(&moment).plus(-T::one(), effects);
-        let storage = self.storage(&moment);
+        let effects = self.effects.terms(&signals, &self.model, |kind| kind != EffectKind::Storage);
+        let net = self.model.residual(&signals).plus(-T::one(), effects);
+        let storage = self.storage(&signals);
 
         let bulk = self.model.fluid.bulk_modulus_pa;
         let (soft_a, soft_b) =
             (volume_a / bulk + storage.chamber_a_m3s, volume_b / bulk + storage.chamber_b_m3s);
-        moment.dpa_pas = chamber.slope_pas(pa_pa, net.chamber_a_m3s, soft_a);
-        moment.dpb_pas = chamber.slope_pas(pb_pa, net.chamber_b_m3s, soft_b);
+        signals.dpa_pas = chamber.slope_pas(pa_pa, net.chamber_a_m3s, soft_a);
+        signals.dpb_pas = chamber.slope_pas(pb_pa, net.chamber_b_m3s, soft_b);
 
         let least_mass = cylinder.moving_mass_kg * T::lit(0.1);
         let mass_kg = (cylinder.moving_mass_kg + storage.force_n).max(least_mass);
         let stop = self.end_stop.force_n(state.x_m, state.v_mps, cylinder.stroke_m);
         let net_force_n = net.force_n - stop;
-        moment.a_mps2 = net_force_n / mass_kg;
+        signals.a_mps2 = net_force_n / mass_kg;
 
         let inflow_a =
-            net.chamber_a_m3s + cylinder.area_a_m2 * state.v_mps - storage.chamber_a_m3s * moment.dpa_pas;
+            net.chamber_a_m3s + cylinder.area_a_m2 * state.v_mps - storage.chamber_a_m3s * signals.dpa_pas;
         let inflow_b =
-            net.chamber_b_m3s - cylinder.area_b_m2 * state.v_mps - storage.chamber_b_m3s * moment.dpb_pas;
+            net.chamber_b_m3s - cylinder.area_b_m2 * state.v_mps - storage.chamber_b_m3s * signals.dpb_pas;
         CylinderRates {
-            moment,
+            signals,
             oil_a_m3s: chamber.oil_rate_m3s(state.oil_a_m3, volume_a, inflow_a),
             oil_b_m3s: chamber.oil_rate_m3s(state.oil_b_m3, volume_b, inflow_b),
             net_force_n,
@@ -201,14 +201,14 @@ impl<T: Real> CylinderPlant<T> {
         step_s: T,
         drive_at: impl Fn(T) -> Drive<T>,
     ) -> CylinderState<T> {
-        let (count, step) = substeps(step_s, self.stiffness_ps(state));
+        let (count, step) = substeps(step_s, self.fastest_rate_ps(state));
         let mut next = *state;
         let mut start = T::zero();
         for _ in 0..count {
             let raw = rk4_step(&next.to_array(), step, |elapsed, y| {
                 let drive = self.bounded(drive_at(start + elapsed));
                 let rates = self.rates(&CylinderState::from_array(*y), &drive);
-                [y[1], rates.moment.a_mps2, rates.oil_a_m3s, rates.oil_b_m3s]
+                [y[1], rates.signals.a_mps2, rates.oil_a_m3s, rates.oil_b_m3s]
             });
             next = self.limited(CylinderState::from_array(raw), next);
             start += step;
@@ -217,7 +217,7 @@ impl<T: Real> CylinderPlant<T> {
     }
 
     /// Rate of the fastest motion near a state, 1/s.
-    pub(crate) fn stiffness_ps(&self, state: &CylinderState<T>) -> T {
+    pub(crate) fn fastest_rate_ps(&self, state: &CylinderState<T>) -> T {
         let cylinder = &self.model.cylinder;
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let bulk = self.model.fluid.bulk_modulus_pa;
@@ -227,8 +227,8 @@ impl<T: Real> CylinderPlant<T> {
         let slow = T::lit(1e-4);
         let (pa_pa, pb_pa) = self.pressures_pa(state);
         let friction = |v_mps: T| {
-            let moment = Moment { v_mps, pa_pa, pb_pa, x_m: state.x_m, ..Moment::default() };
-            self.effects.terms(&moment, &self.model, |kind| kind == EffectKind::Force).force_n
+            let signals = Signals { v_mps, pa_pa, pb_pa, x_m: state.x_m, ..Signals::default() };
+            self.effects.terms(&signals, &self.model, |kind| kind == EffectKind::Force).force_n
         };
         let drag = (friction(slow) - friction(-slow)).abs() / (slow + slow);
         let (stop_spring, stop_drag) = self.end_stop.near(state.x_m, cylinder.stroke_m);
@@ -275,8 +275,8 @@ impl<T: Real> CylinderPlant<T> {
     }
 
     /// What the storage effects take per unit of Ṗ_A, Ṗ_B and ẍ.
-    fn storage(&self, at: &Moment<T>) -> Terms<T> {
-        let unit = Moment { dpa_pas: T::one(), dpb_pas: T::one(), a_mps2: T::one(), ..*at };
+    fn storage(&self, at: &Signals<T>) -> Terms<T> {
+        let unit = Signals { dpa_pas: T::one(), dpb_pas: T::one(), a_mps2: T::one(), ..*at };
         self.effects.terms(&unit, &self.model, |kind| kind == EffectKind::Storage)
     }
 

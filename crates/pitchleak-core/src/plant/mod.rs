@@ -4,16 +4,15 @@ mod chamber;
 mod cylinder_plant;
 mod end_stop;
 mod error;
-mod orifice;
+mod rk4;
 mod supply;
 mod valve;
 mod valve_plant;
 
-pub use chamber::{ATMOSPHERE_PA, LEAST_ABSOLUTE_PA};
 pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive, LeakFlows};
 pub use end_stop::EndStop;
 pub use error::PlantError;
-pub use orifice::{metering, signed_root};
+pub use rk4::rk4_step;
 pub use supply::Supply;
 pub use valve::{Valve, ValveFlows};
 pub use valve_plant::{ValvePlant, ValvePlantState};

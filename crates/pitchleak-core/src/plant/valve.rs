@@ -1,5 +1,5 @@
-use super::metering;
 use crate::Real;
+use crate::metering;
 
 /// Four-edge proportional valve: a spool of second order with its stroke limited, square-root
 /// metering at each edge (Merritt, "Hydraulic Control Systems", §5-1), lap and area ratio.

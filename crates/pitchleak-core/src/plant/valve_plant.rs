@@ -58,7 +58,7 @@ impl<T: Real> ValvePlant<T> {
         let command = number_or_zero(command);
         let (pa_pa, pb_pa) = self.cylinder.pressures_pa(&state.cylinder);
         let (at_a, at_b) = self.valve.conductances_m3spa(state.spool, state.supply_pa, pa_pa, pb_pa);
-        let rate = self.cylinder.stiffness_ps(&state.cylinder)
+        let rate = self.cylinder.fastest_rate_ps(&state.cylinder)
             + self.cylinder.filling_ps(&state.cylinder, at_a, at_b)
             + (self.supply.relief_slope_m3spa + at_a + at_b) / self.supply.compliance_m3pa;
         let (count, step) = substeps(step_s, rate);
@@ -69,7 +69,7 @@ impl<T: Real> ValvePlant<T> {
                 let (rates, drawn_m3s) = self.rates(&now, load_n);
                 let [spool, spool_speed] = self.valve.spool_rates(now.spool, now.spool_speed_ps, command);
                 let supply = self.supply.rate_pas(now.supply_pa, drawn_m3s);
-                let a_mps2 = rates.moment.a_mps2;
+                let a_mps2 = rates.signals.a_mps2;
                 [now.cylinder.v_mps, a_mps2, rates.oil_a_m3s, rates.oil_b_m3s, spool, spool_speed, supply]
             });
             next = self.limited(ValvePlantState::from_array(raw), next);
@@ -88,7 +88,7 @@ impl<T: Real> ValvePlant<T> {
     /// Leak flows of a state.
     pub fn leak_flows(&self, state: &ValvePlantState<T>) -> LeakFlows<T> {
         let (rates, _) = self.rates(state, T::zero());
-        self.cylinder.leak_flows(&rates.moment)
+        self.cylinder.leak_flows(&rates.signals)
     }
 
     fn limited(&self, next: ValvePlantState<T>, last: ValvePlantState<T>) -> ValvePlantState<T> {

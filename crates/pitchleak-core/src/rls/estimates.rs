@@ -23,7 +23,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     pub fn covariance(&self, a: Parameter, b: Parameter) -> T {
         let row = self.solution.covariance.get(a as usize);
         let entry = row.and_then(|row| row.get(b as usize));
-        entry.map_or(T::zero(), |entry| *entry * self.surprise.inflation())
+        entry.map_or(T::zero(), |entry| *entry * self.innovations.inflation())
     }
 
     /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means
@@ -150,6 +150,6 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// the model explain the data, above where they do not (Bar-Shalom, Li, Kirubarajan, Estimation with
     /// Applications to Tracking and Navigation, §5.4).
     pub fn normalised_innovation(&self) -> [T; 2] {
-        self.surprise.ratios()
+        self.innovations.ratios()
     }
 }

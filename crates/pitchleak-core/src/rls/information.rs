@@ -20,13 +20,13 @@ use crate::Real;
 )]
 pub(super) struct Information<T, const N: usize> {
     /// Σ w f fᵀ, lower triangle.
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     matrix: [[T; N]; N],
     /// Σ w² f fᵀ, lower triangle: what the weighted sum's own noise amounts to.
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     noise: [[T; N]; N],
     /// Σ w f y.
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     vector: [T; N],
     /// What sensor noise in column 0 adds to the normal equation of that column on average.
     column_noise: T,
@@ -43,9 +43,9 @@ pub(super) struct Information<T, const N: usize> {
     ))
 )]
 pub(super) struct Solution<T, const N: usize> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub mean: [T; N],
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     pub covariance: [[T; N]; N],
 }
 
@@ -61,10 +61,10 @@ pub(super) struct Solution<T, const N: usize> {
 )]
 pub(super) struct BlockSums<T, const N: usize> {
     /// Σ f fᵀ/S, lower triangle.
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::matrix"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     pub matrix: [[T; N]; N],
     /// Σ f y/S.
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub vector: [T; N],
     /// Σ (variance of sensor noise in column 0)/S.
     pub column_noise: T,

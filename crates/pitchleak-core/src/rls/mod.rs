@@ -6,35 +6,37 @@
 //! ([`weights`]). Both are whitened by the declared sensor noise, so their sum is the likelihood:
 //! - the balance is summed over blocks of a quarter of a second; the noise of the pressures in its columns
 //!   (errors in variables) then averages out instead of biasing the leaks;
-//! - the odometer's innovations are white by a scalar Kalman filter on the piston position ([`odometer`]),
+//! - the odometer's innovations are white by a scalar Kalman filter on the piston position ([`position_filter`]),
 //!   and its columns are smooth by nature.
 //!
 //! Time and memory per sample are constant; nothing is ever differentiated.
 
 mod balance;
-mod balance_memory;
 mod estimates;
+mod excitation;
 mod information;
+mod innovation_monitor;
+mod ma1_whitener;
 mod noise;
-mod odometer;
 mod offset_prior;
 mod parameter;
+mod position_filter;
 mod pressure_means;
 mod prior;
-mod surprise;
 mod weights;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use balance::{Integrals, combine};
-use balance_memory::BalanceMemory;
+pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
 use information::{BlockSums, Information, Solution};
+use innovation_monitor::{InnovationMonitor, NoiseMeter};
+use ma1_whitener::Ma1Whitener;
 use noise::NoiseStd;
-use odometer::Odometer;
 use offset_prior::OffsetPrior;
 pub use parameter::Parameter;
+use position_filter::PositionFilter;
 use pressure_means::PressureMeans;
 use prior::prior_spread;
-use surprise::{NoiseMeter, Surprise};
 use weights::Weights;
 
 /// How [`Rls`] forgets and averages.
@@ -89,14 +91,14 @@ pub struct Rls<T, const N: usize> {
     settings: RlsSettings<T>,
     sensors: Sensors<T>,
     compressibility: T,
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     scale: [T; N],
     offsets: OffsetPrior<T>,
     last: Option<Sample<T>>,
     both: Weights<T>,
     only_a: Weights<T>,
     only_b: Weights<T>,
-    odometer: Option<Odometer<T, N>>,
+    position_filter: Option<PositionFilter<T, N>>,
     sums: BlockSums<T, N>,
     block: Integrals<T>,
     /// The part of the block in which both flows were measured.
@@ -104,10 +106,10 @@ pub struct Rls<T, const N: usize> {
     pressure_noise_a: NoiseMeter<T>,
     pressure_noise_b: NoiseMeter<T>,
     /// The balance equation's moving-average noise filter: last whitened block.
-    memory: Option<BalanceMemory<T, N>>,
+    memory: Option<Ma1Whitener<T, N>>,
     information: Information<T, N>,
     solution: Solution<T, N>,
-    surprise: Surprise<T>,
+    innovations: InnovationMonitor<T>,
     pressures: PressureMeans<T>,
 }
 
@@ -135,7 +137,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             both: Weights::both(&cylinder, &noise, &no_leak),
             only_a: Weights::only_a(&cylinder, &noise, &no_leak),
             only_b: Weights::only_b(&cylinder, &noise, &no_leak),
-            odometer: None,
+            position_filter: None,
             sums: BlockSums::new(),
             block: Integrals::default(),
             fed: Integrals::default(),
@@ -144,7 +146,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             memory: None,
             information: Information::new(),
             solution: Information::new().solve(T::zero(), &offsets.information),
-            surprise: Surprise::default(),
+            innovations: InnovationMonitor::default(),
             pressures: PressureMeans::default(),
         }
     }
@@ -171,11 +173,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if full { self.renew() } else { Update::Accepted }
     }
 
-    /// Odometer step, by whichever flows both ends of the step have.
+    /// PositionFilter step, by whichever flows both ends of the step have.
     #[inline]
     fn advance(&mut self, step: &Integrals<T>, last: &Sample<T>, now: &Sample<T>) {
         let sensor_variance = self.noise.position_m * self.noise.position_m;
-        let odometer = self.odometer.get_or_insert(Odometer::anchored(last.x_m, sensor_variance));
+        let odometer =
+            self.position_filter.get_or_insert(PositionFilter::anchored(last.x_m, sensor_variance));
         let fed_a = last.qa_m3s.is_some() && now.qa_m3s.is_some();
         let fed_b = last.qb_m3s.is_some() && now.qb_m3s.is_some();
         let weights = match (fed_a, fed_b) {
@@ -218,7 +221,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             self.memory = None;
         }
         let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
-        let changed = self.surprise.take_change();
+        let changed = self.innovations.take_change();
         if changed {
             self.begin_anew();
             travelled = self.sums;
@@ -226,15 +229,15 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.information.forget(keep);
         self.information.add(&self.sums);
         self.pressures.add_block(&self.block, keep);
-        self.surprise.forget(keep);
+        self.innovations.forget(keep);
         let scale = self.scale[Parameter::Compressibility as usize];
         self.solution = self.information.solve(self.compressibility / scale, &self.offsets.information);
-        self.surprise.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
+        self.innovations.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
         self.reweigh();
         self.sums = BlockSums::new();
         self.block = Integrals::default();
         self.fed = Integrals::default();
-        if let Some(odometer) = &mut self.odometer {
+        if let Some(odometer) = &mut self.position_filter {
             odometer.weight_sum = T::zero();
         }
         if changed { Update::Changed } else { Update::Renewed }
@@ -249,7 +252,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.sums = BlockSums::new();
         self.memory = None;
         let variance = self.noise.position_m * self.noise.position_m;
-        if let (Some(odometer), Some(last)) = (&mut self.odometer, &self.last) {
+        if let (Some(odometer), Some(last)) = (&mut self.position_filter, &self.last) {
             odometer.anchor(last.x_m, variance);
         }
     }
@@ -276,8 +279,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         } else {
             variance += stored;
         }
-        self.memory =
-            Some(BalanceMemory { left: equation.left, columns: equation.columns, stored, variance });
+        self.memory = Some(Ma1Whitener { left: equation.left, columns: equation.columns, stored, variance });
         let scale = T::one() / variance.sqrt();
         equation.left *= scale;
         for value in &mut equation.columns {
@@ -288,7 +290,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     fn add_balance(&mut self, equation: &balance::Equation<T, N>) {
         let (innovation, variance) = self.solution.predict(equation.left, &equation.columns);
-        self.surprise.balance(innovation, variance);
+        self.innovations.balance(innovation, variance);
         self.sums.add(&equation.columns, equation.left, T::one());
         // Both ends of the block are noisy readings of the pressure.
         if let Some(memory) = self.memory {
@@ -307,7 +309,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Pressure noise in the odometer's compressibility column: the last reading's only, as the
     /// differences before it telescope.
     fn compensate_odometer(&mut self) {
-        let Some(odometer) = &self.odometer else { return };
+        let Some(odometer) = &self.position_filter else { return };
         let noise = self.stored_oil_variance(
             self.both.odometer_a,
             self.both.odometer_b,
@@ -347,9 +349,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn restart(&mut self, sample: &Sample<T>) -> Update {
         self.last = Some(*sample);
         let variance = self.noise.position_m * self.noise.position_m;
-        match &mut self.odometer {
+        match &mut self.position_filter {
             Some(odometer) => odometer.anchor(sample.x_m, variance),
-            None => self.odometer = Some(Odometer::anchored(sample.x_m, variance)),
+            None => self.position_filter = Some(PositionFilter::anchored(sample.x_m, variance)),
         }
         self.memory = None;
         self.pressure_noise_a.interrupt();

@@ -4,7 +4,7 @@ use crate::Real;
 /// The constants in which some effects are not linear. Every effect is linear in its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Shape<T> {
+pub struct EffectConstants<T> {
     /// Gas: gauge pressure at which the accumulator's volume is counted, and below which it takes
     /// no oil, Pa. Zero for a trapped bubble.
     pub precharge_pa: T,
@@ -22,30 +22,30 @@ pub struct Shape<T> {
     pub reference_temp_k: T,
 }
 
-/// One constant of a [`Shape`], by name: what a fit may vary.
+/// One constant of a [`EffectConstants`], by name: what a fit may vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum ShapeParameter {
-    /// [`Shape::precharge_pa`]
+pub enum EffectConstant {
+    /// [`EffectConstants::precharge_pa`]
     Precharge,
-    /// [`Shape::polytropic_exponent`]
+    /// [`EffectConstants::polytropic_exponent`]
     PolytropicExponent,
-    /// [`Shape::slip_speed_mps`]
+    /// [`EffectConstants::slip_speed_mps`]
     SlipSpeed,
-    /// [`Shape::stribeck_speed_mps`]
+    /// [`EffectConstants::stribeck_speed_mps`]
     StribeckSpeed,
-    /// [`Shape::spot_position_m`]
+    /// [`EffectConstants::spot_position_m`]
     SpotPosition,
-    /// [`Shape::spot_width_m`]
+    /// [`EffectConstants::spot_width_m`]
     SpotWidth,
-    /// [`Shape::reference_temp_k`]
+    /// [`EffectConstants::reference_temp_k`]
     ReferenceTemp,
 }
 
-/// Name, unit and physical bounds of a [`ShapeParameter`].
+/// Name, unit and physical bounds of a [`EffectConstant`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShapeParameterSpec {
+pub struct EffectConstantSpec {
     /// Name in rig files and reports.
     pub id: &'static str,
     /// SI unit.
@@ -56,7 +56,7 @@ pub struct ShapeParameterSpec {
     pub upper: f64,
 }
 
-impl ShapeParameter {
+impl EffectConstant {
     /// Every constant.
     pub const ALL: [Self; 7] = [
         Self::Precharge,
@@ -69,7 +69,7 @@ impl ShapeParameter {
     ];
 
     /// Name, unit and bounds.
-    pub const fn spec(self) -> ShapeParameterSpec {
+    pub const fn spec(self) -> EffectConstantSpec {
         let (id, unit, lower, upper) = match self {
             Self::Precharge => ("precharge", "Pa", 0.0, 3e7),
             Self::PolytropicExponent => ("polytropic_exponent", "1", 1.0, 1.8),
@@ -79,14 +79,14 @@ impl ShapeParameter {
             Self::SpotWidth => ("spot_width", "m", 1e-4, 10.0),
             Self::ReferenceTemp => ("reference_temp", "K", 200.0, 500.0),
         };
-        ShapeParameterSpec { id, unit, lower, upper }
+        EffectConstantSpec { id, unit, lower, upper }
     }
 }
 
 impl Effect {
-    /// The shape constants on which this effect's term depends; empty for most.
-    pub const fn shape_parameters(self) -> &'static [ShapeParameter] {
-        use ShapeParameter as P;
+    /// The constants constants on which this effect's term depends; empty for most.
+    pub const fn constants(self) -> &'static [EffectConstant] {
+        use EffectConstant as P;
         match self {
             Self::EntrainedAir => &[P::PolytropicExponent],
             Self::AccumulatorA | Self::AccumulatorB => &[P::Precharge, P::PolytropicExponent],
@@ -99,7 +99,7 @@ impl Effect {
     }
 }
 
-impl<T: Real> Default for Shape<T> {
+impl<T: Real> Default for EffectConstants<T> {
     fn default() -> Self {
         Self {
             precharge_pa: T::zero(),
@@ -113,37 +113,37 @@ impl<T: Real> Default for Shape<T> {
     }
 }
 
-impl<T: Real> Shape<T> {
+impl<T: Real> EffectConstants<T> {
     /// The value of one constant.
-    pub fn get(&self, parameter: ShapeParameter) -> T {
+    pub fn get(&self, parameter: EffectConstant) -> T {
         let mut copy = *self;
         *copy.slot(parameter)
     }
 
-    /// The same shape with one constant changed.
+    /// The same constants with one constant changed.
     #[must_use]
-    pub fn with(mut self, parameter: ShapeParameter, value: T) -> Self {
+    pub fn with(mut self, parameter: EffectConstant, value: T) -> Self {
         *self.slot(parameter) = value;
         self
     }
 
     /// Whether every constant lies within its bounds.
     pub fn is_physical(&self) -> bool {
-        ShapeParameter::ALL.iter().all(|parameter| {
+        EffectConstant::ALL.iter().all(|parameter| {
             let (value, spec) = (self.get(*parameter), parameter.spec());
             value >= T::lit(spec.lower) && value <= T::lit(spec.upper)
         })
     }
 
-    fn slot(&mut self, parameter: ShapeParameter) -> &mut T {
+    fn slot(&mut self, parameter: EffectConstant) -> &mut T {
         match parameter {
-            ShapeParameter::Precharge => &mut self.precharge_pa,
-            ShapeParameter::PolytropicExponent => &mut self.polytropic_exponent,
-            ShapeParameter::SlipSpeed => &mut self.slip_speed_mps,
-            ShapeParameter::StribeckSpeed => &mut self.stribeck_speed_mps,
-            ShapeParameter::SpotPosition => &mut self.spot_position_m,
-            ShapeParameter::SpotWidth => &mut self.spot_width_m,
-            ShapeParameter::ReferenceTemp => &mut self.reference_temp_k,
+            EffectConstant::Precharge => &mut self.precharge_pa,
+            EffectConstant::PolytropicExponent => &mut self.polytropic_exponent,
+            EffectConstant::SlipSpeed => &mut self.slip_speed_mps,
+            EffectConstant::StribeckSpeed => &mut self.stribeck_speed_mps,
+            EffectConstant::SpotPosition => &mut self.spot_position_m,
+            EffectConstant::SpotWidth => &mut self.spot_width_m,
+            EffectConstant::ReferenceTemp => &mut self.reference_temp_k,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What the data can tell: per parameter, whether this trace pins it down.
 
-use crate::{Estimate, PerLeak, Real, Rls, rls::Parameter};
+use super::{Parameter, Rls};
+use crate::{Estimate, PerLeak, Real};
 
 /// When a parameter counts as identified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +38,7 @@ pub struct Excitation<T> {
     /// Whether the trace identifies the parameter.
     pub identifiable: bool,
     /// Share of the prior's variance that the trace took away, 0 (dead parameter) to 1 (pinned).
-    pub share_learnt: T,
+    pub variance_reduction: T,
     /// The parameter it trades off with (|correlation| above 0.95), if any: only their combination is
     /// known well.
     pub traded_with: Option<Parameter>,
@@ -59,7 +60,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     pub fn excitation(&self, settings: &ExcitationSettings<T>) -> ExcitationReport<T> {
         let one = |parameter: Parameter, identifiable: bool| Excitation {
             identifiable,
-            share_learnt: self.share_learnt(parameter),
+            variance_reduction: self.variance_reduction(parameter),
             traded_with: self.traded_with(parameter),
         };
         let pinned = self.leak_coefficients().zip(self.mean_pressures_pa()).map(|(leak, pressure)| {
@@ -77,7 +78,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    fn share_learnt(&self, parameter: Parameter) -> T {
+    fn variance_reduction(&self, parameter: Parameter) -> T {
         (T::one() - self.covariance(parameter, parameter)).max(T::zero())
     }
 

@@ -16,16 +16,16 @@ use crate::Real;
         deserialize = "T: Real + serde::Deserialize<'de>"
     ))
 )]
-pub(super) struct Odometer<T, const N: usize> {
+pub(super) struct PositionFilter<T, const N: usize> {
     position_m: T,
     variance_m2: T,
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     sensitivity: [T; N],
     /// Σ 1/S over the block, to compensate pressure noise in the compressibility column.
     pub weight_sum: T,
 }
 
-impl<T: Real, const N: usize> Odometer<T, N> {
+impl<T: Real, const N: usize> PositionFilter<T, N> {
     /// Starts from one reading of the sensor.
     pub fn anchored(x_m: T, sensor_variance_m2: T) -> Self {
         Self {

@@ -11,9 +11,9 @@ use crate::Real;
         deserialize = "T: Real + serde::Deserialize<'de>"
     ))
 )]
-pub(super) struct BalanceMemory<T, const N: usize> {
+pub(super) struct Ma1Whitener<T, const N: usize> {
     pub left: T,
-    #[cfg_attr(feature = "serde", serde(with = "crate::arrays::vector"))]
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub columns: [T; N],
     /// Variance of the stored oil's pressure noise at the block's end.
     pub stored: T,
@@ -21,7 +21,7 @@ pub(super) struct BalanceMemory<T, const N: usize> {
     pub variance: T,
 }
 
-impl<T: Real, const N: usize> BalanceMemory<T, N> {
+impl<T: Real, const N: usize> Ma1Whitener<T, N> {
     /// Share of this block's innovation that is expected to come back in the next.
     pub fn share(&self) -> T {
         self.stored / self.variance

@@ -16,7 +16,7 @@ pub struct Leaks<T> {
 /// sensors. Pressures are gauge, flows go into their chamber.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Moment<T> {
+pub struct Signals<T> {
     /// Piston position x from the A end, m.
     pub x_m: T,
     /// Piston speed ẋ, m/s.
@@ -89,7 +89,7 @@ impl<T: Real> Model<T> {
     ///
     /// Zero where the model is complete; else it is the missing effect's term.
     #[inline]
-    pub fn residual(&self, at: &Moment<T>) -> Terms<T> {
+    pub fn residual(&self, at: &Signals<T>) -> Terms<T> {
         let (cylinder, leaks, bulk) = (&self.cylinder, &self.leaks, self.fluid.bulk_modulus_pa);
         let internal = leaks.internal_m3spa * (at.pa_pa - at.pb_pa);
         Terms {
@@ -137,7 +137,7 @@ impl<T: Real> Terms<T> {
     }
 }
 
-impl<T: Real> Moment<T> {
+impl<T: Real> Signals<T> {
     /// Each signal of `self` with its partner of `other` through `f`.
     pub fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
         Self {

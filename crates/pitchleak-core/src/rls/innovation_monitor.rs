@@ -3,32 +3,32 @@ use crate::Real;
 /// Watches the innovations: are they as large as the declared noise says, and did the leak change?
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Surprise<T> {
+pub(super) struct InnovationMonitor<T> {
     balance_sum: T,
     balance_count: T,
     odometer_sum: T,
     odometer_count: T,
-    page: T,
+    cusum: T,
     changed: bool,
 }
 
 /// Page's test on ν²/S, which is χ²₁ as long as nothing changes: drift, largest step and bound. A false
 /// change comes at most once per exp(0.398 · 40) ≈ 8·10⁶ blocks, three weeks at four blocks a second
 /// (Page 1954; Basseville & Nikiforov 1993, Detection of Abrupt Changes, §2.2 and §5.2).
-const PAGE_DRIFT: f64 = 2.0;
-const PAGE_STEP: f64 = 16.0;
-const PAGE_BOUND: f64 = 40.0;
+const CUSUM_DRIFT: f64 = 2.0;
+const CUSUM_STEP: f64 = 16.0;
+const CUSUM_BOUND: f64 = 40.0;
 
-impl<T: Real> Surprise<T> {
+impl<T: Real> InnovationMonitor<T> {
     /// Takes one balance innovation of variance `variance`, both over the declared noise's variance.
     pub fn balance(&mut self, innovation: T, variance: T) {
         let ratio = innovation * innovation / variance;
         let known = self.inflation();
-        let step = (ratio / known).min(T::lit(PAGE_STEP)) - T::lit(PAGE_DRIFT);
-        self.page = (self.page + step).max(T::zero());
+        let step = (ratio / known).min(T::lit(CUSUM_STEP)) - T::lit(CUSUM_DRIFT);
+        self.cusum = (self.cusum + step).max(T::zero());
         self.balance_sum += ratio;
         self.balance_count += T::one();
-        if self.page > T::lit(PAGE_BOUND) {
+        if self.cusum > T::lit(CUSUM_BOUND) {
             self.changed = true;
         }
     }

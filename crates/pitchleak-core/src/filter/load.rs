@@ -1,21 +1,22 @@
-use crate::{Cylinder, FadingParabola, Real, Sample, momentum::hydraulic_force_n};
+use super::{FadingMemoryFilter, hydraulic_force_n};
+use crate::{Cylinder, Real, Sample};
 
 /// Load force F from eq. (2) by least squares, for a trace without a force column (paper, Section II after
 /// eq. 14): F = P_A A_A − P_B A_B − m ẍ.
 ///
-/// ẍ is the curvature of the [`FadingParabola`] through the positions; the hydraulic force is smoothed by
+/// ẍ is the curvature of the [`FadingMemoryFilter`] through the positions; the hydraulic force is smoothed by
 /// the same filter, so that both sides lag alike.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoadEstimator<T> {
-    position: FadingParabola<T>,
-    force: FadingParabola<T>,
+    position: FadingMemoryFilter<T>,
+    force: FadingMemoryFilter<T>,
 }
 
 impl<T: Real> LoadEstimator<T> {
     /// With a memory of `memory_s` seconds.
     pub fn new(memory_s: T) -> Self {
-        let filter = FadingParabola::new(memory_s);
+        let filter = FadingMemoryFilter::new(memory_s);
         Self { position: filter, force: filter }
     }
 

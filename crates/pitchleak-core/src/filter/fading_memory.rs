@@ -8,7 +8,7 @@ use crate::Real;
 /// damped g-h-k filter"). Exact on a parabola, without lag.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FadingParabola<T> {
+pub struct FadingMemoryFilter<T> {
     memory_s: T,
     value: T,
     slope: T,
@@ -16,7 +16,7 @@ pub struct FadingParabola<T> {
     started: bool,
 }
 
-impl<T: Real> FadingParabola<T> {
+impl<T: Real> FadingMemoryFilter<T> {
     /// With a memory of `memory_s` seconds.
     pub fn new(memory_s: T) -> Self {
         Self { memory_s, value: T::zero(), slope: T::zero(), curvature: T::zero(), started: false }

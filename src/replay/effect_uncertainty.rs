@@ -11,11 +11,11 @@ use pitchleak_core::{Effect, Estimate, PerLeak};
 /// it finds are off by what that uncertainty costs, to first order. The file gives no correlations, so the
 /// effects count as independent.
 #[derive(serde::Serialize, serde::Deserialize)]
-pub(super) struct EffectDoubt {
+pub(super) struct EffectUncertainty {
     shifted: Vec<(Correction, Estimator)>,
 }
 
-impl EffectDoubt {
+impl EffectUncertainty {
     /// None for the paper's law, which knows no uncertainty.
     pub fn of(rig: &Rig) -> Self {
         if rig.estimator.kind == EstimatorKind::Paper {

@@ -1,0 +1,19 @@
+//! Eq. (1)–(2) and what they speak of: cylinder, oil, sensors, samples, leaks, the blade's linkage.
+
+mod cylinder;
+mod equations;
+mod estimate;
+mod gas;
+mod linkage;
+mod orifice;
+mod sample;
+mod sensors;
+
+pub use cylinder::{Cylinder, CylinderError, Fluid};
+pub use equations::{Leaks, Model, Signals, Terms};
+pub use estimate::{Estimate, LeakPressures, PerLeak};
+pub use gas::{ATMOSPHERE_PA, LEAST_ABSOLUTE_PA};
+pub use linkage::{Linkage, LinkageError};
+pub use orifice::{metering, signed_root};
+pub use sample::Sample;
+pub use sensors::{SensorSpread, Sensors};
