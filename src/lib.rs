@@ -9,7 +9,6 @@ pub mod curve;
 pub mod diagnose;
 pub mod figure;
 pub mod openfast;
-mod parallel;
 pub mod reference;
 pub mod replay;
 pub mod report;

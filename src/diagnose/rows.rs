@@ -11,6 +11,7 @@ use super::series::Series;
 use super::term::Term;
 use pitchleak_core::Signals;
 use pitchleak_core::effects::EffectConstants;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// One of the three equations.
@@ -119,28 +120,10 @@ impl Rows {
     /// The rows of all traces, in their order; `motions` has one entry per trace. Traces are shared out
     /// over the cores; the result does not depend on how many there are.
     pub(super) fn build(traces: &[Series], motions: &[Motion], recipe: &Recipe<'_>) -> Self {
-        let numbered: Vec<_> = traces.iter().zip(motions).enumerate().collect();
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let shares = numbered.chunks(numbered.len().div_ceil(cores).max(1));
-        let of_share = |share: &[(usize, (&Series, &Motion))]| -> Vec<Self> {
-            share
-                .iter()
-                .map(|(number, (series, motion))| Self::of_trace(*number, series, motion, recipe))
-                .collect()
-        };
-        let parts: Vec<Vec<Self>> = if numbered.len() < 2 {
-            shares.map(of_share).collect()
-        } else {
-            std::thread::scope(|scope| {
-                let workers: Vec<_> = shares.map(|share| scope.spawn(move || of_share(share))).collect();
-                let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
-                    worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-                };
-                workers.into_iter().map(join).collect()
-            })
-        };
+        let of_trace = |(number, (series, motion))| Self::of_trace(number, series, motion, recipe);
+        let parts: Vec<Self> = traces.par_iter().zip(motions).enumerate().map(of_trace).collect();
         let mut all = Self::empty(recipe.terms.len());
-        parts.into_iter().flatten().for_each(|part| all.append(part));
+        parts.into_iter().for_each(|part| all.append(part));
         all
     }
 

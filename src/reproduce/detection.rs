@@ -1,9 +1,9 @@
 //! How soon a leak that opens raises its alarm, and how often a sound cylinder raises one.
 
+use super::counted::map_counted;
 use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, rig};
 use super::{Law, Progress};
 use crate::Rig;
-use crate::parallel;
 use crate::replay::Replay;
 use crate::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use crate::trace::Record;
@@ -73,14 +73,10 @@ pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detec
         }
     }
     let opening = report("leaks that open", jobs.len());
-    let delays =
-        parallel::map(&jobs, |n| progress(opening(n)), |&(wind, leak, size)| delay(wind, leak, size));
+    let delays = map_counted(&jobs, |n| progress(opening(n)), |&(wind, leak, size)| delay(wind, leak, size));
     let watching = report("simulating sound cylinders", WindCase::ALL.len());
-    let runs = parallel::map(
-        &WindCase::ALL,
-        |n| progress(watching(n)),
-        |wind| Run::simulate(*wind, Leaks::default()),
-    );
+    let runs =
+        map_counted(&WindCase::ALL, |n| progress(watching(n)), |wind| Run::simulate(*wind, Leaks::default()));
     let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     let run_hours = runs.first().map_or(1.0, |run| run.truths.len() as f64 / SAMPLE_RATE_HZ / 3600.0);
     let count = (hours / run_hours).ceil() as u64;
@@ -88,7 +84,7 @@ pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detec
     let sound: Vec<(&Law, u64)> =
         (0..count).map(|seed| (&plain, seed)).chain((0..BIASED_RUNS).map(|seed| (&biased, seed))).collect();
     let step = report("watching sound cylinders", sound.len());
-    let watched = parallel::map(
+    let watched = map_counted(
         &sound,
         |n| progress(step(n)),
         |(law, seed)| {

@@ -1,6 +1,7 @@
 //! The paper's experiment again (Wu et al. 2011, Section IV): four winds, two leak settings, its law
 //! and ours on the same readings, with many seeds. docs/reproduction.md explains every choice.
 
+mod counted;
 mod detection;
 mod efficient;
 mod figures;
@@ -17,12 +18,13 @@ pub use trial::{Course, TrialScore};
 
 use crate::Rig;
 use crate::cramer_rao::CramerRaoModel;
-use crate::parallel;
 use crate::rig::{Instrument, Instruments};
 use crate::simulate::{Biases, Normal, Sensing};
 use crate::wind::WindCase;
+use counted::map_counted;
 use efficient::Efficient;
 use pitchleak_core::{PerLeak, Sample};
+use rayon::prelude::*;
 use serde::Serialize;
 use table::{Entry, WindowBound};
 use trial::mean;
@@ -122,7 +124,7 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
     let settings: Vec<(WindCase, Case)> =
         WindCase::ALL.into_iter().flat_map(|wind| Case::ALL.map(|case| (wind, case))).collect();
     let simulating = at("simulating", settings.len());
-    let runs = parallel::map(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks()));
+    let runs = map_counted(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks()));
     let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     let paper_gains = best_gains(&runs, |done, count| {
         progress(Progress { stage: "searching gains of the paper's law", done, count });
@@ -133,7 +135,7 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
     let estimating = at("estimating", jobs.len());
     let laws = [Law::paper(best), Law::default_estimator(), Law::with_biases()];
     let [paper, plain, biased] = &laws;
-    let trials = parallel::map(
+    let trials = map_counted(
         &jobs,
         |n| progress(estimating(n)),
         |&(run, window)| {
@@ -151,7 +153,7 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
         rows: rows(&[(0, paper), (1, plain)]),
         rows_with_bias: rows(&[(2, biased)]),
         tracking: cases.iter().map(|(case, run)| tracking(*case, run)).collect(),
-        bulk_modulus: parallel::map(&cases, |_| (), |(case, run)| bulk_modulus(*case, run)),
+        bulk_modulus: cases.par_iter().map(|(case, run)| bulk_modulus(*case, run)).collect(),
         paper_gains,
         detection: None,
     };

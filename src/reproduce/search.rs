@@ -1,9 +1,9 @@
 //! The paper does not print λ and γ: the best ones are searched for, in the same runs.
 
+use super::counted::map_counted;
 use super::protocol::{ReproduceError, Run, WINDOWS, rig};
 use super::trial::{Course, mean};
 use crate::Rig;
-use crate::parallel;
 use crate::rig::EstimatorKind;
 use crate::simulate::{Biases, Sensing};
 use serde::Serialize;
@@ -40,8 +40,7 @@ pub fn best_gains(
 ) -> Result<Vec<Candidate>, ReproduceError> {
     let pairs: Vec<(f64, f64)> = LAMBDAS.iter().flat_map(|&l| RATIOS.map(|ratio| (l, l * ratio))).collect();
     let count = pairs.len();
-    let results =
-        parallel::map(&pairs, |n| done(n, count), |&(lambda, gamma)| try_gains(runs, lambda, gamma));
+    let results = map_counted(&pairs, |n| done(n, count), |&(lambda, gamma)| try_gains(runs, lambda, gamma));
     let mut candidates = results.into_iter().collect::<Result<Vec<_>, _>>()?;
     candidates.sort_by(|a, b| a.coefficient_mean_error_percent.total_cmp(&b.coefficient_mean_error_percent));
     Ok(candidates)

@@ -1,6 +1,7 @@
 use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::source::Source;
+use crate::threads::detached;
 use pitchleak::diagnose::{Declared, Residual, Series, diagnose as engine_diagnose};
 use pyo3::prelude::*;
 
@@ -23,7 +24,7 @@ pub fn diagnose(
         sources.iter().map(read).collect()
     };
     let (train, test) = (read_all(&train)?, read_all(&test)?);
-    let diagnosis = py.detach(|| engine_diagnose(&train, &test, &Declared::of(&rig.0), &|| ()));
+    let diagnosis = detached(py, || engine_diagnose(&train, &test, &Declared::of(&rig.0), &|| ()))?;
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
     let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text());

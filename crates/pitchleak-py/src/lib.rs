@@ -11,6 +11,7 @@ mod rig;
 mod simulate;
 mod source;
 mod table;
+mod threads;
 
 use pyo3::prelude::*;
 

@@ -1,5 +1,6 @@
 use crate::errors::value_error;
 use crate::replay::Report;
+use crate::threads::detached;
 use pitchleak::reproduce::reproduce as engine_reproduce;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -7,7 +8,7 @@ use std::path::PathBuf;
 /// Reruns the paper's experiment; writes its figures and tables into a directory where one is given.
 #[pyfunction]
 pub fn reproduce(py: Python<'_>, seeds: u64, out: Option<PathBuf>) -> PyResult<Report> {
-    let done = py.detach(|| engine_reproduce(seeds, |_| ()));
+    let done = detached(py, || engine_reproduce(seeds, |_| ()))?;
     let done = done.map_err(value_error)?;
     if let Some(directory) = out {
         py.detach(|| done.write(&directory)).map_err(value_error)?;

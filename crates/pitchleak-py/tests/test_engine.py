@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -65,6 +67,28 @@ def test_diagnose_is_the_programs(program, tmp_path):
     assert len(before.t_s) == len(before.residual) and np.std(after.residual) < 0.1 * np.std(before.residual)
     assert pl.diagnose(path, test=[path]).effects[0].id == "coulomb_friction"
     assert list(found.to_polars()["id"]) == [effect.id for effect in found.effects]
+
+
+FORKED = """
+import multiprocessing, sys
+import pitchleak as pl
+
+def diagnosed(path):
+    return pl.diagnose([path, path]).raw
+
+if __name__ == "__main__":
+    before = diagnosed(sys.argv[1])
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(diagnosed, (sys.argv[1],)).get(timeout=100) == before
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not fork")
+def test_a_forked_process_diagnoses_too(tmp_path):
+    path, script = tmp_path / "trace.csv", tmp_path / "forked.py"
+    pl.simulate(21, noise="1 %", duration=5, out=path)
+    script.write_text(FORKED)
+    subprocess.run([sys.executable, script, path], check=True, timeout=200)
 
 
 def test_reproduce_is_the_programs(program, tmp_path):
