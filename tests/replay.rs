@@ -7,9 +7,9 @@ mod synthetic;
 use std::fmt::Write;
 
 use pitchleak::Rig;
-use pitchleak::core::PerLeak;
+use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::replay;
-use pitchleak::report::{Leak, ReplayReport};
+use pitchleak::report::ReplayReport;
 use pitchleak::trace::{TraceError, TraceReader};
 use synthetic::Motion;
 

@@ -10,7 +10,7 @@ use crate::replay::replay;
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{TraceError, TraceReader};
-use pitchleak_core::PerLeak;
+use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
 
@@ -49,7 +49,7 @@ impl Reach {
     fn new(entry: &EstimateEntry, std: Option<f64>) -> Self {
         Self {
             identifiable: entry.identifiable,
-            resolution: std.map(|std| 1.959_963_984_540_054 * std),
+            resolution: std.map(|std| Estimate { value: entry.value, std }.half_width95()),
             reason: entry.reason.clone(),
         }
     }

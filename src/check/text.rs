@@ -1,5 +1,5 @@
 use super::{CheckReport, Reach};
-use crate::report::{Leak, Palette, data_line, misfit, rig_line};
+use crate::report::{Palette, data_line, misfit, rig_line};
 use std::fmt::Write;
 
 impl CheckReport {
@@ -32,9 +32,8 @@ impl CheckReport {
     fn write_reach(&self, out: &mut String, palette: &Palette) {
         let (faint, reset) = palette.faint();
         let _ = writeln!(out, "\n{faint}{:<12}this trace shows it to (95 %){reset}", "leak");
-        let leaks = Leak::ALL.zip(self.leaks.clone());
-        for (leak, reach) in [leaks.internal, leaks.external_a, leaks.external_b] {
-            write_reach(out, leak.label(), &reach, 1.0, "L/min", palette);
+        for (leak, reach) in &self.leaks {
+            write_reach(out, leak.label(), reach, 1.0, "L/min", palette);
         }
         write_reach(out, "bulk modulus", &self.bulk_modulus, 1e-9, "GPa", palette);
     }

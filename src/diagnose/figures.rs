@@ -4,7 +4,7 @@ use super::outcome::{BinnedResidual, Diagnosis};
 use super::residual::BalanceResidual;
 use super::residual_text::{balance_name, people, symbol};
 use crate::figure::{FigureError, Ink, Line, Panel, svg};
-use crate::report::LPM_PER_M3S;
+use crate::units::LPM_PER_M3S;
 
 /// Lags of the autocorrelation, in hats.
 const LAGS: usize = 30;

@@ -47,7 +47,7 @@ use fit::Fit;
 use held_out::HeldOut;
 use motion::Motion;
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
-use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, Leaks, Model, SensorSpread, Sensors};
+use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, Model, PerLeak, SensorSpread, Sensors};
 use select::Named;
 use std::collections::BTreeMap;
 use term::Term;
@@ -235,7 +235,7 @@ fn is_excited(fit: &Fit<'_>) -> bool {
 
 /// Friction turns within the speed that these traces can resolve.
 fn friction_shape(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
-    let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks: Leaks::default() };
+    let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: PerLeak::default() };
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
     let speeds: Vec<(f64, f64)> =
         traces.iter().map(|series| least(&Motion::of(series, &model, &declared.sensors))).collect();

@@ -69,7 +69,7 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
 
 /// Speed from eq. (1), both chambers averaged where both have a meter.
 fn raw_speed(series: &Series, model: &Model<f64>) -> Vec<f64> {
-    let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks, model.fluid.bulk_modulus_pa);
+    let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks_m3spa, model.fluid.bulk_modulus_pa);
     let rate = |values: &[f64], at: usize| {
         let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
         let span = series.t_s[to] - series.t_s[from];
@@ -78,11 +78,11 @@ fn raw_speed(series: &Series, model: &Model<f64>) -> Vec<f64> {
     (0..series.len())
         .map(|at| {
             let (x, pa, pb) = (series.x_m[at], series.pa_pa[at], series.pb_pa[at]);
-            let past = leaks.internal_m3spa * (pa - pb);
+            let past = leaks.internal * (pa - pb);
             let stored_a = cylinder.volume_a_m3(x) / bulk * rate(&series.pa_pa, at);
             let stored_b = cylinder.volume_b_m3(x) / bulk * rate(&series.pb_pa, at);
-            let a = (series.qa_m3s[at] - past - leaks.external_a_m3spa * pa - stored_a) / cylinder.area_a_m2;
-            let b = -(series.qb_m3s[at] + past - leaks.external_b_m3spa * pb - stored_b) / cylinder.area_b_m2;
+            let a = (series.qa_m3s[at] - past - leaks.external_a * pa - stored_a) / cylinder.area_a_m2;
+            let b = -(series.qb_m3s[at] + past - leaks.external_b * pb - stored_b) / cylinder.area_b_m2;
             match (a.is_finite(), b.is_finite()) {
                 (true, true) => (a + b) / 2.0,
                 (true, false) => a,

@@ -43,11 +43,11 @@ impl Spread<'_> {
     /// Sensitivity of a chamber's row to both pressures as flows, m³/(s·Pa). While a missing effect drives
     /// the leaks to absurd sizes, their noise must not hide it: it is held to that of the flow meter.
     fn leak_gain(&self, balance: Balance) -> [f64; 2] {
-        let leaks = &self.point.model.leaks;
-        let past = leaks.internal_m3spa;
+        let leaks = &self.point.model.leaks_m3spa;
+        let past = leaks.internal;
         let gain = match balance {
-            Balance::ChamberA => [past + leaks.external_a_m3spa, -past],
-            _ => [-past, past + leaks.external_b_m3spa],
+            Balance::ChamberA => [past + leaks.external_a, -past],
+            _ => [-past, past + leaks.external_b],
         };
         let noise = gain[0].hypot(gain[1]) * self.sensors.pressure.noise_std;
         let held = if noise > self.flow_std(balance) { self.flow_std(balance) / noise } else { 1.0 };

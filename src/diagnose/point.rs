@@ -3,7 +3,7 @@
 use super::Declared;
 use super::term::Term;
 use pitchleak_core::effects::{EffectConstants, EffectKind};
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Signals, Terms};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals, Terms};
 
 /// The values around which the regression is linear.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ impl Point {
         let softness = 1.0 / fluid.bulk_modulus_pa;
         let share = OIL_SIGMA * fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
         Self {
-            model: Model { cylinder: declared.cylinder, fluid, leaks: Leaks::default() },
+            model: Model { cylinder: declared.cylinder, fluid, leaks_m3spa: PerLeak::default() },
             effects: declared.effects,
             softness: (softness * (1.0 - share).max(LEAST_SOFTNESS), softness * (1.0 + share)),
         }
@@ -75,12 +75,12 @@ impl Point {
 
     /// Value of a term here; what the point does not know is zero.
     pub(super) fn value(&self, term: Term) -> f64 {
-        let leaks = &self.model.leaks;
+        let leaks = &self.model.leaks_m3spa;
         match term {
             Term::InverseBulk => 1.0 / self.model.fluid.bulk_modulus_pa,
-            Term::Internal => leaks.internal_m3spa,
-            Term::ExternalA => leaks.external_a_m3spa,
-            Term::ExternalB => leaks.external_b_m3spa,
+            Term::Internal => leaks.internal,
+            Term::ExternalA => leaks.external_a,
+            Term::ExternalB => leaks.external_b,
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
             }
@@ -90,14 +90,14 @@ impl Point {
 
     /// The same point with one term at another value, held within what physics allows.
     pub(super) fn set(&mut self, term: Term, value: f64, shape: &EffectConstants<f64>) {
-        let leaks = &mut self.model.leaks;
+        let leaks = &mut self.model.leaks_m3spa;
         match term {
             Term::InverseBulk => {
                 self.model.fluid.bulk_modulus_pa = 1.0 / value.clamp(self.softness.0, self.softness.1)
             }
-            Term::Internal => leaks.internal_m3spa = value,
-            Term::ExternalA => leaks.external_a_m3spa = value,
-            Term::ExternalB => leaks.external_b_m3spa = value,
+            Term::Internal => leaks.internal = value,
+            Term::ExternalA => leaks.external_a = value,
+            Term::ExternalB => leaks.external_b = value,
             Term::Effect(effect) => self.set_effect(effect, value, shape),
             Term::Nameless(_) | Term::Product(..) => {}
         }

@@ -3,7 +3,7 @@
 use super::outcome::{BinnedResidual, Diagnosis};
 use super::residual::BalanceResidual;
 use super::whiteness;
-use crate::report::LPM_PER_M3S;
+use crate::units::LPM_PER_M3S;
 use std::fmt::Write;
 
 /// A variable is named where chance does so once in a hundred diagnoses.

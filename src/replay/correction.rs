@@ -3,7 +3,7 @@
 use crate::rig::Rig;
 use crate::trace::Record;
 use pitchleak_core::effects::EffectKind;
-use pitchleak_core::{EffectSet, FadingMemoryFilter, Leaks, Model, PerLeak, Sample, Signals};
+use pitchleak_core::{EffectSet, FadingMemoryFilter, Model, PerLeak, Sample, Signals};
 
 /// Memory of the derivatives that effects such as dead volume or drag ask for, s.
 const MEMORY_S: f64 = 0.05;
@@ -37,7 +37,7 @@ impl Correction {
         if rig.effects.is_empty() {
             return None;
         }
-        let model = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks: Leaks::default() };
+        let model = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks_m3spa: PerLeak::default() };
         let filter = FadingMemoryFilter::new(MEMORY_S);
         let rates = Rates { x: filter, pa: filter, pb: filter, qa: filter, qb: filter };
         Some(Self { effects: rig.effect_set(), model, rates, leaked_m3: PerLeak::default(), time_s: 0.0 })

@@ -13,9 +13,10 @@ pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
 pub use stream::{RestoreError, Stream};
 
-use crate::report::{Alarm, LPM_PER_M3S, Leak, ReplayReport, TraceSummary};
+use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
+use crate::units::LPM_PER_M3S;
 use correction::Correction;
 use effect_uncertainty::EffectUncertainty;
 use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, Update};
@@ -153,8 +154,7 @@ impl Replay {
         });
         let changes = self.detector.update(self.since_detection_s, &flows);
         self.since_detection_s = 0.0;
-        let changes = changes.zip(Leak::ALL);
-        for (change, fault) in [changes.internal, changes.external_a, changes.external_b] {
+        for (fault, change) in changes {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
     }

@@ -2,8 +2,9 @@
 
 use super::Replay;
 use crate::report::{
-    EstimateEntry, Estimates, FlowMeterOffsets, LPM_PER_M3S, Leakage, ReplayReport, TraceSummary, Verdict,
+    EstimateEntry, Estimates, FlowMeterOffsets, Leakage, ReplayReport, TraceSummary, Verdict,
 };
+use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Excitation, Parameter, PerLeak};
 
 impl Replay {

@@ -8,26 +8,9 @@ pub(crate) use text::{misfit, rig_line};
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;
 use crate::trace::TraceQuality;
-use pitchleak_core::{AlarmState, Estimate, PerLeak};
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{AlarmState, Estimate, Leak, PerLeak};
 use serde::Serialize;
-
-/// Where oil can leak.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Leak {
-    /// Past the piston seal, chamber A to chamber B.
-    Internal,
-    /// Out of chamber A.
-    ExternalA,
-    /// Out of chamber B.
-    ExternalB,
-}
-
-impl Leak {
-    /// Every leak, each with its own name.
-    pub const ALL: PerLeak<Self> =
-        PerLeak { internal: Self::Internal, external_a: Self::ExternalA, external_b: Self::ExternalB };
-}
 
 /// A replay's result, as `replay --json` prints it. Numbers that are not finite become `null`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -212,11 +195,6 @@ impl FlowMeterOffsets {
     }
 }
 
-/// 1 m³/s in L/min.
-pub const LPM_PER_M3S: f64 = 60e3;
-/// 1 m³/(s·Pa) in L/min/bar.
-pub const LPM_PER_BAR: f64 = 6e9;
-
 /// An alarm raised or cleared.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Alarm {
@@ -247,9 +225,7 @@ impl Verdict {
         threshold_m3s: &PerLeak<f64>,
         trace: &TraceSummary,
     ) -> Self {
-        let faults = Leak::ALL.zip(active).map(|(leak, active)| active.then_some(leak));
-        let faults: Vec<_> =
-            [faults.internal, faults.external_a, faults.external_b].into_iter().flatten().collect();
+        let faults: Vec<_> = Leak::ALL.into_iter().filter(|leak| active[*leak]).collect();
         Self { text: text::verdict(&faults, leakage, estimates, threshold_m3s, trace), faults }
     }
 }

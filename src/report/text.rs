@@ -1,14 +1,10 @@
 //! The report as lines of text: verdict first, then what backs it.
 
-use super::{
-    EstimateEntry, Estimates, LPM_PER_BAR, LPM_PER_M3S, Leak, Leakage, ReplayReport, TraceSummary, Verdict,
-};
+use super::{EstimateEntry, Estimates, Leakage, ReplayReport, TraceSummary, Verdict};
 use crate::rig::Rig;
-use pitchleak_core::{AlarmState, PerLeak};
+use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
+use pitchleak_core::{AlarmState, Estimate, Leak, PerLeak};
 use std::fmt::Write;
-
-/// z of a two-sided 95 % interval.
-const Z95: f64 = 1.959_963_984_540_054;
 
 /// Escape sequences around a text, empty where the reader is no terminal.
 #[derive(Clone, Copy, Debug)]
@@ -43,35 +39,14 @@ impl Palette {
     }
 }
 
-impl Leak {
-    /// For people.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Internal => "internal",
-            Self::ExternalA => "external A",
-            Self::ExternalB => "external B",
-        }
-    }
-
-    /// Where to look.
-    fn advice(self) -> &'static str {
-        match self {
-            Self::Internal => "oil passes the piston seal: plan its change, check the bore for scoring",
-            Self::ExternalA => "oil leaves the piston-side chamber: check its port, hose, fittings and valve",
-            Self::ExternalB => "oil leaves the rod-side chamber: check rod seal, port, hose and valve",
-        }
-    }
-}
-
-fn pick<V: Copy>(values: &PerLeak<V>, leak: Leak) -> V {
+/// Where to look for a leak.
+fn advice(leak: Leak) -> &'static str {
     match leak {
-        Leak::Internal => values.internal,
-        Leak::ExternalA => values.external_a,
-        Leak::ExternalB => values.external_b,
+        Leak::Internal => "oil passes the piston seal: plan its change, check the bore for scoring",
+        Leak::ExternalA => "oil leaves the piston-side chamber: check its port, hose, fittings and valve",
+        Leak::ExternalB => "oil leaves the rod-side chamber: check rod seal, port, hose and valve",
     }
 }
-
-const LEAKS: [Leak; 3] = [Leak::Internal, Leak::ExternalA, Leak::ExternalB];
 
 /// The verdict as a sentence or two.
 pub(super) fn verdict(
@@ -83,12 +58,12 @@ pub(super) fn verdict(
 ) -> String {
     let identified = estimates.leaks().map(|entry| entry.identifiable);
     let (open, judged): (Vec<_>, Vec<_>) =
-        LEAKS.into_iter().filter(|leak| !faults.contains(leak)).partition(|leak| !pick(&identified, *leak));
-    let impossible = LEAKS.into_iter().filter_map(|leak| impossible_sentence(leak, leakage));
+        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak)).partition(|leak| !identified[*leak]);
+    let impossible = Leak::ALL.into_iter().filter_map(|leak| impossible_sentence(leak, &leakage[leak]));
     let mut sentences: Vec<_> = mostly_bad_sentence(trace).into_iter().chain(impossible).collect();
-    sentences.extend(faults.iter().map(|leak| fault_sentence(*leak, leakage)));
+    sentences.extend(faults.iter().map(|leak| fault_sentence(*leak, &leakage[*leak])));
     if !judged.is_empty() {
-        let limit = judged.iter().map(|leak| pick(threshold_m3s, *leak)).fold(0.0, f64::max) * LPM_PER_M3S;
+        let limit = judged.iter().map(|leak| threshold_m3s[*leak]).fold(0.0, f64::max) * LPM_PER_M3S;
         sentences.push(format!("No {} leak above {limit:.2} L/min.", join(&judged, "or")));
     }
     if !open.is_empty() {
@@ -97,11 +72,11 @@ pub(super) fn verdict(
     sentences.join(" ")
 }
 
-fn fault_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> String {
+fn fault_sentence(leak: Leak, leakage: &Leakage) -> String {
     let label = leak.label();
     let capital = label[..1].to_uppercase() + &label[1..];
-    let flow = flow_text(&pick(leakage, leak));
-    format!("{capital} leak of {flow} L/min: {}.", leak.advice())
+    let flow = flow_text(leakage);
+    format!("{capital} leak of {flow} L/min: {}.", advice(leak))
 }
 
 /// Where more rows are bad than good, what remains may not stand for the cylinder.
@@ -118,8 +93,8 @@ fn is_impossible(leakage: &Leakage) -> bool {
     leakage.std_lpm.is_some_and(|std| leakage.mean_lpm + 3.0 * std < 0.0)
 }
 
-fn impossible_sentence(leak: Leak, leakage: &PerLeak<Leakage>) -> Option<String> {
-    is_impossible(&pick(leakage, leak)).then(|| {
+fn impossible_sentence(leak: Leak, leakage: &Leakage) -> Option<String> {
+    is_impossible(leakage).then(|| {
         let label = leak.label();
         format!(
             "The {label} leak comes out negative, which cannot be: the rig file misstates the rig or lacks an \
@@ -141,7 +116,8 @@ fn join(leaks: &[Leak], word: &str) -> String {
 
 /// Value and half width of the 95 % interval, to two digits of the half width.
 fn with_interval(value: f64, std: Option<f64>) -> String {
-    let Some(half) = std.map(|std| Z95 * std).filter(|half| half.is_finite()) else {
+    let Some(half) = std.map(|std| Estimate { value, std }.half_width95()).filter(|half| half.is_finite())
+    else {
         return format!("{value:.4}");
     };
     let decimals = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
@@ -211,9 +187,9 @@ impl ReplayReport {
 
     fn write_verdict(&self, out: &mut String, palette: &Palette) {
         let Verdict { faults, text } = &self.verdict;
-        let impossible = LEAKS.into_iter().any(|leak| is_impossible(&pick(&self.leakage, leak)));
+        let impossible = self.leakage.iter().any(|(_, leakage)| is_impossible(leakage));
         let doubtful = impossible || mostly_bad_sentence(&self.trace).is_some();
-        let judged = LEAKS.into_iter().all(|leak| pick(&self.identified(), leak));
+        let judged = self.estimates.leaks().iter().all(|(_, entry)| entry.identifiable);
         let (word, colour) = match (doubtful, faults.is_empty(), judged) {
             (true, _, _) => ("DOUBTFUL", palette.caution),
             (false, false, _) => ("LEAK", palette.fault),
@@ -223,16 +199,11 @@ impl ReplayReport {
         let _ = writeln!(out, "{colour}{word}{}  {text}\n", palette.reset);
     }
 
-    fn identified(&self) -> PerLeak<bool> {
-        self.estimates.leaks().map(|entry| entry.identifiable)
-    }
-
     fn write_leaks(&self, out: &mut String, palette: &Palette) {
         let Palette { faint, reset, caution, .. } = palette;
         let _ = writeln!(out, "{faint}{:<12}{:<24}L/min/bar, 95 %{reset}", "leak", "L/min, 95 %");
-        for leak in LEAKS {
-            let entry = pick(&self.estimates.leaks(), leak);
-            let flow = flow_text(&pick(&self.leakage, leak));
+        for (leak, entry) in self.estimates.leaks() {
+            let flow = flow_text(&self.leakage[leak]);
             let scaled = entry.std.map(|std| std * LPM_PER_BAR);
             let coefficient = with_interval(entry.value * LPM_PER_BAR, scaled);
             let line = format!("{:<12}{flow:<24}{coefficient:<24}", leak.label());
@@ -271,8 +242,8 @@ impl ReplayReport {
     fn write_scores(&self, out: &mut String) {
         let Some(scores) = &self.score else { return };
         let _ = writeln!(out, "\nagainst the reference leak flows, in steady state");
-        for leak in LEAKS {
-            let Some(score) = pick(scores, leak) else { continue };
+        for (leak, score) in scores {
+            let Some(score) = score else { continue };
             let converged = match score.convergence_time_s {
                 Some(time_s) => format!("within 5 % after {time_s:.2} s"),
                 None => "never within 5 % for good".to_owned(),

@@ -7,14 +7,13 @@ use crate::Rig;
 use crate::replay::Replay;
 use crate::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use crate::trace::Record;
+use crate::units::LPM_PER_M3S;
 use crate::wind::{Emulation, History, Wind, WindCase};
-use pitchleak_core::{EffectSet, Leaks, PerLeak};
+use pitchleak_core::{EffectSet, Leak, PerLeak};
 use serde::Serialize;
 
 /// Sizes of the leaks, L/min at the run's mean pressures.
 const SIZES_LPM: [f64; 4] = [0.1, 0.2, 0.5, 1.0];
-/// Which leaks open, in the order of [`PerLeak`].
-const LEAKS: [&str; 3] = ["internal", "external_a", "external_b"];
 /// The leak opens so long after the estimator started, s …
 const ONSET_S: f64 = 60.0;
 /// … and is watched for as long.
@@ -68,15 +67,18 @@ pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detec
     let report = |stage, count| move |done| Progress { stage, done, count };
     let mut jobs = Vec::new();
     for wind in WindCase::ALL {
-        for leak in 0..LEAKS.len() {
+        for leak in Leak::ALL {
             jobs.extend(SIZES_LPM.map(|size| (wind, leak, size)));
         }
     }
     let opening = report("leaks that open", jobs.len());
     let delays = map_counted(&jobs, |n| progress(opening(n)), |&(wind, leak, size)| delay(wind, leak, size));
     let watching = report("simulating sound cylinders", WindCase::ALL.len());
-    let runs =
-        map_counted(&WindCase::ALL, |n| progress(watching(n)), |wind| Run::simulate(*wind, Leaks::default()));
+    let runs = map_counted(
+        &WindCase::ALL,
+        |n| progress(watching(n)),
+        |wind| Run::simulate(*wind, PerLeak::default()),
+    );
     let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     let run_hours = runs.first().map_or(1.0, |run| run.truths.len() as f64 / SAMPLE_RATE_HZ / 3600.0);
     let count = (hours / run_hours).ceil() as u64;
@@ -102,14 +104,14 @@ pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detec
         false_alarms: plain.iter().map(|watch| watch.raised.len() as u64).sum(),
         biased_runs: BIASED_RUNS,
         biased_false_alarms: biased.iter().filter(|watch| !watch.raised.is_empty()).count() as u64,
-        biased_coverage_percent: 100.0 * held as f64 / (LEAKS.len() * biased.len()).max(1) as f64,
+        biased_coverage_percent: 100.0 * held as f64 / (Leak::ALL.len() * biased.len()).max(1) as f64,
     })
 }
 
 /// What happened over one run.
 struct Watch {
     /// Leaks whose alarm was raised, and when, s.
-    raised: Vec<(usize, f64)>,
+    raised: Vec<(Leak, f64)>,
     /// How many of the leaks' 95 % intervals hold zero at the end.
     intervals_with_zero: usize,
 }
@@ -118,7 +120,7 @@ impl Watch {
     fn over(rig: &Rig, truths: &[Truth], mut sensing: Sensing) -> Self {
         let mut replay = Replay::new(rig);
         let mut raised = Vec::new();
-        let mut before = [false; LEAKS.len()];
+        let mut before = PerLeak::<bool>::default();
         let mut record = Record::default();
         for truth in truths {
             let first = record.t_s.to_bits() == 0 && truth.t_s.to_bits() == 0;
@@ -127,28 +129,29 @@ impl Watch {
                 Record { t_s: truth.t_s, dt_s, sample: sensing.read(&truth.sample), ..Record::default() };
             if replay.push(&record) {
                 let active = replay.point(&record).active;
-                let now = [active.internal, active.external_a, active.external_b];
-                let new = (0..LEAKS.len()).filter(|&k| now.get(k) > before.get(k));
+                let new = Leak::ALL.into_iter().filter(|leak| active[*leak] && !before[*leak]);
                 raised.extend(new.map(|leak| (leak, truth.t_s)));
-                before = now;
+                before = active;
             }
         }
         let coefficients = replay.estimator().leak_coefficients();
-        let all = [coefficients.internal, coefficients.external_a, coefficients.external_b];
         let holds_zero = |[low, high]: [f64; 2]| low <= 0.0 && high >= 0.0;
-        Self { raised, intervals_with_zero: all.iter().filter(|c| holds_zero(c.ci95())).count() }
+        Self {
+            raised,
+            intervals_with_zero: coefficients.iter().filter(|(_, c)| holds_zero(c.ci95())).count(),
+        }
     }
 }
 
-fn delay(wind: WindCase, leak: usize, size_lpm: f64) -> Result<Delay, ReproduceError> {
+fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceError> {
     let rig = rig();
     let reference =
         Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?;
-    let size = |which| LeakSize::MeanFlow(if which == leak { size_lpm / 60e3 } else { 0.0 });
+    let size = |which| LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
     let scenario = Scenario {
         rig: rig.clone(),
         reference,
-        leaks: PerLeak { internal: size(0), external_a: size(1), external_b: size(2) },
+        leaks: PerLeak::from_fn(size),
         onset_s: ONSET_S,
         effects: EffectSet::default(),
         start_s: 10.0,
@@ -172,7 +175,7 @@ fn delay(wind: WindCase, leak: usize, size_lpm: f64) -> Result<Delay, ReproduceE
     let detected = delays.iter().filter(|delay| delay.is_finite()).count();
     Ok(Delay {
         wind_mps: wind.mean_mps(),
-        leak: LEAKS.get(leak).copied().unwrap_or("internal"),
+        leak: leak.id(),
         size_lpm,
         detected_percent: 100.0 * detected as f64 / SEEDS as f64,
         median_delay_s: at(delays.len() / 2),

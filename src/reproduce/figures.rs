@@ -6,16 +6,14 @@ use super::trial::Course;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
 use crate::figure::{Ink, Line, Panel, svg};
 use crate::simulate::{Biases, Sensing, Truth};
-use pitchleak_core::PerLeak;
+use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
+use pitchleak_core::{Leak, PerLeak};
 use std::path::Path;
 
 /// The window drawn (30 to 50 s of each wind history) …
 const WINDOW: usize = 1;
 /// … with the noise of this seed.
 const SEED: u64 = 1;
-/// 1 m³/(s·Pa) in L/min/bar.
-const LPM_PER_BAR: f64 = 6e9;
-const LPM: f64 = 60e3;
 
 const COLUMNS: usize = 2;
 
@@ -87,7 +85,7 @@ impl Reproduction {
         let mean_mps = run.wind.mean_mps();
         Ok(Courses {
             mean_mps,
-            truth: run.coefficients(),
+            truth: run.leaks_m3spa,
             paper: course(paper_rig(lambda, gamma))?,
             ours: course(rig())?,
         })
@@ -168,15 +166,15 @@ fn at_least(least: f64, points: &Points) -> (f64, f64) {
 }
 
 fn leak_flows(courses: &Courses) -> [Panel; 2] {
-    let panel = |name: &str, of: fn(&PerLeak<f64>) -> f64| {
+    let panel = |leak: Leak| {
         let points = |flows: &[PerLeak<f64>]| -> Points {
-            courses.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM * of(q))).collect()
+            courses.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM_PER_M3S * q[leak])).collect()
         };
         let reference = points(&courses.ours.references_m3s);
         let (low, high) = at_least(0.1, &reference);
         let room = 0.3 * (high - low);
         Panel {
-            title: format!("{} m/s: {name} leakage", courses.mean_mps),
+            title: format!("{} m/s: {} leakage", courses.mean_mps, leak.label()),
             x_label: "time (s)",
             y_label: "leakage (L/min)",
             y_range: Some((low - room, high + room)),
@@ -187,19 +185,19 @@ fn leak_flows(courses: &Courses) -> [Panel; 2] {
             ],
         }
     };
-    [panel("internal", |q| q.internal), panel("external A", |q| q.external_a)]
+    [panel(Leak::Internal), panel(Leak::ExternalA)]
 }
 
 fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
-    let panel = |name: &str, of: fn(&PerLeak<f64>) -> f64| {
+    let panel = |leak: Leak| {
         let points = |course: &Course| -> Points {
-            let values = course.coefficients.iter().map(|c| LPM_PER_BAR * of(&c.map(|c| c.value)));
+            let values = course.coefficients.iter().map(|c| LPM_PER_BAR * c[leak].value);
             course.t_s.iter().copied().zip(values).collect()
         };
-        let truth = LPM_PER_BAR * of(&courses.truth);
+        let truth = LPM_PER_BAR * courses.truth[leak];
         let end = courses.ours.t_s.last().copied().unwrap_or(0.0);
         Panel {
-            title: format!("{} m/s: {name} leak coefficient", courses.mean_mps),
+            title: format!("{} m/s: {} leak coefficient", courses.mean_mps, leak.label()),
             x_label: "time (s)",
             y_label: "coefficient (L/min/bar)",
             y_range: Some((-0.2 * truth, 2.0 * truth)),
@@ -210,5 +208,5 @@ fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
             ],
         }
     };
-    [panel("internal", |c| c.internal), panel("external A", |c| c.external_a)]
+    [panel(Leak::Internal), panel(Leak::ExternalA)]
 }

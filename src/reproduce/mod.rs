@@ -20,10 +20,11 @@ use crate::Rig;
 use crate::cramer_rao::CramerRaoModel;
 use crate::rig::{Instrument, Instruments};
 use crate::simulate::{Biases, Normal, Sensing};
+use crate::units::LPM_PER_M3S;
 use crate::wind::WindCase;
 use counted::map_counted;
 use efficient::Efficient;
-use pitchleak_core::{PerLeak, Sample};
+use pitchleak_core::{Leak, PerLeak, Sample};
 use rayon::prelude::*;
 use serde::Serialize;
 use table::{Entry, WindowBound};
@@ -124,7 +125,8 @@ pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Repro
     let settings: Vec<(WindCase, Case)> =
         WindCase::ALL.into_iter().flat_map(|wind| Case::ALL.map(|case| (wind, case))).collect();
     let simulating = at("simulating", settings.len());
-    let runs = map_counted(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks()));
+    let runs =
+        map_counted(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks_m3spa()));
     let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     let paper_gains = best_gains(&runs, |done, count| {
         progress(Progress { stage: "searching gains of the paper's law", done, count });
@@ -192,7 +194,7 @@ impl Law {
 
     fn trials(&self, run: &Run, window: usize, seeds: u64) -> Result<Trials, ReproduceError> {
         let truths = run.window(window);
-        let truth = run.coefficients();
+        let truth = run.leaks_m3spa;
         let samples: Vec<Sample<f64>> = truths.iter().map(|truth| truth.sample).collect();
         let sensors = self.bound_rig.sensors();
         let model = CramerRaoModel {
@@ -210,16 +212,15 @@ impl Law {
             let course = Course::run(&self.rig, truths, Sensing::new(self.rig.sensors(), biases, seed))?;
             let unbiased = Sensing::new(sensors, Biases::default(), seed);
             let best = efficient.course(truths, unbiased, &mut Normal::stream(seed, EFFICIENT_STREAM))?;
-            let entry = |coefficient: f64, stds: (f64, f64), size_pa, of: fn(&PerLeak<f64>) -> f64| Entry {
-                score: course.score(coefficient, of),
-                efficient: best.score(coefficient, of),
-                window: WindowBound::new(coefficient, stds, size_pa),
-            };
-            Ok(PerLeak {
-                internal: entry(truth.internal, stds.internal, sizes.internal, |leaks| leaks.internal),
-                external_a: entry(truth.external_a, stds.external_a, sizes.external_a, |l| l.external_a),
-                external_b: entry(1.0, stds.external_b, sizes.external_b, |leaks| leaks.external_b),
-            })
+            Ok(PerLeak::from_fn(|leak| {
+                // Nothing leaks out of B here; its errors are relative to 1.
+                let coefficient = if leak == Leak::ExternalB { 1.0 } else { truth[leak] };
+                Entry {
+                    score: course.score(coefficient, leak),
+                    efficient: best.score(coefficient, leak),
+                    window: WindowBound::new(coefficient, stds[leak], sizes[leak]),
+                }
+            }))
         })
         .collect()
     }
@@ -227,10 +228,11 @@ impl Law {
 
 /// Means of |P_L|, P_A, P_B, Pa.
 fn mean_pressures_pa(samples: &[Sample<f64>]) -> PerLeak<f64> {
+    let mean = |of: fn(&Sample<f64>) -> f64| mean(samples.iter().map(of));
     PerLeak {
-        internal: mean(samples.iter().map(|s| s.load_pressure_pa().abs())),
-        external_a: mean(samples.iter().map(|s| s.pa_pa)),
-        external_b: mean(samples.iter().map(|s| s.pb_pa)),
+        internal: mean(|sample| sample.load_pressure_pa().abs()),
+        external_a: mean(|sample| sample.pa_pa),
+        external_b: mean(|sample| sample.pb_pa),
     }
 }
 
@@ -239,13 +241,11 @@ fn mean_pressures_pa(samples: &[Sample<f64>]) -> PerLeak<f64> {
 fn rows(settings: &[(WindCase, Case)], trials: &[Vec<Trials>], laws: &[(usize, &Law)]) -> Vec<Row> {
     let mut rows = Vec::new();
     for ((wind, case), windows) in settings.iter().zip(trials.chunks(WINDOWS)) {
-        for leak in ["internal", "external_a"] {
+        for leak in [Leak::Internal, Leak::ExternalA] {
             for (place, law) in laws {
                 let entries = windows.iter().filter_map(|window| window.get(*place)).flatten();
-                let entries: Vec<Entry> = entries
-                    .map(|entry| if leak == "internal" { entry.internal } else { entry.external_a })
-                    .collect();
-                rows.push(Row::of(wind.mean_mps(), *case, leak, law.name, &entries));
+                let entries: Vec<Entry> = entries.map(|entry| entry[leak]).collect();
+                rows.push(Row::of(wind.mean_mps(), *case, leak.id(), law.name, &entries));
             }
         }
     }
@@ -255,7 +255,7 @@ fn rows(settings: &[(WindCase, Case)], trials: &[Vec<Trials>], laws: &[(usize, &
 fn bulk_modulus(case: Case, run: &Run) -> BulkModulusBound {
     let rig = rig();
     let sensors = rig.sensors();
-    let leaks = run.coefficients();
+    let leaks = run.leaks_m3spa;
     let model =
         CramerRaoModel { cylinder: &rig.cylinder, fluid: &rig.fluid, sensors: &sensors, leaks: &leaks };
     let spread = |window: usize| {
@@ -289,8 +289,8 @@ fn tracking(case: Case, run: &Run) -> Tracking {
         position_peak_percent_of_stroke: position().fold(0.0, f64::max),
         load_rms_percent_of_peak: rms(&mut load()),
         load_peak_percent_of_peak: load().fold(0.0, f64::max),
-        internal_mean_lpm: 60e3 * mean(run.truths.iter().map(|t| t.leaks_m3s.internal.abs())),
-        external_a_mean_lpm: 60e3 * mean(run.truths.iter().map(|t| t.leaks_m3s.external_a)),
+        internal_mean_lpm: LPM_PER_M3S * mean(run.truths.iter().map(|t| t.leaks_m3s.internal.abs())),
+        external_a_mean_lpm: LPM_PER_M3S * mean(run.truths.iter().map(|t| t.leaks_m3s.external_a)),
     }
 }
 

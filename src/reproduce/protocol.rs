@@ -3,8 +3,9 @@
 use crate::Rig;
 use crate::figure::FigureError;
 use crate::simulate::{LeakSize, Scenario, SimulateError, Truth};
+use crate::units::LPM_PER_BAR;
 use crate::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
-use pitchleak_core::{Cylinder, EffectSet, FilterError, Leaks, PerLeak, Sample};
+use pitchleak_core::{Cylinder, EffectSet, FilterError, PerLeak, Sample};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -20,7 +21,7 @@ const START_S: f64 = 10.0;
 pub const WINDOW_SAMPLES: usize = (WINDOW_S * SAMPLE_RATE_HZ) as usize;
 
 /// 1 L/min/bar, m³/(s·Pa).
-const LPM_PER_BAR: f64 = 1.0 / 6e9;
+const M3SPA_PER_LPM_BAR: f64 = 1.0 / LPM_PER_BAR;
 
 /// The two leak settings of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -48,15 +49,15 @@ impl Case {
     /// Leak coefficients, set once for all winds as one sets a valve. The paper prints none; these
     /// leak 2 to 5 L/min at 13 m/s and above: ten times and more what the paper's reference meters
     /// (1 % of 20 L/min) cannot tell, without which errors of 7 to 13 % could not have been measured.
-    pub fn leaks(self) -> Leaks<f64> {
+    pub fn leaks_m3spa(self) -> PerLeak<f64> {
         let (internal, external_a) = match self {
             Self::One => (0.3, 0.04),
             Self::Two => (0.12, 0.1),
         };
-        Leaks {
-            internal_m3spa: internal * LPM_PER_BAR,
-            external_a_m3spa: external_a * LPM_PER_BAR,
-            external_b_m3spa: 0.0,
+        PerLeak {
+            internal: internal * M3SPA_PER_LPM_BAR,
+            external_a: external_a * M3SPA_PER_LPM_BAR,
+            external_b: 0.0,
         }
     }
 }
@@ -110,8 +111,8 @@ pub enum ReproduceError {
 pub struct Run {
     /// Wind.
     pub wind: WindCase,
-    /// Leaks, m³/(s·Pa).
-    pub leaks: Leaks<f64>,
+    /// True leak coefficients, m³/(s·Pa).
+    pub leaks_m3spa: PerLeak<f64>,
     /// Wind at hub height of each sample, m/s.
     pub wind_mps: Vec<f64>,
     /// The emulator's signals.
@@ -119,11 +120,11 @@ pub struct Run {
 }
 
 impl Run {
-    /// Simulates all windows of `wind` with `leaks`.
+    /// Simulates all windows of `wind` with leaks of these coefficients.
     ///
     /// # Errors
     /// [`ReproduceError`].
-    pub fn simulate(wind: WindCase, leaks: Leaks<f64>) -> Result<Self, ReproduceError> {
+    pub fn simulate(wind: WindCase, leaks_m3spa: PerLeak<f64>) -> Result<Self, ReproduceError> {
         let rig = rig();
         let history = History::of(&Wind::BuiltIn(wind))?;
         let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
@@ -131,11 +132,7 @@ impl Run {
         let scenario = Scenario {
             rig,
             reference,
-            leaks: PerLeak {
-                internal: LeakSize::Coefficient(leaks.internal_m3spa),
-                external_a: LeakSize::Coefficient(leaks.external_a_m3spa),
-                external_b: LeakSize::Coefficient(leaks.external_b_m3spa),
-            },
+            leaks: leaks_m3spa.map(LeakSize::Coefficient),
             onset_s: 0.0,
             effects: EffectSet::default(),
             start_s: START_S,
@@ -143,25 +140,16 @@ impl Run {
             duration_s: WINDOW_S * WINDOWS as f64,
             sample_rate_hz: SAMPLE_RATE_HZ,
         };
-        let truths = scenario.collect(leaks)?;
+        let truths = scenario.collect(leaks_m3spa)?;
         let wind_at = |truth: &Truth| wind_curve.as_ref().map_or(f64::NAN, |c| c.at(START_S + truth.t_s));
         let wind_mps = truths.iter().map(wind_at).collect();
-        Ok(Self { wind, leaks, wind_mps, truths })
+        Ok(Self { wind, leaks_m3spa, wind_mps, truths })
     }
 
     /// The samples of window `index`, counted round.
     pub fn window(&self, index: usize) -> &[Truth] {
         let start = (index % WINDOWS) * WINDOW_SAMPLES;
         self.truths.get(start..start + WINDOW_SAMPLES).unwrap_or(&self.truths)
-    }
-
-    /// The true leak coefficients, m³/(s·Pa).
-    pub fn coefficients(&self) -> PerLeak<f64> {
-        PerLeak {
-            internal: self.leaks.internal_m3spa,
-            external_a: self.leaks.external_a_m3spa,
-            external_b: self.leaks.external_b_m3spa,
-        }
     }
 }
 

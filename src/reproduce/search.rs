@@ -6,6 +6,7 @@ use super::trial::{Course, mean};
 use crate::Rig;
 use crate::rig::EstimatorKind;
 use crate::simulate::{Biases, Sensing};
+use pitchleak_core::Leak;
 use serde::Serialize;
 
 /// λ tried, 1/s.
@@ -54,9 +55,9 @@ fn try_gains(runs: &[Run], lambda_per_s: f64, gamma: f64) -> Result<Candidate, R
             let seed = SEED + 1000 * number + window as u64;
             let sensing = Sensing::new(rig.sensors(), Biases::default(), seed);
             let course = Course::run(&rig, run.window(window), sensing)?;
-            let truth = run.coefficients();
-            errors.push(course.late_error(truth.internal, |leaks| leaks.internal));
-            errors.push(course.late_error(truth.external_a, |leaks| leaks.external_a));
+            let truth = run.leaks_m3spa;
+            errors.push(course.late_error(truth.internal, Leak::Internal));
+            errors.push(course.late_error(truth.external_a, Leak::ExternalA));
         }
     }
     let percent = 100.0 * mean(errors.into_iter().map(|error| error.min(1.0)));

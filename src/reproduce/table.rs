@@ -2,6 +2,8 @@
 
 use super::protocol::Case;
 use super::trial::{TrialScore, mean};
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::Estimate;
 use serde::Serialize;
 
 /// The five figures of the paper.
@@ -102,11 +104,11 @@ impl WindowBound {
     /// From the bounds on the coefficient `leak` at the end and early on, m³/(s·Pa), and the mean size of
     /// the pressure that drives it.
     pub fn new(leak: f64, (std, early): (f64, f64), pressure_pa: f64) -> Self {
-        let half_width_m3s = 1.96 * std * pressure_pa;
+        let half_width_m3s = Estimate { value: leak, std }.half_width95() * pressure_pa;
         Self {
             coefficient: std / leak,
             coefficient_early: early / leak,
-            identifiable: half_width_m3s <= f64::max(0.1 / 60e3, 0.1 * leak * pressure_pa),
+            identifiable: half_width_m3s <= f64::max(0.1 / LPM_PER_M3S, 0.1 * leak * pressure_pa),
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::Rig;
 use crate::replay::Estimator;
 use crate::simulate::{Sensing, Truth};
 use crate::trace::Record;
-use pitchleak_core::{Butterworth, Estimate, FilterError, PerLeak};
+use pitchleak_core::{Butterworth, Estimate, FilterError, Leak, PerLeak};
 
 /// Cut-off of the filter on leak flows and pressures, Hz, Section IV.
 const CUTOFF_HZ: f64 = 5.0;
@@ -87,36 +87,34 @@ impl Course {
     }
 
     /// Mean of |Ĉ/C − 1| over the second half of the window.
-    pub fn late_error(&self, truth: f64, of: impl Fn(&PerLeak<f64>) -> f64) -> f64 {
+    pub fn late_error(&self, truth: f64, leak: Leak) -> f64 {
         let late = self.coefficients.iter().skip(self.coefficients.len() / 2);
-        mean(late.map(|c| (of(&c.map(|c| c.value)) / truth - 1.0).abs()))
+        mean(late.map(|c| (c[leak].value / truth - 1.0).abs()))
     }
 
-    /// Scores the leak that `of` picks, whose true coefficient is `truth`.
-    pub fn score(&self, truth: f64, of: impl Fn(&PerLeak<f64>) -> f64) -> TrialScore {
-        let coefficient = |k: usize| {
-            self.coefficients.get(k).map_or(f64::NAN, |c| (of(&c.map(|c| c.value)) / truth - 1.0).abs())
-        };
+    /// Scores one leak, whose true coefficient is `truth`.
+    pub fn score(&self, truth: f64, leak: Leak) -> TrialScore {
+        let coefficient =
+            |k: usize| self.coefficients.get(k).map_or(f64::NAN, |c| (c[leak].value / truth - 1.0).abs());
         let count = self.t_s.len();
         let converged =
             (0..count).rev().find(|&k| coefficient(k).is_nan() || coefficient(k) > BAND).map_or(0, |k| k + 1);
         let latest = ((LATEST_STEADY_S * SAMPLE_RATE_HZ) as usize).min(count);
         let steady = converged.min(latest);
-        let mean_size = mean(self.references_m3s.iter().map(|q| of(q).abs()));
+        let mean_size = mean(self.references_m3s.iter().map(|q| q[leak].abs()));
         let leakage = self.flows_m3s.iter().zip(&self.references_m3s).skip(steady);
-        let leakage = || leakage.clone().map(|(q, r)| (of(q) - of(r)).abs() / mean_size);
+        let leakage = || leakage.clone().map(|(q, r)| (q[leak] - r[leak]).abs() / mean_size);
         let last = self.coefficients.last();
-        let value = last.map_or(f64::NAN, |c| of(&c.map(|c| c.value)));
-        let std = last.map_or(f64::NAN, |c| of(&c.map(|c| c.std)));
-        let [low, high] = Estimate { value, std }.ci95();
+        let estimate = last.map_or(Estimate { value: f64::NAN, std: f64::NAN }, |c| c[leak]);
+        let [low, high] = estimate.ci95();
         TrialScore {
             leakage_mean: 100.0 * mean(leakage()),
             leakage_peak: 100.0 * leakage().fold(0.0, f64::max),
             coefficient_mean: 100.0 * mean((steady..count).map(coefficient)),
             coefficient_peak: 100.0 * (steady..count).map(coefficient).fold(0.0, f64::max),
             convergence_s: (converged < count).then(|| converged as f64 / SAMPLE_RATE_HZ),
-            final_error: 100.0 * (value / truth - 1.0),
-            covered: (std > 0.0).then_some(low <= truth && truth <= high),
+            final_error: 100.0 * (estimate.value / truth - 1.0),
+            covered: (estimate.std > 0.0).then_some(low <= truth && truth <= high),
         }
     }
 }
@@ -153,11 +151,7 @@ fn settled(start: PerLeak<f64>) -> Result<PerLeakFilter, FilterError> {
 }
 
 fn advance(filters: &mut PerLeakFilter, values: PerLeak<f64>) -> PerLeak<f64> {
-    PerLeak {
-        internal: filters.internal.update(values.internal),
-        external_a: filters.external_a.update(values.external_a),
-        external_b: filters.external_b.update(values.external_b),
-    }
+    PerLeak::from_fn(|leak| filters[leak].update(values[leak]))
 }
 
 pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {

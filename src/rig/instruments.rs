@@ -1,7 +1,7 @@
 use super::bound::Bound;
 use super::document::Section;
 use super::error::RigError;
-use crate::units::Dimension;
+use crate::units::{Dimension, LPM_PER_M3S};
 use pitchleak_core::{Cylinder, SensorSpread, Sensors};
 
 /// One sensor as its data sheet declares it.
@@ -70,7 +70,7 @@ impl Instruments {
     /// Sensors of the paper's rig (Section III) on this cylinder: flow meters 20 L/min, the position
     /// sensor as long as the stroke.
     pub fn paper(cylinder: &Cylinder<f64>) -> Self {
-        let flow = Instrument::of_full_scale(20.0 / 60e3);
+        let flow = Instrument::of_full_scale(20.0 / LPM_PER_M3S);
         Self {
             flow_a: flow,
             flow_b: flow,

@@ -1,5 +1,5 @@
 use crate::units::{self, Dimension, UnitError};
-use pitchleak_core::{Leaks, PerLeak};
+use pitchleak_core::PerLeak;
 
 /// How large a simulated laminar leak is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,17 +60,7 @@ pub(super) fn coefficients(
     sizes: &PerLeak<LeakSize>,
     mean_pressures_pa: &PerLeak<f64>,
 ) -> Option<PerLeak<f64>> {
-    let found = sizes.zip(*mean_pressures_pa).map(|(size, pressure)| size.coefficient(pressure));
-    Some(PerLeak { internal: found.internal?, external_a: found.external_a?, external_b: found.external_b? })
-}
-
-/// The coefficients as the plant takes them.
-pub(super) fn laminar(coefficients: &PerLeak<f64>) -> Leaks<f64> {
-    Leaks {
-        internal_m3spa: coefficients.internal,
-        external_a_m3spa: coefficients.external_a,
-        external_b_m3spa: coefficients.external_b,
-    }
+    sizes.zip(*mean_pressures_pa).map(|(size, pressure)| size.coefficient(pressure)).complete()
 }
 
 /// The next coefficients to try, from the last two pairs (tried, found at its pressures): each leak by
@@ -90,15 +80,13 @@ pub(super) fn next_guess(
 
 /// Whether a leak is given by its flow, so that its coefficient has to be found.
 pub(super) fn any_by_flow(sizes: &PerLeak<LeakSize>) -> bool {
-    let by_flow = |size| matches!(size, LeakSize::MeanFlow(flow) if flow > 0.0);
-    by_flow(sizes.internal) || by_flow(sizes.external_a) || by_flow(sizes.external_b)
+    sizes.iter().any(|(_, size)| matches!(size, LeakSize::MeanFlow(flow) if *flow > 0.0))
 }
 
 /// Greatest relative difference between two sets of coefficients.
 pub(super) fn differ(one: &PerLeak<f64>, other: &PerLeak<f64>) -> f64 {
     let relative = |(a, b): (f64, f64)| (a - b).abs() / a.abs().max(b.abs()).max(f64::MIN_POSITIVE);
-    let all = one.zip(*other).map(relative);
-    all.internal.max(all.external_a).max(all.external_b)
+    one.zip(*other).into_iter().map(|(_, pair)| relative(pair)).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ use crate::reference::Reference;
 use pitchleak_core::effects::LaggedReading;
 use pitchleak_core::emulator::{Emulator, EmulatorParams};
 use pitchleak_core::plant::PlantError;
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, PerLeak, Sample, Signals};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sample, Signals};
 
 /// What is simulated: a rig, what it follows, its leaks, and for how long.
 #[derive(Clone, Debug)]
@@ -103,7 +103,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`SimulateError`].
-    pub fn leak_coefficients(&self) -> Result<Leaks<f64>, SimulateError> {
+    pub fn leak_coefficients(&self) -> Result<PerLeak<f64>, SimulateError> {
         self.check()?;
         let calibration =
             Self { duration_s: self.duration_s.min(CALIBRATION_S), onset_s: 0.0, ..self.clone() };
@@ -112,13 +112,13 @@ impl Scenario {
         };
         let mut guess = coefficients(&FIRST_GUESS_PA)?;
         if !leak::any_by_flow(&self.leaks) {
-            return Ok(leak::laminar(&guess));
+            return Ok(guess);
         }
         let mut last = None;
         for _ in 0..CALIBRATION_RUNS {
-            let found = coefficients(&calibration.mean_pressures_pa(leak::laminar(&guess))?)?;
+            let found = coefficients(&calibration.mean_pressures_pa(guess)?)?;
             if leak::differ(&found, &guess) <= CALIBRATION_ACCURACY {
-                return Ok(leak::laminar(&guess));
+                return Ok(guess);
             }
             let next = leak::next_guess(last, (guess, found));
             last = Some((guess, found));
@@ -128,9 +128,9 @@ impl Scenario {
     }
 
     /// Means of |P_L|, P_A, P_B over the run with these leaks, Pa.
-    fn mean_pressures_pa(&self, leaks: Leaks<f64>) -> Result<PerLeak<f64>, SimulateError> {
+    fn mean_pressures_pa(&self, leaks_m3spa: PerLeak<f64>) -> Result<PerLeak<f64>, SimulateError> {
         let (mut sum, mut count) = (PerLeak::<f64>::default(), 0.0);
-        self.run(leaks, |truth| {
+        self.run(leaks_m3spa, |truth| {
             sum.internal += (truth.signals.pa_pa - truth.signals.pb_pa).abs();
             sum.external_a += truth.signals.pa_pa;
             sum.external_b += truth.signals.pb_pa;
@@ -143,7 +143,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`SimulateError`].
-    pub fn run(&self, leaks: Leaks<f64>, mut each: impl FnMut(&Truth)) -> Result<(), SimulateError> {
+    pub fn run(&self, leaks_m3spa: PerLeak<f64>, mut each: impl FnMut(&Truth)) -> Result<(), SimulateError> {
         self.check()?;
         let period_s = 1.0 / self.sample_rate_hz;
         let steps = (period_s / STEP_S).ceil().max(1.0);
@@ -155,7 +155,7 @@ impl Scenario {
         for sample in -warm_up..samples {
             let t_s = sample as f64 * period_s;
             if sample == onset {
-                rig.emulator.set_leaks(leaks)?;
+                rig.emulator.set_leaks(leaks_m3spa)?;
             }
             if sample >= 0 {
                 each(&rig.truth(t_s, self.start_s + t_s, &self.reference));
@@ -172,9 +172,9 @@ impl Scenario {
     ///
     /// # Errors
     /// [`SimulateError`].
-    pub fn collect(&self, leaks: Leaks<f64>) -> Result<Vec<Truth>, SimulateError> {
+    pub fn collect(&self, leaks_m3spa: PerLeak<f64>) -> Result<Vec<Truth>, SimulateError> {
         let mut truths = Vec::new();
-        self.run(leaks, |truth| truths.push(*truth))?;
+        self.run(leaks_m3spa, |truth| truths.push(*truth))?;
         Ok(truths)
     }
 
@@ -227,7 +227,7 @@ impl Lagging {
 impl RunningRig {
     fn new(scenario: &Scenario, t_s: f64) -> Result<Self, PlantError> {
         let Scenario { rig, reference, effects, .. } = scenario;
-        let healthy = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks: Leaks::default() };
+        let healthy = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks_m3spa: PerLeak::default() };
         let mut params = EmulatorParams::for_model(healthy)?;
         params.pitch.plant.effects = *effects;
         params.internal_step_s = STEP_S;
@@ -275,11 +275,7 @@ impl RunningRig {
                 qb_m3s: Some(shown.qb_m3s),
                 force_n: Some(shown.force_n),
             },
-            leaks_m3s: PerLeak {
-                internal: reading.leaks.internal_m3s,
-                external_a: reading.leaks.external_a_m3s,
-                external_b: reading.leaks.external_b_m3s,
-            },
+            leaks_m3s: reading.leaks_m3s,
         }
     }
 }

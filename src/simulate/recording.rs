@@ -1,5 +1,6 @@
 use super::{Biases, Scenario, Sensing, SimulateError, TraceWriter};
-use pitchleak_core::{Leaks, PerLeak, Sensors};
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{PerLeak, Sensors};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -121,12 +122,12 @@ impl Recording {
         mut done: impl FnMut(f64),
     ) -> Result<(W, TruthFile), RecordingError> {
         let write = |source| RecordingError::Write { path: path.to_owned(), source };
-        let leaks = self.scenario.leak_coefficients()?;
+        let leaks_m3spa = self.scenario.leak_coefficients()?;
         let mut sensing = Sensing::new(self.noise, self.biases, self.seed);
         let mut writer = open().and_then(TraceWriter::new).map_err(write)?;
         let mut totals = Totals::default();
         let mut failure = None;
-        self.scenario.run(leaks, |truth| {
+        self.scenario.run(leaks_m3spa, |truth| {
             let shown = sensing.read(&truth.sample);
             if failure.is_none() {
                 failure = writer.row(truth, &shown).err();
@@ -139,18 +140,13 @@ impl Recording {
         })?;
         match failure {
             Some(source) => Err(write(source)),
-            None => Ok((writer.into_inner(), self.truth(reference, &leaks, &totals))),
+            None => Ok((writer.into_inner(), self.truth(reference, &leaks_m3spa, &totals))),
         }
     }
 
-    fn truth(&self, reference: &str, leaks: &Leaks<f64>, totals: &Totals) -> TruthFile {
+    fn truth(&self, reference: &str, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
         let Self { scenario, noise, biases, seed } = self;
         let count = totals.samples.max(1) as f64;
-        let coefficients = PerLeak {
-            internal: leaks.internal_m3spa,
-            external_a: leaks.external_a_m3spa,
-            external_b: leaks.external_b_m3spa,
-        };
         TruthFile {
             schema: "pitchleak.simulate/1",
             program: concat!("pitchleak ", env!("CARGO_PKG_VERSION")),
@@ -162,9 +158,9 @@ impl Recording {
             samples: totals.samples,
             seed: *seed,
             leak_onset_s: scenario.onset_s,
-            leaks: coefficients.zip(totals.flows_m3s).map(|(coefficient_m3spa, sum)| LeakTruth {
+            leaks: leaks_m3spa.zip(totals.flows_m3s).map(|(coefficient_m3spa, sum)| LeakTruth {
                 coefficient_m3spa,
-                mean_flow_lpm: 60e3 * sum / count,
+                mean_flow_lpm: LPM_PER_M3S * sum / count,
             }),
             effects: scenario.effects.iter().map(|active| (active.effect.spec().id, active.value)).collect(),
             noise_std: BTreeMap::from([

@@ -1,4 +1,5 @@
 use super::Truth;
+use crate::units::LPM_PER_M3S;
 use pitchleak_core::Sample;
 use std::io::{self, Write};
 
@@ -26,7 +27,7 @@ impl<W: Write> TraceWriter<W> {
     /// # Errors
     /// Where the output cannot be written to.
     pub fn row(&mut self, truth: &Truth, shown: &Sample<f64>) -> io::Result<()> {
-        let lpm = |flow_m3s: f64| flow_m3s * 60e3;
+        let lpm = |flow_m3s: f64| flow_m3s * LPM_PER_M3S;
         let cell = |value: Option<f64>, decimals: usize| {
             value.map(|value| format!("{value:.decimals$}")).unwrap_or_default()
         };

@@ -28,9 +28,8 @@ pub use filter::{
     hydraulic_force_n,
 };
 pub use model::{
-    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, LeakPressures, Leaks,
-    Linkage, LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering,
-    signed_root,
+    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, Leak, LeakPressures, Linkage,
+    LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, signed_root,
 };
 pub use number::Real;
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};

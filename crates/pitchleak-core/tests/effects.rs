@@ -1,7 +1,7 @@
 //! The table of effects and the maps between truth and reading.
 
 use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectError, EffectKind, LaggedReading};
-use pitchleak_core::{Effect, EffectSet, Leaks, Model, Signals};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals};
 use proptest::prelude::*;
 
 fn signals() -> impl Strategy<Value = Signals<f64>> {
@@ -50,8 +50,8 @@ proptest! {
     /// A sensor's regressor is the slope of the residual in the effect's value.
     #[test]
     fn sensor_term_is_the_slope_of_the_residual(truth in signals()) {
-        let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 1e-12 };
-        let model = Model { leaks, ..Model::paper() };
+        let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 1e-12 };
+        let model = Model { leaks_m3spa: leaks, ..Model::paper() };
         for effect in Effect::ALL.iter().copied().filter(|e| e.spec().kind == EffectKind::Sensor) {
             let value = effect.spec().default_size * 1e-2;
             let change = model.residual(&effect.read(value, &truth)).plus(-1.0, model.residual(&truth));

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak_core::plant::{CylinderPlant, Drive};
-use pitchleak_core::{Cylinder, Fluid, Leaks, Model, PaperGains, PaperLaw, Sample, Theta, regressors};
+use pitchleak_core::{Cylinder, Fluid, Model, PaperGains, PaperLaw, PerLeak, Sample, Theta, regressors};
 use proptest::prelude::*;
 
 fn cylinder() -> impl Strategy<Value = Cylinder<f64>> {
@@ -108,8 +108,8 @@ proptest! {
 /// |dP_L/dt − Σ θ f| over a run of the plant under valve-like flows and a load, largest, relative to the
 /// largest |dP_L/dt|; `f1` combines Q_A/V_A and Q_B/V_B.
 fn identity_error(f1: impl Fn(f64, f64) -> f64) -> f64 {
-    let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 2e-12 };
-    let model = Model { leaks, ..Model::paper() };
+    let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
+    let model = Model { leaks_m3spa: leaks, ..Model::paper() };
     let (beta, m) = (model.fluid.bulk_modulus_pa, model.cylinder.moving_mass_kg);
     let truth = theta(beta, [1e-11, 3e-12, 2e-12], m);
     let plant = CylinderPlant::new(model).unwrap();

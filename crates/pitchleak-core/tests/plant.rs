@@ -2,7 +2,7 @@
 
 use pitchleak_core::effects::{EffectConstants, EffectKind};
 use pitchleak_core::plant::{CylinderPlant, CylinderState, Drive, Supply, Valve, ValvePlant};
-use pitchleak_core::{Cylinder, Effect, Fluid, Leaks, Model};
+use pitchleak_core::{Cylinder, Effect, Fluid, Model, PerLeak};
 use proptest::prelude::*;
 
 fn model() -> impl Strategy<Value = Model<f64>> {
@@ -19,7 +19,7 @@ fn model() -> impl Strategy<Value = Model<f64>> {
                 dead_volume_b_m3: dead_b,
             },
             fluid: Fluid { bulk_modulus_pa: bulk, bulk_modulus_std_pa: 0.0 },
-            leaks: Leaks { internal_m3spa: ip, external_a_m3spa: epa, external_b_m3spa: epb },
+            leaks_m3spa: PerLeak { internal: ip, external_a: epa, external_b: epb },
         },
     )
 }
@@ -55,13 +55,13 @@ proptest! {
         };
         let seen = |state: &CylinderState<f64>, t: f64| {
             let rates = plant.rates(state, &drive(t));
-            let leaks = plant.leak_flows(&rates.signals);
+            let leaks = plant.leaks_m3s(&rates.signals);
             let m = rates.signals;
             let c = &model.cylinder;
             let vapour = plant.vapour_m3(state);
             [
-                [m.qa_m3s - leaks.internal_m3s - leaks.external_a_m3s, m.pa_pa, c.volume_a_m3(m.x_m), vapour.0],
-                [m.qb_m3s + leaks.internal_m3s - leaks.external_b_m3s, m.pb_pa, c.volume_b_m3(m.x_m), vapour.1],
+                [m.qa_m3s - leaks.internal - leaks.external_a, m.pa_pa, c.volume_a_m3(m.x_m), vapour.0],
+                [m.qb_m3s + leaks.internal - leaks.external_b, m.pb_pa, c.volume_b_m3(m.x_m), vapour.1],
             ]
         };
         let (step, first) = (1e-5, seen(&state, 0.0));
@@ -91,7 +91,7 @@ proptest! {
     fn sealed_oil_stays_through_cavitation(
         model in model(), start in 0.3..0.7, pa in 1e6..4e6, hertz in 5.0..40.0_f64,
     ) {
-        let model = Model { leaks: Leaks::default(), ..model };
+        let model = Model { leaks_m3spa: PerLeak::default(), ..model };
         let plant = CylinderPlant::new(model).unwrap();
         let cylinder = &model.cylinder;
         let pb = pa * cylinder.area_a_m2 / cylinder.area_b_m2;
@@ -136,9 +136,9 @@ proptest! {
             driven = plant.step(&driven, 1e-3, special, c);
             driven = plant.step(&driven, special, a, b);
             let (p, q) = (cylinder.pressures_pa(&free), cylinder.pressures_pa(&driven.cylinder));
-            let leak = plant.leak_flows(&driven);
+            let leak = plant.leaks_m3s(&driven);
             for value in [free.x_m, free.v_mps, free.oil_a_m3, free.oil_b_m3, p.0, p.1, q.0, q.1,
-                driven.spool, driven.spool_speed_ps, driven.supply_pa, leak.internal_m3s] {
+                driven.spool, driven.spool_speed_ps, driven.supply_pa, leak.internal] {
                 prop_assert!(value.is_finite(), "{free:?} {driven:?}");
             }
             prop_assert!((0.0..=0.2).contains(&free.x_m) && p.0 >= -1e5 && p.1 >= -1e5);
@@ -195,8 +195,8 @@ fn residual_of_the_plain_model_is_the_effects_term() {
         if spec.kind == EffectKind::Sensor {
             continue;
         }
-        let leaks = Leaks { internal_m3spa: 1e-11, external_a_m3spa: 3e-12, external_b_m3spa: 0.0 };
-        let mut plant = CylinderPlant::new(Model::<f64> { leaks, ..Model::paper() }).unwrap();
+        let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 0.0 };
+        let mut plant = CylinderPlant::new(Model::<f64> { leaks_m3spa: leaks, ..Model::paper() }).unwrap();
         plant.temp_k = 323.0;
         plant.effects.set(effect, spec.default_size, EffectConstants::default()).unwrap();
         let state = plant.state_at(0.09, 0.02, 4e6, 2e6);

@@ -9,7 +9,7 @@
 #![allow(clippy::unwrap_used)] // helpers of tests are no tests to clippy
 
 use pitchleak_core::plant::{CylinderPlant, Drive};
-use pitchleak_core::{Cylinder, Fluid, Leaks, Model};
+use pitchleak_core::{Cylinder, Fluid, Model, PerLeak};
 use std::path::PathBuf;
 
 /// Columns of the trace: t, x, v, P_A, P_B, Q_A, Q_B, force.
@@ -77,11 +77,11 @@ fn nrmse(rows: &[Row], model: Model<f64>, window_s: f64) -> [f64; 3] {
     [share(squares[0], 1), share(squares[1], 3), share(squares[2], 4)]
 }
 
-fn paper_size(mass_kg: f64, bulk_modulus_pa: f64, leaks: Leaks<f64>) -> Model<f64> {
+fn paper_size(mass_kg: f64, bulk_modulus_pa: f64, leaks: PerLeak<f64>) -> Model<f64> {
     Model {
         cylinder: Cylinder { moving_mass_kg: mass_kg, ..Cylinder::paper() },
         fluid: Fluid { bulk_modulus_pa, bulk_modulus_std_pa: 0.0 },
-        leaks,
+        leaks_m3spa: leaks,
     }
 }
 
@@ -99,13 +99,13 @@ fn agrees(name: &str, model: Model<f64>) {
 
 #[test]
 fn val_h02_internal_leak() {
-    let leaks = Leaks { internal_m3spa: 1.2e-11, ..Leaks::default() };
+    let leaks = PerLeak { internal: 1.2e-11, ..PerLeak::default() };
     agrees("h02", paper_size(30.0, 0.9e9, leaks));
 }
 
 #[test]
 fn val_h06_external_leaks() {
-    let leaks = Leaks { external_a_m3spa: 4e-12, external_b_m3spa: 2.5e-12, ..Leaks::default() };
+    let leaks = PerLeak { external_a: 4e-12, external_b: 2.5e-12, ..PerLeak::default() };
     agrees("h06", paper_size(50.0, 1.1e9, leaks));
 }
 
@@ -113,7 +113,7 @@ fn val_h06_external_leaks() {
 #[test]
 fn val_a_missing_leak_is_seen() {
     if let Some(rows) = trace("h02") {
-        let [_, pa, pb] = nrmse(&rows, paper_size(30.0, 0.9e9, Leaks::default()), 1.0);
+        let [_, pa, pb] = nrmse(&rows, paper_size(30.0, 0.9e9, PerLeak::default()), 1.0);
         assert!(pa.max(pb) > 0.05, "P_A {pa}, P_B {pb}");
     }
 }

@@ -118,7 +118,7 @@ impl Rig {
     /// Leak flows at which an alarm is raised, L/min: internal, external_a, external_b.
     #[getter]
     fn alarm_thresholds_lpm(&self) -> [f64; 3] {
-        let threshold = self.0.alarms.threshold_m3s.map(|flow| flow * pitchleak::report::LPM_PER_M3S);
+        let threshold = self.0.alarms.threshold_m3s.map(|flow| flow * pitchleak::units::LPM_PER_M3S);
         [threshold.internal, threshold.external_a, threshold.external_b]
     }
 

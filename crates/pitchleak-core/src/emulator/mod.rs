@@ -6,10 +6,8 @@ mod state;
 
 pub use controller::Gains;
 
-use crate::plant::{
-    CylinderPlant, CylinderState, LeakFlows, PlantError, Supply, Valve, number_or_zero, substeps,
-};
-use crate::{Cylinder, EffectSet, Leaks, Model, Real, Signals, rk4_step};
+use crate::plant::{CylinderPlant, CylinderState, PlantError, Supply, Valve, number_or_zero, substeps};
+use crate::{Cylinder, EffectSet, Model, PerLeak, Real, Signals, rk4_step};
 use state::State;
 
 /// One hydraulic axis: a cylinder, its valve and its controller.
@@ -46,7 +44,7 @@ pub struct EmulatorReading<T> {
     /// [`EffectSet::read`].
     pub signals: Signals<T>,
     /// Flows through the leak circuits (and leak effects), m³/s.
-    pub leaks: LeakFlows<T>,
+    pub leaks_m3s: PerLeak<T>,
     /// Supply pressure, Pa.
     pub supply_pa: T,
     /// Valve command of the pitching cylinder, share of the stroke.
@@ -83,8 +81,9 @@ impl<T: Real> EmulatorParams<T> {
         };
         let hose = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(0.1);
         let load_cylinder = Cylinder { dead_volume_a_m3: hose, dead_volume_b_m3: hose, ..cylinder };
-        let bypass = Leaks { internal_m3spa: T::lit(2e-11) * scale, ..Leaks::default() };
-        let load = CylinderPlant::new(Model { cylinder: load_cylinder, fluid: model.fluid, leaks: bypass })?;
+        let bypass = PerLeak { internal: T::lit(2e-11) * scale, ..PerLeak::default() };
+        let load =
+            CylinderPlant::new(Model { cylinder: load_cylinder, fluid: model.fluid, leaks_m3spa: bypass })?;
         let supply = Supply { pump_flow_m3s: supply.pump_flow_m3s * scale, ..supply };
         let drop = supply.relief_pressure_pa / T::lit(3.0);
         let params = Self {
@@ -139,7 +138,7 @@ fn force_gains<T: Real>(model: &Model<T>, valve: &Valve<T>, drop_pa: T) -> Gains
     let oil_b = stiffness(cylinder.volume_b_m3(middle));
     let (a, b) = (cylinder.area_a_m2, cylinder.area_b_m2);
     let spring = a * a * oil_a + b * b * oil_b;
-    let bypass_ps = model.leaks.internal_m3spa * (oil_a + oil_b);
+    let bypass_ps = model.leaks_m3spa.internal * (oil_a + oil_b);
     let crossover = T::lit(0.4 * core::f64::consts::TAU) * valve.bandwidth_hz;
     let proportional = crossover / (speed_gain_mps(cylinder, valve, drop_pa) * spring);
     Gains { proportional, integral_ps: proportional * bypass_ps, derivative_s: T::zero() }
@@ -168,11 +167,11 @@ impl<T: Real> Emulator<T> {
     }
 
     /// Turns the leak circuits of the pitching cylinder.
-    pub fn set_leaks(&mut self, leaks: Leaks<T>) -> Result<(), PlantError> {
-        if !leaks.is_physical() {
+    pub fn set_leaks(&mut self, leaks_m3spa: PerLeak<T>) -> Result<(), PlantError> {
+        if !leaks_m3spa.is_physical() {
             return Err(PlantError::Leaks);
         }
-        self.params.pitch.plant.model.leaks = leaks;
+        self.params.pitch.plant.model.leaks_m3spa = leaks_m3spa;
         Ok(())
     }
 
@@ -220,7 +219,7 @@ impl<T: Real> Emulator<T> {
         let [pitch_command, load_command] = self.commands;
         EmulatorReading {
             signals: pitch.signals,
-            leaks: self.params.pitch.plant.leak_flows(&pitch.signals),
+            leaks_m3s: self.params.pitch.plant.leaks_m3s(&pitch.signals),
             supply_pa: self.state.supply_pa,
             pitch_command,
             load_command,

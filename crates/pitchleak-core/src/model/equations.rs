@@ -1,16 +1,4 @@
-use crate::{Cylinder, Fluid, Real};
-
-/// Laminar leak coefficients of eq. (1), m³/(s·Pa).
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Leaks<T> {
-    /// C_ip, from chamber A past the piston to chamber B.
-    pub internal_m3spa: T,
-    /// C_epA, from chamber A to the outside.
-    pub external_a_m3spa: T,
-    /// C_epB, from chamber B to the outside.
-    pub external_b_m3spa: T,
-}
+use crate::{Cylinder, Fluid, PerLeak, Real};
 
 /// Everything the equations of one cylinder need to know about one instant, true or as read by
 /// sensors. Pressures are gauge, flows go into their chamber.
@@ -69,14 +57,14 @@ pub struct Model<T> {
     pub cylinder: Cylinder<T>,
     /// Oil.
     pub fluid: Fluid<T>,
-    /// Leaks.
-    pub leaks: Leaks<T>,
+    /// Laminar leak coefficients C_ip, C_epA, C_epB of eq. (1), m³/(s·Pa).
+    pub leaks_m3spa: PerLeak<T>,
 }
 
 impl<T: Real> Model<T> {
     /// The rig of the paper without leaks.
     pub fn paper() -> Self {
-        Self { cylinder: Cylinder::paper(), fluid: Fluid::paper(), leaks: Leaks::default() }
+        Self { cylinder: Cylinder::paper(), fluid: Fluid::paper(), leaks_m3spa: PerLeak::default() }
     }
 
     /// What eq. (1)–(2) leave over at an instant, left side less right side:
@@ -90,32 +78,23 @@ impl<T: Real> Model<T> {
     /// Zero where the model is complete; else it is the missing effect's term.
     #[inline]
     pub fn residual(&self, at: &Signals<T>) -> Terms<T> {
-        let (cylinder, leaks, bulk) = (&self.cylinder, &self.leaks, self.fluid.bulk_modulus_pa);
-        let internal = leaks.internal_m3spa * (at.pa_pa - at.pb_pa);
+        let (cylinder, leaks, bulk) = (&self.cylinder, &self.leaks_m3spa, self.fluid.bulk_modulus_pa);
+        let internal = leaks.internal * (at.pa_pa - at.pb_pa);
         Terms {
             chamber_a_m3s: at.qa_m3s
                 - cylinder.area_a_m2 * at.v_mps
                 - cylinder.volume_a_m3(at.x_m) / bulk * at.dpa_pas
                 - internal
-                - leaks.external_a_m3spa * at.pa_pa,
+                - leaks.external_a * at.pa_pa,
             chamber_b_m3s: at.qb_m3s + cylinder.area_b_m2 * at.v_mps
                 - cylinder.volume_b_m3(at.x_m) / bulk * at.dpb_pas
                 + internal
-                - leaks.external_b_m3spa * at.pb_pa,
+                - leaks.external_b * at.pb_pa,
             force_n: at.pa_pa * cylinder.area_a_m2
                 - at.pb_pa * cylinder.area_b_m2
                 - cylinder.moving_mass_kg * at.a_mps2
                 - at.force_n,
         }
-    }
-}
-
-impl<T: Real> Leaks<T> {
-    /// Whether every coefficient is a number and none is negative.
-    pub fn is_physical(&self) -> bool {
-        [self.internal_m3spa, self.external_a_m3spa, self.external_b_m3spa]
-            .iter()
-            .all(|c| c.is_finite() && *c >= T::zero())
     }
 }
 

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::{PerLeak, Real};
 
 /// A number with its standard deviation, both in the unit of the quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -11,43 +11,20 @@ pub struct Estimate<T> {
 }
 
 impl<T: Real> Estimate<T> {
+    /// Half width of [`ci95`](Self::ci95).
+    pub fn half_width95(&self) -> T {
+        T::lit(1.959_963_984_540_054) * self.std
+    }
+
     /// The interval that holds the true value with 95 % probability, `[low, high]`.
     pub fn ci95(&self) -> [T; 2] {
-        let half = T::lit(1.959_963_984_540_054) * self.std;
+        let half = self.half_width95();
         [self.value - half, self.value + half]
     }
 
     /// The same quantity in another unit: value and spread times `factor`.
     pub fn scaled(&self, factor: T) -> Self {
         Self { value: self.value * factor, std: self.std * factor.abs() }
-    }
-}
-
-/// One value per kind of leak.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct PerLeak<V> {
-    /// Past the piston seal, chamber A to chamber B.
-    pub internal: V,
-    /// Out of chamber A.
-    pub external_a: V,
-    /// Out of chamber B.
-    pub external_b: V,
-}
-
-impl<V> PerLeak<V> {
-    /// Applies `f` to each value.
-    pub fn map<W>(self, mut f: impl FnMut(V) -> W) -> PerLeak<W> {
-        PerLeak { internal: f(self.internal), external_a: f(self.external_a), external_b: f(self.external_b) }
-    }
-
-    /// Pairs each value with that of `other`.
-    pub fn zip<W>(self, other: PerLeak<W>) -> PerLeak<(V, W)> {
-        PerLeak {
-            internal: (self.internal, other.internal),
-            external_a: (self.external_a, other.external_a),
-            external_b: (self.external_b, other.external_b),
-        }
     }
 }
 

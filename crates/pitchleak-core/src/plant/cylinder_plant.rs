@@ -1,7 +1,7 @@
 use super::chamber::Chamber;
 use super::{EndStop, PlantError};
 use crate::effects::{EffectKind, EffectSet};
-use crate::{Model, Real, Signals, Terms, rk4_step};
+use crate::{Model, PerLeak, Real, Signals, Terms, rk4_step};
 
 /// Numbers in the state vector of one cylinder: x, ẋ, oil in A, oil in B.
 pub(crate) const STATES: usize = 4;
@@ -52,18 +52,6 @@ pub struct Drive<T> {
     pub force_n: T,
 }
 
-/// Flows that leave where they should not, m³/s: laminar and by effects.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LeakFlows<T> {
-    /// From chamber A to chamber B.
-    pub internal_m3s: T,
-    /// From chamber A outside.
-    pub external_a_m3s: T,
-    /// From chamber B outside.
-    pub external_b_m3s: T,
-}
-
 /// How a cylinder changes at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CylinderRates<T> {
@@ -97,7 +85,7 @@ impl<T: Real> CylinderPlant<T> {
         self.model.cylinder.check()?;
         self.model.fluid.check()?;
         let vapour = self.vapour_pressure_pa;
-        if !self.model.leaks.is_physical() {
+        if !self.model.leaks_m3spa.is_physical() {
             Err(PlantError::Leaks)
         } else if !self.end_stop.is_physical(self.model.cylinder.stroke_m) {
             Err(PlantError::EndStop)
@@ -134,15 +122,14 @@ impl<T: Real> CylinderPlant<T> {
         (chamber.vapour_m3(state.oil_a_m3, volume_a), chamber.vapour_m3(state.oil_b_m3, volume_b))
     }
 
-    /// Leak flows at an instant, those of effects included.
-    pub fn leak_flows(&self, at: &Signals<T>) -> LeakFlows<T> {
-        let leaks = &self.model.leaks;
+    /// Leak flows at an instant, those of effects included, m³/s.
+    pub fn leaks_m3s(&self, at: &Signals<T>) -> PerLeak<T> {
+        let leaks = &self.model.leaks_m3spa;
         let by = |kind| self.effects.terms(at, &self.model, |other| other == kind);
-        LeakFlows {
-            internal_m3s: leaks.internal_m3spa * (at.pa_pa - at.pb_pa)
-                + by(EffectKind::InternalLeak).chamber_a_m3s,
-            external_a_m3s: leaks.external_a_m3spa * at.pa_pa + by(EffectKind::ExternalLeakA).chamber_a_m3s,
-            external_b_m3s: leaks.external_b_m3spa * at.pb_pa + by(EffectKind::ExternalLeakB).chamber_b_m3s,
+        PerLeak {
+            internal: leaks.internal * (at.pa_pa - at.pb_pa) + by(EffectKind::InternalLeak).chamber_a_m3s,
+            external_a: leaks.external_a * at.pa_pa + by(EffectKind::ExternalLeakA).chamber_a_m3s,
+            external_b: leaks.external_b * at.pb_pa + by(EffectKind::ExternalLeakB).chamber_b_m3s,
         }
     }
 

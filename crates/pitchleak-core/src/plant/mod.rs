@@ -9,7 +9,7 @@ mod supply;
 mod valve;
 mod valve_plant;
 
-pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive, LeakFlows};
+pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive};
 pub use end_stop::EndStop;
 pub use error::PlantError;
 pub use rk4::rk4_step;

@@ -1,8 +1,8 @@
 use super::{
-    CYLINDER_STATES, CylinderPlant, CylinderRates, CylinderState, Drive, LeakFlows, PlantError, Supply,
-    Valve, number_or_zero, substeps,
+    CYLINDER_STATES, CylinderPlant, CylinderRates, CylinderState, Drive, PlantError, Supply, Valve,
+    number_or_zero, substeps,
 };
-use crate::{Real, rk4_step};
+use crate::{PerLeak, Real, rk4_step};
 
 /// The pitching cylinder with its valve and supply: one state vector of seven numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,10 +85,10 @@ impl<T: Real> ValvePlant<T> {
         (self.cylinder.rates(&state.cylinder, &self.cylinder.bounded(drive)), flows.supply_m3s)
     }
 
-    /// Leak flows of a state.
-    pub fn leak_flows(&self, state: &ValvePlantState<T>) -> LeakFlows<T> {
+    /// Leak flows of a state, m³/s.
+    pub fn leaks_m3s(&self, state: &ValvePlantState<T>) -> PerLeak<T> {
         let (rates, _) = self.rates(state, T::zero());
-        self.cylinder.leak_flows(&rates.signals)
+        self.cylinder.leaks_m3s(&rates.signals)
     }
 
     fn limited(&self, next: ValvePlantState<T>, last: ValvePlantState<T>) -> ValvePlantState<T> {
