@@ -18,16 +18,7 @@ use std::error::Error;
 /// A minute of wind on a cylinder with a worn spot, through sensors of 0.3 % of full scale.
 fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
     let mut rig = Rig::paper();
-    let sheets = &mut rig.instruments;
-    for sheet in [
-        &mut sheets.flow_a,
-        &mut sheets.flow_b,
-        &mut sheets.pressure,
-        &mut sheets.position,
-        &mut sheets.force,
-    ] {
-        sheet.accuracy = 3e-3;
-    }
+    rig.instruments = rig.instruments.with_accuracy(3e-3);
     let mut effects = EffectSet::default();
     let constants =
         EffectConstants { spot_position_m: 0.09, spot_width_m: 0.01, ..EffectConstants::default() };

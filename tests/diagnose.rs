@@ -13,16 +13,7 @@ const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, extern
 
 fn rig() -> Rig {
     let mut rig = Rig::paper();
-    let sheets = &mut rig.instruments;
-    for sheet in [
-        &mut sheets.flow_a,
-        &mut sheets.flow_b,
-        &mut sheets.pressure,
-        &mut sheets.position,
-        &mut sheets.force,
-    ] {
-        sheet.accuracy = 1e-3;
-    }
+    rig.instruments = rig.instruments.with_accuracy(1e-3);
     rig
 }
 

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod synthetic;
-
 use std::fmt::Write;
 
 use pitchleak::Rig;
@@ -11,19 +9,10 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::replay;
 use pitchleak::report::ReplayReport;
 use pitchleak::trace::{TraceError, TraceReader};
-use synthetic::Motion;
+use pitchleak_testkit::Motion;
+use pitchleak_testkit::rig::PAPER;
 
 const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 0.0 };
-
-const RIG: &str = r#"
-[cylinder]
-area_a = "12.6 cm^2"
-area_b = "9.4 cm^2"
-stroke = "0.2 m"
-moving_mass = "20 kg"
-[fluid]
-bulk_modulus = "0.9 GPa"
-"#;
 
 fn run(rig: &str, trace: String) -> ReplayReport {
     let rig = Rig::parse(rig, "test").unwrap();
@@ -60,7 +49,7 @@ fn coefficients(report: &ReplayReport) -> [f64; 3] {
 
 #[test]
 fn finds_the_leaks_and_says_so() {
-    let report = run(RIG, plain());
+    let report = run(PAPER, plain());
     for (found, truth) in coefficients(&report).into_iter().zip([1e-11, 3e-12, 0.0]) {
         assert!((found - truth).abs() < 1e-14, "{found} for {truth}");
     }
@@ -74,9 +63,9 @@ fn finds_the_leaks_and_says_so() {
 /// The same readings in people's units give the same estimates.
 #[test]
 fn units_do_not_matter() {
-    let si = run(RIG, plain());
+    let si = run(PAPER, plain());
     let practice = run(
-        RIG,
+        PAPER,
         trace("t_ms,x_mm,pa_bar,pb_kpa,qa_lpm,qb_lpm", |t, [x, pa, pb, qa, qb], _| {
             vec![t * 1e3, x * 1e3, pa / 1e5, pb / 1e3, qa * 6e4, qb * 6e4]
         }),
@@ -94,9 +83,9 @@ fn declared_effects_are_corrected() {
     let text = trace("t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s", |t, [x, pa, pb, qa, qb], _| {
         vec![t, 1.02 * x, pa, pb, qa + turbulent * pa.sqrt(), qb]
     });
-    let blind = run(RIG, text.clone());
+    let blind = run(PAPER, text.clone());
     let effects = "[effects]\nposition_gain = 0.02\nexternal_leak_a_turbulent = 2e-9\n";
-    let told = run(&format!("{RIG}{effects}"), text);
+    let told = run(&format!("{PAPER}{effects}"), text);
     let error = |report: &ReplayReport| {
         let pairs = coefficients(report).into_iter().zip([1e-11, 3e-12, 0.0]);
         pairs.map(|(found, truth)| (found - truth).abs()).fold(0.0, f64::max)
@@ -119,8 +108,8 @@ fn uncertain_effects_widen_the_intervals() {
         vec![t, x, pa, pb, qa + 1.5e-9 * pa.sqrt(), qb]
     });
     let effects = "[effects]\nexternal_leak_a_turbulent = { value = 1e-9, std = 0.5e-9 }\n";
-    let report = run(&format!("{RIG}{effects}"), text.clone());
-    let certain = run(&format!("{RIG}[effects]\nexternal_leak_a_turbulent = 1e-9\n"), text);
+    let report = run(&format!("{PAPER}{effects}"), text.clone());
+    let certain = run(&format!("{PAPER}[effects]\nexternal_leak_a_turbulent = 1e-9\n"), text);
     let leak = |report: &ReplayReport| report.estimates.leaks().external_a.clone();
     let (wide, narrow) = (leak(&report), leak(&certain));
     let error = (wide.value - 3e-12).abs();
@@ -131,7 +120,7 @@ fn uncertain_effects_widen_the_intervals() {
 
 #[test]
 fn the_papers_law_runs_and_is_scored() {
-    let report = run(&format!("{RIG}[estimator]\nkind = \"paper\"\n"), plain());
+    let report = run(&format!("{PAPER}[estimator]\nkind = \"paper\"\n"), plain());
     assert!(coefficients(&report).iter().all(|c| c.is_finite()));
     assert!(report.estimates.internal_leak_coefficient.std.is_none());
     assert!(report.score.unwrap().internal.is_some());
@@ -160,7 +149,7 @@ fn a_leak_that_opens_counts_from_then_on() {
         let cells: Vec<String> = signals.iter().map(|c| format!("{c:e}")).collect();
         write!(text, "\n{}", cells.join(",")).unwrap();
     }
-    let report = run(RIG, text);
+    let report = run(PAPER, text);
     assert!((30.0..32.0).contains(&report.changed_at_s.unwrap()), "{:?}", report.changed_at_s);
     let found = report.leakage.external_a.mean_lpm;
     assert!((found / (since.0 / since.1) - 1.0).abs() < 0.02, "{found} for {}", since.0 / since.1);

@@ -82,16 +82,7 @@ fn reference(excitation: Excitation) -> Reference {
 
 pub fn rig(accuracy: f64) -> Rig {
     let mut rig = Rig::paper();
-    let sheets = &mut rig.instruments;
-    for sheet in [
-        &mut sheets.flow_a,
-        &mut sheets.flow_b,
-        &mut sheets.pressure,
-        &mut sheets.position,
-        &mut sheets.force,
-    ] {
-        sheet.accuracy = accuracy;
-    }
+    rig.instruments = rig.instruments.with_accuracy(accuracy);
     rig
 }
 

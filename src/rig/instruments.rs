@@ -67,6 +67,15 @@ impl Instrument {
 }
 
 impl Instruments {
+    /// The same sensors, each with white noise of 3 σ = `accuracy` of its full scale.
+    pub fn with_accuracy(mut self, accuracy: f64) -> Self {
+        let Self { flow_a, flow_b, pressure, position, force } = &mut self;
+        for sheet in [flow_a, flow_b, pressure, position, force] {
+            sheet.accuracy = accuracy;
+        }
+        self
+    }
+
     /// Sensors of the paper's rig (Section III) on this cylinder: flow meters 20 L/min, the position
     /// sensor as long as the stroke.
     pub fn paper(cylinder: &Cylinder<f64>) -> Self {

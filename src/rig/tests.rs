@@ -1,23 +1,13 @@
 use super::*;
 use crate::signal::Signal;
 use pitchleak_core::Effect;
+use pitchleak_testkit::rig::with_sensors_of;
 use proptest::prelude::*;
 
-const PAPER: &str = r#"
-[cylinder]
-area_a = "12.6 cm^2"
-area_b = "9.4 cm^2"
-stroke = "0.2 m"
-moving_mass = "20 kg"
-[fluid]
-bulk_modulus = "0.8 GPa"
-bulk_modulus_std = "0.2 GPa"
-[sensors]
-flow = { full_scale = "20 L/min", accuracy = "1 %", bias = "0 %", gain = "0 %" }
-pressure = { full_scale = "16 MPa", accuracy = "1 %" }
-position = { full_scale = "0.2 m", accuracy = "1 %" }
-force = { full_scale = "10 kN", accuracy = "1 %" }
-"#;
+/// The paper's rig, every sensor declared.
+fn declared() -> String {
+    with_sensors_of("1 %")
+}
 
 fn message(text: &str) -> String {
     Rig::parse(text, "rig.toml").unwrap_err().to_string()
@@ -25,7 +15,7 @@ fn message(text: &str) -> String {
 
 #[test]
 fn the_contracts_file_is_the_papers_rig() {
-    let mut rig = Rig::parse(PAPER, Rig::PAPER_NAME).unwrap();
+    let mut rig = Rig::parse(&declared(), Rig::PAPER_NAME).unwrap();
     let paper = Rig::paper();
     let area_b_m2 = &mut rig.cylinder.area_b_m2;
     assert!((*area_b_m2 / paper.cylinder.area_b_m2 - 1.0).abs() < 3e-16);
@@ -36,7 +26,7 @@ fn the_contracts_file_is_the_papers_rig() {
 
 #[test]
 fn optional_sections_are_read() {
-    let text = PAPER.replace("flow = {", "flow_a = {").to_owned()
+    let text = declared().replace("flow = {", "flow_a = {")
         + r#"flow_b = { full_scale = 1e-4, accuracy = 0.005, bias = "1 %", gain = "20 %" }
 [estimator]
 kind = "paper"
@@ -75,36 +65,36 @@ load_offset = 12
 fn errors_name_file_line_key_and_the_values_allowed() {
     let cases = [
         (
-            PAPER.replace("area_a", "aera_a"),
-            "rig.toml:3: unknown key `cylinder.aera_a`; allowed here: area_a,",
+            declared().replace("area_a", "aera_a"),
+            "rig.toml:2: unknown key `cylinder.aera_a`; allowed here: area_a,",
         ),
         (
-            PAPER.replace("12.6 cm^2", "12.6 cm"),
-            "rig.toml:3: `cylinder.area_a`: unit `cm` is not one of: m^2,",
+            declared().replace("12.6 cm^2", "12.6 cm"),
+            "rig.toml:2: `cylinder.area_a`: unit `cm` is not one of: m^2,",
         ),
         (
-            PAPER.replace("12.6 cm^2", "-12.6 cm^2"),
-            "rig.toml:3: `cylinder.area_a` is -0.00126 m^2; it must be above 0 to 10 m^2",
+            declared().replace("12.6 cm^2", "-12.6 cm^2"),
+            "rig.toml:2: `cylinder.area_a` is -0.00126 m^2; it must be above 0 to 10 m^2",
         ),
-        (PAPER.replace("\"12.6 cm^2\"", "nan"), "rig.toml:3: `cylinder.area_a` is NaN"),
-        (PAPER.replace("\"12.6 cm^2\"", "[1]"), "rig.toml:3: `cylinder.area_a` must be a quantity"),
+        (declared().replace("\"12.6 cm^2\"", "nan"), "rig.toml:2: `cylinder.area_a` is NaN"),
+        (declared().replace("\"12.6 cm^2\"", "[1]"), "rig.toml:2: `cylinder.area_a` must be a quantity"),
         (
-            PAPER.replace("stroke = \"0.2 m\"", ""),
-            "rig.toml:2: missing key `cylinder.stroke`: above 0 to 100 m",
+            declared().replace("stroke = \"0.2 m\"", ""),
+            "rig.toml:1: missing key `cylinder.stroke`: above 0 to 100 m",
         ),
-        (PAPER.replace("[fluid]", "[fluids]"), "rig.toml:7: unknown key `fluids`"),
-        (PAPER.replace("20 L/min", "20 gpm"), "rig.toml:11: `sensors.flow.full_scale`: unit `gpm`"),
+        (declared().replace("[fluid]", "[fluids]"), "rig.toml:6: unknown key `fluids`"),
+        (declared().replace("20 L/min", "20 gpm"), "rig.toml:10: `sensors.flow.full_scale`: unit `gpm`"),
         (
-            PAPER.replace("accuracy = \"1 %\"", "accuracy = \"200 %\""),
-            "rig.toml:11: `sensors.flow.accuracy` is 2;",
+            declared().replace("accuracy = \"1 %\"", "accuracy = \"200 %\""),
+            "rig.toml:10: `sensors.flow.accuracy` is 2;",
         ),
-        (PAPER.replace("[fluid]", "[fluid"), "rig.toml:7: not a TOML file:"),
-        (PAPER.to_owned() + "[estimator]\nkind = \"kalman\"", "it must be rls or paper"),
+        (declared().replace("[fluid]", "[fluid"), "rig.toml:6: not a TOML file:"),
+        (declared() + "[estimator]\nkind = \"kalman\"", "it must be rls or paper"),
         (
-            PAPER.to_owned() + "[columns]\npa = { name = \"p\" }",
+            declared() + "[columns]\npa = { name = \"p\" }",
             "missing key `columns.pa.unit`: one of pa, kpa, mpa, bar",
         ),
-        (PAPER.to_owned() + "[effects]\nmagic = 1", "unknown key `effects.magic`"),
+        (declared() + "[effects]\nmagic = 1", "unknown key `effects.magic`"),
         (String::new(), "rig.toml: missing key `cylinder.area_a`"),
     ];
     for (text, expected) in cases {

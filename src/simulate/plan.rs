@@ -1,7 +1,6 @@
 use super::{Biases, EffectSize, EffectsError, LeakSize, Recording, Scenario, effects};
 use crate::Rig;
 use crate::reference::Reference;
-use crate::rig::Instrument;
 use crate::units::{self, Dimension};
 use pitchleak_core::{PerLeak, Sensors};
 
@@ -46,16 +45,7 @@ impl Noise {
             Self::None => 0.0,
             Self::Share(share) => share,
         };
-        let mut sheets = rig.instruments;
-        let all: [&mut Instrument; 5] = [
-            &mut sheets.flow_a,
-            &mut sheets.flow_b,
-            &mut sheets.pressure,
-            &mut sheets.position,
-            &mut sheets.force,
-        ];
-        all.into_iter().for_each(|sheet| sheet.accuracy = accuracy);
-        sheets.spread()
+        rig.instruments.with_accuracy(accuracy).spread()
     }
 }
 

@@ -2,38 +2,26 @@
 
 #![allow(clippy::unwrap_used)]
 
+use pitchleak::core::PerLeak;
+use pitchleak_testkit::Motion;
+use pitchleak_testkit::rig::with_sensors_of;
+use pitchleak_testkit::trace_text::{HEADER, file, row};
 use std::fs;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const RIG: &str = r#"
-[cylinder]
-area_a = "12.6 cm^2"
-area_b = "9.4 cm^2"
-stroke = "0.2 m"
-moving_mass = "20 kg"
-[fluid]
-bulk_modulus = "0.8 GPa"
-bulk_modulus_std = "0.2 GPa"
-[sensors]
-flow = { full_scale = "20 L/min", accuracy = "0.1 %" }
-pressure = { full_scale = "16 MPa", accuracy = "0.1 %" }
-position = { full_scale = "0.2 m", accuracy = "0.1 %" }
-"#;
+const INTERNAL: f64 = 1.2e-11;
 
 /// 40 s of the paper's cylinder, flow meter A reading `gain` too much.
 fn trace(gain: f64) -> String {
-    let row = |i: i32| {
-        let t = f64::from(i) * 0.01;
-        let (x, v) = (0.1 + 0.03 * (0.8 * t).sin(), 0.03 * 0.8 * (0.8 * t).cos());
-        let (pa, pb) = (5e6 + 1e6 * (1.5 * t).sin(), 3e6 + 5e5 * (1.9 * t).cos());
-        let (pa_rate, pb_rate) = (1.5e6 * (1.5 * t).cos(), -9.5e5 * (1.9 * t).sin());
-        let leak = 1.2e-11 * (pa - pb);
-        let qa = 1.26e-3 * v + leak + 1.26e-3 * x / 0.8e9 * pa_rate;
-        let qb = -0.94e-3 * v - leak + 0.94e-3 * (0.2 - x) / 0.8e9 * pb_rate;
-        format!("{t:.2},{x:.9},{pa:.3},{pb:.3},{:.9e},{qb:.9e}\n", qa * (1.0 + gain))
+    let motion = Motion::sines(PerLeak { internal: INTERNAL, external_a: 0.0, external_b: 0.0 });
+    let row = |k: u32| {
+        let t = f64::from(k) * 0.01;
+        let mut sample = motion.sample(t);
+        sample.qa_m3s = sample.qa_m3s.map(|flow| flow * (1.0 + gain));
+        row(t, motion.position_m.slope(t), &sample)
     };
-    "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s\n".to_owned() + &(0..4000).map(row).collect::<String>()
+    file(&(0..4000).map(row).collect::<Vec<_>>())
 }
 
 fn pitchleak(folder: &TempDir, arguments: &[&str]) -> Output {
@@ -42,7 +30,7 @@ fn pitchleak(folder: &TempDir, arguments: &[&str]) -> Output {
 
 fn folder(gain: f64) -> TempDir {
     let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("rig.toml"), RIG).unwrap();
+    fs::write(folder.path().join("rig.toml"), with_sensors_of("0.1 %")).unwrap();
     fs::write(folder.path().join("trace.csv"), trace(gain)).unwrap();
     folder
 }
@@ -62,7 +50,7 @@ fn it_names_the_effect_and_saves_a_rig_that_replay_uses() {
     assert!(folder.path().join("new.toml").is_file());
     let replayed = json(&pitchleak(&folder, &["replay", "trace.csv", "--json", "--rig", "new.toml"]));
     let leak = replayed["estimates"]["internal_leak_coefficient"]["value"].as_f64().unwrap();
-    assert!((leak / 1.2e-11 - 1.0).abs() < 0.02, "{leak}");
+    assert!((leak / INTERNAL - 1.0).abs() < 0.02, "{leak}");
     let again = json(&pitchleak(&folder, &["diagnose", "trace.csv", "--json", "--rig", "new.toml"]));
     assert_eq!(again["verdict"], "no_missing_effect");
 }
@@ -98,7 +86,7 @@ fn several_traces_are_fitted_together_and_others_judged() {
 #[test]
 fn bad_input_is_one_clear_line() {
     let folder = folder(0.0);
-    fs::write(folder.path().join("header.csv"), "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s\n").unwrap();
+    fs::write(folder.path().join("header.csv"), format!("{HEADER}\n")).unwrap();
     for arguments in [
         vec!["diagnose", "absent.csv"],
         vec!["diagnose", "header.csv"],

@@ -2,33 +2,21 @@
 
 #![allow(clippy::unwrap_used)]
 
+use pitchleak::core::PerLeak;
+use pitchleak_testkit::Motion;
+use pitchleak_testkit::rig::PAPER;
+use pitchleak_testkit::trace_text::{HEADER, file};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
-const HEADER: &str = "t_s,x_m,v_mps,pa_pa,pb_pa,qa_m3s,qb_m3s";
 const INTERNAL: f64 = 1.2e-11;
 
-/// A trace of the paper's cylinder without compressibility: `rows` at 100 Hz with an internal leak.
-fn rows(rows: usize) -> Vec<String> {
-    let row = |i: usize| {
-        let t = i as f64 * 0.01;
-        let (x, v) = (0.1 + 0.03 * (0.8 * t).sin(), 0.03 * 0.8 * (0.8 * t).cos());
-        let (pa, pb) = (5e6 + 1e6 * (0.5 * t).sin(), 3e6 + 5e5 * (0.9 * t).cos());
-        let beta = 0.8e9;
-        let (pa_rate, pb_rate) = (0.5e6 * (0.5 * t).cos(), -4.5e5 * (0.9 * t).sin());
-        let leak = INTERNAL * (pa - pb);
-        let qa = 1.26e-3 * v + leak + 1.26e-3 * x / beta * pa_rate;
-        let qb = -0.94e-3 * v - leak + 0.94e-3 * (0.2 - x) / beta * pb_rate;
-        format!("{t:.2},{x:.9},{v:.9},{pa:.3},{pb:.3},{qa:.9e},{qb:.9e}")
-    };
-    (0..rows).map(row).collect()
-}
-
-fn file(rows: &[String]) -> String {
-    format!("{HEADER}\n{}\n", rows.join("\n"))
+/// The first `count` rows of a trace of the paper's cylinder with an internal leak.
+fn rows(count: u32) -> Vec<String> {
+    Motion::sines(PerLeak { internal: INTERNAL, external_a: 0.0, external_b: 0.0 }).rows(count)
 }
 
 struct Place {
@@ -246,17 +234,14 @@ fn bom_and_crlf_change_nothing() {
     assert_eq!(plain["estimates"], windows["estimates"]);
 }
 
-const RIG: &str = "[cylinder]\narea_a = \"12.6 cm^2\"\narea_b = \"9.4 cm^2\"\nstroke = \"0.2 m\"\nmoving_mass = \"20 kg\"\n\
-                   [fluid]\nbulk_modulus = \"0.8 GPa\"\n";
-
 #[test]
 fn the_rig_beside_the_trace_is_used_and_named() {
     let place = Place::new();
     let trace = place.write("trace.csv", file(&rows(500)));
-    let rig = place.write("rig.toml", RIG);
+    let rig = place.write("rig.toml", PAPER);
     let beside = json(&replay(&trace, &["--json"]));
     assert_eq!(beside["rig"], rig.display().to_string());
-    let named = place.write("other.toml", RIG);
+    let named = place.write("other.toml", PAPER);
     let named = named.display().to_string();
     assert_eq!(json(&replay(&trace, &["--json", "--rig", &named]))["rig"], named);
 }
@@ -268,14 +253,14 @@ fn bad_rig_files_are_refused_in_one_line() {
     let cases: [(&str, String, &[&str]); 6] = [
         (
             "unknown key",
-            RIG.replace("stroke", "strok"),
+            PAPER.replace("stroke", "strok"),
             &["rig.toml:4", "`cylinder.strok`", "allowed here: area_a"],
         ),
-        ("wrong unit", RIG.replace("9.4 cm^2", "9.4 bar"), &["rig.toml:3", "`bar`", "m^2, cm^2, mm^2"]),
-        ("impossible", RIG.replace("0.2 m", "-0.2 m"), &["rig.toml:4", "cylinder.stroke", "above 0"]),
+        ("wrong unit", PAPER.replace("9.4 cm^2", "9.4 bar"), &["rig.toml:3", "`bar`", "m^2, cm^2, mm^2"]),
+        ("impossible", PAPER.replace("0.2 m", "-0.2 m"), &["rig.toml:4", "cylinder.stroke", "above 0"]),
         (
             "missing",
-            RIG.replace("[fluid]\nbulk_modulus = \"0.8 GPa\"\n", ""),
+            PAPER.split("[fluid]").next().unwrap().to_owned(),
             &["missing key `fluid.bulk_modulus`"],
         ),
         ("no TOML", "area: 3".to_owned(), &["rig.toml:1", "not a TOML file"]),

@@ -9,24 +9,28 @@
 #![allow(clippy::unwrap_used)] // helpers of tests are no tests to clippy
 
 use pitchleak_core::plant::{CylinderPlant, Drive};
-use pitchleak_core::{Cylinder, Fluid, Model, PerLeak};
-use std::path::PathBuf;
+use pitchleak_core::{Model, PerLeak};
+use pitchleak_testkit::hopsan::{self, Recording, STEP_S};
 
-/// Columns of the trace: t, x, v, P_A, P_B, Q_A, Q_B, force.
-type Row = [f64; 8];
+/// One instant of the trace.
+type Row = [f64; 7];
+/// Places in a row.
+const X: usize = 0;
+const V: usize = 1;
+const PA: usize = 2;
+const PB: usize = 3;
+const QA: usize = 4;
+const QB: usize = 5;
+const FORCE: usize = 6;
 
-fn trace(name: &str) -> Option<Vec<Row>> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/hopsan")
-        .join(name)
-        .with_extension("csv.gz");
-    let file = std::fs::File::open(&path).ok()?;
-    let mut reader = csv::Reader::from_reader(flate2::read::GzDecoder::new(file));
-    let rows = reader.records().map(|record| {
-        let record = record.unwrap();
-        std::array::from_fn(|i| record[i].parse().unwrap())
-    });
-    Some(rows.collect())
+fn columns(recording: &Recording) -> Vec<Row> {
+    let row = |row: &hopsan::Row| {
+        let sample = &row.sample;
+        let measured = |cell: Option<f64>| cell.unwrap();
+        let flows = [measured(sample.qa_m3s), measured(sample.qb_m3s)];
+        [sample.x_m, row.v_mps, sample.pa_pa, sample.pb_pa, flows[0], flows[1], measured(sample.force_n)]
+    };
+    recording.rows.iter().map(row).collect()
 }
 
 /// Value of a column `share` of the way from row `i` to the next.
@@ -48,24 +52,25 @@ fn between(rows: &[Row], i: usize, share: f64, column: usize) -> f64 {
 /// each restart from a recorded state.
 fn nrmse(rows: &[Row], model: Model<f64>, window_s: f64) -> [f64; 3] {
     let plant = CylinderPlant::new(model).unwrap();
-    let window = (window_s / 0.01).round() as usize;
+    let window = (window_s / STEP_S).round() as usize;
     let inner = 100;
     let mut squares = [0.0; 3];
-    let mut state = plant.state_at(rows[0][1], rows[0][2], rows[0][3], rows[0][4]);
+    let recorded = |row: &Row| plant.state_at(row[X], row[V], row[PA], row[PB]);
+    let mut state = recorded(&rows[0]);
     for i in 0..rows.len() - 1 {
         if i % window == 0 {
-            state = plant.state_at(rows[i][1], rows[i][2], rows[i][3], rows[i][4]);
+            state = recorded(&rows[i]);
         }
         for k in 0..inner {
-            let step = 0.01 / f64::from(inner);
+            let step = STEP_S / f64::from(inner);
             state = plant.step(&state, step, |elapsed| {
-                let share = (f64::from(k) * step + elapsed) / 0.01;
+                let share = (f64::from(k) * step + elapsed) / STEP_S;
                 let value = |column| between(rows, i, share, column);
-                Drive { qa_m3s: value(5), qb_m3s: value(6), force_n: value(7) }
+                Drive { qa_m3s: value(QA), qb_m3s: value(QB), force_n: value(FORCE) }
             });
         }
         let (pa, pb) = plant.pressures_pa(&state);
-        for (sum, (seen, column)) in squares.iter_mut().zip([(state.x_m, 1), (pa, 3), (pb, 4)]) {
+        for (sum, (seen, column)) in squares.iter_mut().zip([(state.x_m, X), (pa, PA), (pb, PB)]) {
             *sum += (seen - rows[i + 1][column]).powi(2);
         }
     }
@@ -74,46 +79,30 @@ fn nrmse(rows: &[Row], model: Model<f64>, window_s: f64) -> [f64; 3] {
         values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
     };
     let share = |sum: f64, column| (sum / (rows.len() - 1) as f64).sqrt() / range(column);
-    [share(squares[0], 1), share(squares[1], 3), share(squares[2], 4)]
+    [share(squares[0], X), share(squares[1], PA), share(squares[2], PB)]
 }
 
-fn paper_size(mass_kg: f64, bulk_modulus_pa: f64, leaks: PerLeak<f64>) -> Model<f64> {
-    Model {
-        cylinder: Cylinder { moving_mass_kg: mass_kg, ..Cylinder::paper() },
-        fluid: Fluid { bulk_modulus_pa, bulk_modulus_std_pa: 0.0 },
-        leaks_m3spa: leaks,
-    }
-}
-
-fn agrees(name: &str, model: Model<f64>) {
-    let Some(rows) = trace(name) else {
-        println!("{name}: the independent simulator's traces are not here, nothing compared");
-        return;
-    };
-    for window_s in [60.0, 10.0, 1.0] {
-        let [x, pa, pb] = nrmse(&rows, model, window_s);
-        println!("{name}, {window_s:>2} s open loop: NRMSE x {x:.2e}, P_A {pa:.2e}, P_B {pb:.2e}");
-        assert!(pa < 1e-3 && pb < 1e-3 && x < 1e-3, "{name} over {window_s} s");
-    }
+fn model(recording: &Recording) -> Model<f64> {
+    Model { cylinder: recording.cylinder, fluid: recording.fluid, leaks_m3spa: recording.leaks }
 }
 
 #[test]
-fn val_h02_internal_leak() {
-    let leaks = PerLeak { internal: 1.2e-11, ..PerLeak::default() };
-    agrees("h02", paper_size(30.0, 0.9e9, leaks));
-}
-
-#[test]
-fn val_h06_external_leaks() {
-    let leaks = PerLeak { external_a: 4e-12, external_b: 2.5e-12, ..PerLeak::default() };
-    agrees("h06", paper_size(50.0, 1.1e9, leaks));
+fn val_plant_shows_the_simulators_pressures() {
+    for recording in ["h02", "h06"].map(hopsan::read) {
+        let (rows, name) = (columns(&recording), recording.name);
+        for window_s in [60.0, 10.0, 1.0] {
+            let [x, pa, pb] = nrmse(&rows, model(&recording), window_s);
+            println!("{name}, {window_s:>2} s open loop: NRMSE x {x:.2e}, P_A {pa:.2e}, P_B {pb:.2e}");
+            assert!(pa < 1e-3 && pb < 1e-3 && x < 1e-3, "{name} over {window_s} s");
+        }
+    }
 }
 
 /// The comparison can fail: a leak left out shows in the pressures at once.
 #[test]
 fn val_a_missing_leak_is_seen() {
-    if let Some(rows) = trace("h02") {
-        let [_, pa, pb] = nrmse(&rows, paper_size(30.0, 0.9e9, PerLeak::default()), 1.0);
-        assert!(pa.max(pb) > 0.05, "P_A {pa}, P_B {pb}");
-    }
+    let recording = hopsan::read("h02");
+    let sound = Model { leaks_m3spa: PerLeak::default(), ..model(&recording) };
+    let [_, pa, pb] = nrmse(&columns(&recording), sound, 1.0);
+    assert!(pa.max(pb) > 0.05, "P_A {pa}, P_B {pb}");
 }

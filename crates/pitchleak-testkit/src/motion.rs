@@ -1,22 +1,25 @@
-//! Exact traces for the tests: position and pressures are chosen as sums of sines, the flows then follow from
+//! Exact traces: position and pressures are chosen as sums of sines, the flows then follow from
 //! eq. (1) with analytic derivatives, so nothing is approximated.
 
-use pitchleak::core::{Cylinder, PerLeak, Sample};
+use pitchleak_core::{Cylinder, Fluid, PerLeak, Sample};
 
 /// Sum of sines about a mean.
 #[derive(Clone, Debug)]
 pub struct Multisine {
+    /// The mean.
     pub mean: f64,
     /// Amplitude, frequency in Hz, phase in rad.
     pub lines: Vec<(f64, f64, f64)>,
 }
 
 impl Multisine {
+    /// Value at time t, s.
     pub fn value(&self, t: f64) -> f64 {
         let tau = std::f64::consts::TAU;
         self.mean + self.lines.iter().map(|(a, f, p)| a * (tau * f * t + p).sin()).sum::<f64>()
     }
 
+    /// Its slope, 1/s.
     pub fn slope(&self, t: f64) -> f64 {
         let tau = std::f64::consts::TAU;
         self.lines.iter().map(|(a, f, p)| a * tau * f * (tau * f * t + p).cos()).sum()
@@ -26,11 +29,17 @@ impl Multisine {
 /// A cylinder with leaks and its motion.
 #[derive(Clone, Debug)]
 pub struct Motion {
+    /// The cylinder.
     pub cylinder: Cylinder<f64>,
+    /// β, Pa.
     pub bulk_modulus_pa: f64,
+    /// C_ip, C_epA, C_epB, m³/(s·Pa).
     pub leaks: PerLeak<f64>,
+    /// Piston position, m.
     pub position_m: Multisine,
+    /// P_A, Pa.
     pub pressure_a_pa: Multisine,
+    /// P_B, Pa.
     pub pressure_b_pa: Multisine,
 }
 
@@ -45,12 +54,33 @@ impl Motion {
         let load_b = [(0.5, 0.05, 3.0), (0.4, 0.11, 1.3), (0.4, 0.34, 3.9), (0.2, 0.9, 5.1)];
         Self {
             cylinder: Cylinder::paper(),
-            bulk_modulus_pa: 0.9e9,
+            bulk_modulus_pa: Fluid::paper().bulk_modulus_pa,
             leaks,
             position_m: Multisine { mean: 0.09, lines: lines(0.04, &slow) },
             pressure_a_pa: Multisine { mean: 5.2e6, lines: lines(1e6, &load_a) },
             pressure_b_pa: Multisine { mean: 4.1e6, lines: lines(1e6, &load_b) },
         }
+    }
+
+    /// The paper's cylinder with one slow sine for each signal.
+    pub fn sines(leaks: PerLeak<f64>) -> Self {
+        let sine = |mean, amplitude, rate_rad_s: f64, phase| Multisine {
+            mean,
+            lines: vec![(amplitude, rate_rad_s / std::f64::consts::TAU, phase)],
+        };
+        Self {
+            cylinder: Cylinder::paper(),
+            bulk_modulus_pa: Fluid::paper().bulk_modulus_pa,
+            leaks,
+            position_m: sine(0.1, 0.04, 0.9, 0.0),
+            pressure_a_pa: sine(6e6, 1e6, 1.3, 0.0),
+            pressure_b_pa: sine(4e6, 8e5, 0.7, 1.0),
+        }
+    }
+
+    /// `seconds` of readings at 100 Hz.
+    pub fn samples(&self, seconds: u32) -> Vec<Sample<f64>> {
+        (0..100 * seconds).map(|k| self.sample(f64::from(k) * 0.01)).collect()
     }
 
     /// Noise-free reading at time t.

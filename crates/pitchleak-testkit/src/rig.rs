@@ -1,0 +1,24 @@
+//! Rig files.
+
+/// The paper's cylinder and oil. Sensors are the paper's where a rig file names none.
+pub const PAPER: &str = r#"[cylinder]
+area_a = "12.6 cm^2"
+area_b = "9.4 cm^2"
+stroke = "0.2 m"
+moving_mass = "20 kg"
+[fluid]
+bulk_modulus = "0.8 GPa"
+bulk_modulus_std = "0.2 GPa"
+"#;
+
+/// The paper's rig with sensors of this accuracy, for instance `"0.1 %"`.
+pub fn with_sensors_of(accuracy: &str) -> String {
+    format!(
+        r#"{PAPER}[sensors]
+flow = {{ full_scale = "20 L/min", accuracy = "{accuracy}", bias = "0 %", gain = "0 %" }}
+pressure = {{ full_scale = "16 MPa", accuracy = "{accuracy}" }}
+position = {{ full_scale = "0.2 m", accuracy = "{accuracy}" }}
+force = {{ full_scale = "10 kN", accuracy = "{accuracy}" }}
+"#
+    )
+}
