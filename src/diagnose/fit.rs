@@ -458,27 +458,13 @@ fn motions(traces: &[Series], point: &Point, sensors: &Sensors<f64>) -> Vec<Moti
 }
 
 fn prior(term: Term, declared: &Declared) -> Option<Prior> {
-    let spread = |std: f64| (std > 0.0).then_some(Prior { mean: 0.0, std });
-    let sensors = &declared.sensors;
     match term {
         Term::InverseBulk => {
             let bulk = declared.fluid.bulk_modulus_pa;
             let share = (declared.fluid.bulk_modulus_std_pa / bulk).max(1e-6);
             Some(Prior { mean: 1.0 / bulk, std: share / bulk })
         }
-        Term::Effect(effect) => match effect {
-            Effect::FlowMeterOffsetA => spread(sensors.flow_a.bias_std),
-            Effect::FlowMeterOffsetB => spread(sensors.flow_b.bias_std),
-            Effect::FlowMeterGainA => spread(sensors.flow_a.gain_std),
-            Effect::FlowMeterGainB => spread(sensors.flow_b.gain_std),
-            Effect::PositionGain => spread(sensors.position.gain_std),
-            Effect::PositionOffset => spread(sensors.position.bias_std),
-            Effect::PressureOffsetA | Effect::PressureOffsetB => spread(sensors.pressure.bias_std),
-            Effect::PressureGainA | Effect::PressureGainB => spread(sensors.pressure.gain_std),
-            Effect::ForceGain => spread(sensors.force.gain_std),
-            Effect::LoadOffset => spread(sensors.force.bias_std),
-            _ => None,
-        },
+        Term::Effect(effect) => effect.prior_std(&declared.sensors).map(|std| Prior { mean: 0.0, std }),
         _ => None,
     }
 }

@@ -74,7 +74,7 @@ pub(super) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term:
 
 /// Every column: the declared model's, the candidates', the nameless ones.
 pub(super) fn all() -> Vec<Term> {
-    let known = Effect::ALL.iter().copied().filter(|e| *e != Effect::ExternalLeakB).map(Term::Effect);
+    let known = Effect::ALL.iter().copied().map(Term::Effect);
     DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
 }
 

@@ -179,19 +179,33 @@ impl Leakage {
     }
 }
 
-/// Offsets of the flow meters, reading minus truth.
+/// Offsets of the flow meters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FlowMeterOffsets {
     /// Meter A.
-    pub a: Leakage,
+    pub a: FlowMeterOffset,
     /// Meter B.
-    pub b: Leakage,
+    pub b: FlowMeterOffset,
+}
+
+/// What a flow meter reads beside the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FlowMeterOffset {
+    /// Reading minus truth, L/min.
+    #[serde(rename = "mean_lpm")]
+    pub offset_lpm: f64,
+    /// Standard deviation of its error, L/min.
+    pub std_lpm: f64,
 }
 
 impl FlowMeterOffsets {
     /// From offsets in m³/s.
-    pub fn new([a, b]: [Estimate<f64>; 2]) -> Self {
-        Self { a: Leakage::new(a), b: Leakage::new(b) }
+    pub fn new(offsets_m3s: [Estimate<f64>; 2]) -> Self {
+        let [a, b] = offsets_m3s.map(|offset| {
+            let Estimate { value, std } = offset.scaled(LPM_PER_M3S);
+            FlowMeterOffset { offset_lpm: value, std_lpm: std }
+        });
+        Self { a, b }
     }
 }
 

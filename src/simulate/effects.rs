@@ -1,6 +1,6 @@
 use crate::Rig;
 use pitchleak_core::effects::{EffectConstants, EffectError, UnknownEffect};
-use pitchleak_core::{Effect, EffectSet};
+use pitchleak_core::{Effect, EffectSet, Leak};
 
 /// One effect and its size, SI: `viscous_friction=1500`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,9 +25,38 @@ pub enum EffectsError {
         /// The ids that are known.
         source: UnknownEffect,
     },
+    /// A leak of the model itself.
+    #[error("`{id}` is a leak of the model, not an effect: use --leak-{leak} (in Python `{argument}`)")]
+    ModelLeak {
+        /// As named.
+        id: String,
+        /// The leak, as the command line has it.
+        leak: String,
+        /// The leak, as Python has it.
+        argument: String,
+    },
     /// The value does not suit the effect, or there are too many.
     #[error(transparent)]
     Value(#[from] EffectError),
+}
+
+impl EffectSize {
+    /// The effect of this id.
+    ///
+    /// # Errors
+    /// [`EffectsError::Unknown`], [`EffectsError::ModelLeak`].
+    pub fn new(id: &str, value: f64) -> Result<Self, EffectsError> {
+        let own = ["internal_leak", "external_leak_a", "external_leak_b"];
+        if let Some((_, leak)) = own.into_iter().zip(Leak::ALL).find(|(name, _)| *name == id) {
+            return Err(EffectsError::ModelLeak {
+                id: id.to_owned(),
+                leak: leak.id().replace('_', "-"),
+                argument: format!("leak_{}", leak.id()),
+            });
+        }
+        let effect = id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })?;
+        Ok(Self { effect, value })
+    }
 }
 
 impl std::str::FromStr for EffectSize {
@@ -36,9 +65,7 @@ impl std::str::FromStr for EffectSize {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let form = || EffectsError::Form(text.to_owned());
         let (id, value) = text.split_once('=').ok_or_else(form)?;
-        let id = id.trim();
-        let effect = id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })?;
-        Ok(Self { effect, value: value.trim().parse().map_err(|_| form())? })
+        Self::new(id.trim(), value.trim().parse().map_err(|_| form())?)
     }
 }
 
@@ -66,6 +93,8 @@ mod tests {
         assert!(matches!("viscous_friction=much".parse::<EffectSize>(), Err(EffectsError::Form(_))));
         let unknown = "sand=1".parse::<EffectSize>().expect_err("no such effect").to_string();
         assert!(unknown.starts_with("`sand`: ") && unknown.contains("position_gain"), "{unknown}");
+        let leak = "external_leak_b=1e-12".parse::<EffectSize>().expect_err("the model's own").to_string();
+        assert!(leak.contains("--leak-external-b") && leak.contains("`leak_external_b`"), "{leak}");
         let out_of_range = [EffectSize { effect: Effect::ViscousFriction, value: f64::NAN }];
         assert!(matches!(effects(&Rig::paper(), &out_of_range), Err(EffectsError::Value(_))));
     }

@@ -199,28 +199,27 @@ struct RunningRig {
     lagging: Vec<Lagging>,
 }
 
-/// A signal that is shown late.
+/// Sensors that answer late by an effect.
 struct Lagging {
-    signal: fn(&mut Signals<f64>) -> &mut f64,
+    effect: Effect,
     lag_s: f64,
-    reading: LaggedReading<f64>,
+    readings: [Option<LaggedReading<f64>>; 2],
 }
 
 impl Lagging {
-    /// The signals that an effect delays.
-    fn of(effect: Effect) -> &'static [fn(&mut Signals<f64>) -> &mut f64] {
-        match effect {
-            Effect::FlowMeterLag => &[|m| &mut m.qa_m3s, |m| &mut m.qb_m3s],
-            Effect::PressureLagA => &[|m| &mut m.pa_pa],
-            Effect::PressureLagB => &[|m| &mut m.pb_pa],
-            _ => &[],
-        }
+    /// Sensors that have shown these signals for long; none where the effect delays nothing.
+    fn new(effect: Effect, lag_s: f64, signals: &mut Signals<f64>) -> Option<Self> {
+        let readings = effect.late(signals).map(|signal| signal.map(|now| LaggedReading::new(*now)));
+        readings.iter().any(Option::is_some).then_some(Self { effect, lag_s, readings })
     }
 
-    /// Puts the late reading in the signal's place.
+    /// Puts the late readings in the signals' place.
     fn show(&mut self, step_s: f64, signals: &mut Signals<f64>) {
-        let signal = (self.signal)(signals);
-        *signal = self.reading.update(step_s, self.lag_s, *signal);
+        for (signal, reading) in self.effect.late(signals).into_iter().zip(&mut self.readings) {
+            if let (Some(signal), Some(reading)) = (signal, reading) {
+                *signal = reading.update(step_s, self.lag_s, *signal);
+            }
+        }
     }
 }
 
@@ -234,16 +233,13 @@ impl RunningRig {
         let emulator = Emulator::new(params, reference.position_m.at(t_s), reference.load_n.at(t_s))?;
         let (mut prompt, mut lagging) = (EffectSet::default(), Vec::new());
         let mut now = emulator.reading().signals;
-        for active in
-            effects.iter().filter(|active| active.value > 0.0 || Lagging::of(active.effect).is_empty())
-        {
-            for signal in Lagging::of(active.effect) {
-                let reading = LaggedReading::new(*signal(&mut now));
-                lagging.push(Lagging { signal: *signal, lag_s: active.value, reading });
-            }
-            if Lagging::of(active.effect).is_empty() {
-                // As many fit as there were, and they were within their bounds.
-                let _ = prompt.set(active.effect, active.value, active.constants);
+        for active in effects.iter() {
+            match Lagging::new(active.effect, active.value, &mut now) {
+                Some(sensor) => lagging.push(sensor),
+                None => {
+                    // As many fit as there were, and they were within their bounds.
+                    let _ = prompt.set(active.effect, active.value, active.constants);
+                }
             }
         }
         Ok(Self { emulator, prompt, lagging })

@@ -1,7 +1,7 @@
 //! The table of effects and the maps between truth and reading.
 
 use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectError, EffectKind, LaggedReading};
-use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, SensorSpread, Sensors, Signals};
 use proptest::prelude::*;
 
 fn signals() -> impl Strategy<Value = Signals<f64>> {
@@ -116,9 +116,80 @@ fn a_set_refuses_what_cannot_be() {
     assert_eq!(set.iter().count(), 8);
 }
 
+/// A term that moves with a measured left side of the chambers' equations carries its noise, and says so.
+#[test]
+fn what_carries_the_noise_of_the_left_side_is_in_proportion_to_it() {
+    use pitchleak_core::effects::LeftSide;
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    let rest =
+        Signals { x_m: 0.09, pa_pa: 4e6, pb_pa: 1e6, dpa_pas: 1e6, temp_k: 330.0, ..Signals::default() };
+    let sides = [
+        (LeftSide::Speed, Signals { v_mps: 0.05, ..rest }, Signals { v_mps: 0.1, ..rest }),
+        (LeftSide::FlowA, Signals { qa_m3s: 1e-4, ..rest }, Signals { qa_m3s: 2e-4, ..rest }),
+        (LeftSide::FlowB, Signals { qb_m3s: 1e-4, ..rest }, Signals { qb_m3s: 2e-4, ..rest }),
+    ];
+    for effect in Effect::ALL.iter().copied() {
+        for (side, one, two) in &sides {
+            let flows = |at: &Signals<f64>| {
+                let own = effect.unit_term(at, &model, &constants);
+                let none = effect.unit_term(&rest, &model, &constants);
+                [own.chamber_a_m3s - none.chamber_a_m3s, own.chamber_b_m3s - none.chamber_b_m3s]
+            };
+            let size = flows(one)[0].abs() + flows(one)[1].abs();
+            let carries = effect.spec().carries == Some(*side);
+            assert_eq!(size > 1e-9, carries, "{effect} {side:?} {size}");
+            for (one, two) in flows(one).into_iter().zip(flows(two)) {
+                assert!((two - 2.0 * one).abs() < 1e-9 * size + 1e-12, "{effect} {side:?}");
+            }
+        }
+    }
+}
+
+/// What is known of a sensor's error beforehand is what its data sheet says, each of its own.
+#[test]
+fn a_sensors_declared_error_is_the_prior_of_its_effect() {
+    let spread = |k: f64| SensorSpread { noise_std: 99.0, bias_std: k, gain_std: 10.0 * k };
+    let sensors = Sensors {
+        flow_a: spread(1.0),
+        flow_b: spread(2.0),
+        pressure: spread(3.0),
+        position: spread(4.0),
+        force: spread(5.0),
+    };
+    for effect in Effect::ALL.iter().copied() {
+        let id = effect.spec().id;
+        let sensor = ["flow_meter_", "pressure_", "position_", "force_", "load_offset"]
+            .iter()
+            .position(|name| id.starts_with(name))
+            .filter(|_| id.contains("offset") || id.contains("gain"));
+        let own = sensor.map(|k| match (k, id.ends_with("_b")) {
+            (0, false) => 1.0,
+            (0, true) => 2.0,
+            (1, _) => 3.0,
+            (2, _) => 4.0,
+            _ => 5.0,
+        });
+        let expected = own.map(|own| if id.contains("gain") { 10.0 * own } else { own });
+        assert_eq!(effect.prior_std(&sensors), expected, "{effect}");
+        assert_eq!(effect.prior_std(&Sensors::<f64>::default()), None, "{effect}");
+    }
+}
+
+/// A lag's value is a time, and the signals that it delays are those that its map changes.
+#[test]
+fn late_sensors_are_those_that_a_lag_delays() {
+    let moving = Signals { dqa_m3s2: 1.0, dqb_m3s2: 1.0, dpa_pas: 1.0, dpb_pas: 1.0, ..Signals::default() };
+    for effect in Effect::ALL.iter().copied() {
+        let mut shown = effect.read(0.5, &moving);
+        let late: Vec<f64> = effect.late(&mut shown).into_iter().flatten().map(|signal| *signal).collect();
+        assert_eq!(!late.is_empty(), effect.spec().unit == "s", "{effect}");
+        assert!(late.iter().all(|signal| (signal + 0.5).abs() < 1e-12), "{effect}: {late:?}");
+    }
+}
+
 /// A fit varies exactly the constants that an effect's term depends on.
 #[test]
-fn every_shape_parameter_that_matters_is_listed() {
+fn every_constant_that_matters_is_listed() {
     let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
     let at = Signals {
         x_m: 0.09,

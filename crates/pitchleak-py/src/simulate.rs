@@ -155,10 +155,7 @@ impl Order {
     }
 
     fn plan(&self) -> PyResult<Plan> {
-        let effect = |(id, value): (&String, &f64)| -> PyResult<EffectSize> {
-            let effect = id.parse().map_err(|error| value_error(format!("`{id}`: {error}")))?;
-            Ok(EffectSize { effect, value: *value })
-        };
+        let effect = |(id, value): (&String, &f64)| EffectSize::new(id, *value).map_err(value_error);
         let leak = |name, size: &Quantity| size.parsed::<LeakSize>(name);
         let time = |name, time: &Option<Quantity>| {
             time.as_ref().map(|time| time.si(name, Dimension::Time)).transpose()

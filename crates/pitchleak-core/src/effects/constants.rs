@@ -1,4 +1,3 @@
-use super::Effect;
 use crate::Real;
 
 /// The constants in which some effects are not linear. Every effect is linear in its value.
@@ -80,22 +79,6 @@ impl EffectConstant {
             Self::ReferenceTemp => ("reference_temp", "K", 200.0, 500.0),
         };
         EffectConstantSpec { id, unit, lower, upper }
-    }
-}
-
-impl Effect {
-    /// The constants constants on which this effect's term depends; empty for most.
-    pub const fn constants(self) -> &'static [EffectConstant] {
-        use EffectConstant as P;
-        match self {
-            Self::EntrainedAir => &[P::PolytropicExponent],
-            Self::AccumulatorA | Self::AccumulatorB => &[P::Precharge, P::PolytropicExponent],
-            Self::PositionDependentLeak => &[P::SpotPosition, P::SpotWidth],
-            Self::InternalLeakTemperature => &[P::ReferenceTemp],
-            Self::CoulombFriction | Self::SealFriction => &[P::SlipSpeed],
-            Self::StribeckFriction => &[P::StribeckSpeed, P::SlipSpeed],
-            _ => &[],
-        }
     }
 }
 

@@ -1,16 +1,18 @@
-//! Effects that the plain model of eq. (1)–(2) lacks. Each is written once: the plant adds its
-//! term when it simulates, the diagnosis takes the same term as a regressor.
+//! Effects that the plain model of eq. (1)–(2) lacks. Each is written once, in its entry of `table.rs`: the plant
+//! adds its term when it simulates, the diagnosis takes the same term as a regressor.
 
 mod constants;
+mod entry;
 mod physical;
 mod sensor;
 mod set;
 mod table;
 
 pub use constants::{EffectConstant, EffectConstantSpec, EffectConstants};
+pub use entry::{EffectKind, EffectSpec, LeftSide};
 pub use sensor::LaggedReading;
 pub use set::{ActiveEffect, EffectError, EffectSet};
-pub use table::{Effect, EffectKind, EffectSpec, UnknownEffect};
+pub use table::{Effect, UnknownEffect};
 
 use crate::{Model, Real, Signals, Terms};
 
@@ -26,8 +28,13 @@ impl Effect {
     ) -> Terms<T> {
         match self.spec().kind {
             EffectKind::Sensor => sensor::unit_term(self, at, model),
-            _ => physical::unit_term(self, at, model, constants),
+            _ => self.physical_term(at, model, constants),
         }
+    }
+
+    /// The constants on which this effect's term depends; empty for most.
+    pub const fn constants(self) -> &'static [EffectConstant] {
+        self.spec().constants
     }
 
     /// What the sensors show when this effect has size `value`; physical effects change nothing.

@@ -3,54 +3,42 @@ use crate::{Model, Real, Signals, Terms};
 
 /// What one unit of a sensor effect does to the readings:
 /// `reading = truth · (1 + value · scale) + value · shift`, signal by signal.
-struct Distortion<T> {
+pub(super) struct Distortion<T> {
     scale: Signals<T>,
     shift: Signals<T>,
 }
 
-/// The definition of every sensor effect; a physical effect distorts nothing. `at` supplies the
-/// signals that one reading borrows from another.
-fn distortion<T: Real>(effect: Effect, at: &Signals<T>) -> Distortion<T> {
-    let (one, none) = (T::one(), Signals::default());
-    let scale = |scale| Distortion { scale, shift: none };
-    let shift = |shift| Distortion { scale: none, shift };
-    // A flow that is not measured is none: the pressure stays as it was read.
-    let known = |flow: T| if flow.is_finite() { flow } else { T::zero() };
-    match effect {
-        Effect::FlowMeterOffsetA => shift(Signals { qa_m3s: one, ..none }),
-        Effect::FlowMeterOffsetB => shift(Signals { qb_m3s: one, ..none }),
-        Effect::FlowMeterGainA => scale(Signals { qa_m3s: one, dqa_m3s2: one, ..none }),
-        Effect::FlowMeterGainB => scale(Signals { qb_m3s: one, dqb_m3s2: one, ..none }),
-        // First order in the lag; the simulation filters, see `LaggedReading`.
-        Effect::FlowMeterLag => shift(Signals { qa_m3s: -at.dqa_m3s2, qb_m3s: -at.dqb_m3s2, ..none }),
-        Effect::PositionGain => scale(Signals { x_m: one, v_mps: one, a_mps2: one, ..none }),
-        Effect::PositionOffset => shift(Signals { x_m: one, ..none }),
-        Effect::PressureOffsetA => shift(Signals { pa_pa: one, ..none }),
-        Effect::PressureOffsetB => shift(Signals { pb_pa: one, ..none }),
-        Effect::PressureGainA => scale(Signals { pa_pa: one, dpa_pas: one, d2pa_pas2: one, ..none }),
-        Effect::PressureGainB => scale(Signals { pb_pa: one, dpb_pas: one, d2pb_pas2: one, ..none }),
-        Effect::PressureLagA => shift(Signals { pa_pa: -at.dpa_pas, dpa_pas: -at.d2pa_pas2, ..none }),
-        Effect::PressureLagB => shift(Signals { pb_pa: -at.dpb_pas, dpb_pas: -at.d2pb_pas2, ..none }),
-        Effect::LineResistanceA => {
-            shift(Signals { pa_pa: known(at.qa_m3s), dpa_pas: known(at.dqa_m3s2), ..none })
-        }
-        Effect::LineResistanceB => {
-            shift(Signals { pb_pa: known(at.qb_m3s), dpb_pas: known(at.dqb_m3s2), ..none })
-        }
-        Effect::ForceGain => scale(Signals { force_n: one, ..none }),
-        _ => Distortion { scale: none, shift: none },
+impl<T: Real> Distortion<T> {
+    /// Readings as the truth.
+    pub fn none() -> Self {
+        Self { scale: Signals::default(), shift: Signals::default() }
     }
+}
+
+/// Readings in proportion to the truth.
+pub(super) fn scale<T: Real>(scale: Signals<T>) -> Distortion<T> {
+    Distortion { scale, shift: Signals::default() }
+}
+
+/// Readings beside the truth.
+pub(super) fn shift<T: Real>(shift: Signals<T>) -> Distortion<T> {
+    Distortion { scale: Signals::default(), shift }
+}
+
+/// A flow that is not measured is none: what is read in its place stays as it was.
+pub(super) fn known<T: Real>(flow: T) -> T {
+    if flow.is_finite() { flow } else { T::zero() }
 }
 
 /// What the sensors show of the truth.
 pub(super) fn read<T: Real>(effect: Effect, value: T, truth: &Signals<T>) -> Signals<T> {
-    let Distortion { scale, shift } = distortion(effect, truth);
+    let Distortion { scale, shift } = effect.distortion(truth);
     truth.zip(scale, |signal, gain| signal * (T::one() + value * gain)).zip(shift, |s, more| s + value * more)
 }
 
 /// The truth behind a reading: [`read`] undone.
 pub(super) fn correct<T: Real>(effect: Effect, value: T, reading: &Signals<T>) -> Signals<T> {
-    let Distortion { scale, shift } = distortion(effect, reading);
+    let Distortion { scale, shift } = effect.distortion(reading);
     reading
         .zip(shift, |s, more| s - value * more)
         .zip(scale, |signal, gain| signal / (T::one() + value * gain))
