@@ -12,5 +12,5 @@ mod statistics;
 pub mod trace_text;
 
 pub use motion::{Motion, Multisine};
-pub use noise::{noisy, seeded, sensors_of};
+pub use noise::{noisy, seeded, sensors_of, white_noise};
 pub use statistics::{NormalScatter, coverage_bounds};

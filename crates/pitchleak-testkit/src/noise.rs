@@ -10,6 +10,11 @@ pub fn seeded(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
+/// Independent normal numbers of standard deviation one.
+pub fn white_noise(seed: u64) -> impl Iterator<Item = f64> {
+    StandardNormal.sample_iter(seeded(seed))
+}
+
 /// The paper's sensors with 3 σ = `share` of full scale.
 pub fn sensors_of(share: f64) -> Sensors<f64> {
     let mut sensors = Sensors::paper();

@@ -107,3 +107,59 @@ impl<T: Real> NoiseMeter<T> {
         if self.count > T::zero() { (self.sum / (T::lit(6.0) * self.count)).sqrt() } else { T::zero() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pitchleak_testkit::white_noise;
+
+    /// White noise on a slope: the slope cancels, the noise is read as large as it is.
+    #[test]
+    fn the_meter_reads_the_noise_and_not_the_slope() {
+        let (std_pa, slope_pa) = (5e4, 1e3);
+        let mut meter = NoiseMeter::default();
+        let mut before = 0.0;
+        let mut readings = [0.0; 40];
+        let mut noise = white_noise(1).enumerate();
+        for reading in &mut readings {
+            // A few times the meter's memory of a thousand samples.
+            for (k, unit) in noise.by_ref().take(3000) {
+                let now = slope_pa * k as f64 + std_pa * unit;
+                meter.add(before, now);
+                before = now;
+            }
+            *reading = meter.std_pa() / std_pa;
+        }
+        let mean = readings.iter().sum::<f64>() / readings.len() as f64;
+        assert!((mean - 1.0).abs() < 0.02, "{mean} of the noise");
+    }
+
+    /// χ²₁ innovations stay as they are; twice as large ones widen the intervals by what they are more.
+    #[test]
+    fn intervals_grow_with_what_residuals_are_beyond_chance() {
+        for (scale, expected) in [(1.0, 1.0), (2.0, 4.0)] {
+            let mut monitor = InnovationMonitor::default();
+            for unit in white_noise(2).take(20_000) {
+                monitor.balance(scale * unit, 1.0);
+            }
+            assert!((monitor.inflation() / expected - 1.0).abs() < 0.05, "{}", monitor.inflation());
+        }
+    }
+
+    /// A leak that opens shows within a few blocks; in the eight million that a false change takes at the least
+    /// there is one at most.
+    #[test]
+    fn a_change_is_seen_soon_and_nothing_else_is() {
+        let mut monitor = InnovationMonitor::default();
+        let mut false_changes = 0;
+        for unit in white_noise(3).take(8_000_000) {
+            monitor.balance(unit, 1.0);
+            false_changes += u32::from(monitor.take_change());
+        }
+        assert!(false_changes <= 1, "{false_changes}");
+        for unit in white_noise(4).take(5) {
+            monitor.balance(unit + 6.0, 1.0);
+        }
+        assert!(monitor.take_change());
+    }
+}
