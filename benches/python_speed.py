@@ -92,8 +92,10 @@ def numba_loop():
         theta, covariance, keep, noise = np.zeros(4), np.eye(4), np.exp(-0.01 / 60.0), 1e-12
         h, projected = np.zeros(4), np.zeros(4)
         for k in range(1, len(samples)):
-            s, l = samples[k], samples[k - 1]
-            left, row_a, row_b = step((s[0], s[1], s[2], s[3], s[4], s[5]), (l[0], l[1], l[2], l[3], l[4], l[5]))
+            now, last = samples[k], samples[k - 1]
+            left, row_a, row_b = step(
+                (now[0], now[1], now[2], now[3], now[4], now[5]), (last[0], last[1], last[2], last[3], last[4], last[5])
+            )
             for i in range(4):
                 for j in range(4):
                     covariance[i, j] /= keep

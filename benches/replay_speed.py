@@ -16,7 +16,7 @@ import tempfile
 import time
 
 os.environ["POLARS_MAX_THREADS"] = "1"
-import polars  # noqa: E402  (reads the variable when it is imported)
+import polars  # after the variable, which it reads when it is imported
 
 PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release" / "pitchleak"
 HEADER = "t_s,x_m,v_mps,pa_pa,pb_pa,qa_m3s,qb_m3s,force_n,q_int_m3s,q_ext_a_m3s,q_ext_b_m3s\n"
@@ -68,7 +68,7 @@ def main():
         write(trace, 360_000)
         print(f"trace of {os.path.getsize(trace) / 1e6:.1f} MB, best of {ROUNDS}")
         pairs = [(seconds(polars.read_csv, trace), seconds(replay, trace)) for _ in range(ROUNDS)]
-        read, replayed = (min(times) for times in zip(*pairs))
+        read, replayed = (min(times) for times in zip(*pairs, strict=True))
         print(f"polars reads it in {read:.3f} s; replay takes {replayed:.3f} s: {replayed / read:.2f} times that")
         write(long_trace, 3_600_000)
         print(f"peak memory {peak_mib(trace):.1f} MiB, on a trace ten times as long {peak_mib(long_trace):.1f} MiB")

@@ -1,5 +1,7 @@
 """From a controller's raw CSV to a decision: which cylinder leaks, how much, and is the data good enough to say so.
 
+Run it with
+
     pip install '.[pandas,plot]'
     python examples/raw_csv_to_decision.py [picture.png]
 """
@@ -43,12 +45,23 @@ pb = { name = "Druck B", unit = "bar" }
 qa = { name = "Strom A", unit = "L/min" }
 qb = { name = "Strom B", unit = "L/min" }
 """
-NAMES = {"t_s": "Zeit", "x_mm": "Weg", "pa_bar": "Druck A", "pb_bar": "Druck B", "qa_lpm": "Strom A", "qb_lpm": "Strom B"}
+NAMES = {
+    "t_s": "Zeit",
+    "x_mm": "Weg",
+    "pa_bar": "Druck A",
+    "pb_bar": "Druck B",
+    "qa_lpm": "Strom A",
+    "qb_lpm": "Strom B",
+}
 
 
 def raw_csv():
     """Three blades in one export, with the flaws that exports have."""
-    leaks = {"blade 1": {}, "blade 2": {"leak_internal": "0.4 L/min", "onset": 20}, "blade 3": {"leak_external_a": "0.25 L/min"}}
+    leaks = {
+        "blade 1": {},
+        "blade 2": {"leak_internal": "0.4 L/min", "onset": 20},
+        "blade 3": {"leak_external_a": "0.25 L/min"},
+    }
     parts = []
     for seed, (blade, leak) in enumerate(leaks.items()):
         trace = pl.simulate(13, noise="1 %", seed=seed, duration=60, **leak).to_pandas()

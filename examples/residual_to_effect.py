@@ -1,5 +1,7 @@
 """From a residual to the missing effect: leaks that cannot be, what the model lacks, and the leaks once it has it.
 
+Run it with
+
     pip install '.[plot]'
     python examples/residual_to_effect.py [picture.png]
 """

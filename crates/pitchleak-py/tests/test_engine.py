@@ -16,7 +16,13 @@ def test_simulate_is_the_programs(program, tmp_path):
     arguments = ("--wind", 13, "--leak-internal", "0.5 L/min", "--noise", "1 %", "--seed", 7, "--duration", "5 s")
     path = tmp_path / "program.csv.gz"
     program("simulate", *arguments, "--effect", "position_gain=0.02", "--out", path)
-    options = {"leak_internal": "0.5 L/min", "noise": 0.01, "seed": 7, "duration": 5, "effects": {"position_gain": 0.02}}
+    options = {
+        "leak_internal": "0.5 L/min",
+        "noise": 0.01,
+        "seed": 7,
+        "duration": 5,
+        "effects": {"position_gain": 0.02},
+    }
     simulation = pl.simulate(13, **options)
     for name, values in read_columns(path).items():
         np.testing.assert_array_equal(simulation.columns[name], values)

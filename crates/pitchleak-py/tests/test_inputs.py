@@ -104,7 +104,7 @@ def test_views_give_what_their_copies_give(data):
 @given(st.lists(st.text(max_size=6), max_size=5, unique=True))
 def test_any_headers(names):
     columns = {name: np.zeros(3) for name in names}
-    with pytest.raises(pl.TraceError, match="no column for time|unknown unit"):
+    with pytest.raises(pl.TraceError, match=r"no column for time|unknown unit"):
         pl.replay(columns)
     others = {name: np.zeros(1) for name in names if name not in SOUND}
     if not SIGNALS & {name.partition("_")[0] for name in others}:

@@ -140,9 +140,7 @@ class Diagnosis(Tabular):
     """Leaks before and after."""
     not_detectable_below: dict[str, Size]
     """Smallest size of each further effect that these traces would have shown."""
-    verdict: Literal[
-        "explained", "partly_explained", "no_missing_effect", "unexplained", "insufficient_excitation"
-    ]
+    verdict: Literal["explained", "partly_explained", "no_missing_effect", "unexplained", "insufficient_excitation"]
     """The answer."""
     notes: tuple[str, ...] = ()
     """What speaks for it."""

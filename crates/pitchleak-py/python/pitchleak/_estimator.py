@@ -1,7 +1,7 @@
 """Live: samples in, estimates out."""
 
 import os
-from typing import Any
+from typing import Any, Self
 
 from . import _inputs, _pitchleak
 from ._pitchleak import Rig
@@ -32,7 +32,7 @@ class Estimator(_pitchleak.Estimator):
 
     def __new__(
         cls, rig: Rig | _inputs.Path | None = None, *, estimator: str | None = None, strict: bool = False
-    ) -> "Estimator":
+    ) -> Self:
         return super().__new__(cls, _inputs.rig_for(None, rig), estimator=estimator, strict=strict)
 
     def extend(self, data: Any) -> int:

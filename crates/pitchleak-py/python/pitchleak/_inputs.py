@@ -45,9 +45,7 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
         return _from_columns(data, rig, first_ns)
     if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
         return Table.from_arrow(data, rig, first_ns)
-    raise TypeError(
-        f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path"
-    )
+    raise TypeError(f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path")
 
 
 def rig_for(data: Any, rig: Rig | Path | None) -> Rig:

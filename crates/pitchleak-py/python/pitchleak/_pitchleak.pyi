@@ -1,17 +1,17 @@
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, final, overload
+from typing import Any, Final, Self, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import Self, disjoint_base
+from typing_extensions import disjoint_base
 
-_Floats = npt.NDArray[np.float64]
-_Path = str | os.PathLike[str]
-_Source = _Path | Table
-_Readings = float | npt.ArrayLike
-_Columns = list[tuple[str, _Floats]]
-_Residuals = list[tuple[str, list[float], list[float]]]
+_Floats: TypeAlias = npt.NDArray[np.float64]
+_Path: TypeAlias = str | os.PathLike[str]
+_Source: TypeAlias = _Path | Table
+_Readings: TypeAlias = float | npt.ArrayLike
+_Columns: TypeAlias = list[tuple[str, _Floats]]
+_Residuals: TypeAlias = list[tuple[str, list[float], list[float]]]
 
 __all__ = [
     "Estimator",
