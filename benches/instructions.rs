@@ -36,8 +36,9 @@ fn feed(count: usize, mut take: impl FnMut(&Sample<f64>)) {
 }
 
 fn rls<const N: usize>(count: usize) {
-    let mut rls =
+    let new =
         Rls::<f64, N>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+    let Ok(mut rls) = new else { return };
     feed(count, |sample| {
         rls.update(black_box(0.01), sample);
     });

@@ -7,8 +7,8 @@ use pitchleak::Rig;
 use pitchleak::core::{
     Cylinder, Fluid, PaperEstimator, PaperGains, PaperLaw, Rls, RlsSettings, Sample, Sensors, regressors,
 };
-use pitchleak::replay::replay;
-use pitchleak::trace::{TableLayout, TraceError, TraceReader};
+use pitchleak::replay::{ReplayError, replay};
+use pitchleak::trace::{TableLayout, TraceReader};
 
 const SAMPLES: usize = 10_000;
 
@@ -32,10 +32,11 @@ fn rls<const N: usize>(c: &mut Criterion, name: &str, samples: &[Sample<f64>]) {
     let mut group = c.benchmark_group("per sample");
     group.throughput(Throughput::Elements(SAMPLES as u64));
     let new =
-        || Rls::<f64, N>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+        Rls::<f64, N>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+    let Ok(new) = new else { return };
     group.bench_function(name, |b| {
         b.iter_batched_ref(
-            new,
+            || new,
             |rls| {
                 for sample in samples {
                     black_box(rls.update(0.01, sample));
@@ -98,7 +99,7 @@ fn columns(c: &mut Criterion, samples: &[Sample<f64>]) {
         b.iter(|| {
             let batch = columns.iter().map(Vec::as_slice).collect();
             let mut reader = TraceReader::from_table("columns", &layout, vec![batch], &rig)?;
-            replay(&mut reader, &rig, |_, _, _| Ok::<_, TraceError>(()))
+            replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
         });
     });
 }

@@ -2,7 +2,7 @@
 //! std nor an allocator. Run with `cargo run --release --example streaming`.
 
 use pitchleak_core::{
-    AlarmSettings, Cylinder, Fluid, LeakDetector, Rls, RlsSettings, Sample, Sensors, Update,
+    AlarmSettings, Cylinder, Fluid, LeakDetector, Rls, RlsError, RlsSettings, Sample, Sensors, Update,
 };
 
 /// Stands for the fieldbus: a cylinder whose piston seal lets 0.3 L/min through at 15 bar.
@@ -16,16 +16,16 @@ fn read_sensors(t_s: f32) -> Sample<f32> {
     Sample { x_m: 0.1 + travel, pa_pa: pa, pb_pa: pb, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None }
 }
 
-fn main() {
+fn main() -> Result<(), RlsError> {
     let settings = RlsSettings::default();
-    let mut rls = Rls::<f32, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), settings);
+    let mut rls = Rls::<f32, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), settings)?;
     let mut detector = LeakDetector::new(AlarmSettings::default());
     for k in 0..3000_u16 {
         let t_s = f32::from(k) * 0.01;
-        if matches!(rls.update(0.01, &read_sensors(t_s)), Update::Renewed | Update::Changed) {
-            let flow = rls.mean_leak_flows_m3s();
-            if let Some(state) = detector.update(0.25, &flow).internal {
-                let internal = flow.internal.scaled(60e3);
+        if let Update::Renewed { elapsed_s, .. } = rls.update(0.01, &read_sensors(t_s)) {
+            let flows = rls.estimates().mean_leaks_m3s;
+            if let Some(state) = detector.update(elapsed_s, &flows).internal {
+                let internal = flows.internal.scaled(60e3);
                 println!(
                     "{t_s:5.2} s: {state:?}, internal {:.3} ± {:.3} L/min",
                     internal.value, internal.std
@@ -33,4 +33,5 @@ fn main() {
             }
         }
     }
+    Ok(())
 }

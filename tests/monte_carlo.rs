@@ -44,7 +44,7 @@ fn run(motion: &Motion, sensors: &Sensors<f64>, first_seed: u64) -> Statistics {
     let mut found = Statistics::default();
     for seed in first_seed..first_seed + SEEDS {
         let mut random = seeded(seed);
-        let mut rls = Rls::<f64, 4>::new(motion.cylinder, fluid, sensors, RlsSettings::default());
+        let mut rls = Rls::<f64, 4>::new(motion.cylinder, fluid, sensors, RlsSettings::default()).unwrap();
         for sample in &clean {
             rls.update(DT_S, &noisy(sample, sensors, &mut random));
         }
@@ -117,7 +117,8 @@ fn a_sound_cylinder_stays_silent() {
         let mut bias = |full_scale: f64| full_scale * 0.01 * (2.0 * random.random::<f64>() - 1.0);
         let (qa, qb) = (bias(20.0 / 6e4), bias(20.0 / 6e4));
         let (pa, pb) = (bias(16e6), bias(16e6));
-        let mut rls = Rls::<f64, 6>::new(motion.cylinder, Fluid::paper(), &declared, RlsSettings::default());
+        let mut rls =
+            Rls::<f64, 6>::new(motion.cylinder, Fluid::paper(), &declared, RlsSettings::default()).unwrap();
         let mut detector = LeakDetector::new(pitchleak::core::AlarmSettings::default());
         for sample in &clean {
             let mut reading = noisy(sample, &declared, &mut random);
@@ -125,8 +126,8 @@ fn a_sound_cylinder_stays_silent() {
             reading.qb_m3s = reading.qb_m3s.map(|q| q + qb);
             reading.pa_pa += pa;
             reading.pb_pa += pb;
-            if matches!(rls.update(DT_S, &reading), Update::Renewed | Update::Changed) {
-                let change = detector.update(0.25, &rls.mean_leak_flows_m3s());
+            if let Update::Renewed { elapsed_s, .. } = rls.update(DT_S, &reading) {
+                let change = detector.update(elapsed_s, &rls.estimates().mean_leaks_m3s);
                 alarms += change.iter().filter(|(_, change)| change.is_some()).count();
             }
         }

@@ -52,7 +52,7 @@ fn a_sudden_leak_is_named_alone_and_within_ten_seconds() {
         let truths = scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs");
         for seed in 0..3 {
             let mut sensing = Sensing::new(rig().sensors(), Biases::default(), seed);
-            let mut replay = Replay::new(&rig());
+            let mut replay = Replay::new(&rig()).expect("a rig");
             for (index, truth) in truths.iter().enumerate() {
                 let dt_s = if index == 0 { 0.0 } else { 0.01 };
                 let sample = sensing.read(&truth.sample);

@@ -6,9 +6,9 @@ use std::fmt::Write;
 
 use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak};
-use pitchleak::replay::replay;
+use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::ReplayReport;
-use pitchleak::trace::{TraceError, TraceReader};
+use pitchleak::trace::TraceReader;
 use pitchleak_testkit::Motion;
 use pitchleak_testkit::rig::PAPER;
 
@@ -18,7 +18,7 @@ fn run(rig: &str, trace: String) -> ReplayReport {
     let rig = Rig::parse(rig, "test").unwrap();
     let stream = Box::new(std::io::Cursor::new(trace.into_bytes()));
     let mut reader = TraceReader::from_stream("test", stream, &rig).unwrap();
-    replay(&mut reader, &rig, |_, _, _| Ok::<(), TraceError>(())).unwrap()
+    replay(&mut reader, &rig, |_, _, _| Ok::<(), ReplayError>(())).unwrap()
 }
 
 /// A 30 s trace; `row` gives the cells of one instant.

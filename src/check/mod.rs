@@ -6,10 +6,10 @@ mod text;
 
 pub use readings::Reading;
 
-use crate::replay::replay;
+use crate::replay::{ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
-use crate::trace::{TraceError, TraceReader};
+use crate::trace::TraceReader;
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -72,13 +72,13 @@ impl CheckReport {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, TraceError> {
+pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, ReplayError> {
     let mut rig = rig.clone();
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();
     let replayed = replay(reader, &rig, |_, record, _| {
         extremes.add(record);
-        Ok::<_, TraceError>(())
+        Ok::<_, ReplayError>(())
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;

@@ -62,8 +62,9 @@ impl Correction {
             external_a: of(EffectKind::ExternalLeakA).chamber_a_m3s,
             external_b: of(EffectKind::ExternalLeakB).chamber_b_m3s,
         };
-        self.time_s += record.dt_s;
-        self.leaked_m3 = self.leaked_m3.zip(leaks).map(|(sum, flow)| sum + flow.abs() * record.dt_s);
+        let step_s = record.step_s();
+        self.time_s += step_s;
+        self.leaked_m3 = self.leaked_m3.zip(leaks).map(|(sum, flow)| sum + flow.abs() * step_s);
         Record { sample, ..*record }
     }
 
@@ -73,7 +74,7 @@ impl Correction {
     }
 
     fn signals(&mut self, record: &Record) -> Signals<f64> {
-        let dt_s = if record.after_gap { 0.0 } else { record.dt_s };
+        let dt_s = record.step_s();
         let sample = &record.sample;
         let (qa, qb) = (sample.qa_m3s.unwrap_or(0.0), sample.qb_m3s.unwrap_or(0.0));
         let x = *self.rates.x.update(dt_s, sample.x_m);

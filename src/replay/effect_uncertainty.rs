@@ -5,7 +5,7 @@ use super::estimator::Estimator;
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
 use pitchleak_core::effects::EffectKind;
-use pitchleak_core::{Effect, Estimate, PerLeak};
+use pitchleak_core::{Effect, Estimate, PerLeak, RlsError};
 
 /// One more estimator for each uncertain effect, which takes it to be a standard deviation larger: the leaks
 /// it finds are off by what that uncertainty costs, to first order. The file gives no correlations, so the
@@ -17,15 +17,20 @@ pub(super) struct EffectUncertainty {
 
 impl EffectUncertainty {
     /// None for the paper's law, which knows no uncertainty.
-    pub fn of(rig: &Rig) -> Self {
+    ///
+    /// # Errors
+    /// As [`Estimator::new`].
+    pub fn of(rig: &Rig) -> Result<Self, RlsError> {
         if rig.estimator.kind == EstimatorKind::Paper {
-            return Self { shifted: Vec::new() };
+            return Ok(Self { shifted: Vec::new() });
         }
         let uncertain = rig.effects.iter().filter_map(|(effect, size)| Some((*effect, size.std?)));
         let shifted = uncertain.filter_map(|(effect, std)| shifted(rig, effect, std));
-        Self {
-            shifted: shifted.filter_map(|rig| Some((Correction::of(&rig)?, Estimator::new(&rig)))).collect(),
-        }
+        let with_estimator = |rig: Rig| {
+            let correction = Correction::of(&rig)?;
+            Some(Estimator::new(&rig).map(|estimator| (correction, estimator)))
+        };
+        Ok(Self { shifted: shifted.filter_map(with_estimator).collect::<Result<_, _>>()? })
     }
 
     /// Takes in a record as read.

@@ -1,8 +1,8 @@
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
 use pitchleak_core::{
-    Estimate, ExcitationReport, ExcitationSettings, LeakPressures, PaperEstimator, PaperGains, PerLeak, Rls,
-    RlsSettings, Sensors, Update,
+    Estimate, Estimates, LeakPressures, PaperEstimator, PaperGains, PerLeak, Rls, RlsError, RlsSettings,
+    Sensors, Update,
 };
 
 /// Gains of the paper's law where the rig file gives none: a search over simulated wind traces
@@ -41,127 +41,79 @@ pub struct BulkModulus {
     pub spread: Option<(f64, [f64; 2])>,
 }
 
+/// The same of every size, and of the paper's law.
+macro_rules! each {
+    ($estimator:expr, $rls:ident => $known:expr, $paper:ident => $law:expr) => {
+        match $estimator {
+            Self::Plain($rls) => $known,
+            Self::WithOffsets($rls) => $known,
+            Self::WithGains($rls) => $known,
+            Self::Paper($paper) => $law,
+        }
+    };
+}
+
 impl Estimator {
     /// The estimator for `rig`.
-    pub fn new(rig: &Rig) -> Self {
+    ///
+    /// # Errors
+    /// Where nothing can be estimated for such a rig; no rig file makes one.
+    pub fn new(rig: &Rig) -> Result<Self, RlsError> {
         if rig.estimator.kind == EstimatorKind::Paper {
-            return Self::Paper(Box::new(PaperChain { rig: rig.clone(), waiting: None, estimator: None }));
+            let chain = PaperChain { rig: rig.clone(), waiting: None, estimator: None };
+            return Ok(Self::Paper(Box::new(chain)));
         }
         let sensors = rig.sensors();
-        if has_gains(&sensors) {
-            Self::WithGains(Box::new(rls(rig, &sensors)))
+        Ok(if has_gains(&sensors) {
+            Self::WithGains(Box::new(rls(rig, &sensors)?))
         } else if has_biases(&sensors) {
-            Self::WithOffsets(Box::new(rls(rig, &sensors)))
+            Self::WithOffsets(Box::new(rls(rig, &sensors)?))
         } else {
-            Self::Plain(Box::new(rls(rig, &sensors)))
-        }
+            Self::Plain(Box::new(rls(rig, &sensors)?))
+        })
     }
 
     /// Takes in one record.
     #[inline]
-    pub fn update(&mut self, record: &Record) -> Update {
+    pub fn update(&mut self, record: &Record) -> Update<f64> {
         // A step of no length makes the core start anew.
-        let dt_s = if record.after_gap { 0.0 } else { record.dt_s };
-        match self {
-            Self::Plain(rls) => rls.update(dt_s, &record.sample),
-            Self::WithOffsets(rls) => rls.update(dt_s, &record.sample),
-            Self::WithGains(rls) => rls.update(dt_s, &record.sample),
-            Self::Paper(chain) => chain.update(dt_s, record),
-        }
+        let dt_s = record.step_s();
+        each!(self, rls => rls.update(dt_s, &record.sample), chain => chain.update(dt_s, record))
+    }
+
+    /// All that has been found; `None` for the paper's law, which knows no uncertainty.
+    pub fn estimates(&self) -> Option<Estimates<f64>> {
+        each!(self, rls => Some(rls.estimates()), _chain => None)
     }
 
     /// Leak coefficients, m³/(s·Pa); the paper's law knows no spread, it is zero there.
     pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
-        match self {
-            Self::Plain(rls) => rls.leak_coefficients(),
-            Self::WithOffsets(rls) => rls.leak_coefficients(),
-            Self::WithGains(rls) => rls.leak_coefficients(),
-            Self::Paper(chain) => chain.leak_coefficients().map(|value| Estimate { value, std: 0.0 }),
-        }
-    }
-
-    /// Mean leak flows over the estimator's memory, m³/s; `None` for the paper's law.
-    pub fn mean_leak_flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
-        match self {
-            Self::Plain(rls) => Some(rls.mean_leak_flows_m3s()),
-            Self::WithOffsets(rls) => Some(rls.mean_leak_flows_m3s()),
-            Self::WithGains(rls) => Some(rls.mean_leak_flows_m3s()),
-            Self::Paper(_) => None,
-        }
+        each!(self,
+            rls => rls.leak_coefficients(),
+            chain => chain.leak_coefficients().map(|value| Estimate { value, std: 0.0 })
+        )
     }
 
     /// Leak flows at `pressures`, m³/s; `None` for the paper's law.
     pub fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> Option<PerLeak<Estimate<f64>>> {
-        match self {
-            Self::Plain(rls) => Some(rls.leak_flows_m3s(pressures)),
-            Self::WithOffsets(rls) => Some(rls.leak_flows_m3s(pressures)),
-            Self::WithGains(rls) => Some(rls.leak_flows_m3s(pressures)),
-            Self::Paper(_) => None,
-        }
+        each!(self, rls => Some(rls.leak_flows_m3s(pressures)), _chain => None)
     }
 
     /// Biases found of the pressure sensors A and B, Pa; zero where the rig file declares none.
     pub fn pressure_biases_pa(&self) -> [f64; 2] {
-        match self {
-            Self::WithOffsets(rls) => rls.pressure_biases_pa().map(|bias| bias.value),
-            Self::WithGains(rls) => rls.pressure_biases_pa().map(|bias| bias.value),
-            Self::Plain(_) | Self::Paper(_) => [0.0; 2],
-        }
+        each!(self, rls => rls.pressure_biases_pa().map(|bias| bias.value), _chain => [0.0; 2])
     }
 
     /// The bulk modulus, from the interval of the compressibility.
     pub fn bulk_modulus(&self) -> BulkModulus {
-        let compressibility = match self {
-            Self::Plain(rls) => rls.compressibility(),
-            Self::WithOffsets(rls) => rls.compressibility(),
-            Self::WithGains(rls) => rls.compressibility(),
-            Self::Paper(chain) => {
-                return BulkModulus { value: chain.bulk_modulus_pa(), spread: None };
-            }
-        };
+        let compressibility = each!(self,
+            rls => rls.estimates().compressibility_per_pa,
+            chain => return BulkModulus { value: chain.bulk_modulus_pa(), spread: None }
+        );
         let value = 1.0 / compressibility.value;
         let [low, high] = compressibility.ci95();
         let stiffest = if low > 0.0 { 1.0 / low } else { f64::INFINITY };
         BulkModulus { value, spread: Some((compressibility.std * value * value, [1.0 / high, stiffest])) }
-    }
-
-    /// Which parameters the samples identify; `None` for the paper's law, which cannot tell.
-    pub fn excitation(&self) -> Option<ExcitationReport<f64>> {
-        let settings = ExcitationSettings::default();
-        match self {
-            Self::Plain(rls) => Some(rls.excitation(&settings)),
-            Self::WithOffsets(rls) => Some(rls.excitation(&settings)),
-            Self::WithGains(rls) => Some(rls.excitation(&settings)),
-            Self::Paper(_) => None,
-        }
-    }
-
-    /// Offsets of the flow meters A and B, m³/s, where the rig file says they may be off.
-    pub fn flow_offsets_m3s(&self) -> Option<[Estimate<f64>; 2]> {
-        match self {
-            Self::WithOffsets(rls) => Some(rls.flow_offsets_m3s()),
-            Self::WithGains(rls) => Some(rls.flow_offsets_m3s()),
-            Self::Plain(_) | Self::Paper(_) => None,
-        }
-    }
-
-    /// Scale errors of flow meter A, flow meter B and position sensor, where the rig file says they may
-    /// be off.
-    pub fn gains(&self) -> Option<[Estimate<f64>; 3]> {
-        match self {
-            Self::WithGains(rls) => Some(rls.gains()),
-            Self::Plain(_) | Self::WithOffsets(_) | Self::Paper(_) => None,
-        }
-    }
-
-    /// Normalised innovations squared of balance and odometer; `None` for the paper's law.
-    pub fn normalised_innovation(&self) -> Option<[f64; 2]> {
-        match self {
-            Self::Plain(rls) => Some(rls.normalised_innovation()),
-            Self::WithOffsets(rls) => Some(rls.normalised_innovation()),
-            Self::WithGains(rls) => Some(rls.normalised_innovation()),
-            Self::Paper(_) => None,
-        }
     }
 }
 
@@ -173,7 +125,7 @@ fn has_gains(sensors: &Sensors<f64>) -> bool {
     [sensors.flow_a, sensors.flow_b, sensors.position].iter().any(|s| s.gain_std > 0.0)
 }
 
-fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>) -> Rls<f64, N> {
+fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>) -> Result<Rls<f64, N>, RlsError> {
     let default = RlsSettings::default();
     let settings = RlsSettings {
         forgetting_time_s: rig.estimator.forgetting_time_s.unwrap_or(default.forgetting_time_s),
@@ -185,7 +137,7 @@ fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>) -> Rls<f64, N> {
 }
 
 impl PaperChain {
-    fn update(&mut self, dt_s: f64, record: &Record) -> Update {
+    fn update(&mut self, dt_s: f64, record: &Record) -> Update<f64> {
         if let Some(estimator) = &mut self.estimator {
             return estimator.update(dt_s, &record.sample);
         }

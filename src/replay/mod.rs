@@ -19,7 +19,7 @@ use crate::trace::{Record, TraceError, TraceReader};
 use crate::units::LPM_PER_M3S;
 use correction::Correction;
 use effect_uncertainty::EffectUncertainty;
-use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, Update};
+use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
 
@@ -86,7 +86,6 @@ pub struct Replay {
     estimator: Estimator,
     doubt: EffectUncertainty,
     detector: LeakDetector<f64>,
-    since_detection_s: f64,
     /// Over the trace, or since the leak changed.
     pressures: TracePressures,
     changed_at_s: Option<f64>,
@@ -96,19 +95,21 @@ pub struct Replay {
 
 impl Replay {
     /// A replay for a rig; the rig file's `[estimator]` says with which estimator.
-    pub fn new(rig: &Rig) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// Where nothing can be estimated for such a rig; no rig file makes one.
+    pub fn new(rig: &Rig) -> Result<Self, RlsError> {
+        Ok(Self {
             correction: Correction::of(rig),
-            estimator: Estimator::new(rig),
-            doubt: EffectUncertainty::of(rig),
+            estimator: Estimator::new(rig)?,
+            doubt: EffectUncertainty::of(rig)?,
             detector: LeakDetector::new(rig.alarms),
-            since_detection_s: 0.0,
             pressures: TracePressures::default(),
             changed_at_s: None,
             scoring: Scoring::default(),
             alarms: Vec::new(),
             rig: rig.clone(),
-        }
+        })
     }
 
     /// Takes in one record; says whether the estimates are new.
@@ -127,34 +128,31 @@ impl Replay {
     #[inline]
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
-        self.since_detection_s += record.dt_s;
         let update = self.estimator.update(record);
-        if update == Update::Changed {
-            self.pressures = TracePressures::default();
-            self.changed_at_s = Some(record.t_s);
-        }
-        let renewed = matches!(update, Update::Renewed | Update::Changed);
-        if renewed {
+        if let Update::Renewed { elapsed_s, changed, .. } = update {
+            if changed {
+                self.pressures = TracePressures::default();
+                self.changed_at_s = Some(record.t_s);
+            }
             self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
-            self.detect(record.t_s);
+            self.detect(record.t_s, elapsed_s);
         }
         self.scoring.add(record);
-        renewed
+        matches!(update, Update::Renewed { .. })
     }
 
-    fn detect(&mut self, t_s: f64) {
-        let flows = self.estimator.mean_leak_flows_m3s().map(|flows| {
+    /// Holds the leak flows against their alarms, `elapsed_s` of watched time after they were held last.
+    fn detect(&mut self, t_s: f64, elapsed_s: f64) {
+        let mean_leaks_m3s = |estimator: &Estimator| estimator.estimates().map(|found| found.mean_leaks_m3s);
+        let flows = mean_leaks_m3s(&self.estimator).map(|flows| {
             self.doubt.widen(with_effects(self.correction.as_ref(), flows), |correction, estimator| {
-                let flows = estimator.mean_leak_flows_m3s().unwrap_or_default();
-                with_effects(Some(correction), flows)
+                with_effects(Some(correction), mean_leaks_m3s(estimator).unwrap_or_default())
             })
         });
         let flows = flows.unwrap_or_else(|| {
             with_effects(self.correction.as_ref(), self.exact_flows_m3s(&self.pressures.sizes()))
         });
-        let changes = self.detector.update(self.since_detection_s, &flows);
-        self.since_detection_s = 0.0;
-        for (fault, change) in changes {
+        for (fault, change) in self.detector.update(elapsed_s, &flows) {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
     }
@@ -216,21 +214,35 @@ pub fn leak_pressures_pa(record: &Record, [bias_a, bias_b]: [f64; 2]) -> PerLeak
     PerLeak { internal: pa - pb, external_a: pa, external_b: pb }
 }
 
+/// Error returned by [`replay()`].
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The trace cannot be read on, or has a bad row and none is allowed.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    /// The rig, built by hand, is none for which anything can be estimated.
+    #[error("nothing can be estimated for this rig: {0}")]
+    Rig(#[from] RlsError),
+}
+
 /// Replays a whole trace; `each` sees every record after it was taken in, and whether the estimates are
 /// new.
 ///
 /// # Errors
 /// Where the trace cannot be read on, or a bad row is fatal, or `each` fails.
-pub fn replay<E: From<TraceError>>(
+pub fn replay<E: From<ReplayError>>(
     reader: &mut TraceReader<'_>,
     rig: &Rig,
     mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
 ) -> Result<ReplayReport, E> {
-    let mut replay = Replay::new(rig);
+    let mut replay = Replay::new(rig).map_err(ReplayError::from)?;
     let mut record = Record::default();
-    while reader.next_record(&mut record)? {
+    while reader.next_record(&mut record).map_err(ReplayError::from)? {
         let renewed = replay.push(&record);
         each(&replay, &record, renewed)?;
     }
     Ok(replay.report(TraceSummary::new(reader.name(), reader.quality())))
 }
+
+#[cfg(test)]
+mod tests;

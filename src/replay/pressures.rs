@@ -22,8 +22,7 @@ const BLOCK_S: f64 = 0.1;
 impl TracePressures {
     #[inline]
     pub fn add(&mut self, record: &Record) {
-        // The first sample of a stretch stands for no time of its own.
-        let dt = if record.after_gap { 0.0 } else { record.dt_s };
+        let dt = record.step_s();
         let (pa, pb) = (record.sample.pa_pa, record.sample.pb_pa);
         self.time += dt;
         self.load += (pa - pb) * dt;

@@ -2,6 +2,7 @@ use super::Replay;
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{BadRows, Intake, Record, TraceError, TraceFault, TraceReader};
+use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
 /// would, to the last bit.
@@ -60,8 +61,11 @@ impl Stream {
     }
 
     /// A stream for a rig.
-    pub fn new(rig: &Rig, bad_rows: BadRows) -> Self {
-        Self { replay: Replay::new(rig), intake: None, bad_rows, epoch_ns: None }
+    ///
+    /// # Errors
+    /// As [`Replay::new`].
+    pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, RlsError> {
+        Ok(Self { replay: Replay::new(rig)?, intake: None, bad_rows, epoch_ns: None })
     }
 
     /// What becomes of bad rows.

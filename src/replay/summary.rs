@@ -5,13 +5,15 @@ use crate::report::{
     EstimateEntry, Estimates, FlowMeterOffsets, Leakage, ReplayReport, TraceSummary, Verdict,
 };
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Excitation, Parameter, PerLeak};
+use pitchleak_core::{Excitation, ExcitationReport, Parameter, PerLeak};
 
 impl Replay {
     /// The report on the trace so far.
     pub fn report(&self, trace: TraceSummary) -> ReplayReport {
-        let estimates = self.estimates();
-        let leakage = self.leakage();
+        let found = self.estimator.estimates();
+        let excitation = found.map(|found| found.excitation);
+        let estimates = self.estimates(excitation);
+        let leakage = self.leakage(excitation.is_some());
         let active = self.detector.active();
         ReplayReport {
             schema: ReplayReport::SCHEMA,
@@ -21,8 +23,8 @@ impl Replay {
             trace,
             estimates,
             leakage,
-            flow_meter_offsets: self.estimator.flow_offsets_m3s().map(FlowMeterOffsets::new),
-            normalised_innovation: self.estimator.normalised_innovation(),
+            flow_meter_offsets: found.and_then(|found| found.flow_offsets_m3s).map(FlowMeterOffsets::new),
+            normalised_innovation: found.map(|found| found.normalised_innovation),
             changed_at_s: self.changed_at_s,
             alarms: self.alarms.clone(),
             score: self.scoring.scores(),
@@ -31,8 +33,7 @@ impl Replay {
 
     /// Flows at the mean pressures of the trace, or since the leak changed, eq. (15); the internal one at the mean size of P_L, whatever
     /// its sign.
-    fn leakage(&self) -> PerLeak<Leakage> {
-        let knows_spread = self.estimator.excitation().is_some();
+    fn leakage(&self, knows_spread: bool) -> PerLeak<Leakage> {
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
         sizes.zip(net).map(|(size, net)| {
@@ -45,8 +46,7 @@ impl Replay {
         })
     }
 
-    fn estimates(&self) -> Estimates {
-        let excitation = self.estimator.excitation();
+    fn estimates(&self, excitation: Option<ExcitationReport<f64>>) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
         let entries = self.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
             let unit = EstimateEntry::COEFFICIENT_UNIT;

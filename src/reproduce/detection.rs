@@ -9,7 +9,7 @@ use crate::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use crate::wind::{Emulation, History, Wind, WindCase};
-use pitchleak_core::{EffectSet, Leak, PerLeak};
+use pitchleak_core::{EffectSet, Leak, PerLeak, RlsError};
 use serde::Serialize;
 
 /// Sizes of the leaks, L/min at the run's mean pressures.
@@ -92,7 +92,7 @@ pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detec
         |(law, seed)| {
             let run = runs.get(*seed as usize % runs.len()).ok_or(ReproduceError::Empty)?;
             let biases = Biases::drawn(&law.rig.instruments, law.bias_share, *seed);
-            Ok(Watch::over(&law.rig, &run.truths, Sensing::new(law.rig.sensors(), biases, *seed)))
+            Ok(Watch::over(&law.rig, &run.truths, Sensing::new(law.rig.sensors(), biases, *seed))?)
         },
     );
     let watched = watched.into_iter().collect::<Result<Vec<Watch>, ReproduceError>>()?;
@@ -117,8 +117,8 @@ struct Watch {
 }
 
 impl Watch {
-    fn over(rig: &Rig, truths: &[Truth], mut sensing: Sensing) -> Self {
-        let mut replay = Replay::new(rig);
+    fn over(rig: &Rig, truths: &[Truth], mut sensing: Sensing) -> Result<Self, RlsError> {
+        let mut replay = Replay::new(rig)?;
         let mut raised = Vec::new();
         let mut before = PerLeak::<bool>::default();
         let mut record = Record::default();
@@ -136,10 +136,8 @@ impl Watch {
         }
         let coefficients = replay.estimator().leak_coefficients();
         let holds_zero = |[low, high]: [f64; 2]| low <= 0.0 && high >= 0.0;
-        Self {
-            raised,
-            intervals_with_zero: coefficients.iter().filter(|(_, c)| holds_zero(c.ci95())).count(),
-        }
+        let intervals_with_zero = coefficients.iter().filter(|(_, c)| holds_zero(c.ci95())).count();
+        Ok(Self { raised, intervals_with_zero })
     }
 }
 
@@ -165,7 +163,7 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
     let mut delays = Vec::new();
     let mut misnamed = 0;
     for seed in 0..SEEDS {
-        let watch = Watch::over(&rig, &truths, Sensing::new(rig.sensors(), Biases::default(), seed));
+        let watch = Watch::over(&rig, &truths, Sensing::new(rig.sensors(), Biases::default(), seed))?;
         let own = watch.raised.iter().find(|(which, t_s)| *which == leak && *t_s >= ONSET_S);
         delays.push(own.map_or(f64::INFINITY, |(_, t_s)| t_s - ONSET_S));
         misnamed += u64::from(watch.raised.iter().any(|(which, _)| *which != leak));

@@ -24,7 +24,7 @@ use crate::units::LPM_PER_M3S;
 use crate::wind::WindCase;
 use counted::map_counted;
 use efficient::Efficient;
-use pitchleak_core::{Leak, PerLeak, Sample};
+use pitchleak_core::{ExcitationSettings, Leak, PerLeak, Sample};
 use rayon::prelude::*;
 use serde::Serialize;
 use table::{Entry, WindowBound};
@@ -270,7 +270,7 @@ fn bulk_modulus(case: Case, run: &Run) -> BulkModulusBound {
         case,
         prior_std_percent: 100.0 * prior,
         bound_std_percent: 100.0 * bound,
-        identifiable: bound <= 0.5 * prior,
+        identifiable: ExcitationSettings::default().learns(bound, prior),
     }
 }
 

@@ -5,7 +5,7 @@ use crate::figure::FigureError;
 use crate::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use crate::units::LPM_PER_BAR;
 use crate::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
-use pitchleak_core::{Cylinder, EffectSet, FilterError, PerLeak, Sample};
+use pitchleak_core::{Cylinder, EffectSet, FilterError, PerLeak, RlsError, Sample};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -85,6 +85,9 @@ pub enum ReproduceError {
     /// The emulator.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// The estimator.
+    #[error(transparent)]
+    Estimator(#[from] RlsError),
     /// The paper's filter.
     #[error(transparent)]
     Filter(#[from] FilterError),

@@ -2,8 +2,7 @@
 
 use super::protocol::Case;
 use super::trial::{TrialScore, mean};
-use crate::units::LPM_PER_M3S;
-use pitchleak_core::Estimate;
+use pitchleak_core::{Estimate, ExcitationSettings};
 use serde::Serialize;
 
 /// The five figures of the paper.
@@ -104,11 +103,11 @@ impl WindowBound {
     /// From the bounds on the coefficient `leak` at the end and early on, m³/(s·Pa), and the mean size of
     /// the pressure that drives it.
     pub fn new(leak: f64, (std, early): (f64, f64), pressure_pa: f64) -> Self {
-        let half_width_m3s = Estimate { value: leak, std }.half_width95() * pressure_pa;
+        let flow_m3s = Estimate { value: leak, std }.scaled(pressure_pa);
         Self {
             coefficient: std / leak,
             coefficient_early: early / leak,
-            identifiable: half_width_m3s <= f64::max(0.1 / LPM_PER_M3S, 0.1 * leak * pressure_pa),
+            identifiable: ExcitationSettings::default().resolves(&flow_m3s),
         }
     }
 }

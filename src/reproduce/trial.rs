@@ -1,6 +1,6 @@
 //! One estimator on one noisy 20 s window, and how far off it was.
 
-use super::protocol::{SAMPLE_RATE_HZ, driving_pressures_pa};
+use super::protocol::{ReproduceError, SAMPLE_RATE_HZ, driving_pressures_pa};
 use crate::Rig;
 use crate::replay::Estimator;
 use crate::simulate::{Sensing, Truth};
@@ -50,9 +50,9 @@ impl Course {
     /// The rig's estimator on a window as `sensing` reads it.
     ///
     /// # Errors
-    /// Where the filter does not exist at the protocol's rate.
-    pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, FilterError> {
-        let mut estimator = Estimator::new(rig);
+    /// Where the rig has no estimator, or the filter does not exist at the protocol's rate.
+    pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, ReproduceError> {
+        let mut estimator = Estimator::new(rig)?;
         let mut course = Self::default();
         let mut filters = Filters::default();
         let dt_s = 1.0 / SAMPLE_RATE_HZ;

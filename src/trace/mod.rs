@@ -50,6 +50,14 @@ pub struct Record {
     pub leak_m3s: PerLeak<Option<f64>>,
 }
 
+impl Record {
+    /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
+    #[inline]
+    pub fn step_s(&self) -> f64 {
+        if self.after_gap { 0.0 } else { self.dt_s }
+    }
+}
+
 /// What becomes of a bad row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum BadRows {

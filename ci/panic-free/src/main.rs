@@ -8,8 +8,8 @@
 use core::ptr::{read_volatile, write_volatile};
 
 use pitchleak_core::{
-    AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Excitation, ExcitationSettings,
-    Fluid, LeakDetector, Linkage, LoadEstimator, Model, Signals, Momentum, PaperEstimator, PaperGains,
+    AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Estimates, Excitation, ExcitationSettings,
+    Fluid, LeakDetector, LeakPressures, Linkage, LoadEstimator, Model, Signals, Momentum, PaperEstimator, PaperGains,
     PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
     effects::EffectConstants,
     emulator::{Emulator, EmulatorParams},
@@ -53,15 +53,17 @@ fn any_sample<T: Real>() -> Sample<T> {
 fn rls<T: Real, const N: usize>() {
     let sensors: Sensors<T> = any(Sensors::paper());
     let settings: RlsSettings<T> = any(RlsSettings::default());
-    let mut rls = Rls::<T, N>::new(any(Cylinder::paper()), any(Fluid::paper()), &sensors, settings);
+    let rls = Rls::<T, N>::new(any(Cylinder::paper()), any(Fluid::paper()), &sensors, settings);
+    let Ok(mut rls) = rls else { return keep(rls.is_ok()) };
     let mut detector = LeakDetector::new(any(AlarmSettings::default()));
     loop {
-        let update: Update = rls.update(any(T::lit(0.01)), &any_sample());
+        let update: Update<T> = rls.update(any(T::lit(0.01)), &any_sample());
+        let found: Estimates<T> = rls.estimates();
         let changed: PerLeak<Option<AlarmState>> =
-            detector.update(any(T::lit(0.25)), &rls.mean_leak_flows_m3s());
+            detector.update(any(T::lit(0.25)), &found.mean_leaks_m3s);
         let excitation: Excitation<T> = rls.excitation(&any(ExcitationSettings::default())).bulk_modulus;
-        keep((update, changed, excitation, rls.leak_coefficients(), rls.compressibility()));
-        keep((rls.flow_offsets_m3s(), rls.gains(), rls.normalised_innovation()));
+        keep((update, changed, excitation, found, rls.leak_coefficients()));
+        keep((rls.pressure_biases_pa(), rls.leak_flows_m3s(&any(LeakPressures::default()))));
         if any(false) {
             break;
         }

@@ -1,6 +1,6 @@
 use pitchleak::figure::FigureError;
 use pitchleak::reference::ReferenceError;
-use pitchleak::replay::EstimateFileError;
+use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::reproduce::ReproduceError;
 use pitchleak::rig::RigError;
 use pitchleak::simulate::{EffectsError, RecordingError};
@@ -18,6 +18,9 @@ pub enum Failure {
     /// The trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// The replay of a trace.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
     /// Standard output.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] io::Error),

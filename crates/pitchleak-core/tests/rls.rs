@@ -1,8 +1,8 @@
 //! Laws of the default estimator: units, number types, and that nothing but numbers ever leaves it.
 
 use pitchleak_core::{
-    Cylinder, ExcitationSettings, Fluid, LeakDetector, PerLeak, Real, Rls, RlsSettings, Sample, SensorSpread,
-    Sensors, Update,
+    Cylinder, CylinderError, ExcitationSettings, Fluid, Innovation, LeakDetector, PerLeak, Real, Rls,
+    RlsError, RlsSettings, Sample, SensorSpread, Sensors, Update,
 };
 use pitchleak_testkit::Motion;
 use proptest::prelude::*;
@@ -31,7 +31,7 @@ fn estimate<T: Real, const N: usize>(
     sensors: &Sensors<T>,
     samples: impl Iterator<Item = Sample<T>>,
 ) -> Rls<T, N> {
-    let mut rls = Rls::new(cylinder, fluid, sensors, RlsSettings::default());
+    let mut rls = Rls::new(cylinder, fluid, sensors, RlsSettings::default()).unwrap();
     for sample in samples {
         rls.update(T::lit(0.01), &sample);
     }
@@ -120,14 +120,15 @@ fn a_long_rest_lets_no_covariance_blow_up() {
 #[test]
 fn a_sudden_leak_is_found_within_a_second() {
     let cylinder = Cylinder::<f64>::paper();
-    let mut rls = Rls::<f64, 4>::new(cylinder, Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+    let mut rls =
+        Rls::<f64, 4>::new(cylinder, Fluid::paper(), &Sensors::paper(), RlsSettings::default()).unwrap();
     let (mut found_after_s, mut changed_at_s) = (None, None);
     for (k, mut sample) in (0..).zip(exact(90)) {
         let t = f64::from(k) * 0.01;
         if t >= 60.0 {
             sample.qa_m3s = sample.qa_m3s.map(|q| q + 5e-12 * sample.pa_pa);
         }
-        if rls.update(0.01, &sample) == Update::Changed {
+        if matches!(rls.update(0.01, &sample), Update::Renewed { changed: true, .. }) {
             changed_at_s = Some(t);
         }
         let off = (rls.leak_coefficients().external_a.value - LEAKS.external_a - 5e-12).abs();
@@ -160,16 +161,100 @@ prop_compose! {
     }
 }
 
+/// The innovations that `update` hands out are those that the estimator judges itself by, and the time between two
+/// renewals is the time that was watched.
+#[test]
+fn an_update_tells_innovation_and_watched_time() {
+    let sensors = Sensors::paper();
+    let settings = RlsSettings { forgetting_time_s: f64::INFINITY, ..RlsSettings::default() };
+    let mut rls = Rls::<f64, 4>::new(Cylinder::paper(), Fluid::paper(), &sensors, settings).unwrap();
+    let mut rng = pitchleak_testkit::seeded(7);
+    let (mut ratio, mut count, mut watched_s) = (0.0, 0.0, 0.0);
+    for (k, sample) in exact(60).enumerate() {
+        // A minute's pause every ten seconds: nothing is known of it.
+        let dt_s = if k % 1000 == 0 { 60.0 } else { 0.01 };
+        let update = rls.update(dt_s, &pitchleak_testkit::noisy(&sample, &sensors, &mut rng));
+        if let Update::Renewed { elapsed_s, changed, innovation: Some(Innovation { value, variance }) } =
+            update
+        {
+            assert!(!changed && variance >= 1.0, "{update:?}");
+            ratio += value * value / variance;
+            count += 1.0;
+            watched_s += elapsed_s;
+        }
+    }
+    let [balance, _] = rls.estimates().normalised_innovation;
+    assert!((ratio / count - balance).abs() < 1e-12, "{} {balance}", ratio / count);
+    assert!((0.7..1.4).contains(&balance), "{balance} of {count}");
+    assert!((59.0..=60.0).contains(&watched_s), "{watched_s}");
+}
+
+#[test]
+fn an_estimator_refuses_what_cannot_be() {
+    let settings = RlsSettings::default();
+    let new =
+        |cylinder, fluid, sensors, settings| Rls::<f64, 6>::new(cylinder, fluid, &sensors, settings).err();
+    let (cylinder, fluid, sensors) = (Cylinder::paper(), Fluid::paper(), Sensors::paper());
+    assert_eq!(new(cylinder, fluid, sensors, settings), None);
+    for area_a_m2 in [f64::NAN, 0.0, -1.0, f64::INFINITY] {
+        let error = new(Cylinder { area_a_m2, ..cylinder }, fluid, sensors, settings);
+        assert_eq!(error, Some(RlsError::Cylinder(CylinderError::Area)), "{area_a_m2}");
+    }
+    let error = new(cylinder, Fluid { bulk_modulus_pa: 0.0, ..fluid }, sensors, settings);
+    assert_eq!(error, Some(RlsError::Cylinder(CylinderError::BulkModulus)));
+    for std in [-1e-9, f64::NAN, f64::INFINITY] {
+        let spread = [
+            SensorSpread { noise_std: std, ..sensors.force },
+            SensorSpread { bias_std: std, ..sensors.force },
+            SensorSpread { gain_std: std, ..sensors.force },
+        ];
+        for bad in spread {
+            for sensors in [
+                Sensors { flow_a: bad, ..sensors },
+                Sensors { flow_b: bad, ..sensors },
+                Sensors { pressure: bad, ..sensors },
+                Sensors { position: bad, ..sensors },
+                Sensors { force: bad, ..sensors },
+            ] {
+                assert_eq!(new(cylinder, fluid, sensors, settings), Some(RlsError::Sensors), "{sensors:?}");
+            }
+        }
+    }
+    for time in [0.0, -1.0, f64::NAN] {
+        for settings in [
+            RlsSettings { forgetting_time_s: time, ..settings },
+            RlsSettings { block_time_s: time, ..settings },
+            RlsSettings { max_step_s: time, ..settings },
+            RlsSettings { block_time_s: f64::INFINITY, ..settings },
+        ] {
+            assert_eq!(new(cylinder, fluid, sensors, settings), Some(RlsError::Settings), "{settings:?}");
+        }
+    }
+}
+
+/// What an estimator of fewer parameters does not know is none, not zero.
+#[test]
+fn small_estimators_know_no_offsets_and_no_gains() {
+    fn known<const N: usize>() -> (bool, bool) {
+        let sensors = Sensors::paper();
+        let found = estimate::<f64, N>(Cylinder::paper(), Fluid::paper(), &sensors, exact(2)).estimates();
+        (found.flow_offsets_m3s.is_some(), found.gains.is_some())
+    }
+    assert_eq!((known::<4>(), known::<6>(), known::<9>()), ((false, false), (true, false), (true, true)));
+}
+
 fn all_finite<T: Real, const N: usize>(rls: &Rls<T, N>, detector: &mut LeakDetector<T>) -> bool {
-    let leaks = rls.leak_coefficients().into_iter().chain(rls.mean_leak_flows_m3s());
+    let found = rls.estimates();
+    let leaks = found.leaks_m3spa.into_iter().chain(found.mean_leaks_m3s);
     let estimates = leaks
         .map(|(_, estimate)| estimate)
-        .chain(rls.flow_offsets_m3s())
-        .chain(rls.gains())
-        .chain([rls.compressibility()]);
+        .chain(found.flow_offsets_m3s.into_iter().flatten())
+        .chain(found.gains.into_iter().flatten())
+        .chain(found.pressure_biases_pa)
+        .chain([found.compressibility_per_pa]);
     let mut numbers: Vec<T> = estimates.flat_map(|estimate| [estimate.value, estimate.std]).collect();
-    numbers.extend(rls.normalised_innovation());
-    detector.update(T::lit(0.25), &rls.mean_leak_flows_m3s());
+    numbers.extend(found.normalised_innovation);
+    detector.update(T::lit(0.25), &found.mean_leaks_m3s);
     numbers.iter().all(|n| n.is_finite())
 }
 
@@ -181,9 +266,9 @@ proptest! {
     fn nothing_but_numbers_leaves_the_core(
         samples in prop::collection::vec((any_sample(), prop_oneof![3 => Just(0.01), 1 => any_number()]), 1..400),
     ) {
-        let mut plain = Rls::<f64, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
-        let mut gains = Rls::<f64, 9>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
-        let mut single = Rls::<f32, 6>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+        let mut plain = Rls::<f64, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default()).unwrap();
+        let mut gains = Rls::<f64, 9>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default()).unwrap();
+        let mut single = Rls::<f32, 6>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default()).unwrap();
         let mut detector = LeakDetector::new(Default::default());
         let mut detector_single = LeakDetector::new(Default::default());
         for (sample, dt) in &samples {

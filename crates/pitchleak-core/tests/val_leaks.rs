@@ -19,11 +19,13 @@ struct Found {
 
 fn replay(recording: &Recording, samples: impl Iterator<Item = Sample<f64>>) -> PerLeak<Found> {
     let settings = RlsSettings::default();
-    let mut rls = Rls::<f64, 4>::new(recording.cylinder, recording.fluid, &Sensors::paper(), settings);
+    let mut rls =
+        Rls::<f64, 4>::new(recording.cylinder, recording.fluid, &Sensors::paper(), settings).unwrap();
     for sample in samples {
         rls.update(STEP_S, &sample);
     }
-    let errors = rls.leak_coefficients().zip(recording.leaks).zip(rls.mean_pressures_pa());
+    let found = rls.estimates();
+    let errors = found.leaks_m3spa.zip(recording.leaks).zip(found.mean_pressures_pa);
     errors.map(|((found, truth), pressure_pa)| Found {
         error_lpm: LPM * (found.value - truth) * pressure_pa,
         deviations: (found.value - truth) / found.std,

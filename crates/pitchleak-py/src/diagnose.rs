@@ -19,8 +19,9 @@ pub fn diagnose(
     strict: bool,
 ) -> PyResult<(String, String, Rig, Residuals, Residuals)> {
     let read_all = |sources: &[Source<'_>]| -> PyResult<Vec<Series>> {
-        let read =
-            |source: &Source<'_>| source.read(py, &rig.0, strict, |mut reader| Series::read(&mut reader));
+        let read = |source: &Source<'_>| {
+            source.read(py, &rig.0, strict, |mut reader| Ok(Series::read(&mut reader)?))
+        };
         sources.iter().map(read).collect()
     };
     let (train, test) = (read_all(&train)?, read_all(&test)?);

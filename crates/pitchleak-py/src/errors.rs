@@ -1,5 +1,6 @@
 //! The engine's errors as Python exceptions.
 
+use pitchleak::replay::ReplayError;
 use pitchleak::rig::RigError as EngineRigError;
 use pitchleak::trace::{BadRow, Counted, TraceError as EngineTraceError, TraceFault};
 use pyo3::create_exception;
@@ -38,6 +39,13 @@ pub fn trace_error(py: Python<'_>, error: &EngineTraceError) -> PyErr {
     match set.and_then(|()| value.setattr("line", line)) {
         Ok(()) => raised,
         Err(failure) => failure,
+    }
+}
+
+pub fn replay_error(py: Python<'_>, error: &ReplayError) -> PyErr {
+    match error {
+        ReplayError::Trace(error) => trace_error(py, error),
+        ReplayError::Rig(_) => value_error(error),
     }
 }
 

@@ -4,7 +4,7 @@ use crate::source::Source;
 use crate::table::{NAME, is_plain};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pitchleak::Rig as EngineRig;
-use pitchleak::replay::Stream;
+use pitchleak::replay::{ReplayError, Stream};
 use pitchleak::report::Palette;
 use pitchleak::trace::{BadRows, TableLayout, TraceError, TraceReader};
 use pyo3::prelude::*;
@@ -66,7 +66,8 @@ impl Estimator {
     #[pyo3(signature = (rig, *, estimator = None, strict = false))]
     fn new(rig: &Rig, estimator: Option<&str>, strict: bool) -> PyResult<Self> {
         let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
-        Ok(Self::over(Stream::new(&rig.with_estimator(estimator)?, bad_rows)))
+        let stream = Stream::new(&rig.with_estimator(estimator)?, bad_rows).map_err(value_error)?;
+        Ok(Self::over(stream))
     }
 
     /// What `save` writes.
@@ -152,8 +153,8 @@ impl Estimator {
             running.stream.epoch_ns = running.stream.epoch_ns.or(table.get().first_ns());
         }
         source.read(py, &self.rig.0, false, |reader| match self.running.lock() {
-            Ok(mut running) => running.stream.extend(reader),
-            Err(poisoned) => poisoned.into_inner().stream.extend(reader),
+            Ok(mut running) => running.stream.extend(reader).map_err(ReplayError::from),
+            Err(poisoned) => poisoned.into_inner().stream.extend(reader).map_err(ReplayError::from),
         })
     }
 

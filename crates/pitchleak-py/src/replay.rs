@@ -4,9 +4,8 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::source::Source;
 use numpy::{IntoPyArray, PyArray1};
-use pitchleak::replay::Point;
+use pitchleak::replay::{Point, ReplayError};
 use pitchleak::report::Palette;
-use pitchleak::trace::TraceError;
 use pyo3::prelude::*;
 
 /// A report for programs (JSON) and for people.
@@ -23,7 +22,7 @@ pub fn replay(
 ) -> PyResult<Report> {
     let rig = rig.with_estimator(estimator)?;
     let report = source.read(py, &rig, strict, |mut reader| {
-        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, TraceError>(()))
+        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
     })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }
@@ -47,7 +46,7 @@ pub fn over_time<'py>(
             for (column, value) in columns.iter_mut().zip(replay.point(record).values()) {
                 column.push(value);
             }
-            Ok::<_, TraceError>(())
+            Ok::<_, ReplayError>(())
         })
     })?;
     let columns = Point::COLUMNS.into_iter().zip(columns.map(|column| column.into_pyarray(py))).collect();

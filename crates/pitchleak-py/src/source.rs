@@ -1,7 +1,8 @@
-use crate::errors::trace_error;
+use crate::errors::replay_error;
 use crate::table::{NAME, Table};
 use pitchleak::Rig;
-use pitchleak::trace::{BadRows, TraceError, TraceReader};
+use pitchleak::replay::ReplayError;
+use pitchleak::trace::{BadRows, TraceReader};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -19,12 +20,13 @@ impl Source<'_> {
         py: Python<'_>,
         rig: &Rig,
         strict: bool,
-        work: impl FnOnce(TraceReader<'_>) -> Result<T, TraceError> + Send,
+        work: impl FnOnce(TraceReader<'_>) -> Result<T, ReplayError> + Send,
     ) -> PyResult<T> {
         let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
         let done = match self {
             Self::Path(path) => py.detach(|| {
-                TraceReader::open(path, rig).and_then(|reader| work(reader.with_bad_rows(bad_rows)))
+                let reader = TraceReader::open(path, rig)?;
+                work(reader.with_bad_rows(bad_rows))
             }),
             Self::Table(table) => {
                 let table = table.get();
@@ -36,6 +38,6 @@ impl Source<'_> {
                 })
             }
         };
-        done.map_err(|error| trace_error(py, &error))
+        done.map_err(|error| replay_error(py, &error))
     }
 }

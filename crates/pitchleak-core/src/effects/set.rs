@@ -25,6 +25,7 @@ pub struct EffectSet<T> {
 
 /// Error returned by [`EffectSet::set`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EffectError {
     /// The value is not a number or lies outside the bounds of this effect.
     Value(Effect),

@@ -20,6 +20,7 @@ pub struct Butterworth<T> {
 
 /// Error returned by [`Butterworth::new`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FilterError {
     /// The sample rate is not positive and finite.
     SampleRate,

@@ -30,6 +30,7 @@ pub struct Fluid<T> {
 
 /// Error returned by [`Cylinder::check`] and [`Fluid::check`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum CylinderError {
     /// An area is not positive and finite.
     Area,

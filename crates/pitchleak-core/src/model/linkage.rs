@@ -19,6 +19,7 @@ pub struct Linkage<T> {
 
 /// Error returned by [`Linkage`]'s functions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum LinkageError {
     /// A length is not positive and finite, or the angle is not finite.
     Geometry,

@@ -36,6 +36,13 @@ impl<T: Real> SensorSpread<T> {
     }
 }
 
+impl<T: Real> SensorSpread<T> {
+    /// Whether every spread is a number and none is negative.
+    pub fn is_physical(&self) -> bool {
+        [self.noise_std, self.bias_std, self.gain_std].iter().all(|std| std.is_finite() && *std >= T::zero())
+    }
+}
+
 impl<T: Real> Sensors<T> {
     /// Sensors of the paper's rig (Section III): flow meters 20 L/min full scale, 1 % of full scale.
     pub fn paper() -> Self {

@@ -2,12 +2,14 @@ use core::fmt::Debug;
 use core::ops::{AddAssign, DivAssign, MulAssign, SubAssign};
 use num_traits::Float;
 
-/// The number type of the core: `f32` on a microcontroller, `f64` elsewhere.
+/// The number type of the core: `f32` on a microcontroller, `f64` elsewhere, and no other.
 ///
 /// The functions named `libm_…` come from libm on every target. [`Float`]'s own come from the
 /// platform as soon as anything in the program turns on num-traits' `std`, and then differ in the
 /// last bit from one machine to the next; the basic operations and the square root never do.
-pub trait Real: Float + Default + Debug + AddAssign + SubAssign + MulAssign + DivAssign + 'static {
+pub trait Real:
+    sealed::Sealed + Float + Default + Debug + AddAssign + SubAssign + MulAssign + DivAssign + 'static
+{
     /// The constant nearest to `value`.
     fn lit(value: f64) -> Self;
     /// The value as `f64` (exact).
@@ -32,6 +34,13 @@ pub trait Real: Float + Default + Debug + AddAssign + SubAssign + MulAssign + Di
     fn libm_tanh(self) -> Self;
     /// √(self² + other²) without overflow.
     fn libm_hypot(self, other: Self) -> Self;
+}
+
+/// Nobody else may add a [`Real`]: the last bit of each result depends on it.
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
 }
 
 macro_rules! real {

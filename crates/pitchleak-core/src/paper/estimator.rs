@@ -17,6 +17,8 @@ pub struct PaperEstimator<T> {
     momentum: Momentum<T>,
     law: Option<PaperLaw<T>>,
     max_step_s: T,
+    /// Time watched since the law last moved, s.
+    since_renewal_s: T,
 }
 
 /// One filter per signal.
@@ -55,11 +57,12 @@ impl<T: Real> PaperEstimator<T> {
             momentum: Momentum::new(cylinder.moving_mass_kg, T::one() / (T::lit(4.0) * memory_s)),
             law: None,
             max_step_s: T::lit(50.0) / sample_rate_hz,
+            since_renewal_s: T::zero(),
         })
     }
 
     /// Takes in the reading `sample`, `dt_s` after the one before.
-    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update {
+    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
         if !sample.is_finite() {
             return Update::Rejected;
         }
@@ -72,6 +75,7 @@ impl<T: Real> PaperEstimator<T> {
             self.law = Some(PaperLaw { load_pressure_pa: sample.load_pressure_pa(), ..law });
             return update;
         }
+        self.since_renewal_s += dt_s;
         let smooth = self.filters.update(sample);
         let load_n = match smooth.force_n {
             Some(force_n) => force_n,
@@ -87,13 +91,14 @@ impl<T: Real> PaperEstimator<T> {
         law.step(&self.gains, dt_s, smooth.load_pressure_pa(), &f);
         if law.is_finite() {
             self.law = Some(law);
-            Update::Renewed
+            let elapsed_s = core::mem::take(&mut self.since_renewal_s);
+            Update::Renewed { elapsed_s, changed: false, innovation: None }
         } else {
             Update::Rejected
         }
     }
 
-    fn start(&mut self, sample: &Sample<T>) -> Update {
+    fn start(&mut self, sample: &Sample<T>) -> Update<T> {
         self.filters.reset(sample);
         self.momentum.restart(sample.x_m);
         self.law = Some(PaperLaw::new(&self.cylinder, &self.fluid, sample.load_pressure_pa()));

@@ -2,6 +2,7 @@ use crate::CylinderError;
 
 /// Error returned by the `check` functions of the plant and the emulator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PlantError {
     /// Cylinder or oil cannot exist.
     Cylinder(CylinderError),

@@ -1,11 +1,56 @@
 //! What the estimator has found so far.
 
-use super::{Parameter, Rls};
+use super::{ExcitationReport, ExcitationSettings, Parameter, Rls};
 use crate::{Estimate, LeakPressures, PerLeak, Real};
+
+/// All that an estimator has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Estimates<T> {
+    /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means that
+    /// the model lacks an effect.
+    pub leaks_m3spa: PerLeak<Estimate<T>>,
+    /// Mean leak flows over the memory, m³/s, by eq. (15) at the mean pressures.
+    pub mean_leaks_m3s: PerLeak<Estimate<T>>,
+    /// Means of |P_L|, P_A, P_B over the memory as read, Pa.
+    pub mean_pressures_pa: PerLeak<T>,
+    /// Compressibility κ = 1/β, 1/Pa.
+    pub compressibility_per_pa: Estimate<T>,
+    /// Offsets of the flow meters A and B, m³/s (reading minus truth), apart from what biased pressures drive
+    /// through the leaks. None where N < 6.
+    pub flow_offsets_m3s: Option<[Estimate<T>; 2]>,
+    /// Scale errors of flow meter A, flow meter B and the position sensor, as shares. None where N < 9.
+    pub gains: Option<[Estimate<T>; 3]>,
+    /// Biases of the pressure sensors A and B, Pa (reading minus truth), as far as the offsets found tell: a
+    /// biased pressure drives a leak a little more all the time. Zero, as wide as declared, where N < 6.
+    pub pressure_biases_pa: [Estimate<T>; 2],
+    /// Normalised innovation squared of the balance and of the odometer: 1 where the declared noise and
+    /// the model explain the data, above where they do not (Bar-Shalom, Li, Kirubarajan, Estimation with
+    /// Applications to Tracking and Navigation, §5.4).
+    pub normalised_innovation: [T; 2],
+    /// What the samples identify, by the usual [`ExcitationSettings`].
+    pub excitation: ExcitationReport<T>,
+}
 
 const OFFSETS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 
 impl<T: Real, const N: usize> Rls<T, N> {
+    /// All that is known by now.
+    pub fn estimates(&self) -> Estimates<T> {
+        let pressures = self.pressures.means();
+        Estimates {
+            leaks_m3spa: self.leak_coefficients(),
+            mean_leaks_m3s: self.leak_flows_m3s(&pressures),
+            mean_pressures_pa: pressures.sizes_pa,
+            compressibility_per_pa: self.compressibility(),
+            flow_offsets_m3s: (N > Parameter::OffsetB as usize).then(|| self.flow_offsets_m3s()),
+            gains: (N > Parameter::GainPosition as usize).then(|| self.gains()),
+            pressure_biases_pa: self.pressure_biases_pa(),
+            normalised_innovation: self.innovations.ratios(),
+            excitation: self.excitation(&ExcitationSettings::default()),
+        }
+    }
+
     /// Estimate of a parameter's deviation from its prior mean, SI; zero with no spread where N is too
     /// small to have it.
     fn parameter(&self, parameter: Parameter) -> Estimate<T> {
@@ -26,8 +71,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         entry.map_or(T::zero(), |entry| *entry * self.innovations.inflation())
     }
 
-    /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means
-    /// that the model lacks an effect.
+    /// [`Estimates::leaks_m3spa`] alone.
     pub fn leak_coefficients(&self) -> PerLeak<Estimate<T>> {
         PerLeak {
             internal: self.parameter(Parameter::Internal),
@@ -36,15 +80,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    /// Compressibility κ = 1/β, 1/Pa.
-    pub fn compressibility(&self) -> Estimate<T> {
+    pub(super) fn compressibility(&self) -> Estimate<T> {
         let deviation = self.parameter(Parameter::Compressibility);
         Estimate { value: deviation.value + self.compressibility, std: deviation.std }
     }
 
-    /// Offsets of the flow meters A and B, m³/s (reading minus truth), apart from what biased pressures drive
-    /// through the leaks. Zero where N < 6.
-    pub fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
+    fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
         let (one, none) = (T::one(), T::zero());
         let leaks = self.leak_coefficients().map(|c| c.value.max(none));
         let c = leaks.internal;
@@ -54,8 +95,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         ]
     }
 
-    /// Scale errors of flow meter A, flow meter B and the position sensor, as shares; zero where N < 9.
-    pub fn gains(&self) -> [Estimate<T>; 3] {
+    fn gains(&self) -> [Estimate<T>; 3] {
         [
             self.parameter(Parameter::GainA),
             self.parameter(Parameter::GainB),
@@ -73,8 +113,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.scale[Parameter::Compressibility as usize]
     }
 
-    /// Biases of the pressure sensors A and B, Pa (reading minus truth), as far as the offsets found tell:
-    /// a biased pressure drives a leak a little more all the time. Zero, as wide as declared, where N < 6.
+    /// [`Estimates::pressure_biases_pa`] alone.
     pub fn pressure_biases_pa(&self) -> [Estimate<T>; 2] {
         let (one, none) = (T::one(), T::zero());
         [[one, none], [none, one]].map(|shares| self.offset_sum([none, none], shares))
@@ -136,20 +175,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Estimate { value: coefficient.value * pressure, std: variance.max(T::zero()).sqrt() }
     }
 
-    /// Mean leak flows over the memory, m³/s: [`leak_flows_m3s`](Self::leak_flows_m3s) at its pressures.
-    pub fn mean_leak_flows_m3s(&self) -> PerLeak<Estimate<T>> {
-        self.leak_flows_m3s(&self.pressures.means())
-    }
-
-    /// Means of |P_L|, P_A, P_B over the memory, less the biases found, Pa.
-    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
+    /// Means of |P_L|, P_A, P_B over the memory as read, Pa.
+    pub(super) fn mean_pressures_pa(&self) -> PerLeak<T> {
         self.pressures.means().sizes_pa
-    }
-
-    /// Normalised innovation squared of the balance and of the odometer: 1 where the declared noise and
-    /// the model explain the data, above where they do not (Bar-Shalom, Li, Kirubarajan, Estimation with
-    /// Applications to Tracking and Navigation, §5.4).
-    pub fn normalised_innovation(&self) -> [T; 2] {
-        self.innovations.ratios()
     }
 }

@@ -31,6 +31,18 @@ impl<T: Real> Default for ExcitationSettings<T> {
     }
 }
 
+impl<T: Real> ExcitationSettings<T> {
+    /// Whether a leak's flow, m³/s, is known well enough to call it identified.
+    pub fn resolves(&self, flow_m3s: &Estimate<T>) -> bool {
+        flow_m3s.half_width95() <= self.resolution_m3s.max(self.resolution_share * flow_m3s.value.abs())
+    }
+
+    /// Whether the bulk modulus, or its inverse, is identified: its spread beside its prior's.
+    pub fn learns(&self, std: T, prior_std: T) -> bool {
+        std <= self.prior_share * prior_std
+    }
+}
+
 /// What a trace tells about one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -64,10 +76,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
             traded_with: self.traded_with(parameter),
         };
         let pinned = self.leak_coefficients().zip(self.mean_pressures_pa()).map(|(leak, pressure)| {
-            is_resolved(&leak.scaled(pressure.max(settings.least_pressure_pa)), settings)
+            settings.resolves(&leak.scaled(pressure.max(settings.least_pressure_pa)))
         });
-        let compressibility = self.compressibility();
-        let learnt = compressibility.std <= settings.prior_share * self.compressibility_prior_std();
+        let learnt = settings.learns(self.compressibility().std, self.compressibility_prior_std());
         ExcitationReport {
             leaks: PerLeak {
                 internal: one(Parameter::Internal, pinned.internal),
@@ -99,10 +110,4 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         partner
     }
-}
-
-fn is_resolved<T: Real>(flow: &Estimate<T>, settings: &ExcitationSettings<T>) -> bool {
-    let [low, high] = flow.ci95();
-    let half_width = (high - low) * T::lit(0.5);
-    half_width <= settings.resolution_m3s.max(settings.resolution_share * flow.value.abs())
 }

@@ -12,6 +12,7 @@
 //! Time and memory per sample are constant; nothing is ever differentiated.
 
 mod balance;
+mod error;
 mod estimates;
 mod excitation;
 mod information;
@@ -23,10 +24,13 @@ mod parameter;
 mod position_filter;
 mod pressure_means;
 mod prior;
+mod update;
 mod weights;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use balance::{Integrals, combine};
+pub use error::RlsError;
+pub use estimates::Estimates;
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
 use information::{BlockSums, Information, Solution};
 use innovation_monitor::{InnovationMonitor, NoiseMeter};
@@ -37,6 +41,7 @@ pub use parameter::Parameter;
 use position_filter::PositionFilter;
 use pressure_means::PressureMeans;
 use prior::prior_spread;
+pub use update::{Innovation, Update};
 use weights::Weights;
 
 /// How [`Rls`] forgets and averages.
@@ -57,25 +62,17 @@ impl<T: Real> Default for RlsSettings<T> {
     }
 }
 
-/// What one [`Rls::update`] did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Update {
-    /// The first sample, or the first after a gap: nothing to integrate yet.
-    Started,
-    /// The sample was taken in.
-    Accepted,
-    /// The sample completed a block: the estimates are new.
-    Renewed,
-    /// So did this one, and the leak has changed: what was learnt before counts for nothing any more.
-    Changed,
-    /// Not a number, or beyond what a cylinder can do: the sample was left out.
-    Rejected,
-}
-
 /// Recursive generalised least squares on both chambers, with N parameters:
 /// - N = 4: 1/β and the three leak coefficients;
 /// - N = 6: also the offsets of the two flow meters;
 /// - N = 9: also the gains of both flow meters and of the position sensor.
+///
+/// There is no estimator of any other size:
+///
+/// ```compile_fail
+/// # use pitchleak_core::{Cylinder, Fluid, Rls, RlsSettings, Sensors};
+/// Rls::<f64, 5>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -114,18 +111,25 @@ pub struct Rls<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Rls<T, N> {
+    const HAS_A_KNOWN_SIZE: () = assert!(matches!(N, 4 | 6 | 9), "an estimator has 4, 6 or 9 parameters");
+
     /// An estimator for a rig. `fluid` holds the prior of the bulk modulus; `sensors` the noise, and the
     /// priors of the offsets and gains.
+    ///
+    /// # Errors
+    /// Where the cylinder, its oil, a sensor or a setting cannot be.
     pub fn new(
         cylinder: Cylinder<T>,
         fluid: Fluid<T>,
         sensors: &Sensors<T>,
         settings: RlsSettings<T>,
-    ) -> Self {
+    ) -> Result<Self, RlsError> {
+        let () = Self::HAS_A_KNOWN_SIZE;
+        error::check(&cylinder, &fluid, sensors, &settings)?;
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
         let offsets = OffsetPrior::new(&cylinder, sensors, &no_leak);
-        Self {
+        Ok(Self {
             cylinder,
             noise,
             settings,
@@ -148,12 +152,13 @@ impl<T: Real, const N: usize> Rls<T, N> {
             solution: Information::new().solve(T::zero(), &offsets.information),
             innovations: InnovationMonitor::default(),
             pressures: PressureMeans::default(),
-        }
+        })
     }
 
     /// Takes in the reading `sample`, `dt_s` after the one before.
     #[inline]
-    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update {
+    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
+        let () = Self::HAS_A_KNOWN_SIZE;
         if !self.plausible(sample) {
             return Update::Rejected;
         }
@@ -211,15 +216,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     /// Closes the block: both whitened equations go into the information, and the estimates are renewed.
-    fn renew(&mut self) -> Update {
+    fn renew(&mut self) -> Update<T> {
         let mut travelled = self.sums;
         self.compensate_odometer();
-        let balance = self.whitened_balance();
-        if let Some(equation) = balance {
-            self.add_balance(&equation);
-        } else {
+        let innovation = self.whitened_balance().map(|equation| self.add_balance(&equation));
+        if innovation.is_none() {
             self.memory = None;
         }
+        let elapsed_s = self.block.time;
         let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
         let changed = self.innovations.take_change();
         if changed {
@@ -240,7 +244,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if let Some(odometer) = &mut self.position_filter {
             odometer.weight_sum = T::zero();
         }
-        if changed { Update::Changed } else { Update::Renewed }
+        Update::Renewed { elapsed_s, changed, innovation }
     }
 
     /// The leak has changed: what was learnt before it counts for nothing, and neither the odometer
@@ -288,9 +292,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Some(equation)
     }
 
-    fn add_balance(&mut self, equation: &balance::Equation<T, N>) {
-        let (innovation, variance) = self.solution.predict(equation.left, &equation.columns);
-        self.innovations.balance(innovation, variance);
+    fn add_balance(&mut self, equation: &balance::Equation<T, N>) -> Innovation<T> {
+        let (value, variance) = self.solution.predict(equation.left, &equation.columns);
+        self.innovations.balance(value, variance);
         self.sums.add(&equation.columns, equation.left, T::one());
         // Both ends of the block are noisy readings of the pressure.
         if let Some(memory) = self.memory {
@@ -304,6 +308,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
                 );
             self.compensate(noise / memory.variance);
         }
+        Innovation { value, variance }
     }
 
     /// Pressure noise in the odometer's compressibility column: the last reading's only, as the
@@ -346,7 +351,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    fn restart(&mut self, sample: &Sample<T>) -> Update {
+    fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
         self.last = Some(*sample);
         let variance = self.noise.position_m * self.noise.position_m;
         match &mut self.position_filter {

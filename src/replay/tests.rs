@@ -1,0 +1,78 @@
+use super::*;
+use crate::rig::EstimatorKind;
+use crate::simulate::Normal;
+use pitchleak_testkit::Motion;
+
+/// Records at 100 Hz of a cylinder that leaks; a pause of a minute comes before the records `gaps`.
+fn records(gaps: &[usize]) -> Vec<Record> {
+    let leaks = PerLeak { internal: 1e-11, external_a: 0.0, external_b: 0.0 };
+    let (mut t_s, mut normal) = (0.0, Normal::stream(1, 0));
+    let read = |(k, mut sample): (usize, pitchleak_core::Sample<f64>)| {
+        sample.qa_m3s = sample.qa_m3s.map(|flow| flow + 1e-6 * normal.draw());
+        let after_gap = gaps.contains(&k);
+        let dt_s = if k == 0 {
+            0.0
+        } else if after_gap {
+            60.0
+        } else {
+            0.01
+        };
+        t_s += dt_s;
+        Record { t_s, dt_s, after_gap, sample, ..Record::default() }
+    };
+    Motion::wind_like(leaks).samples(20).into_iter().enumerate().map(read).collect()
+}
+
+/// How many records it takes until the alarm is raised.
+fn raised_after(rig: &Rig, gaps: &[usize]) -> Option<usize> {
+    let mut replay = Replay::new(rig).expect("the paper's rig");
+    records(gaps).iter().position(|record| {
+        replay.push(record);
+        replay.detector.active().internal
+    })
+}
+
+/// An alarm waits until its evidence has lasted for the hold time: a pause is no evidence.
+#[test]
+fn a_gap_is_no_hold_time() {
+    let mut rig = Rig::paper();
+    rig.alarms.hold_time_s = 5.0;
+    let first = raised_after(&rig, &[]).expect("a large leak");
+    let gapped = raised_after(&rig, &[first - 300]).expect("a large leak");
+    assert!(gapped >= first && gapped <= first + 60, "{first} records, with a gap {gapped}");
+}
+
+#[test]
+fn the_papers_law_waits_as_long() {
+    let mut rig = Rig::paper();
+    rig.estimator.kind = EstimatorKind::Paper;
+    rig.alarms.hold_time_s = 2.0;
+    let first = raised_after(&rig, &[]).expect("a large leak");
+    let gapped = raised_after(&rig, &[first - 100]).expect("a large leak");
+    assert!(gapped >= first, "{first} records, with a gap {gapped}");
+}
+
+/// The leak that an effect of the rig file carries is a mean over time that was watched.
+#[test]
+fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
+    use crate::rig::EffectValue;
+    let mut rig = Rig::paper();
+    rig.effects.insert(pitchleak_core::Effect::InternalLeakTurbulent, EffectValue::new(6e-9, None));
+    let mean = |gaps: &[usize]| {
+        let mut correction = Correction::of(&rig).expect("an effect");
+        for record in records(gaps) {
+            correction.correct(&record);
+        }
+        correction.mean_leaks_m3s().internal
+    };
+    let (whole, gapped) = (mean(&[]), mean(&[700, 1300]));
+    assert!((gapped / whole - 1.0).abs() < 1e-3, "{whole} {gapped}");
+}
+
+#[test]
+fn a_rig_that_cannot_be_is_refused() {
+    let mut rig = Rig::paper();
+    rig.cylinder.area_a_m2 = f64::NAN;
+    let error = Replay::new(&rig).err().expect("no such rig").to_string();
+    assert_eq!(error, "piston areas must be positive");
+}
