@@ -51,11 +51,11 @@ fn read(rig: &str, traces: &[String]) -> Result<(Rig, Vec<Series>), Box<dyn Erro
 
 /// What is left over time, before in grey and after in blue.
 fn panels(diagnosis: &Diagnosis) -> Vec<Panel> {
-    let (before, after) = (&diagnosis.residual_before, &diagnosis.residual);
+    let (before, after) = (&diagnosis.before.residual_over_time, &diagnosis.after.residual_over_time);
     let balances = [
-        ("Chamber A", "left over, L/min", &before.chamber_a_m3s, &after.chamber_a_m3s, 60e3),
-        ("Chamber B", "left over, L/min", &before.chamber_b_m3s, &after.chamber_b_m3s, 60e3),
-        ("Forces", "left over, N", &before.force_n, &after.force_n, 1.0),
+        ("Chamber A", "left over, L/min", &before.chamber_a, &after.chamber_a, 60e3),
+        ("Chamber B", "left over, L/min", &before.chamber_b, &after.chamber_b, 60e3),
+        ("Forces", "left over, N", &before.force, &after.force, 1.0),
     ];
     let line = |label, ink, points: &[(f64, f64)], factor: f64| Line {
         label,

@@ -75,7 +75,7 @@ fn first(answer: &Diagnosis) -> &str {
 fn a_sound_rig_is_called_sound() {
     let answer = ask(trace(None), &rig());
     assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{:?}", answer.notes);
-    let leaks = &answer.leaks.after;
+    let leaks = &answer.after.leaks;
     for (leak, truth) in [
         (leaks.internal_leak_coefficient, LEAKS.internal),
         (leaks.external_leak_a_coefficient, LEAKS.external_a),
@@ -95,7 +95,7 @@ fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
     let saved = Rig::parse(&saved, "saved.toml").expect("what was written can be read");
     let again = ask(series, &saved);
     assert_eq!(again.verdict, Verdict::NoMissingEffect, "{:?}", again.notes);
-    let leak = again.leaks.after.internal_leak_coefficient;
+    let leak = again.after.leaks.internal_leak_coefficient;
     assert!((leak.value - LEAKS.internal).abs() < 4.0 * leak.std);
 }
 
@@ -108,7 +108,7 @@ fn the_saved_rig_has_the_oil_that_its_volumes_were_found_with() {
     let answer = ask(series.clone(), &declared);
     assert_eq!(first(&answer), "dead_volume_a", "{:?}", answer.notes);
     let saved = answer.rig(&declared);
-    let bulk = answer.leaks.after.bulk_modulus.value;
+    let bulk = answer.after.leaks.bulk_modulus.value;
     assert!((saved.fluid.bulk_modulus_pa - bulk).abs() < 1e-6 * bulk);
     let again = ask(series, &saved);
     assert_eq!(again.verdict, Verdict::NoMissingEffect, "{:?}", again.notes);
@@ -168,7 +168,7 @@ fn a_ripple_in_one_pressure_sensor_stays_unexplained() {
     }
     let answer = ask(series, &rig());
     assert_eq!(answer.verdict, Verdict::Unexplained);
-    assert!(!answer.remainder.is_empty());
+    assert!(!answer.after.binned_residuals.is_empty());
 }
 
 #[test]
@@ -178,9 +178,9 @@ fn a_chamber_without_a_meter_is_left_out() {
     series.force_n.fill(f64::NAN);
     let answer = ask(series, &rig());
     assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{:?}", answer.notes);
-    let rmse = answer.after.rmse;
-    assert!(rmse.chamber_a_m3s.is_some());
-    assert_eq!((rmse.chamber_b_m3s, rmse.force_n), (None, None));
+    let rmse = answer.after.quality.rmse;
+    assert!(rmse.chamber_a.is_some());
+    assert_eq!((rmse.chamber_b, rmse.force), (None, None));
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn traces_to_judge_on_are_not_fitted() {
     let declared = Declared::of(&rig());
     let answer = diagnose(std::slice::from_ref(&train), &[test], &declared, &|| ());
     assert_eq!(answer.verdict, Verdict::NoMissingEffect);
-    assert!((answer.after.rmse.chamber_a_m3s.unwrap() - 1e-5).abs() < 2e-6);
+    assert!((answer.after.quality.rmse.chamber_a.unwrap() - 1e-5).abs() < 2e-6);
 }
 
 #[test]

@@ -77,8 +77,8 @@ fn val_friction_is_named_and_mends_the_force_balance() {
         assert_eq!(ids, ["coulomb_friction", "viscous_friction"]);
     }
     let clean = &answers[0];
-    assert!(clean.before.rmse.force_n.unwrap() > 0.4 * LOAD_SPREAD_N);
-    assert!(clean.after.rmse.force_n.unwrap() < 0.02 * LOAD_SPREAD_N);
+    assert!(clean.before.quality.rmse.force.unwrap() > 0.4 * LOAD_SPREAD_N);
+    assert!(clean.after.quality.rmse.force.unwrap() < 0.02 * LOAD_SPREAD_N);
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn val_position_gain_is_named_and_mends_the_leaks() {
         assert_eq!(ids(answer), ["position_gain"]);
         let effect = &answer.effects[0];
         assert!((effect.value - 0.02).abs() < 4.0 * effect.std && (effect.value - 0.02).abs() < 2e-3);
-        let (before, after) = (&answer.leaks.before, &answer.leaks.after);
+        let (before, after) = (&answer.before.leaks, &answer.after.leaks);
         let off = |leaks: &LeakEstimates| leaks.external_leak_b_coefficient.value.abs();
         assert!(off(after) < 0.5 * off(before));
         for (leak, truth) in [

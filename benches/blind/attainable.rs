@@ -2,7 +2,7 @@
 
 use pitchleak::core::Effect;
 use pitchleak::core::effects::EffectConstants;
-use pitchleak::diagnose::Likeness;
+use pitchleak::diagnose::Collinearity;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -42,32 +42,32 @@ fn factor(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// covariance is the correlation itself. Sizes that physics forbids do not compete, and fitted constants
 /// pay for their trials as in the diagnosis.
 pub fn attainable(
-    likeness: &Likeness,
+    collinearity: &Collinearity,
     truth: Effect,
     constants: EffectConstants<f64>,
     size: f64,
 ) -> Option<Attainable> {
-    let looks = &likeness.looks;
-    let at = looks.iter().rposition(|look| look.effect == truth && look.shape == constants);
-    let at = at.or_else(|| looks.iter().position(|look| look.effect == truth))?;
-    let sigma = size / looks[at].std;
-    let toward = &likeness.correlation[at];
-    let rivals = looks.iter().zip(toward).filter(|(look, _)| look.effect != truth);
+    let candidates = &collinearity.candidates;
+    let at = candidates.iter().rposition(|one| one.effect == truth && one.constants == constants);
+    let at = at.or_else(|| candidates.iter().position(|one| one.effect == truth))?;
+    let sigma = size / candidates[at].std;
+    let toward = &collinearity.correlation[at];
+    let rivals = candidates.iter().zip(toward).filter(|(one, _)| one.effect != truth);
     let (nearest, r) = rivals.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    let lower = factor(&likeness.correlation);
+    let lower = factor(&collinearity.correlation);
     let mut random = ChaCha8Rng::seed_from_u64(truth as u64);
     let first = (0..DRAWS)
         .filter(|_| {
-            let unit: Vec<f64> = looks.iter().map(|_| StandardNormal.sample(&mut random)).collect();
+            let unit: Vec<f64> = candidates.iter().map(|_| StandardNormal.sample(&mut random)).collect();
             let scores = lower.iter().zip(toward).map(|(row, r)| {
                 let noise: f64 = row.iter().zip(&unit).map(|(l, u)| l * u).sum();
                 r * sigma + noise
             });
-            let named = looks
+            let named = candidates
                 .iter()
                 .zip(scores)
-                .filter(|(look, z)| look.effect.spec().lower < 0.0 || *z > 0.0)
-                .map(|(look, z)| (look.effect, z * z - look.critical_sigma.powi(2)))
+                .filter(|(one, z)| one.effect.spec().lower < 0.0 || *z > 0.0)
+                .map(|(one, z)| (one.effect, z * z - one.critical_sigma.powi(2)))
                 .max_by(|a, b| a.1.total_cmp(&b.1));
             named.is_some_and(|(effect, beyond)| effect == truth && beyond > 0.0)
         })

@@ -5,7 +5,7 @@ use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak, Sensors};
 use pitchleak::curve::Curve;
-use pitchleak::diagnose::{Declared, Diagnosis, Likeness, Series, diagnose};
+use pitchleak::diagnose::{Collinearity, Declared, Diagnosis, Series, diagnose};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -147,14 +147,14 @@ pub fn cases(excitation: Excitation, accuracies: &[f64], multiples: &[f64]) -> V
         cases.push(case(Ailment::None, 0.0, 0.0));
         let rig = rig(accuracy);
         let (series, declared) = (seen(&sound, rig.sensors(), 1), Declared::of(&rig));
-        let likeness = Likeness::of(std::slice::from_ref(&series), &declared, &[constants()]);
-        let reach = diagnose(&[series], &[], &declared, &|| ()).not_detectable_below;
+        let collinearity = Collinearity::of(std::slice::from_ref(&series), &declared, &[constants()]);
+        let limits = diagnose(&[series], &[], &declared, &|| ()).not_detectable_below;
         for effect in Effect::ALL {
-            let Some(limit) = reach.get(effect.spec().id) else { continue };
+            let Some(limit) = limits.get(effect.spec().id) else { continue };
             for multiple in multiples {
                 let size = multiple * limit.value;
                 if size < 0.8 * effect.spec().upper {
-                    let expected = attainable(&likeness, *effect, constants(), size);
+                    let expected = attainable(&collinearity, *effect, constants(), size);
                     cases.push(Case { expected, ..case(Ailment::Known(*effect), *multiple, size) });
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::cases::{Ailment, Case, LEAKS, ask, truth};
 use pitchleak::core::effects::EffectKind;
-use pitchleak::diagnose::{Diagnosis, LeakEstimates, Rmse, Verdict};
+use pitchleak::diagnose::{Diagnosis, LeakEstimates, PerEquation, Verdict};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -49,19 +49,19 @@ impl Tally {
         };
         self.wrong_without_doubt += usize::from(others().any(sure));
         let in_force = matches!(ailment, Ailment::Known(effect) if effect.spec().kind == EffectKind::Force);
-        self.error_before += error(&answer.before.rmse, in_force);
-        self.error_after += error(&answer.after.rmse, in_force);
-        self.leak_bias_before_lpm += leak_bias_lpm(&answer.leaks.before);
-        self.leak_bias_after_lpm += leak_bias_lpm(&answer.leaks.after);
+        self.error_before += error(&answer.before.quality.rmse, in_force);
+        self.error_after += error(&answer.after.quality.rmse, in_force);
+        self.leak_bias_before_lpm += leak_bias_lpm(&answer.before.leaks);
+        self.leak_bias_after_lpm += leak_bias_lpm(&answer.after.leaks);
     }
 }
 
 /// L/min of both chambers, or N.
-fn error(rmse: &Rmse, in_force: bool) -> f64 {
+fn error(rmse: &PerEquation<Option<f64>>, in_force: bool) -> f64 {
     if in_force {
-        return rmse.force_n.unwrap_or(0.0);
+        return rmse.force.unwrap_or(0.0);
     }
-    rmse.chamber_a_m3s.unwrap_or(0.0).hypot(rmse.chamber_b_m3s.unwrap_or(0.0)) * 60e3
+    rmse.chamber_a.unwrap_or(0.0).hypot(rmse.chamber_b.unwrap_or(0.0)) * 60e3
 }
 
 /// The largest of the three leaks' errors at 2 (internal) or 4 MPa.

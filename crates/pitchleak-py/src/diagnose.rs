@@ -2,10 +2,10 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::source::Source;
 use crate::threads::detached;
-use pitchleak::diagnose::{Declared, Residual, Series, diagnose as engine_diagnose};
+use pitchleak::diagnose::{Declared, Equation, PerEquation, Series, diagnose as engine_diagnose};
 use pyo3::prelude::*;
 
-/// What is left of each balance over time: name, time in s, residual in SI.
+/// What is left of each equation over time: name, time in s, residual in SI.
 type Residuals = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
 /// Fits traces of one rig together; gives JSON, text, the rig with the effects found, and residuals before
@@ -29,17 +29,19 @@ pub fn diagnose(
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
     let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text());
-    Ok((json, text, saved, residuals(diagnosis.residual_before), residuals(diagnosis.residual)))
+    Ok((
+        json,
+        text,
+        saved,
+        residuals(&diagnosis.before.residual_over_time),
+        residuals(&diagnosis.after.residual_over_time),
+    ))
 }
 
-fn residuals(residual: Residual) -> Residuals {
-    let Residual { chamber_a_m3s, chamber_b_m3s, force_n } = residual;
-    let named = [("chamber_a_m3s", chamber_a_m3s), ("chamber_b_m3s", chamber_b_m3s), ("force_n", force_n)];
-    named
-        .into_iter()
-        .map(|(name, points)| {
-            let (t_s, left) = points.into_iter().unzip();
-            (name, t_s, left)
-        })
-        .collect()
+fn residuals(over_time: &PerEquation<Vec<(f64, f64)>>) -> Residuals {
+    let series = |(equation, points): (Equation, &Vec<(f64, f64)>)| {
+        let (t_s, residual) = points.iter().copied().unzip();
+        (equation.id_with_unit(), t_s, residual)
+    };
+    over_time.iter().map(series).collect()
 }

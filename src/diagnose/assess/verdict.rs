@@ -1,0 +1,60 @@
+//! The answer in a word, and the sentences that speak for it.
+
+use super::adequacy::{complaints, ripples};
+use super::leaks::negative_leaks;
+use crate::diagnose::data::SensorCheck;
+use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
+use crate::diagnose::search::Selection;
+use crate::diagnose::thresholds::UNMENDED_SHARE;
+
+/// What the search makes of the traces.
+pub(crate) struct Judgement {
+    pub(crate) verdict: Verdict,
+    /// Whether the effects' names can be believed.
+    pub(crate) confident: bool,
+    /// What speaks against the model with the effects.
+    pub(crate) complaints: Vec<String>,
+}
+
+/// Judges the model with the effects; `excess_before` is the power that the declared model leaves beyond the noise.
+pub(crate) fn judge(
+    selection: &Selection<'_>,
+    excited: bool,
+    excess_before: f64,
+    checks: &[SensorCheck],
+) -> Judgement {
+    let Selection { fit, effects } = selection;
+    let mut complaints = complaints(fit);
+    complaints.extend(ripples(checks));
+    let beaten = effects.iter().any(|one| one.beaten_by_nameless);
+    if beaten {
+        complaints.push("a product of signals without a name fits better than any known effect".to_owned());
+    }
+    let verdict = match (excited, effects.is_empty(), complaints.is_empty()) {
+        (false, ..) => Verdict::InsufficientExcitation,
+        (true, true, true) => Verdict::NoMissingEffect,
+        (true, true, false) => Verdict::Unexplained,
+        (true, false, true) => Verdict::Explained,
+        (true, false, false) => Verdict::PartlyExplained,
+    };
+    let mends_nearly_all = !beaten && fit.excess_power() < UNMENDED_SHARE * excess_before;
+    Judgement { verdict, confident: verdict == Verdict::Explained || mends_nearly_all, complaints }
+}
+
+/// All sentences for people: `after` is none where no effect was named.
+pub(crate) fn notes(
+    complaints: Vec<String>,
+    before: &ModelFit,
+    after: Option<&ModelFit>,
+    interactions: &[Interaction],
+) -> Vec<String> {
+    let mut notes = complaints;
+    notes.extend(negative_leaks(&before.leaks, "the declared model"));
+    notes.extend(interactions.iter().map(|found| {
+        let Interaction { effects: [one, other], sigma, mended_percent } = found;
+        format!("{one} and {other} act on each other: the product of their terms shows at {sigma:.1} sigma and would mend {mended_percent:.1} %")
+    }));
+    let after = after.map(|after| negative_leaks(&after.leaks, "the model with the effects"));
+    notes.extend(after.into_iter().flatten());
+    notes
+}

@@ -1,0 +1,123 @@
+//! The speed that friction feels: from the flows where they are measured, which know it ten times
+//! better than the position's difference does, else from the slope of the position.
+
+use super::series::Series;
+use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
+use pitchleak_core::{Model, Sensors};
+
+/// Speed along a trace, smoothed just enough for the sensors' noise.
+pub(crate) struct Motion {
+    /// m/s, one per sample; NaN where it can't be told.
+    pub(crate) v_mps: Vec<f64>,
+    /// Standard deviation of its noise, m/s.
+    pub(crate) std_mps: f64,
+    /// Root mean square, m/s.
+    pub(crate) rms_mps: f64,
+}
+
+impl Motion {
+    pub(crate) fn of(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> Self {
+        let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
+        if has(&series.qa_m3s) || has(&series.qb_m3s) {
+            Self::from_flow(series, model, sensors)
+        } else {
+            Self::from_position(series, sensors)
+        }
+    }
+
+    fn from_flow(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> Self {
+        let raw = raw_speed(series, model);
+        let rms = root_mean_square(&raw);
+        let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
+            .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
+        let (half, step) = (half_window(std, rms, 2.0), series.step_s());
+        let half = half.min(longest_half(step));
+        let v_mps = smooth(&raw, half);
+        Self { v_mps, std_mps: std / ((2 * half + 1) as f64).sqrt(), rms_mps: rms }
+    }
+
+    fn from_position(series: &Series, sensors: &Sensors<f64>) -> Self {
+        let half = longest_half(series.step_s()).max(1);
+        let v_mps = slope(&series.t_s, &series.x_m, half);
+        let n = (2 * half + 1) as f64;
+        let std = sensors.position.noise_std * (12.0 / (n * n * n)).sqrt() / series.step_s().max(1e-9);
+        let rms_mps = root_mean_square(&v_mps);
+        Self { v_mps, std_mps: std, rms_mps }
+    }
+
+    /// Below this speed the direction of motion is not known.
+    pub(crate) fn least_sure_mps(&self) -> f64 {
+        (LEAST_SURE_SIGMA * self.std_mps).max(LEAST_SURE_SHARE * self.rms_mps)
+    }
+}
+
+fn longest_half(step_s: f64) -> usize {
+    if step_s > 0.0 { (LONGEST_WINDOW_S / step_s / 2.0) as usize } else { 0 }
+}
+
+/// Samples on each side over which noise `std` averages down to the wanted share of `rms`.
+fn half_window(std: f64, rms: f64, power: f64) -> usize {
+    if rms <= 0.0 {
+        return usize::MAX / 4;
+    }
+    ((std / (SPEED_NOISE_SHARE * rms)).powf(power) / 2.0).min(1e6) as usize
+}
+
+/// Speed from eq. (1), both chambers averaged where both have a meter.
+fn raw_speed(series: &Series, model: &Model<f64>) -> Vec<f64> {
+    let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks_m3spa, model.fluid.bulk_modulus_pa);
+    let rate = |values: &[f64], at: usize| {
+        let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
+        let span = series.t_s[to] - series.t_s[from];
+        if span > 0.0 { (values[to] - values[from]) / span } else { 0.0 }
+    };
+    (0..series.len())
+        .map(|at| {
+            let (x, pa, pb) = (series.x_m[at], series.pa_pa[at], series.pb_pa[at]);
+            let past = leaks.internal * (pa - pb);
+            let stored_a = cylinder.volume_a_m3(x) / bulk * rate(&series.pa_pa, at);
+            let stored_b = cylinder.volume_b_m3(x) / bulk * rate(&series.pb_pa, at);
+            let a = (series.qa_m3s[at] - past - leaks.external_a * pa - stored_a) / cylinder.area_a_m2;
+            let b = -(series.qb_m3s[at] + past - leaks.external_b * pb - stored_b) / cylinder.area_b_m2;
+            match (a.is_finite(), b.is_finite()) {
+                (true, true) => (a + b) / 2.0,
+                (true, false) => a,
+                _ => b,
+            }
+        })
+        .collect()
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    let (sum, count) =
+        values.iter().filter(|v| v.is_finite()).fold((0.0, 0_usize), |(s, n), v| (s + v * v, n + 1));
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+fn smooth(values: &[f64], half: usize) -> Vec<f64> {
+    if half == 0 {
+        return values.to_vec();
+    }
+    (0..values.len())
+        .map(|at| {
+            let window = &values[at.saturating_sub(half)..(at + half + 1).min(values.len())];
+            window.iter().sum::<f64>() / window.len() as f64
+        })
+        .collect()
+}
+
+/// Least-squares slope over `half` samples on each side.
+fn slope(t: &[f64], x: &[f64], half: usize) -> Vec<f64> {
+    (0..x.len())
+        .map(|at| {
+            let range = at.saturating_sub(half)..(at + half + 1).min(x.len());
+            let n = range.len() as f64;
+            let (mt, mx) =
+                (t[range.clone()].iter().sum::<f64>() / n, x[range.clone()].iter().sum::<f64>() / n);
+            let (num, den) = range.fold((0.0, 0.0), |(num, den), i| {
+                (num + (t[i] - mt) * (x[i] - mx), den + (t[i] - mt) * (t[i] - mt))
+            });
+            if den > 0.0 { num / den } else { 0.0 }
+        })
+        .collect()
+}

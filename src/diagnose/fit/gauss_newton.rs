@@ -1,0 +1,273 @@
+//! Gauss–Newton on the generalised least-squares criterion: rows are rebuilt around the last estimate,
+//! with sensor effects undone on the readings. Columns that carry the residual's own noise are corrected
+//! for it (errors in variables: Söderström 2018, "Errors-in-Variables Methods in System Identification").
+
+use super::equation_error;
+use super::problem::Problem;
+use super::regression::{Prior, Regression, Solution};
+use super::score::{PartialColumn, Score};
+use crate::diagnose::equation::PerEquation;
+use crate::diagnose::thresholds::{FIRST_ROUNDS, FOLDS, HELD, NEXT_ROUNDS};
+use crate::diagnose::weak_form::{Linearisation, Term, WeakForm};
+use pitchleak_core::Estimate;
+use pitchleak_core::effects::EffectConstants;
+
+/// Called at every round of a fit.
+pub type Progress<'a> = &'a dyn Fn();
+
+/// Which terms are fitted, and with which constants each column stands.
+#[derive(Clone)]
+pub(super) struct Structure {
+    /// Places among the problem's terms, those of the declared model first.
+    active: Vec<usize>,
+    constants: Vec<EffectConstants<f64>>,
+}
+
+impl Structure {
+    fn without(mut self, term: usize) -> Self {
+        self.active.retain(|one| *one != term);
+        self
+    }
+
+    fn with(mut self, term: usize, constants: EffectConstants<f64>) -> Self {
+        self.active.push(term);
+        self.constants[term] = constants;
+        self
+    }
+}
+
+/// A fit: the regression around one linearisation, and its solution. It never changes; another effect makes another fit.
+pub(crate) struct Fit<'a> {
+    pub(crate) problem: &'a Problem<'a>,
+    structure: Structure,
+    pub(super) weak_form: WeakForm<'a>,
+    pub(crate) regression: Regression,
+    /// With 1/β within the oil's range.
+    pub(crate) bounded: Solution,
+    /// With 1/β free to leave its range: what candidates are scored against, since the right one
+    /// takes it back.
+    pub(crate) free: Solution,
+    /// The end of the oil's range at which 1/β is held, because the data would take it further.
+    pub(crate) held_compressibility: Option<f64>,
+    /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
+    pub(super) equation_error: PerEquation<f64>,
+}
+
+impl<'a> Fit<'a> {
+    /// Best fit of the declared model.
+    pub(crate) fn declared(problem: &'a Problem<'a>, progress: Progress<'_>) -> Self {
+        let constants = vec![problem.usual_constants; problem.terms.len()];
+        let structure = Structure { active: problem.declared_terms(), constants };
+        Self::around(problem, structure, problem.start.clone(), PerEquation::default())
+            .rounds(FIRST_ROUNDS, progress)
+    }
+
+    /// Best fit with one more effect.
+    pub(crate) fn with(&self, term: usize, constants: EffectConstants<f64>, progress: Progress<'_>) -> Self {
+        self.changed(&[], &[(term, constants)], progress)
+    }
+
+    /// Best fit without an effect.
+    pub(crate) fn without(&self, term: usize, progress: Progress<'_>) -> Self {
+        self.changed(&[term], &[], progress)
+    }
+
+    /// Best fit without the `old` effects and with the `new` ones.
+    pub(crate) fn changed(
+        &self,
+        old: &[usize],
+        new: &[(usize, EffectConstants<f64>)],
+        progress: Progress<'_>,
+    ) -> Self {
+        let (structure, at) = self.left_by(old);
+        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
+        Self::around(self.problem, structure, at, self.equation_error).rounds(NEXT_ROUNDS, progress)
+    }
+
+    /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
+    pub(crate) fn vacated(&self, term: usize) -> Self {
+        let (structure, at) = self.left_by(&[term]);
+        let vacated = Self::around(self.problem, structure, at, self.equation_error);
+        Self { equation_error: self.equation_error, ..vacated }
+    }
+
+    /// Structure and linearisation once some effects are gone.
+    fn left_by(&self, old: &[usize]) -> (Structure, Linearisation) {
+        let gone = |(structure, at): (Structure, Linearisation), term: &usize| {
+            let constants = &self.structure.constants[*term];
+            (structure.without(*term), at.with(self.problem.terms[*term], 0.0, constants))
+        };
+        old.iter().fold((self.structure.clone(), self.solved()), gone)
+    }
+
+    /// One linearisation and its solution.
+    fn around(
+        problem: &'a Problem<'a>,
+        structure: Structure,
+        at: Linearisation,
+        assumed_error: PerEquation<f64>,
+    ) -> Self {
+        let columns = (problem.terms.as_slice(), structure.constants.as_slice());
+        let weak_form = WeakForm::new(problem.traces, &problem.sensors, at, columns, assumed_error);
+        let WeakForm { at, rows, whitening, .. } = &weak_form;
+        let regression = Regression::new(rows, whitening, &weak_form.shared_noise(&problem.terms));
+        let mut priors = problem.increments(at);
+        let free = regression.solve(&structure.active, &priors);
+        let held_compressibility = beyond_range(problem, at, &free);
+        hold(&mut priors, problem, at, held_compressibility);
+        let mut bounded = regression.solve(&structure.active, &priors);
+        if assumed_error != PerEquation::default() {
+            let pieces = regression.jackknife(&structure.active, &priors);
+            bounded.std.iter_mut().zip(pieces).for_each(|(std, wide)| *std = std.max(wide));
+        }
+        let equation_error = equation_error::estimate(&weak_form, &regression, &bounded);
+        Self {
+            problem,
+            structure,
+            weak_form,
+            regression,
+            bounded,
+            free,
+            held_compressibility,
+            equation_error,
+        }
+    }
+
+    /// So many linearisations, this one the first.
+    fn rounds(mut self, count: usize, progress: Progress<'_>) -> Self {
+        for _ in 1..count {
+            progress();
+            self = Self::around(self.problem, self.structure.clone(), self.solved(), self.equation_error);
+        }
+        self
+    }
+
+    /// The linearisation at the solution.
+    pub(super) fn solved(&self) -> Linearisation {
+        let step = |at: Linearisation, (place, increment): (&usize, &f64)| {
+            let term = self.problem.terms[*place];
+            let value = at.value(term) + increment;
+            at.with(term, value, &self.structure.constants[*place])
+        };
+        self.bounded.terms.iter().zip(&self.bounded.value).fold(self.weak_form.at.clone(), step)
+    }
+
+    /// Terms that are fitted.
+    pub(crate) fn active(&self) -> &[usize] {
+        &self.structure.active
+    }
+
+    /// The constants with which a term's column stands: those it was last fitted with.
+    pub(crate) fn constants(&self, term: usize) -> EffectConstants<f64> {
+        self.structure.constants[term]
+    }
+
+    /// The priors with 1/β held where it would leave its range.
+    pub(super) fn held_priors(&self) -> Vec<Option<Prior>> {
+        let mut priors = self.problem.increments(&self.weak_form.at);
+        hold(&mut priors, self.problem, &self.weak_form.at, self.held_compressibility);
+        priors
+    }
+
+    /// Value and standard deviation of a fitted term.
+    pub(crate) fn estimate(&self, term: usize) -> Option<Estimate<f64>> {
+        let at = self.bounded.terms.iter().position(|one| *one == term)?;
+        let value = self.weak_form.at.value(self.problem.terms[term]) + self.bounded.value[at];
+        Some(Estimate { value, std: self.bounded.std[at] })
+    }
+
+    /// Whether more is left than the sensors' noise.
+    pub(crate) fn is_incomplete(&self) -> bool {
+        self.equation_error.iter().any(|(_, error)| *error > 0.0)
+    }
+
+    /// Size of what is left as a multiple of the noise that the sensors bring.
+    pub(crate) fn noise_ratio(&self) -> PerEquation<f64> {
+        self.noise_ratios(self.equation_error)
+    }
+
+    fn noise_ratios(&self, equation_error: PerEquation<f64>) -> PerEquation<f64> {
+        PerEquation::from_fn(|equation| {
+            let rows = &self.weak_form.rows;
+            let entry = rows.entries.iter().find(|entry| entry.equation == equation);
+            let variance = |error| {
+                let noise = self.weak_form.noise(error);
+                entry.map_or(1.0, |entry| noise.white_variance(&rows.rows[entry.row], equation))
+            };
+            (variance(equation_error) / variance(PerEquation::default())).sqrt()
+        })
+    }
+
+    /// Power of what is left beyond the sensors' noise, as a multiple of that, over the equations.
+    pub(crate) fn excess_power(&self) -> f64 {
+        self.noise_ratio().iter().map(|(_, ratio)| ratio.powi(2) - 1.0).sum()
+    }
+
+    /// How much larger the residual is than the declared noise: 1 for a model that is complete.
+    pub(crate) fn dispersion(&self, chi2: f64) -> f64 {
+        (chi2 / self.regression.count().max(1) as f64).max(1.0)
+    }
+
+    /// What one further term would bring to a model; none where it can't be or would be unphysical.
+    pub(crate) fn score(&self, model: &Solution, term: usize) -> Option<Score> {
+        let score = self.regression.score(model, term)?;
+        self.problem.allows(term, score.value).then_some(score)
+    }
+
+    /// The whitened column of a term with these constants.
+    pub(crate) fn white_column(&self, term: Term, constants: EffectConstants<f64>) -> Vec<f64> {
+        self.weak_form.white_column(term, constants)
+    }
+
+    /// Fall of the sum of squares by a term that is not among the candidates.
+    pub(crate) fn chi2_drop(&self, term: Term, constants: EffectConstants<f64>) -> Option<f64> {
+        let column = self.partial(&self.free, &self.white_column(term, constants))?;
+        Some(self.regression.chi2_drop(&self.free, &column))
+    }
+
+    /// What a model's terms do not explain of a whitened column.
+    pub(crate) fn partial(&self, model: &Solution, white: &[f64]) -> Option<PartialColumn> {
+        self.regression.partial(model, white)
+    }
+
+    /// The fit with some effects held at zero: no new pass over the data.
+    pub(crate) fn solve_without(&self, terms: &[usize]) -> Solution {
+        let mut priors = self.problem.increments(&self.weak_form.at);
+        for term in terms {
+            let mean = -self.weak_form.at.value(self.problem.terms[*term]);
+            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
+        }
+        self.regression.solve(&self.structure.active, &priors)
+    }
+
+    /// Whether a further term with these constants also helps where it was not fitted.
+    pub(crate) fn holds_out(&self, term: usize, constants: EffectConstants<f64>) -> bool {
+        let priors = self.problem.increments(&self.weak_form.at);
+        let column = || self.white_column(self.problem.terms[term], constants);
+        let other = (constants != self.constants(term)).then(|| self.regression.with_column(term, column()));
+        let regression = other.as_ref().unwrap_or(&self.regression);
+        let mut with = self.structure.active.clone();
+        with.push(term);
+        let before = regression.held_out(&self.structure.active, &priors);
+        let after = regression.held_out(&with, &priors);
+        let better = before.iter().zip(&after).filter(|(b, a)| a < b).count();
+        let sum: f64 = before.iter().zip(&after).map(|(b, a)| b - a).sum();
+        sum > 0.0 && 2 * better > FOLDS
+    }
+}
+
+/// The end of the oil's range beyond which the data alone would take 1/β.
+fn beyond_range(problem: &Problem<'_>, at: &Linearisation, free: &Solution) -> Option<f64> {
+    let own = problem.place(Term::InverseBulk)?;
+    let place = free.terms.iter().position(|term| *term == own)?;
+    let value = at.value(Term::InverseBulk) + free.value[place];
+    let (low, high) = at.compressibility;
+    (!(low..=high).contains(&value)).then(|| value.clamp(low, high))
+}
+
+/// Holds 1/β at a value.
+fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation, held: Option<f64>) {
+    if let (Some(held), Some(own)) = (held, problem.place(Term::InverseBulk)) {
+        priors[own] = Some(Prior { mean: held - at.value(Term::InverseBulk), std: HELD * held });
+    }
+}

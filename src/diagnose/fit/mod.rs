@@ -1,0 +1,15 @@
+//! The declared model and effects beside it, fitted to all traces at once.
+
+mod equation_error;
+mod gauss_newton;
+mod predict;
+mod problem;
+mod regression;
+mod score;
+
+pub(crate) use gauss_newton::Fit;
+pub use gauss_newton::Progress;
+pub(crate) use predict::MeanFlow;
+pub(crate) use problem::Problem;
+pub(crate) use regression::Solution;
+pub(crate) use score::{PartialColumn, Score};

@@ -1,0 +1,289 @@
+//! Generalised least squares on the whitened rows. All fits, tests and held-out errors come from one
+//! Gram matrix per fold, so that trying a candidate costs a small solve, not a pass over the data.
+
+use crate::diagnose::equation::Equation;
+use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FOLDS, PIECES};
+use crate::diagnose::weak_form::{Rows, SharedNoise, Whitening};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// What is known of a term beside the data, as an increment from the linearisation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prior {
+    pub(crate) mean: f64,
+    pub(crate) std: f64,
+}
+
+/// Whitened columns and their products.
+#[derive(Clone)]
+pub(crate) struct Regression {
+    piece_of: Vec<usize>,
+    /// Whitened y.
+    pub(crate) y: Vec<f64>,
+    /// Whitened columns of length one; empty where a term does not show.
+    pub(crate) columns: Vec<Vec<f64>>,
+    /// Unit column times this is the whitened column of one unit.
+    pub(crate) scale: Vec<f64>,
+    /// Entries that count.
+    pub(crate) counted: Vec<bool>,
+    grams: Vec<DMatrix<f64>>,
+    pub(super) total: DMatrix<f64>,
+}
+
+/// A fit of some terms.
+pub(crate) struct Solution {
+    pub(crate) terms: Vec<usize>,
+    /// Increments from the linearisation, in the terms' units.
+    pub(crate) value: Vec<f64>,
+    pub(crate) std: Vec<f64>,
+    /// Sum of squares with the priors' part.
+    pub(crate) chi2: f64,
+    pub(super) scaled: DVector<f64>,
+    pub(super) inverse: DMatrix<f64>,
+}
+
+impl Regression {
+    /// `shared` are realisations of the noise that columns share with the residual. Their mean products
+    /// are taken off the Gram matrices, so that on average only the signals are left in them (corrected
+    /// score, bias-compensated least squares: Söderström 2018, ch. 6; Stefanski 1985).
+    pub(crate) fn new(rows: &Rows, whitening: &Whitening, shared: &[SharedNoise]) -> Self {
+        let counted: Vec<bool> = rows.entries.iter().map(|entry| rows.counts(entry)).collect();
+        let total_rows = rows.rows.len().max(1);
+        let piece_of: Vec<usize> = rows.entries.iter().map(|e| e.row * PIECES / total_rows).collect();
+        let (y, columns, scale, grams, total) = (vec![], vec![], vec![], vec![], DMatrix::zeros(0, 0));
+        let mut new = Self { piece_of, y, columns, scale, counted, grams, total };
+        new.y = new.counting(whitening.whiten(&rows.y));
+        let columns = rows.columns.iter().map(|column| normalised(new.counting(whitening.whiten(column))));
+        (new.columns, new.scale) = columns.unzip();
+        new.grams = new.products();
+        for noise in shared {
+            new.take_off(noise, whitening, 1.0 / shared.len() as f64);
+        }
+        new.total = sum_of(&new.grams);
+        new
+    }
+
+    /// Columns and y.
+    fn width(&self) -> usize {
+        self.columns.len() + 1
+    }
+
+    /// The columns and y, in the order of the Gram matrices.
+    fn all(&self) -> Vec<&[f64]> {
+        self.columns.iter().chain(std::iter::once(&self.y)).map(Vec::as_slice).collect()
+    }
+
+    /// The sum over each piece.
+    fn by_piece(&self, left: &[f64], right: &[f64]) -> [f64; PIECES] {
+        let mut sums = [0.0; PIECES];
+        for ((u, v), piece) in left.iter().zip(right).zip(&self.piece_of) {
+            sums[*piece] += u * v;
+        }
+        sums
+    }
+
+    fn products(&self) -> Vec<DMatrix<f64>> {
+        let mut grams = vec![DMatrix::zeros(self.width(), self.width()); PIECES];
+        let all = self.all();
+        for (a, left) in all.iter().enumerate() {
+            for (b, right) in all.iter().enumerate().take(a + 1) {
+                for (gram, sum) in grams.iter_mut().zip(self.by_piece(left, right)) {
+                    gram[(a, b)] = sum;
+                    gram[(b, a)] = sum;
+                }
+            }
+        }
+        grams
+    }
+
+    /// The same regression with another column for a term that carries none of the residual's noise.
+    pub(crate) fn with_column(&self, term: usize, white: Vec<f64>) -> Self {
+        let mut new = self.clone();
+        (new.columns[term], new.scale[term]) = normalised(self.counting(white));
+        let products: Vec<_> =
+            new.all().into_iter().map(|other| new.by_piece(&new.columns[term], other)).collect();
+        for (other, sums) in products.into_iter().enumerate() {
+            for (gram, sum) in new.grams.iter_mut().zip(sums) {
+                gram[(term, other)] = sum;
+                gram[(other, term)] = sum;
+            }
+        }
+        new.total = sum_of(&new.grams);
+        new
+    }
+
+    /// A column with zeros where an entry does not count.
+    pub(crate) fn counting(&self, white: Vec<f64>) -> Vec<f64> {
+        white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect()
+    }
+
+    fn take_off(&mut self, noise: &SharedNoise, whitening: &Whitening, weight: f64) {
+        let rows = whitening.whiten(&noise.rows);
+        let columns: Vec<(usize, Vec<f64>)> = noise
+            .columns
+            .iter()
+            .filter(|(term, _)| self.shows(*term))
+            .map(|(term, column)| {
+                let white = whitening.whiten(column);
+                (*term, white.into_iter().map(|v| v / self.scale[*term]).collect())
+            })
+            .collect();
+        let y = self.columns.len();
+        for (i, piece) in self.piece_of.iter().enumerate().filter(|(i, _)| self.counted[*i]) {
+            let gram = &mut self.grams[*piece];
+            for (a, left) in &columns {
+                let with_rows = weight * left[i] * rows[i];
+                gram[(*a, y)] -= with_rows;
+                gram[(y, *a)] -= with_rows;
+                for (b, right) in &columns {
+                    gram[(*a, *b)] -= weight * left[i] * right[i];
+                }
+            }
+        }
+    }
+
+    /// Number of entries that count.
+    pub(crate) fn count(&self) -> usize {
+        self.counted.iter().filter(|counts| **counts).count()
+    }
+
+    /// Whether a term shows in the data at all.
+    pub(crate) fn shows(&self, term: usize) -> bool {
+        !self.columns[term].is_empty()
+    }
+
+    /// Which fold an entry belongs to.
+    pub(crate) fn fold_of(&self, entry: usize) -> usize {
+        self.piece_of[entry] % FOLDS
+    }
+
+    fn fold(&self, fold: usize) -> DMatrix<f64> {
+        let zero = DMatrix::zeros(self.width(), self.width());
+        self.grams.iter().skip(fold).step_by(FOLDS).fold(zero, |sum, gram| sum + gram)
+    }
+
+    /// Fits `terms` to all the data.
+    pub(crate) fn solve(&self, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
+        self.solve_gram(&self.total, terms, priors)
+    }
+
+    /// Fits `terms` to all but one fold.
+    pub(crate) fn solve_without(&self, fold: usize, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
+        self.solve_gram(&(&self.total - self.fold(fold)), terms, priors)
+    }
+
+    /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
+    /// where what is left is neither white nor of known size.
+    pub(crate) fn jackknife(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
+        let fits = self.leave_one_out(terms, priors);
+        let of = |i: usize| jackknife_std(fits.iter().map(|fit| fit.value[i]));
+        (0..fits.first().map_or(0, |fit| fit.value.len())).map(of).collect()
+    }
+
+    /// Fits without one piece each.
+    pub(crate) fn leave_one_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<Solution> {
+        self.grams.iter().map(|gram| self.solve_gram(&(&self.total - gram), terms, priors)).collect()
+    }
+
+    fn solve_gram(&self, gram: &DMatrix<f64>, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
+        let terms: Vec<usize> = terms.iter().copied().filter(|t| self.shows(*t)).collect();
+        let y = self.columns.len();
+        let mut matrix = DMatrix::from_fn(terms.len(), terms.len(), |i, j| gram[(terms[i], terms[j])]);
+        let mut right = DVector::from_fn(terms.len(), |i, _| gram[(terms[i], y)]);
+        let mut chi2 = gram[(y, y)];
+        for (i, term) in terms.iter().enumerate() {
+            matrix[(i, i)] += COLLINEAR_RIDGE;
+            if let Some(prior) = priors[*term] {
+                let weight = (self.scale[*term] * prior.std).powi(-2);
+                let mean = prior.mean * self.scale[*term];
+                matrix[(i, i)] += weight;
+                right[i] += weight * mean;
+                chi2 += weight * mean * mean;
+            }
+        }
+        let inverse = inverse(matrix);
+        let scaled = &inverse * &right;
+        let chi2 = chi2 - right.dot(&scaled);
+        let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
+        let std =
+            terms.iter().enumerate().map(|(i, t)| inverse[(i, i)].max(0.0).sqrt() / self.scale[*t]).collect();
+        Solution { terms, value, std, chi2, scaled, inverse }
+    }
+
+    /// Whitened sum of squares of each fold under the fit to the other folds.
+    pub(crate) fn held_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> [f64; FOLDS] {
+        std::array::from_fn(|fold| {
+            let solution = self.solve_without(fold, terms, priors);
+            let gram = self.fold(fold);
+            let y = self.columns.len();
+            let mut sum = gram[(y, y)];
+            for (a, va) in solution.terms.iter().zip(solution.scaled.iter()) {
+                sum -= 2.0 * va * gram[(*a, y)];
+                for (b, vb) in solution.terms.iter().zip(solution.scaled.iter()) {
+                    sum += va * vb * gram[(*a, *b)];
+                }
+            }
+            sum
+        })
+    }
+
+    /// Whitened residuals of one equation, in order of time.
+    pub(crate) fn innovations(&self, rows: &Rows, solution: &Solution, equation: Equation) -> Vec<f64> {
+        self.innovations_by_entry(rows, solution, equation).map(|(_, value)| value).collect()
+    }
+
+    /// The same with the entry that each belongs to.
+    pub(crate) fn innovations_by_entry<'a>(
+        &'a self,
+        rows: &'a Rows,
+        solution: &'a Solution,
+        equation: Equation,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let counted = move |i: &usize| rows.entries[*i].equation == equation && self.counted[*i];
+        (0..self.y.len()).filter(counted).map(|i| {
+            let fit = solution.terms.iter().zip(solution.scaled.iter());
+            (i, self.y[i] - fit.map(|(term, v)| v * self.columns[*term][i]).sum::<f64>())
+        })
+    }
+}
+
+fn sum_of(grams: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let width = grams.first().map_or(0, DMatrix::nrows);
+    grams.iter().fold(DMatrix::zeros(width, width), |sum, gram| sum + gram)
+}
+
+/// A column of length one, empty where it does not show, and its length.
+pub(crate) fn normalised(mut column: Vec<f64>) -> (Vec<f64>, f64) {
+    let length = column.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if !(length.is_finite() && length > 0.0) {
+        return (vec![], 1.0);
+    }
+    column.iter_mut().for_each(|v| *v /= length);
+    (column, length)
+}
+
+/// Standard deviation of an estimate from its values without one piece each.
+pub(crate) fn jackknife_std(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = PIECES as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    ((n - 1.0) / n * values.map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
+}
+
+fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    let factor: Option<Cholesky<f64, Dyn>> = Cholesky::new(matrix.clone());
+    factor.map_or_else(
+        || matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(n, n)),
+        |f| f.inverse(),
+    )
+}
+
+/// What the fit leaves over of each entry, in the equation's own unit times seconds.
+pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
+    let mut residual = rows.y.clone();
+    for (term, value) in solution.terms.iter().zip(&solution.value) {
+        for (cell, column) in residual.iter_mut().zip(&rows.columns[*term]) {
+            *cell -= value * column;
+        }
+    }
+    residual
+}

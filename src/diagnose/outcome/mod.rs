@@ -1,0 +1,79 @@
+//! What a diagnosis says.
+
+mod effects;
+mod leaks;
+mod residual;
+
+pub use effects::{Calibration, FoundEffect, Interaction, Size};
+pub use leaks::{HoldLeak, Holds, LeakEstimate, LeakEstimates};
+pub use residual::{BinnedResidual, Correlation, EquationResidual};
+
+use super::equation::PerEquation;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The answer in a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// With the effects named, what is left is sensor noise.
+    Explained,
+    /// The effects named mend much, but more than sensor noise is left.
+    PartlyExplained,
+    /// What the declared model leaves over is sensor noise.
+    NoMissingEffect,
+    /// Something is missing, and no known effect fits.
+    Unexplained,
+    /// Too little happens in these traces to tell.
+    InsufficientExcitation,
+}
+
+/// How well a model fits: on samples it did not see (`rmse`), and as noise (`whiteness_p`).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality {
+    /// Root mean square of what is left, averaged over hats of 0.2 s, on held-out samples, m³/s and N; none
+    /// where the traces lack the equation.
+    pub rmse: PerEquation<Option<f64>>,
+    /// Probability that what is left is white noise of the declared size (portmanteau test).
+    pub whiteness_p: PerEquation<Option<f64>>,
+}
+
+/// One model fitted to the traces: the declared one, or that with the effects found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelFit {
+    /// How well it fits.
+    pub quality: Quality,
+    /// Leaks and bulk modulus.
+    pub leaks: LeakEstimates,
+    /// Size of what is left as a multiple of the sensors' noise.
+    pub noise_ratio: PerEquation<f64>,
+    /// What is left of the fitted samples, whitened and tested; none where the traces lack the equation.
+    pub residuals: PerEquation<Option<EquationResidual>>,
+    /// What is left of held-out samples against each variable.
+    pub binned_residuals: Vec<BinnedResidual>,
+    /// The same over time: s, and m³/s or N, averaged over hats of 0.2 s.
+    pub residual_over_time: PerEquation<Vec<(f64, f64)>>,
+}
+
+/// All that a diagnosis found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnosis {
+    /// Best fit of the declared model.
+    pub before: ModelFit,
+    /// With the effects.
+    pub after: ModelFit,
+    /// The effects, strongest first.
+    pub effects: Vec<FoundEffect>,
+    /// Pairs of these effects that act on each other.
+    pub interactions: Vec<Interaction>,
+    /// Offsets and gains that the rig file declares possible, as found with the effects.
+    pub calibration: Vec<Calibration>,
+    /// Smallest size of each further effect that these traces would have shown at five standard deviations.
+    pub not_detectable_below: BTreeMap<&'static str, Size>,
+    /// The answer.
+    pub verdict: Verdict,
+    /// Sentences for people: what speaks for the verdict.
+    pub notes: Vec<String>,
+    /// Leaks while the piston stands, against those found in motion; none without such holds.
+    pub holds: Option<Holds>,
+}

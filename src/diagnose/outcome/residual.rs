@@ -1,0 +1,83 @@
+//! What a model leaves over.
+
+use crate::diagnose::equation::Equation;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What a model leaves over of one equation: a number per hat of 0.2 s, whitened (docs/closing-the-loop.md). With the right model and the
+/// declared noise they are independent standard normal numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct EquationResidual {
+    /// The whitened numbers, in the order of time. Where more than the sensors' noise is left, they are
+    /// whitened by what is left.
+    #[serde(skip)]
+    pub white: Vec<f64>,
+    /// What the machine did then, by variable, SI: read from samples that the number does not contain, not a
+    /// number where there are none.
+    #[serde(skip)]
+    pub variables: BTreeMap<&'static str, Vec<f64>>,
+    /// How many numbers.
+    pub count: usize,
+    /// Size of what is left as a multiple of the sensors' noise.
+    #[serde(rename = "excess")]
+    pub noise_ratio: f64,
+    /// Probability of autocorrelations this large in white noise (Box and Pierce 1970).
+    pub whiteness_p: Option<f64>,
+    /// Probability of skewness and kurtosis this far off in normal numbers (Jarque and Bera 1980, "Efficient tests
+    /// for normality, homoscedasticity and serial independence of regression residuals", Econ. Lett. 6).
+    pub normality_p: Option<f64>,
+    /// Third standardised moment; 0 if normal.
+    pub skewness: f64,
+    /// Fourth standardised moment less 3; 0 if normal.
+    pub excess_kurtosis: f64,
+    /// With each variable that varies.
+    pub correlations: BTreeMap<&'static str, Correlation>,
+}
+
+/// How what is left goes with a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Correlation {
+    /// Pearson's coefficient.
+    pub coefficient: f64,
+    /// In standard deviations of what white noise would show: white numbers need no allowance for how slowly
+    /// the variable moves.
+    pub sigma: f64,
+}
+
+impl EquationResidual {
+    /// Autocorrelation at lags of 1 to `lags` hats; white noise stays within ± 1.96/√count.
+    pub fn autocorrelation(&self, lags: usize) -> Vec<f64> {
+        let power: f64 = self.white.iter().map(|w| w * w).sum();
+        let at = |lag: usize| {
+            let later = self.white.get(lag..).unwrap_or_default();
+            self.white.iter().zip(later).map(|(a, b)| a * b).sum::<f64>() / power.max(f64::MIN_POSITIVE)
+        };
+        (1..=lags).map(at).collect()
+    }
+
+    /// Variables that what is left goes with beyond chance (`sigma` standard deviations), strongest first.
+    pub fn goes_with(&self, sigma: f64) -> Vec<(&'static str, Correlation)> {
+        let mut found: Vec<_> = self.correlations.iter().map(|(name, c)| (*name, *c)).collect();
+        found.retain(|(_, c)| c.sigma.abs() > sigma);
+        found.sort_by(|a, b| b.1.sigma.abs().total_cmp(&a.1.sigma.abs()));
+        found
+    }
+}
+
+/// What is left against one variable: means in bins of equal count.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BinnedResidual {
+    /// Of which equation.
+    #[serde(rename = "balance")]
+    pub equation: Equation,
+    /// The variable.
+    pub against: &'static str,
+    /// Middle of each bin, SI.
+    pub at: Vec<f64>,
+    /// Mean of what is left there, SI.
+    pub mean: Vec<f64>,
+    /// Standard error of each mean, as if the hats were independent, SI.
+    pub std_error: Vec<f64>,
+    /// Correlation of the two.
+    pub correlation: f64,
+}

@@ -1,0 +1,8 @@
+//! A diagnosis for people, programs and the rig file.
+
+mod figures;
+mod json;
+mod labels;
+mod residual_text;
+mod rig;
+mod text;

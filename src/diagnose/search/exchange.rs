@@ -1,0 +1,87 @@
+//! Second thoughts: what was named first was named while other effects were still missing, and at the noise of an
+//! incomplete model. Each named effect, and each pair, has to hold its place against its rivals again.
+
+use super::candidates::{Candidates, Trial, critical_sigma};
+use super::selection::{self, Selected, Selection};
+use crate::diagnose::fit::{Fit, Progress};
+use crate::diagnose::statistics;
+use crate::diagnose::thresholds::{CONFUSABLE_CHI2, MOST_SWAPS};
+
+/// Exchanges named effects for rivals that do better in their place, until none does.
+pub(super) fn exchange_all(all: &mut Selection<'_>, progress: Progress<'_>) {
+    for _ in 0..MOST_SWAPS {
+        if !swap_one(all, progress) && !merge_two(all, progress) {
+            return;
+        }
+    }
+}
+
+/// Gives one effect's place to a rival that does better there; false when all keep theirs.
+fn swap_one(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
+    let mut next = 0;
+    while let Some(at) = first_contested(all, next) {
+        let one = &mut all.effects[at];
+        let vacated = all.fit.vacated(one.term);
+        progress();
+        if let Some(best) = Candidates::of(&vacated).trials(&vacated.free).into_iter().next() {
+            all.fit = selection::with(&vacated, &[], &best, progress);
+            if best.score.term != one.term {
+                replace(&all.fit, one, &best);
+                return true;
+            }
+        }
+        next = at + 1;
+    }
+    false
+}
+
+/// The first effect from `next` on to which a rival comes close, as far as the present linearisation tells.
+fn first_contested(all: &Selection<'_>, next: usize) -> Option<usize> {
+    let fit = &all.fit;
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let mut candidates = Candidates::of(fit);
+    let mut is_contested = |term: usize| {
+        let without = fit.solve_without(&[term]);
+        let own = (without.chi2 - fit.free.chi2) / dispersion;
+        let own = own - critical_sigma(fit, fit.constants(term)).powi(2);
+        let rivals = candidates.rough_trials(&without);
+        rivals.first().is_some_and(|best| best.beyond(dispersion) > own - CONFUSABLE_CHI2)
+    };
+    (next..all.effects.len()).find(|at| is_contested(all.effects[*at].term))
+}
+
+/// Gives the places of two effects to a single one beside which neither is significant.
+fn merge_two(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
+    let count = all.effects.len();
+    let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b)));
+    let Some(((a, b), best)) = mergeable(all, pairs) else { return false };
+    let terms = [all.effects[a].term, all.effects[b].term];
+    all.fit = selection::with(&all.fit, &terms, &best, progress);
+    replace(&all.fit, &mut all.effects[a], &best);
+    all.effects.remove(b);
+    true
+}
+
+/// The first pair that one candidate can stand for.
+fn mergeable(
+    all: &Selection<'_>,
+    mut pairs: impl Iterator<Item = (usize, usize)>,
+) -> Option<((usize, usize), Trial)> {
+    let fit = &all.fit;
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let mut candidates = Candidates::of(fit);
+    pairs.find_map(|(a, b)| {
+        let terms = [all.effects[a].term, all.effects[b].term];
+        let without = fit.solve_without(&terms);
+        let lost = without.chi2 - fit.free.chi2;
+        let needed = terms.map(|term| critical_sigma(fit, fit.constants(term)).powi(2));
+        let spare = dispersion * needed[0].max(needed[1]);
+        let best = candidates.rough_trials(&without).into_iter().next()?;
+        (lost - best.score.chi2_drop <= spare).then_some(((a, b), best))
+    })
+}
+
+fn replace(fit: &Fit<'_>, one: &mut Selected, best: &Trial) {
+    let chi2_drop = best.score.chi2_drop / fit.dispersion(fit.free.chi2);
+    *one = Selected { term: best.score.term, p_value: statistics::chi2_p(chi2_drop, 1.0), ..one.clone() };
+}

@@ -1,0 +1,65 @@
+//! The laws by which numbers are judged: whether they are white noise, and how large chance makes them.
+
+use super::thresholds::PORTMANTEAU_LAGS;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// Probability that white noise of variance one shows correlations this large: Box and Pierce (1970),
+/// but with the known variance in the denominator, so that a remainder far below the noise passes. Where the
+/// numbers happen to be larger than that, their own: products of 300 numbers that are by chance 10 % too large
+/// would pass for colour ten times as often as the law says.
+pub(crate) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64> {
+    let n = innovations.len();
+    if n < 4 * PORTMANTEAU_LAGS {
+        return None;
+    }
+    let power = innovations.iter().map(|v| v * v).sum::<f64>() / n as f64;
+    let variance = power.max(dispersion);
+    let sum: f64 = (1..=PORTMANTEAU_LAGS)
+        .map(|lag| {
+            let later = &innovations[lag..];
+            let product: f64 = innovations.iter().zip(later).map(|(a, b)| a * b).sum();
+            product * product / later.len() as f64 / (variance * variance)
+        })
+        .sum();
+    Some(chi2_p(sum, PORTMANTEAU_LAGS as f64))
+}
+
+/// Upper tail of the chi-squared distribution.
+pub(crate) fn chi2_p(value: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(f64::NAN, |law| law.sf(value.max(0.0)))
+}
+
+/// The size in standard deviations that one of `count` tests passes by chance with probability `rate`.
+pub(crate) fn bonferroni_sigma(rate: f64, count: usize) -> f64 {
+    let share = rate / count.max(1) as f64 / 2.0;
+    Normal::standard().inverse_cdf(1.0 - share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_wave_is_not_white_and_a_tiny_one_is_below_the_noise() {
+        let wave: Vec<f64> = (0..500).map(|i| (0.05 * f64::from(i)).sin()).collect();
+        assert!(portmanteau_p(&wave, 1.0).is_some_and(|p| p < 1e-9));
+        let tiny: Vec<f64> = wave.iter().map(|v| 1e-3 * v).collect();
+        assert!(portmanteau_p(&tiny, 1.0).is_some_and(|p| p > 0.99));
+    }
+
+    #[test]
+    fn white_numbers_fail_about_as_rarely_as_the_law_says() {
+        let mut normal = crate::simulate::Normal::stream(3, 0);
+        let mut failed = 0;
+        for _ in 0..20_000 {
+            let white: Vec<f64> = (0..300).map(|_| normal.draw()).collect();
+            failed += usize::from(portmanteau_p(&white, 1.0).is_some_and(|p| p < 2e-4));
+        }
+        assert!((1..=30).contains(&failed), "{failed} of 20000, four by the law");
+    }
+
+    #[test]
+    fn thirty_tests_at_one_in_a_thousand_need_four_sigma() {
+        assert!((bonferroni_sigma(1e-3, 30) - 4.15).abs() < 0.05);
+    }
+}

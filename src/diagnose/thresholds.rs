@@ -1,0 +1,156 @@
+//! Every number that the diagnosis decides by, with where it comes from: *derived* from another or from a law,
+//! *sourced* from a publication, *tuned on* traces, or *chosen* as a convention or for cost, without tuning.
+
+// Chance.
+
+/// Share of sound rigs on which the search may name anything, shared out over all candidates (Bonferroni). Chosen.
+pub(crate) const FALSE_EFFECT_RATE: f64 = 1e-3;
+/// A sound rig fails any one test of what is left this rarely. Derived: size and whiteness of three equations and one
+/// test for nameless products make seven, so that 1.4 in a thousand sound rigs are complained about, as many as are
+/// named an effect.
+pub(crate) const LEAST_P: f64 = 2e-4;
+/// What is left counts as noise unless its variance is this many standard deviations too large. Derived: the normal
+/// law's two-sided bound of [`LEAST_P`].
+pub(crate) const CHANCE_SIGMA: f64 = 3.7;
+/// Share of diagnoses in which a product of two effects may be reported by chance. Derived: as [`FALSE_EFFECT_RATE`].
+pub(crate) const FALSE_PRODUCT_RATE: f64 = FALSE_EFFECT_RATE;
+/// A variable that the residual goes with is named where chance does so once in a hundred diagnoses. Chosen.
+pub(crate) const CHANCE_RATE: f64 = 0.01;
+/// Derived: three equations, eleven variables.
+pub(crate) const RESIDUAL_TESTS: usize = 33;
+/// Lags of the portmanteau test. Chosen: two seconds of hats, the machine's slowest answer.
+pub(crate) const PORTMANTEAU_LAGS: usize = 20;
+/// Half width of the 95 % interval of a normal law, in standard deviations. Derived.
+pub(crate) const CI95_SIGMA: f64 = 1.96;
+
+// Sensors and samples.
+
+/// Below this share of full scale nothing is an effect. Sourced: one step of a 16-bit converter.
+pub(crate) const RESOLUTION: f64 = 1.0 / 65_536.0;
+/// Faster samples than this are averaged first, s. Chosen: ten samples to a block of [`BLOCK_S`].
+pub(crate) const LEAST_STEP_S: f64 = 0.01;
+/// Noise this many times the declared one is remarked upon. Derived: the median of third differences of 600 samples
+/// (6 s at 100 Hz) of white noise is larger by that much at 3.5 standard deviations (7 %: the median's efficiency is
+/// 0.37, and third differences have 2.3 times the variance of independent ones, Bartlett 1946).
+pub(crate) const NOISIER: f64 = 1.25;
+/// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
+/// samples of white noise has a standard deviation of √(2.3/600) = 0.06 (Bartlett 1946); this is four of them.
+pub(crate) const RIPPLE_COLOUR: f64 = 0.25;
+/// Wanted noise of the speed as a share of its root mean square. Chosen: friction's column is as exact as that.
+pub(crate) const SPEED_NOISE_SHARE: f64 = 0.02;
+/// No window for smoothing the speed is longer than this, s. Derived: one block, [`BLOCK_S`].
+pub(crate) const LONGEST_WINDOW_S: f64 = BLOCK_S;
+/// Below so many standard deviations of the speed's noise, or this share of its root mean square, the direction of
+/// motion is not known. Chosen: three standard deviations; the share stands for what no noise tells, as creep.
+pub(crate) const LEAST_SURE_SIGMA: f64 = 3.0;
+/// See [`LEAST_SURE_SIGMA`].
+pub(crate) const LEAST_SURE_SHARE: f64 = 5e-3;
+
+// Weak form.
+
+/// Length of a block, s. Chosen: short against the machine's motion, long against a sample.
+pub(crate) const BLOCK_S: f64 = 0.1;
+/// Share of a hat that is rounding, not time. Derived: far above the rounding of a sum of samples, far below one.
+pub(crate) const SLIVER: f64 = 1e-6;
+/// Variance of an entry that must not count, times its own. Derived: its weight is then below rounding of the rest.
+pub(crate) const IGNORED: f64 = 1e8;
+/// A pivot of the covariance is at least this share of its variance. Derived: rounding alone brings it there.
+pub(crate) const LEAST_PIVOT: f64 = 1e-3;
+/// Step of a derivative, as a share of an effect's usual size. Derived: central differences err by its square.
+pub(crate) const DERIVATIVE_STEP: f64 = 1e-2;
+/// Realisations of sensor noise whose mean products correct the columns that carry it. Chosen: their own scatter is
+/// then half of the residual's.
+pub(crate) const NOISE_DRAWS: u64 = 4;
+
+// The fit.
+
+/// The oil stays within so many standard deviations of its prior, and at this share of 1/β at least: what is softer
+/// or stiffer is not oil but an effect. Chosen: three standard deviations; the share keeps β finite.
+pub(crate) const OIL_SIGMA: f64 = 3.0;
+/// See [`OIL_SIGMA`].
+pub(crate) const LEAST_COMPRESSIBILITY: f64 = 0.3;
+/// Rounds of Gauss–Newton from scratch, and after a small change. Chosen.
+pub(crate) const FIRST_ROUNDS: usize = 4;
+/// See [`FIRST_ROUNDS`].
+pub(crate) const NEXT_ROUNDS: usize = 3;
+/// Halvings of the interval that holds the equation error. Derived: to 2⁻¹⁶ of it.
+pub(crate) const BISECTIONS: usize = 16;
+/// A term held at a value has this share of its own standard deviation as prior. Derived: it moves by 1e-8 of it.
+pub(crate) const HELD: f64 = 1e-4;
+/// Added to the diagonal of the scaled normal equations, so that collinear columns can be solved. Derived: as a prior
+/// it is a billion times too wide to matter.
+pub(crate) const COLLINEAR_RIDGE: f64 = 1e-11;
+/// What is left of a column after the others explain it, below which it tells nothing new. Derived: the root of
+/// rounding.
+pub(crate) const LEAST_NEW_SHARE: f64 = 1e-8;
+/// Held-out parts of the data. Chosen: the usual five (Hastie, Tibshirani and Friedman 2009, section 7.10).
+pub(crate) const FOLDS: usize = 5;
+/// The traces are cut into so many pieces; fold f is every fifth piece from f. Chosen: enough for a jackknife.
+pub(crate) const PIECES: usize = 4 * FOLDS;
+
+// The search.
+
+/// Constants fitted to the data count as this many candidates.
+pub(crate) const CONSTANTS_TRIALS: usize = 20;
+/// Effects that one diagnosis names at most. Chosen: with two of the rig file they fill the core's set of eight.
+pub(crate) const MOST_EFFECTS: usize = 6;
+/// Additions, counting those that are taken back. Chosen against cycles.
+pub(crate) const MOST_STEPS: usize = 10;
+/// Swaps that one addition may set off. Chosen against cycles.
+pub(crate) const MOST_SWAPS: usize = 4;
+/// While the residual is larger than the noise, an effect must mend this share of it to be named.
+pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;
+/// A candidate below this share of the best is not worth a search for its constants.
+pub(crate) const IN_THE_RUNNING: f64 = 0.4;
+/// Standard deviations by the jackknife that an effect must have beside an unexplained residual. Chosen: three.
+pub(crate) const AGREED_SIGMA: f64 = 3.0;
+/// Candidates whose fit is this close cannot be told apart. Derived: three standard deviations.
+pub(crate) const CONFUSABLE_CHI2: f64 = 9.0;
+/// A score below this is not worth a search for constants. Derived: three standard deviations.
+pub(crate) const WORTH_SEARCHING: f64 = 9.0;
+/// Steps of the search for constants. Chosen against cycles.
+pub(crate) const MOST_CLIMBS: usize = 40;
+/// First and last step of that search as shares of a constant's range. Chosen: from a fifth down to what shows in a
+/// fitted constant.
+pub(crate) const FIRST_STEP: f64 = 0.2;
+/// See [`FIRST_STEP`].
+pub(crate) const LAST_STEP: f64 = 0.002;
+/// What a step must gain. Derived: half of what chance brings to one fitted constant.
+pub(crate) const LEAST_CLIMB: f64 = 0.5;
+/// Places along the range of each constant from which the search starts. Chosen: ends and middle.
+pub(crate) const SEARCH_STARTS: [f64; 3] = [0.15, 0.5, 0.85];
+
+// The verdict.
+
+/// Fewer hats than this tell nothing. Chosen: the law of large numbers' usual thirty.
+pub(crate) const FEWEST_ROWS: usize = 30;
+/// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
+/// by nearly one, so that four of five are found.
+pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
+/// Effects that leave more than this share of the power beyond the sensors' noise are not to be believed.
+pub(crate) const UNMENDED_SHARE: f64 = 0.1;
+/// A leak this many standard deviations below zero is evidence against the model. Chosen: three.
+pub(crate) const NEGATIVE_SIGMA: f64 = 3.0;
+/// A leak known to within this flow at the mean pressure is identified, m³/s. Chosen: 0.1 L/min.
+pub(crate) const IDENTIFIED_M3S: f64 = 0.1 / 60e3;
+/// The bulk modulus is identified when less than this share of its prior's standard deviation is left. Chosen.
+pub(crate) const LEARNT_SHARE: f64 = 0.5;
+
+// Holds.
+
+/// A hold lasts so long, s. Chosen: ten of [`BLOCK_S`].
+pub(crate) const HOLD_S: f64 = 1.0;
+/// Pieces of a hold whose mean positions are compared. Derived: [`HOLD_S`] over [`BLOCK_S`].
+pub(crate) const HOLD_PIECES: usize = 10;
+/// The piston stands while those means stay within this share of what it travels elsewhere in the trace in the
+/// same time (under load it creeps by what leaks), of the stroke, or within their noise. Tuned on the measured
+/// laboratory rig of docs/closing-the-loop.md, where the piston creeps under load.
+pub(crate) const STILL_SHARE_OF_TRAVEL: f64 = 0.05;
+/// See [`STILL_SHARE_OF_TRAVEL`].
+pub(crate) const STILL_SHARE_OF_STROKE: f64 = 1e-4;
+/// See [`STILL_SHARE_OF_TRAVEL`]. Derived: the range of ten normal numbers stays within that.
+pub(crate) const STILL_SIGMA: f64 = 6.0;
+/// Below this a chamber is not under pressure, Pa gauge. Chosen: ten times the tank line's usual pressure.
+pub(crate) const LEAST_HELD_PA: f64 = 1e6;
+/// Fewer holds than this are no check. Derived: a scatter needs three.
+pub(crate) const FEWEST_HOLDS: usize = 3;

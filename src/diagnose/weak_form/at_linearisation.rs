@@ -1,0 +1,72 @@
+//! The rows of all traces around one linearisation, with their whitening.
+
+use super::hats::Integrand;
+use super::linearisation::Linearisation;
+use super::noise_model::NoiseModel;
+use super::rows::Rows;
+use super::shared_noise::SharedNoise;
+use super::terms::Term;
+use super::whitening::Whitening;
+use crate::diagnose::data::{Motion, Series};
+use crate::diagnose::equation::PerEquation;
+use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use pitchleak_core::Sensors;
+use pitchleak_core::effects::EffectConstants;
+
+/// The weak form of traces at a linearisation; never changed.
+pub(crate) struct WeakForm<'a> {
+    traces: &'a [Series],
+    sensors: &'a Sensors<f64>,
+    pub(crate) at: Linearisation,
+    motions: Vec<Motion>,
+    pub(crate) rows: Rows,
+    pub(crate) whitening: Whitening,
+}
+
+impl<'a> WeakForm<'a> {
+    /// A column for each of `terms` with its constants; `equation_error` as in [`NoiseModel`].
+    pub(crate) fn new(
+        traces: &'a [Series],
+        sensors: &'a Sensors<f64>,
+        at: Linearisation,
+        (terms, constants): (&[Term], &[EffectConstants<f64>]),
+        equation_error: PerEquation<f64>,
+    ) -> Self {
+        let motions = motions(traces, sensors, &at);
+        let rows = Rows::build(traces, &motions, &Integrand::new(&at, terms, constants), BLOCK_S);
+        let whitening = Whitening::new(&rows, &NoiseModel { at: &at, sensors, equation_error });
+        Self { traces, sensors, at, motions, rows, whitening }
+    }
+
+    /// The noise of these rows, had the equations this error.
+    pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
+        NoiseModel { at: &self.at, sensors: self.sensors, equation_error }
+    }
+
+    /// Realisations of the noise that the columns of `terms` share with the residual.
+    pub(crate) fn shared_noise(&self, terms: &[Term]) -> Vec<SharedNoise> {
+        let noise = self.noise(PerEquation::default());
+        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, terms, number)).collect()
+    }
+
+    /// The column of one term, whitened.
+    pub(crate) fn white_column(&self, term: Term, constants: EffectConstants<f64>) -> Vec<f64> {
+        let integrand = Integrand::new(&self.at, &[term], &[constants]);
+        let rows = Rows::build(self.traces, &self.motions, &integrand, BLOCK_S);
+        rows.columns.first().map(|column| self.whitening.whiten(column)).unwrap_or_default()
+    }
+}
+
+/// What a model leaves over along traces, in hats over blocks of `block_s`, without any column.
+pub(crate) fn residual_rows(
+    traces: &[Series],
+    sensors: &Sensors<f64>,
+    at: &Linearisation,
+    block_s: f64,
+) -> Rows {
+    Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
+}
+
+fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
+    traces.iter().map(|series| Motion::of(series, &at.model, sensors)).collect()
+}

@@ -1,0 +1,114 @@
+//! Where the model stands: its constants and the effects found so far.
+
+use super::terms::Term;
+use crate::diagnose::data::Declared;
+use crate::diagnose::thresholds::{DERIVATIVE_STEP, LEAST_COMPRESSIBILITY, OIL_SIGMA};
+use pitchleak_core::effects::{EffectConstants, EffectKind};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals, Terms};
+
+/// The values around which the regression is linear.
+#[derive(Clone, Debug)]
+pub(crate) struct Linearisation {
+    pub(crate) model: Model<f64>,
+    /// Sensor effects are undone on the readings; physical ones are subtracted.
+    pub(crate) effects: EffectSet<f64>,
+    /// Values of 1/β that the rig file leaves possible, per Pa.
+    pub(crate) compressibility: (f64, f64),
+}
+
+/// Whether two instants agree in all that physical effects depend on.
+fn is_same(one: &Signals<f64>, other: &Signals<f64>) -> bool {
+    let motion = |m: &Signals<f64>| [m.x_m, m.v_mps, m.a_mps2, m.temp_k].map(f64::to_bits);
+    let oil = |m: &Signals<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas].map(f64::to_bits);
+    motion(one) == motion(other) && oil(one) == oil(other)
+}
+
+impl Linearisation {
+    /// The declared model without leaks.
+    pub(crate) fn declared(declared: &Declared) -> Self {
+        let fluid = declared.fluid;
+        let compressibility = 1.0 / fluid.bulk_modulus_pa;
+        let share = OIL_SIGMA * fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
+        Self {
+            model: Model { cylinder: declared.cylinder, fluid, leaks_m3spa: PerLeak::default() },
+            effects: declared.effects,
+            compressibility: (
+                compressibility * (1.0 - share).max(LEAST_COMPRESSIBILITY),
+                compressibility * (1.0 + share),
+            ),
+        }
+    }
+
+    /// What is left of the three equations at corrected readings.
+    pub(crate) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
+        let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
+        self.model.residual(at).plus(-1.0, known)
+    }
+
+    /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what
+    /// the physical effects found so far are computed from.
+    pub(crate) fn unit_term(
+        &self,
+        term: Term,
+        at: &Signals<f64>,
+        constants: &EffectConstants<f64>,
+    ) -> Terms<f64> {
+        let own = term.unit_term(at, &self.model, constants);
+        let Some(effect) = term.effect().filter(|effect| effect.spec().kind == EffectKind::Sensor) else {
+            return own;
+        };
+        let step = DERIVATIVE_STEP * effect.spec().default_size;
+        let read = |value: f64| effect.read(value, at);
+        if self.effects.iter().all(|one| one.effect.spec().kind == EffectKind::Sensor)
+            || is_same(&read(step), at)
+        {
+            return own;
+        }
+        let known =
+            |at: &Signals<f64>| self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
+        own.plus(-0.5 / step, known(&read(step)).plus(-1.0, known(&read(-step))))
+    }
+
+    /// Value of a term here; what the model does not know is zero.
+    pub(crate) fn value(&self, term: Term) -> f64 {
+        let leaks = &self.model.leaks_m3spa;
+        match term {
+            Term::InverseBulk => 1.0 / self.model.fluid.bulk_modulus_pa,
+            Term::Internal => leaks.internal,
+            Term::ExternalA => leaks.external_a,
+            Term::ExternalB => leaks.external_b,
+            Term::Effect(effect) => {
+                self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
+            }
+            Term::Nameless(_) | Term::Product(..) => 0.0,
+        }
+    }
+
+    /// The same with one term at another value, held within what physics allows.
+    #[must_use]
+    pub(crate) fn with(mut self, term: Term, value: f64, constants: &EffectConstants<f64>) -> Self {
+        self.set(term, value, constants);
+        self
+    }
+
+    fn set(&mut self, term: Term, value: f64, constants: &EffectConstants<f64>) {
+        let leaks = &mut self.model.leaks_m3spa;
+        match term {
+            Term::InverseBulk => {
+                self.model.fluid.bulk_modulus_pa =
+                    1.0 / value.clamp(self.compressibility.0, self.compressibility.1)
+            }
+            Term::Internal => leaks.internal = value,
+            Term::ExternalA => leaks.external_a = value,
+            Term::ExternalB => leaks.external_b = value,
+            Term::Effect(effect) => self.set_effect(effect, value, constants),
+            Term::Nameless(_) | Term::Product(..) => {}
+        }
+    }
+
+    fn set_effect(&mut self, effect: Effect, value: f64, constants: &EffectConstants<f64>) {
+        let spec = effect.spec();
+        // Full or unphysical: the effect stays as it was, and the regression goes on around that.
+        let _ = self.effects.set(effect, value.clamp(spec.lower, spec.upper), *constants);
+    }
+}

@@ -1,0 +1,18 @@
+//! The equations integrated against hats at a linearisation, and the known noise of what they leave over.
+
+mod at_linearisation;
+mod hats;
+mod linearisation;
+mod noise_model;
+mod rows;
+mod shared_noise;
+mod terms;
+mod whitening;
+
+pub(crate) use at_linearisation::{WeakForm, residual_rows};
+pub(crate) use linearisation::Linearisation;
+pub(crate) use noise_model::NoiseModel;
+pub(crate) use rows::{Entry, Row, Rows};
+pub(crate) use shared_noise::SharedNoise;
+pub(crate) use terms::{DECLARED, Nameless, Term, all_terms};
+pub(crate) use whitening::Whitening;

@@ -1,0 +1,155 @@
+//! The weak form: each equation of the cylinder integrated against hat functions.
+//!
+//! For blocks of m samples, the difference of two neighbouring block means of any running integral
+//! is that integrand weighted by a hat over both blocks. So ∫ hat·ẋ dt is x̄_{k+1} − x̄_k, the difference
+//! of two averages: no signal is differentiated, and the noise of a row is known exactly (`noise_model.rs`).
+//! Weak forms for identification: Messenger and Bortz (2021), "Weak SINDy", Multiscale Model. Simul. 19.
+
+use super::hats::{Hats, Integrals, Integrand};
+use crate::diagnose::data::{Motion, Series};
+use crate::diagnose::equation::Equation;
+use crate::diagnose::thresholds::SLIVER;
+use pitchleak_core::Signals;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Two neighbouring blocks of samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row {
+    /// Consecutive rows with the same number share a block.
+    pub(crate) stretch: usize,
+    /// Time at the hat's peak, s.
+    pub(crate) t_s: f64,
+    /// Length of a block, s, and its samples.
+    pub(crate) block_s: f64,
+    pub(crate) samples: usize,
+    /// Averages over both blocks.
+    pub(crate) mean: Signals<f64>,
+    /// Share of the hat during which the direction of motion is unknown.
+    pub(crate) stuck: f64,
+}
+
+/// One equation of one row: an entry of the regression.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub(crate) row: usize,
+    pub(crate) equation: Equation,
+}
+
+/// All traces as one regression y = Σ θ column + noise, in m³ (chambers) and N·s (force).
+pub(crate) struct Rows {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) entries: Vec<Entry>,
+    /// What the model leaves over at the linearisation.
+    pub(crate) y: Vec<f64>,
+    /// One column per term.
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+/// Numbers set aside for the stretches of one trace.
+const MOST_STRETCHES: usize = 1 << 32;
+
+impl Rows {
+    /// The rows of all traces, in their order, on all cores; `motions` has one entry per trace, `block_s` is the
+    /// length of a block, s.
+    pub(crate) fn build(
+        traces: &[Series],
+        motions: &[Motion],
+        integrand: &Integrand<'_>,
+        block_s: f64,
+    ) -> Self {
+        let of_trace =
+            |(number, (series, motion))| Self::of_trace(number, series, motion, integrand, block_s);
+        let parts: Vec<Self> = traces.par_iter().zip(motions).enumerate().map(of_trace).collect();
+        let mut all = Self::empty(integrand.width());
+        parts.into_iter().for_each(|part| all.append(part));
+        all
+    }
+
+    fn empty(terms: usize) -> Self {
+        Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
+    }
+
+    fn of_trace(
+        number: usize,
+        series: &Series,
+        motion: &Motion,
+        integrand: &Integrand<'_>,
+        block_s: f64,
+    ) -> Self {
+        let mut rows = Self::empty(integrand.width());
+        let samples = ((block_s / series.step_s().max(1e-9)).round() as usize).max(1);
+        for (stretch, range) in series.stretches().into_iter().enumerate() {
+            let stretch = number * MOST_STRETCHES + stretch;
+            rows.add_stretch(series, motion, range, (stretch, samples), integrand);
+        }
+        rows
+    }
+
+    fn append(&mut self, part: Self) {
+        let first = self.rows.len();
+        self.rows.extend(part.rows);
+        self.entries.extend(part.entries.into_iter().map(|entry| Entry { row: first + entry.row, ..entry }));
+        self.y.extend(part.y);
+        for (column, more) in self.columns.iter_mut().zip(part.columns) {
+            column.extend(more);
+        }
+    }
+
+    fn add_stretch(
+        &mut self,
+        series: &Series,
+        motion: &Motion,
+        range: Range<usize>,
+        (stretch, samples): (usize, usize),
+        integrand: &Integrand<'_>,
+    ) {
+        let mut hats = Hats::new(integrand.width());
+        let mut step = Integrals::zero(integrand.width());
+        let mut in_block = 0;
+        for at in range.clone() {
+            if at > range.start {
+                integrand.step(series, motion, at, &mut step);
+                hats.add_step(&step);
+            }
+            hats.end_sample();
+            in_block += 1;
+            if in_block < samples {
+                continue;
+            }
+            in_block = 0;
+            if let Some(hat) = hats.end_block(samples) {
+                self.add_row(stretch, series.t_s[at + 1 - samples], samples, &hat);
+            }
+        }
+    }
+
+    fn add_row(&mut self, stretch: usize, t_s: f64, samples: usize, hat: &Integrals) {
+        let block_s = hat.time_s;
+        let mean = hat.signals.zip(Signals::default(), |sum, _| sum / block_s);
+        let row = self.rows.len();
+        self.rows.push(Row { stretch, t_s, block_s, samples, mean, stuck: hat.unsure_s / block_s });
+        for equation in Equation::ALL {
+            if hat.missing_s[equation] > SLIVER * block_s {
+                continue;
+            }
+            self.entries.push(Entry { row, equation });
+            self.y.push(hat.residual[equation]);
+            for (column, integral) in self.columns.iter_mut().zip(&hat.columns) {
+                column.push(integral[equation]);
+            }
+        }
+    }
+
+    /// What the machine does at `row`, read from the second hat after it: that shares no sample with it, so
+    /// that the noise of what is left at `row` does not show in what it is held against.
+    pub(crate) fn beside(&self, row: usize) -> Option<&Row> {
+        let (own, later) = (self.rows.get(row)?, self.rows.get(row + 2)?);
+        (own.stretch == later.stretch).then_some(later)
+    }
+
+    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown.
+    pub(crate) fn counts(&self, entry: &Entry) -> bool {
+        entry.equation != Equation::Force || self.rows[entry.row].stuck <= SLIVER
+    }
+}

@@ -1,0 +1,172 @@
+//! The unknowns of the fit: the declared model's own four constants, every effect of the core's
+//! table, and a few products of signals without a name that only serve to say "something else is there".
+
+use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
+use pitchleak_core::{Effect, Model, Signals, Terms};
+
+/// One column of the regression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Term {
+    /// 1/β, per Pa.
+    InverseBulk,
+    /// C_ip.
+    Internal,
+    /// C_epA.
+    ExternalA,
+    /// C_epB.
+    ExternalB,
+    /// A candidate of the core's table.
+    Effect(Effect),
+    /// A product of signals that no known effect makes.
+    Nameless(Nameless),
+    /// The product of two effects' terms, equation by equation: one acts on the other.
+    Product(Effect, Effect),
+}
+
+/// Products of signals that stand for effects nobody listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Nameless {
+    /// Leak past the piston in proportion to |ẋ| P_L.
+    SpeedLeak,
+    /// Leak past the piston in proportion to ẋ P_L.
+    DirectionLeak,
+    /// Leak past the piston in proportion to P_L |P_L|.
+    SquareLeak,
+    /// Leak past the piston in proportion to the spool's opening |ẋ|/√P times P_L.
+    SpoolLeak,
+    /// Flow of meter A in proportion to |Q_A|.
+    BentMeterA,
+    /// Flow of meter B in proportion to |Q_B|.
+    BentMeterB,
+    /// Force in proportion to ẋ |ẋ|.
+    SquareFriction,
+}
+
+impl Nameless {
+    pub(crate) const ALL: [Self; 7] = [
+        Self::SpeedLeak,
+        Self::DirectionLeak,
+        Self::SquareLeak,
+        Self::SpoolLeak,
+        Self::BentMeterA,
+        Self::BentMeterB,
+        Self::SquareFriction,
+    ];
+
+    fn unit_term(self, at: &Signals<f64>) -> Terms<f64> {
+        let load = at.pa_pa - at.pb_pa;
+        let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
+        let force = |force_n: f64| Terms { force_n, ..Terms::default() };
+        match self {
+            Self::SpeedLeak => past(at.v_mps.abs() * load),
+            Self::DirectionLeak => past(at.v_mps * load),
+            Self::SquareLeak => past(load * load.abs()),
+            Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
+            Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
+            Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
+            Self::SquareFriction => force(at.v_mps * at.v_mps.abs()),
+        }
+    }
+}
+
+/// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
+const PROBE: Signals<f64> = Signals {
+    x_m: 0.1,
+    v_mps: 1e-3,
+    a_mps2: 0.1,
+    pa_pa: 4e6,
+    pb_pa: 3e6,
+    dpa_pas: 1e6,
+    dpb_pas: -1.1e6,
+    d2pa_pas2: 1e7,
+    d2pb_pas2: -1.2e7,
+    qa_m3s: 1e-5,
+    qb_m3s: -1.3e-5,
+    dqa_m3s2: 1e-4,
+    dqb_m3s2: -1.4e-4,
+    force_n: 2e3,
+    temp_k: 300.0,
+};
+
+/// The four constants of the declared model.
+pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
+
+/// Every column: the declared model's, the candidates', the nameless ones.
+pub(crate) fn all_terms() -> Vec<Term> {
+    let known = Effect::ALL.iter().copied().map(Term::Effect);
+    DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
+}
+
+impl Term {
+    /// What one unit leaves in the residual at an instant.
+    pub(crate) fn unit_term(
+        self,
+        at: &Signals<f64>,
+        model: &Model<f64>,
+        constants: &EffectConstants<f64>,
+    ) -> Terms<f64> {
+        let load = at.pa_pa - at.pb_pa;
+        match self {
+            Self::InverseBulk => Terms {
+                chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.dpa_pas,
+                chamber_b_m3s: model.cylinder.volume_b_m3(at.x_m) * at.dpb_pas,
+                force_n: 0.0,
+            },
+            Self::Internal => Terms { chamber_a_m3s: load, chamber_b_m3s: -load, force_n: 0.0 },
+            Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
+            Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
+            Self::Effect(effect) => effect.unit_term(at, model, constants),
+            Self::Nameless(product) => product.unit_term(at),
+            Self::Product(one, other) => {
+                one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
+            }
+        }
+    }
+
+    /// Whether it is a leak.
+    pub(crate) fn is_leak(self) -> bool {
+        match self {
+            Self::Internal | Self::ExternalA | Self::ExternalB => true,
+            Self::Effect(effect) => effect.spec().kind.is_leak(),
+            Self::InverseBulk | Self::Nameless(_) | Self::Product(..) => false,
+        }
+    }
+
+    /// Whether the term shows in the balance of forces. A sensor's error in the acceleration does not: the speed that
+    /// forces feel comes from the flows (`data/motion.rs`), not from the position.
+    pub(crate) fn in_force(self) -> bool {
+        match self {
+            Self::Effect(effect) => {
+                let is_sensor = effect.spec().kind == EffectKind::Sensor;
+                let at = Signals { a_mps2: if is_sensor { 0.0 } else { PROBE.a_mps2 }, ..PROBE };
+                effect.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n != 0.0
+            }
+            Self::Nameless(product) => product == Nameless::SquareFriction,
+            Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
+            _ => false,
+        }
+    }
+
+    /// The signal of the equations' left side to which the term is in proportion, so that its column carries the
+    /// noise of what the model leaves over.
+    pub(crate) fn carries(self) -> Option<LeftSide> {
+        match self {
+            Self::Effect(effect) => effect.spec().carries,
+            Self::Nameless(Nameless::DirectionLeak) => Some(LeftSide::Speed),
+            _ => None,
+        }
+    }
+
+    /// The effect, where the term is one.
+    pub(crate) fn effect(self) -> Option<Effect> {
+        if let Self::Effect(effect) = self { Some(effect) } else { None }
+    }
+
+    /// Values that physics allows.
+    pub(crate) fn bounds(self) -> (f64, f64) {
+        match self {
+            Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+}
