@@ -1,7 +1,7 @@
 use super::Replay;
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
-use crate::trace::{BadRows, Intake, Record, TraceError, TraceFault, TraceReader};
+use crate::trace::{BadRows, Record, RowValidator, TraceError, TraceFault, TraceReader};
 use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
@@ -9,7 +9,7 @@ use pitchleak_core::RlsError;
 #[derive(serde::Serialize, serde::Deserialize)]
 pub struct Stream {
     replay: Replay,
-    intake: Option<Intake>,
+    validator: Option<RowValidator>,
     bad_rows: BadRows,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
     pub epoch_ns: Option<i64>,
@@ -65,7 +65,7 @@ impl Stream {
     /// # Errors
     /// As [`Replay::new`].
     pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, RlsError> {
-        Ok(Self { replay: Replay::new(rig)?, intake: None, bad_rows, epoch_ns: None })
+        Ok(Self { replay: Replay::new(rig)?, validator: None, bad_rows, epoch_ns: None })
     }
 
     /// What becomes of bad rows.
@@ -79,7 +79,7 @@ impl Stream {
     /// Where a bad row is fatal, or the part cannot be read on: what came before it is taken in. A part
     /// without a good row is no error.
     pub fn extend(&mut self, part: TraceReader<'_>) -> Result<u64, TraceError> {
-        let mut reader = match self.intake.take() {
+        let mut reader = match self.validator.take() {
             Some(before) => part.resuming(before),
             None => part.with_bad_rows(self.bad_rows),
         };
@@ -92,13 +92,13 @@ impl Stream {
                 Err(error) => break Err(error),
             }
         };
-        self.intake = Some(reader.into_intake());
+        self.validator = Some(reader.into_validator());
         ended
     }
 
     /// Time of the last good row, s; none before the first.
     pub fn time_s(&self) -> Option<f64> {
-        self.intake.as_ref().and_then(Intake::time_s)
+        self.validator.as_ref().and_then(RowValidator::time_s)
     }
 
     /// The running replay.
@@ -108,7 +108,7 @@ impl Stream {
 
     /// The report as it stands; `name` is the trace's. None before the first part.
     pub fn report(&self, name: &str) -> Option<ReplayReport> {
-        let quality = self.intake.as_ref()?.quality();
+        let quality = self.validator.as_ref()?.quality();
         Some(self.replay.report(TraceSummary::new(name, quality)))
     }
 }

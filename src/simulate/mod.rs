@@ -4,6 +4,7 @@
 //! trace file and the truth beside it. The controllers act on the truth, not on the readings.
 
 mod effects;
+mod followed;
 mod leak;
 mod plan;
 mod recording;
@@ -11,12 +12,13 @@ mod sensing;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
+pub use followed::Followed;
 pub use leak::{LeakSize, LeakSizeError};
-pub use plan::{Noise, Plan};
-pub use recording::{LeakTruth, Recording, RecordingError, TruthFile, truth_path};
+pub use plan::{Noise, Plan, PlanError};
+pub use recording::{LeakTruth, Recording, RecordingError, TruthFile};
 pub(crate) use sensing::Normal;
 pub use sensing::{Biases, Sensing};
-pub use writer::TraceWriter;
+pub use writer::{Columns, TraceWriter};
 
 use crate::Rig;
 use crate::reference::Reference;

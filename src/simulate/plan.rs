@@ -1,7 +1,8 @@
-use super::{Biases, EffectSize, EffectsError, LeakSize, Recording, Scenario, effects};
+use super::{Biases, EffectSize, EffectsError, Followed, LeakSize, Recording, Scenario, effects};
 use crate::Rig;
-use crate::reference::Reference;
+use crate::reference::ReferenceError;
 use crate::units::{self, Dimension};
+use crate::wind::{EmulationError, HistoryError};
 use pitchleak_core::{PerLeak, Sensors};
 
 /// Time for which the loops run before a trace begins, s.
@@ -52,6 +53,8 @@ impl Noise {
 /// What is asked of a simulation; what is left out follows from the reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
+    /// What the rig follows.
+    pub followed: Followed,
     /// Laminar leaks.
     pub leaks: PerLeak<LeakSize>,
     /// Time into the trace at which the leaks open, s; zero or less: before it begins.
@@ -72,31 +75,34 @@ pub struct Plan {
     pub sample_rate_hz: f64,
 }
 
-impl Default for Plan {
-    fn default() -> Self {
-        Self {
-            leaks: PerLeak::default(),
-            onset_s: 0.0,
-            effects: Vec::new(),
-            noise: Noise::None,
-            bias_share: 0.0,
-            seed: 1,
-            start_s: None,
-            duration_s: None,
-            sample_rate_hz: 100.0,
-        }
-    }
+/// Why a plan cannot be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// Wind to follow.
+    #[error(transparent)]
+    Wind(#[from] HistoryError),
+    /// Wind that the rig cannot follow.
+    #[error(transparent)]
+    Emulation(#[from] EmulationError),
+    /// Position or load to follow.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// Effects that cannot be switched on.
+    #[error(transparent)]
+    Effects(#[from] EffectsError),
 }
 
 impl Plan {
-    /// The recording of `rig` as it follows `reference`.
+    /// The recording of `rig` as it follows what it is to follow.
     ///
     /// # Errors
-    /// Where the effects cannot be switched on.
-    pub fn recording(&self, rig: Rig, reference: Reference) -> Result<Recording, EffectsError> {
+    /// [`PlanError`].
+    pub fn recording(&self, rig: Rig) -> Result<Recording, PlanError> {
+        let reference = self.followed.reference(&rig)?;
         let (begin, end) = reference.span_s().unwrap_or((0.0, f64::INFINITY));
         let start_s = self.start_s.map_or(begin + WARM_UP_S.min(0.5 * (end - begin)), |start| begin + start);
         Ok(Recording {
+            followed: self.followed.to_string(),
             noise: self.noise.sensors(&rig),
             biases: Biases::drawn(&rig.instruments, self.bias_share, self.seed),
             seed: self.seed,

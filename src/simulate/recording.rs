@@ -1,6 +1,7 @@
-use super::{Biases, Scenario, Sensing, SimulateError, TraceWriter};
+use super::writer::{self, Columns};
+use super::{Biases, Scenario, Sensing, SimulateError, TraceWriter, Truth};
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{PerLeak, Sensors};
+use pitchleak_core::{PerLeak, Sample, Sensors};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -10,6 +11,8 @@ use std::path::{Path, PathBuf};
 /// A scenario with the sensors that record it.
 #[derive(Clone, Debug)]
 pub struct Recording {
+    /// Name of what the rig follows.
+    pub followed: String,
     /// What happens.
     pub scenario: Scenario,
     /// White noise of the sensors.
@@ -92,65 +95,87 @@ struct Totals {
 }
 
 impl Recording {
-    /// Writes the trace to `path` (`.csv`, `.csv.gz`, `-` for standard output) and says what is true of
-    /// it. `reference` names what the rig follows; `done` gets the share that is done.
+    /// What people should know before they use the trace.
+    pub fn warning(&self) -> Option<String> {
+        let percent = 100.0 * self.scenario.reference.clipped_share;
+        let text = || {
+            format!(
+                "{}: the position was held off the end stops for {percent:.1} % of the time",
+                self.followed
+            )
+        };
+        (percent > 0.0).then(text)
+    }
+
+    /// Writes the trace to `path` (`.csv`, `.csv.gz`, `-` for standard output), and what is true of it
+    /// beside it as `.json`. `done` gets the share that is done.
     ///
     /// # Errors
     /// [`RecordingError`].
-    pub fn write(
-        &self,
-        path: &Path,
-        reference: &str,
-        done: impl FnMut(f64),
-    ) -> Result<TruthFile, RecordingError> {
+    pub fn write(&self, path: &Path, done: impl FnMut(f64)) -> Result<TruthFile, RecordingError> {
         let write = |source| RecordingError::Write { path: path.to_owned(), source };
-        let (sink, truth) = self.record(|| sink(path), path, reference, done)?;
-        sink.finish().map_err(write)?;
+        let leaks_m3spa = self.scenario.leak_coefficients()?;
+        let mut writer = sink(path).and_then(TraceWriter::new).map_err(write)?;
+        let mut failure = None;
+        let truth = self.run(&leaks_m3spa, done, |truth, shown| {
+            if failure.is_none() {
+                failure = writer.row(truth, shown).err();
+            }
+        })?;
+        let written = failure.map_or_else(|| writer.into_inner().finish(), Err);
+        written.map_err(write)?;
+        if path != Path::new("-") {
+            truth.write_beside(path)?;
+        }
         Ok(truth)
     }
 
-    /// As [`write`](Self::write), to any output, opened once the simulation is known to run and given back
-    /// at its end; `path` is its name for messages.
+    /// The trace in memory, and what is true of it.
     ///
     /// # Errors
-    /// [`RecordingError`].
-    pub fn record<W: Write>(
-        &self,
-        open: impl FnOnce() -> std::io::Result<W>,
-        path: &Path,
-        reference: &str,
-        mut done: impl FnMut(f64),
-    ) -> Result<(W, TruthFile), RecordingError> {
-        let write = |source| RecordingError::Write { path: path.to_owned(), source };
+    /// [`RecordingError::Simulate`].
+    pub fn columns(&self) -> Result<(Columns, TruthFile), RecordingError> {
+        let mut columns = writer::columns();
         let leaks_m3spa = self.scenario.leak_coefficients()?;
+        let truth = self.run(
+            &leaks_m3spa,
+            |_| (),
+            |truth, shown| {
+                for ((_, values), value) in columns.iter_mut().zip(writer::row(truth, shown)) {
+                    values.push(value);
+                }
+            },
+        )?;
+        Ok((columns, truth))
+    }
+
+    /// Hands each sample and its readings to `each`.
+    fn run(
+        &self,
+        leaks_m3spa: &PerLeak<f64>,
+        mut done: impl FnMut(f64),
+        mut each: impl FnMut(&Truth, &Sample<f64>),
+    ) -> Result<TruthFile, SimulateError> {
         let mut sensing = Sensing::new(self.noise, self.biases, self.seed);
-        let mut writer = open().and_then(TraceWriter::new).map_err(write)?;
         let mut totals = Totals::default();
-        let mut failure = None;
-        self.scenario.run(leaks_m3spa, |truth| {
-            let shown = sensing.read(&truth.sample);
-            if failure.is_none() {
-                failure = writer.row(truth, &shown).err();
-            }
+        self.scenario.run(*leaks_m3spa, |truth| {
+            each(truth, &sensing.read(&truth.sample));
             totals.samples += 1;
             totals.flows_m3s = totals.flows_m3s.zip(truth.leaks_m3s).map(|(sum, flow)| sum + flow.abs());
             totals.position_square += (truth.signals.x_m - truth.position_reference_m).powi(2);
             totals.load_square += (truth.signals.force_n - truth.load_reference_n).powi(2);
             done(truth.t_s / self.scenario.duration_s);
         })?;
-        match failure {
-            Some(source) => Err(write(source)),
-            None => Ok((writer.into_inner(), self.truth(reference, &leaks_m3spa, &totals))),
-        }
+        Ok(self.truth(leaks_m3spa, &totals))
     }
 
-    fn truth(&self, reference: &str, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
-        let Self { scenario, noise, biases, seed } = self;
+    fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
+        let Self { followed, scenario, noise, biases, seed } = self;
         let count = totals.samples.max(1) as f64;
         TruthFile {
             schema: "pitchleak.simulate/1",
             program: concat!("pitchleak ", env!("CARGO_PKG_VERSION")),
-            reference: reference.to_owned(),
+            reference: followed.clone(),
             rig: scenario.rig.name.clone(),
             start_s: scenario.start_s,
             duration_s: scenario.duration_s,
@@ -184,8 +209,18 @@ impl Recording {
     }
 }
 
+impl TruthFile {
+    /// Writes it beside the trace at `path`.
+    fn write_beside(&self, path: &Path) -> Result<(), RecordingError> {
+        let path = truth_path(path);
+        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
+        let written = text.and_then(|text| std::fs::write(&path, text + "\n"));
+        written.map_err(|source| RecordingError::Write { path, source })
+    }
+}
+
 /// Where the truth of the trace at `path` is written: `T.csv.gz` → `T.json`.
-pub fn truth_path(path: &Path) -> PathBuf {
+fn truth_path(path: &Path) -> PathBuf {
     let plain = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
         path.with_extension("")
     } else {

@@ -4,25 +4,25 @@ mod clock;
 mod columns;
 mod csv;
 mod error;
-mod intake;
-mod lines;
-mod number;
+mod format;
 mod quality;
 mod range;
+mod records;
+mod row;
+mod row_validator;
 mod stamp;
 mod table;
 
 pub use error::{TraceError, TraceFault};
-pub use intake::Intake;
 pub use quality::{BadReason, BadRow, Counted, TraceQuality};
+pub use row_validator::RowValidator;
 pub use stamp::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 
 use crate::rig::Rig;
 use crate::signal::Signal;
-use columns::Layout;
-use csv::{CsvRows, Next, Row};
 use pitchleak_core::{PerLeak, Sample};
+use row::{Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -71,34 +71,10 @@ pub enum BadRows {
 /// Reads a trace row by row: a file, a stream, or columns in memory.
 pub struct TraceReader<'a> {
     name: String,
-    rows: Rows<'a>,
+    rows: Box<dyn RowSource + Send + 'a>,
     row: Row,
-    intake: Intake,
+    validator: RowValidator,
     done: bool,
-}
-
-/// Where rows come from.
-enum Rows<'a> {
-    Csv(CsvRows),
-    Table(TableRows<'a>),
-}
-
-impl Rows<'_> {
-    fn layout(&self) -> &Layout {
-        match self {
-            Self::Csv(rows) => rows.layout(),
-            Self::Table(rows) => rows.layout(),
-        }
-    }
-
-    /// Reads the next row into `row`.
-    #[inline]
-    fn next(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
-        match self {
-            Self::Csv(rows) => rows.next(row),
-            Self::Table(rows) => Ok(rows.next(row)),
-        }
-    }
 }
 
 impl TraceReader<'static> {
@@ -137,10 +113,10 @@ impl TraceReader<'static> {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
-        let rows = csv::decompress(stream)
-            .and_then(|(stream, compressed)| CsvRows::open(stream, compressed, &rig.columns))
-            .map_err(|fault| TraceError { trace: name.to_owned(), fault })?;
-        Ok(Self::over(name, Rows::Csv(rows), rig))
+        match format::open(stream, &rig.columns) {
+            Ok(rows) => Ok(Self::over(name, rows, rig)),
+            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
+        }
     }
 }
 
@@ -157,35 +133,33 @@ impl<'a> TraceReader<'a> {
         rig: &Rig,
     ) -> Result<Self, TraceError> {
         match TableRows::new(layout, batches) {
-            Ok(rows) => Ok(Self::over(name, Rows::Table(rows), rig)),
+            Ok(rows) => Ok(Self::over(name, Box::new(rows), rig)),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }
     }
 
-    fn over(name: &str, rows: Rows<'a>, rig: &Rig) -> Self {
-        let intake = Intake::new(rig, rows.layout());
-        Self { name: name.to_owned(), rows, row: Row::empty(), intake, done: false }
+    fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
+        let validator = RowValidator::new(rig, rows.layout());
+        Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false }
     }
 
     /// Goes on where another part of the same trace ended; rows of columns in memory count on from there.
     #[must_use]
-    pub fn resuming(mut self, before: Intake) -> Self {
-        if let Rows::Table(rows) = &mut self.rows {
-            rows.count_from(before.rows_seen());
-        }
-        self.intake = before;
+    pub fn resuming(mut self, before: RowValidator) -> Self {
+        self.rows.count_from(before.rows_seen());
+        self.validator = before;
         self
     }
 
     /// What has to be kept for the next part of the trace.
-    pub fn into_intake(self) -> Intake {
-        self.intake
+    pub fn into_validator(self) -> RowValidator {
+        self.validator
     }
 
     /// Says what becomes of bad rows.
     #[must_use]
     pub fn with_bad_rows(mut self, bad_rows: BadRows) -> Self {
-        self.intake.set_bad_rows(bad_rows);
+        self.validator.set_bad_rows(bad_rows);
         self
     }
 
@@ -201,7 +175,7 @@ impl<'a> TraceReader<'a> {
 
     /// What was noticed so far.
     pub fn quality(&self) -> &TraceQuality {
-        self.intake.quality()
+        self.validator.quality()
     }
 
     /// Reads the next good row into `record`; `false` at the end of the trace, and from then on.
@@ -213,12 +187,12 @@ impl<'a> TraceReader<'a> {
     #[inline(always)]
     pub fn next_record(&mut self, record: &mut Record) -> Result<bool, TraceError> {
         while !self.done {
-            let taken = match self.rows.next(&mut self.row).map_err(|fault| self.error(fault))? {
-                Next::Row => self.intake.take(&self.row, self.rows.layout(), record),
-                Next::Bad(bad) => self.intake.skip(bad).map(|()| false),
+            let taken = match self.rows.next_row(&mut self.row).map_err(|fault| self.error(fault))? {
+                Next::Row => self.validator.take(&self.row, self.rows.layout(), record),
+                Next::Bad(bad) => self.validator.skip(bad).map(|()| false),
                 Next::CutOff(why) => {
                     self.done = true;
-                    self.intake.cut_off(why).map(|()| false)
+                    self.validator.cut_off(why).map(|()| false)
                 }
                 Next::End => {
                     self.done = true;
@@ -234,7 +208,7 @@ impl<'a> TraceReader<'a> {
                 }
             }
         }
-        self.intake.end().map(|()| false).map_err(|fault| self.error(fault))
+        self.validator.end().map(|()| false).map_err(|fault| self.error(fault))
     }
 
     fn error(&self, fault: TraceFault) -> TraceError {

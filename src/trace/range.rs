@@ -1,6 +1,6 @@
 //! What readings are possible on a rig.
 
-use super::csv::Row;
+use super::row::Row;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Dimension;

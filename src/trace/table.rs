@@ -1,9 +1,9 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
 use super::columns::{Content, Layout, shorten};
-use super::csv::{Next, Row, check_present};
 use super::error::{TraceError, TraceFault};
 use super::quality::{BadReason, BadRow, Counted};
+use super::row::{Next, Row, RowSource, check_present};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Unit;
@@ -87,39 +87,6 @@ impl<'a> TableRows<'a> {
         })
     }
 
-    pub(super) fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    /// Numbers the first row `row`.
-    pub(super) fn count_from(&mut self, row: u64) {
-        self.before = row;
-    }
-
-    /// Reads the next row into `row`.
-    #[inline]
-    pub(super) fn next(&mut self, row: &mut Row) -> Next {
-        while self.at == self.length {
-            if !self.next_batch() {
-                return Next::End;
-            }
-        }
-        // Signals without a column were NaN before and stay so.
-        row.line = self.before + self.at as u64;
-        let mut finite = true;
-        for cells in &self.current {
-            let value = cells.values.get(self.at).copied().unwrap_or(f64::NAN);
-            finite &= !value.is_infinite();
-            row.set(cells.signal, cells.unit.map_or(value, |unit| unit.to_si(value)));
-        }
-        let at = self.at;
-        self.at += 1;
-        if finite && check_present(&self.layout.columns, row).is_ok() {
-            return Next::Row;
-        }
-        Next::Bad(self.blame(at, row))
-    }
-
     #[cold]
     fn next_batch(&mut self) -> bool {
         let Some(batch) = self.batches.pop() else { return false };
@@ -149,6 +116,39 @@ impl<'a> TableRows<'a> {
             reason,
             detail: detail.to_owned(),
         }
+    }
+}
+
+impl RowSource for TableRows<'_> {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn count_from(&mut self, rows: u64) {
+        self.before = rows;
+    }
+
+    #[inline]
+    fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
+        while self.at == self.length {
+            if !self.next_batch() {
+                return Ok(Next::End);
+            }
+        }
+        // Signals without a column were NaN before and stay so.
+        row.line = self.before + self.at as u64;
+        let mut finite = true;
+        for cells in &self.current {
+            let value = cells.values.get(self.at).copied().unwrap_or(f64::NAN);
+            finite &= !value.is_infinite();
+            row.set(cells.signal, cells.unit.map_or(value, |unit| unit.to_si(value)));
+        }
+        let at = self.at;
+        self.at += 1;
+        if finite && check_present(&self.layout.columns, row).is_ok() {
+            return Ok(Next::Row);
+        }
+        Ok(Next::Bad(self.blame(at, row)))
     }
 }
 

@@ -299,6 +299,77 @@ proptest! {
     }
 }
 
+/// Gives its bytes a few at a time, so that records end anywhere in what has been read.
+struct Dribble(std::io::Cursor<Vec<u8>>, usize);
+
+impl std::io::Read for Dribble {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let few = self.1.min(into.len());
+        std::io::Read::read(&mut self.0, &mut into[..few])
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_stream_in_pieces_reads_as_a_whole(
+        body in prop::collection::vec(prop_oneof![
+            r#"[0-9.,"\r\n]{0,40}"#.prop_map(String::into_bytes),
+            (0..200u32).prop_map(|i| format!("{},0.1,\"5e6\",4e6,1e-5,-1e-5\r\n", f64::from(i) * 0.01).into_bytes()),
+            prop::collection::vec(any::<u8>(), 0..40),
+        ], 0..30),
+        few in 1..9usize,
+    ) {
+        let mut bytes = format!("{HEADER}\n").into_bytes();
+        bytes.extend(body.concat());
+        let stream = Box::new(Dribble(std::io::Cursor::new(bytes.clone()), few));
+        let pieces = TraceReader::from_stream("trace.csv", stream, &Rig::paper()).and_then(read_all);
+        prop_assert_eq!(pieces.map_err(|e| e.to_string()), read(bytes).map_err(|e| e.to_string()));
+    }
+
+    #[test]
+    fn quotes_around_cells_do_not_matter(
+        quoted in prop::collection::vec(prop::collection::vec(any::<bool>(), 6), 1..20),
+        delimiter in prop::sample::select(vec![",", ";", "\t"]),
+        line_end in prop::sample::select(vec!["\n", "\r\n"]),
+        last in any::<bool>(),
+    ) {
+        let plain = rows(quoted.len());
+        let mut text = HEADER.replace(',', delimiter) + line_end;
+        for (row, quoted) in plain.iter().zip(&quoted) {
+            let cell = |(cell, quoted): (&str, &bool)| if *quoted { format!("\"{cell}\"") } else { cell.to_owned() };
+            text += &row.split(',').zip(quoted).map(cell).collect::<Vec<_>>().join(delimiter);
+            text += line_end;
+        }
+        let text = if last { text.trim_end() } else { &text };
+        prop_assert_eq!(read(text).unwrap(), read(file(&plain)).unwrap());
+    }
+}
+
+#[test]
+fn quotes_that_do_not_close_cost_their_rows_wherever_they_stand() {
+    for at in [0, 1, 2000, 4998, 4999] {
+        for end in ["\n", ""] {
+            let mut all = rows(5000);
+            all[at] = all[at].replace("4e6", "\"4e6");
+            let text = file(&all).trim_end().to_owned() + end;
+            let (records, quality) = read(text).unwrap();
+            assert_eq!((records.len(), quality.skipped), (4999, 1), "{at}: {:?}", quality.first_bad);
+            assert_eq!(
+                (quality.first_bad[0].line, quality.first_bad[0].reason),
+                (at as u64 + 2, BadReason::NotANumber)
+            );
+        }
+    }
+}
+
+#[test]
+fn nul_bytes_cost_their_row_only() {
+    let mut all = rows(6);
+    all[3] = all[3].replace("0.1", "0.\u{0}1");
+    let (records, quality) = read(file(&all)).unwrap();
+    assert_eq!((records.len(), quality.first_bad[0].reason), (5, BadReason::NotANumber));
+}
+
 const TABLE: [[f64; 4]; 6] = [
     [0.0, 10.0, 20.0, 30.0],
     [100.0, 101.0, 102.0, 103.0],
@@ -351,7 +422,7 @@ fn a_trace_in_parts_is_one_trace() {
     while first.next_record(&mut record).unwrap() {
         records.push(record);
     }
-    let mut second = part(3..4).resuming(first.into_intake());
+    let mut second = part(3..4).resuming(first.into_validator());
     while second.next_record(&mut record).unwrap() {
         records.push(record);
     }

@@ -4,11 +4,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
-use pitchleak::reference::{Reference, constant_or_file};
-use pitchleak::simulate::{EffectSize, LeakSize, Noise, Plan, truth_path};
+use pitchleak::simulate::{EffectSize, Followed, LeakSize, Noise, Plan};
 use pitchleak::units::{self, Dimension};
-use pitchleak::wind::{Emulation, History, Wind};
-use std::path::{Path, PathBuf};
+use pitchleak::wind::{Emulation, Wind};
+use std::path::PathBuf;
 
 /// Simulate a rig with known leaks and write what its sensors would have recorded
 #[derive(Args)]
@@ -117,49 +116,36 @@ fn share(text: &str) -> Result<f64, String> {
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rig = arguments.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
-    let (reference, name) = arguments.reference(&rig)?;
-    if reference.clipped_share > 0.0 {
-        let percent = 100.0 * reference.clipped_share;
-        output::warn(&[format!(
-            "{name}: the position was held off the end stops for {percent:.1} % of the time"
-        )]);
-    }
-    let recording = arguments.plan().recording(rig, reference)?;
+    let recording = arguments.plan().recording(rig)?;
+    recording.warning().into_iter().for_each(|warning| output::warn(&[warning]));
     let bar = progress();
-    let truth = recording.write(&arguments.out, &name, |share| bar.set_position((1000.0 * share) as u64))?;
+    recording.write(&arguments.out, |share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
-    if arguments.out != Path::new("-") {
-        let path = truth_path(&arguments.out);
-        let text = serde_json::to_string_pretty(&truth)? + "\n";
-        std::fs::write(&path, text).map_err(|source| Failure::Write { path, source })?;
-    }
     Ok(Outcome::Done)
 }
 
 impl Arguments {
-    /// What the rig follows, and its name.
-    fn reference(&self, rig: &Rig) -> Result<(Reference, String), Failure> {
-        if let Some(wind) = &self.wind {
-            let emulation = Emulation {
-                load_scale: self.load_scale,
-                position_scale: self.position_scale,
-                blade_inertia_kgm2: self.blade_inertia,
-                ..Emulation::paper()
-            };
-            let reference = emulation.reference(&History::of(wind)?, rig.cylinder.stroke_m)?;
-            return Ok((reference, format!("wind {wind}")));
+    fn followed(&self) -> Followed {
+        match &self.wind {
+            Some(wind) => {
+                let emulation = Emulation {
+                    load_scale: self.load_scale,
+                    position_scale: self.position_scale,
+                    blade_inertia_kgm2: self.blade_inertia,
+                    ..Emulation::paper()
+                };
+                Followed::Wind(wind.clone(), emulation)
+            }
+            None => Followed::Given {
+                position: self.position.clone().unwrap_or_default(),
+                load: self.load.clone().unwrap_or_default(),
+            },
         }
-        let (position, load) =
-            (self.position.as_deref().unwrap_or_default(), self.load.as_deref().unwrap_or_default());
-        let reference = Reference::of(
-            constant_or_file(position, "x", Dimension::Length)?,
-            constant_or_file(load, "force", Dimension::Force)?,
-        );
-        Ok((reference, format!("position {position}, load {load}")))
     }
 
     fn plan(&self) -> Plan {
         Plan {
+            followed: self.followed(),
             leaks: PerLeak {
                 internal: self.leak_internal,
                 external_a: self.leak_external_a,

@@ -1,9 +1,9 @@
 use super::clock::{Clock, Step};
 use super::columns::{Layout, shorten};
-use super::csv::Row;
 use super::error::TraceFault;
 use super::quality::{BadReason, BadRow, TraceQuality};
 use super::range::Ranges;
+use super::row::Row;
 use super::{BadRows, Record};
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -12,14 +12,14 @@ use pitchleak_core::{PerLeak, Sample};
 /// From rows to records: what is possible, what time it is, and what was noticed so far. It does not
 /// know where the rows come from, so that a trace may come in parts.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-pub struct Intake {
+pub struct RowValidator {
     ranges: Ranges,
     clock: Clock,
     bad_rows: BadRows,
     quality: TraceQuality,
 }
 
-impl Intake {
+impl RowValidator {
     pub(super) fn new(rig: &Rig, layout: &Layout) -> Self {
         let quality = TraceQuality {
             ignored_columns: layout.ignored(),

@@ -1,0 +1,43 @@
+use super::PlanError;
+use crate::Rig;
+use crate::reference::{Reference, constant_or_file};
+use crate::units::Dimension;
+use crate::wind::{Emulation, History, Wind};
+use std::fmt;
+
+/// What a simulated rig follows, as a person says it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Followed {
+    /// Wind on a turbine, brought onto the rig.
+    Wind(Wind, Emulation),
+    /// Piston position and load, each a quantity that never changes or a CSV file.
+    Given {
+        /// E.g. `100 mm`.
+        position: String,
+        /// E.g. `2 kN`.
+        load: String,
+    },
+}
+
+impl Followed {
+    pub(super) fn reference(&self, rig: &Rig) -> Result<Reference, PlanError> {
+        match self {
+            Self::Wind(wind, emulation) => {
+                Ok(emulation.reference(&History::of(wind)?, rig.cylinder.stroke_m)?)
+            }
+            Self::Given { position, load } => Ok(Reference::of(
+                constant_or_file(position, "x", Dimension::Length)?,
+                constant_or_file(load, "force", Dimension::Force)?,
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Followed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wind(wind, _) => write!(f, "wind {wind}"),
+            Self::Given { position, load } => write!(f, "position {position}, load {load}"),
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! Records of a CSV stream out of one buffer of bounded size.
+
+use csv_core::{ReadRecordResult, ReaderBuilder, Terminator};
+use std::io::{self, Read};
+
+const CHUNK: usize = 256 * 1024;
+/// A record longer than this is no row of numbers.
+const LONGEST_RECORD: usize = 1024 * 1024;
+/// How far a quoted cell may run over line ends before its quote counts as stray.
+const LONGEST_QUOTED: usize = 64 * 1024;
+
+/// One record.
+#[derive(Clone, Copy)]
+pub(super) struct Record<'a> {
+    /// The line it starts on, from 1.
+    pub(super) line: u64,
+    pub(super) text: Text<'a>,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Text<'a> {
+    /// As in the file, to be split at each delimiter.
+    Plain(&'a [u8]),
+    /// Cells without their quotes, one after the other, and where each ends.
+    Unquoted(&'a [u8], &'a [usize]),
+}
+
+impl<'a> Record<'a> {
+    pub(super) fn cells(&self, delimiter: u8) -> Vec<&'a [u8]> {
+        match self.text {
+            Text::Plain(text) => text.split(|byte| *byte == delimiter).collect(),
+            Text::Unquoted(text, ends) => {
+                let starts = std::iter::once(&0).chain(ends);
+                starts.zip(ends).map(|(start, end)| text.get(*start..*end).unwrap_or_default()).collect()
+            }
+        }
+    }
+}
+
+/// Why no further record comes.
+#[derive(Debug)]
+pub(super) enum Stop {
+    /// The stream is over.
+    End,
+    /// The stream fails; what came before is good, a partial last record is not.
+    Failed(io::Error),
+    /// A record without end.
+    TooLong,
+}
+
+pub(super) struct Records {
+    source: Box<dyn Read + Send>,
+    buffer: Vec<u8>,
+    start: usize,
+    filled: usize,
+    /// Lines ended so far.
+    ended: u64,
+    finished: Option<Option<io::Error>>,
+    unquoter: Unquoter,
+}
+
+impl Records {
+    pub(super) fn new(source: Box<dyn Read + Send>) -> Self {
+        let unquoter = Unquoter::new(b',');
+        Self { source, buffer: vec![0; CHUNK], start: 0, filled: 0, ended: 0, finished: None, unquoter }
+    }
+
+    /// Splits at `delimiter` from here on.
+    pub(super) fn split_at(&mut self, delimiter: u8) {
+        self.unquoter = Unquoter::new(delimiter);
+    }
+
+    /// The line that the next record starts on, from 1.
+    pub(super) fn next_line(&self) -> u64 {
+        self.ended + 1
+    }
+
+    /// The next record; empty lines are passed over.
+    #[inline]
+    pub(super) fn next(&mut self) -> Result<Record<'_>, Stop> {
+        let found = self.find()?;
+        let line = self.next_line();
+        let start = self.start;
+        self.start += found.length;
+        self.ended += found.lines;
+        Ok(self.record(line, start, &found))
+    }
+
+    /// As [`next`](Self::next), and the record is the next one still.
+    pub(super) fn peek(&mut self) -> Result<Record<'_>, Stop> {
+        let found = self.find()?;
+        Ok(self.record(self.next_line(), self.start, &found))
+    }
+
+    #[inline]
+    fn record(&self, line: u64, start: usize, found: &Found) -> Record<'_> {
+        let text = match found.cells {
+            Some(cells) => {
+                let ends = self.unquoter.ends.get(..cells).unwrap_or_default();
+                Text::Unquoted(&self.unquoter.cells, ends)
+            }
+            None => Text::Plain(self.buffer.get(start..start + found.text).unwrap_or_default()),
+        };
+        Record { line, text }
+    }
+
+    #[inline]
+    fn find(&mut self) -> Result<Found, Stop> {
+        loop {
+            let found = self.find_any()?;
+            if found.text > 0 {
+                return Ok(found);
+            }
+            self.start += found.length;
+            self.ended += found.lines;
+        }
+    }
+
+    #[inline]
+    fn find_any(&mut self) -> Result<Found, Stop> {
+        loop {
+            let pending = self.buffer.get(self.start..self.filled).unwrap_or_default();
+            let at_end = self.finished.is_some();
+            match memchr::memchr2(b'\n', b'"', pending) {
+                Some(at) if pending.get(at) == Some(&b'\n') => return Ok(Found::line(pending, at)),
+                Some(_) => {
+                    let within = pending.get(..LONGEST_QUOTED).unwrap_or(pending);
+                    if let Some(found) = self.unquoter.read(within, at_end && within.len() == pending.len()) {
+                        return Ok(found);
+                    }
+                    // A quote that does not close within reach is stray: its record ends with its line.
+                    let out_of_reach = at_end || pending.len() > LONGEST_QUOTED;
+                    if let Some(at) = memchr::memchr(b'\n', pending).filter(|_| out_of_reach) {
+                        return Ok(Found::line(pending, at));
+                    }
+                }
+                None => {}
+            }
+            if at_end {
+                return self.last_line();
+            }
+            self.refill()?;
+        }
+    }
+
+    /// What is left at the end of the stream, without a line end.
+    #[cold]
+    fn last_line(&mut self) -> Result<Found, Stop> {
+        let rest = self.buffer.get(self.start..self.filled).unwrap_or_default();
+        match self.finished.as_mut().and_then(Option::take) {
+            Some(error) => Err(Stop::Failed(error)),
+            None if rest.is_empty() => Err(Stop::End),
+            None => Ok(Found { length: rest.len(), ..Found::line(rest, rest.len()) }),
+        }
+    }
+
+    #[cold]
+    fn refill(&mut self) -> Result<(), Stop> {
+        self.buffer.copy_within(self.start..self.filled, 0);
+        self.filled -= self.start;
+        self.start = 0;
+        if self.filled >= LONGEST_RECORD {
+            return Err(Stop::TooLong);
+        }
+        if self.filled == self.buffer.len() {
+            self.buffer.resize(2 * self.filled, 0);
+        }
+        let free = self.buffer.get_mut(self.filled..).unwrap_or_default();
+        match self.source.read(free) {
+            Ok(0) => self.finished = Some(None),
+            Ok(count) => self.filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => self.finished = Some(Some(error)),
+        }
+        Ok(())
+    }
+}
+
+/// A record at the start of the pending bytes.
+struct Found {
+    /// With its line end.
+    length: usize,
+    /// Its text as it stands, without the line end.
+    text: usize,
+    lines: u64,
+    /// How many cells were unquoted, where there are quotes.
+    cells: Option<usize>,
+}
+
+impl Found {
+    /// The line whose end is at `at`.
+    #[inline]
+    fn line(pending: &[u8], at: usize) -> Self {
+        let carriage_return = at > 0 && pending.get(at - 1) == Some(&b'\r');
+        Self { length: at + 1, text: at - usize::from(carriage_return), lines: 1, cells: None }
+    }
+}
+
+/// Splits records with quotes (RFC 4180). Those without, all but a few, are split as their numbers are
+/// read: the automaton takes as long for a row as all else that is done to it.
+struct Unquoter {
+    automaton: csv_core::Reader,
+    cells: Vec<u8>,
+    ends: Vec<usize>,
+}
+
+impl Unquoter {
+    fn new(delimiter: u8) -> Self {
+        // A carriage return at the end of a line is trimmed with the blanks of its last cell.
+        let automaton = ReaderBuilder::new().delimiter(delimiter).terminator(Terminator::Any(b'\n')).build();
+        // Room for every record that is read, so that it is never full.
+        Self { automaton, cells: vec![0; LONGEST_QUOTED + 1], ends: vec![0; LONGEST_QUOTED + 2] }
+    }
+
+    /// Reads the record that `pending` starts with; none where it does not end there.
+    #[cold]
+    fn read(&mut self, pending: &[u8], at_end: bool) -> Option<Found> {
+        self.automaton.reset();
+        let (mut result, length, text, mut cells) =
+            self.automaton.read_record(pending, &mut self.cells, &mut self.ends);
+        if at_end && matches!(result, ReadRecordResult::InputEmpty) {
+            let (cells_left, ends_left) = (self.cells.get_mut(text..)?, self.ends.get_mut(cells..)?);
+            let (last, _, _, more) = self.automaton.read_record(b"\n", cells_left, ends_left);
+            (result, cells) = (last, cells + more);
+        }
+        let lines = self.automaton.line() - 1;
+        let found = Found { length, text: length, lines, cells: Some(cells) };
+        matches!(result, ReadRecordResult::Record).then_some(found)
+    }
+}

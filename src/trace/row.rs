@@ -1,0 +1,85 @@
+//! Where rows come from: one trait, whatever the file's format, or columns in memory.
+
+use super::columns::{Column, Layout};
+use super::error::TraceFault;
+use super::quality::{BadReason, BadRow};
+use crate::signal::Signal;
+
+/// A source of rows. A new one is an implementation of this trait; a file format is told by its first
+/// bytes, in `format.rs`.
+pub(super) trait RowSource {
+    /// What the columns hold.
+    fn layout(&self) -> &Layout;
+
+    /// Reads the next row into `row`.
+    fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault>;
+
+    /// This is the part of a trace after its first `rows` rows. Files, numbered by lines, are whole.
+    fn count_from(&mut self, _rows: u64) {}
+}
+
+/// One row in SI, by signal; NaN where the cell is empty or the trace has no such column.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    pub(super) line: u64,
+    pub(super) cells: [f64; Signal::ALL.len()],
+}
+
+impl Row {
+    pub(super) fn empty() -> Self {
+        Self { line: 0, cells: [f64::NAN; Signal::ALL.len()] }
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, signal: Signal) -> f64 {
+        self.cells.get(signal as usize).copied().unwrap_or(f64::NAN)
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, signal: Signal, value: f64) {
+        if let Some(cell) = self.cells.get_mut(signal as usize) {
+            *cell = value;
+        }
+    }
+}
+
+/// What comes next.
+pub(super) enum Next {
+    Row,
+    Bad(BadRow),
+    /// The stream fails here; every row before is good.
+    CutOff(String),
+    End,
+}
+
+/// What is wrong with a row, before words are put to it.
+pub(super) struct Fault {
+    pub(super) column: Option<usize>,
+    pub(super) reason: BadReason,
+}
+
+/// An empty cell is a missing value only where every row must have one.
+#[inline]
+pub(super) fn check_present(columns: &[Column], row: &Row) -> Result<(), Fault> {
+    let time = row.get(Signal::Time);
+    let needed = time + row.get(Signal::Position) + row.get(Signal::PressureA) + row.get(Signal::PressureB);
+    if needed.is_finite() {
+        return Ok(());
+    }
+    Err(blame(columns, row))
+}
+
+/// The cell that makes the sum of the needed ones no number.
+#[cold]
+fn blame(columns: &[Column], row: &Row) -> Fault {
+    for (index, column) in columns.iter().enumerate() {
+        let Some(signal) = column.content.signal().filter(|signal| signal.is_required()) else { continue };
+        let signal = if signal == Signal::Timestamp { Signal::Time } else { signal };
+        let value = row.get(signal);
+        if !value.is_finite() {
+            let reason = if value.is_nan() { BadReason::Missing } else { BadReason::OutOfRange };
+            return Fault { column: Some(index), reason };
+        }
+    }
+    Fault { column: None, reason: BadReason::OutOfRange }
+}
