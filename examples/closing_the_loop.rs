@@ -7,7 +7,7 @@
 
 use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
-use pitchleak::core::{Effect, EffectSet, PerLeak};
+use pitchleak::core::{Effect, EffectSet, LPM_PER_M3S, PerLeak};
 use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
 use pitchleak::figure::{Ink, Line, Panel, svg};
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing};
@@ -53,8 +53,8 @@ fn read(rig: &str, traces: &[String]) -> Result<(Rig, Vec<Series>), Box<dyn Erro
 fn panels(diagnosis: &Diagnosis) -> Vec<Panel> {
     let (before, after) = (&diagnosis.before.residual_over_time, &diagnosis.after.residual_over_time);
     let balances = [
-        ("Chamber A", "left over, L/min", &before.chamber_a, &after.chamber_a, 60e3),
-        ("Chamber B", "left over, L/min", &before.chamber_b, &after.chamber_b, 60e3),
+        ("Chamber A", "left over, L/min", &before.chamber_a, &after.chamber_a, LPM_PER_M3S),
+        ("Chamber B", "left over, L/min", &before.chamber_b, &after.chamber_b, LPM_PER_M3S),
         ("Forces", "left over, N", &before.force, &after.force, 1.0),
     ];
     let line = |label, ink, points: &[(f64, f64)], factor: f64| Line {

@@ -2,7 +2,8 @@
 //! std nor an allocator. Run with `cargo run --release --example streaming`.
 
 use pitchleak_core::{
-    AlarmSettings, Cylinder, Fluid, LeakDetector, Rls, RlsError, RlsSettings, Sample, Sensors, Update,
+    AlarmSettings, Cylinder, Fluid, LPM_PER_M3S, LeakDetector, Rls, RlsError, RlsSettings, Sample, Sensors,
+    Update,
 };
 
 /// Stands for the fieldbus: a cylinder whose piston seal lets 0.3 L/min through at 15 bar.
@@ -25,7 +26,7 @@ fn main() -> Result<(), RlsError> {
         if let Update::Renewed { elapsed_s, .. } = rls.update(0.01, &read_sensors(t_s)) {
             let flows = rls.estimates().mean_leaks_m3s;
             if let Some(state) = detector.update(elapsed_s, &flows).internal {
-                let internal = flows.internal.scaled(60e3);
+                let internal = flows.internal.scaled(LPM_PER_M3S as f32);
                 println!(
                     "{t_s:5.2} s: {state:?}, internal {:.3} ± {:.3} L/min",
                     internal.value, internal.std

@@ -3,8 +3,8 @@
 //! Every unit converts by a factor or a divisor that a double holds exactly, with one rounding:
 //! the same quantity in two units differs by at most two units in the last place.
 
-/// 1 m³/s in L/min.
-pub const LPM_PER_M3S: f64 = 60e3;
+pub use pitchleak_core::LPM_PER_M3S;
+
 /// 1 m³/(s·Pa) in L/min/bar.
 pub const LPM_PER_BAR: f64 = LPM_PER_M3S * 1e5;
 

@@ -44,7 +44,8 @@ fn run(motion: &Motion, sensors: &Sensors<f64>, first_seed: u64) -> Statistics {
     let mut found = Statistics::default();
     for seed in first_seed..first_seed + SEEDS {
         let mut random = seeded(seed);
-        let mut rls = Rls::<f64, 4>::new(motion.cylinder, fluid, sensors, RlsSettings::default()).unwrap();
+        let mut rls = Rls::<f64, 4>::new(motion.cylinder, fluid, sensors, RlsSettings::default())
+            .expect("a rig that can be");
         for sample in &clean {
             rls.update(DT_S, &noisy(sample, sensors, &mut random));
         }

@@ -16,7 +16,7 @@
 //! one on a leak just below its threshold costs little. It is cleared when the whole interval stays below the
 //! clearing level, so the band between the two is the hysteresis.
 
-use crate::{Estimate, PerLeak, Real};
+use crate::{Estimate, LPM_PER_M3S, PerLeak, Real};
 
 /// Levels and times of [`LeakDetector`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +38,7 @@ impl<T: Real> Default for AlarmSettings<T> {
     /// 0.1 L/min, clearing at half of that, held for a second, one false alarm in 10 000 memories of a sound
     /// cylinder and in 20 of one whose leak is at the threshold.
     fn default() -> Self {
-        let threshold = T::lit(0.1 / 60_000.0);
+        let threshold = T::lit(0.1 / LPM_PER_M3S);
         Self {
             threshold_m3s: PerLeak { internal: threshold, external_a: threshold, external_b: threshold },
             clear_share: T::lit(0.5),
@@ -141,9 +141,9 @@ mod tests {
     use super::*;
 
     fn flows(internal_lpm: f64, std_lpm: f64) -> PerLeak<Estimate<f64>> {
-        let sound = Estimate { value: 0.0, std: std_lpm / 6e4 };
+        let sound = Estimate { value: 0.0, std: std_lpm / LPM_PER_M3S };
         PerLeak {
-            internal: Estimate { value: internal_lpm / 6e4, std: std_lpm / 6e4 },
+            internal: Estimate { value: internal_lpm / LPM_PER_M3S, std: std_lpm / LPM_PER_M3S },
             external_a: sound,
             external_b: sound,
         }

@@ -69,7 +69,7 @@ pub use model::{
     ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, Leak, LeakPressures, Linkage,
     LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, signed_root,
 };
-pub use number::Real;
+pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;
 pub use rls::{

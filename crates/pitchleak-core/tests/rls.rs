@@ -31,7 +31,7 @@ fn estimate<T: Real, const N: usize>(
     sensors: &Sensors<T>,
     samples: impl Iterator<Item = Sample<T>>,
 ) -> Rls<T, N> {
-    let mut rls = Rls::new(cylinder, fluid, sensors, RlsSettings::default()).unwrap();
+    let mut rls = Rls::new(cylinder, fluid, sensors, RlsSettings::default()).expect("a rig that can be");
     for sample in samples {
         rls.update(T::lit(0.01), &sample);
     }

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::{LPM_PER_M3S, Real};
 
 /// How far one sensor's reading may be off, 1 σ each, in the sensor's SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -47,7 +47,7 @@ impl<T: Real> Sensors<T> {
     /// Sensors of the paper's rig (Section III): flow meters 20 L/min full scale, 1 % of full scale.
     pub fn paper() -> Self {
         let one_percent = T::lit(0.01);
-        let flow = SensorSpread::of_full_scale(T::lit(20.0 / 60_000.0), one_percent);
+        let flow = SensorSpread::of_full_scale(T::lit(20.0 / LPM_PER_M3S), one_percent);
         Self {
             flow_a: flow,
             flow_b: flow,

@@ -5,3 +5,6 @@ pub(crate) mod arrays;
 mod real;
 
 pub use real::Real;
+
+/// 1 m³/s in L/min, in which people think of flows.
+pub const LPM_PER_M3S: f64 = 60e3;

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::{LPM_PER_M3S, Real};
 
 /// Constant-flow pump into a line with a relief valve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Supply<T> {
 impl<T: Real> Supply<T> {
     /// Two pumps of 20 L/min together, relief at 10 MPa with 4 % override, 1 L of line.
     pub fn paper() -> Self {
-        let pump_flow_m3s = T::lit(40.0 / 60_000.0);
+        let pump_flow_m3s = T::lit(40.0 / LPM_PER_M3S);
         Self {
             pump_flow_m3s,
             relief_pressure_pa: T::lit(10e6),

@@ -1,5 +1,5 @@
-use crate::Real;
 use crate::metering;
+use crate::{LPM_PER_M3S, Real};
 
 /// Four-edge proportional valve: a spool of second order with its stroke limited, square-root
 /// metering at each edge (Merritt, "Hydraulic Control Systems", §5-1), lap and area ratio.
@@ -40,7 +40,7 @@ impl<T: Real> Valve<T> {
     /// edges in the ratio of the piston areas.
     pub fn paper() -> Self {
         Self {
-            rated_flow_m3s: T::lit(20.0 / 60_000.0),
+            rated_flow_m3s: T::lit(20.0 / LPM_PER_M3S),
             rated_drop_pa: T::lit(3.5e6),
             bandwidth_hz: T::lit(50.0),
             damping: T::lit(0.8),

@@ -1,7 +1,7 @@
 //! What the data can tell: per parameter, whether this trace pins it down.
 
 use super::{Parameter, Rls};
-use crate::{Estimate, PerLeak, Real};
+use crate::{Estimate, LPM_PER_M3S, PerLeak, Real};
 
 /// When a parameter counts as identified.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +23,7 @@ impl<T: Real> Default for ExcitationSettings<T> {
     /// the bulk modulus then comes from the trace).
     fn default() -> Self {
         Self {
-            resolution_m3s: T::lit(0.1 / 60_000.0),
+            resolution_m3s: T::lit(0.1 / LPM_PER_M3S),
             least_pressure_pa: T::lit(1e6),
             resolution_share: T::lit(0.1),
             prior_share: T::lit(0.5),
