@@ -1,26 +1,31 @@
 """Every path of this repository that a Markdown file names must exist; CHANGELOG.md may speak of what was.
 
-A path is text in backquotes whose first folder stands at the top of the repository, or the target of a link.
+A path is text in backquotes whose first folder stands at the top of the repository, or which ends in .rs (the end of a
+path is enough then), or the target of a link.
 """
 
 import pathlib
 import re
+import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).parent.parent
 TOPS = {path.name for path in ROOT.iterdir()}
-QUOTED = re.compile(r"`([\w.-]+(?:/[\w.*-]+)+/?)`")
+FILES = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+QUOTED = re.compile(r"`([\w.-]+(?:/[\w.*-]+)*/?)`")
 LINKED = re.compile(r"\]\((?!\w+:|#)([^)#\s]+)")
+
+
+def exists(path):
+    if "/" in path and path.split("/")[0] in TOPS:
+        return any(ROOT.glob(path))
+    return not path.endswith(".rs") or any(f"/{file}".endswith(f"/{path}") for file in FILES)
 
 
 def missing(document):
     text = document.read_text()
-    for path in QUOTED.findall(text):
-        if path.split("/")[0] in TOPS and not any(ROOT.glob(path)):
-            yield path
-    for path in LINKED.findall(text):
-        if not (document.parent / path).exists():
-            yield path
+    yield from (path for path in QUOTED.findall(text) if not exists(path))
+    yield from (path for path in LINKED.findall(text) if not (document.parent / path).exists())
 
 
 documents = [path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")) if path.name != "CHANGELOG.md"]

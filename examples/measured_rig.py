@@ -5,8 +5,8 @@
     python examples/measured_rig.py Electro-Hydraulic-Actuator traces && cd traces
     pitchleak diagnose d1018*stroke[13].csv.gz --test d1018*stroke[24].csv.gz d1017*.csv.gz
 
-A laboratory's pump-controlled cylinder, 31 s at 1 kHz per run, of 17 and 18 October 2024; docs/closing-the-loop.md says what
-comes out. That repository declares no licence, so its data are no part of this project. Counts become SI with its own
+A laboratory's pump-controlled cylinder, 31 s at 1 kHz per run, of 17 and 18 October 2024; docs/closing-the-loop.md says
+what comes out. That repository declares no licence, so its data are no part of this project. Counts become SI with its own
 calibration (4_ANALIZE_DATA/PYTHON_Processing/processing_data_1.py). Needs nothing but Python.
 """
 
@@ -16,8 +16,8 @@ import sys
 from pathlib import Path
 
 RUNS = "2_EHA_desktop program_python_project"
-# The rig as far as its authors' simulation model tells; none of it was checked. The displacement of the pump may be off by
-# 20 % (`gain`), its volumetric efficiency is not known.
+# The rig as far as its authors' simulation model tells; none of it was checked. The displacement of the pump may be off
+# by 20 % (`gain`), its volumetric efficiency is not known.
 RIG = """\
 [cylinder]
 area_a = "19.63495 cm^2"
