@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Instructions per sample of each estimator, by callgrind (needs valgrind).
+# Instructions per sample of each estimator, by callgrind (needs valgrind); fails where one takes more than README and
+# docs/estimators.md say.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 binary=$(cargo bench --bench instructions --no-run --message-format=json 2>/dev/null |
@@ -13,6 +14,19 @@ count() {
 }
 per_sample() { echo $((($(count "$1" 61440) - $(count "$1" 20480)) / 40960)); }
 idle=$(per_sample nothing)
-for estimator in paper-law paper rls rls-offsets rls-gains; do
-    echo "$estimator: $(($(per_sample "$estimator") - idle)) instructions per sample"
-done
+failed=0
+while read -r estimator limit; do
+    found=$(($(per_sample "$estimator") - idle))
+    echo "$estimator: $found instructions per sample"
+    if ((found > limit)); then
+        echo "$estimator: $limit are claimed" >&2
+        failed=1
+    fi
+done <<END
+paper-law 61
+paper 113
+rls 378
+rls-offsets 554
+rls-gains 1027
+END
+exit $failed

@@ -21,6 +21,9 @@ import polars  # after the variable, which it reads when it is imported
 PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release" / "pitchleak"
 HEADER = "t_s,x_m,v_mps,pa_pa,pb_pa,qa_m3s,qb_m3s,force_n,q_int_m3s,q_ext_a_m3s,q_ext_b_m3s\n"
 ROUNDS = 15
+# What README claims, with room for a machine that is not quiet.
+MOST_TIMES = 1.2
+MOST_MIB = 8
 
 
 def row(i):
@@ -71,8 +74,9 @@ def main():
         read, replayed = (min(times) for times in zip(*pairs, strict=True))
         print(f"polars reads it in {read:.3f} s; replay takes {replayed:.3f} s: {replayed / read:.2f} times that")
         write(long_trace, 3_600_000)
-        print(f"peak memory {peak_mib(trace):.1f} MiB, on a trace ten times as long {peak_mib(long_trace):.1f} MiB")
-        return 0 if replayed <= 1.5 * read else 1
+        short, long = peak_mib(trace), peak_mib(long_trace)
+        print(f"peak memory {short:.1f} MiB, on a trace ten times as long {long:.1f} MiB")
+        return 0 if replayed <= MOST_TIMES * read and long <= MOST_MIB else 1
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ const SECONDS: [usize; 3] = [20, 60, 280];
 /// 3 σ of every sensor's noise, share of full scale; the paper's sensors have 1 %.
 const ACCURACIES: [f64; 3] = [0.0, 0.001, 0.01];
 /// Evaluations per descent where none are asked for.
-const EVALUATIONS: usize = 150;
+const EVALUATIONS: usize = 60;
 /// Seeds of the noise in which gains are searched, and in which they are judged.
 const SEARCHED: u64 = 1;
 const JUDGED: u64 = 2;

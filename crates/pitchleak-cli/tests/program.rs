@@ -93,6 +93,17 @@ fn replay_finds_the_leak_and_says_so() {
     assert_eq!(replay(&trace, &["--fail-on-fault"]).status.code(), Some(1));
 }
 
+/// README shows the report that its first command prints.
+#[test]
+fn the_readme_shows_what_is_printed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let command = ["replay", "data/traces/external_a.csv.gz"];
+    assert!(readme.contains(&command.join(" ")));
+    assert_eq!(stdout(&pitchleak().current_dir(&root).args(command).output().unwrap()), shown);
+}
+
 #[test]
 fn the_paper_law_runs_too() {
     let place = Place::new();
