@@ -187,3 +187,35 @@ fn explicit_euler_diverges_where_the_implicit_step_does_not() {
     assert!((implicit.load_pressure_pa - p).abs() < 1e5);
     assert!(!explicit.is_finite() || (explicit.load_pressure_pa - p).abs() > 1e12);
 }
+
+proptest! {
+    /// γ_i = γ (θ_i*/P*)², with C* the leak that empties the cylinder in 100 s at P* = 1 MPa.
+    #[test]
+    fn a_gain_goes_with_the_square_of_what_its_parameter_may_be(
+        cylinder in cylinder(), lambda in 0.1..100.0, gamma in 1e-3..1e3,
+    ) {
+        let gains = PaperGains::scaled(&cylinder, &fluid(), lambda, gamma);
+        let pressure_pa = 1e6;
+        let emptying_leak = cylinder.area_a_m2 * cylinder.stroke_m / 100.0 / pressure_pa;
+        let largest = theta(fluid().bulk_modulus_pa, [emptying_leak; 3], cylinder.moving_mass_kg);
+        for (gain, largest) in gains.gamma.iter().zip(largest) {
+            let expected = gamma * (largest / pressure_pa) * (largest / pressure_pa);
+            prop_assert!((gain / expected - 1.0).abs() < 1e-12, "{gain:e} {expected:e}");
+        }
+    }
+
+    #[test]
+    fn leak_coefficients_undo_eq_5(
+        cylinder in cylinder(), beta in 1e8..3e9, internal in 0.0..1e-10, external_a in 0.0..1e-10, external_b in 0.0..1e-10,
+    ) {
+        let mut law = PaperLaw::new(&cylinder, &fluid(), 1e6);
+        let leaks = [internal, external_a, external_b];
+        law.theta = theta(beta, leaks, cylinder.moving_mass_kg);
+        let found = law.leak_coefficients();
+        for (found, leak) in [found.internal, found.external_a, found.external_b].into_iter().zip(leaks) {
+            prop_assert!((found - leak).abs() <= 1e-14 * leak, "{found:e} {leak:e}");
+        }
+        law.theta[0] = -beta;
+        prop_assert_eq!(law.leak_coefficients(), PerLeak::default(), "no leak is read from a negative β̂");
+    }
+}
