@@ -20,6 +20,8 @@ mod outcome;
 mod present;
 mod search;
 mod statistics;
+#[cfg(test)]
+mod testing;
 mod thresholds;
 mod weak_form;
 
@@ -64,6 +66,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict: judgement.verdict,
         notes: assess::notes(
+            fit,
             judgement.complaints,
             &before,
             (!effects.is_empty()).then_some(&after),

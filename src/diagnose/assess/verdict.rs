@@ -3,9 +3,10 @@
 use super::adequacy::{complaints, ripples};
 use super::leaks::negative_leaks;
 use crate::diagnose::data::SensorCheck;
+use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
 use crate::diagnose::search::Selection;
-use crate::diagnose::thresholds::UNMENDED_SHARE;
+use crate::diagnose::thresholds::{MOST_ROUNDS, UNMENDED_SHARE};
 
 /// What the search makes of the traces.
 pub(crate) struct Judgement {
@@ -43,6 +44,7 @@ pub(crate) fn judge(
 
 /// All sentences for people: `after` is none where no effect was named.
 pub(crate) fn notes(
+    fit: &Fit<'_>,
     complaints: Vec<String>,
     before: &ModelFit,
     after: Option<&ModelFit>,
@@ -56,5 +58,8 @@ pub(crate) fn notes(
     }));
     let after = after.map(|after| negative_leaks(&after.leaks, "the model with the effects"));
     notes.extend(after.into_iter().flatten());
+    if !fit.has_converged() {
+        notes.push(format!("the fit still moved after {MOST_ROUNDS} linearisations: estimates may be off by more than they say"));
+    }
     notes
 }

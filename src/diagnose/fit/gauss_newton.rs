@@ -6,8 +6,8 @@ use super::equation_error;
 use super::problem::Problem;
 use super::regression::{Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
-use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{FIRST_ROUNDS, FOLDS, HELD, NEXT_ROUNDS};
+use crate::diagnose::equation::{Equation, PerEquation};
+use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
 use crate::diagnose::weak_form::{Linearisation, Term, WeakForm};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
@@ -49,6 +49,8 @@ pub(crate) struct Fit<'a> {
     pub(crate) free: Solution,
     /// The end of the oil's range at which 1/β is held, because the data would take it further.
     pub(crate) held_compressibility: Option<f64>,
+    /// Variance of each equation's error that the regression was weighted with.
+    assumed_error: PerEquation<f64>,
     /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
     pub(super) equation_error: PerEquation<f64>,
 }
@@ -58,8 +60,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn declared(problem: &'a Problem<'a>, progress: Progress<'_>) -> Self {
         let constants = vec![problem.usual_constants; problem.terms.len()];
         let structure = Structure { active: problem.declared_terms(), constants };
-        Self::around(problem, structure, problem.start.clone(), PerEquation::default())
-            .rounds(FIRST_ROUNDS, progress)
+        Self::around(problem, structure, problem.start.clone(), PerEquation::default()).settled(progress)
     }
 
     /// Best fit with one more effect.
@@ -81,7 +82,7 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let (structure, at) = self.left_by(old);
         let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
-        Self::around(self.problem, structure, at, self.equation_error).rounds(NEXT_ROUNDS, progress)
+        Self::around(self.problem, structure, at, self.equation_error).settled(progress)
     }
 
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
@@ -129,17 +130,36 @@ impl<'a> Fit<'a> {
             bounded,
             free,
             held_compressibility,
+            assumed_error,
             equation_error,
         }
     }
 
-    /// So many linearisations, this one the first.
-    fn rounds(mut self, count: usize, progress: Progress<'_>) -> Self {
-        for _ in 1..count {
+    /// Linearises anew until a further time would change nothing that matters.
+    fn settled(mut self, progress: Progress<'_>) -> Self {
+        for _ in 1..MOST_ROUNDS {
+            if self.has_converged() {
+                break;
+            }
             progress();
             self = Self::around(self.problem, self.structure.clone(), self.solved(), self.equation_error);
         }
         self
+    }
+
+    /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and
+    /// the noise is as it was assumed.
+    pub(crate) fn has_converged(&self) -> bool {
+        let (at, solved) = (&self.weak_form.at, self.solved());
+        let is_still = |(term, std): (&usize, &f64)| {
+            let term = self.problem.terms[*term];
+            (solved.value(term) - at.value(term)).abs() <= SETTLED_SIGMA * std
+        };
+        let (assumed, found) = (self.noise_ratios(self.assumed_error), self.noise_ratio());
+        let is_as_assumed =
+            |equation: Equation| (found[equation] / assumed[equation] - 1.0).abs() <= SETTLED_NOISE;
+        self.bounded.terms.iter().zip(&self.bounded.std).all(is_still)
+            && Equation::ALL.into_iter().all(is_as_assumed)
     }
 
     /// The linearisation at the solution.
@@ -269,5 +289,62 @@ fn beyond_range(problem: &Problem<'_>, at: &Linearisation, free: &Solution) -> O
 fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation, held: Option<f64>) {
     if let (Some(held), Some(own)) = (held, problem.place(Term::InverseBulk)) {
         priors[own] = Some(Prior { mean: held - at.value(Term::InverseBulk), std: HELD * held });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, torn_seal};
+
+    #[test]
+    fn with_an_effect_and_without_it_again_is_the_fit_before() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let plain = Fit::declared(&problem, &|| ());
+        let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+        let with = plain.with(term, problem.usual_constants, &|| ());
+        let again = with.without(term, &|| ());
+        assert!(plain.has_converged() && with.has_converged() && again.has_converged());
+        assert!(plain.is_incomplete() && !with.is_incomplete() && again.is_incomplete());
+        assert!(with.estimate(term).is_some() && again.estimate(term).is_none());
+        for term in plain.active() {
+            let (before, after) = (plain.estimate(*term), again.estimate(*term));
+            let (before, after) = before.zip(after).expect("is fitted");
+            assert!(
+                (before.value - after.value).abs() < 3.0 * SETTLED_SIGMA * before.std,
+                "{before:?} {after:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_right_effect_is_found_in_its_size_beside_the_leaks() {
+        let traces = [torn_seal(60)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+        let fit = Fit::declared(&problem, &|| ()).with(term, problem.usual_constants, &|| ());
+        let terms = [
+            (Term::Internal, LEAKS.internal),
+            (Term::ExternalA, LEAKS.external_a),
+            (Term::Effect(TURBULENT.0), TURBULENT.1),
+        ];
+        for (term, truth) in terms {
+            let own = problem.place(term).and_then(|place| fit.estimate(place)).expect("is fitted");
+            assert!((own.value - truth).abs() < 4.0 * own.std && own.std < 0.2 * truth, "{term:?}: {own:?}");
+        }
+    }
+
+    #[test]
+    fn a_vacated_place_scores_its_own_effect_as_high_as_the_fit_loses_without_it() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+        let fit = Fit::declared(&problem, &|| ()).with(term, problem.usual_constants, &|| ());
+        let lost = fit.solve_without(&[term]).chi2 - fit.free.chi2;
+        let vacated = fit.vacated(term);
+        let score = vacated.score(&vacated.free, term).expect("shows");
+        assert!((score.chi2_drop / lost - 1.0).abs() < 0.05, "{} of {lost}", score.chi2_drop);
+        assert!(fit.active().contains(&term) && !vacated.active().contains(&term));
     }
 }

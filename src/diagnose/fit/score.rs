@@ -115,3 +115,104 @@ impl Regression {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::equation::PerEquation;
+    use crate::diagnose::fit::Problem;
+    use crate::diagnose::testing::{declared, torn_seal};
+    use crate::diagnose::weak_form::{DECLARED, Term, WeakForm};
+    use nalgebra::DMatrix;
+    use pitchleak_core::Effect;
+
+    /// A regression of the declared model's constants and some effects, none of which share the residual's noise.
+    fn with_regression(test: impl Fn(&Problem<'_>, &WeakForm<'_>, &Regression)) {
+        let (traces, declared) = ([torn_seal(20)], declared());
+        let problem = Problem::new(&traces, &declared, &[]);
+        let constants = vec![problem.usual_constants; problem.terms.len()];
+        let columns = (problem.terms.as_slice(), constants.as_slice());
+        let start = problem.start.clone();
+        let form = WeakForm::new(&traces, &problem.sensors, start, columns, PerEquation::default());
+        test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));
+    }
+
+    fn is_near(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-6 * a.abs().max(b.abs())
+    }
+
+    #[test]
+    fn a_solution_is_that_of_dense_least_squares() {
+        with_regression(|problem, form, regression| {
+            let terms: Vec<usize> = DECLARED.iter().filter_map(|term| problem.place(*term)).collect();
+            let priors = problem.increments(&form.at);
+            let white = |column: &[f64]| regression.counting(form.whitening.whiten(column));
+            let columns: Vec<Vec<f64>> = terms.iter().map(|term| white(&form.rows.columns[*term])).collect();
+            let n = form.rows.y.len();
+            // One more row for the prior of 1/β.
+            let prior = priors[terms[0]].expect("oil has a prior");
+            let scale = [1e-9, 1e-11, 1e-11, 1e-11];
+            let x = DMatrix::from_fn(n + 1, 4, |i, j| match (i == n, j) {
+                (false, _) => columns[j][i] * scale[j],
+                (true, 0) => scale[0] / prior.std,
+                (true, _) => 0.0,
+            });
+            let mut y = white(&form.rows.y);
+            y.push(prior.mean / prior.std);
+            let y = DVector::from_vec(y);
+            let svd = x.clone().svd(true, true);
+            let dense = svd.solve(&y, 0.0).expect("both factors");
+            let covariance = (x.transpose() * &x).try_inverse().expect("regular");
+            let solution = regression.solve(&terms, &priors);
+            for j in 0..4 {
+                assert!(is_near(solution.value[j], dense[j] * scale[j]), "{j}");
+                assert!(is_near(solution.std[j], covariance[(j, j)].sqrt() * scale[j]), "{j}");
+            }
+            assert!(is_near(solution.chi2, (&y - &x * &dense).norm_squared()));
+        });
+    }
+
+    #[test]
+    fn a_score_says_what_a_refit_brings() {
+        with_regression(|problem, form, regression| {
+            let priors = problem.increments(&form.at);
+            let terms: Vec<usize> = DECLARED.iter().filter_map(|term| problem.place(*term)).collect();
+            let without = regression.solve(&terms, &priors);
+            let effects = [Effect::InternalLeakTurbulent, Effect::FlowMeterOffsetA, Effect::EntrainedAir];
+            for effect in effects {
+                let term = problem.place(Term::Effect(effect)).expect("is a term");
+                let with = regression.solve(&[&terms[..], &[term]].concat(), &priors);
+                let white = form.white_column(Term::Effect(effect), problem.usual_constants);
+                let partial = regression.partial(&without, &white).expect("shows");
+                let scores =
+                    [regression.score(&without, term), regression.score_column(&without, term, &partial)];
+                for score in scores {
+                    let score = score.expect("is new");
+                    assert!(is_near(score.chi2_drop, without.chi2 - with.chi2), "{effect}: {score:?}");
+                    assert!(
+                        is_near(score.value, with.value[4]) && is_near(score.std, with.std[4]),
+                        "{effect}"
+                    );
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn a_column_put_in_is_as_if_it_had_been_there() {
+        with_regression(|problem, form, regression| {
+            let place = |effect| problem.place(Term::Effect(effect)).expect("is a term");
+            let (air, offset) = (place(Effect::EntrainedAir), place(Effect::FlowMeterOffsetA));
+            let white = form.white_column(Term::Effect(Effect::EntrainedAir), problem.usual_constants);
+            let replaced = regression.with_column(offset, white);
+            let priors = vec![None; problem.terms.len()];
+            let (own, there) =
+                (regression.solve(&[0, 1, air], &priors), replaced.solve(&[0, 1, offset], &priors));
+            assert!(own.value.iter().zip(&there.value).all(|(a, b)| is_near(*a, *b)));
+            assert!(is_near(own.chi2, there.chi2));
+            let errors = regression.held_out(&[0, 1, air], &priors);
+            let replaced = replaced.held_out(&[0, 1, offset], &priors);
+            assert!(errors.iter().zip(&replaced).all(|(a, b)| is_near(*a, *b)));
+        });
+    }
+}

@@ -1,26 +1,10 @@
-//! The effects that could be named next, each with what it would bring to a model.
+//! The effects that could be named next, and the score of each beside a model.
 
-use super::constants;
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE, IN_THE_RUNNING};
+use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE};
 use crate::diagnose::weak_form::Term;
 use pitchleak_core::effects::EffectConstants;
-
-/// A candidate at its best: with the constants it starts from, or with fitted ones, which have to be paid for.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Trial {
-    pub(super) score: Score,
-    pub(super) constants: EffectConstants<f64>,
-    critical_sigma: f64,
-}
-
-impl Trial {
-    /// By how much it passes what chance could bring: the measure by which candidates compete.
-    pub(super) fn beyond(&self, dispersion: f64) -> f64 {
-        self.score.chi2_drop / dispersion - self.critical_sigma.powi(2)
-    }
-}
 
 /// Places of the terms that could be named.
 pub(crate) fn open(fit: &Fit<'_>) -> Vec<usize> {
@@ -89,44 +73,5 @@ impl<'f, 'a> Candidates<'f, 'a> {
             self.columns.len() - 1
         });
         self.fit.partial(model, &self.columns[place].white)
-    }
-
-    /// Every candidate against a model, its constants only tried at a few places; the best first.
-    pub(super) fn rough_trials(&mut self, model: &Solution) -> Vec<Trial> {
-        let scores = self.starts(model);
-        self.ranked(model, scores)
-    }
-
-    /// Every candidate at its best against a model; the best first.
-    pub(super) fn trials(&mut self, model: &Solution) -> Vec<Trial> {
-        let mut scores = self.starts(model);
-        let best = scores.iter().flatten().map(|(score, _)| score.chi2_drop).fold(0.0, f64::max);
-        for of_one in &mut scores {
-            let top = of_one.iter().copied().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop));
-            let top = top.filter(|top| top.0.chi2_drop > IN_THE_RUNNING * best);
-            of_one.extend(top.map(|top| constants::best_score(self, model, top)));
-        }
-        self.ranked(model, scores)
-    }
-
-    /// The scores of each candidate with its usual constants and at a few places of their ranges.
-    fn starts(&mut self, model: &Solution) -> Vec<Vec<(Score, EffectConstants<f64>)>> {
-        open(self.fit).into_iter().map(|term| constants::first_scores(self, model, term)).collect()
-    }
-
-    fn ranked(&self, model: &Solution, scores: Vec<Vec<(Score, EffectConstants<f64>)>>) -> Vec<Trial> {
-        let dispersion = self.fit.dispersion(model.chi2);
-        let trial = |(score, constants)| Trial {
-            score,
-            constants,
-            critical_sigma: critical_sigma(self.fit, constants),
-        };
-        let best = |scores: Vec<(Score, EffectConstants<f64>)>| {
-            let trials = scores.into_iter().map(trial);
-            trials.max_by(|a, b| a.beyond(dispersion).total_cmp(&b.beyond(dispersion)))
-        };
-        let mut trials: Vec<Trial> = scores.into_iter().filter_map(best).collect();
-        trials.sort_by(|a, b| b.beyond(dispersion).total_cmp(&a.beyond(dispersion)));
-        trials
     }
 }

@@ -1,8 +1,9 @@
 //! Second thoughts: what was named first was named while other effects were still missing, and at the noise of an
 //! incomplete model. Each named effect, and each pair, has to hold its place against its rivals again.
 
-use super::candidates::{Candidates, Trial, critical_sigma};
+use super::candidates::{Candidates, critical_sigma};
 use super::selection::{self, Selected, Selection};
+use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONFUSABLE_CHI2, MOST_SWAPS};

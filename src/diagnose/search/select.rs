@@ -1,7 +1,8 @@
 //! Forward selection by the score test, with backward elimination, each step confirmed on data that it did not fit.
 
-use super::candidates::{Candidates, Trial, critical_sigma, nameless_chi2_drop};
+use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop};
 use super::selection::{Selected, Selection, loss, with};
+use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{AGREED_SIGMA, CONFUSABLE_CHI2, LEAST_MENDED_SHARE, MOST_EFFECTS};

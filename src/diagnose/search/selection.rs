@@ -1,7 +1,8 @@
 //! The effects named so far, and how one takes its place in the fit.
 
-use super::candidates::{Candidates, Trial};
+use super::candidates::Candidates;
 use super::constants;
+use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use pitchleak_core::Effect;
 
@@ -16,6 +17,14 @@ pub(crate) struct Selected {
     pub(crate) confusable_with: Vec<Effect>,
     /// A product of signals without a name would have fitted better.
     pub(crate) beaten_by_nameless: bool,
+}
+
+#[cfg(test)]
+impl Selected {
+    /// An effect of which nothing is known but its place.
+    pub(crate) fn unjudged(term: usize) -> Self {
+        Self { term, p_value: 1.0, mended_percent: None, confusable_with: vec![], beaten_by_nameless: false }
+    }
 }
 
 /// The effects named so far and the fit with them.

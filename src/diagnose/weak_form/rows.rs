@@ -153,3 +153,64 @@ impl Rows {
         entry.equation != Equation::Force || self.rows[entry.row].stuck <= SLIVER
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::declared;
+    use crate::diagnose::weak_form::{Linearisation, Term};
+    use pitchleak_core::Sample;
+    use pitchleak_core::effects::EffectConstants;
+
+    const SPEED_MPS: f64 = 0.02;
+    const LOST_M3S: f64 = 1e-6;
+    const RESISTANCE_N: f64 = 50.0;
+
+    /// Four blocks of ten samples at constant speed: more flows into A than the piston sweeps, and a force resists.
+    fn rows(last_flow_b: usize) -> Rows {
+        let declared = declared();
+        let cylinder = declared.cylinder;
+        let mut series = Series::default();
+        for k in 0..40_u32 {
+            let t = 0.01 * f64::from(k);
+            let force = 4e6 * cylinder.area_a_m2 - 3e6 * cylinder.area_b_m2 - RESISTANCE_N;
+            let sample = Sample {
+                x_m: 0.05 + SPEED_MPS * t,
+                pa_pa: 4e6,
+                pb_pa: 3e6,
+                qa_m3s: Some(cylinder.area_a_m2 * SPEED_MPS + LOST_M3S),
+                qb_m3s: (k as usize <= last_flow_b).then_some(-cylinder.area_b_m2 * SPEED_MPS),
+                force_n: Some(force),
+            };
+            series.push(t, &sample, None);
+        }
+        let at = Linearisation::declared(&declared);
+        let motion = Motion::of(&series, &at.model, &declared.sensors);
+        let integrand = Integrand::new(&at, &[Term::Internal], &[EffectConstants::default()]);
+        Rows::build(&[series], &[motion], &integrand, 0.1)
+    }
+
+    #[test]
+    fn a_hat_holds_what_is_left_times_its_length() {
+        let rows = rows(39);
+        assert_eq!((rows.rows.len(), rows.entries.len()), (3, 9));
+        for (entry, (y, column)) in rows.entries.iter().zip(rows.y.iter().zip(&rows.columns[0])) {
+            let row = &rows.rows[entry.row];
+            assert!((row.block_s - 0.1).abs() < 1e-12 && rows.counts(entry));
+            let (left, load) = match entry.equation {
+                Equation::ChamberA => (LOST_M3S, 1e6),
+                Equation::ChamberB => (0.0, -1e6),
+                Equation::Force => (RESISTANCE_N, 0.0),
+            };
+            assert!((y - 0.1 * left).abs() < 1e-9 * left.max(LOST_M3S), "{entry:?}: {y}");
+            assert!((column - 0.1 * load).abs() < 1e-3, "{entry:?}: {column}");
+            assert!((row.mean.x_m - 0.05 - SPEED_MPS * (row.t_s - 0.005)).abs() < 1e-9, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn an_equation_rests_where_its_flow_is_missing() {
+        let of_b = |entry: &&Entry| entry.equation == Equation::ChamberB;
+        assert_eq!(rows(35).entries.iter().filter(of_b).map(|entry| entry.row).collect::<Vec<_>>(), [0, 1]);
+    }
+}

@@ -51,3 +51,31 @@ impl Whitening {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::equation::PerEquation;
+    use crate::diagnose::testing::{declared, sound};
+    use crate::diagnose::weak_form::{Linearisation, residual_rows};
+    use nalgebra::{DMatrix, DVector};
+    use pitchleak_testkit::white_noise;
+
+    #[test]
+    fn whitening_is_that_of_a_dense_cholesky_factor() {
+        let declared = declared();
+        let at = Linearisation::declared(&declared);
+        let rows = residual_rows(&[sound(5), sound(3)], &declared.sensors, &at, 0.1);
+        let equation_error = PerEquation { chamber_a: 1e-14, chamber_b: 0.0, force: 0.0 };
+        let noise = NoiseModel { at: &at, sensors: &declared.sensors, equation_error };
+        let n = rows.entries.len();
+        let hats = hat_weights(rows.rows[0].samples);
+        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(&rows, i.max(j), i.min(j), hats));
+        let factor = dense.cholesky().expect("a covariance");
+        let v: Vec<f64> = white_noise(1).take(n).collect();
+        let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");
+        let white = Whitening::new(&rows, &noise).whiten(&v);
+        let worst = white.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(n > 100 && worst < 1e-9 * expected.amax(), "{worst} of {}", expected.amax());
+    }
+}
