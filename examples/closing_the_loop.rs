@@ -26,9 +26,10 @@ fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
     let history = History::of(&Wind::BuiltIn(WindCase::Mps21))?;
     let scenario = Scenario {
         reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m)?,
-        leaks: PerLeak { internal: 5e-12, external_a: 1e-12, external_b: 0.0 }.map(LeakSize::Coefficient),
+        leaks: PerLeak { internal: 5e-12, external_a: 1e-12, external_b: 0.0 }
+            .map(|leak| LeakSize::Coefficient(leak).into()),
         rig: rig.clone(),
-        onset_s: 0.0,
+        oil_temperature: None,
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

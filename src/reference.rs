@@ -15,6 +15,18 @@ pub struct Reference {
     pub wind_mps: Option<Curve>,
     /// Share of the history whose position was held off the end stops.
     pub clipped_share: f64,
+    /// How it goes on after its end.
+    pub after_end: AfterEnd,
+}
+
+/// How a reference goes on after its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AfterEnd {
+    /// It keeps its last values.
+    Held,
+    /// It runs back to its beginning, then forth again: position and load stay continuous.
+    Mirrored,
 }
 
 impl Reference {
@@ -25,7 +37,25 @@ impl Reference {
 
     /// Position and load by their own curves.
     pub fn of(position_m: Curve, load_n: Curve) -> Self {
-        Self { position_m, load_n, wind_mps: None, clipped_share: 0.0 }
+        Self { position_m, load_n, wind_mps: None, clipped_share: 0.0, after_end: AfterEnd::Held }
+    }
+
+    /// Position (m) and load (N) at a time; before its beginning it has its first values.
+    pub fn at(&self, t_s: f64) -> (f64, f64) {
+        let t_s = self.own_time_s(t_s);
+        (self.position_m.at(t_s), self.load_n.at(t_s))
+    }
+
+    /// The time within the reference that stands for one after its end.
+    fn own_time_s(&self, t_s: f64) -> f64 {
+        match (self.after_end, self.span_s()) {
+            (AfterEnd::Mirrored, Some((begin_s, end_s))) if t_s > end_s => {
+                let length_s = end_s - begin_s;
+                let phase_s = (t_s - begin_s).rem_euclid(2.0 * length_s);
+                begin_s + phase_s.min(2.0 * length_s - phase_s)
+            }
+            _ => t_s,
+        }
     }
 
     /// First and last time between which any of the curves changes, s; `None` if all are constant.
@@ -130,4 +160,25 @@ pub fn read_curve(path: &Path, signal: &'static str, measures: Dimension) -> Res
         values.push(cell(&value)?);
     }
     Curve::through(&t_s, &values).map_err(|source| ReferenceError::Curve { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wind_runs_back_and_forth_without_a_jump() {
+        let curve = |values: &[f64]| Curve::through(&[1.0, 2.0, 3.0], values).expect("a curve");
+        let held = Reference::of(curve(&[0.0, 1.0, 4.0]), curve(&[5.0, 3.0, 2.0]));
+        let mirrored = Reference { after_end: AfterEnd::Mirrored, ..held.clone() };
+        assert_eq!((held.at(9.0), mirrored.at(0.0)), ((4.0, 2.0), (0.0, 5.0)));
+        for (after, within) in [(3.5, 2.5), (4.0, 2.0), (5.0, 1.0), (5.5, 1.5), (7.0, 3.0), (7.25, 2.75)] {
+            let (there, here) = (mirrored.at(after), mirrored.at(within));
+            assert!((there.0 - here.0).abs() < 1e-12 && (there.1 - here.1).abs() < 1e-12, "{after} s");
+        }
+        for k in 0..2000 {
+            let (before, after) = (mirrored.at(0.01 * f64::from(k)), mirrored.at(0.01 * f64::from(k + 1)));
+            assert!((before.0 - after.0).abs() < 0.06 && (before.1 - after.1).abs() < 0.06, "step {k}");
+        }
+    }
 }

@@ -4,7 +4,7 @@
 use pitchleak::core::{EffectSet, Leak, PerLeak};
 use pitchleak::replay::Replay;
 use pitchleak::reproduce::{Run, SAMPLE_RATE_HZ, rig};
-use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
+use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use std::thread;
@@ -15,12 +15,15 @@ const LPM: f64 = 1.0 / 60e3;
 /// A minute of sound operation, then `leak` of this size on average.
 fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
-    let size = |which| LeakSize::MeanFlow(if which == leak { size_lpm * LPM } else { 0.0 });
+    let size = |which| {
+        let size = LeakSize::MeanFlow(if which == leak { size_lpm * LPM } else { 0.0 });
+        LeakCourse::from_onset(size, ONSET_S)
+    };
     let scenario = Scenario {
         rig: rig(),
         reference: Emulation::paper().reference(&history, rig().cylinder.stroke_m).expect("fits"),
         leaks: PerLeak::from_fn(size),
-        onset_s: ONSET_S,
+        oil_temperature: None,
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

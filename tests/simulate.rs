@@ -4,7 +4,10 @@ use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
 use pitchleak::reference::Reference;
-use pitchleak::simulate::{LeakSize, Scenario, SimulateError, TraceWriter, Truth};
+use pitchleak::simulate::{
+    LeakCourse, LeakSize, OilTemperature, Reading, Row, Scenario, SimulateError, TraceLayout, TraceWriter,
+    Truth,
+};
 use pitchleak::trace::{Record, TraceReader};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 
@@ -18,13 +21,17 @@ fn scenario() -> Scenario {
         rig: Rig::paper(),
         reference: Emulation::paper().reference(&history, 0.2).expect("fits"),
         leaks: PerLeak::default(),
-        onset_s: 0.0,
+        oil_temperature: None,
         effects: EffectSet::default(),
         start_s: 20.0,
         warm_up_s: 3.0,
         duration_s: 4.0,
         sample_rate_hz: 100.0,
     }
+}
+
+fn external_a(leak: LeakCourse) -> PerLeak<LeakCourse> {
+    PerLeak { external_a: leak, ..PerLeak::default() }
 }
 
 fn run(scenario: &Scenario) -> Vec<Truth> {
@@ -52,7 +59,8 @@ fn a_leak_given_by_its_flow_has_that_mean_flow() {
         internal: LeakSize::MeanFlow(lpm(1.0)),
         external_a: LeakSize::MeanFlow(lpm(0.5)),
         external_b: LeakSize::MeanFlow(lpm(0.2)),
-    };
+    }
+    .map(LeakCourse::from);
     let truths = run(&Scenario { leaks, ..scenario() });
     for (found, asked) in [
         (mean(&truths, |t| t.leaks_m3s.internal.abs()), 1.0),
@@ -65,16 +73,37 @@ fn a_leak_given_by_its_flow_has_that_mean_flow() {
 
 #[test]
 fn a_leak_opens_at_its_onset() {
-    let leaks = PerLeak { external_a: LeakSize::Coefficient(2e-12), ..PerLeak::default() };
-    let truths = run(&Scenario { leaks, onset_s: 2.5, ..scenario() });
+    let leaks = external_a(LeakCourse::from_onset(LeakSize::Coefficient(2e-12), 2.5));
+    let truths = run(&Scenario { leaks, ..scenario() });
     for truth in truths {
         assert_eq!(truth.leaks_m3s.external_a > 0.0, truth.t_s >= 2.5 - 1e-9, "at {} s", truth.t_s);
     }
 }
 
 #[test]
+fn a_leak_grows_comes_and_goes_and_warms_as_it_was_told() {
+    let coefficient = |text: &str, oil: Option<&str>| -> Vec<(f64, f64)> {
+        let leaks = external_a(text.parse().expect("a leak"));
+        let oil_temperature = oil.map(|text| OilTemperature::of(text, 4.0).expect("a temperature"));
+        let truths = run(&Scenario { leaks, oil_temperature, ..scenario() });
+        truths.iter().map(|truth| (truth.t_s, truth.leaks_m3s.external_a / truth.signals.pa_pa)).collect()
+    };
+    let near = |found: f64, told: f64| (found - told).abs() < 1e-9 * 2e-12;
+    for (t_s, c) in coefficient("1e-12 /Pa -> 2e-12 /Pa @ 1 s..3 s", None) {
+        assert!(near(c, 1e-12 * (1.0 + ((t_s - 1.0) / 2.0).clamp(0.0, 1.0))), "{c} at {t_s} s");
+    }
+    for (t_s, c) in coefficient("2e-12 /Pa every 2 s for 0.5 s", None) {
+        let open = t_s < 0.495 || (1.995..2.495).contains(&t_s);
+        assert!(near(c, if open { 2e-12 } else { 0.0 }), "{c} at {t_s} s");
+    }
+    let warming = coefficient("1e-12 /Pa", Some("40 °C -> 60 °C"));
+    assert!(near(warming[0].1, 1e-12) && warming.is_sorted_by(|a, b| a.1 < b.1));
+    assert!(warming[399].1 > 1.9e-12, "{:?}", warming[399]);
+}
+
+#[test]
 fn a_leak_that_no_supply_feeds_is_an_error() {
-    let leaks = PerLeak { external_a: LeakSize::MeanFlow(lpm(500.0)), ..PerLeak::default() };
+    let leaks = external_a(LeakSize::MeanFlow(lpm(500.0)).into());
     assert_eq!(Scenario { leaks, ..scenario() }.leak_coefficients(), Err(SimulateError::LeakOutOfReach));
 }
 
@@ -93,10 +122,12 @@ fn lagging_meters_show_an_older_flow_and_the_rig_does_not_notice() {
 
 #[test]
 fn a_written_trace_reads_back_with_its_leaks() {
-    let leaks = PerLeak { internal: LeakSize::Coefficient(1e-11), ..PerLeak::default() };
+    let leaks = PerLeak { internal: LeakSize::Coefficient(1e-11).into(), ..PerLeak::default() };
     let truths = run(&Scenario { leaks, duration_s: 1.0, ..scenario() });
-    let mut writer = TraceWriter::new(Vec::new()).expect("writes");
-    truths.iter().for_each(|truth| writer.row(truth, &truth.sample).expect("writes"));
+    let mut writer = TraceWriter::new(Vec::new(), TraceLayout::default()).expect("writes");
+    for truth in &truths {
+        writer.row(&Row::new(truth, Reading::at(truth, truth.sample))).expect("writes");
+    }
     let bytes = std::io::Cursor::new(writer.into_inner());
     let mut reader = TraceReader::from_stream("trace", Box::new(bytes), &Rig::paper()).expect("a trace");
     let mut record = Record::default();

@@ -95,8 +95,8 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
     let scenario = Scenario {
         rig: rig(1e-2),
         reference: reference(excitation),
-        leaks: LEAKS.map(LeakSize::Coefficient),
-        onset_s: 0.0,
+        leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
+        oil_temperature: None,
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

@@ -5,7 +5,7 @@ use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, rig};
 use super::{Law, Progress};
 use crate::Rig;
 use crate::replay::Replay;
-use crate::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
+use crate::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use crate::wind::{Emulation, History, Wind, WindCase};
@@ -145,12 +145,15 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
     let rig = rig();
     let reference =
         Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?;
-    let size = |which| LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
+    let size = |which| {
+        let size = LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
+        LeakCourse::from_onset(size, ONSET_S)
+    };
     let scenario = Scenario {
         rig: rig.clone(),
         reference,
         leaks: PerLeak::from_fn(size),
-        onset_s: ONSET_S,
+        oil_temperature: None,
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

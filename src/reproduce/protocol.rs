@@ -135,8 +135,8 @@ impl Run {
         let scenario = Scenario {
             rig,
             reference,
-            leaks: leaks_m3spa.map(LeakSize::Coefficient),
-            onset_s: 0.0,
+            leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
+            oil_temperature: None,
             effects: EffectSet::default(),
             start_s: START_S,
             warm_up_s: START_S,

@@ -35,6 +35,9 @@ pub enum EffectsError {
         /// The leak, as Python has it.
         argument: String,
     },
+    /// Which of two sizes is meant?
+    #[error("`{0}` is given twice")]
+    Repeated(&'static str),
     /// The value does not suit the effect, or there are too many.
     #[error(transparent)]
     Value(#[from] EffectError),
@@ -75,7 +78,10 @@ impl std::str::FromStr for EffectSize {
 /// [`EffectsError`].
 pub fn effects(rig: &Rig, more: &[EffectSize]) -> Result<EffectSet<f64>, EffectsError> {
     let mut set = rig.effect_set();
-    for EffectSize { effect, value } in more {
+    for (index, EffectSize { effect, value }) in more.iter().enumerate() {
+        if more.iter().take(index).any(|earlier| earlier.effect == *effect) {
+            return Err(EffectsError::Repeated(effect.spec().id));
+        }
         set.set(*effect, *value, EffectConstants::default())?;
     }
     Ok(set)
@@ -97,5 +103,6 @@ mod tests {
         assert!(leak.contains("--leak-external-b") && leak.contains("`leak_external_b`"), "{leak}");
         let out_of_range = [EffectSize { effect: Effect::ViscousFriction, value: f64::NAN }];
         assert!(matches!(effects(&Rig::paper(), &out_of_range), Err(EffectsError::Value(_))));
+        assert_eq!(effects(&Rig::paper(), &[size, size]), Err(EffectsError::Repeated("viscous_friction")));
     }
 }

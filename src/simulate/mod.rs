@@ -6,19 +6,29 @@
 mod effects;
 mod followed;
 mod leak;
+mod leak_course;
+mod oil_temperature;
 mod plan;
+mod reading;
 mod recording;
 mod sensing;
+pub mod sensor_fault;
+mod span;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
 pub use followed::Followed;
 pub use leak::{LeakSize, LeakSizeError};
-pub use plan::{Noise, Plan, PlanError};
+pub use leak_course::{LeakCourse, LeakCourseError, Opening};
+pub use oil_temperature::{OilTemperature, OilTemperatureError};
+pub use plan::{Noise, Plan, PlanError, ShareError, share_of_full_scale};
+pub use reading::Reading;
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile};
 pub(crate) use sensing::Normal;
 pub use sensing::{Biases, Sensing};
-pub use writer::{Columns, TraceWriter};
+pub use sensor_fault::{SensorFault, SensorFaults};
+pub use span::{Span, SpanError};
+pub use writer::{Columns, Row, TraceLayout, TraceWriter};
 
 use crate::Rig;
 use crate::reference::Reference;
@@ -35,9 +45,9 @@ pub struct Scenario {
     /// Position and load to follow.
     pub reference: Reference,
     /// Laminar leaks.
-    pub leaks: PerLeak<LeakSize>,
-    /// Time into the trace at which the leaks open, s; zero or less: before it begins.
-    pub onset_s: f64,
+    pub leaks: PerLeak<LeakCourse>,
+    /// The oil's temperature, which the leaks follow by its viscosity; none where it doesn't matter.
+    pub oil_temperature: Option<OilTemperature>,
     /// Effects beyond the model.
     pub effects: EffectSet<f64>,
     /// Time of the reference at which the trace begins, s.
@@ -65,6 +75,8 @@ pub struct Truth {
     pub sample: Sample<f64>,
     /// Leak flows, m³/s.
     pub leaks_m3s: PerLeak<f64>,
+    /// Oil temperature, K, where the scenario has one.
+    pub temp_k: Option<f64>,
 }
 
 /// Why a scenario cannot be simulated.
@@ -100,20 +112,26 @@ const CALIBRATION_ACCURACY: f64 = 0.01;
 const CALIBRATION_RUNS: usize = 12;
 
 impl Scenario {
-    /// Leak coefficients: as given, or found so that the mean |flow| over the run, its first minute
-    /// where it is longer, is as given to 1 %. A leak takes pressure away, so this takes some runs.
+    /// Coefficients of the leaks at their largest: as given, or found so that the mean |flow| over the run, its
+    /// first minute where it is longer, is as given to 1 % while they are open all the time. A leak takes
+    /// pressure away, so this takes some runs.
     ///
     /// # Errors
     /// [`SimulateError`].
     pub fn leak_coefficients(&self) -> Result<PerLeak<f64>, SimulateError> {
         self.check()?;
-        let calibration =
-            Self { duration_s: self.duration_s.min(CALIBRATION_S), onset_s: 0.0, ..self.clone() };
+        let sizes = self.leaks.map(|leak| leak.size);
+        let calibration = Self {
+            duration_s: self.duration_s.min(CALIBRATION_S),
+            leaks: sizes.map(LeakCourse::from),
+            oil_temperature: None,
+            ..self.clone()
+        };
         let coefficients = |pressures: &PerLeak<f64>| {
-            leak::coefficients(&self.leaks, pressures).ok_or(SimulateError::LeakOutOfReach)
+            leak::coefficients(&sizes, pressures).ok_or(SimulateError::LeakOutOfReach)
         };
         let mut guess = coefficients(&FIRST_GUESS_PA)?;
-        if !leak::any_by_flow(&self.leaks) {
+        if !leak::any_by_flow(&sizes) {
             return Ok(guess);
         }
         let mut last = None;
@@ -141,33 +159,65 @@ impl Scenario {
         Ok(sum.map(|sum| sum / f64::max(count, 1.0)))
     }
 
-    /// Runs the emulator with these leak coefficients and hands each sample to `each`.
+    /// Runs the emulator with leaks that have these coefficients at their largest, and hands each sample to
+    /// `each`.
     ///
     /// # Errors
     /// [`SimulateError`].
     pub fn run(&self, leaks_m3spa: PerLeak<f64>, mut each: impl FnMut(&Truth)) -> Result<(), SimulateError> {
+        self.run_while(leaks_m3spa, |truth| {
+            each(truth);
+            true
+        })
+    }
+
+    /// The same until `each` has had enough.
+    ///
+    /// # Errors
+    /// [`SimulateError`].
+    pub fn run_while(
+        &self,
+        leaks_m3spa: PerLeak<f64>,
+        mut each: impl FnMut(&Truth) -> bool,
+    ) -> Result<(), SimulateError> {
         self.check()?;
         let period_s = 1.0 / self.sample_rate_hz;
         let steps = (period_s / STEP_S).ceil().max(1.0);
         let step_s = period_s / steps;
         let warm_up = (self.warm_up_s / period_s).round() as i64;
         let samples = (self.duration_s / period_s).round() as i64;
-        let onset = if self.onset_s > 0.0 { (self.onset_s / period_s).ceil() as i64 } else { -warm_up };
         let mut rig = RunningRig::new(self, self.start_s - warm_up as f64 * period_s)?;
         for sample in -warm_up..samples {
             let t_s = sample as f64 * period_s;
-            if sample == onset {
-                rig.emulator.set_leaks(leaks_m3spa)?;
-            }
-            if sample >= 0 {
-                each(&rig.truth(t_s, self.start_s + t_s, &self.reference));
-            }
             for step in 0..steps as i64 {
-                let next = self.start_s + t_s + (step + 1) as f64 * step_s;
-                rig.step(step_s, self.reference.position_m.at(next), self.reference.load_n.at(next))?;
+                self.set_course(t_s + step as f64 * step_s, &leaks_m3spa, &mut rig)?;
+                if step == 0 && sample >= 0 && !each(&rig.truth(self, t_s)) {
+                    return Ok(());
+                }
+                let (position_m, load_n) = self.reference.at(self.start_s + t_s + (step + 1) as f64 * step_s);
+                rig.step(step_s, position_m, load_n)?;
             }
         }
         Ok(())
+    }
+
+    /// Leaks and oil as they are at a time of the trace.
+    fn set_course(
+        &self,
+        t_s: f64,
+        leaks_m3spa: &PerLeak<f64>,
+        rig: &mut RunningRig,
+    ) -> Result<(), SimulateError> {
+        let factor = self.oil_temperature.as_ref().map_or(1.0, |oil| oil.leak_factor(t_s));
+        let now = self.leaks.zip(*leaks_m3spa).map(|(leak, most)| most * leak.opening.share(t_s) * factor);
+        if now != rig.leaks_m3spa {
+            rig.emulator.set_leaks(now)?;
+            rig.leaks_m3spa = now;
+        }
+        match &self.oil_temperature {
+            Some(oil) => Ok(rig.emulator.set_temperature(oil.at(t_s))?),
+            None => Ok(()),
+        }
     }
 
     /// The whole run in memory.
@@ -188,14 +238,15 @@ impl Scenario {
         within("the duration in s", self.duration_s, 0.01, 1e6)?;
         within("the warm-up in s", self.warm_up_s, 0.0, 1e4)?;
         within("the start in s", self.start_s, -1e9, 1e9)?;
-        within("the sample rate in Hz", self.sample_rate_hz, 1.0, 1e5)?;
-        within("the onset in s", self.onset_s.max(0.0), 0.0, 1e6)
+        within("the sample rate in Hz", self.sample_rate_hz, 1.0, 1e5)
     }
 }
 
-/// The emulator, its leaks shut, with the sensors' own lags.
+/// The emulator with the sensors' own lags.
 struct RunningRig {
     emulator: Emulator<f64>,
+    /// Coefficients that its leaks have now, m³/(s·Pa).
+    leaks_m3spa: PerLeak<f64>,
     /// What the sensors do to the readings beside their lags.
     prompt: EffectSet<f64>,
     lagging: Vec<Lagging>,
@@ -232,7 +283,8 @@ impl RunningRig {
         let mut params = EmulatorParams::for_model(healthy)?;
         params.pitch.plant.effects = *effects;
         params.internal_step_s = STEP_S;
-        let emulator = Emulator::new(params, reference.position_m.at(t_s), reference.load_n.at(t_s))?;
+        let (position_m, load_n) = reference.at(t_s);
+        let emulator = Emulator::new(params, position_m, load_n)?;
         let (mut prompt, mut lagging) = (EffectSet::default(), Vec::new());
         let mut now = emulator.reading().signals;
         for active in effects.iter() {
@@ -244,7 +296,7 @@ impl RunningRig {
                 }
             }
         }
-        Ok(Self { emulator, prompt, lagging })
+        Ok(Self { emulator, leaks_m3spa: PerLeak::default(), prompt, lagging })
     }
 
     fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
@@ -254,7 +306,8 @@ impl RunningRig {
         Ok(())
     }
 
-    fn truth(&mut self, t_s: f64, reference_s: f64, reference: &Reference) -> Truth {
+    fn truth(&mut self, scenario: &Scenario, t_s: f64) -> Truth {
+        let (position_reference_m, load_reference_n) = scenario.reference.at(scenario.start_s + t_s);
         let reading = self.emulator.reading();
         let signals = reading.signals;
         let mut seen = signals;
@@ -262,8 +315,8 @@ impl RunningRig {
         let shown = self.prompt.read(&seen);
         Truth {
             t_s,
-            position_reference_m: reference.position_m.at(reference_s),
-            load_reference_n: reference.load_n.at(reference_s),
+            position_reference_m,
+            load_reference_n,
             signals,
             sample: Sample {
                 x_m: shown.x_m,
@@ -274,6 +327,7 @@ impl RunningRig {
                 force_n: Some(shown.force_n),
             },
             leaks_m3s: reading.leaks_m3s,
+            temp_k: scenario.oil_temperature.as_ref().map(|oil| oil.at(t_s)),
         }
     }
 }

@@ -1,7 +1,10 @@
-use super::{Biases, EffectSize, EffectsError, Followed, LeakSize, Recording, Scenario, effects};
+use super::{
+    Biases, EffectSize, EffectsError, Followed, LeakCourse, LeakCourseError, OilTemperature,
+    OilTemperatureError, Recording, Scenario, SensorFault, effects,
+};
 use crate::Rig;
 use crate::reference::ReferenceError;
-use crate::units::{self, Dimension};
+use crate::units::{self, Dimension, UnitError};
 use crate::wind::{EmulationError, HistoryError};
 use pitchleak_core::{PerLeak, Sensors};
 
@@ -22,18 +25,53 @@ pub enum Noise {
     Share(f64),
 }
 
+/// Why a text is no share of a sensor's full scale.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ShareError {
+    /// No number, or another unit.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+    /// Less than nothing.
+    #[error("must not be negative")]
+    Negative,
+    /// More than the sensor shows.
+    #[error("must not exceed 100 % of full scale")]
+    AboveFullScale,
+    /// `1` for `1 %`.
+    #[error("`{0}` is {0} times full scale: did you mean `{0} %`? If not, write it in %")]
+    Percent(String),
+}
+
+/// A bare number above this is rather meant in per cent.
+const LARGEST_BARE_SHARE: f64 = 0.2;
+
+/// A share of full scale, as `1 %` or `0.01`.
+///
+/// # Errors
+/// [`ShareError`]; also for a bare number that must be a percentage.
+pub fn share_of_full_scale(text: &str) -> Result<f64, ShareError> {
+    let share = units::parse(text, Dimension::Share)?;
+    if share < 0.0 {
+        Err(ShareError::Negative)
+    } else if share > LARGEST_BARE_SHARE && !text.contains('%') {
+        Err(ShareError::Percent(text.trim().to_owned()))
+    } else if share > 1.0 {
+        Err(ShareError::AboveFullScale)
+    } else {
+        Ok(share)
+    }
+}
+
 impl std::str::FromStr for Noise {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let allowed = |error: &dyn std::fmt::Display| format!("{error}; or `none`, or `rig`");
         match text {
             "none" => Ok(Self::None),
             "rig" => Ok(Self::Rig),
-            _ => match units::parse(text, Dimension::Share) {
-                Ok(share) if share >= 0.0 => Ok(Self::Share(share)),
-                Ok(_) => Err(allowed(&"must not be negative")),
-                Err(error) => Err(allowed(&error)),
+            _ => match share_of_full_scale(text) {
+                Ok(share) => Ok(Self::Share(share)),
+                Err(error) => Err(format!("{error}; or `none`, or `rig`")),
             },
         }
     }
@@ -56,16 +94,20 @@ pub struct Plan {
     /// What the rig follows.
     pub followed: Followed,
     /// Laminar leaks.
-    pub leaks: PerLeak<LeakSize>,
-    /// Time into the trace at which the leaks open, s; zero or less: before it begins.
+    pub leaks: PerLeak<LeakCourse>,
+    /// Time into the trace at which leaks without times of their own open, s; zero or less: before it begins.
     pub onset_s: f64,
+    /// The oil's temperature, as [`OilTemperature::of`] reads it.
+    pub oil_temperature: Option<String>,
     /// Effects beyond those of the rig file.
     pub effects: Vec<EffectSize>,
     /// Noise of the sensors.
     pub noise: Noise,
     /// Greatest constant offset of each sensor, share of full scale.
     pub bias_share: f64,
-    /// Seed of noise and offsets.
+    /// Mistakes of the sensors, in the order in which they happen.
+    pub sensor_faults: Vec<SensorFault>,
+    /// Seed of noise, offsets and mistakes.
     pub seed: u64,
     /// Where in the reference the trace begins, s; else once the loops have run in.
     pub start_s: Option<f64>,
@@ -90,6 +132,12 @@ pub enum PlanError {
     /// Effects that cannot be switched on.
     #[error(transparent)]
     Effects(#[from] EffectsError),
+    /// Leaks that cannot open when they should.
+    #[error(transparent)]
+    Leak(#[from] LeakCourseError),
+    /// Oil that cannot be.
+    #[error(transparent)]
+    OilTemperature(#[from] OilTemperatureError),
 }
 
 impl Plan {
@@ -101,22 +149,51 @@ impl Plan {
         let reference = self.followed.reference(&rig)?;
         let (begin, end) = reference.span_s().unwrap_or((0.0, f64::INFINITY));
         let start_s = self.start_s.map_or(begin + WARM_UP_S.min(0.5 * (end - begin)), |start| begin + start);
+        let left_s = if start_s < end { end - start_s } else { f64::INFINITY };
+        let duration_s = self.duration_s.unwrap_or(DURATION_S.min(left_s));
+        let opened = self.leaks.map(|leak| leak.opening_at(self.onset_s));
+        let leaks = PerLeak {
+            internal: opened.internal?,
+            external_a: opened.external_a?,
+            external_b: opened.external_b?,
+        };
+        let oil_temperature =
+            self.oil_temperature.as_deref().map(|text| OilTemperature::of(text, duration_s));
         Ok(Recording {
             followed: self.followed.to_string(),
             noise: self.noise.sensors(&rig),
             biases: Biases::drawn(&rig.instruments, self.bias_share, self.seed),
+            sensor_faults: self.sensor_faults.clone(),
             seed: self.seed,
             scenario: Scenario {
                 effects: effects(&rig, &self.effects)?,
                 rig,
-                leaks: self.leaks,
-                onset_s: self.onset_s,
+                leaks: leaks.map(|leak| leak.within_trace(duration_s)),
+                oil_temperature: oil_temperature.transpose()?,
                 start_s,
                 warm_up_s: WARM_UP_S,
-                duration_s: self.duration_s.unwrap_or(DURATION_S.min(end - start_s)),
+                duration_s,
                 sample_rate_hz: self.sample_rate_hz,
                 reference,
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_per_cent_is_not_taken_for_all_of_it() {
+        assert_eq!("1 %".parse(), Ok(Noise::Share(0.01)));
+        assert_eq!("0.01".parse(), Ok(Noise::Share(0.01)));
+        assert_eq!("100 %".parse(), Ok(Noise::Share(1.0)));
+        assert_eq!(share_of_full_scale("1"), Err(ShareError::Percent("1".into())));
+        assert_eq!(share_of_full_scale("1e308"), Err(ShareError::Percent("1e308".into())));
+        assert_eq!(share_of_full_scale("1e300 %"), Err(ShareError::AboveFullScale));
+        assert_eq!(share_of_full_scale("-1 %"), Err(ShareError::Negative));
+        let message = "1".parse::<Noise>().expect_err("100 %");
+        assert!(message.contains("`1 %`") && message.ends_with("or `none`, or `rig`"), "{message}");
     }
 }

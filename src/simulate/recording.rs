@@ -1,7 +1,11 @@
-use super::writer::{self, Columns};
-use super::{Biases, Scenario, Sensing, SimulateError, TraceWriter, Truth};
+use super::writer::Columns;
+use super::{
+    Biases, Opening, Reading, Row, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
+    TraceWriter,
+};
+use crate::reference::AfterEnd;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{PerLeak, Sample, Sensors};
+use pitchleak_core::{PerLeak, Sensors};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -19,7 +23,9 @@ pub struct Recording {
     pub noise: Sensors<f64>,
     /// Constant offsets of the sensors.
     pub biases: Biases,
-    /// Seed of the noise.
+    /// Mistakes of the sensors, in the order in which they happen.
+    pub sensor_faults: Vec<SensorFault>,
+    /// Seed of the noise and of the mistakes.
     pub seed: u64,
 }
 
@@ -44,7 +50,7 @@ pub struct TruthFile {
     pub samples: u64,
     /// Seed of noise and biases.
     pub seed: u64,
-    /// Time at which the leaks open, s.
+    /// Time at which there is first a leak, s; zero: from the beginning, or never.
     pub leak_onset_s: f64,
     /// The leaks.
     pub leaks: PerLeak<LeakTruth>,
@@ -54,24 +60,45 @@ pub struct TruthFile {
     pub noise_std: BTreeMap<&'static str, f64>,
     /// Constant offsets of the sensors, reading minus truth, SI.
     pub biases: BTreeMap<&'static str, f64>,
+    /// Mistakes of the sensors, as given, in the order in which they happen.
+    pub sensor_faults: Vec<String>,
+    /// How the reference went on after its end, and when, where the trace is longer.
+    pub reference_end: Option<ReferenceEnd>,
     /// Root mean square of position less its reference, m.
     pub position_error_rms_m: f64,
     /// Root mean square of load less its reference, N.
     pub load_error_rms_n: f64,
 }
 
+/// A reference that is shorter than the trace.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ReferenceEnd {
+    /// Time into the trace of its end, s.
+    pub time_s: f64,
+    /// How it goes on.
+    pub after: AfterEnd,
+}
+
 /// One leak of a recorded trace.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
 pub struct LeakTruth {
-    /// Laminar coefficient, m³/(s·Pa).
+    /// Laminar coefficient at the leak's largest, and at 40 °C where the oil has a temperature, m³/(s·Pa).
     pub coefficient_m3spa: f64,
     /// Mean size of its flow, effects included, L/min.
     pub mean_flow_lpm: f64,
+    /// How much of it is there at a time.
+    pub course: Opening,
 }
 
 /// Why a recording was not made.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
+    /// A file of another kind.
+    #[error("{path}: a simulated trace is written as .csv or .csv.gz, or to `-` (standard output)", path = path.display())]
+    Kind {
+        /// The file.
+        path: PathBuf,
+    },
     /// The simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -88,6 +115,8 @@ pub enum RecordingError {
 /// Sums over a recording.
 #[derive(Default)]
 struct Totals {
+    /// Written.
+    rows: u64,
     samples: u64,
     flows_m3s: PerLeak<f64>,
     position_square: f64,
@@ -95,16 +124,26 @@ struct Totals {
 }
 
 impl Recording {
-    /// What people should know before they use the trace.
-    pub fn warning(&self) -> Option<String> {
+    /// What people should know before they use the trace, a line each.
+    pub fn warnings(&self) -> Vec<String> {
         let percent = 100.0 * self.scenario.reference.clipped_share;
-        let text = || {
-            format!(
-                "{}: the position was held off the end stops for {percent:.1} % of the time",
-                self.followed
-            )
+        let clipped = || format!("the position was held off the end stops for {percent:.1} % of the time");
+        let ended = |end: ReferenceEnd| {
+            let after = match end.after {
+                AfterEnd::Held => "keeps its last values",
+                AfterEnd::Mirrored => "runs back and forth again",
+            };
+            format!("it ends {:.0} s into the trace and then {after}", end.time_s)
         };
-        (percent > 0.0).then(text)
+        let lines = (percent > 0.0).then(clipped).into_iter().chain(self.reference_end().map(ended));
+        lines.map(|line| format!("{}: {line}", self.followed)).collect()
+    }
+
+    /// Where the trace is longer than what the rig follows.
+    fn reference_end(&self) -> Option<ReferenceEnd> {
+        let Scenario { reference, start_s, duration_s, .. } = &self.scenario;
+        let time_s = (reference.span_s()?.1 - start_s).max(0.0);
+        (time_s < *duration_s - 1e-9).then_some(ReferenceEnd { time_s, after: reference.after_end })
     }
 
     /// Writes the trace to `path` (`.csv`, `.csv.gz`, `-` for standard output), and what is true of it
@@ -114,13 +153,14 @@ impl Recording {
     /// [`RecordingError`].
     pub fn write(&self, path: &Path, done: impl FnMut(f64)) -> Result<TruthFile, RecordingError> {
         let write = |source| RecordingError::Write { path: path.to_owned(), source };
+        let kind = kind(path).ok_or_else(|| RecordingError::Kind { path: path.to_owned() })?;
         let leaks_m3spa = self.scenario.leak_coefficients()?;
-        let mut writer = sink(path).and_then(TraceWriter::new).map_err(write)?;
+        let layout = TraceLayout::of(&self.scenario);
+        let mut writer = sink(path, kind).and_then(|out| TraceWriter::new(out, layout)).map_err(write)?;
         let mut failure = None;
-        let truth = self.run(&leaks_m3spa, done, |truth, shown| {
-            if failure.is_none() {
-                failure = writer.row(truth, shown).err();
-            }
+        let truth = self.run(&leaks_m3spa, done, |row| {
+            failure = writer.row(row).err();
+            failure.is_none()
         })?;
         let written = failure.map_or_else(|| writer.into_inner().finish(), Err);
         written.map_err(write)?;
@@ -135,42 +175,53 @@ impl Recording {
     /// # Errors
     /// [`RecordingError::Simulate`].
     pub fn columns(&self) -> Result<(Columns, TruthFile), RecordingError> {
-        let mut columns = writer::columns();
+        let layout = TraceLayout::of(&self.scenario);
+        let mut columns = layout.columns();
         let leaks_m3spa = self.scenario.leak_coefficients()?;
         let truth = self.run(
             &leaks_m3spa,
             |_| (),
-            |truth, shown| {
-                for ((_, values), value) in columns.iter_mut().zip(writer::row(truth, shown)) {
-                    values.push(value);
-                }
+            |row| {
+                layout.push(row, &mut columns);
+                true
             },
         )?;
         Ok((columns, truth))
     }
 
-    /// Hands each sample and its readings to `each`.
+    /// Hands each row to `each` until that has had enough.
     fn run(
         &self,
         leaks_m3spa: &PerLeak<f64>,
         mut done: impl FnMut(f64),
-        mut each: impl FnMut(&Truth, &Sample<f64>),
+        mut each: impl FnMut(&Row) -> bool,
     ) -> Result<TruthFile, SimulateError> {
-        let mut sensing = Sensing::new(self.noise, self.biases, self.seed);
+        let Self { scenario, noise, biases, sensor_faults, seed, .. } = self;
+        let mut sensing = Sensing::new(*noise, *biases, *seed);
+        let Scenario { rig, duration_s, .. } = scenario;
+        let mut faults = SensorFaults::new(sensor_faults, &rig.instruments, rig.cylinder.stroke_m, *seed);
         let mut totals = Totals::default();
-        self.scenario.run(*leaks_m3spa, |truth| {
-            each(truth, &sensing.read(&truth.sample));
+        scenario.run_while(*leaks_m3spa, |truth| {
+            let honest = Reading::at(truth, sensing.read(&truth.sample));
+            let shown = faults.show(&honest);
+            if shown.is_some_and(|shown| !each(&Row::new(truth, shown))) {
+                return false;
+            }
+            totals.rows += u64::from(shown.is_some());
             totals.samples += 1;
             totals.flows_m3s = totals.flows_m3s.zip(truth.leaks_m3s).map(|(sum, flow)| sum + flow.abs());
             totals.position_square += (truth.signals.x_m - truth.position_reference_m).powi(2);
             totals.load_square += (truth.signals.force_n - truth.load_reference_n).powi(2);
-            done(truth.t_s / self.scenario.duration_s);
+            done(truth.t_s / duration_s);
+            true
         })?;
         Ok(self.truth(leaks_m3spa, &totals))
     }
 
     fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
-        let Self { followed, scenario, noise, biases, seed } = self;
+        let Self { followed, scenario, noise, biases, sensor_faults, seed } = self;
+        let leaky = scenario.leaks.zip(*leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
+        let onset_s = leaky.map(|(_, (leak, _))| leak.opening.onset_s()).reduce(f64::min).unwrap_or(0.0);
         let count = totals.samples.max(1) as f64;
         TruthFile {
             schema: "pitchleak.simulate/1",
@@ -180,13 +231,16 @@ impl Recording {
             start_s: scenario.start_s,
             duration_s: scenario.duration_s,
             sample_rate_hz: scenario.sample_rate_hz,
-            samples: totals.samples,
+            samples: totals.rows,
             seed: *seed,
-            leak_onset_s: scenario.onset_s,
-            leaks: leaks_m3spa.zip(totals.flows_m3s).map(|(coefficient_m3spa, sum)| LeakTruth {
-                coefficient_m3spa,
-                mean_flow_lpm: LPM_PER_M3S * sum / count,
-            }),
+            leak_onset_s: onset_s,
+            leaks: leaks_m3spa.zip(totals.flows_m3s).zip(scenario.leaks).map(
+                |((coefficient_m3spa, sum), leak)| LeakTruth {
+                    coefficient_m3spa,
+                    mean_flow_lpm: LPM_PER_M3S * sum / count,
+                    course: leak.opening,
+                },
+            ),
             effects: scenario.effects.iter().map(|active| (active.effect.spec().id, active.value)).collect(),
             noise_std: BTreeMap::from([
                 ("x_m", noise.position.noise_std),
@@ -203,6 +257,8 @@ impl Recording {
                 ("qb_m3s", biases.qb_m3s),
                 ("force_n", biases.force_n),
             ]),
+            sensor_faults: sensor_faults.iter().map(ToString::to_string).collect(),
+            reference_end: self.reference_end(),
             position_error_rms_m: (totals.position_square / count).sqrt(),
             load_error_rms_n: (totals.load_square / count).sqrt(),
         }
@@ -235,15 +291,34 @@ enum Sink {
     Gzip(flate2::write::GzEncoder<BufWriter<File>>),
 }
 
-fn sink(path: &Path) -> std::io::Result<Sink> {
-    if path == Path::new("-") {
-        return Ok(Sink::Plain(BufWriter::new(Box::new(std::io::stdout()))));
+/// How a trace is written.
+#[derive(Clone, Copy)]
+enum Kind {
+    StandardOutput,
+    Csv,
+    CsvGzip,
+}
+
+/// What a file's name asks for.
+fn kind(path: &Path) -> Option<Kind> {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    match name.as_str() {
+        "-" => Some(Kind::StandardOutput),
+        name if name.ends_with(".csv") => Some(Kind::Csv),
+        name if name.ends_with(".csv.gz") => Some(Kind::CsvGzip),
+        _ => None,
     }
-    let file = File::create(path)?;
-    Ok(if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
-        Sink::Gzip(flate2::write::GzEncoder::new(BufWriter::new(file), flate2::Compression::best()))
-    } else {
-        Sink::Plain(BufWriter::new(Box::new(file)))
+}
+
+fn sink(path: &Path, kind: Kind) -> std::io::Result<Sink> {
+    let plain = |out: Box<dyn Write>| Sink::Plain(BufWriter::new(out));
+    Ok(match kind {
+        Kind::StandardOutput => plain(Box::new(std::io::stdout())),
+        Kind::Csv => plain(Box::new(File::create(path)?)),
+        Kind::CsvGzip => {
+            let file = BufWriter::new(File::create(path)?);
+            Sink::Gzip(flate2::write::GzEncoder::new(file, flate2::Compression::best()))
+        }
     })
 }
 

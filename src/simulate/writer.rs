@@ -1,58 +1,102 @@
-use super::Truth;
+use super::{Reading, Scenario, Truth};
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::Sample;
+use pitchleak_core::PerLeak;
 use std::io::{self, Write};
 
-/// The columns of a simulated trace and their decimals: rounding stays below any sensor (10 nm, 1 Pa,
-/// 1e-6 L/min, 1 mN). Times are shares of a second: rounding to 1 ns shows them as they are.
-const COLUMNS: [(&str, usize); 10] = [
-    ("t_s", 9),
-    ("x_mm", 5),
-    ("pa_bar", 5),
-    ("pb_bar", 5),
-    ("qa_lpm", 6),
-    ("qb_lpm", 6),
-    ("force_n", 3),
-    ("q_int_lpm", 6),
-    ("q_ext_a_lpm", 6),
-    ("q_ext_b_lpm", 6),
+/// One column of a simulated trace.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    header: &'static str,
+    /// Rounding stays below any sensor (10 nm, 1 Pa, 1e-6 L/min, 1 mN). Times are shares of a second: rounding to
+    /// 1 ns shows them as they are.
+    decimals: usize,
+    /// NaN where there is no reading.
+    value: fn(&Row) -> f64,
+}
+
+/// What a row of a simulated trace is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// What sensors and clock show.
+    pub shown: Reading,
+    /// The true leak flows, m³/s.
+    pub leaks_m3s: PerLeak<f64>,
+}
+
+impl Row {
+    /// The reading of an instant, with its leak flows.
+    pub fn new(truth: &Truth, shown: Reading) -> Self {
+        Self { shown, leaks_m3s: truth.leaks_m3s }
+    }
+}
+
+fn or_nan(reading: Option<f64>, per_unit: f64) -> f64 {
+    reading.map_or(f64::NAN, |value| value * per_unit)
+}
+
+const READINGS: [Column; 7] = [
+    Column { header: "t_s", decimals: 9, value: |row| row.shown.t_s },
+    Column { header: "x_mm", decimals: 5, value: |row| row.shown.sample.x_m * 1e3 },
+    Column { header: "pa_bar", decimals: 5, value: |row| row.shown.sample.pa_pa / 1e5 },
+    Column { header: "pb_bar", decimals: 5, value: |row| row.shown.sample.pb_pa / 1e5 },
+    Column { header: "qa_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qa_m3s, LPM_PER_M3S) },
+    Column { header: "qb_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qb_m3s, LPM_PER_M3S) },
+    Column { header: "force_n", decimals: 3, value: |row| or_nan(row.shown.sample.force_n, 1.0) },
+];
+const TEMPERATURE: Column =
+    Column { header: "temp_c", decimals: 3, value: |row| row.shown.temp_k.map_or(f64::NAN, |k| k - 273.15) };
+const LEAKS: [Column; 3] = [
+    Column { header: "q_int_lpm", decimals: 6, value: |row| row.leaks_m3s.internal * LPM_PER_M3S },
+    Column { header: "q_ext_a_lpm", decimals: 6, value: |row| row.leaks_m3s.external_a * LPM_PER_M3S },
+    Column { header: "q_ext_b_lpm", decimals: 6, value: |row| row.leaks_m3s.external_b * LPM_PER_M3S },
 ];
 
-/// One row: the readings `shown`, and the leak flows of `truth`, rounded; NaN where there is no reading.
-pub(super) fn row(truth: &Truth, shown: &Sample<f64>) -> [f64; COLUMNS.len()] {
-    let lpm = |flow_m3s: f64| flow_m3s * LPM_PER_M3S;
-    let leaks = truth.leaks_m3s.map(lpm);
-    let mut cells = [
-        truth.t_s,
-        shown.x_m * 1e3,
-        shown.pa_pa / 1e5,
-        shown.pb_pa / 1e5,
-        shown.qa_m3s.map_or(f64::NAN, lpm),
-        shown.qb_m3s.map_or(f64::NAN, lpm),
-        shown.force_n.unwrap_or(f64::NAN),
-        leaks.internal,
-        leaks.external_a,
-        leaks.external_b,
-    ];
-    for (cell, (_, decimals)) in cells.iter_mut().zip(COLUMNS) {
-        // The double nearest to the decimal number: what a reader of its text gets.
-        let scale = 10f64.powi(decimals as i32);
-        *cell = (*cell * scale).round() / scale;
+impl Column {
+    /// The double nearest to the rounded decimal number: what a reader of its text gets.
+    fn rounded(&self, row: &Row) -> f64 {
+        let scale = 10f64.powi(self.decimals as i32);
+        ((self.value)(row) * scale).round() / scale
     }
-    cells
+}
+
+/// The columns of a simulated trace.
+#[derive(Clone, Debug)]
+pub struct TraceLayout(Vec<Column>);
+
+impl Default for TraceLayout {
+    /// Without the oil's temperature.
+    fn default() -> Self {
+        Self(READINGS.into_iter().chain(LEAKS).collect())
+    }
+}
+
+impl TraceLayout {
+    /// The columns that a scenario's trace has; the oil's temperature only where the scenario says it.
+    pub fn of(scenario: &Scenario) -> Self {
+        let temperature = scenario.oil_temperature.as_ref().map(|_| TEMPERATURE);
+        Self(READINGS.into_iter().chain(temperature).chain(LEAKS).collect())
+    }
+
+    /// The columns without a row.
+    pub(super) fn columns(&self) -> Columns {
+        self.0.iter().map(|column| (column.header, Vec::new())).collect()
+    }
+
+    /// Adds a row to columns of this layout.
+    pub(super) fn push(&self, row: &Row, columns: &mut Columns) {
+        for (column, (_, values)) in self.0.iter().zip(columns) {
+            values.push(column.rounded(row));
+        }
+    }
 }
 
 /// A simulated trace in memory: header and values of each column, as a reader of its file has them.
 pub type Columns = Vec<(&'static str, Vec<f64>)>;
 
-/// The columns without a row.
-pub(super) fn columns() -> Columns {
-    COLUMNS.iter().map(|(header, _)| (*header, Vec::new())).collect()
-}
-
 /// Writes a trace as CSV with the reference leak columns.
 pub struct TraceWriter<W> {
     out: W,
+    layout: TraceLayout,
 }
 
 impl<W: Write> TraceWriter<W> {
@@ -60,17 +104,19 @@ impl<W: Write> TraceWriter<W> {
     ///
     /// # Errors
     /// Where `out` cannot be written to.
-    pub fn new(mut out: W) -> io::Result<Self> {
-        writeln!(out, "{}", COLUMNS.map(|(header, _)| header).join(","))?;
-        Ok(Self { out })
+    pub fn new(mut out: W, layout: TraceLayout) -> io::Result<Self> {
+        let headers: Vec<_> = layout.0.iter().map(|column| column.header).collect();
+        writeln!(out, "{}", headers.join(","))?;
+        Ok(Self { out, layout })
     }
 
-    /// One row: the readings `shown`, and the leak flows of `truth`.
+    /// Writes one row.
     ///
     /// # Errors
     /// Where the output cannot be written to.
-    pub fn row(&mut self, truth: &Truth, shown: &Sample<f64>) -> io::Result<()> {
-        for (index, (value, (_, decimals))) in row(truth, shown).into_iter().zip(COLUMNS).enumerate() {
+    pub fn row(&mut self, row: &Row) -> io::Result<()> {
+        for (index, column) in self.layout.0.iter().enumerate() {
+            let (value, decimals) = (column.rounded(row), column.decimals);
             let comma = if index > 0 { "," } else { "" };
             match index {
                 _ if value.is_nan() => write!(self.out, "{comma}")?,

@@ -1,6 +1,6 @@
 use super::History;
 use crate::curve::{Curve, CurveError};
-use crate::reference::Reference;
+use crate::reference::{AfterEnd, Reference};
 use pitchleak_core::{Linkage, LinkageError};
 
 /// How the blade of a turbine is brought onto the rig: eq. (17), (18) and two scale factors.
@@ -51,7 +51,7 @@ impl Emulation {
         }
     }
 
-    /// Position and load for a rig of stroke `stroke_m`, over the history's own time.
+    /// Position and load for a rig of stroke `stroke_m`, over the history's own time and, mirrored, after it.
     ///
     /// Where the pitch would take the piston within `guard_m` of an end stop it is held there; the
     /// share of such samples stands in [`Reference::clipped_share`].
@@ -81,6 +81,7 @@ impl Emulation {
             load_n: curve(&load_n)?,
             wind_mps: history.wind_mps.as_deref().map(curve).transpose()?,
             clipped_share: clipped as f64 / history.t_s.len().max(1) as f64,
+            after_end: AfterEnd::Mirrored,
         })
     }
 

@@ -28,6 +28,18 @@ pub enum HistoryError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Neither built in nor a file.
+    #[error("{path}: no such file; built in are the winds 5, 13, 21 and 30 (m/s)", path = path.display())]
+    NoSuchWind {
+        /// As given.
+        path: PathBuf,
+    },
+    /// More than any history has: a device, or the wrong file.
+    #[error("{path}: longer than {} MiB: no wind history is", LARGEST_BYTES >> 20, path = path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
     /// An OpenFAST file that cannot be read.
     #[error(transparent)]
     OpenFast(#[from] openfast::Error),
@@ -71,6 +83,9 @@ pub enum HistoryError {
     },
 }
 
+/// More than an hour of OpenFAST output with a hundred channels at 80 Hz, in text.
+const LARGEST_BYTES: u64 = 512 << 20;
+
 impl History {
     /// Reads the history of `wind`, from within the program or from its file.
     ///
@@ -84,8 +99,11 @@ impl History {
     }
 
     fn from_file(path: &Path) -> Result<Self, HistoryError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| HistoryError::Io { path: path.to_owned(), source })?;
+        let bytes = std::fs::File::open(path).and_then(bounded).map_err(|source| match source.kind() {
+            std::io::ErrorKind::NotFound => HistoryError::NoSuchWind { path: path.to_owned() },
+            _ => HistoryError::Io { path: path.to_owned(), source },
+        })?;
+        let bytes = bytes.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?;
         if is_csv(path) {
             return Self::from_csv(&bytes, path);
         }
@@ -135,9 +153,10 @@ impl History {
     /// CSV, plain or gzip, with the columns of `data/wind/README.md`.
     fn from_csv(bytes: &[u8], path: &Path) -> Result<Self, HistoryError> {
         let io = |source| HistoryError::Io { path: path.to_owned(), source };
-        let mut plain = Vec::new();
+        let plain;
         if bytes.starts_with(&[0x1f, 0x8b]) {
-            flate2::read::MultiGzDecoder::new(bytes).read_to_end(&mut plain).map_err(io)?;
+            let inflated = bounded(flate2::read::MultiGzDecoder::new(bytes)).map_err(io)?;
+            plain = inflated.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?;
         } else {
             plain = bytes.to_vec();
         }
@@ -203,6 +222,13 @@ impl History {
             Ok(self)
         }
     }
+}
+
+/// All there is to read; none where that is more than any history has.
+fn bounded(from: impl Read) -> std::io::Result<Option<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    from.take(LARGEST_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok((bytes.len() as u64 <= LARGEST_BYTES).then_some(bytes))
 }
 
 fn built_in(case: WindCase) -> &'static [u8] {

@@ -4,7 +4,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
-use pitchleak::simulate::{EffectSize, Followed, LeakSize, Noise, Plan};
+use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, share_of_full_scale};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use std::path::PathBuf;
@@ -30,21 +30,28 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
 
-    /// Leak past the piston: mean flow over the run ("0.5 L/min") or coefficient ("0.02 L/min/bar")
+    /// Leak past the piston: mean flow over the run ("0.5 L/min") or coefficient ("0.02 L/min/bar"); it may
+    /// grow ("0.1 L/min -> 0.5 L/min @ 10 s..300 s"), begin or end ("0.5 L/min @ ..200 s"), come and go
+    /// ("0.5 L/min every 60 s for 10 s")
     #[arg(long, value_name = "Q", default_value = "0")]
-    leak_internal: LeakSize,
+    leak_internal: LeakCourse,
 
     /// Leak out of chamber A
     #[arg(long, value_name = "Q", default_value = "0")]
-    leak_external_a: LeakSize,
+    leak_external_a: LeakCourse,
 
     /// Leak out of chamber B
     #[arg(long, value_name = "Q", default_value = "0")]
-    leak_external_b: LeakSize,
+    leak_external_b: LeakCourse,
 
-    /// Time into the trace at which the leaks open [default: before it begins]
+    /// Time into the trace at which leaks without times of their own open [default: before it begins]
     #[arg(long, value_name = "TIME", value_parser = time)]
     onset: Option<f64>,
+
+    /// Oil temperature: "45 °C", "20 °C -> 60 °C @ 0 s..600 s", or a CSV file with t_s and temp_c. Leaks have
+    /// their size at 40 °C and follow the viscosity of an oil ISO VG 32; the trace gets a column temp_c
+    #[arg(long, value_name = "T|FILE")]
+    oil_temp: Option<String>,
 
     /// Effect beyond the model and its size in SI units; may be given more than once
     #[arg(long, value_name = "ID=VALUE")]
@@ -55,10 +62,15 @@ pub struct Arguments {
     noise: Noise,
 
     /// Constant offset of every sensor, drawn evenly within this share of full scale
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "0")]
+    #[arg(long, value_name = "SHARE", value_parser = share_of_full_scale, default_value = "0")]
     bias: f64,
 
-    /// Seed of noise and offsets
+    /// Mistake of a sensor, its wires or the recorder, e.g. "qa stuck 20 s..40 s"; may be given more than once
+    /// and then happens in this order. All ways are listed below
+    #[arg(long, value_name = "FAULT")]
+    fault: Vec<SensorFault>,
+
+    /// Seed of noise, offsets and mistakes
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 
@@ -92,8 +104,17 @@ pub struct Arguments {
 }
 
 const EXAMPLES: &str = "\
+Mistakes (--fault) of the channels t, x, pa, pb, qa, qb, force, temp; each with ' @ 20 s..40 s' where not for ever:
+  'qa dead' (zero), 'qa stuck', 'qa missing', 'qa reversed', 'qa absolute', 'x other_end' (from the B end),
+  'pa offset 10 bar', 'qb offset 1 %' (of full scale), 'qa drift 0.2 L/min/h', 'qa drift 1 %/h', 'qa gain 20 %',
+  'pa times 10', 'pa in psi' (the number in another unit), 't in ms', 'qa clipped 5 L/min', 'qa held 200 ms',
+  'pa late 100 ms', 'pa spikes 0.1 %' (of its readings are full scale), 'swap qa qb', 'rows lost 2 %',
+  'rows lost 20 s..25 s'
+
 Examples:
   pitchleak simulate --wind 13 --leak-internal '0.5 L/min' --noise '1 %' --seed 7 --out trace.csv.gz
+  pitchleak simulate --wind 13 --leak-internal '0 -> 0.5 L/min' --oil-temp '30 °C -> 55 °C' --duration '10 min' --out trace.csv
+  pitchleak simulate --wind 21 --noise '0.3 %' --fault 'swap pa pb' --fault 'qa drift 1 %/h' --out trace.csv
   pitchleak simulate --wind run.outb --rig turbine7.toml --effect viscous_friction=1500 --out trace.csv
   pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
 
@@ -110,14 +131,10 @@ fn frequency(text: &str) -> Result<f64, String> {
     quantity(text, Dimension::Frequency)
 }
 
-fn share(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Share)
-}
-
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rig = arguments.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
     let recording = arguments.plan().recording(rig)?;
-    recording.warning().into_iter().for_each(|warning| output::warn(&[warning]));
+    output::warn(&recording.warnings());
     let bar = progress();
     recording.write(&arguments.out, |share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
@@ -152,9 +169,11 @@ impl Arguments {
                 external_b: self.leak_external_b,
             },
             onset_s: self.onset.unwrap_or(0.0),
+            oil_temperature: self.oil_temp.clone(),
             effects: self.effect.clone(),
             noise: self.noise,
             bias_share: self.bias,
+            sensor_faults: self.fault.clone(),
             seed: self.seed,
             start_s: self.start,
             duration_s: self.duration,

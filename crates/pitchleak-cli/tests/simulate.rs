@@ -67,10 +67,82 @@ fn references_come_from_files_and_standard_output_is_a_trace() {
 }
 
 #[test]
+fn leaks_oil_and_sensors_change_as_told_and_the_truth_says_so() {
+    let folder = TempDir::new().unwrap();
+    let trace = folder.path().join("t.csv");
+    let arguments = ["--position", "90 mm", "--load", "2 kN", "--duration", "4 s", "--sample-rate", "10"];
+    let leaks = ["--leak-external-a", "0.1 L/min -> 0.5 L/min @ 1 s..3 s", "--leak-internal", "0.2 L/min"];
+    let world =
+        ["--onset", "2 s", "--oil-temp", "50 °C", "--fault", "swap qa qb", "--fault", "pa dead 2 s..3 s"];
+    let refused = simulate(&trace, &[&arguments[..], &leaks, &world].concat());
+    assert_eq!(refused.status.code(), Some(2), "a leak that grows has its own times");
+    let output = simulate(&trace, &[&arguments[..], &leaks, &world[2..]].concat());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    let truth = json(&folder.path().join("t.json"));
+    assert_eq!(truth["sensor_faults"], serde_json::json!(["swap qa qb", "pa dead 2 s..3 s"]));
+    let course = &truth["leaks"]["external_a"]["course"];
+    assert_eq!(
+        (&course["kind"], &course["from_s"], &course["to_share"]),
+        (&"ramp".into(), &1.0.into(), &1.0.into())
+    );
+    assert_eq!(truth["leaks"]["internal"]["course"]["kind"], "steady");
+    let text = std::fs::read_to_string(&trace).unwrap();
+    let rows: Vec<Vec<f64>> =
+        text.lines().skip(1).map(|row| row.split(',').map(|c| c.parse().unwrap()).collect()).collect();
+    assert_eq!(
+        text.lines().next(),
+        Some("t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm,force_n,temp_c,q_int_lpm,q_ext_a_lpm,q_ext_b_lpm")
+    );
+    assert!(rows.iter().all(|row| (row[7] - 50.0).abs() < 1e-9));
+    assert!(rows.iter().all(|row| (row[2] == 0.0) == (20..30).contains(&((10.0 * row[0]).round() as i64))));
+    let coefficient = |row: &[f64]| row[9] / row[2];
+    let grown = coefficient(&rows[35]) / coefficient(&rows[5]);
+    assert!((grown - 5.0).abs() < 1e-3, "{grown}");
+}
+
+#[test]
+fn a_trace_longer_than_its_wind_says_how_it_goes_on() {
+    let folder = TempDir::new().unwrap();
+    let wind = folder.path().join("w.csv");
+    let rows: String =
+        (0..60).map(|k| format!("{},{},1000\n", 0.1 * f64::from(k), 20.0 + 0.1 * f64::from(k))).collect();
+    std::fs::write(&wind, format!("t_s,pitch_deg,pitch_moment_Nm\n{rows}")).unwrap();
+    let (wind, trace) = (wind.display().to_string(), folder.path().join("t.csv"));
+    let output =
+        simulate(&trace, &["--wind", &wind, "--start", "0 s", "--duration", "12 s", "--sample-rate", "10"]);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && message.lines().count() == 1 && message.contains("back and forth"),
+        "{message}"
+    );
+    let truth = json(&folder.path().join("t.json"));
+    assert_eq!(truth["reference_end"]["after"], "mirrored");
+    assert!((truth["reference_end"]["time_s"].as_f64().unwrap() - 5.9).abs() < 1e-9);
+    let text = std::fs::read_to_string(&trace).unwrap();
+    let x: Vec<f64> =
+        text.lines().skip(1).map(|row| row.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(x.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 0.5), "no jump");
+    assert!((x[59] - x[0]).abs() > 5.0 && (x[118] - x[0]).abs() < 0.05 * (x[59] - x[0]), "{x:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_had_enough_ends_it_quietly_and_at_once() {
+    let program = env!("CARGO_BIN_EXE_pitchleak");
+    let begun = std::time::Instant::now();
+    let line = format!(
+        "'{program}' simulate --position '90 mm' --load '2 kN' --duration '20000 s' --out - | head -1"
+    );
+    let output = Command::new("sh").args(["-c", &line]).output().unwrap();
+    assert!(output.stdout.starts_with(b"t_s,") && output.stderr.is_empty(), "{output:?}");
+    assert!(begun.elapsed().as_secs() < 60, "it went on for nobody");
+}
+
+#[test]
 fn bad_usage_is_one_clear_message() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("t.csv");
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 19] = [
         (&[], "--position"),
         (&["--wind", "nowhere.outb"], "nowhere.outb"),
         (&["--wind", "13", "--leak-internal", "1 bar"], "L/min"),
@@ -79,6 +151,17 @@ fn bad_usage_is_one_clear_message() {
         (&["--wind", "13", "--duration", "0 s"], "the duration"),
         (&["--wind", "13", "--rig", "nowhere.toml"], "nowhere.toml"),
         (&["--position", "90 mm", "--load", "heavy"], "heavy"),
+        (&["--wind", "14"], "14: no such file; built in are the winds 5, 13, 21 and 30 (m/s)"),
+        (&["--wind", "13", "--noise", "1"], "did you mean `1 %`?"),
+        (&["--wind", "13", "--noise", "1e308"], "times full scale"),
+        (&["--wind", "13", "--bias", "2"], "did you mean `2 %`?"),
+        (&["--wind", "13", "--effect", "drag_leak=0.01", "--effect", "drag_leak=0.02"], "given twice"),
+        (&["--wind", "13", "--leak-internal", "1 L/min @ 9 s..", "--onset", "5 s"], "takes no onset"),
+        (&["--wind", "13", "--leak-internal", "1 L/min every 5 s"], "for 10 s"),
+        (&["--wind", "13", "--oil-temp", "warm"], "warm"),
+        (&["--wind", "13", "--fault", "qa asleep"], "clipped"),
+        (&["--wind", "13", "--fault", "swap qa pa"], "one kind"),
+        (&["--wind", "/dev/zero"], "/dev/zero"),
     ];
     for (arguments, part) in cases {
         let output = simulate(&out, arguments);
@@ -87,5 +170,8 @@ fn bad_usage_is_one_clear_message() {
         assert!(message.contains(part) && !message.contains("panicked"), "{arguments:?}: {message}");
     }
     assert!(!out.exists(), "nothing is written where nothing was simulated");
+    let other = simulate(&folder.path().join("t.parquet"), &["--wind", "13"]);
+    let message = String::from_utf8_lossy(&other.stderr);
+    assert!(other.status.code() == Some(2) && message.contains(".csv.gz"), "{message}");
     assert_eq!(pitchleak(&["reproduce", "--seeds", "0"]).status.code(), Some(2));
 }

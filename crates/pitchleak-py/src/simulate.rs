@@ -2,7 +2,7 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::core::PerLeak;
-use pitchleak::simulate::{EffectSize, Followed, LeakSize, Plan};
+use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, share_of_full_scale};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use pyo3::prelude::*;
@@ -50,9 +50,11 @@ pub struct Order {
     leak_external_a: Quantity,
     leak_external_b: Quantity,
     onset: Quantity,
+    oil_temp: Option<Quantity>,
     effects: BTreeMap<String, f64>,
     noise: Quantity,
     bias: Quantity,
+    faults: Vec<String>,
     seed: u64,
     duration: Option<Quantity>,
     start: Option<Quantity>,
@@ -82,11 +84,7 @@ pub fn simulate<'py>(
     });
     let (columns, truth) = made.map_err(value_error)?;
     let columns = columns.into_iter().map(|(header, values)| (header, values.into_pyarray(py))).collect();
-    Ok((
-        serde_json::to_string(&truth).map_err(value_error)?,
-        recording.warning().into_iter().collect(),
-        columns,
-    ))
+    Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }
 
 impl Order {
@@ -118,7 +116,7 @@ impl Order {
 
     fn plan(&self) -> PyResult<Plan> {
         let effect = |(id, value): (&String, &f64)| EffectSize::new(id, *value).map_err(value_error);
-        let leak = |name, size: &Quantity| size.parsed::<LeakSize>(name);
+        let leak = |name, size: &Quantity| size.parsed::<LeakCourse>(name);
         let time = |name, time: &Option<Quantity>| {
             time.as_ref().map(|time| time.si(name, Dimension::Time)).transpose()
         };
@@ -130,9 +128,16 @@ impl Order {
                 external_b: leak("leak_external_b", &self.leak_external_b)?,
             },
             onset_s: self.onset.si("onset", Dimension::Time)?,
+            oil_temperature: self.oil_temp.as_ref().map(Quantity::text),
             effects: self.effects.iter().map(effect).collect::<PyResult<_>>()?,
             noise: self.noise.parsed("noise")?,
-            bias_share: self.bias.si("bias", Dimension::Share)?,
+            bias_share: share_of_full_scale(&self.bias.text())
+                .map_err(|error| value_error(format!("bias: {error}")))?,
+            sensor_faults: self
+                .faults
+                .iter()
+                .map(|fault| fault.parse().map_err(value_error))
+                .collect::<PyResult<_>>()?,
             seed: self.seed,
             start_s: time("start", &self.start)?,
             duration_s: time("duration", &self.duration)?,

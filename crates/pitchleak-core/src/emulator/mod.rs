@@ -175,6 +175,15 @@ impl<T: Real> Emulator<T> {
         Ok(())
     }
 
+    /// Changes the oil's temperature, K, which effects of the pitching cylinder may follow.
+    pub fn set_temperature(&mut self, temp_k: T) -> Result<(), PlantError> {
+        if !(temp_k.is_finite() && temp_k > T::zero()) {
+            return Err(PlantError::Temperature);
+        }
+        self.params.pitch.plant.temp_k = temp_k;
+        Ok(())
+    }
+
     /// Changes the effects that act on the pitching cylinder.
     pub fn set_effects(&mut self, effects: EffectSet<T>) {
         self.params.pitch.plant.effects = effects;

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,8 @@ class LeakTruth:
     """Laminar coefficient, m³/(s·Pa)."""
     mean_flow_lpm: float
     """Mean size of its flow, L/min."""
+    course: dict[str, Any] = field(default_factory=dict)
+    """How much of it is there at a time: ``kind`` (steady, during, ramp, pulsed) with its times, s, and shares."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,6 +52,8 @@ class Simulation(Tabular):
     """Standard deviation of the sensors' noise, SI."""
     biases: dict[str, float]
     """Constant offsets of the sensors, SI."""
+    sensor_faults: tuple[str, ...] = ()
+    """Mistakes of the sensors, as given, in the order in which they happen."""
     raw: dict[str, Any] = field(init=False, default_factory=dict)
     """Every field of the truth file of ``pitchleak simulate``."""
     columns: Mapping[str, Any] = field(init=False, default_factory=dict)
@@ -93,9 +97,11 @@ def simulate(
     leak_external_a: float | str = 0.0,
     leak_external_b: float | str = 0.0,
     onset: float | str = 0.0,
+    oil_temp: float | str | None = None,
     effects: Mapping[str, float] | None = None,
     noise: float | str = "none",
     bias: float | str = 0.0,
+    faults: Sequence[str] = (),
     seed: int = 1,
     duration: float | str | None = None,
     start: float | str | None = None,
@@ -110,9 +116,14 @@ def simulate(
     A quantity is a number in SI or a text with its unit (``"0.5 L/min"``, ``"1 %"``). The rig follows
     ``wind`` (5, 13, 21 or 30 m/s, built in; OpenFAST output; CSV) or ``position`` and ``load`` (a constant
     or a CSV file). A leak is its mean flow, or its coefficient (``"0.02 L/min/bar"``), and opens at
-    ``onset`` (s into the trace; 0: before it begins). ``effects`` are sizes by id in SI. ``noise`` is 3 σ
-    of every sensor as a share of full scale, ``"none"`` or ``"rig"``; ``bias`` the greatest constant
-    offset. ``out`` writes the trace (.csv, .csv.gz) and the truth beside it (.json) instead of keeping it.
+    ``onset`` (s into the trace; 0: before it begins); it may grow (``"0.1 L/min -> 0.5 L/min @ 10 s..300 s"``),
+    begin or end (``"0.5 L/min @ ..200 s"``), come and go (``"0.5 L/min every 60 s for 10 s"``). ``oil_temp``
+    (K, ``"45 °C"``, ``"20 °C -> 60 °C @ 0 s..600 s"`` or a CSV file) makes the leaks, which have their size at
+    40 °C, follow the oil's viscosity. ``effects`` are sizes by id in SI. ``noise`` is 3 σ of every sensor as a
+    share of full scale, ``"none"`` or ``"rig"``; ``bias`` the greatest constant offset. ``faults`` are mistakes of
+    the sensors (``"qa dead"``, ``"pa offset 10 bar"``, ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see
+    ``pitchleak simulate --help``). ``out`` writes the trace (.csv, .csv.gz) and the truth beside it (.json)
+    instead of keeping it.
 
     Raises ``ValueError`` naming the argument.
 
@@ -129,9 +140,11 @@ def simulate(
         "leak_external_a": leak_external_a,
         "leak_external_b": leak_external_b,
         "onset": onset,
+        "oil_temp": oil_temp,
         "effects": dict(effects or {}),
         "noise": noise,
         "bias": bias,
+        "faults": [faults] if isinstance(faults, str) else list(faults),
         "seed": seed,
         "duration": duration,
         "start": start,
