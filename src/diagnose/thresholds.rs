@@ -1,6 +1,7 @@
 //! Every number that the diagnosis decides by, with where it comes from: *derived* from another or from a law,
-//! *sourced* from a publication, or *chosen*: a convention, a guard or a matter of cost. None is tuned to a trace; what the
-//! chosen ones are worth is held by `tests/blind.rs`.
+//! *sourced* from a publication, or *chosen*: a convention, a guard or a matter of cost. The chosen ones come from no
+//! optimisation, but they were chosen by people who saw the bench's cases and the simulator's traces. `tests/blind.rs`
+//! notices where a change of one costs names on a small bench; how good each value is, nothing has measured.
 
 // Chance.
 

@@ -27,7 +27,7 @@ pub enum RestoreError {
 }
 
 /// Name and version of the saved form.
-const SCHEMA: &str = "pitchleak.state/1";
+const SCHEMA: &str = "pitchleak.state/2";
 
 impl Stream {
     /// All that the stream knows, to the last bit, rig included: CBOR (RFC 8949) of a name and the state.

@@ -76,3 +76,20 @@ fn a_rig_that_cannot_be_is_refused() {
     let error = Replay::new(&rig).err().expect("no such rig").to_string();
     assert_eq!(error, "piston areas must be positive");
 }
+
+/// The saved form names its version first; one of before is told apart from rubbish.
+#[test]
+fn a_state_of_another_version_is_refused_by_name() {
+    let stream = Stream::new(&Rig::paper(), crate::trace::BadRows::Skip).expect("the paper's rig");
+    let saved = stream.save().expect("saves");
+    assert!(Stream::restore(&saved).is_ok());
+    let mut older = saved;
+    let at = older.windows(7).position(|bytes| bytes == b"state/2").expect("names its version");
+    older[at + 6] = b'1';
+    assert_eq!(
+        Stream::restore(&older).err().map(|error| error.to_string()).as_deref(),
+        Some(
+            "saved by another version (`pitchleak.state/1`, this one reads `pitchleak.state/2`): start the estimator anew"
+        )
+    );
+}

@@ -2,7 +2,7 @@
 
 use super::columns::{Content, Layout, shorten};
 use super::error::TraceFault;
-use super::format::Stream;
+use super::format::{Format, Stream};
 use super::quality::{BadReason, BadRow, Counted};
 use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_present};
@@ -10,14 +10,18 @@ use super::stamp::Epoch;
 use crate::rig::ColumnMap;
 use crate::signal::Signal;
 
-pub(super) struct CsvRows {
+/// Text is whatever no other format knows as its own.
+pub(super) const FORMAT: Format =
+    Format { starts_with: b"", open: |stream, map| Ok(Box::new(CsvRows::open(stream, map)?)) };
+
+struct CsvRows {
     records: Records,
-    format: Format,
+    splitting: Splitting,
     gzip: bool,
 }
 
 /// How a record is split, and into what.
-struct Format {
+struct Splitting {
     delimiter: u8,
     layout: Layout,
     epoch: Epoch,
@@ -25,11 +29,12 @@ struct Format {
 
 impl CsvRows {
     /// Reads the header.
-    pub(super) fn open(stream: Stream, map: &ColumnMap) -> Result<Self, TraceFault> {
+    fn open(stream: Stream, map: &ColumnMap) -> Result<Self, TraceFault> {
         let mut records = Records::new(stream.bytes);
         let (delimiter, headers) = read_header(&mut records)?;
         let layout = Layout::new(&headers, map)?;
-        Ok(Self { records, format: Format { delimiter, layout, epoch: Epoch::default() }, gzip: stream.gzip })
+        let splitting = Splitting { delimiter, layout, epoch: Epoch::default() };
+        Ok(Self { records, splitting, gzip: stream.gzip })
     }
 
     #[cold]
@@ -48,15 +53,15 @@ impl CsvRows {
 
 impl RowSource for CsvRows {
     fn layout(&self) -> &Layout {
-        &self.format.layout
+        &self.splitting.layout
     }
 
     #[inline]
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
         match self.records.next() {
-            Ok(record) => match self.format.read(&record, row) {
+            Ok(record) => match self.splitting.read(&record, row) {
                 Ok(()) => Ok(Next::Row),
-                Err(fault) => Ok(Next::Bad(self.format.describe(&record, &fault))),
+                Err(fault) => Ok(Next::Bad(self.splitting.describe(&record, &fault))),
             },
             Err(stop) => self.stopped(stop),
         }
@@ -99,7 +104,7 @@ fn sniff(records: &mut Records) -> Result<u8, Stop> {
     Ok(best)
 }
 
-impl Format {
+impl Splitting {
     #[inline]
     fn read(&mut self, record: &Record<'_>, row: &mut Row) -> Result<(), Fault> {
         *row = Row { line: record.line, ..Row::empty() };

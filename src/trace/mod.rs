@@ -4,7 +4,9 @@ mod clock;
 mod columns;
 mod csv;
 mod error;
+mod file;
 mod format;
+mod parquet;
 mod quality;
 mod range;
 mod records;
@@ -113,7 +115,7 @@ impl TraceReader<'static> {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
-        match format::open(stream, &rig.columns) {
+        match file::open(stream, &rig.columns) {
             Ok(rows) => Ok(Self::over(name, rows, rig)),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }

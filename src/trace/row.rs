@@ -5,8 +5,8 @@ use super::error::TraceFault;
 use super::quality::{BadReason, BadRow};
 use crate::signal::Signal;
 
-/// A source of rows. A new one is an implementation of this trait; a file format is told by its first
-/// bytes, in `format.rs`.
+/// A source of rows. A new one is an implementation of this trait; a file format is also one
+/// line of registration in `file.rs`.
 pub(super) trait RowSource {
     /// What the columns hold.
     fn layout(&self) -> &Layout;

@@ -1,0 +1,36 @@
+//! Opens a file of rows: its format is told by the first bytes and not by the name.
+
+use super::error::TraceFault;
+use super::format::{Format, Rows, Stream};
+use super::{csv, parquet};
+use crate::rig::ColumnMap;
+use std::io::{BufReader, Cursor, Read};
+
+/// Every format; the first that fits is taken.
+const FORMATS: &[Format] = &[parquet::FORMAT, csv::FORMAT];
+
+/// Bytes by which a format is told.
+const MAGIC: usize = 4;
+
+/// Opens a trace file of any format, compressed or not.
+pub(super) fn open(bytes: Box<dyn Read + Send>, map: &ColumnMap) -> Result<Rows, TraceFault> {
+    let (mut start, mut bytes) = peek(bytes)?;
+    let gzip = start.starts_with(b"\x1f\x8b");
+    if gzip {
+        let buffered = BufReader::with_capacity(64 * 1024, bytes);
+        (start, bytes) = peek(Box::new(flate2::bufread::MultiGzDecoder::new(buffered)))?;
+    }
+    match FORMATS.iter().find(|format| start.starts_with(format.starts_with)) {
+        Some(format) => (format.open)(Stream { bytes, gzip }, map),
+        None => Err(TraceFault::Empty),
+    }
+}
+
+/// The first bytes, and all of them.
+fn peek(mut source: Box<dyn Read + Send>) -> Result<(Vec<u8>, Box<dyn Read + Send>), TraceFault> {
+    let mut start = Vec::with_capacity(MAGIC);
+    let read = source.by_ref().take(MAGIC as u64).read_to_end(&mut start);
+    read.map_err(|source| TraceFault::Read { line: 0, source })?;
+    let whole = Cursor::new(start.clone()).chain(source);
+    Ok((start, Box::new(whole)))
+}
