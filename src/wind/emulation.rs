@@ -66,11 +66,11 @@ impl Emulation {
         let acceleration = second_derivative(&history.pitch_rad, history.step_s());
         let mut position_m = Vec::with_capacity(history.t_s.len());
         let mut load_n = Vec::with_capacity(history.t_s.len());
-        for ((&pitch, &signals), acceleration) in
+        for ((&pitch, &moment), acceleration) in
             history.pitch_rad.iter().zip(&history.moment_nm).zip(acceleration)
         {
             let pitch = pitch.clamp(lowest, highest);
-            let torque_nm = self.blade_inertia_kgm2 * acceleration + signals;
+            let torque_nm = self.blade_inertia_kgm2 * acceleration + moment;
             position_m.push(self.linkage.position_m(pitch)? / self.position_scale);
             load_n.push(self.linkage.force_n(pitch, torque_nm)? / self.load_scale);
         }

@@ -3,7 +3,7 @@ use crate::openfast;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Pitch and pitch signals of one blade over time, on the turbine's own scale.
+/// Pitch and pitch moment of one blade over time, on the turbine's own scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     /// Time of each sample, s; increasing, evenly spaced to 5 %.
@@ -12,7 +12,7 @@ pub struct History {
     pub wind_mps: Option<Vec<f64>>,
     /// Pitch angle θ, rad, positive towards feather.
     pub pitch_rad: Vec<f64>,
-    /// Pitch signals T_w of eq. (18), N m, positive against the extending piston: OpenFAST's
+    /// Pitch moment T_w of eq. (18), N m, positive against the extending piston: OpenFAST's
     /// `RootMzb` with its own sign. Inertia about the pitch axis is not in it.
     pub moment_nm: Vec<f64>,
 }
@@ -112,14 +112,14 @@ impl History {
         Self::from_run(&run, path)
     }
 
-    /// The first blade of which `run` has both pitch (`BldPitch1`…) and signals (`RootMzb1`… or
+    /// The first blade of which `run` has both pitch (`BldPitch1`…) and moment (`RootMzb1`… or
     /// `RootMzc1`…). `path` is named in errors.
     ///
     /// # Errors
     /// [`HistoryError::Missing`], [`HistoryError::Unit`], [`HistoryError::Samples`].
     pub fn from_run(run: &openfast::Run, path: &Path) -> Result<Self, HistoryError> {
         let find = |names: [String; 2]| names.iter().find_map(|name| run.channel(name));
-        let (pitch, signals) = (1..=3)
+        let (pitch, moment) = (1..=3)
             .find_map(|blade| {
                 let pitch = find([format!("BldPitch{blade}"), format!("PtchPMzc{blade}")])?;
                 Some((pitch, find([format!("RootMzb{blade}"), format!("RootMzc{blade}")])?))
@@ -134,7 +134,7 @@ impl History {
             wind_mps: wind.map(|channel| channel.values.clone()),
             pitch_rad: in_si(pitch, &[("deg", 1.0_f64.to_radians()), ("rad", 1.0)], "deg or rad", path)?,
             moment_nm: in_si(
-                signals,
+                moment,
                 &[
                     ("kN-m", 1e3),
                     ("kN\u{b7}m", 1e3),
@@ -167,7 +167,7 @@ impl History {
             headers.iter().position(|h| h.eq_ignore_ascii_case(name.as_bytes())).map(|index| (index, name))
         };
         let need = |missing| find(missing).ok_or(HistoryError::Missing { path: path.into(), missing });
-        let (t, pitch, signals) = (need("t_s")?, need("pitch_deg")?, need("pitch_moment_Nm")?);
+        let (t, pitch, moment) = (need("t_s")?, need("pitch_deg")?, need("pitch_moment_Nm")?);
         let wind = find("wind_mps");
         let mut history = Self {
             t_s: Vec::new(),
@@ -186,7 +186,7 @@ impl History {
             };
             history.t_s.push(cell(t)?);
             history.pitch_rad.push(cell(pitch)?.to_radians());
-            history.moment_nm.push(cell(signals)?);
+            history.moment_nm.push(cell(moment)?);
             if let (Some(values), Some(column)) = (&mut history.wind_mps, wind) {
                 values.push(cell(column)?);
             }

@@ -1,6 +1,6 @@
 //! From turbulent wind to what a pitch cylinder has to do: the paper's Section IV, Fig. 5 and 6.
 //!
-//! A [`History`] is what a turbine simulation says about one blade: pitch angle and pitch signals
+//! A [`History`] is what a turbine simulation says about one blade: pitch angle and pitch moment
 //! over time. [`Emulation`] turns it into the position and load the rig follows, by eq. (17) and
 //! (18) and the two scale factors of the rig.
 
