@@ -44,13 +44,17 @@ def sample(count, folder):
     return [{**entry, "id": number} for number, entry in enumerate(chosen, 1)]
 
 
-def write(mutants):
-    """Makes the copy anew with these mutants in it; those that found no place are left out."""
+def copy_sources():
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, tracked.split("\0")):
         if (ROOT / name).exists():
             (COPY / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, COPY / name)
+
+
+def write(mutants):
+    """Makes the copy anew with these mutants in it; those that found no place are left out."""
+    copy_sources()
     (WORK / "list.json").write_text(json.dumps(mutants))
     tool = ["cargo", "run", "--locked", "--quiet", "--manifest-path", ROOT / "ci/mutants/Cargo.toml", "--"]
     placeless = subprocess.run([*tool, COPY, WORK / "list.json"], capture_output=True, text=True, check=True).stdout

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak_core::plant::{CylinderPlant, Drive};
-use pitchleak_core::{Cylinder, Fluid, Model, PaperGains, PaperLaw, PerLeak, Sample, Theta, regressors};
+use pitchleak_core::{
+    Cylinder, Fluid, Model, PaperGains, PaperLaw, PerLeak, Sample, Theta, force_imbalance_n, regressors,
+};
 use proptest::prelude::*;
 
 fn cylinder() -> impl Strategy<Value = Cylinder<f64>> {
@@ -217,5 +219,46 @@ proptest! {
         }
         law.theta[0] = -beta;
         prop_assert_eq!(law.leak_coefficients(), PerLeak::default(), "no leak is read from a negative β̂");
+    }
+}
+
+proptest! {
+    /// A step to the new sample goes by the law's own rate there, eq. (8) and (12): backward Euler.
+    #[test]
+    fn a_step_obeys_the_law_at_its_end((cylinder, samples, truth, gains) in case(), log_step in -4.0..1.0_f64) {
+        let h = 10.0_f64.powf(log_step);
+        let before = PaperLaw { load_pressure_pa: 3e6, theta: truth };
+        for (sample, momentum) in &samples {
+            let f = regressors(&cylinder, sample, *momentum).unwrap();
+            // Measured P_L is zero: P̂_L is then the error, without rounding.
+            let mut law = before;
+            law.step(&gains, h, 0.0, &f);
+            let rate = law.rate(&gains, 0.0, &f);
+            let sizes = |theta: &Theta<f64>| dot(&theta.map(f64::abs), &f.map(f64::abs));
+            let scale = before.load_pressure_pa
+                + h * (gains.lambda_per_s * law.load_pressure_pa.abs() + sizes(&law.theta) + sizes(&truth));
+            let expected = before.load_pressure_pa + h * rate.load_pressure_pa_s;
+            let found = law.load_pressure_pa;
+            prop_assert!((found - expected).abs() < 1e-12 * scale, "P̂_L {found} and {expected}");
+            for ((now, before), rate) in law.theta.iter().zip(&truth).zip(&rate.theta_per_s) {
+                let expected = before + h * rate;
+                let scale = before.abs() + (h * rate).abs();
+                prop_assert!((now - expected).abs() <= 1e-12 * scale, "θ̂ {now} and {expected}");
+            }
+        }
+    }
+
+    /// What the readings of the plant say of eq. (2) is what moves its mass: P_A A_A − P_B A_B − F = m ẍ.
+    #[test]
+    fn force_imbalance_moves_the_mass(
+        cylinder in cylinder(), share in 0.1..0.9, v_mps in -0.1..0.1, pa in 0.0..2e7, pb in 0.0..2e7, force_n in -1e4..1e4,
+    ) {
+        let plant = CylinderPlant::new(Model { cylinder, ..Model::paper() }).unwrap();
+        let state = plant.state_at(share * cylinder.stroke_m, v_mps, pa, pb);
+        let at = plant.rates(&state, &Drive { force_n, ..Drive::default() }).signals;
+        let sample = Sample { x_m: at.x_m, pa_pa: at.pa_pa, pb_pa: at.pb_pa, ..Sample::default() };
+        let imbalance_n = force_imbalance_n(&cylinder, &sample, force_n);
+        let scale = 2e7 * cylinder.area_a_m2 + 1e4;
+        prop_assert!((imbalance_n - cylinder.moving_mass_kg * at.a_mps2).abs() < 1e-9 * scale, "{imbalance_n} {at:?}");
     }
 }

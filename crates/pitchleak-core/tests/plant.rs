@@ -216,3 +216,43 @@ fn residual_of_the_plain_model_is_the_effects_term() {
         assert!(pairs.iter().any(|(_, right)| *right != 0.0), "{effect} has no term");
     }
 }
+
+/// An end stop only ever pushes the piston back into the stroke, with its stiffness times its depth.
+#[test]
+fn end_stops_push_inwards() {
+    let plant = CylinderPlant::new(Model::<f64>::paper()).unwrap();
+    let (stop, mass_kg) = (plant.end_stop, plant.model.cylinder.moving_mass_kg);
+    let stroke_m = plant.model.cylinder.stroke_m;
+    let drive = Drive::default();
+    let accelerated = |x_m: f64| plant.rates(&plant.state_at(x_m, 0.0, 0.0, 0.0), &drive).signals.a_mps2;
+    let force_n = stop.stiffness_npm * 0.5 * stop.gap_m;
+    assert!((mass_kg * accelerated(0.5 * stop.gap_m) / force_n - 1.0).abs() < 1e-9);
+    assert!((mass_kg * accelerated(stroke_m - 0.5 * stop.gap_m) / force_n + 1.0).abs() < 1e-9);
+    assert!((mass_kg * accelerated(0.5 * stroke_m) / force_n).abs() < 1e-9);
+}
+
+/// Every edge passes oil from the higher pressure to the lower, the B edges by their area ratio.
+#[test]
+fn valve_edges_pass_the_rated_flow_downhill() {
+    let valve = Valve::<f64> { underlap: 0.0, ..Valve::paper() };
+    let (rated, drop, ratio) = (valve.rated_flow_m3s, valve.rated_drop_pa, valve.area_ratio_b);
+    // Metering rounds the root off where it is laminar: by a per mille at this drop.
+    let near = |flow: f64, expected: f64| (flow - expected).abs() < 2e-3 * rated;
+    let extend = valve.flows(1.0, 2.0 * drop, drop, drop);
+    assert!(near(extend.a_m3s, rated) && near(extend.b_m3s, -ratio * rated), "{extend:?}");
+    assert!(near(extend.supply_m3s, rated), "{extend:?}");
+    let retract = valve.flows(-1.0, 2.0 * drop, drop, drop);
+    assert!(near(retract.a_m3s, -rated) && near(retract.b_m3s, ratio * rated), "{retract:?}");
+    assert!(near(retract.supply_m3s, ratio * rated), "{retract:?}");
+}
+
+/// The supply's pressure goes back to where all of the pump's flow runs over the relief valve.
+#[test]
+fn supply_settles_at_its_idle_pressure() {
+    let supply = Supply::<f64>::paper();
+    let idle_pa = supply.idle_pressure_pa();
+    assert!(idle_pa > supply.relief_pressure_pa);
+    assert!((supply.rate_pas(idle_pa, 0.0) * supply.compliance_m3pa).abs() < 1e-12 * supply.pump_flow_m3s);
+    assert!(supply.rate_pas(idle_pa + 1e4, 0.0) < 0.0 && supply.rate_pas(idle_pa - 1e4, 0.0) > 0.0);
+    assert!(supply.rate_pas(idle_pa, supply.pump_flow_m3s) < 0.0, "what valves draw lowers it");
+}

@@ -232,6 +232,21 @@ fn an_estimator_refuses_what_cannot_be() {
     }
 }
 
+/// A gain is the share by which a sensor reads too much.
+#[test]
+fn the_gain_of_the_position_sensor_is_found() {
+    let base = Sensors::paper();
+    let position = SensorSpread { gain_std: 0.05, ..base.position };
+    let sensors = Sensors { position, ..base };
+    for gain in [-0.03, 0.03] {
+        let read = exact(60).map(|sample| Sample { x_m: sample.x_m * (1.0 + gain), ..sample });
+        let rls: Rls<f64, 9> = estimate(Cylinder::paper(), Fluid::paper(), &sensors, read);
+        let [flow_a, flow_b, position] = rls.estimates().gains.expect("nine parameters");
+        println!("{gain}: {position:?}, {flow_a:?}, {flow_b:?}");
+        assert!((position.value - gain).abs() < 0.1 * gain.abs(), "{position:?} for {gain}");
+    }
+}
+
 /// What an estimator of fewer parameters does not know is none, not zero.
 #[test]
 fn small_estimators_know_no_offsets_and_no_gains() {

@@ -71,3 +71,21 @@ impl<T: Real> Weights<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chamber A reads A_A ẋ, chamber B −A_B ẋ: whichever meters there are, the odometer counts ẋ once.
+    #[test]
+    fn an_odometer_counts_the_speed_once() {
+        let cylinder = Cylinder::<f64>::paper();
+        let noise = NoiseStd { flow_a_m3s: 1e-6, flow_b_m3s: 2e-6, pressure_pa: 5e4, position_m: 1e-3 };
+        let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
+        for weights in [Weights::both, Weights::only_a, Weights::only_b] {
+            let Weights { odometer_a, odometer_b, .. } = weights(&cylinder, &noise, &leaks);
+            let counted = odometer_a * cylinder.area_a_m2 - odometer_b * cylinder.area_b_m2;
+            assert!((counted - 1.0).abs() < 1e-12, "{counted}");
+        }
+    }
+}
