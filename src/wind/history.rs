@@ -153,13 +153,12 @@ impl History {
     /// CSV, plain or gzip, with the columns of `data/wind/README.md`.
     fn from_csv(bytes: &[u8], path: &Path) -> Result<Self, HistoryError> {
         let io = |source| HistoryError::Io { path: path.to_owned(), source };
-        let plain;
-        if bytes.starts_with(&[0x1f, 0x8b]) {
+        let plain = if bytes.starts_with(&[0x1f, 0x8b]) {
             let inflated = bounded(flate2::read::MultiGzDecoder::new(bytes)).map_err(io)?;
-            plain = inflated.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?;
+            inflated.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?
         } else {
-            plain = bytes.to_vec();
-        }
+            bytes.to_vec()
+        };
         let csv_io = |e: csv::Error| io(std::io::Error::other(e));
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(plain.as_slice());
         let headers = reader.byte_headers().map_err(csv_io)?.clone();

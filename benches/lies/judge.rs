@@ -1,0 +1,81 @@
+//! What an operator would believe after the replay, and whether it is so.
+
+use crate::lie::Lie;
+use crate::plant::{Leaking, rig};
+use pitchleak::core::{Leak, Sample, Sensors};
+use pitchleak::replay::{ReplayError, replay};
+use pitchleak::report::{Palette, ReplayReport};
+use pitchleak::simulate::{
+    Biases, Reading, Row, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
+};
+use pitchleak::trace::TraceReader;
+use pitchleak::units::LPM_PER_M3S;
+use std::io::Cursor;
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Judgement {
+    /// Sure, and so it is.
+    Right,
+    /// The report doubts, cannot tell, or the trace is refused.
+    InDoubt,
+    /// Sure, and it is not so.
+    ConfidentlyWrong,
+}
+
+/// A stated figure may be off by this much, or by its own 3 σ, L/min.
+const FIGURE_LPM: f64 = 0.1;
+
+/// Whether a report commits itself to what it says. All that the bench knows of the verdict's form stands here.
+fn is_sure(report: &ReplayReport) -> bool {
+    let text = report.to_text(&Palette::PLAIN);
+    let head = text.split("  ").next().unwrap_or_default();
+    head == "LEAK" || head == "SOUND"
+}
+
+fn judge(report: &ReplayReport, leaking: Leaking, truths: &[Truth]) -> Judgement {
+    let right_place = report.verdict.faults.iter().copied().eq(leaking);
+    let right_size = report.verdict.faults.iter().all(|leak| is_size(report, *leak, truths));
+    match (is_sure(report), right_place && right_size) {
+        (false, _) => Judgement::InDoubt,
+        (true, true) => Judgement::Right,
+        (true, false) => Judgement::ConfidentlyWrong,
+    }
+}
+
+/// Whether the mean flow of a leak is the one stated.
+fn is_size(report: &ReplayReport, leak: Leak, truths: &[Truth]) -> bool {
+    let since_s = report.changed_at_s.unwrap_or(0.0);
+    let flows = truths.iter().filter(|truth| truth.t_s >= since_s).map(|truth| truth.leaks_m3s[leak].abs());
+    let (sum, count) = flows.fold((0.0, 0.0), |(sum, count), flow| (sum + flow, count + 1.0));
+    let stated = report.leakage[leak];
+    let off_lpm = (stated.mean_lpm - LPM_PER_M3S * sum / f64::max(count, 1.0)).abs();
+    off_lpm <= FIGURE_LPM.max(3.0 * stated.std_lpm.unwrap_or(0.0))
+}
+
+/// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie.
+pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> Judgement {
+    let text = recorded(truths, lie, rig(accuracy).sensors(), seed);
+    let rig = rig(accuracy);
+    let reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig);
+    let report = reader
+        .map_err(ReplayError::from)
+        .and_then(|mut reader| replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(())));
+    report.map_or(Judgement::InDoubt, |report| judge(&report, leaking, truths))
+}
+
+/// The trace as CSV, as users have it.
+fn recorded(truths: &[Truth], lie: &Lie, noise: Sensors<f64>, seed: u64) -> Vec<u8> {
+    let rig = rig(1e-2);
+    let faults: Vec<SensorFault> = lie.faults.iter().map(|text| text.parse().expect("a fault")).collect();
+    let mut faults = SensorFaults::new(&faults, &rig.instruments, rig.cylinder.stroke_m, seed);
+    let mut sensing = Sensing::new(noise, Biases::default(), seed);
+    let mut writer = TraceWriter::new(Vec::new(), TraceLayout::default()).expect("memory takes it");
+    for (index, truth) in truths.iter().enumerate() {
+        let sample: Sample<f64> = sensing.read(&truth.sample);
+        let shown = faults.show(&Reading::at(truth, sample)).filter(|_| index % lie.every == 0);
+        if let Some(shown) = shown {
+            writer.row(&Row::new(truth, shown)).expect("memory takes it");
+        }
+    }
+    writer.into_inner()
+}

@@ -1,0 +1,80 @@
+//! The truth: a cylinder that does what the estimator's model leaves out, each as much as a sound rig has it.
+
+use pitchleak::Rig;
+use pitchleak::core::effects::EffectConstants;
+use pitchleak::core::{Effect, EffectSet, Leak, PerLeak};
+use pitchleak::simulate::{LeakCourse, LeakSize, Scenario, Truth};
+use pitchleak::units::LPM_PER_M3S;
+use pitchleak::wind::{Emulation, History, Wind, WindCase};
+
+const DURATION_S: f64 = 60.0;
+/// Size of a leak, L/min; the alarm stands at 0.1.
+const LEAK_LPM: f64 = 0.5;
+/// Of which about this passes an orifice: C √P, where the estimator has C P.
+const TURBULENT_LPM: f64 = 0.1;
+/// A leak is made this large at the beginning of the minute, s.
+const SIZED_OVER_S: f64 = 15.0;
+/// Every seal weeps, m³/(s·Pa): some 0.02 L/min, far below the alarm.
+const WEEPING_M3SPA: f64 = 4.5e-13;
+/// Free air in the oil at atmospheric pressure, by volume: the bulk modulus follows the pressure.
+const FREE_AIR: f64 = 5e-3;
+/// N.
+const DRY_FRICTION_N: f64 = 100.0;
+/// Roots of the mean pressures behind the leaks in wind, √Pa: turbulent coefficients follow from them.
+const ROOT_PRESSURE: PerLeak<f64> = PerLeak { internal: 9e2, external_a: 2.4e3, external_b: 2.4e3 };
+
+/// What leaks.
+pub type Leaking = Option<Leak>;
+pub const LEAKING: [Leaking; 3] = [None, Some(Leak::Internal), Some(Leak::ExternalA)];
+
+pub fn leak_name(leaking: Leaking) -> &'static str {
+    leaking.map_or("sound", Leak::id)
+}
+
+pub fn rig(accuracy: f64) -> Rig {
+    let mut rig = Rig::paper();
+    rig.instruments = rig.instruments.with_accuracy(accuracy);
+    rig
+}
+
+/// A minute of a cylinder in wind at 100 Hz; each sample is that of one instant of a simulation in steps of 1 ms.
+pub fn truths(wind: WindCase, leaking: Leaking) -> Vec<Truth> {
+    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
+    let laminar = |leak: Leak| match leak {
+        _ if leaking == Some(leak) => LeakSize::MeanFlow((LEAK_LPM - TURBULENT_LPM) / LPM_PER_M3S),
+        Leak::Internal => LeakSize::Coefficient(WEEPING_M3SPA),
+        _ => LeakSize::default(),
+    };
+    let scenario = Scenario {
+        rig: rig(1e-2),
+        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
+        leaks: PerLeak::from_fn(laminar).map(LeakCourse::from),
+        oil_temperature: None,
+        effects: effects(leaking),
+        start_s: 20.0,
+        warm_up_s: 10.0,
+        duration_s: DURATION_S,
+        sample_rate_hz: 100.0,
+    };
+    let beginning = Scenario { duration_s: SIZED_OVER_S, ..scenario.clone() };
+    scenario.collect(beginning.leak_coefficients().expect("within reach")).expect("runs")
+}
+
+fn effects(leaking: Leaking) -> EffectSet<f64> {
+    let turbulent = |leak: Leak, effect: Effect| {
+        let flow_lpm = if leaking == Some(leak) { TURBULENT_LPM } else { 0.0 };
+        (effect, flow_lpm / LPM_PER_M3S / ROOT_PRESSURE[leak])
+    };
+    let mut effects = EffectSet::default();
+    for (effect, size) in [
+        (Effect::EntrainedAir, FREE_AIR),
+        (Effect::CoulombFriction, DRY_FRICTION_N),
+        turbulent(Leak::Internal, Effect::InternalLeakTurbulent),
+        turbulent(Leak::ExternalA, Effect::ExternalLeakATurbulent),
+    ] {
+        if size > 0.0 {
+            effects.set(effect, size, EffectConstants::default()).expect("within bounds");
+        }
+    }
+    effects
+}

@@ -1,0 +1,50 @@
+//! All lies on all cylinders.
+
+use crate::judge::{Judgement, ask};
+use crate::lie::{LIES, Lie};
+use crate::plant::{LEAKING, Leaking, truths};
+use pitchleak::wind::WindCase;
+use rayon::prelude::*;
+
+/// One row of the bench, over its seeds.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    pub lie: &'static Lie,
+    pub leaking: Leaking,
+    pub accuracy: f64,
+    pub wind: WindCase,
+    pub right: usize,
+    pub in_doubt: usize,
+    pub confidently_wrong: usize,
+}
+
+impl Outcome {
+    pub fn runs(&self) -> usize {
+        self.right + self.in_doubt + self.confidently_wrong
+    }
+}
+
+/// Every lie × leak × accuracy × wind, `seeds` times each; the order and the seeds don't depend on the cores.
+pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome> {
+    let cylinders: Vec<_> = winds.iter().flat_map(|wind| LEAKING.map(|leaking| (*wind, leaking))).collect();
+    let of_cylinder = |(wind, leaking): &(WindCase, Leaking)| {
+        let truths = truths(*wind, *leaking);
+        let cases: Vec<_> = accuracies.iter().flat_map(|a| LIES.iter().map(move |lie| (*a, lie))).collect();
+        let outcome = |(accuracy, lie): &(f64, &'static Lie)| {
+            let judgements: Vec<_> =
+                (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
+            let count = |which| judgements.iter().filter(|judgement| **judgement == which).count();
+            Outcome {
+                lie,
+                leaking: *leaking,
+                accuracy: *accuracy,
+                wind: *wind,
+                right: count(Judgement::Right),
+                in_doubt: count(Judgement::InDoubt),
+                confidently_wrong: count(Judgement::ConfidentlyWrong),
+            }
+        };
+        cases.par_iter().map(outcome).collect::<Vec<_>>()
+    };
+    cylinders.par_iter().map(of_cylinder).collect::<Vec<_>>().concat()
+}

@@ -1,0 +1,75 @@
+//! A small bench of lies against its snapshot: `data/lies-snapshot.csv` says how each trace was judged.
+//! After a deliberate change: `LIES_SNAPSHOT=write cargo test --release --test lies`, and read the difference.
+
+#[path = "../benches/lies/judge.rs"]
+mod judge;
+#[path = "../benches/lies/lie.rs"]
+mod lie;
+#[path = "../benches/lies/plant.rs"]
+mod plant;
+#[path = "../benches/lies/sweep.rs"]
+mod sweep;
+#[allow(dead_code, reason = "the bench prints more of it")]
+#[path = "../benches/lies/table.rs"]
+mod table;
+
+use lie::{Family, LIES};
+use pitchleak::wind::WindCase;
+use std::collections::{BTreeMap, BTreeSet};
+
+const ACCURACIES: [f64; 1] = [3e-3];
+const WINDS: [WindCase; 2] = [WindCase::Mps5, WindCase::Mps13];
+/// Another platform rounds otherwise and may turn a coin or two, as a share of a family's runs.
+const SLACK: f64 = 0.01;
+
+/// Right and confidently wrong ones of each row.
+fn read(text: &str) -> BTreeMap<String, (usize, usize)> {
+    let line = |line: &str| {
+        let mut cells = line.rsplitn(4, ',');
+        let mut count = || cells.next().and_then(|cell| cell.parse().ok());
+        let (wrong, _doubt, right): (_, usize, _) = (count()?, count()?, count()?);
+        Some((cells.next()?.to_owned(), (right, wrong)))
+    };
+    text.lines().skip(1).filter_map(line).collect()
+}
+
+#[test]
+fn every_lie_has_a_name_of_its_own() {
+    let names: BTreeSet<_> = LIES.iter().map(|lie| lie.name).collect();
+    assert_eq!(names.len(), LIES.len());
+    let mistakes = LIES.iter().filter(|lie| lie.family == Family::Mistake).count();
+    assert!(mistakes >= 40, "{mistakes} mistakes");
+}
+
+#[test]
+fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
+    if cfg!(debug_assertions) {
+        eprintln!("too slow without optimisation: nothing tested");
+        return;
+    }
+    let outcomes = sweep::sweep(&ACCURACIES, &WINDS, 1);
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/lies-snapshot.csv");
+    if std::env::var_os("LIES_SNAPSHOT").is_some() {
+        std::fs::write(path, table::csv(&outcomes)).expect("the snapshot is written");
+    }
+    let before = read(&std::fs::read_to_string(path).expect("the snapshot is there"));
+    assert_eq!(before.len(), outcomes.len(), "the lies have changed: write the snapshot anew");
+    for family in Family::ALL {
+        let (mut runs, mut lost, mut wrong) = (0, 0, Vec::new());
+        for outcome in outcomes.iter().filter(|outcome| outcome.lie.family == family) {
+            let key = table::key(outcome);
+            let (right, wrong_before) =
+                before.get(&key).unwrap_or_else(|| panic!("{key} is not in the snapshot"));
+            runs += outcome.runs();
+            lost += right.saturating_sub(outcome.right);
+            if outcome.confidently_wrong > *wrong_before {
+                wrong.push(key);
+            }
+        }
+        let slack = (SLACK * runs as f64) as usize;
+        assert!(wrong.len() <= slack, "{family:?}: newly confidently wrong: {wrong:#?}");
+        // To doubt a trace whose meters lie is no loss.
+        let must_be_sure = matches!(family, Family::Honest | Family::Harmless);
+        assert!(!must_be_sure || lost <= slack, "{family:?}: {lost} of {runs} right and sure ones are lost");
+    }
+}
