@@ -53,17 +53,17 @@ impl CramerRaoModel<'_> {
     /// The bound for noise-free `samples`, `dt_s` apart; `None` where a flow is missing or nothing at all
     /// can be learnt.
     pub fn bound(&self, dt_s: f64, samples: &[Sample<f64>]) -> Option<CramerRao> {
-        self.course(dt_s, samples, samples.len().saturating_sub(1).max(1))?.pop()
+        self.history(dt_s, samples, samples.len().saturating_sub(1).max(1))?.pop()
     }
 
     /// The bound after every `stride` samples of noise-free `samples`, `dt_s` apart; `None` as in
     /// [`bound`](Self::bound).
-    pub fn course(&self, dt_s: f64, samples: &[Sample<f64>], stride: usize) -> Option<Vec<CramerRao>> {
+    pub fn history(&self, dt_s: f64, samples: &[Sample<f64>], stride: usize) -> Option<Vec<CramerRao>> {
         let units = self.units();
         let noise = self.noise_variance();
         let mut information = self.prior_information(&units);
         let mut before: Option<(Matrix2<f64>, StepModel, Columns)> = None;
-        let mut course = Vec::new();
+        let mut history = Vec::new();
         for (index, pair) in samples.windows(2).enumerate() {
             let [first, second] = pair else { continue };
             let step = self.step(dt_s, first, second, &units)?;
@@ -80,10 +80,10 @@ impl CramerRaoModel<'_> {
             information += columns.transpose() * inverse * columns;
             before = Some((inverse, step, columns));
             if (index + 1) % stride == 0 {
-                course.push(CramerRao::of(&information, &units)?);
+                history.push(CramerRao::of(&information, &units)?);
             }
         }
-        Some(course)
+        Some(history)
     }
 
     /// Variances of x, P_A, P_B, Q_A, Q_B.

@@ -43,7 +43,7 @@ fn watch(truths: &[Truth], seed: u64, mut at: impl FnMut(f64, PerLeak<bool>)) {
         let sample = sensing.read(&truth.sample);
         let record = Record { t_s: truth.t_s, dt_s, sample, ..Record::default() };
         if replay.push(&record) {
-            at(truth.t_s, replay.point(&record).active);
+            at(truth.t_s, replay.estimate_row(&record).active);
         }
     }
 }

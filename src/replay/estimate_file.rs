@@ -1,4 +1,4 @@
-use super::Point;
+use super::EstimateRow;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fs::File;
@@ -54,7 +54,7 @@ impl EstimateFile {
             Sink::Plain(writer)
         };
         let mut created = Self { file, sink };
-        let header = created.sink.write_line(format_args!("{}", Point::COLUMNS.join(",")));
+        let header = created.sink.write_line(format_args!("{}", EstimateRow::COLUMNS.join(",")));
         header.map_err(|source| created.error(source))?;
         Ok(created)
     }
@@ -63,7 +63,7 @@ impl EstimateFile {
     ///
     /// # Errors
     /// Where the file cannot be written on.
-    pub fn write(&mut self, point: &Point) -> Result<(), EstimateFileError> {
+    pub fn write(&mut self, point: &EstimateRow) -> Result<(), EstimateFileError> {
         let [t_s, numbers @ .., internal, external_a, external_b] = point.values();
         let [a, b, c, d, e, f, g, h, i] = numbers;
         let written = self.sink.write_line(format_args!(

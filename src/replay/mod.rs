@@ -25,7 +25,7 @@ use scoring::Scoring;
 
 /// The estimates after one record, for a file of estimates over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct EstimateRow {
     /// Time in the trace, s.
     pub t_s: f64,
     /// Coefficients, m³/(s·Pa).
@@ -36,7 +36,7 @@ pub struct Point {
     pub active: PerLeak<bool>,
 }
 
-impl Point {
+impl EstimateRow {
     /// What [`values`](Self::values) are, as column headers: coefficients and their standard deviations in
     /// m³/(s·Pa), flows in L/min, active alarms as 1.
     pub const COLUMNS: [&str; 13] = [
@@ -184,11 +184,11 @@ impl Replay {
     }
 
     /// The estimates as they stand after `record`.
-    pub fn point(&self, record: &Record) -> Point {
+    pub fn estimate_row(&self, record: &Record) -> EstimateRow {
         let coefficients = self.leak_coefficients();
         let pressures = leak_pressures_pa(record, self.estimator.pressure_biases_pa());
         let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
-        Point { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
+        EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
     /// The rig.

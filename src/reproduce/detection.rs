@@ -128,7 +128,7 @@ impl Watch {
             record =
                 Record { t_s: truth.t_s, dt_s, sample: sensing.read(&truth.sample), ..Record::default() };
             if replay.push(&record) {
-                let active = replay.point(&record).active;
+                let active = replay.estimate_row(&record).active;
                 let new = Leak::ALL.into_iter().filter(|leak| active[*leak] && !before[*leak]);
                 raised.extend(new.map(|leak| (leak, truth.t_s)));
                 before = active;

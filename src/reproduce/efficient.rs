@@ -2,12 +2,12 @@
 //!
 //! An efficient estimator's error at one time is its error at any later time plus a part that is independent
 //! of it (S. Kay 1993, Fundamentals of Statistical Signal Processing, §3.4 and §12.6: the sequential estimator's
-//! corrections are white). So its course over a window is drawn backwards: from the bound at the end,
+//! corrections are white). So its history over a window is drawn backwards: from the bound at the end,
 //! each step adds the difference of two bounds. Scored like a real estimator, it tells what the figures of
 //! the table can be at best, start and definition of steady state included.
 
 use super::protocol::{SAMPLE_RATE_HZ, driving_pressures_pa};
-use super::trial::{Course, Filters};
+use super::trial::{EstimateHistory, Filters};
 use crate::cramer_rao::{CramerRaoModel, PARAMETERS};
 use crate::simulate::{Normal, Sensing, Truth};
 use nalgebra::{SMatrix, SVector, SymmetricEigen};
@@ -31,7 +31,7 @@ pub struct Efficient {
 impl Efficient {
     /// The efficient estimator of the noise-free `samples`; `None` where nothing can be learnt.
     pub fn new(model: &CramerRaoModel<'_>, samples: &[Sample<f64>]) -> Option<Self> {
-        let bounds = model.course(1.0 / SAMPLE_RATE_HZ, samples, STRIDE)?;
+        let bounds = model.history(1.0 / SAMPLE_RATE_HZ, samples, STRIDE)?;
         let differences = bounds.windows(2).map(|pair| match pair {
             [now, next] => root(now.covariance - next.covariance),
             _ => Matrix::zeros(),
@@ -69,14 +69,14 @@ impl Efficient {
     ///
     /// # Errors
     /// Where the filter does not exist at the protocol's rate.
-    pub fn course(
+    pub fn history(
         &self,
         window: &[Truth],
         mut sensing: Sensing,
         normal: &mut Normal,
-    ) -> Result<Course, FilterError> {
+    ) -> Result<EstimateHistory, FilterError> {
         let errors = self.draw(normal);
-        let mut course = Course::default();
+        let mut history = EstimateHistory::default();
         let mut filters = Filters::default();
         for (index, truth) in window.iter().enumerate() {
             let place = self.place(index + 1).unwrap_or(0);
@@ -90,9 +90,9 @@ impl Efficient {
             let read = driving_pressures_pa(&sensing.read(&truth.sample));
             let (pressures, references) = filters.advance(read, truth.leaks_m3s)?;
             let flows = coefficients.zip(pressures.zip(unseen)).map(|(c, (p, off))| c.value * (p - off));
-            course.push(index, coefficients, flows, references);
+            history.push(index, coefficients, flows, references);
         }
-        Ok(course)
+        Ok(history)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::protocol::{Case, ReproduceError, Run};
 use super::search::paper_rig;
-use super::trial::Course;
+use super::trial::EstimateHistory;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
 use crate::figure::{Ink, Line, Panel, svg};
 use crate::simulate::{Biases, Sensing, Truth};
@@ -46,10 +46,10 @@ impl Reproduction {
             ("fig8a_leakage_case2.svg", "fig8b_coefficients_case2.svg"),
         ];
         for (case, (leakage, coefficients)) in Case::ALL.into_iter().zip(names) {
-            let courses =
-                of_case(case).into_iter().map(|run| self.courses(run)).collect::<Result<Vec<_>, _>>()?;
+            let histories =
+                of_case(case).into_iter().map(|run| self.histories(run)).collect::<Result<Vec<_>, _>>()?;
             let panels =
-                |draw: fn(&Courses) -> [Panel; 2]| legend_once(courses.iter().flat_map(draw).collect());
+                |draw: fn(&Histories) -> [Panel; 2]| legend_once(histories.iter().flat_map(draw).collect());
             figures.push((leakage, svg(&panels(leak_flows), COLUMNS)?));
             figures.push((coefficients, svg(&panels(leak_coefficients), COLUMNS)?));
         }
@@ -75,28 +75,28 @@ impl Reproduction {
     }
 
     /// Both laws on the same readings of the window that is drawn.
-    fn courses(&self, run: &Run) -> Result<Courses, ReproduceError> {
+    fn histories(&self, run: &Run) -> Result<Histories, ReproduceError> {
         let best = self.report.paper_gains.first();
         let (lambda, gamma) = best.map_or((10.0, 1.0), |best| (best.lambda_per_s, best.gamma));
-        let course = |rig| {
+        let history = |rig| {
             let sensing = Sensing::new(super::rig().sensors(), Biases::default(), SEED);
-            Course::run(&rig, run.window(WINDOW), sensing)
+            EstimateHistory::run(&rig, run.window(WINDOW), sensing)
         };
         let mean_mps = run.wind.mean_mps();
-        Ok(Courses {
+        Ok(Histories {
             mean_mps,
             truth: run.leaks_m3spa,
-            paper: course(paper_rig(lambda, gamma))?,
-            ours: course(rig())?,
+            paper: history(paper_rig(lambda, gamma))?,
+            ours: history(rig())?,
         })
     }
 }
 
-struct Courses {
+struct Histories {
     mean_mps: u32,
     truth: PerLeak<f64>,
-    paper: Course,
-    ours: Course,
+    paper: EstimateHistory,
+    ours: EstimateHistory,
 }
 
 fn over_time(truths: &[Truth], value: impl Fn(&Truth) -> f64) -> Points {
@@ -165,46 +165,46 @@ fn at_least(least: f64, points: &Points) -> (f64, f64) {
     (0.5 * (low + high) - half, 0.5 * (low + high) + half)
 }
 
-fn leak_flows(courses: &Courses) -> [Panel; 2] {
+fn leak_flows(histories: &Histories) -> [Panel; 2] {
     let panel = |leak: Leak| {
         let points = |flows: &[PerLeak<f64>]| -> Points {
-            courses.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM_PER_M3S * q[leak])).collect()
+            histories.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM_PER_M3S * q[leak])).collect()
         };
-        let reference = points(&courses.ours.references_m3s);
+        let reference = points(&histories.ours.references_m3s);
         let (low, high) = at_least(0.1, &reference);
         let room = 0.3 * (high - low);
         Panel {
-            title: format!("{} m/s: {} leakage", courses.mean_mps, leak.label()),
+            title: format!("{} m/s: {} leakage", histories.mean_mps, leak.label()),
             x_label: "time (s)",
             y_label: "leakage (L/min)",
             y_range: Some((low - room, high + room)),
             lines: vec![
                 line("measured", Ink::Measured, reference),
-                line("paper's law", Ink::Paper, points(&courses.paper.flows_m3s)),
-                line("ours", Ink::Ours, points(&courses.ours.flows_m3s)),
+                line("paper's law", Ink::Paper, points(&histories.paper.flows_m3s)),
+                line("ours", Ink::Ours, points(&histories.ours.flows_m3s)),
             ],
         }
     };
     [panel(Leak::Internal), panel(Leak::ExternalA)]
 }
 
-fn leak_coefficients(courses: &Courses) -> [Panel; 2] {
+fn leak_coefficients(histories: &Histories) -> [Panel; 2] {
     let panel = |leak: Leak| {
-        let points = |course: &Course| -> Points {
-            let values = course.coefficients.iter().map(|c| LPM_PER_BAR * c[leak].value);
-            course.t_s.iter().copied().zip(values).collect()
+        let points = |history: &EstimateHistory| -> Points {
+            let values = history.coefficients.iter().map(|c| LPM_PER_BAR * c[leak].value);
+            history.t_s.iter().copied().zip(values).collect()
         };
-        let truth = LPM_PER_BAR * courses.truth[leak];
-        let end = courses.ours.t_s.last().copied().unwrap_or(0.0);
+        let truth = LPM_PER_BAR * histories.truth[leak];
+        let end = histories.ours.t_s.last().copied().unwrap_or(0.0);
         Panel {
-            title: format!("{} m/s: {} leak coefficient", courses.mean_mps, leak.label()),
+            title: format!("{} m/s: {} leak coefficient", histories.mean_mps, leak.label()),
             x_label: "time (s)",
             y_label: "coefficient (L/min/bar)",
             y_range: Some((-0.2 * truth, 2.0 * truth)),
             lines: vec![
                 line("measured", Ink::Measured, vec![(0.0, truth), (end, truth)]),
-                line("paper's law", Ink::Paper, points(&courses.paper)),
-                line("ours", Ink::Ours, points(&courses.ours)),
+                line("paper's law", Ink::Paper, points(&histories.paper)),
+                line("ours", Ink::Ours, points(&histories.ours)),
             ],
         }
     };

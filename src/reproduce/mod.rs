@@ -13,8 +13,8 @@ mod trial;
 pub use detection::{Delay, Detection, detection};
 pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
 pub use search::{Candidate, best_gains, paper_rig};
-pub use table::{Bound, Figures, Row, Scored};
-pub use trial::{Course, TrialScore};
+pub use table::{Bound, ErrorMetrics, Row, Scored};
+pub use trial::{EstimateHistory, TrialScore};
 
 use crate::Rig;
 use crate::cramer_rao::CramerRaoModel;
@@ -209,14 +209,15 @@ impl Law {
         let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
         mine.map(|seed| {
             let biases = Biases::drawn(&self.rig.instruments, self.bias_share, seed);
-            let course = Course::run(&self.rig, truths, Sensing::new(self.rig.sensors(), biases, seed))?;
+            let history =
+                EstimateHistory::run(&self.rig, truths, Sensing::new(self.rig.sensors(), biases, seed))?;
             let unbiased = Sensing::new(sensors, Biases::default(), seed);
-            let best = efficient.course(truths, unbiased, &mut Normal::stream(seed, EFFICIENT_STREAM))?;
+            let best = efficient.history(truths, unbiased, &mut Normal::stream(seed, EFFICIENT_STREAM))?;
             Ok(PerLeak::from_fn(|leak| {
                 // Nothing leaks out of B here; its errors are relative to 1.
                 let coefficient = if leak == Leak::ExternalB { 1.0 } else { truth[leak] };
                 Entry {
-                    score: course.score(coefficient, leak),
+                    score: history.score(coefficient, leak),
                     efficient: best.score(coefficient, leak),
                     window: WindowBound::new(coefficient, stds[leak], sizes[leak]),
                 }

@@ -2,7 +2,7 @@
 
 use super::counted::map_counted;
 use super::protocol::{ReproduceError, Run, WINDOWS, rig};
-use super::trial::{Course, mean};
+use super::trial::{EstimateHistory, mean};
 use crate::Rig;
 use crate::rig::EstimatorKind;
 use crate::simulate::{Biases, Sensing};
@@ -54,10 +54,10 @@ fn try_gains(runs: &[Run], lambda_per_s: f64, gamma: f64) -> Result<Candidate, R
         for window in (0..WINDOWS).step_by(WINDOW_STRIDE) {
             let seed = SEED + 1000 * number + window as u64;
             let sensing = Sensing::new(rig.sensors(), Biases::default(), seed);
-            let course = Course::run(&rig, run.window(window), sensing)?;
+            let history = EstimateHistory::run(&rig, run.window(window), sensing)?;
             let truth = run.leaks_m3spa;
-            errors.push(course.late_error(truth.internal, Leak::Internal));
-            errors.push(course.late_error(truth.external_a, Leak::ExternalA));
+            errors.push(history.late_error(truth.internal, Leak::Internal));
+            errors.push(history.late_error(truth.external_a, Leak::ExternalA));
         }
     }
     let percent = 100.0 * mean(errors.into_iter().map(|error| error.min(1.0)));

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// The five figures of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Figures {
+pub struct ErrorMetrics {
     /// Mean leakage error in steady state, % of the window's mean |Q|.
     pub leakage_mean_error_percent: f64,
     /// Peak leakage error in steady state, % of the window's mean |Q|.
@@ -54,7 +54,7 @@ pub struct Row {
     #[serde(flatten)]
     pub median: Scored,
     /// Worst over all seeds; `null` where not identifiable.
-    pub worst: Option<Figures>,
+    pub worst: Option<ErrorMetrics>,
     /// Share of the seeds that converged, %.
     pub converged_percent: f64,
     /// Share of the seeds whose 95 % interval at the end of the window holds the truth, %; `null` for
@@ -67,15 +67,15 @@ pub struct Row {
 /// The five figures, or nulls where the row is not identifiable.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
 pub struct Scored {
-    /// See [`Figures::leakage_mean_error_percent`].
+    /// See [`ErrorMetrics::leakage_mean_error_percent`].
     pub leakage_mean_error_percent: Option<f64>,
-    /// See [`Figures::leakage_peak_error_percent`].
+    /// See [`ErrorMetrics::leakage_peak_error_percent`].
     pub leakage_peak_error_percent: Option<f64>,
-    /// See [`Figures::coefficient_mean_error_percent`].
+    /// See [`ErrorMetrics::coefficient_mean_error_percent`].
     pub coefficient_mean_error_percent: Option<f64>,
-    /// See [`Figures::coefficient_peak_error_percent`].
+    /// See [`ErrorMetrics::coefficient_peak_error_percent`].
     pub coefficient_peak_error_percent: Option<f64>,
-    /// See [`Figures::convergence_time_s`].
+    /// See [`ErrorMetrics::convergence_time_s`].
     pub convergence_time_s: Option<f64>,
 }
 
@@ -113,10 +113,13 @@ impl WindowBound {
 }
 
 /// The five figures of all seeds, by `pick`.
-fn figures<'a>(scores: impl Iterator<Item = &'a TrialScore> + Clone, pick: fn(Vec<f64>) -> f64) -> Figures {
+fn error_metrics<'a>(
+    scores: impl Iterator<Item = &'a TrialScore> + Clone,
+    pick: fn(Vec<f64>) -> f64,
+) -> ErrorMetrics {
     let all = |of: fn(&TrialScore) -> f64| pick(scores.clone().map(of).collect());
     let time = all(|s| s.convergence_s.unwrap_or(f64::INFINITY));
-    Figures {
+    ErrorMetrics {
         leakage_mean_error_percent: all(|s| s.leakage_mean),
         leakage_peak_error_percent: all(|s| s.leakage_peak),
         coefficient_mean_error_percent: all(|s| s.coefficient_mean),
@@ -135,7 +138,7 @@ impl Row {
     ) -> Self {
         let identifiable = 2 * entries.iter().filter(|e| e.window.identifiable).count() >= entries.len();
         let scores = entries.iter().map(|e| &e.score);
-        let best = figures(entries.iter().map(|e| &e.efficient), median);
+        let best = error_metrics(entries.iter().map(|e| &e.efficient), median);
         let covered: Vec<f64> = entries
             .iter()
             .filter_map(|e| e.score.covered)
@@ -150,8 +153,12 @@ impl Row {
             leak,
             estimator,
             identifiable,
-            median: if identifiable { figures(scores.clone(), median).into() } else { Scored::default() },
-            worst: identifiable.then(|| figures(scores.clone(), worst)),
+            median: if identifiable {
+                error_metrics(scores.clone(), median).into()
+            } else {
+                Scored::default()
+            },
+            worst: identifiable.then(|| error_metrics(scores.clone(), worst)),
             converged_percent: 100.0 * mean(scores.map(|s| f64::from(u8::from(s.convergence_s.is_some())))),
             coverage_percent: (!covered.is_empty()).then(|| mean(covered.into_iter())),
             bound: Bound {
@@ -164,8 +171,8 @@ impl Row {
     }
 }
 
-impl From<Figures> for Scored {
-    fn from(figures: Figures) -> Self {
+impl From<ErrorMetrics> for Scored {
+    fn from(figures: ErrorMetrics) -> Self {
         Self {
             leakage_mean_error_percent: Some(figures.leakage_mean_error_percent),
             leakage_peak_error_percent: Some(figures.leakage_peak_error_percent),

@@ -35,7 +35,7 @@ pub struct TrialScore {
 
 /// What was estimated over time.
 #[derive(Clone, Debug, Default)]
-pub struct Course {
+pub struct EstimateHistory {
     /// Time since the window began, s.
     pub t_s: Vec<f64>,
     /// Coefficients, m³/(s·Pa).
@@ -46,14 +46,14 @@ pub struct Course {
     pub references_m3s: Vec<PerLeak<f64>>,
 }
 
-impl Course {
+impl EstimateHistory {
     /// The rig's estimator on a window as `sensing` reads it.
     ///
     /// # Errors
     /// Where the rig has no estimator, or the filter does not exist at the protocol's rate.
     pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, ReproduceError> {
         let mut estimator = Estimator::new(rig)?;
-        let mut course = Self::default();
+        let mut history = Self::default();
         let mut filters = Filters::default();
         let dt_s = 1.0 / SAMPLE_RATE_HZ;
         for (index, truth) in window.iter().enumerate() {
@@ -67,9 +67,9 @@ impl Course {
             let [bias_a, bias_b] = estimator.pressure_biases_pa();
             let found = PerLeak { internal: bias_a - bias_b, external_a: bias_a, external_b: bias_b };
             let flows = coefficients.zip(read.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
-            course.push(index, coefficients, flows, references);
+            history.push(index, coefficients, flows, references);
         }
-        Ok(course)
+        Ok(history)
     }
 
     /// Adds what stands after sample `index`.

@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut file = arguments.out.as_deref().map(EstimateFile::create).transpose()?;
     let report = replay(&mut reader, &rig, |replay, record, _| match &mut file {
         None => Ok(()),
-        Some(file) => file.write(&replay.point(record)).map_err(Failure::from),
+        Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
     })?;
     file.map(EstimateFile::finish).transpose()?;
     bar.finish_and_clear();

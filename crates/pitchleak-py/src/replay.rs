@@ -4,7 +4,7 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::source::Source;
 use numpy::{IntoPyArray, PyArray1};
-use pitchleak::replay::{Point, ReplayError};
+use pitchleak::replay::{EstimateRow, ReplayError};
 use pitchleak::report::Palette;
 use pyo3::prelude::*;
 
@@ -40,16 +40,17 @@ pub fn over_time<'py>(
     strict: bool,
 ) -> PyResult<(String, Columns<'py>)> {
     let rig = rig.with_estimator(estimator)?;
-    let mut columns: [Vec<f64>; Point::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
+    let mut columns: [Vec<f64>; EstimateRow::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
     let report = source.read(py, &rig, strict, |mut reader| {
         pitchleak::replay::replay(&mut reader, &rig, |replay, record, _| {
-            for (column, value) in columns.iter_mut().zip(replay.point(record).values()) {
+            for (column, value) in columns.iter_mut().zip(replay.estimate_row(record).values()) {
                 column.push(value);
             }
             Ok::<_, ReplayError>(())
         })
     })?;
-    let columns = Point::COLUMNS.into_iter().zip(columns.map(|column| column.into_pyarray(py))).collect();
+    let columns =
+        EstimateRow::COLUMNS.into_iter().zip(columns.map(|column| column.into_pyarray(py))).collect();
     Ok((report.to_json().map_err(value_error)?, columns))
 }
 
