@@ -256,3 +256,48 @@ fn supply_settles_at_its_idle_pressure() {
     assert!(supply.rate_pas(idle_pa + 1e4, 0.0) < 0.0 && supply.rate_pas(idle_pa - 1e4, 0.0) > 0.0);
     assert!(supply.rate_pas(idle_pa, supply.pump_flow_m3s) < 0.0, "what valves draw lowers it");
 }
+
+/// Where a motion is fast the step is divided: one long step comes near many short ones. (Each part may be as long as
+/// the fastest motion's time constant: a few percent off, where too long a step diverges.)
+#[test]
+fn a_step_may_be_as_long_as_one_likes() {
+    let model = Model::<f64>::paper();
+    let plain = CylinderPlant::new(model).unwrap();
+    let mut dragged = plain;
+    dragged.effects.set(Effect::ViscousFriction, 1e6, EffectConstants::default()).unwrap();
+    let stop = plain.end_stop.gap_m;
+    let cases = [
+        ("at the A end", plain, 0.002, 0.1),
+        ("at the B end", plain, 0.198, -0.1),
+        ("at mid stroke", plain, 0.1, 0.1),
+        ("under heavy friction", dragged, 0.1, 0.1),
+        ("on the A stop", plain, 0.5 * stop, 0.0),
+        ("on the B stop", plain, 0.2 - 0.5 * stop, 0.0),
+    ];
+    for (place, plant, x_m, v_mps) in cases {
+        let start = plant.state_at(x_m, v_mps, 4e6, 4e6 * 1.26 / 0.94);
+        let after = |steps: u32| {
+            let step_s = 1e-3 / f64::from(steps);
+            let end = (0..steps).fold(start, |state, _| plant.step(&state, step_s, |_| Drive::default()));
+            let (pa, pb) = plant.pressures_pa(&end);
+            [end.x_m / 1e-4, end.v_mps / 0.1, pa / 4e6, pb / 4e6]
+        };
+        for (once, fine) in after(1).into_iter().zip(after(1000)) {
+            assert!(
+                (once - fine).abs() < 0.1 * fine.abs().max(1.0),
+                "{place}: {once} at once, {fine} finely"
+            );
+        }
+    }
+}
+
+/// The fastest piston is so many strokes a second, whatever the stroke.
+#[test]
+fn the_fastest_piston_goes_with_the_stroke() {
+    let fastest = |share: f64| {
+        let mut model = Model::<f64>::paper();
+        model.cylinder.stroke_m *= share;
+        CylinderPlant::new(model).unwrap().state_at(0.05, 1e9, 1e6, 1e6).v_mps
+    };
+    assert!((fastest(3.0) / fastest(1.0) - 3.0).abs() < 1e-12, "{} {}", fastest(3.0), fastest(1.0));
+}

@@ -175,6 +175,23 @@ mod tests {
     }
 
     #[test]
+    fn lengths_are_positive() {
+        let paper = Linkage::<f64>::paper();
+        assert_eq!(paper.check(), Ok(()));
+        for length in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            for bad in [
+                Linkage { pivot_distance_m: length, ..paper },
+                Linkage { retracted_length_m: length, ..paper },
+                Linkage { crank_radius_m: length, ..paper },
+            ] {
+                assert_eq!(bad.check(), Err(LinkageError::Geometry), "{bad:?}");
+            }
+        }
+        let bad = Linkage { zero_angle_rad: f64::NAN, ..paper };
+        assert_eq!(bad.check(), Err(LinkageError::Geometry));
+    }
+
+    #[test]
     fn dead_point_has_no_force() {
         let linkage = Linkage { zero_angle_rad: 0.0, retracted_length_m: 0.5, ..Linkage::paper() };
         assert_eq!(linkage.force_n(0.0, 1.0), Err(LinkageError::DeadPoint));

@@ -180,3 +180,104 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.pressures.means().sizes_pa
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Cylinder, Fluid, RlsSettings, Sample, Sensors};
+    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+    /// Half a minute of a leaking cylinder whose meters and pressure sensors read too much.
+    fn fed() -> Rls<f64, 6> {
+        let mut sensors = Sensors::paper();
+        sensors.flow_a.bias_std = 2e-6;
+        sensors.flow_b.bias_std = 3e-6;
+        sensors.pressure.bias_std = 9e4;
+        let (cylinder, fluid) = (Cylinder::paper(), Fluid::paper());
+        let mut rls = Rls::new(cylinder, fluid, &sensors, RlsSettings::default()).unwrap();
+        for k in 0..3000 {
+            let t = f64::from(k) * 0.01;
+            let (pa, pb) = (5.5e6 + 1e6 * (1.3 * t).sin(), 4e6 + 8e5 * (0.7 * t).sin());
+            let (x, v) = (0.1 + 0.03 * (0.9 * t).sin(), 0.027 * (0.9 * t).cos());
+            let leak = 2e-11 * (pa - pb);
+            let store_a = cylinder.volume_a_m3(x) / fluid.bulk_modulus_pa * 1.3e6 * (1.3 * t).cos();
+            let store_b = cylinder.volume_b_m3(x) / fluid.bulk_modulus_pa * 5.6e5 * (0.7 * t).cos();
+            let qa = cylinder.area_a_m2 * v + store_a + leak + 5e-12 * pa + 2e-6;
+            let qb = -cylinder.area_b_m2 * v + store_b - leak + 3e-12 * pb - 1e-6;
+            let (pa_pa, pb_pa) = (pa + 9e4, pb - 5e4);
+            rls.update(
+                0.01,
+                &Sample { x_m: x, pa_pa, pb_pa, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None },
+            );
+        }
+        rls
+    }
+
+    /// Mean and covariance of the offsets found, prior units; biases per offset and what is hidden of them, Pa.
+    fn offsets(rls: &Rls<f64, 6>) -> (Vector2<f64>, Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
+        let mean = OFFSETS.map(|o| rls.parameter(o).value / rls.scale[o as usize]);
+        let covariance = Matrix2::from_fn(|i, j| rls.covariance(OFFSETS[i], OFFSETS[j]));
+        let bias_pa = rls.sensors.pressure.bias_std;
+        let per_offset = rls.offsets.pressure_per_offset;
+        let hidden = rls.offsets.pressure_spread;
+        (
+            mean.into(),
+            covariance,
+            Matrix2::from_fn(|i, j| per_offset[i][j]) * bias_pa,
+            Matrix2::from_fn(|i, j| hidden[i][j]) * bias_pa * bias_pa,
+        )
+    }
+
+    fn assert_near(found: Estimate<f64>, value: f64, variance: f64) {
+        assert!((found.value - value).abs() < 1e-9 * value.abs(), "{found:?} for {value}");
+        assert!((found.std / variance.sqrt() - 1.0).abs() < 1e-9, "{found:?} for {}", variance.sqrt());
+    }
+
+    /// Offsets and biases are linear in the offsets found o: q + J b with b = M o, and what o does not show of b.
+    #[test]
+    fn an_offset_sum_has_the_variance_of_a_linear_form() {
+        let rls = fed();
+        let (mean, covariance, per_offset, hidden) = offsets(&rls);
+        let units = Matrix2::from_diagonal(&OFFSETS.map(|o| rls.scale[o as usize]).into());
+        for (flows, pressures) in
+            [([1.0, 0.0], [3e-11, -2e-11]), ([0.0, 1.0], [-2e-11, 2e-11]), ([0.0; 2], [1.0, -0.4])]
+        {
+            let (q, b) = (Vector2::from(flows), Vector2::from(pressures));
+            let weights = units * q + per_offset.transpose() * b;
+            let variance = weights.dot(&(covariance * weights)) + b.dot(&(hidden * b));
+            assert_near(rls.offset_sum(flows, pressures), weights.dot(&mean), variance);
+        }
+    }
+
+    /// A leak's flow is C (P − b): to first order its error is that of C, of the offsets that tell b, and what is
+    /// hidden of b.
+    #[test]
+    fn a_leak_flow_is_as_uncertain_as_its_factors_together() {
+        let rls = fed();
+        let (mean, covariance, per_offset, hidden) = offsets(&rls);
+        let flows = rls.leak_flows_m3s(&LeakPressures {
+            sizes_pa: PerLeak { internal: 2e6, external_a: 5e6, external_b: 4e6 },
+            load_sign: 0.8,
+        });
+        for (found, leak, pressure_pa, shares) in [
+            (flows.internal, Parameter::Internal, 2e6, Vector2::new(0.8, -0.8)),
+            (flows.external_a, Parameter::ExternalA, 5e6, Vector2::new(1.0, 0.0)),
+            (flows.external_b, Parameter::ExternalB, 4e6, Vector2::new(0.0, 1.0)),
+        ] {
+            let coefficient = rls.parameter(leak).value;
+            let to_bias = per_offset.transpose() * shares;
+            let pressure = pressure_pa - to_bias.dot(&mean);
+            let [a, b] = OFFSETS.map(|offset| rls.covariance(leak, offset));
+            let own = rls.covariance(leak, leak);
+            let joint =
+                Matrix3::new(own, a, b, a, covariance.m11, covariance.m12, b, covariance.m21, covariance.m22);
+            let slope = Vector3::new(
+                rls.scale[leak as usize] * pressure,
+                -coefficient * to_bias.x,
+                -coefficient * to_bias.y,
+            );
+            let variance = slope.dot(&(joint * slope)) + coefficient.powi(2) * shares.dot(&(hidden * shares));
+            assert_near(found, coefficient * pressure, variance);
+        }
+    }
+}

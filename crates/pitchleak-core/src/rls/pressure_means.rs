@@ -45,3 +45,37 @@ impl<T: Real> PressureMeans<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::balance::ChamberIntegral;
+    use super::*;
+
+    fn block(time: f64, pa_pa: f64, pb_pa: f64) -> Integrals<f64> {
+        let chamber = |pa: f64| ChamberIntegral { pressure: pa * time, ..ChamberIntegral::default() };
+        Integrals { a: chamber(pa_pa), b: chamber(pb_pa), time, ..Integrals::default() }
+    }
+
+    /// What is weighed by time and forgetting is the mean: Σ w P / Σ w.
+    #[test]
+    fn means_weigh_by_time_and_age() {
+        let mut means = PressureMeans::default();
+        means.add_block(&block(1.0, 5e6, 3e6), 0.9);
+        means.add_block(&block(3.0, 1e6, 2e6), 0.5);
+        let LeakPressures { sizes_pa, load_sign } = means.means();
+        let mean = |first: f64, second: f64| (0.5 * first + 3.0 * second) / 3.5;
+        for (found, expected) in [
+            (sizes_pa.internal, mean(2e6, 1e6)),
+            (sizes_pa.external_a, mean(5e6, 1e6)),
+            (sizes_pa.external_b, mean(3e6, 2e6)),
+            (load_sign, mean(1.0, -1.0)),
+        ] {
+            assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn nothing_watched_is_no_pressure() {
+        assert_eq!(PressureMeans::<f64>::default().means(), LeakPressures::default());
+    }
+}

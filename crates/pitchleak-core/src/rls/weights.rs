@@ -75,6 +75,37 @@ impl<T: Real> Weights<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Matrix2, Vector2};
+    use proptest::prelude::*;
+
+    const AREAS: Vector2<f64> = Vector2::new(1.3e-3, 0.9e-3);
+
+    fn cylinder() -> Cylinder<f64> {
+        Cylinder { area_a_m2: AREAS.x, area_b_m2: AREAS.y, ..Cylinder::paper() }
+    }
+
+    prop_compose! {
+        /// Noise and leaks that weigh alike in the equations' errors.
+        fn errors()(
+            flow_a_m3s in 1e-7..1e-6, flow_b_m3s in 1e-7..1e-6, pressure_pa in 1e4..1e5_f64,
+            (internal, external_a, external_b) in (0.0..1e-11, 0.0..1e-11, 0.0..1e-11),
+        ) -> (NoiseStd<f64>, PerLeak<f64>) {
+            (NoiseStd { flow_a_m3s, flow_b_m3s, pressure_pa, position_m: 0.0 }, PerLeak { internal, external_a, external_b })
+        }
+    }
+
+    /// Covariance of both chambers' errors: flow noise, and pressure noise through the leaks.
+    fn covariance(noise: &NoiseStd<f64>, leaks: &PerLeak<f64>) -> Matrix2<f64> {
+        let c = leaks.internal;
+        let through =
+            Matrix2::new(-(c + leaks.external_a), c, c, -(c + leaks.external_b)) * noise.pressure_pa;
+        let flows = Vector2::new(noise.flow_a_m3s.powi(2), noise.flow_b_m3s.powi(2));
+        Matrix2::from_diagonal(&flows) + through * through.transpose()
+    }
+
+    fn near(found: f64, expected: f64) -> bool {
+        (found / expected - 1.0).abs() < 1e-9
+    }
 
     /// Chamber A reads A_A ẋ, chamber B −A_B ẋ: whichever meters there are, the odometer counts ẋ once.
     #[test]
@@ -86,6 +117,37 @@ mod tests {
             let Weights { odometer_a, odometer_b, .. } = weights(&cylinder, &noise, &leaks);
             let counted = odometer_a * cylinder.area_a_m2 - odometer_b * cylinder.area_b_m2;
             assert!((counted - 1.0).abs() < 1e-12, "{counted}");
+        }
+    }
+
+    proptest! {
+        /// The odometer is the generalised least-squares estimate of ẋ from Q_A = A_A ẋ, Q_B = −A_B ẋ; the balance,
+        /// in which ẋ cancels, keeps what is left of the covariance.
+        #[test]
+        fn both_are_generalised_least_squares((noise, leaks) in errors()) {
+            let weights = Weights::both(&cylinder(), &noise, &leaks);
+            let covariance = covariance(&noise, &leaks);
+            let speed = Vector2::new(AREAS.x, -AREAS.y);
+            let inverse = covariance.try_inverse().unwrap();
+            let variance = 1.0 / (speed.transpose() * inverse * speed).x;
+            let best = inverse * speed * variance;
+            prop_assert!(near(weights.odometer_a, best.x) && near(weights.odometer_b, best.y), "{weights:?} {best}");
+            prop_assert!(near(weights.odometer_variance, variance));
+            let cancelling = Vector2::new(AREAS.y, AREAS.x);
+            prop_assert!(near(weights.balance_variance, (cancelling.transpose() * covariance * cancelling).x));
+        }
+
+        /// One chamber alone: its speed is its flow over its area, as uncertain as its own error; nothing balances.
+        #[test]
+        fn one_chamber_counts_alone((noise, leaks) in errors()) {
+            let covariance = covariance(&noise, &leaks);
+            let a = Weights::only_a(&cylinder(), &noise, &leaks);
+            prop_assert!(near(a.odometer_a, 1.0 / AREAS.x) && a.odometer_b == 0.0);
+            prop_assert!(near(a.odometer_variance, covariance.m11 / AREAS.x.powi(2)));
+            let b = Weights::only_b(&cylinder(), &noise, &leaks);
+            prop_assert!(near(b.odometer_b, -1.0 / AREAS.y) && b.odometer_a == 0.0);
+            prop_assert!(near(b.odometer_variance, covariance.m22 / AREAS.y.powi(2)));
+            prop_assert!(a.balance_variance.is_infinite() && b.balance_variance.is_infinite());
         }
     }
 }
