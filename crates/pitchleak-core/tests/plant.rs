@@ -266,6 +266,10 @@ fn a_step_may_be_as_long_as_one_likes() {
     let mut dragged = plain;
     dragged.effects.set(Effect::ViscousFriction, 1e6, EffectConstants::default()).unwrap();
     let stop = plain.end_stop.gap_m;
+    // With hoses the stop is stiffer than the oil.
+    let mut hosed = plain;
+    hosed.model.cylinder.dead_volume_a_m3 = 2e-4;
+    hosed.model.cylinder.dead_volume_b_m3 = 2e-4;
     let cases = [
         ("at the A end", plain, 0.002, 0.1),
         ("at the B end", plain, 0.198, -0.1),
@@ -273,6 +277,8 @@ fn a_step_may_be_as_long_as_one_likes() {
         ("under heavy friction", dragged, 0.1, 0.1),
         ("on the A stop", plain, 0.5 * stop, 0.0),
         ("on the B stop", plain, 0.2 - 0.5 * stop, 0.0),
+        ("on the A stop with hoses", hosed, 0.5 * stop, 0.0),
+        ("on the B stop with hoses", hosed, 0.2 - 0.5 * stop, 0.0),
     ];
     for (place, plant, x_m, v_mps) in cases {
         let start = plant.state_at(x_m, v_mps, 4e6, 4e6 * 1.26 / 0.94);
