@@ -27,6 +27,7 @@
 
 pub use pitchleak_core as core;
 
+pub mod channels;
 pub mod check;
 pub mod cramer_rao;
 pub mod curve;
@@ -44,5 +45,6 @@ pub mod simulate;
 pub mod trace;
 pub mod units;
 pub mod wind;
+pub mod wiring;
 
 pub use rig::Rig;

@@ -1,7 +1,7 @@
 //! Quantities in text ("12.6 cm^2", "20 L/min", "1 %") and the units of trace columns, to SI.
 //!
-//! Every unit converts by a factor or a divisor that a double holds exactly, with one rounding:
-//! the same quantity in two units differs by at most two units in the last place.
+//! Every unit but those of inch and pound converts by a factor or a divisor that a double holds exactly, with one
+//! rounding: the same quantity in two units differs by at most two units in the last place.
 
 pub use pitchleak_core::LPM_PER_M3S;
 
@@ -56,6 +56,18 @@ impl Unit {
         value * self.factor / self.divisor + self.offset
     }
 
+    /// The unit of numbers that give `scale` times the quantity less `offset` (SI): what a column's own scale and
+    /// offset make of its unit.
+    #[must_use]
+    pub fn scaled(self, scale: f64, offset: f64) -> Self {
+        Self { factor: self.factor * scale, offset: self.offset * scale + offset, ..self }
+    }
+
+    /// How many of `other` one of this unit is; offsets do not count.
+    pub fn over(&self, other: &Self) -> f64 {
+        self.factor / self.divisor * (other.divisor / other.factor)
+    }
+
     /// Whether the unit is the SI unit itself.
     #[allow(clippy::float_cmp)]
     pub fn is_si(&self) -> bool {
@@ -103,7 +115,12 @@ const fn over(text: &'static str, suffix: Option<&'static str>, divisor: f64) ->
 }
 
 const AREA: &[Unit] = &[times("m^2", None, 1.0), over("cm^2", None, 1e4), over("mm^2", None, 1e6)];
-const LENGTH: &[Unit] = &[times("m", Some("m"), 1.0), over("cm", None, 1e2), over("mm", Some("mm"), 1e3)];
+const LENGTH: &[Unit] = &[
+    times("m", Some("m"), 1.0),
+    over("cm", None, 1e2),
+    over("mm", Some("mm"), 1e3),
+    times("in", None, 0.0254),
+];
 const VOLUME: &[Unit] = &[
     times("m^3", None, 1.0),
     over("dm^3", None, 1e3),
@@ -118,6 +135,8 @@ const PRESSURE: &[Unit] = &[
     times("MPa", Some("mpa"), 1e6),
     times("GPa", None, 1e9),
     times("bar", Some("bar"), 1e5),
+    // Pound-force (4.4482216152605 N, exact) per square inch.
+    times("psi", Some("psi"), 4.448_221_615_260_5 / (0.0254 * 0.0254)),
 ];
 const FLOW: &[Unit] = &[
     times("m^3/s", Some("m3s"), 1.0),
@@ -125,6 +144,9 @@ const FLOW: &[Unit] = &[
     over("L/s", None, 1e3),
     over("cm^3/s", None, 1e6),
     over("mL/min", None, 60e6),
+    over("m^3/h", Some("m3h"), 3600.0),
+    // A US gallon is 231 cubic inches.
+    unit_of("gal/min", Some("gpm"), 231.0 * 0.0254 * 0.0254 * 0.0254, 60.0, 0.0),
 ];
 const FORCE: &[Unit] = &[times("N", Some("n"), 1.0), times("kN", Some("kn"), 1e3), times("MN", None, 1e6)];
 const SPEED: &[Unit] = &[times("m/s", Some("mps"), 1.0), over("mm/s", Some("mmps"), 1e3)];
@@ -194,6 +216,7 @@ fn canonical(unit: &str) -> String {
         "ml" => "mL".to_owned(),
         "ml/min" => "mL/min".to_owned(),
         "m^3s" => "m^3/s".to_owned(),
+        "inch" => "in".to_owned(),
         "C" | "degC" => "°C".to_owned(),
         _ => unit,
     }

@@ -1,15 +1,17 @@
-//! What a trace is worth before anybody believes its leaks: data quality, excitation, and what it can
-//! and cannot identify.
+//! What a trace is worth before anybody believes its leaks: data quality, channels, wiring, excitation, and what it
+//! can and cannot identify.
 
 mod readings;
 mod text;
 
 pub use readings::Reading;
 
+use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::replay::{ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::TraceReader;
+use crate::wiring::{Excerpt, Wiring, explain};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -25,6 +27,10 @@ pub struct CheckReport {
     pub rig: String,
     /// What each signal did.
     pub readings: Vec<Reading>,
+    /// Channels that are dead, stuck, clipped, held or coarse.
+    pub channels: Vec<ChannelFault>,
+    /// The mistake of wiring, sign or unit that explains what the columns as declared do not.
+    pub wiring: Option<Wiring>,
     /// What the trace tells about each leak.
     pub leaks: PerLeak<Reach>,
     /// What the trace tells about the bulk modulus.
@@ -76,19 +82,26 @@ pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, Rep
     let mut rig = rig.clone();
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();
+    let mut monitor = ChannelMonitor::default();
+    let mut excerpt = Excerpt::default();
+    let columns = reader.columns(&rig.columns);
     let replayed = replay(reader, &rig, |_, record, _| {
         extremes.add(record);
+        monitor.add(record);
+        excerpt.add(record);
         Ok::<_, ReplayError>(())
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
-        rig: rig.name,
         readings: extremes.readings(),
+        channels: monitor.faults(&rig),
+        wiring: explain(&excerpt.records(), &rig).map(|found| found.wiring(&columns, &rig)),
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,
         trace: replayed.trace,
+        rig: rig.name,
     })
 }

@@ -9,7 +9,9 @@ impl CheckReport {
         let _ = writeln!(out, "trace  {}: {}", self.trace.path, data_line(&self.trace));
         let _ = writeln!(out, "rig    {}\n", rig_line(&self.rig));
         self.write_readings(&mut out, palette);
+        self.write_channels(&mut out, palette);
         self.write_reach(&mut out, palette);
+        self.write_wiring(&mut out, palette);
         self.write_consistency(&mut out, palette);
         out
     }
@@ -26,6 +28,29 @@ impl CheckReport {
                 short(reading.most),
                 reading.present_percent,
             );
+        }
+    }
+
+    fn write_channels(&self, out: &mut String, palette: &Palette) {
+        let (caution, reset) = palette.caution();
+        if !self.channels.is_empty() {
+            let _ = writeln!(out);
+        }
+        for fault in &self.channels {
+            let _ = writeln!(out, "{caution}{}{reset}: {}", fault.text, fault.suggestion);
+        }
+    }
+
+    fn write_wiring(&self, out: &mut String, palette: &Palette) {
+        let Some(wiring) = &self.wiring else { return };
+        let (caution, reset) = palette.caution();
+        let _ = writeln!(out, "\n{caution}Check the wiring: {}{reset}", wiring.suggestion);
+        if wiring.columns.is_empty() {
+            return;
+        }
+        let _ = writeln!(out, "Where that is so, this in the rig file mends it:\n    [columns]");
+        for line in &wiring.columns {
+            let _ = writeln!(out, "    {line}");
         }
     }
 

@@ -62,6 +62,22 @@ pub struct ForeignColumn {
     pub name: String,
     /// The unit its numbers are in.
     pub unit: Option<Unit>,
+    /// Factor on what it reads, …
+    pub scale: f64,
+    /// … and what is then added, SI.
+    pub offset: f64,
+}
+
+impl ForeignColumn {
+    /// A column whose numbers are read as they are.
+    pub fn new(name: impl Into<String>, unit: Option<Unit>) -> Self {
+        Self { name: name.into(), unit, scale: 1.0, offset: 0.0 }
+    }
+
+    /// The unit of its numbers, scale and offset included.
+    pub fn reading(&self) -> Option<Unit> {
+        self.unit.map(|unit| unit.scaled(self.scale, self.offset))
+    }
 }
 
 /// `[columns]`: the foreign name of each mapped signal.
@@ -119,17 +135,29 @@ pub(super) fn read_alarms(
     })
 }
 
-/// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar" }`.
+/// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar", scale = -1.0, offset = "2 bar" }`: minus
+/// what the column says, plus 2 bar.
 pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError> {
     section.allow(&Signal::ALL.map(Signal::name))?;
     let mut columns = ColumnMap::new();
     for signal in section.keys().filter_map(Signal::by_name) {
         let entry = section.section(signal.name())?;
-        entry.allow(&["name", "unit"])?;
+        entry.allow(&["name", "unit", "scale", "offset"])?;
         let name =
             entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
         let unit = read_unit(&entry, signal)?;
-        columns.insert(signal, ForeignColumn { name: name.to_owned(), unit });
+        let scale = entry.quantity("scale", Dimension::Share, Bound::between(-1e12, 1e12))?.unwrap_or(1.0);
+        if scale == 0.0 {
+            return Err(entry.impossible("scale", "0", "a number that keeps the readings apart"));
+        }
+        let offset = match signal.dimension() {
+            Some(dimension) => entry.quantity("offset", dimension, Bound::between(-1e12, 1e12))?,
+            None => None,
+        };
+        columns.insert(
+            signal,
+            ForeignColumn { name: name.to_owned(), unit, scale, offset: offset.unwrap_or(0.0) },
+        );
     }
     Ok(columns)
 }

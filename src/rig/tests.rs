@@ -38,7 +38,7 @@ internal = "0.2 L/min"
 hysteresis = "25 %"
 hold_time = "5 s"
 [columns]
-pa = { name = "Head pressure", unit = "bar" }
+pa = { name = "Head pressure", unit = "bar", scale = -1.5, offset = "2 bar" }
 timestamp = { name = "Zeit" }
 [effects]
 position_gain = { value = 0.02, std = 0.001 }
@@ -83,7 +83,7 @@ fn errors_name_file_line_key_and_the_values_allowed() {
             "rig.toml:1: missing key `cylinder.stroke`: above 0 to 100 m",
         ),
         (declared().replace("[fluid]", "[fluids]"), "rig.toml:6: unknown key `fluids`"),
-        (declared().replace("20 L/min", "20 gpm"), "rig.toml:10: `sensors.flow.full_scale`: unit `gpm`"),
+        (declared().replace("20 L/min", "20 cfm"), "rig.toml:10: `sensors.flow.full_scale`: unit `cfm`"),
         (
             declared().replace("accuracy = \"1 %\"", "accuracy = \"200 %\""),
             "rig.toml:10: `sensors.flow.accuracy` is 2;",

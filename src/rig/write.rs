@@ -1,4 +1,5 @@
-use super::{Instrument, Rig};
+use super::{ForeignColumn, Instrument, Rig};
+use crate::signal::Signal;
 use crate::units::Dimension;
 use std::fmt::Write;
 
@@ -97,9 +98,7 @@ impl Rig {
         }
         out.push_str("\n[columns]\n");
         for (signal, column) in &self.columns {
-            let unit = column.unit.map_or(String::new(), |unit| format!(", unit = {}", toml_text(unit.text)));
-            let name = toml_text(&column.name);
-            let _ = writeln!(out, "{} = {{ name = {name}{unit} }}", signal.name());
+            let _ = writeln!(out, "{} = {}", signal.name(), column.to_toml(*signal));
         }
     }
 
@@ -116,6 +115,24 @@ impl Rig {
             }
             out.push_str(" }\n");
         }
+    }
+}
+
+impl ForeignColumn {
+    /// The entry of `[columns]`, e.g. `{ name = "Head pressure", unit = "bar" }`; scale and offset where they do
+    /// anything.
+    pub fn to_toml(&self, signal: Signal) -> String {
+        let mut out = format!("{{ name = {}", toml_text(&self.name));
+        if let Some(unit) = self.unit {
+            let _ = write!(out, ", unit = {}", toml_text(unit.text));
+        }
+        if (self.scale - 1.0).abs() > 0.0 {
+            let _ = write!(out, ", scale = {:?}", self.scale);
+        }
+        if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
+            let _ = write!(out, ", offset = {}", quantity(self.offset, dimension));
+        }
+        out + " }"
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::TraceFault;
 use super::quality::Counted;
-use crate::rig::ColumnMap;
+use crate::rig::{ColumnMap, ForeignColumn};
 use crate::signal::Signal;
 use crate::units::Unit;
 
@@ -62,6 +62,21 @@ impl Layout {
     /// As [`has`](Self::has), where a timestamp is as good as a time.
     fn gives(&self, signal: Signal) -> bool {
         self.has(signal) || (signal == Signal::Time && self.has(Signal::Timestamp))
+    }
+
+    /// Each signal's column as a rig file's `[columns]` would name it.
+    pub(super) fn column_map(&self, map: &ColumnMap) -> ColumnMap {
+        let entry = |column: &Column| match column.content {
+            Content::Number(signal, unit) => {
+                let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
+                let read = map.get(&signal).filter(|mapped| mapped.name.trim() == column.header);
+                let own = || ForeignColumn::new(&column.header, unit.or_else(si));
+                Some((signal, read.cloned().unwrap_or_else(own)))
+            }
+            Content::Timestamp => Some((Signal::Timestamp, ForeignColumn::new(&column.header, None))),
+            Content::Ignored => None,
+        };
+        self.columns.iter().filter_map(entry).collect()
     }
 
     /// The header of the column that holds `signal`.
@@ -133,7 +148,7 @@ fn bind(header: &str, map: &ColumnMap) -> Column {
     let mapped = map.iter().find(|(_, column)| column.name.trim() == header);
     let content = match mapped {
         Some((Signal::Timestamp, _)) => Content::Timestamp,
-        Some((signal, column)) => column.unit.map_or(Content::Ignored, |unit| number(*signal, unit)),
+        Some((signal, column)) => column.reading().map_or(Content::Ignored, |unit| number(*signal, unit)),
         None => bind_by_suffix(header),
     };
     Column { header: header.to_owned(), content }

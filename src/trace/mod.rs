@@ -21,7 +21,7 @@ pub use row_validator::RowValidator;
 pub use stamp::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 
-use crate::rig::Rig;
+use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use pitchleak_core::{PerLeak, Sample};
 use row::{Next, Row, RowSource};
@@ -168,6 +168,11 @@ impl<'a> TraceReader<'a> {
     /// The trace as the user named it.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// The column of each signal, as a rig file's `[columns]` would name it; `map` is the one it was read with.
+    pub fn columns(&self, map: &ColumnMap) -> ColumnMap {
+        self.rows.layout().column_map(map)
     }
 
     /// Whether the trace has a column for `signal`.

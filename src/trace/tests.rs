@@ -77,15 +77,18 @@ fn header_errors_say_what_is_expected() {
         (HEADER, "no usable row: the trace has only a header"),
         (
             "t_s,x_m,pa_pa\n",
-            "no column for pressure B: pb_pa or pb_kpa or pb_mpa or pb_bar expected; the header has t_s, x_m, pa_pa",
+            "no column for pressure B: pb_pa or pb_kpa or pb_mpa or pb_bar or pb_psi expected; the header has t_s, x_m, pa_pa",
         ),
         ("t_s,x_m,x_mm,pa_pa,pb_pa\n", "columns `x_m` and `x_mm` both give `x`"),
         ("t_s,x_m,x_m,pa_pa,pb_pa\n", "columns `x_m` and `x_m` both give `x`"),
         (
-            "t_s,x_m,pa_psi,pb_pa\n",
-            "column `pa_psi`: unknown unit `psi`; allowed for `pa`: pa, kpa, mpa, bar",
+            "t_s,x_m,pa_atm,pb_pa\n",
+            "column `pa_atm`: unknown unit `atm`; allowed for `pa`: pa, kpa, mpa, bar, psi",
         ),
-        ("t_s,x_m,pa_pa,pb_pa,qa_gpm\n", "column `qa_gpm`: unknown unit `gpm`; allowed for `qa`: m3s, lpm"),
+        (
+            "t_s,x_m,pa_pa,pb_pa,qa_cfm\n",
+            "column `qa_cfm`: unknown unit `cfm`; allowed for `qa`: m3s, lpm, m3h, gpm",
+        ),
         ("t_s,x_m,pa_pa,pb_pa,qa\n", "column `qa`: unknown unit ``"),
         ("PAR1\u{0}", "Parquet"),
         ("\u{0}\u{1}\u{2}\u{3}", "not a CSV file"),

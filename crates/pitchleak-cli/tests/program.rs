@@ -144,7 +144,7 @@ fn unusable_traces_are_refused_in_one_line() {
         ("header only", format!("{HEADER}\n"), &["no usable row", "only a header"]),
         ("missing column", good.replace("pb_pa", "other"), &["no column for pressure B", "pb_pa or pb_kpa"]),
         ("doubled column", good.replace("v_mps", "x_mm"), &["`x_m` and `x_mm`", "keep one"]),
-        ("unknown unit", good.replace("pa_pa", "pa_psi"), &["unknown unit `psi`", "pa, kpa, mpa, bar"]),
+        ("unknown unit", good.replace("pa_pa", "pa_atm"), &["unknown unit `atm`", "pa, kpa, mpa, bar, psi"]),
         ("all words", good.replace("0.", "o."), &["no usable row", "line 2", "is not a number"]),
         ("all outside", good.replace(",0.1", ",7.1"), &["no usable row", "outside the stroke"]),
         ("binary", "\u{0}\u{1}\u{2}".to_owned(), &["not a CSV file"]),

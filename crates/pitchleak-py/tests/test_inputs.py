@@ -139,7 +139,7 @@ def test_any_sample(readings):
         ({"x_m": np.array([0.1, 0.1, np.nan, 0.1, 0.1])}, pl.TraceError, "row 2, column `x_m`: missing"),
         ({"qa_m3s": np.array([0, 0, 0, np.inf, 0])}, pl.TraceError, "row 3, column `qa_m3s`: not a finite number"),
         ({"t_s": np.zeros(5)}, pl.TraceError, "row 1, column `t_s`: 0 s is not after 0 s"),
-        ({"pa_psi": np.zeros(5)}, pl.TraceWarning, "columns ignored: pa_psi"),
+        ({"pa_atm": np.zeros(5)}, pl.TraceWarning, "columns ignored: pa_atm"),
     ],
 )
 def test_an_error_names_column_and_row(change, error, words):

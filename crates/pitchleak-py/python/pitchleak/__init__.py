@@ -12,7 +12,7 @@ numpy arrays, or a path; its columns are named ``<signal>_<unit>`` as in trace f
 10.1109/TMECH.2011.2142400.
 """
 
-from ._check import Check, Reach, Reading, check
+from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
 from ._diagnose import Diagnosis, diagnose
 from ._estimator import Estimator
 from ._inputs import TraceWarning
@@ -24,6 +24,7 @@ from ._simulate import Simulation, simulate
 
 __all__ = [
     "Alarm",
+    "ChannelFault",
     "Check",
     "Diagnosis",
     "Estimate",
@@ -45,6 +46,7 @@ __all__ = [
     "TraceError",
     "TraceWarning",
     "Verdict",
+    "Wiring",
     "__version__",
     "check",
     "diagnose",

@@ -41,6 +41,40 @@ class Reach:
     """Why it does not."""
 
 
+@dataclass(frozen=True, slots=True)
+class ChannelFault:
+    """A fault that a channel shows by itself."""
+
+    channel: str
+    """Name of the signal, as in the column headers."""
+    id: str
+    """``channel_dead``, ``channel_stuck``, ``channel_clipped``, ``channel_held`` or ``channel_coarse``."""
+    from_s: float
+    """When it begins, s."""
+    to_s: float
+    """When it ends, s."""
+    text: str
+    """What was seen."""
+    suggestion: str
+    """What to check."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """A mistake of wiring, sign or unit that explains what the columns as declared do not."""
+
+    suggestion: str
+    """The mistake and its evidence, in one sentence."""
+    residual_before: float
+    """Size of the residual, in standard deviations of the declared noise, as the columns are declared."""
+    residual_after: float
+    """The same with the mistake mended."""
+    columns: tuple[str, ...] = ()
+    """Lines for ``[columns]`` of the rig file that mend it; none where the recording has to be mended."""
+    alternatives: tuple[str, ...] = ()
+    """Mistakes that explain the trace as well."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(Tabular):
     """Data quality, excitation, what the trace can and cannot identify. As a table: the signals."""
@@ -57,6 +91,10 @@ class Check(Tabular):
     """What it tells about the bulk modulus."""
     normalised_innovation: tuple[float, ...] | None = None
     """About 1 each where model and declared noise explain the trace, far above where they do not."""
+    channels: tuple[ChannelFault, ...] = ()
+    """Channels that are dead, stuck, clipped, held or coarse."""
+    wiring: Wiring | None = None
+    """The mistake of wiring that explains the trace, if there is one."""
     raw: dict[str, Any] = field(init=False, default_factory=dict)
     """Every field of ``pitchleak check --json``."""
     _text: str = field(init=False, default="")

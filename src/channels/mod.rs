@@ -1,0 +1,110 @@
+//! Channels before estimates: a sensor that is dead, stuck, clipped, held or coarse shows it by itself, whatever the
+//! cylinder does. Constant memory, a few instructions per reading.
+//!
+//! What counts as a fault, and why each bound lies where it does: docs/channels-and-wiring.md.
+
+mod channel;
+mod faults;
+
+use crate::rig::Rig;
+use crate::signal::Signal;
+use crate::trace::Record;
+use channel::Channel;
+use serde::Serialize;
+
+/// What is wrong with a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum ChannelFaultKind {
+    /// One reading through the whole trace, though the cylinder moves.
+    #[serde(rename = "channel_dead")]
+    Dead,
+    /// One reading for a part of the trace, though the channel jitters elsewhere.
+    #[serde(rename = "channel_stuck")]
+    Stuck,
+    /// The readings pile up at their largest or smallest.
+    #[serde(rename = "channel_clipped")]
+    Clipped,
+    /// Each reading is repeated: the channel is renewed slower than it is sampled.
+    #[serde(rename = "channel_held")]
+    Held,
+    /// The smallest step between readings is larger than the declared noise.
+    #[serde(rename = "channel_coarse")]
+    Coarse,
+}
+
+impl ChannelFaultKind {
+    /// Its id, as among the reasons of a verdict.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Dead => "channel_dead",
+            Self::Stuck => "channel_stuck",
+            Self::Clipped => "channel_clipped",
+            Self::Held => "channel_held",
+            Self::Coarse => "channel_coarse",
+        }
+    }
+}
+
+/// A fault that a channel shows by itself.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelFault {
+    /// Name of the signal, as in the column headers.
+    pub channel: &'static str,
+    /// What is wrong.
+    #[serde(rename = "id")]
+    pub kind: ChannelFaultKind,
+    /// When it begins, s.
+    pub from_s: f64,
+    /// When it ends, s.
+    pub to_s: f64,
+    /// What was seen, in one sentence.
+    pub text: String,
+    /// What to check.
+    pub suggestion: &'static str,
+}
+
+/// The channels that are watched.
+const CHANNELS: [Signal; 6] =
+    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
+
+/// Watches every channel of a trace.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct ChannelMonitor {
+    channels: [Channel; CHANNELS.len()],
+    first_s: f64,
+    last_s: f64,
+    rows: u64,
+}
+
+impl Default for ChannelMonitor {
+    fn default() -> Self {
+        Self { channels: [Channel::default(); CHANNELS.len()], first_s: 0.0, last_s: 0.0, rows: 0 }
+    }
+}
+
+impl ChannelMonitor {
+    /// Takes in one record.
+    #[inline]
+    pub fn add(&mut self, record: &Record) {
+        if self.rows == 0 {
+            self.first_s = record.t_s;
+        }
+        self.rows += 1;
+        self.last_s = record.t_s;
+        let s = &record.sample;
+        let [x, pa, pb, qa, qb, force] = &mut self.channels;
+        x.add(record.t_s, s.x_m);
+        pa.add(record.t_s, s.pa_pa);
+        pb.add(record.t_s, s.pb_pa);
+        for (channel, value) in [(qa, s.qa_m3s), (qb, s.qb_m3s), (force, s.force_n)] {
+            if let Some(value) = value {
+                channel.add(record.t_s, value);
+            }
+        }
+    }
+
+    /// The faults so far: at most one per channel, the gravest.
+    pub fn faults(&self, rig: &Rig) -> Vec<ChannelFault> {
+        faults::find(self, rig)
+    }
+}

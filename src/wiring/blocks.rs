@@ -1,0 +1,112 @@
+use crate::trace::Record;
+use pitchleak_core::Cylinder;
+
+/// Shortest block, s, and its fewest steps: as in the estimator.
+const BLOCK_S: f64 = 0.25;
+const BLOCK_STEPS: u32 = 8;
+
+/// Which flows were measured all through a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fed {
+    Both,
+    OnlyA,
+    OnlyB,
+}
+
+/// Both continuity equations, eq. (1), integrated over a block: ∫Q dt = ±A Δx + κ ∫V dP + leaks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    /// The block follows the one before without a pause.
+    pub follows: bool,
+    pub fed: Fed,
+    pub a: Chamber,
+    pub b: Chamber,
+    /// Δx, m.
+    pub travel_m: f64,
+    /// ∫dt, s, and Σ dt², s².
+    pub time_s: f64,
+    pub time_square_s2: f64,
+}
+
+/// One chamber's integrals.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Chamber {
+    /// ∫Q dt, m³.
+    pub flow_m3: f64,
+    /// ∫V dP, m³·Pa.
+    pub compression: f64,
+    /// ∫P dt, Pa·s.
+    pub pressure: f64,
+    /// V at the block's end, m³: a pressure reading's noise acts through it.
+    pub volume_m3: f64,
+}
+
+#[derive(Default)]
+struct Sum {
+    a: Chamber,
+    b: Chamber,
+    travel_m: f64,
+    time_s: f64,
+    time_square_s2: f64,
+    steps: u32,
+    fed_a: u32,
+    fed_b: u32,
+}
+
+/// The records' blocks; a rest that a gap cuts off is lost, as is a block without any flow all through.
+pub(super) fn blocks(records: &[Record], cylinder: &Cylinder<f64>) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    let (mut sum, mut follows) = (Sum::default(), false);
+    for pair in records.windows(2) {
+        let [last, now] = pair else { continue };
+        if now.step_s() <= 0.0 {
+            (sum, follows) = (Sum::default(), false);
+            continue;
+        }
+        sum.add(last, now, cylinder);
+        if sum.time_s >= BLOCK_S && sum.steps >= BLOCK_STEPS {
+            match std::mem::take(&mut sum).block(follows) {
+                Some(block) => {
+                    follows = true;
+                    blocks.push(block);
+                }
+                None => follows = false,
+            }
+        }
+    }
+    blocks
+}
+
+impl Sum {
+    fn add(&mut self, last: &Record, now: &Record, cylinder: &Cylinder<f64>) {
+        let (dt, l, n) = (now.step_s(), &last.sample, &now.sample);
+        let x = (0.5 * (l.x_m + n.x_m)).clamp(0.0, cylinder.stroke_m);
+        let add = |chamber: &mut Chamber, volume: f64, [p0, p1]: [f64; 2], flows: Option<f64>| {
+            chamber.flow_m3 += 0.5 * dt * flows.unwrap_or(0.0);
+            chamber.compression += volume * (p1 - p0);
+            chamber.pressure += 0.5 * dt * (p0 + p1);
+            chamber.volume_m3 = volume;
+        };
+        let sum = |a: Option<f64>, b: Option<f64>| Some(a? + b?);
+        let (qa, qb) = (sum(l.qa_m3s, n.qa_m3s), sum(l.qb_m3s, n.qb_m3s));
+        add(&mut self.a, cylinder.volume_a_m3(x), [l.pa_pa, n.pa_pa], qa);
+        add(&mut self.b, cylinder.volume_b_m3(x), [l.pb_pa, n.pb_pa], qb);
+        self.travel_m += n.x_m - l.x_m;
+        self.time_s += dt;
+        self.time_square_s2 += dt * dt;
+        self.steps += 1;
+        self.fed_a += u32::from(qa.is_some());
+        self.fed_b += u32::from(qb.is_some());
+    }
+
+    fn block(self, follows: bool) -> Option<Block> {
+        let fed = match (self.fed_a == self.steps, self.fed_b == self.steps) {
+            (true, true) => Fed::Both,
+            (true, false) => Fed::OnlyA,
+            (false, true) => Fed::OnlyB,
+            (false, false) => return None,
+        };
+        let Self { a, b, travel_m, time_s, time_square_s2, .. } = self;
+        Some(Block { follows, fed, a, b, travel_m, time_s, time_square_s2 })
+    }
+}

@@ -1,0 +1,147 @@
+//! What a mistake is called, and the lines of `[columns]` that mend it.
+
+use super::mistake::{ATMOSPHERE_PA, Exchange, Mistake, Readings};
+use crate::rig::{ColumnMap, ForeignColumn, Rig};
+use crate::signal::Signal;
+use crate::units::Unit;
+use serde::Serialize;
+
+/// The mistake that explains a trace.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// The most likely one, and those that cannot be told from it.
+    pub mistakes: Vec<Mistake>,
+    /// Size of the residual in standard deviations of the declared noise, as the wiring is declared …
+    pub residual_before: f64,
+    /// … and with the mistake mended.
+    pub residual_after: f64,
+}
+
+/// An [`Explanation`] in words, for a trace whose columns are known.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Wiring {
+    /// The mistake and its evidence, in one sentence.
+    pub suggestion: String,
+    /// As in [`Explanation::residual_before`].
+    pub residual_before: f64,
+    /// As in [`Explanation::residual_after`].
+    pub residual_after: f64,
+    /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended.
+    pub columns: Vec<String>,
+    /// Mistakes that explain the trace as well.
+    pub alternatives: Vec<String>,
+}
+
+impl Explanation {
+    /// In words; `columns` are those that the trace was read by.
+    pub fn wiring(&self, columns: &ColumnMap, rig: &Rig) -> Wiring {
+        let names: Vec<String> = self.mistakes.iter().map(|mistake| mistake.text()).collect();
+        let first = names.first().cloned().unwrap_or_default();
+        let alternatives = names.get(1..).unwrap_or_default().to_vec();
+        let (before, after) = (figure(self.residual_before), figure(self.residual_after));
+        let mut suggestion = if self.residual_before > 1.5 * self.residual_after {
+            format!("with {first} the residual falls from {before} to {after} times the noise")
+        } else {
+            format!("with {first} no leak is negative, which it is as the columns are declared")
+        };
+        if !alternatives.is_empty() {
+            suggestion += &format!("; cannot be told apart: {}", names.join(", "));
+        }
+        Wiring {
+            suggestion,
+            residual_before: self.residual_before,
+            residual_after: self.residual_after,
+            columns: self.mistakes.first().map_or_else(Vec::new, |mistake| mistake.mending(columns, rig)),
+            alternatives,
+        }
+    }
+}
+
+fn figure(residual: f64) -> String {
+    if residual < 9.95 { format!("{residual:.1}") } else { format!("{residual:.0}") }
+}
+
+impl Mistake {
+    /// What mends it, as in "with … the residual falls".
+    pub fn text(self) -> String {
+        match self {
+            Self::Exchanged(Exchange::Pressures) => "pa and pb exchanged".to_owned(),
+            Self::Exchanged(Exchange::Flows) => "qa and qb exchanged".to_owned(),
+            Self::Exchanged(Exchange::Chambers) => "pa and pb, qa and qb exchanged (A and B)".to_owned(),
+            Self::Sign(readings) => format!("the sign of {} turned", readings.text()),
+            Self::Size(readings) => format!("the sign that {} lost put back", readings.text()),
+            Self::OtherEnd => "x counted from the other end (stroke − x)".to_owned(),
+            Self::Scaled(readings, factor) if factor > 1.0 => {
+                format!("{} divided by {}", readings.text(), number(factor))
+            }
+            Self::Scaled(readings, factor) => format!("{} times {}", readings.text(), number(1.0 / factor)),
+            Self::Absolute(readings) => format!("{} taken as absolute pressure", readings.text()),
+            Self::Late(readings, by_s) => format!("{} moved {:.0} ms earlier", readings.text(), 1e3 * by_s),
+        }
+    }
+
+    /// The lines of `[columns]` that mend it; none where a column cannot say it.
+    pub fn mending(self, columns: &ColumnMap, rig: &Rig) -> Vec<String> {
+        let line = |signal: Signal, from: Signal, change: &dyn Fn(ForeignColumn) -> ForeignColumn| {
+            let column = columns.get(&from)?.clone();
+            Some(format!("{} = {}", signal.name(), change(column).to_toml(signal)))
+        };
+        let each = |readings: Readings, change: &dyn Fn(ForeignColumn) -> ForeignColumn| {
+            readings.signals().iter().filter_map(|signal| line(*signal, *signal, change)).collect()
+        };
+        let as_it_is = |column| column;
+        match self {
+            Self::Exchanged(exchange) => exchange
+                .pairs()
+                .iter()
+                .flat_map(|(a, b)| [line(*a, *b, &as_it_is), line(*b, *a, &as_it_is)])
+                .flatten()
+                .collect(),
+            Self::Sign(readings) => each(readings, &|column| linear(column, -1.0, 0.0)),
+            Self::OtherEnd => each(Readings::Position, &|column| linear(column, -1.0, rig.cylinder.stroke_m)),
+            Self::Scaled(Readings::Time, _) if !columns.contains_key(&Signal::Time) => Vec::new(),
+            Self::Scaled(readings, factor) => readings
+                .signals()
+                .iter()
+                .filter_map(|signal| line(*signal, *signal, &|column| in_unit(column, *signal, 1.0 / factor)))
+                .collect(),
+            Self::Absolute(readings) => each(readings, &|column| linear(column, 1.0, -ATMOSPHERE_PA)),
+            Self::Size(_) | Self::Late(..) => Vec::new(),
+        }
+    }
+}
+
+impl Exchange {
+    fn pairs(self) -> &'static [(Signal, Signal)] {
+        const PRESSURES: (Signal, Signal) = (Signal::PressureA, Signal::PressureB);
+        const FLOWS: (Signal, Signal) = (Signal::FlowA, Signal::FlowB);
+        match self {
+            Self::Pressures => &[PRESSURES],
+            Self::Flows => &[FLOWS],
+            Self::Chambers => &[PRESSURES, FLOWS],
+        }
+    }
+}
+
+/// The column, its readings times `scale` plus `offset`.
+fn linear(column: ForeignColumn, scale: f64, offset: f64) -> ForeignColumn {
+    ForeignColumn { scale: column.scale * scale + 0.0, offset: column.offset * scale + offset, ..column }
+}
+
+/// The column in the unit that makes its readings `factor` times as large, else with a scale.
+fn in_unit(column: ForeignColumn, signal: Signal, factor: f64) -> ForeignColumn {
+    let Some(now) = column.unit else { return column };
+    let fits = |unit: &&Unit| (unit.over(&now) / factor - 1.0).abs() < 1e-6;
+    let unit = signal.dimension().and_then(|dimension| dimension.units().iter().find(fits).copied());
+    match unit {
+        Some(unit) => ForeignColumn { unit: Some(unit), ..column },
+        None => linear(column, factor, 0.0),
+    }
+}
+
+/// Five significant digits at the most.
+fn number(value: f64) -> String {
+    let digits = (4 - value.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    let text = format!("{value:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}

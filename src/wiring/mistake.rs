@@ -1,0 +1,216 @@
+use crate::rig::Rig;
+use crate::signal::Signal;
+use crate::trace::Record;
+
+/// The readings that a mistake concerns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Readings {
+    /// t
+    Time,
+    /// x
+    Position,
+    /// P_A
+    PressureA,
+    /// P_B
+    PressureB,
+    /// P_A and P_B
+    Pressures,
+    /// Q_A
+    FlowA,
+    /// Q_B
+    FlowB,
+    /// Q_A and Q_B
+    Flows,
+}
+
+/// What may be exchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    /// P_A and P_B.
+    Pressures,
+    /// Q_A and Q_B.
+    Flows,
+    /// Both.
+    Chambers,
+}
+
+/// A mistake of wiring, sign or unit that readings may carry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mistake {
+    /// A and B are exchanged.
+    Exchanged(Exchange),
+    /// Flows have the wrong sign.
+    Sign(Readings),
+    /// Only the size of a flow is recorded.
+    Size(Readings),
+    /// The position is measured from the B end.
+    OtherEnd,
+    /// Readings are this many times too large.
+    Scaled(Readings, f64),
+    /// Pressures are absolute, not gauge.
+    Absolute(Readings),
+    /// Readings come late by this time, s.
+    Late(Readings, f64),
+}
+
+/// A standard atmosphere, Pa (ISO 2533).
+pub(super) const ATMOSPHERE_PA: f64 = 101_325.0;
+
+impl Readings {
+    /// The signals.
+    pub fn signals(self) -> &'static [Signal] {
+        match self {
+            Self::Time => &[Signal::Time],
+            Self::Position => &[Signal::Position],
+            Self::PressureA => &[Signal::PressureA],
+            Self::PressureB => &[Signal::PressureB],
+            Self::Pressures => &[Signal::PressureA, Signal::PressureB],
+            Self::FlowA => &[Signal::FlowA],
+            Self::FlowB => &[Signal::FlowB],
+            Self::Flows => &[Signal::FlowA, Signal::FlowB],
+        }
+    }
+
+    /// As in a sentence.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Time => "t",
+            Self::Position => "x",
+            Self::PressureA => "pa",
+            Self::PressureB => "pb",
+            Self::Pressures => "pa and pb",
+            Self::FlowA => "qa",
+            Self::FlowB => "qb",
+            Self::Flows => "qa and qb",
+        }
+    }
+
+    fn has(self, signal: Signal) -> bool {
+        self.signals().contains(&signal)
+    }
+
+    /// The record with `change` applied to these readings.
+    fn map(self, record: &Record, change: impl Fn(f64) -> f64) -> Record {
+        let mut out = *record;
+        let sample = &mut out.sample;
+        if self.has(Signal::Time) {
+            out.t_s = change(out.t_s);
+            out.dt_s = change(out.dt_s);
+        }
+        let values = [
+            (Signal::Position, Some(&mut sample.x_m)),
+            (Signal::PressureA, Some(&mut sample.pa_pa)),
+            (Signal::PressureB, Some(&mut sample.pb_pa)),
+            (Signal::FlowA, sample.qa_m3s.as_mut()),
+            (Signal::FlowB, sample.qb_m3s.as_mut()),
+        ];
+        for (signal, value) in values {
+            if let Some(value) = value.filter(|_| self.has(signal)) {
+                *value = change(*value);
+            }
+        }
+        out
+    }
+
+    /// `record` with these readings taken from `other`, `share` of the way to `next`.
+    fn between(self, record: &Record, other: &Record, next: &Record, share: f64) -> Record {
+        let (mut out, a, b) = (*record, &other.sample, &next.sample);
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        let flow = |a: Option<f64>, b: Option<f64>| Some(mix(a?, b?));
+        let sample = &mut out.sample;
+        if self.has(Signal::Position) {
+            sample.x_m = mix(a.x_m, b.x_m);
+        }
+        if self.has(Signal::PressureA) {
+            sample.pa_pa = mix(a.pa_pa, b.pa_pa);
+        }
+        if self.has(Signal::PressureB) {
+            sample.pb_pa = mix(a.pb_pa, b.pb_pa);
+        }
+        if self.has(Signal::FlowA) {
+            sample.qa_m3s = flow(a.qa_m3s, b.qa_m3s);
+        }
+        if self.has(Signal::FlowB) {
+            sample.qb_m3s = flow(a.qb_m3s, b.qb_m3s);
+        }
+        out
+    }
+}
+
+impl Mistake {
+    /// The records that this mistake makes of right ones.
+    pub fn make(self, records: &[Record], rig: &Rig) -> Vec<Record> {
+        match self {
+            Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value * factor)),
+            Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value + ATMOSPHERE_PA)),
+            Self::Size(readings) => each(records, |r| readings.map(r, f64::abs)),
+            Self::Late(readings, by_s) => shifted(records, readings, -by_s),
+            Self::Exchanged(_) | Self::Sign(_) | Self::OtherEnd => self.mend(records, rig),
+        }
+    }
+
+    /// The right records where the given ones carry this mistake. Where a flow's sign cannot be told, its reading
+    /// is left out; where a late reading's own time lies outside of the trace, the record is.
+    pub fn mend(self, records: &[Record], rig: &Rig) -> Vec<Record> {
+        match self {
+            Self::Exchanged(exchange) => each(records, |r| exchanged(r, exchange)),
+            Self::Sign(readings) => each(records, |r| readings.map(r, |value| -value)),
+            Self::Size(readings) => super::signs::restored(records, readings, rig),
+            Self::OtherEnd => each(records, |r| Readings::Position.map(r, |x| rig.cylinder.stroke_m - x)),
+            Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value / factor)),
+            Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value - ATMOSPHERE_PA)),
+            Self::Late(readings, by_s) => shifted(records, readings, by_s),
+        }
+    }
+
+    /// The same kind of mistake on the same readings, of whatever size: what a trace that tells them apart by a hair
+    /// need not list twice.
+    pub(super) fn is_like(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Late(a, _), Self::Late(b, _)) => a == b,
+            _ => self == other,
+        }
+    }
+}
+
+fn each(records: &[Record], change: impl Fn(&Record) -> Record) -> Vec<Record> {
+    records.iter().map(change).collect()
+}
+
+fn exchanged(record: &Record, exchange: Exchange) -> Record {
+    let mut out = *record;
+    let s = &mut out.sample;
+    if exchange != Exchange::Flows {
+        std::mem::swap(&mut s.pa_pa, &mut s.pb_pa);
+    }
+    if exchange != Exchange::Pressures {
+        std::mem::swap(&mut s.qa_m3s, &mut s.qb_m3s);
+    }
+    out
+}
+
+/// Every record with `readings` as they were `by_s` later (earlier where negative), between two records by a straight
+/// line. Records without such a time before the next gap are left out.
+fn shifted(records: &[Record], readings: Readings, by_s: f64) -> Vec<Record> {
+    let mut out = Vec::with_capacity(records.len());
+    let mut cut = true;
+    for piece in records.chunk_by(|_, next| !next.after_gap) {
+        let mut at = 0;
+        for record in piece {
+            let wanted = record.t_s + by_s;
+            while piece.get(at + 1).is_some_and(|next| next.t_s < wanted) {
+                at += 1;
+            }
+            let (Some(before), Some(after)) = (piece.get(at), piece.get(at + 1)) else { break };
+            cut |= record.after_gap;
+            if wanted < before.t_s || wanted > after.t_s {
+                continue;
+            }
+            let share = (wanted - before.t_s) / (after.t_s - before.t_s);
+            let late = readings.between(record, before, after, share);
+            out.push(Record { after_gap: std::mem::take(&mut cut), ..late });
+        }
+        cut = true;
+    }
+    out
+}

@@ -1,0 +1,222 @@
+//! Mistakes of wiring, sign and unit, each scored by the likelihood of what the columns would then say.
+//!
+//! Nothing is ever mended in silence: [`explain`] names the mistake that explains what the declared wiring does not, with
+//! its evidence and the lines of `[columns]` that mend it. docs/channels-and-wiring.md says what can't be told.
+
+mod blocks;
+mod candidates;
+mod excerpt;
+mod explanation;
+mod fit;
+mod mistake;
+mod noise;
+mod signs;
+
+pub use excerpt::Excerpt;
+pub use explanation::{Explanation, Wiring};
+pub use mistake::{Exchange, Mistake, Readings};
+
+use crate::rig::Rig;
+use crate::signal::Signal;
+use crate::trace::Record;
+use fit::{Fit, Priors};
+use noise::{ScatterRatios, Verdict};
+use rayon::prelude::*;
+
+/// Mean square residual, over the declared noise, from which the declared wiring is in doubt …
+const FAR: f64 = 4.0;
+/// … and up to which a mistake explains the trace, …
+const NEAR: f64 = 1.3;
+/// … or as far beyond 1 as chance carries a mean of χ² terms, in standard deviations of it.
+const CHANCE_SIGMAS: f64 = 4.0;
+/// The declared wiring's mean square residual must be this many times the mistake's.
+const CONTRAST: f64 = 4.0;
+/// χ² that a mistake must explain at the least, and that parts two mistakes that can be told apart.
+const LEAST_DROP: f64 = 60.0;
+const APART: f64 = 25.0;
+/// Without misfit a leak so far below zero, in standard deviations, contradicts the declared wiring.
+const IMPOSSIBLE_SIGMAS: f64 = 10.0;
+/// More mistakes than this that cannot be told apart explain nothing.
+const MOST_ALIKE: usize = 4;
+/// A lost sign must have turned so many readings.
+const LEAST_TURNED: u64 = 30;
+/// Range of readings that have more in them than noise, in standard deviations of it.
+const CONTENT_SIGMAS: f64 = 12.0;
+/// A mistake that leaves readings out must leave at least so many rows.
+const ENOUGH_ROWS: usize = 40;
+/// Share of the readings that must be possible on the rig.
+const POSSIBLE_SHARE: f64 = 0.99;
+
+/// A mistake, and how well it explains the trace.
+#[derive(Clone, Copy, Debug)]
+struct Scored {
+    mistake: Mistake,
+    fit: Fit,
+    scatter: Verdict,
+}
+
+/// The mistake of wiring, sign or unit that explains the records where the declared wiring does not; `None` where that
+/// does, or nothing explains them, or too much. Use an [`Excerpt`] of a long trace.
+pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
+    let priors = Priors::declared(rig);
+    let declared = Fit::new(records, rig, &priors)?;
+    let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
+    if !contradicted || sensor_errors_explain(records, rig) {
+        return None;
+    }
+    let ratios = ScatterRatios::of(records, rig);
+    let candidates = candidates::candidates();
+    let score = |mistake: Mistake| {
+        let mended = mistake.mend(records, rig);
+        let lossy = matches!(mistake, Mistake::Size(_))
+            && !(is_wanted(mistake, records) && turns_many(&mended, records));
+        if lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig) {
+            return None;
+        }
+        let fit = Fit::new(&mended, rig, &priors)?;
+        let scatter = ratios.verdict(mistake);
+        let wanted = scatter != Verdict::Against && flows_overshoot(mistake, &declared);
+        (wanted && explains(&fit, &declared)).then_some(Scored { mistake, fit, scatter })
+    };
+    let found: Vec<Scored> = candidates.into_par_iter().filter_map(score).collect();
+    let alike = best(found, declared.row_count());
+    let first = alike.first()?.fit;
+    if alike.len() > MOST_ALIKE {
+        return None;
+    }
+    Some(Explanation {
+        mistakes: with_lost_signs(alike.iter().map(|one| one.mistake).collect(), records),
+        residual_before: declared.worst().sqrt(),
+        residual_after: first.worst().sqrt(),
+    })
+}
+
+/// Mean squares of the normalised residual of the flow balance and of the position against the flows, over all the
+/// records; none of an equation without rows, or of too few records.
+pub fn misfit(records: &[Record], rig: &Rig) -> [Option<f64>; 2] {
+    Fit::new(records, rig, &Priors::declared(rig)).map_or([None; 2], |fit| fit.ratios)
+}
+
+/// Offsets and gains of a few percent are commoner than mistakes of wiring: where they explain as much, they do.
+fn sensor_errors_explain(records: &[Record], rig: &Rig) -> bool {
+    Fit::new(records, rig, &Priors::with_sensor_errors(rig))
+        .is_some_and(|fit| is_near(&fit) && fit.is_possible())
+}
+
+fn is_near(fit: &Fit) -> bool {
+    fit.ratios.iter().zip(fit.rows).all(|(ratio, rows)| {
+        let chance = CHANCE_SIGMAS * (2.0 / rows.max(1) as f64).sqrt();
+        ratio.is_none_or(|ratio| ratio <= NEAR.max(1.0 + chance))
+    })
+}
+
+fn explains(fit: &Fit, declared: &Fit) -> bool {
+    let rows = fit.row_count() as f64;
+    let drop = (declared.mean_chi_square() - fit.mean_chi_square()) * rows;
+    let enough_rows = fit.row_count() >= ENOUGH_ROWS.min(declared.row_count() / 2);
+    let contradiction_gone = declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS && declared.worst() < FAR;
+    let explained = drop >= LEAST_DROP && declared.worst() >= CONTRAST * fit.worst();
+    is_near(fit) && fit.is_possible() && enough_rows && (explained || contradiction_gone)
+}
+
+/// A size is never negative: only such readings can be sizes.
+fn is_wanted(mistake: Mistake, records: &[Record]) -> bool {
+    let Mistake::Size(readings) = mistake else { return true };
+    let positive = |flow: Option<f64>, wanted: bool| !wanted || flow.is_none_or(|flow| flow >= 0.0);
+    let (a, b) = (readings != Readings::FlowB, readings != Readings::FlowA);
+    records.iter().all(|r| positive(r.sample.qa_m3s, a) && positive(r.sample.qb_m3s, b))
+}
+
+/// Flows read too large carry the piston too far; where they do not, dividing them only makes the residual small.
+fn flows_overshoot(mistake: Mistake, declared: &Fit) -> bool {
+    match mistake {
+        Mistake::Scaled(Readings::FlowA | Readings::FlowB | Readings::Flows, factor) if factor > 1.0 => {
+            declared.ratios[1].is_some_and(|ratio| ratio >= FAR)
+        }
+        _ => true,
+    }
+}
+
+/// Whether a factor leaves nothing but noise of the readings: what says nothing contradicts nothing.
+fn has_vanished(mistake: Mistake, mended: &[Record], rig: &Rig) -> bool {
+    let Mistake::Scaled(readings, factor) = mistake else { return false };
+    let sensors = rig.sensors();
+    let range = |of: fn(&Record) -> Option<f64>| {
+        let bounds =
+            mended.iter().filter_map(of).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        bounds.1 - bounds.0
+    };
+    let vanished = |signal: &Signal| match signal {
+        Signal::Position => range(|r| Some(r.sample.x_m)) < CONTENT_SIGMAS * sensors.position.noise_std,
+        Signal::PressureA => range(|r| Some(r.sample.pa_pa)) < CONTENT_SIGMAS * sensors.pressure.noise_std,
+        Signal::PressureB => range(|r| Some(r.sample.pb_pa)) < CONTENT_SIGMAS * sensors.pressure.noise_std,
+        Signal::FlowA => range(|r| r.sample.qa_m3s) < CONTENT_SIGMAS * sensors.flow_a.noise_std,
+        Signal::FlowB => range(|r| r.sample.qb_m3s) < CONTENT_SIGMAS * sensors.flow_b.noise_std,
+        _ => false,
+    };
+    factor > 1.0 && readings.signals().iter().any(vanished)
+}
+
+/// Whether a flow that lost its sign gets another one often enough to make a difference.
+fn turns_many(mended: &[Record], records: &[Record]) -> bool {
+    let flows = |r: &Record| [r.sample.qa_m3s, r.sample.qb_m3s];
+    let (mut signed, mut turned) = ([0_u64; 2], [0_u64; 2]);
+    for (after, before) in mended.iter().zip(records) {
+        for (at, (after, before)) in flows(after).into_iter().zip(flows(before)).enumerate() {
+            signed[at] += u64::from(after.is_some());
+            turned[at] += u64::from(after != before && after.is_some());
+        }
+    }
+    signed.iter().zip(turned).any(|(signed, turned)| turned >= LEAST_TURNED && 10 * turned > *signed)
+}
+
+/// Whether nearly all readings lie within what the rig allows.
+fn is_possible(records: &[Record], rig: &Rig) -> bool {
+    let stroke = rig.cylinder.stroke_m;
+    let (sheets, vacuum) = (&rig.instruments, mistake::ATMOSPHERE_PA);
+    let pressure = -vacuum - 0.05 * sheets.pressure.full_scale..=1.5 * sheets.pressure.full_scale;
+    let flow = |flow: Option<f64>, full_scale: f64| flow.is_none_or(|flow| flow.abs() <= 1.5 * full_scale);
+    let possible = records.iter().filter(|record| {
+        let s = &record.sample;
+        (-0.05 * stroke..=1.05 * stroke).contains(&s.x_m)
+            && pressure.contains(&s.pa_pa)
+            && pressure.contains(&s.pb_pa)
+            && flow(s.qa_m3s, sheets.flow_a.full_scale)
+            && flow(s.qb_m3s, sheets.flow_b.full_scale)
+    });
+    possible.count() as f64 >= POSSIBLE_SHARE * records.len() as f64
+}
+
+/// A flow of the wrong sign that is never negative may as well have lost its sign.
+fn with_lost_signs(mut mistakes: Vec<Mistake>, records: &[Record]) -> Vec<Mistake> {
+    let turned: Vec<_> = mistakes
+        .iter()
+        .filter_map(|one| if let Mistake::Sign(readings) = one { Some(*readings) } else { None })
+        .collect();
+    let lost = turned.into_iter().flat_map(|readings| [readings, Readings::Flows]).map(Mistake::Size);
+    for mistake in lost.filter(|mistake| is_wanted(*mistake, records)) {
+        if !mistakes.contains(&mistake) {
+            mistakes.push(mistake);
+        }
+    }
+    mistakes
+}
+
+/// The best, and those that the trace can't tell from it. A sensor's scatter tells factors apart that the equations
+/// can't: where it speaks for one, others go.
+fn best(mut found: Vec<Scored>, rows: usize) -> Vec<Scored> {
+    let score = |one: &Scored| one.fit.mean_chi_square() * rows as f64;
+    found.sort_by(|a, b| score(a).total_cmp(&score(b)));
+    let Some(least) = found.first().map(score) else { return found };
+    let mut alike: Vec<Scored> = Vec::new();
+    for one in found {
+        if score(&one) <= least + APART && !alike.iter().any(|other| other.mistake.is_like(one.mistake)) {
+            alike.push(one);
+        }
+    }
+    let factor = |one: &Scored| matches!(one.mistake, Mistake::Scaled(..));
+    if alike.iter().any(|one| one.scatter == Verdict::For) {
+        alike.retain(|one| one.scatter == Verdict::For || !factor(one));
+    }
+    alike
+}
