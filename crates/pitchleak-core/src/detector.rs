@@ -149,6 +149,14 @@ mod tests {
         }
     }
 
+    /// The module's formula by hand: r = 100, α = 0.01.
+    #[test]
+    fn the_confidence_sequence_is_as_wide_as_its_formula_says() {
+        let by_hand = 0.1 * f64::sqrt(1.01 * (101_f64.ln() - 2.0 * 0.01_f64.ln()));
+        assert!((confidence_half_width(0.1, 1.0, 0.01) - by_hand).abs() < 1e-12);
+        assert!((by_hand - 0.373_68).abs() < 1e-5);
+    }
+
     #[test]
     fn raises_after_the_hold_time_and_clears_with_hysteresis() {
         let mut detector = LeakDetector::new(AlarmSettings::default());

@@ -226,3 +226,29 @@ fn a_lagging_meter_trails_a_ramp_by_its_lag() {
     assert!((reading - mapped).abs() < 1e-9 * slope, "{reading} {mapped}");
     assert!((meter.update(step, lag, f64::NAN) - reading).abs() < 1e-30);
 }
+
+/// Free gas of share α takes V α/n (P₀/P)^{1/n}/P Ṗ, absolute pressures, whatever the pressure is.
+#[test]
+fn entrained_air_follows_the_polytropic_law() {
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    let n = constants.polytropic_exponent;
+    for pa_pa in [0.0, 4e5, 5e6] {
+        let at = Signals { x_m: 0.1, pa_pa, dpa_pas: 1e6, ..Signals::default() };
+        let absolute_pa: f64 = pa_pa + 101_325.0;
+        let by_hand =
+            model.cylinder.volume_a_m3(0.1) * (101_325.0 / absolute_pa).powf(1.0 / n) / n / absolute_pa;
+        let term = Effect::EntrainedAir.unit_term(&at, &model, &constants).chamber_a_m3s;
+        assert!((term / (by_hand * 1e6) - 1.0).abs() < 1e-12, "{term} at {pa_pa} Pa");
+    }
+}
+
+/// Dry friction turns within its slip speed: tanh 1 of it is there at that speed.
+#[test]
+fn dry_friction_turns_at_its_slip_speed() {
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    for (share, expected) in [(1.0, 0.761_594), (-1.0, -0.761_594), (10.0, 1.0)] {
+        let at = Signals { v_mps: share * constants.slip_speed_mps, ..Signals::default() };
+        let force_n = Effect::CoulombFriction.unit_term(&at, &model, &constants).force_n;
+        assert!((force_n - expected).abs() < 1e-6, "{force_n}");
+    }
+}

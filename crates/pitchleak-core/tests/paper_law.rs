@@ -4,7 +4,8 @@
 
 use pitchleak_core::plant::{CylinderPlant, Drive};
 use pitchleak_core::{
-    Cylinder, Fluid, Model, PaperGains, PaperLaw, PerLeak, Sample, Theta, force_imbalance_n, regressors,
+    Cylinder, Fluid, Model, PaperEstimator, PaperGains, PaperLaw, PerLeak, Sample, Theta, force_imbalance_n,
+    regressors,
 };
 use proptest::prelude::*;
 
@@ -260,5 +261,26 @@ proptest! {
         let imbalance_n = force_imbalance_n(&cylinder, &sample, force_n);
         let scale = 2e7 * cylinder.area_a_m2 + 1e4;
         prop_assert!((imbalance_n - cylinder.moving_mass_kg * at.a_mps2).abs() < 1e-9 * scale, "{imbalance_n} {at:?}");
+    }
+}
+
+/// The filters begin in the steady state of the first sample: constant readings are constant from then on.
+#[test]
+fn the_chain_starts_without_a_jump() {
+    let (cylinder, fluid) = (Cylinder::paper(), Fluid::paper());
+    let gains = PaperGains::scaled(&cylinder, &fluid, 10.0, 3e-5);
+    let mut estimator = PaperEstimator::new(cylinder, fluid, gains, 5.0, 100.0).unwrap();
+    let sample = Sample {
+        x_m: 0.1,
+        pa_pa: 5e6,
+        pb_pa: 3e6,
+        qa_m3s: Some(0.0),
+        qb_m3s: Some(0.0),
+        force_n: Some(5e6 * cylinder.area_a_m2 - 3e6 * cylinder.area_b_m2),
+    };
+    for step in 0..100 {
+        estimator.update(if step == 0 { 0.0 } else { 0.01 }, &sample);
+        let load_pressure_pa: f64 = estimator.law().unwrap().load_pressure_pa;
+        assert!((load_pressure_pa - 2e6).abs() < 1.0, "{load_pressure_pa} Pa after {step} steps");
     }
 }

@@ -172,3 +172,21 @@ fn rates<T: Real>(
     let drive = Drive { qa_m3s: flows.a_m3s, qb_m3s: flows.b_m3s, force_n };
     axis.plant.rates(cylinder, &axis.plant.bounded(drive))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::State;
+    use crate::{EmulatorParams, Model};
+
+    #[test]
+    fn at_rest_the_pressures_carry_the_load() {
+        let params = EmulatorParams::<f64>::for_model(Model::paper()).unwrap();
+        let cylinder = params.pitch.plant.model.cylinder;
+        for load_n in [0.0, 2e3] {
+            let state = State::at_rest(&params, 0.1, load_n);
+            let (pa_pa, pb_pa) = params.pitch.plant.pressures_pa(&state.pitch);
+            let carried_n = pa_pa * cylinder.area_a_m2 - pb_pa * cylinder.area_b_m2;
+            assert!((carried_n - load_n).abs() < 1e-3, "{carried_n} N of {load_n} N");
+        }
+    }
+}

@@ -36,3 +36,14 @@ pub struct LeakPressures<T> {
     /// Mean sign of P_L, −1 to 1: how much of a bias of P_L stays in the mean of |P_L|.
     pub load_sign: T,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Estimate;
+
+    #[test]
+    fn the_interval_lies_around_the_value() {
+        let [low, high] = Estimate { value: 3.0_f64, std: 0.5 }.ci95();
+        assert!((low - 2.020_018).abs() < 1e-6 && (high - 3.979_982).abs() < 1e-6, "{low} to {high}");
+    }
+}

@@ -58,3 +58,30 @@ impl<T: Real> EndStop<T> {
         x_m.max(least).min(stroke_m - least)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::EndStop;
+    use crate::Cylinder;
+
+    #[test]
+    fn the_piston_side_at_20_mpa_is_held_at_half_the_gap() {
+        let cylinder = Cylinder::<f64>::paper();
+        let stop = EndStop::for_cylinder(&cylinder);
+        let held = stop.force_n(cylinder.stroke_m - 0.5 * stop.gap_m, 0.0, cylinder.stroke_m);
+        assert!((held / (20e6 * cylinder.area_a_m2) - 1.0).abs() < 1e-9, "{held} N");
+        let pushed = stop.force_n(0.5 * stop.gap_m, 0.0, cylinder.stroke_m);
+        assert!((held + pushed).abs() < 1e-6, "both ends push inwards");
+    }
+
+    #[test]
+    fn a_stop_counts_near_both_ends_and_nowhere_else() {
+        let cylinder = Cylinder::<f64>::paper();
+        let stop = EndStop::for_cylinder(&cylinder);
+        let near = |x_m: f64| stop.near(x_m, cylinder.stroke_m);
+        assert_eq!(near(0.5 * cylinder.stroke_m), (0.0, 0.0));
+        for x_m in [stop.gap_m, cylinder.stroke_m - stop.gap_m] {
+            assert_eq!(near(x_m), (stop.stiffness_npm, stop.damping_nspm));
+        }
+    }
+}

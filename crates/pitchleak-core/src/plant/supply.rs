@@ -49,3 +49,17 @@ impl<T: Real> Supply<T> {
         self.relief_pressure_pa + self.pump_flow_m3s / self.relief_slope_m3spa
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Supply;
+
+    /// Relief at 10 MPa with 4 % override: there the line rests.
+    #[test]
+    fn an_idle_supply_rests_at_its_override() {
+        let supply = Supply::<f64>::paper();
+        let idle_pa = supply.idle_pressure_pa();
+        assert!((idle_pa / 10.4e6 - 1.0).abs() < 1e-12, "{idle_pa} Pa");
+        assert!(supply.rate_pas(idle_pa, 0.0).abs() < 1.0);
+    }
+}

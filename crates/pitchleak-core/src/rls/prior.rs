@@ -38,3 +38,20 @@ pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, sensors: &Sensors<T>
     [sensors.flow_a, sensors.flow_b]
         .map(|meter| meter.bias_std.libm_hypot(through_leak).max(T::lit(1e-9) * volume))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::prior_spread;
+    use crate::{Cylinder, Fluid, Sensors};
+
+    #[test]
+    fn the_widest_leak_empties_the_cylinder_in_a_tenth_of_a_second_at_1_mpa() {
+        let cylinder = Cylinder::<f64>::paper();
+        let [_, internal, external_a, external_b] =
+            prior_spread(&cylinder, &Fluid::paper(), &Sensors::paper());
+        for leak_m3spa in [internal, external_a, external_b] {
+            let lost_m3 = leak_m3spa * 1e6 * 0.1;
+            assert!((lost_m3 / (cylinder.area_a_m2 * cylinder.stroke_m) - 1.0).abs() < 1e-12);
+        }
+    }
+}
