@@ -1,6 +1,7 @@
 //! The mistakes that are looked for.
 
-use super::mistake::{Exchange, Mistake, Readings};
+use super::mistake::{Exchange, Mistake};
+use super::readings::Readings;
 use crate::units::{Dimension, Unit};
 
 /// Factors between any two units that people log a quantity in, and a slipped decimal point.

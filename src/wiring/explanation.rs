@@ -1,9 +1,11 @@
 //! What a mistake is called, and the lines of `[columns]` that mend it.
 
-use super::mistake::{ATMOSPHERE_PA, Exchange, Mistake, Readings};
+use super::mistake::{Exchange, Mistake};
+use super::readings::Readings;
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
 use crate::units::Unit;
+use pitchleak_core::ATMOSPHERE_PA;
 use serde::Serialize;
 
 /// The mistake that explains a trace.

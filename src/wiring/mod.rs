@@ -10,11 +10,13 @@ mod explanation;
 mod fit;
 mod mistake;
 mod noise;
+mod readings;
 mod signs;
 
 pub use excerpt::Excerpt;
 pub use explanation::{Explanation, Wiring};
-pub use mistake::{Exchange, Mistake, Readings};
+pub use mistake::{Exchange, Mistake};
+pub use readings::Readings;
 
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -173,7 +175,7 @@ fn turns_many(mended: &[Record], records: &[Record]) -> bool {
 /// Whether nearly all readings lie within what the rig allows.
 fn is_possible(records: &[Record], rig: &Rig) -> bool {
     let stroke = rig.cylinder.stroke_m;
-    let (sheets, vacuum) = (&rig.instruments, mistake::ATMOSPHERE_PA);
+    let (sheets, vacuum) = (&rig.instruments, pitchleak_core::ATMOSPHERE_PA);
     let pressure = -vacuum - 0.05 * sheets.pressure.full_scale..=1.5 * sheets.pressure.full_scale;
     let flow = |flow: Option<f64>, full_scale: f64| flow.is_none_or(|flow| flow.abs() <= 1.5 * full_scale);
     let possible = records.iter().filter(|record| {

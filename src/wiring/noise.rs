@@ -1,4 +1,5 @@
-use super::mistake::{Mistake, Readings};
+use super::mistake::Mistake;
+use super::readings::Readings;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;

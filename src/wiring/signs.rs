@@ -1,6 +1,6 @@
 //! The sign of a flow whose size alone was recorded, by the piston's motion.
 
-use super::mistake::Readings;
+use super::readings::Readings;
 use crate::rig::{Instrument, Rig};
 use crate::signal::Signal;
 use crate::trace::Record;
