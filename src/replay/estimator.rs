@@ -94,6 +94,11 @@ impl Estimator {
         )
     }
 
+    /// Mean leak flows over the estimator's memory, m³/s; `None` for the paper's law.
+    pub fn mean_leaks_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
+        each!(self, rls => Some(rls.mean_leaks_m3s()), _chain => None)
+    }
+
     /// Leak flows at `pressures`, m³/s; `None` for the paper's law.
     pub fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> Option<PerLeak<Estimate<f64>>> {
         each!(self, rls => Some(rls.leak_flows_m3s(pressures)), _chain => None)

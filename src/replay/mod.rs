@@ -143,10 +143,9 @@ impl Replay {
 
     /// Holds the leak flows against their alarms, `elapsed_s` of watched time after they were held last.
     fn detect(&mut self, t_s: f64, elapsed_s: f64) {
-        let mean_leaks_m3s = |estimator: &Estimator| estimator.estimates().map(|found| found.mean_leaks_m3s);
-        let flows = mean_leaks_m3s(&self.estimator).map(|flows| {
+        let flows = self.estimator.mean_leaks_m3s().map(|flows| {
             self.doubt.widen(with_effects(self.correction.as_ref(), flows), |correction, estimator| {
-                with_effects(Some(correction), mean_leaks_m3s(estimator).unwrap_or_default())
+                with_effects(Some(correction), estimator.mean_leaks_m3s().unwrap_or_default())
             })
         });
         let flows = flows.unwrap_or_else(|| {

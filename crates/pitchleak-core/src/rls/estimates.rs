@@ -40,7 +40,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let pressures = self.pressures.means();
         Estimates {
             leaks_m3spa: self.leak_coefficients(),
-            mean_leaks_m3s: self.leak_flows_m3s(&pressures),
+            mean_leaks_m3s: self.mean_leaks_m3s(),
             mean_pressures_pa: pressures.sizes_pa,
             compressibility_per_pa: self.compressibility(),
             flow_offsets_m3s: (N > Parameter::OffsetB as usize).then(|| self.flow_offsets_m3s()),
@@ -69,6 +69,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let row = self.solution.covariance.get(a as usize);
         let entry = row.and_then(|row| row.get(b as usize));
         entry.map_or(T::zero(), |entry| *entry * self.innovations.inflation())
+    }
+
+    /// [`Estimates::mean_leaks_m3s`] alone.
+    pub fn mean_leaks_m3s(&self) -> PerLeak<Estimate<T>> {
+        self.leak_flows_m3s(&self.pressures.means())
     }
 
     /// [`Estimates::leaks_m3spa`] alone.
