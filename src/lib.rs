@@ -34,6 +34,7 @@ pub mod curve;
 pub mod diagnose;
 pub mod figure;
 pub mod openfast;
+pub mod output;
 pub mod reference;
 pub mod replay;
 pub mod report;

@@ -5,6 +5,7 @@ use super::search::paper_rig;
 use super::trial::EstimateHistory;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
 use crate::figure::{Ink, Line, Panel, svg};
+use crate::output::{self, Inputs};
 use crate::simulate::{Biases, Sensing, Truth};
 use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
 use pitchleak_core::{Leak, PerLeak};
@@ -61,17 +62,13 @@ impl Reproduction {
     /// # Errors
     /// [`ReproduceError`].
     pub fn write(&self, directory: &Path) -> Result<(), ReproduceError> {
-        let write = |name: &str, text: &str| {
-            let path = directory.join(name);
-            std::fs::write(&path, text).map_err(|source| ReproduceError::Write { path, source })
-        };
-        std::fs::create_dir_all(directory)
-            .map_err(|source| ReproduceError::Write { path: directory.into(), source })?;
+        output::make_folder(directory)?;
+        let write = |name: &str, text: &str| output::write(directory.join(name), text, &Inputs::default());
         for (name, text) in self.figures()? {
             write(name, &text)?;
         }
         write("table.txt", &self.report.to_text())?;
-        write("reproduce.json", &self.report.to_json()?)
+        Ok(write("reproduce.json", &self.report.to_json()?)?)
     }
 
     /// Both laws on the same readings of the window that is drawn.

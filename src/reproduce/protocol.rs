@@ -2,12 +2,12 @@
 
 use crate::Rig;
 use crate::figure::FigureError;
+use crate::output::OutputError;
 use crate::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use crate::units::LPM_PER_BAR;
 use crate::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
 use pitchleak_core::{Cylinder, EffectSet, FilterError, PerLeak, RlsError, Sample};
 use serde::Serialize;
-use std::path::PathBuf;
 
 /// Samples per second, Section IV.
 pub const SAMPLE_RATE_HZ: f64 = 100.0;
@@ -101,13 +101,8 @@ pub enum ReproduceError {
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
     /// A file of figures or the table.
-    #[error("{path}: {source}", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
 /// The truth of one wind with one leak setting, all windows in a row.

@@ -76,6 +76,11 @@ impl Rig {
         if trace != Path::new("-") && neighbour.is_file() { Self::load(neighbour) } else { Ok(Self::paper()) }
     }
 
+    /// The file it was read from; none of the built-in one.
+    pub fn file(&self) -> Option<&Path> {
+        (self.name != Self::PAPER_NAME).then_some(Path::new(&self.name))
+    }
+
     /// Reads the text of a rig file; `file` is its name for messages.
     pub fn parse(text: &str, file: &str) -> Result<Self, RigError> {
         let text = text.trim_start_matches('\u{feff}');

@@ -4,6 +4,7 @@ use crate::reference::{Reference, constant_or_file};
 use crate::units::Dimension;
 use crate::wind::{Emulation, History, Wind};
 use std::fmt;
+use std::path::Path;
 
 /// What a simulated rig follows, as a person says it.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,17 @@ impl Followed {
                 constant_or_file(position, "x", Dimension::Length)?,
                 constant_or_file(load, "force", Dimension::Force)?,
             )),
+        }
+    }
+}
+
+impl Followed {
+    /// What may be the path of a file.
+    pub(super) fn files(&self) -> Vec<&Path> {
+        match self {
+            Self::Wind(Wind::File(path), _) => vec![path],
+            Self::Wind(..) => Vec::new(),
+            Self::Given { position, load } => vec![Path::new(position), Path::new(load)],
         }
     }
 }

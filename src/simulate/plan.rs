@@ -3,10 +3,12 @@ use super::{
     OilTemperatureError, Recording, Scenario, SensorFault, effects,
 };
 use crate::Rig;
+use crate::output::Inputs;
 use crate::reference::ReferenceError;
 use crate::units::{self, Dimension, UnitError};
 use crate::wind::{EmulationError, HistoryError};
 use pitchleak_core::{PerLeak, Sensors};
+use std::path::Path;
 
 /// Time for which the loops run before a trace begins, s.
 const WARM_UP_S: f64 = 10.0;
@@ -160,6 +162,7 @@ impl Plan {
         let oil_temperature =
             self.oil_temperature.as_deref().map(|text| OilTemperature::of(text, duration_s));
         Ok(Recording {
+            inputs: self.inputs(&rig),
             followed: self.followed.to_string(),
             noise: self.noise.sensors(&rig),
             biases: Biases::drawn(&rig.instruments, self.bias_share, self.seed),
@@ -177,6 +180,12 @@ impl Plan {
                 reference,
             },
         })
+    }
+
+    /// The files that the plan names; what is a quantity is no file.
+    fn inputs(&self, rig: &Rig) -> Inputs {
+        let named = self.followed.files().into_iter().chain(self.oil_temperature.as_ref().map(Path::new));
+        Inputs::of(named.chain(rig.file()))
     }
 }
 

@@ -3,13 +3,13 @@ use super::{
     Biases, Opening, Reading, Row, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
     TraceWriter,
 };
+use crate::output::{self, Inputs, OutputError, OutputFile};
 use crate::reference::AfterEnd;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{PerLeak, Sensors};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// A scenario with the sensors that record it.
@@ -27,6 +27,8 @@ pub struct Recording {
     pub sensor_faults: Vec<SensorFault>,
     /// Seed of the noise and of the mistakes.
     pub seed: u64,
+    /// The files that all this was read from.
+    pub inputs: Inputs,
 }
 
 /// What is true of a recorded trace: written beside it as JSON.
@@ -103,13 +105,14 @@ pub enum RecordingError {
     #[error(transparent)]
     Simulate(#[from] SimulateError),
     /// A file.
-    #[error("{path}: {source}", path = path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Standard output.
+    #[error("cannot write to standard output: {0}")]
+    StandardOutput(io::Error),
+    /// The truth as JSON.
+    #[error("cannot write JSON: {0}")]
+    Json(#[from] serde_json::Error),
 }
 
 /// Sums over a recording.
@@ -152,22 +155,41 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`].
     pub fn write(&self, path: &Path, done: impl FnMut(f64)) -> Result<TruthFile, RecordingError> {
-        let write = |source| RecordingError::Write { path: path.to_owned(), source };
-        let kind = kind(path).ok_or_else(|| RecordingError::Kind { path: path.to_owned() })?;
+        match kind(path).ok_or_else(|| RecordingError::Kind { path: path.to_owned() })? {
+            Kind::StandardOutput => {
+                let mut out = BufWriter::new(io::stdout());
+                let truth = self.write_rows(&mut out, done)?;
+                truth.and_then(|truth| out.flush().map(|()| truth)).map_err(RecordingError::StandardOutput)
+            }
+            Kind::Files => {
+                let mut trace = OutputFile::create(path, &self.inputs)?;
+                let mut beside = OutputFile::create(truth_path(path), &self.inputs)?;
+                let truth = self.write_rows(&mut trace, done)?.map_err(|source| trace.error(source))?;
+                let json = serde_json::to_string_pretty(&truth)?;
+                writeln!(beside, "{json}").map_err(|source| beside.error(source))?;
+                output::finish_all([trace, beside])?;
+                Ok(truth)
+            }
+        }
+    }
+
+    /// Writes the trace; the output may fail, or what is simulated.
+    fn write_rows(
+        &self,
+        out: &mut impl Write,
+        done: impl FnMut(f64),
+    ) -> Result<io::Result<TruthFile>, SimulateError> {
         let leaks_m3spa = self.scenario.leak_coefficients()?;
-        let layout = TraceLayout::of(&self.scenario);
-        let mut writer = sink(path, kind).and_then(|out| TraceWriter::new(out, layout)).map_err(write)?;
+        let mut writer = match TraceWriter::new(out, TraceLayout::of(&self.scenario)) {
+            Ok(writer) => writer,
+            Err(error) => return Ok(Err(error)),
+        };
         let mut failure = None;
         let truth = self.run(&leaks_m3spa, done, |row| {
             failure = writer.row(row).err();
             failure.is_none()
         })?;
-        let written = failure.map_or_else(|| writer.into_inner().finish(), Err);
-        written.map_err(write)?;
-        if path != Path::new("-") {
-            truth.write_beside(path)?;
-        }
-        Ok(truth)
+        Ok(failure.map_or(Ok(truth), Err))
     }
 
     /// The trace in memory, and what is true of it.
@@ -219,7 +241,7 @@ impl Recording {
     }
 
     fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
-        let Self { followed, scenario, noise, biases, sensor_faults, seed } = self;
+        let Self { followed, scenario, noise, biases, sensor_faults, seed, .. } = self;
         let leaky = scenario.leaks.zip(*leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
         let onset_s = leaky.map(|(_, (leak, _))| leak.opening.onset_s()).reduce(f64::min).unwrap_or(0.0);
         let count = totals.samples.max(1) as f64;
@@ -265,16 +287,6 @@ impl Recording {
     }
 }
 
-impl TruthFile {
-    /// Writes it beside the trace at `path`.
-    fn write_beside(&self, path: &Path) -> Result<(), RecordingError> {
-        let path = truth_path(path);
-        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
-        let written = text.and_then(|text| std::fs::write(&path, text + "\n"));
-        written.map_err(|source| RecordingError::Write { path, source })
-    }
-}
-
 /// Where the truth of the trace at `path` is written: `T.csv.gz` → `T.json`.
 fn truth_path(path: &Path) -> PathBuf {
     let plain = if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
@@ -285,18 +297,11 @@ fn truth_path(path: &Path) -> PathBuf {
     plain.with_extension("json")
 }
 
-/// An output that has to be closed to be whole.
-enum Sink {
-    Plain(BufWriter<Box<dyn Write>>),
-    Gzip(flate2::write::GzEncoder<BufWriter<File>>),
-}
-
-/// How a trace is written.
+/// Where a trace is written.
 #[derive(Clone, Copy)]
 enum Kind {
     StandardOutput,
-    Csv,
-    CsvGzip,
+    Files,
 }
 
 /// What a file's name asks for.
@@ -304,45 +309,7 @@ fn kind(path: &Path) -> Option<Kind> {
     let name = path.to_string_lossy().to_ascii_lowercase();
     match name.as_str() {
         "-" => Some(Kind::StandardOutput),
-        name if name.ends_with(".csv") => Some(Kind::Csv),
-        name if name.ends_with(".csv.gz") => Some(Kind::CsvGzip),
+        name if name.ends_with(".csv") || name.ends_with(".csv.gz") => Some(Kind::Files),
         _ => None,
-    }
-}
-
-fn sink(path: &Path, kind: Kind) -> std::io::Result<Sink> {
-    let plain = |out: Box<dyn Write>| Sink::Plain(BufWriter::new(out));
-    Ok(match kind {
-        Kind::StandardOutput => plain(Box::new(std::io::stdout())),
-        Kind::Csv => plain(Box::new(File::create(path)?)),
-        Kind::CsvGzip => {
-            let file = BufWriter::new(File::create(path)?);
-            Sink::Gzip(flate2::write::GzEncoder::new(file, flate2::Compression::best()))
-        }
-    })
-}
-
-impl Sink {
-    fn finish(self) -> std::io::Result<()> {
-        match self {
-            Self::Plain(mut out) => out.flush(),
-            Self::Gzip(encoder) => encoder.finish()?.flush(),
-        }
-    }
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self {
-            Self::Plain(out) => out.write(bytes),
-            Self::Gzip(encoder) => encoder.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        match self {
-            Self::Plain(out) => out.flush(),
-            Self::Gzip(encoder) => encoder.flush(),
-        }
     }
 }

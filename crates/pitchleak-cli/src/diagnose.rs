@@ -3,9 +3,11 @@ use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
+use pitchleak::diagnose::{Declared, Series, diagnose};
+use pitchleak::output::{Inputs, OutputFile, make_folder};
 use pitchleak::trace::{BadRows, TraceReader};
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -57,6 +59,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         (None, Some(trace)) => Rig::beside(trace)?,
         (None, None) => Rig::paper(),
     };
+    let inputs =
+        Inputs::of(arguments.traces.iter().chain(&arguments.test).map(PathBuf::as_path).chain(rig.file()));
+    let saved = arguments.save_rig.as_ref().map(|path| OutputFile::create(path, &inputs)).transpose()?;
+    arguments.out.as_deref().map(make_folder).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(Duration::from_millis(200));
     let bad_rows = if arguments.strict { BadRows::Fatal } else { BadRows::Skip };
@@ -69,11 +75,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     bar.set_message("fitting");
     let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
     bar.finish_and_clear();
-    if let Some(path) = &arguments.save_rig {
-        save(&diagnosis.rig(&rig), path)?;
+    if let Some(mut file) = saved {
+        let written = file.write_all(diagnosis.rig(&rig).to_toml().as_bytes());
+        written.map_err(|source| file.error(source))?;
+        file.finish()?;
     }
     if let Some(folder) = &arguments.out {
-        draw(&diagnosis, folder)?;
+        for (name, figure) in diagnosis.figures()? {
+            pitchleak::output::write(folder.join(name), figure, &inputs)?;
+        }
     }
     let text = if arguments.json {
         serde_json::to_string_pretty(&diagnosis)? + "\n"
@@ -109,23 +119,4 @@ fn read(
         warnings.entry(warning).or_default().push(reader.name().to_owned());
     }
     Ok(series)
-}
-
-/// Figures of what is left.
-fn draw(diagnosis: &Diagnosis, folder: &Path) -> Result<(), Failure> {
-    let failed = |path: &Path| {
-        let file = path.display().to_string();
-        move |source| Failure::Save { file, source }
-    };
-    std::fs::create_dir_all(folder).map_err(failed(folder))?;
-    for (name, figure) in diagnosis.figures()? {
-        let path = folder.join(name);
-        std::fs::write(&path, figure).map_err(failed(&path))?;
-    }
-    Ok(())
-}
-
-fn save(rig: &Rig, path: &Path) -> Result<(), Failure> {
-    std::fs::write(path, rig.to_toml())
-        .map_err(|source| Failure::Save { file: path.display().to_string(), source })
 }

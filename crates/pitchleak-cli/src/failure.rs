@@ -1,4 +1,5 @@
 use pitchleak::figure::FigureError;
+use pitchleak::output::OutputError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::reproduce::ReproduceError;
 use pitchleak::rig::RigError;
@@ -28,13 +29,8 @@ pub enum Failure {
     #[error(transparent)]
     Figure(#[from] FigureError),
     /// A rig file or a figure.
-    #[error("cannot write {file}: {source}")]
-    Save {
-        /// As named by the user.
-        file: String,
-        /// What the system says.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Save(#[from] OutputError),
     /// The report as JSON.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -53,7 +49,7 @@ impl Failure {
     /// Whether the reader of standard output is gone.
     pub fn is_broken_pipe(&self) -> bool {
         let cause = match self {
-            Self::Output(cause) | Self::Recording(RecordingError::Write { source: cause, .. }) => cause,
+            Self::Output(cause) | Self::Recording(RecordingError::StandardOutput(cause)) => cause,
             _ => return false,
         };
         cause.kind() == io::ErrorKind::BrokenPipe

@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
+use pitchleak::output::Inputs;
 use pitchleak::trace::{BadRows, TraceReader};
 use std::path::PathBuf;
 
@@ -28,6 +29,11 @@ impl Input {
             Some(path) => Rig::load(path)?,
             None => Rig::beside(&self.trace)?,
         })
+    }
+
+    /// The files read, which are not to be written over.
+    pub fn files(&self, rig: &Rig) -> Inputs {
+        Inputs::of(std::iter::once(self.trace.as_path()).chain(rig.file()))
     }
 
     /// The trace, and a bar that follows the reading on a terminal.

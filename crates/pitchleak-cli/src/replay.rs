@@ -44,8 +44,9 @@ fn estimator(name: &str) -> Result<EstimatorKind, String> {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut rig = arguments.input.rig()?;
     rig.estimator.kind = arguments.estimator.unwrap_or(rig.estimator.kind);
+    let inputs = arguments.input.files(&rig);
+    let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
     let (mut reader, bar) = arguments.input.open(&rig)?;
-    let mut file = arguments.out.as_deref().map(EstimateFile::create).transpose()?;
     let report = replay(&mut reader, &rig, |replay, record, _| match &mut file {
         None => Ok(()),
         Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),

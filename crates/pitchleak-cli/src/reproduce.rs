@@ -2,6 +2,7 @@ use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use pitchleak::output::make_folder;
 use pitchleak::reproduce::{Progress, detection, reproduce};
 use std::path::PathBuf;
 
@@ -27,6 +28,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    arguments.out.as_deref().map(make_folder).transpose()?;
     let bar = ProgressBar::new(1);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos:>3}/{len} {msg}, {elapsed}") {
         bar.set_style(style);

@@ -1,5 +1,6 @@
 //! The engine's errors as Python exceptions.
 
+use pitchleak::output::OutputError;
 use pitchleak::replay::ReplayError;
 use pitchleak::rig::RigError as EngineRigError;
 use pitchleak::trace::{BadRow, Counted, TraceError as EngineTraceError, TraceFault};
@@ -72,6 +73,14 @@ pub fn file_error(py: Python<'_>, file: &str, source: &std::io::Error) -> PyErr 
     match text {
         Ok(text) => PyOSError::new_err((number, text.unbind(), file.to_owned())),
         Err(failure) => failure,
+    }
+}
+
+/// An output over an input is a `ValueError`.
+pub fn output_error(py: Python<'_>, error: &OutputError) -> PyErr {
+    match error {
+        OutputError::OverInput { .. } => value_error(error),
+        OutputError::Write { path, source } => file_error(py, &path.display().to_string(), source),
     }
 }
 

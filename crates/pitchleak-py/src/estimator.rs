@@ -1,15 +1,17 @@
-use crate::errors::{trace_error, value_error};
+use crate::errors::{output_error, trace_error, value_error};
 use crate::rig::Rig;
 use crate::source::Source;
 use crate::table::{NAME, is_plain};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pitchleak::Rig as EngineRig;
+use pitchleak::output::{self, Inputs};
 use pitchleak::replay::{ReplayError, Stream};
 use pitchleak::report::Palette;
 use pitchleak::trace::{BadRows, TableLayout, TraceError, TraceReader};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyBytes;
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 /// The running estimator under `pitchleak.Estimator`.
@@ -74,6 +76,15 @@ impl Estimator {
     fn saved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = self.lock(py)?.stream.save().map_err(value_error)?;
         Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Writes all that the estimator knows, rig included, so that :meth:`load` goes on from here.
+    ///
+    /// The file is replaced as a whole: a crash leaves the old one.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let bytes = self.lock(py)?.stream.save().map_err(value_error)?;
+        let written = py.detach(|| output::write(path, bytes, &Inputs::default()));
+        written.map_err(|error| output_error(py, &error))
     }
 
     /// Takes over the stream that `saved` gave, of an estimator of the same rig.

@@ -1,17 +1,24 @@
-use crate::errors::value_error;
+use crate::errors::{output_error, value_error};
 use crate::replay::Report;
 use crate::threads::detached;
-use pitchleak::reproduce::reproduce as engine_reproduce;
+use pitchleak::output::make_folder;
+use pitchleak::reproduce::{ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
 /// Reruns the paper's experiment; writes its figures and tables into a directory where one is given.
 #[pyfunction]
 pub fn reproduce(py: Python<'_>, seeds: u64, out: Option<PathBuf>) -> PyResult<Report> {
+    if let Some(directory) = &out {
+        make_folder(directory).map_err(|error| output_error(py, &error))?;
+    }
     let done = detached(py, || engine_reproduce(seeds, |_| ()))?;
     let done = done.map_err(value_error)?;
     if let Some(directory) = out {
-        py.detach(|| done.write(&directory)).map_err(value_error)?;
+        py.detach(|| done.write(&directory)).map_err(|error| match error {
+            ReproduceError::Output(error) => output_error(py, &error),
+            error => value_error(error),
+        })?;
     }
     Ok((done.report.to_json().map_err(value_error)?, done.report.to_text()))
 }

@@ -1,8 +1,8 @@
-use crate::errors::value_error;
+use crate::errors::{output_error, value_error};
 use crate::rig::Rig;
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::core::PerLeak;
-use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, share_of_full_scale};
+use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, RecordingError, share_of_full_scale};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use pyo3::prelude::*;
@@ -82,7 +82,10 @@ pub fn simulate<'py>(
         None => recording.columns(),
         Some(path) => recording.write(path, |_| ()).map(|truth| (Vec::new(), truth)),
     });
-    let (columns, truth) = made.map_err(value_error)?;
+    let (columns, truth) = made.map_err(|error| match error {
+        RecordingError::Output(error) => output_error(py, &error),
+        error => value_error(error),
+    })?;
     let columns = columns.into_iter().map(|(header, values)| (header, values.into_pyarray(py))).collect();
     Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }

@@ -145,3 +145,40 @@ def test_an_estimator_is_shared_by_threads(si, rig):
         thread.join()
     trace = est.state().trace
     assert trace.samples + trace.skipped == 80 * 1000
+
+
+def test_saves_from_many_threads_leave_a_whole_file(columns, tmp_path):
+    """They shared one temporary: the file was torn, or gone."""
+    path = tmp_path / "cylinder.state"
+    estimators = [pl.Estimator(pl.Rig.paper()) for _ in range(4)]
+    for count, est in enumerate(estimators):
+        est.extend({name: values[: 100 * (count + 1)] for name, values in columns.items()})
+    failures = []
+
+    def save(est):
+        try:
+            for _ in range(20):
+                est.save(path)
+                pl.Estimator.load(path)
+        except Exception as failure:
+            failures.append(failure)
+
+    threads = [threading.Thread(target=save, args=(est,)) for est in estimators]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
+    assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
+
+
+def test_outputs_that_cannot_be_written(tmp_path):
+    with pytest.raises(FileNotFoundError, match="absent"):
+        pl.Estimator().save(tmp_path / "absent" / "cylinder.state")
+    with pytest.raises(FileNotFoundError, match="absent"):
+        pl.simulate(wind=13, duration=10, out=tmp_path / "absent" / "trace.csv")
+    source = tmp_path / "x.csv"
+    source.write_text("t_s,x_mm\n0,50\n5,60\n")
+    with pytest.raises(ValueError, match="input"):
+        pl.simulate(position=str(source), load="2 kN", duration=10, out=source)
+    assert source.read_text().startswith("t_s,x_mm")

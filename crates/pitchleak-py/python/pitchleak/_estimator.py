@@ -1,6 +1,5 @@
 """Live: samples in, estimates out."""
 
-import os
 from typing import Any, Self
 
 from . import _inputs, _pitchleak
@@ -49,18 +48,6 @@ class Estimator(_pitchleak.Estimator):
         if report is None:
             raise ValueError("no sample yet")
         return parse(Report, *report)
-
-    def save(self, path: _inputs.Path) -> None:
-        """Writes all that the estimator knows, rig included, so that :meth:`load` goes on from here.
-
-        The file is replaced as a whole: a crash leaves the old one.
-        """
-        partial = f"{os.fspath(path)}.partial"
-        with open(partial, "wb") as file:
-            file.write(self.saved())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(partial, path)
 
     @classmethod
     def load(cls, path: _inputs.Path) -> "Estimator":

@@ -1,0 +1,202 @@
+//! Files that a run writes: whole or not at all, and never over what it reads.
+//!
+//! A file is written beside its place under a name of its own, synced, and renamed. A run that fails or is killed leaves
+//! the old file; a kill may leave a hidden `.pitchleak-….tmp` too. What is no regular file (a pipe, a device) is written
+//! to as it is.
+
+mod fault;
+mod inputs;
+mod replacement;
+#[cfg(test)]
+mod tests;
+
+pub use inputs::Inputs;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use replacement::{Replacement, create_beside};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Why a file is not written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// It would take the place of a file that the run reads.
+    #[error("{path}: not written over the run's own input {input}", path = path.display(), input = input.display())]
+    OverInput {
+        /// The output as the user named it.
+        path: PathBuf,
+        /// The input as the user named it.
+        input: PathBuf,
+    },
+    /// The system refuses.
+    #[error("cannot write {path}: {source}", path = path.display())]
+    Write {
+        /// As the user named it.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// A file being written; gzip where its name ends in `.gz`. Without [`finish`](Self::finish) it never was.
+pub struct OutputFile {
+    path: PathBuf,
+    coding: Coding,
+}
+
+enum Coding {
+    Plain(BufWriter<Sink>),
+    Gzip(Box<GzEncoder<BufWriter<Sink>>>),
+}
+
+impl Coding {
+    /// Its bytes, all on the disk.
+    fn sealed(self) -> io::Result<Sink> {
+        let out = match self {
+            Self::Plain(out) => out,
+            Self::Gzip(encoder) => encoder.finish()?,
+        };
+        let mut sink = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        sink.seal()?;
+        Ok(sink)
+    }
+}
+
+enum Sink {
+    Replacement(Replacement),
+    Device(File),
+}
+
+impl OutputFile {
+    /// Makes sure that `path` can be written and is none of `inputs`.
+    ///
+    /// # Errors
+    /// [`OutputError`].
+    pub fn create(path: impl AsRef<Path>, inputs: &Inputs) -> Result<Self, OutputError> {
+        let path = path.as_ref().to_owned();
+        if let Some(input) = inputs.at(&path) {
+            return Err(OutputError::OverInput { input: input.to_owned(), path });
+        }
+        let sink = match Sink::open(&path) {
+            Ok(sink) => BufWriter::new(sink),
+            Err(source) => return Err(OutputError::Write { path, source }),
+        };
+        let gzip = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
+        let coding = if gzip {
+            Coding::Gzip(Box::new(GzEncoder::new(sink, Compression::default())))
+        } else {
+            Coding::Plain(sink)
+        };
+        Ok(Self { path, coding })
+    }
+
+    /// Ends it: from here on it is at its path, whole.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`]; then the old file is still there, unless only the folder could not be synced.
+    pub fn finish(self) -> Result<(), OutputError> {
+        finish_all([self])
+    }
+
+    /// What a failed write to it means.
+    pub fn error(&self, source: io::Error) -> OutputError {
+        OutputError::Write { path: self.path.clone(), source }
+    }
+}
+
+impl Write for OutputFile {
+    #[inline]
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.coding {
+            Coding::Plain(out) => out.write(bytes),
+            Coding::Gzip(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.coding {
+            Coding::Plain(out) => out.flush(),
+            Coding::Gzip(out) => out.flush(),
+        }
+    }
+}
+
+impl Sink {
+    fn open(path: &Path) -> io::Result<Self> {
+        // A link stays one: what it points to is replaced.
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let Ok(old) = fs::metadata(&target) else {
+            return Replacement::of(target).map(Self::Replacement);
+        };
+        // Renaming would pass over a file's protection, and wait until the end to find a folder.
+        let opened = OpenOptions::new().write(true).open(&target)?;
+        if old.is_file() { Replacement::of(target).map(Self::Replacement) } else { Ok(Self::Device(opened)) }
+    }
+
+    fn seal(&mut self) -> io::Result<()> {
+        match self {
+            Self::Replacement(file) => file.seal(),
+            Self::Device(file) => file.flush(),
+        }
+    }
+
+    fn place(self) -> io::Result<()> {
+        match self {
+            Self::Replacement(file) => file.place(),
+            Self::Device(_) => Ok(()),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Replacement(file) => file.write(bytes),
+            Self::Device(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Replacement(file) => file.flush(),
+            Self::Device(file) => file.flush(),
+        }
+    }
+}
+
+/// Ends files that belong together: the first gets its place once all are on the disk.
+///
+/// # Errors
+/// As [`OutputFile::finish`].
+pub fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), OutputError> {
+    let sealed = |OutputFile { path, coding }| match coding.sealed() {
+        Ok(sink) => Ok((path, sink)),
+        Err(source) => Err(OutputError::Write { path, source }),
+    };
+    let sealed = files.into_iter().map(sealed).collect::<Result<Vec<_>, _>>()?;
+    sealed
+        .into_iter()
+        .try_for_each(|(path, sink)| sink.place().map_err(|source| OutputError::Write { path, source }))
+}
+
+/// Writes a whole file at once.
+///
+/// # Errors
+/// [`OutputError`].
+pub fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>, inputs: &Inputs) -> Result<(), OutputError> {
+    let mut file = OutputFile::create(path, inputs)?;
+    file.write_all(bytes.as_ref()).map_err(|source| file.error(source))?;
+    file.finish()
+}
+
+/// Makes the folder where it is not there, and finds out whether files can be made in it.
+///
+/// # Errors
+/// [`OutputError::Write`].
+pub fn make_folder(folder: &Path) -> Result<(), OutputError> {
+    let made = fs::create_dir_all(folder).and_then(|()| create_beside(&folder.join("output")));
+    let removed = made.and_then(|(path, _)| fs::remove_file(path));
+    removed.map_err(|source| OutputError::Write { path: folder.to_owned(), source })
+}
