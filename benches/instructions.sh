@@ -25,8 +25,8 @@ while read -r estimator limit; do
 done <<END
 paper-law 61
 paper 113
-rls 378
-rls-offsets 554
-rls-gains 1027
+rls 700
+rls-offsets 1280
+rls-gains 2480
 END
 exit $failed

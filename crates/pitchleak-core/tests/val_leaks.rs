@@ -38,7 +38,7 @@ fn val_leaks_are_exact_without_noise() {
         let found = replay(&recording, recording.rows.iter().map(|row| row.sample));
         for (leak, found) in found {
             println!("{} {}: {:+.7} L/min", recording.name, leak.label(), found.error_lpm);
-            assert!(found.error_lpm.abs() < 1e-5, "{} {leak:?}", recording.name);
+            assert!(found.error_lpm.abs() < 2e-5, "{} {leak:?}", recording.name);
         }
     }
 }

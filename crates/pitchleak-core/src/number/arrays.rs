@@ -69,20 +69,26 @@ pub(crate) mod vector {
     }
 }
 
-/// `#[serde(with)]` for `[[T; N]; N]`.
+/// `#[serde(with)]` for `[[T; N]; M]`.
 pub(crate) mod matrix {
     use super::{Deserialize, Deserializer, Row, Serialize, Serializer};
 
-    pub fn serialize<S: Serializer, T: Serialize + Copy, const N: usize>(
-        array: &[[T; N]; N],
+    pub fn serialize<S: Serializer, T: Serialize + Copy, const N: usize, const M: usize>(
+        array: &[[T; N]; M],
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         Row(array.map(Row)).serialize(serializer)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default + Copy, const N: usize>(
+    pub fn deserialize<
+        'de,
+        D: Deserializer<'de>,
+        T: Deserialize<'de> + Default + Copy,
+        const N: usize,
+        const M: usize,
+    >(
         deserializer: D,
-    ) -> Result<[[T; N]; N], D::Error> {
-        Row::<Row<T, N>, N>::deserialize(deserializer).map(|rows| rows.0.map(|row| row.0))
+    ) -> Result<[[T; N]; M], D::Error> {
+        Row::<Row<T, N>, M>::deserialize(deserializer).map(|rows| rows.0.map(|row| row.0))
     }
 }

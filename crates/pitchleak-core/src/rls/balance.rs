@@ -73,8 +73,17 @@ impl<T: Real> ChamberIntegral<T> {
 
 /// One scalar equation, left side and regressor.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Equation<T, const N: usize> {
     pub left: T,
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub columns: [T; N],
 }
 

@@ -10,6 +10,9 @@ pub struct Estimates<T> {
     /// Leak coefficients C_ip, C_epA, C_epB, m³/(s·Pa). A negative one is physically impossible and means that
     /// the model lacks an effect.
     pub leaks_m3spa: PerLeak<Estimate<T>>,
+    /// How fast the leak coefficients change, m³/(s·Pa) per s. Leaks that stay have slopes of zero within their
+    /// spread.
+    pub leak_slopes_m3spa_ps: PerLeak<Estimate<T>>,
     /// Mean leak flows over the memory, m³/s, by eq. (15) at the mean pressures.
     pub mean_leaks_m3s: PerLeak<Estimate<T>>,
     /// Means of |P_L|, P_A, P_B over the memory as read, Pa.
@@ -40,7 +43,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let pressures = self.pressures.means();
         Estimates {
             leaks_m3spa: self.leak_coefficients(),
-            mean_leaks_m3s: self.mean_leaks_m3s(),
+            leak_slopes_m3spa_ps: self.leak_slopes(),
+            mean_leaks_m3s: self.leak_flows_m3s(&pressures),
             mean_pressures_pa: pressures.sizes_pa,
             compressibility_per_pa: self.compressibility(),
             flow_offsets_m3s: (N > Parameter::OffsetB as usize).then(|| self.flow_offsets_m3s()),
@@ -83,6 +87,16 @@ impl<T: Real, const N: usize> Rls<T, N> {
             external_a: self.parameter(Parameter::ExternalA),
             external_b: self.parameter(Parameter::ExternalB),
         }
+    }
+
+    fn leak_slopes(&self) -> PerLeak<Estimate<T>> {
+        let unit = self.leak_prior_std();
+        let inflation = self.innovations.inflation();
+        let [internal, external_a, external_b] = self.slopes_ps.map(|(mean, variance)| Estimate {
+            value: mean * unit,
+            std: (variance * inflation).sqrt() * unit,
+        });
+        PerLeak { internal, external_a, external_b }
     }
 
     pub(super) fn compressibility(&self) -> Estimate<T> {

@@ -2,9 +2,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::Parameter;
+use super::block::Block;
 use crate::Real;
 
-/// Weighted normal equations of a linear regression with exponential forgetting and a unit prior.
+/// Normal equations of a linear regression with a unit prior, and what noise in column 0 does to them.
 ///
 /// Parameters are counted in units of their prior standard deviation from their prior mean, so that the
 /// prior is the identity. The prior is never forgotten: when excitation stops, the covariance grows back
@@ -21,15 +22,21 @@ use crate::Real;
 pub(super) struct Information<T, const N: usize> {
     /// Σ w f fᵀ, lower triangle.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    matrix: [[T; N]; N],
-    /// Σ w² f fᵀ, lower triangle: what the weighted sum's own noise amounts to.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    noise: [[T; N]; N],
+    pub matrix: [[T; N]; N],
     /// Σ w f y.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
-    vector: [T; N],
+    pub vector: [T; N],
     /// What sensor noise in column 0 adds to the normal equation of that column on average.
     column_noise: T,
+}
+
+/// What is known before any sample.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior<'a, T> {
+    /// Mean of parameter 0 in units of its standard deviation.
+    pub mean_0: T,
+    /// Information of the two flow offsets; that of all other parameters is one.
+    pub offsets: &'a [[T; 2]; 2],
 }
 
 /// Solution of [`Information`] in prior units.
@@ -49,187 +56,108 @@ pub(super) struct Solution<T, const N: usize> {
     pub covariance: [[T; N]; N],
 }
 
-/// Sums over one block: what is forgotten as one.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
-pub(super) struct BlockSums<T, const N: usize> {
-    /// Σ f fᵀ/S, lower triangle.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    pub matrix: [[T; N]; N],
-    /// Σ f y/S.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
-    pub vector: [T; N],
-    /// Σ (variance of sensor noise in column 0)/S.
-    pub column_noise: T,
-    /// Σ y²/S.
-    pub square: T,
-    /// Number of terms.
-    pub count: T,
-}
-
-impl<T: Real, const N: usize> BlockSums<T, N> {
-    pub fn new() -> Self {
-        Self {
-            matrix: [[T::zero(); N]; N],
-            vector: [T::zero(); N],
-            column_noise: T::zero(),
-            square: T::zero(),
-            count: T::zero(),
-        }
-    }
-
-    /// Adds one observation y = fᵀθ + noise of variance 1/`weight`.
-    #[inline]
-    pub fn add(&mut self, f: &[T; N], y: T, weight: T) {
-        for i in 0..N {
-            let wf = weight * f[i];
-            for j in 0..=i {
-                self.matrix[i][j] += wf * f[j];
-            }
-            self.vector[i] += wf * y;
-        }
-        self.square += weight * y * y;
-        self.count += T::one();
-    }
-
-    /// Σ (y − fᵀθ)²/S at `theta`.
-    pub fn chi_square(&self, theta: &[T; N]) -> T {
-        let mut chi = self.square;
-        for i in 0..N {
-            chi -= T::lit(2.0) * theta[i] * self.vector[i];
-            for j in 0..=i {
-                let twice = if i == j { T::one() } else { T::lit(2.0) };
-                chi += twice * theta[i] * theta[j] * self.matrix[i][j];
-            }
-        }
-        chi.max(T::zero())
-    }
-}
-
 impl<T: Real, const N: usize> Solution<T, N> {
+    pub fn zero() -> Self {
+        Self { mean: [T::zero(); N], covariance: [[T::zero(); N]; N] }
+    }
+
+    /// Variance of aᵀθ.
+    fn variance(&self, a: &[T; N]) -> T {
+        let mut variance = T::zero();
+        for i in 0..N {
+            let mut sum = T::zero();
+            for j in 0..N {
+                sum += self.covariance[i][j] * a[j];
+            }
+            variance += a[i] * sum;
+        }
+        variance
+    }
+
     /// Innovation y − fᵀθ̂ of an observation with unit noise, and its variance 1 + fᵀP f.
     pub fn predict(&self, y: T, f: &[T; N]) -> (T, T) {
         let mut innovation = y;
-        let mut variance = T::one();
         for i in 0..N {
             innovation -= f[i] * self.mean[i];
-            for j in 0..N {
-                variance += f[i] * self.covariance[i][j] * f[j];
-            }
         }
-        (innovation, variance)
+        (innovation, T::one() + self.variance(f))
     }
 }
 
 impl<T: Real, const N: usize> Information<T, N> {
     pub fn new() -> Self {
-        Self {
-            matrix: [[T::zero(); N]; N],
-            noise: [[T::zero(); N]; N],
-            vector: [T::zero(); N],
-            column_noise: T::zero(),
+        Self { matrix: [[T::zero(); N]; N], vector: [T::zero(); N], column_noise: T::zero() }
+    }
+
+    /// Independent parameters of this mean and variance, prior included.
+    pub fn of(mean: &[T; N], variance: &[T; N], prior: &Prior<'_, T>) -> Self {
+        let mut information = Self::new();
+        for i in 0..N {
+            for j in 0..=i {
+                information.matrix[i][j] = -prior_entry(prior.offsets, i, j);
+            }
+            let known = T::one() / variance[i];
+            information.matrix[i][i] += known;
+            information.vector[i] = known * mean[i];
         }
+        information
     }
 
     /// Weighs all that is known by `keep` (0 to 1).
     pub fn forget(&mut self, keep: T) {
-        let keep_noise = keep * keep;
         for i in 0..N {
             for j in 0..=i {
                 self.matrix[i][j] *= keep;
-                self.noise[i][j] *= keep_noise;
             }
             self.vector[i] *= keep;
         }
         self.column_noise *= keep;
     }
 
-    pub fn add(&mut self, block: &BlockSums<T, N>) {
+    pub fn add(&mut self, block: &Block<T, N>) {
         for i in 0..N {
             for j in 0..=i {
                 self.matrix[i][j] += block.matrix[i][j];
-                self.noise[i][j] += block.matrix[i][j];
             }
             self.vector[i] += block.vector[i];
         }
         self.column_noise += block.column_noise;
     }
 
-    /// Posterior mean and the covariance of its error, A⁻¹ (N + prior) A⁻¹ with A = M + prior: forgetting weighs
-    /// the samples unequally, so A⁻¹ alone would overstate the spread (White 1980, sandwich form).
-    ///
-    /// Noise in column 0 (errors in variables) is taken out of A and of the vector; `mean_0` is the
-    /// prior mean of that parameter in units of its prior standard deviation. `offsets` is the prior
-    /// information of the two flow offsets; that of all other parameters is one.
-    pub fn solve(&self, mean_0: T, offsets: &[[T; 2]; 2]) -> Solution<T, N> {
-        let (factors, taken) = self.factor(offsets);
-        let inverse = factors.inverse();
-        let mut vector = self.vector;
-        if let Some(first) = vector.first_mut() {
-            *first += taken * mean_0;
-        }
-        let noise = self.noise_with_prior(offsets);
-        let mut mean = [T::zero(); N];
-        let mut half = [[T::zero(); N]; N];
-        for i in 0..N {
-            for k in 0..N {
-                mean[i] += inverse[i][k] * vector[k];
-                for j in 0..N {
-                    half[i][j] += inverse[i][k] * noise[k][j];
-                }
-            }
-        }
-        let mut covariance = [[T::zero(); N]; N];
-        for i in 0..N {
-            for j in 0..N {
-                for k in 0..N {
-                    covariance[i][j] += half[i][k] * inverse[k][j];
-                }
-            }
-            covariance[i][i] = covariance[i][i].max(T::min_positive_value());
-        }
-        Solution { mean, covariance }
+    /// Entry of the symmetric matrix.
+    #[inline]
+    pub fn entry(&self, i: usize, j: usize) -> T {
+        if i >= j { self.matrix[i][j] } else { self.matrix[j][i] }
     }
 
-    #[inline]
-    fn noise_with_prior(&self, offsets: &[[T; 2]; 2]) -> [[T; N]; N] {
-        let mut whole = [[T::zero(); N]; N];
-        for i in 0..N {
-            for j in 0..=i {
-                whole[i][j] = self.noise[i][j] + prior(offsets, i, j);
-                whole[j][i] = whole[i][j];
-            }
-        }
-        whole
+    /// Posterior mean, and what its covariance follows from: the factors of A = M + prior.
+    ///
+    /// Noise in column 0 (errors in variables) is taken out of A and of the vector.
+    pub fn solve(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
+        let factors = self.factor(prior.offsets);
+        Posterior { mean: factors.solve(self.vector, prior.mean_0), factors }
     }
 
     /// U D Uᵀ of A = M + prior, last parameter first (Bierman 1977, Factorization Methods for Discrete
     /// Sequential Estimation, §III.4), so that the last pivot is what is known of parameter 0 beyond all
-    /// others. The column noise is taken from it, but never more than leaves the prior standing. Also returns what was
-    /// taken.
-    fn factor(&self, offsets: &[[T; 2]; 2]) -> (Factors<T, N>, T) {
+    /// others. The column noise is taken from it, but never more than leaves the prior standing.
+    fn factor(&self, offsets: &[[T; 2]; 2]) -> Factors<T, N> {
         // A pivot is kept above the rounding error of its diagonal, which only matters in f32.
         let floor = T::lit(8.0) * T::epsilon();
         let mut upper = [[T::zero(); N]; N];
+        let mut pivots = [T::zero(); N];
         let mut inverse_pivot = [T::zero(); N];
         let mut taken = T::zero();
         for back in 0..N {
             let i = N - 1 - back;
             for j in (i + 1..N).rev() {
-                let mut sum = self.matrix[j][i] + prior(offsets, j, i);
+                let mut sum = self.matrix[j][i] + prior_entry(offsets, j, i);
                 for k in j + 1..N {
                     sum -= upper[i][k] * upper[j][k];
                 }
                 upper[i][j] = sum;
             }
-            let diagonal = self.matrix[i][i] + prior(offsets, i, i);
+            let diagonal = self.matrix[i][i] + prior_entry(offsets, i, i);
             let mut pivot = diagonal;
             for j in i + 1..N {
                 // upper[i][j] holds U D here; turn it to U as it is used.
@@ -241,15 +169,16 @@ impl<T: Real, const N: usize> Information<T, N> {
                 taken = self.column_noise.min(pivot - T::one()).max(T::zero());
                 pivot -= taken;
             }
-            inverse_pivot[i] = T::one() / pivot.max(floor * diagonal);
+            pivots[i] = pivot.max(floor * diagonal);
+            inverse_pivot[i] = T::one() / pivots[i];
         }
-        (Factors { upper, inverse_pivot }, taken)
+        Factors { upper, pivots, inverse_pivot, taken }
     }
 }
 
 /// Entry of the prior information, `i` >= `j`.
 #[inline]
-fn prior<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
+fn prior_entry<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
     const A: usize = Parameter::OffsetA as usize;
     const B: usize = Parameter::OffsetB as usize;
     match (i, j) {
@@ -261,33 +190,101 @@ fn prior<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
     }
 }
 
-/// Unit upper U (above the diagonal) and 1/D.
+/// Posterior mean θ̂ in prior units, and the factors of its information A.
+#[derive(Clone, Copy)]
+pub(super) struct Posterior<T, const N: usize> {
+    pub mean: [T; N],
+    factors: Factors<T, N>,
+}
+
+impl<T: Real, const N: usize> Posterior<T, N> {
+    pub fn zero() -> Self {
+        let zero = [T::zero(); N];
+        let factors = Factors { upper: [zero; N], pivots: zero, inverse_pivot: zero, taken: T::zero() };
+        Self { mean: zero, factors }
+    }
+
+    /// Pivots of A: their product is its determinant.
+    pub fn pivots(&self) -> &[T; N] {
+        &self.factors.pivots
+    }
+
+    /// Variance of parameter 0: its pivot comes last.
+    pub fn variance_0(&self) -> T {
+        self.factors.inverse_pivot[0]
+    }
+
+    /// Variance aᵀ A⁻¹ a of aᵀθ.
+    pub fn variance(&self, a: &[T; N]) -> T {
+        let mut z = *a;
+        self.factors.substitute_upper(&mut z);
+        let mut variance = T::zero();
+        for i in 0..N {
+            variance += z[i] * z[i] * self.factors.inverse_pivot[i];
+        }
+        variance
+    }
+
+    /// The mean with the whole covariance A⁻¹.
+    pub fn solution(&self) -> Solution<T, N> {
+        let mut covariance = self.factors.inverse();
+        for i in 0..N {
+            covariance[i][i] = covariance[i][i].max(T::min_positive_value());
+        }
+        Solution { mean: self.mean, covariance }
+    }
+}
+
+/// Unit upper U (above the diagonal), D and 1/D.
+#[derive(Clone, Copy)]
 struct Factors<T, const N: usize> {
     upper: [[T; N]; N],
+    pivots: [T; N],
     inverse_pivot: [T; N],
+    /// Column noise that was taken out.
+    taken: T,
 }
 
 impl<T: Real, const N: usize> Factors<T, N> {
-    /// (U D Uᵀ)⁻¹, column by column: U z = e, then Uᵀ x = D⁻¹ z.
+    /// x of A x = `vector`, whose first entry lacks what the column noise took: U z = v, then Uᵀ x = D⁻¹ z.
+    fn solve(&self, vector: [T; N], mean_0: T) -> [T; N] {
+        let mut x = vector;
+        x[0] += self.taken * mean_0;
+        self.substitute(&mut x);
+        x
+    }
+
+    /// z of U z = x.
+    #[inline]
+    fn substitute_upper(&self, x: &mut [T; N]) {
+        for back in 0..N {
+            let i = N - 1 - back;
+            for k in i + 1..N {
+                let known = x[k];
+                x[i] -= self.upper[i][k] * known;
+            }
+        }
+    }
+
+    #[inline]
+    fn substitute(&self, x: &mut [T; N]) {
+        self.substitute_upper(x);
+        for i in 0..N {
+            let mut sum = x[i] * self.inverse_pivot[i];
+            for k in 0..i {
+                sum -= self.upper[k][i] * x[k];
+            }
+            x[i] = sum;
+        }
+    }
+
+    /// A⁻¹, column by column.
     fn inverse(&self) -> [[T; N]; N] {
         let mut inverse = [[T::zero(); N]; N];
         for column in 0..N {
             let mut x = [T::zero(); N];
-            for back in 0..N {
-                let i = N - 1 - back;
-                let mut sum = if i == column { T::one() } else { T::zero() };
-                for k in i + 1..N {
-                    sum -= self.upper[i][k] * x[k];
-                }
-                x[i] = sum;
-            }
-            for i in 0..N {
-                let mut sum = x[i] * self.inverse_pivot[i];
-                for k in 0..i {
-                    sum -= self.upper[k][i] * x[k];
-                }
-                x[i] = sum;
-            }
+            x[column] = T::one();
+            self.substitute(&mut x);
             for i in 0..N {
                 inverse[i][column] = x[i];
             }
@@ -298,44 +295,68 @@ impl<T: Real, const N: usize> Factors<T, N> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::balance::Equation;
+    use super::super::block::{Balance, BlockSums};
     use super::*;
+
+    const OFFSETS: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
+    const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &OFFSETS };
+
+    fn block<const N: usize>(rows: impl Iterator<Item = ([f64; N], f64)>, weight: f64) -> Block<f64, N> {
+        let mut sums = BlockSums::new();
+        rows.for_each(|(f, y)| sums.add(&f, &[0.0; 3], y, weight));
+        Block::new(1.0, &sums, &[None; 2], 0.0)
+    }
 
     #[test]
     fn recovers_a_linear_law_and_its_covariance() {
-        let mut sums = BlockSums::<f64, 3>::new();
-        let truth = [0.3, -1.2, 2.0];
-        let mut expected = nalgebra::Matrix3::<f64>::identity();
-        for k in 0..200 {
-            let t = k as f64 * 0.1;
-            let f = [t.sin(), (0.7 * t).cos(), 1.0 + 0.1 * t];
-            let y = f.iter().zip(truth).map(|(a, b)| a * b).sum();
-            sums.add(&f, y, 1e6);
-            let v = nalgebra::Vector3::from(f);
-            expected += v * v.transpose() * 1e6;
-        }
+        let truth = [0.3, -1.2, 2.0, 0.7];
+        let row = |k: u32| {
+            let t = f64::from(k) * 0.1;
+            [t.sin(), (0.7 * t).cos(), 1.0 + 0.1 * t, (1.3 * t).sin()]
+        };
+        let rows = (0..200).map(|k| (row(k), row(k).iter().zip(truth).map(|(a, b)| a * b).sum()));
         let mut information = Information::new();
-        information.add(&sums);
-        let solution = information.solve(0.0, &[[1.0, 0.0], [0.0, 1.0]]);
+        information.add(&block(rows, 1e6));
+        let expected = (0..200).fold(nalgebra::Matrix4::<f64>::identity(), |sum, k| {
+            let v = nalgebra::Vector4::from(row(k));
+            sum + v * v.transpose() * 1e6
+        });
         let inverse = expected.try_inverse().unwrap();
-        for i in 0..3 {
+        let posterior = information.solve(&PRIOR);
+        let (solution, a) = (posterior.solution(), [0.3, -1.0, 2.0, 0.5]);
+        let dense = (inverse * nalgebra::Vector4::from(a)).dot(&nalgebra::Vector4::from(a));
+        assert!((posterior.variance(&a) / dense - 1.0).abs() < 1e-9);
+        assert!((posterior.variance_0() / inverse[(0, 0)] - 1.0).abs() < 1e-9);
+        for i in 0..4 {
             assert!((solution.mean[i] - truth[i]).abs() < 1e-5);
-            for j in 0..3 {
+            for j in 0..4 {
                 assert!((solution.covariance[i][j] - inverse[(i, j)]).abs() < 1e-9 * inverse[(i, i)].abs());
             }
         }
-        assert!(sums.chi_square(&solution.mean) < 1e-3);
+        assert!((posterior.pivots().iter().product::<f64>() / expected.determinant() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_balance_counts_as_one_more_row() {
+        let rows = [([1.0, 2.0, 0.5, -1.0], 3.0), ([0.3, -1.0, 0.1, 2.0], -1.0)];
+        let (mut together, mut apart) = (Information::new(), Information::new());
+        together.add(&block(rows.into_iter(), 1.0));
+        let mut sums = BlockSums::new();
+        sums.add(&rows[0].0, &[0.0; 3], rows[0].1, 1.0);
+        let equation = Equation { left: rows[1].1, columns: rows[1].0 };
+        apart.add(&Block::new(1.0, &sums, &[None, Some(Balance { equation, age_s: 0.0 })], 0.0));
+        assert_eq!((together.matrix, together.vector), (apart.matrix, apart.vector));
     }
 
     #[test]
     fn forgetting_everything_returns_to_the_prior() {
-        let mut sums = BlockSums::<f64, 2>::new();
-        sums.add(&[1.0, 2.0], 3.0, 1e4);
         let mut information = Information::new();
-        information.add(&sums);
+        information.add(&block([([1.0, 2.0, 3.0, 4.0], 3.0)].into_iter(), 1e4));
         for _ in 0..200 {
             information.forget(0.5);
         }
-        let solution = information.solve(0.0, &[[1.0, 0.0], [0.0, 1.0]]);
+        let solution = information.solve(&PRIOR).solution();
         assert!((solution.covariance[0][0] - 1.0).abs() < 1e-9);
         assert!(solution.mean[1].abs() < 1e-9);
     }

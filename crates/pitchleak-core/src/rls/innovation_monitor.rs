@@ -1,6 +1,6 @@
 use crate::Real;
 
-/// Watches the innovations: are they as large as the declared noise says, and did the leak change?
+/// Watches the innovations: are they as large as the declared noise says?
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct InnovationMonitor<T> {
@@ -8,44 +8,20 @@ pub(super) struct InnovationMonitor<T> {
     balance_count: T,
     odometer_sum: T,
     odometer_count: T,
-    cusum: T,
-    changed: bool,
 }
-
-/// Page's test on ν²/S, which is χ²₁ as long as nothing changes: drift, largest step and bound. A false
-/// change comes at most once per exp(0.398 · 40) ≈ 8·10⁶ blocks, three weeks at four blocks a second
-/// (Page 1954; Basseville & Nikiforov 1993, Detection of Abrupt Changes, §2.2 and §5.2).
-const CUSUM_DRIFT: f64 = 2.0;
-const CUSUM_STEP: f64 = 16.0;
-const CUSUM_BOUND: f64 = 40.0;
 
 impl<T: Real> InnovationMonitor<T> {
     /// Takes one balance innovation of variance `variance`, both over the declared noise's variance.
     pub fn balance(&mut self, innovation: T, variance: T) {
         let ratio = innovation * innovation / variance;
-        let known = self.inflation();
-        let step = (ratio / known).min(T::lit(CUSUM_STEP)) - T::lit(CUSUM_DRIFT);
-        self.cusum = (self.cusum + step).max(T::zero());
         self.balance_sum += ratio;
         self.balance_count += T::one();
-        if self.cusum > T::lit(CUSUM_BOUND) {
-            self.changed = true;
-        }
     }
 
     /// Takes the χ² of `count` odometer innovations.
     pub fn odometer(&mut self, chi_square: T, count: T) {
         self.odometer_sum += chi_square;
         self.odometer_count += count;
-    }
-
-    /// Whether the parameters changed since the last call; the test starts again.
-    pub fn take_change(&mut self) -> bool {
-        let changed = self.changed;
-        if changed {
-            *self = Self::default();
-        }
-        changed
     }
 
     pub fn forget(&mut self, keep: T) {
@@ -144,22 +120,5 @@ mod tests {
             }
             assert!((monitor.inflation() / expected - 1.0).abs() < 0.05, "{}", monitor.inflation());
         }
-    }
-
-    /// A leak that opens shows within a few blocks; in the eight million that a false change takes at the least
-    /// there is one at most.
-    #[test]
-    fn a_change_is_seen_soon_and_nothing_else_is() {
-        let mut monitor = InnovationMonitor::default();
-        let mut false_changes = 0;
-        for unit in white_noise(3).take(8_000_000) {
-            monitor.balance(unit, 1.0);
-            false_changes += u32::from(monitor.take_change());
-        }
-        assert!(false_changes <= 1, "{false_changes}");
-        for unit in white_noise(4).take(5) {
-            monitor.balance(unit + 6.0, 1.0);
-        }
-        assert!(monitor.take_change());
     }
 }

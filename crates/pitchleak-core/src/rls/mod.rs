@@ -9,34 +9,46 @@
 //! - the odometer's innovations are white by a scalar Kalman filter on the piston position ([`position_filter`]),
 //!   and its columns are smooth by nature.
 //!
+//! How fast the leaks change is learnt: a bank of hypotheses, from leaks that stay to leaks whose trend lasts for
+//! a few seconds, is weighed by how well each foretells the data ([`model_bank`]).
+//!
 //! Time and memory per sample are constant; nothing is ever differentiated.
 
 mod balance;
+mod block;
+mod change_detector;
 mod error;
 mod estimates;
+mod evidence;
 mod excitation;
 mod information;
 mod innovation_monitor;
 mod ma1_whitener;
+mod model_bank;
 mod noise;
 mod offset_prior;
 mod parameter;
 mod position_filter;
 mod pressure_means;
 mod prior;
+mod trend;
 mod update;
 mod weights;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
-use balance::{Integrals, combine};
+use balance::{Equation, Integrals, combine};
+use block::{BALANCES, Balance, Block, BlockSums};
+use change_detector::ChangeDetector;
 pub use error::RlsError;
 pub use estimates::Estimates;
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
-use information::{BlockSums, Information, Solution};
+use information::{Information, Prior, Solution};
 use innovation_monitor::{InnovationMonitor, NoiseMeter};
 use ma1_whitener::Ma1Whitener;
+use model_bank::{ModelBank, Outlook};
 use noise::NoiseStd;
 use offset_prior::OffsetPrior;
+use parameter::LEAKS;
 pub use parameter::Parameter;
 use position_filter::PositionFilter;
 use pressure_means::PressureMeans;
@@ -44,13 +56,16 @@ use prior::prior_spread;
 pub use update::{Innovation, Update};
 use weights::Weights;
 
-/// How [`Rls`] forgets and averages.
+/// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
+const AVERAGING_S: f64 = 60.0;
+
+/// How [`Rls`] remembers and averages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RlsSettings<T> {
-    /// Time constant of forgetting, s; infinite to remember everything.
+    /// Longest memory, s; infinite to remember everything. How much of it counts is learnt from the data.
     pub forgetting_time_s: T,
-    /// Length of the balance's blocks, s: the estimates are renewed once per block.
+    /// Length of the balance's blocks, s: the estimates are renewed after every second block.
     pub block_time_s: T,
     /// A step longer than this, s, is a gap: nothing is integrated over it.
     pub max_step_s: T,
@@ -58,7 +73,7 @@ pub struct RlsSettings<T> {
 
 impl<T: Real> Default for RlsSettings<T> {
     fn default() -> Self {
-        Self { forgetting_time_s: T::lit(60.0), block_time_s: T::lit(0.25), max_step_s: T::lit(0.5) }
+        Self { forgetting_time_s: T::infinity(), block_time_s: T::lit(0.25), max_step_s: T::lit(0.5) }
     }
 }
 
@@ -96,7 +111,14 @@ pub struct Rls<T, const N: usize> {
     only_a: Weights<T>,
     only_b: Weights<T>,
     position_filter: Option<PositionFilter<T, N>>,
+    /// What the position filter has told since the estimates were renewed.
     sums: BlockSums<T, N>,
+    /// The balances since then.
+    balances: [Option<Balance<T, N>>; BALANCES],
+    /// Time since then, s.
+    unlearnt_s: T,
+    /// Blocks of the balance since then; after a sudden change the first one counts at once.
+    unlearnt: usize,
     block: Integrals<T>,
     /// The part of the block in which both flows were measured.
     fed: Integrals<T>,
@@ -104,8 +126,13 @@ pub struct Rls<T, const N: usize> {
     pressure_noise_b: NoiseMeter<T>,
     /// The balance equation's moving-average noise filter: last whitened block.
     memory: Option<Ma1Whitener<T, N>>,
-    information: Information<T, N>,
+    /// Variance of the sensor noise in the compressibility's column, over the rows' own, summed over the block.
+    column_noise: T,
+    bank: ModelBank<T, N>,
     solution: Solution<T, N>,
+    /// Slopes of the leaks, mean and variance, prior units per s.
+    slopes_ps: [(T, T); LEAKS],
+    change: ChangeDetector<T, N>,
     innovations: InnovationMonitor<T>,
     pressures: PressureMeans<T>,
 }
@@ -129,6 +156,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
         let offsets = OffsetPrior::new(&cylinder, sensors, &no_leak);
+        let solution =
+            Information::new().solve(&Prior { mean_0: T::zero(), offsets: &offsets.information }).solution();
         Ok(Self {
             cylinder,
             noise,
@@ -143,13 +172,19 @@ impl<T: Real, const N: usize> Rls<T, N> {
             only_b: Weights::only_b(&cylinder, &noise, &no_leak),
             position_filter: None,
             sums: BlockSums::new(),
+            balances: [None; BALANCES],
+            unlearnt_s: T::zero(),
+            unlearnt: 0,
             block: Integrals::default(),
             fed: Integrals::default(),
             pressure_noise_a: NoiseMeter::default(),
             pressure_noise_b: NoiseMeter::default(),
             memory: None,
-            information: Information::new(),
-            solution: Information::new().solve(T::zero(), &offsets.information),
+            column_noise: T::zero(),
+            bank: ModelBank::new(settings.forgetting_time_s),
+            change: ChangeDetector::new(&solution),
+            solution,
+            slopes_ps: [(T::zero(), T::zero()); LEAKS],
             innovations: InnovationMonitor::default(),
             pressures: PressureMeans::default(),
         })
@@ -175,7 +210,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.block.add(&step);
         self.advance(&step, &last, sample);
         let full = self.block.time >= self.settings.block_time_s && self.block.steps >= T::lit(8.0);
-        if full { self.renew() } else { Update::Accepted }
+        if full { self.close_block() } else { Update::Accepted }
     }
 
     /// PositionFilter step, by whichever flows both ends of the step have.
@@ -206,6 +241,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         let variance = weights.odometer_variance * step.time_square;
         odometer.advance(
+            step.time,
             equation.left,
             &equation.columns,
             variance,
@@ -215,54 +251,103 @@ impl<T: Real, const N: usize> Rls<T, N> {
         );
     }
 
-    /// Closes the block: both whitened equations go into the information, and the estimates are renewed.
-    fn renew(&mut self) -> Update<T> {
-        let mut travelled = self.sums;
+    /// Closes a block of the balance; every second one the estimates are renewed.
+    fn close_block(&mut self) -> Update<T> {
         self.compensate_odometer();
-        let innovation = self.whitened_balance().map(|equation| self.add_balance(&equation));
-        if innovation.is_none() {
+        let balance = self.whitened_balance();
+        if balance.is_none() {
             self.memory = None;
         }
-        let elapsed_s = self.block.time;
-        let keep = T::one() / (T::one() + self.block.time / self.settings.forgetting_time_s);
-        let changed = self.innovations.take_change();
-        if changed {
-            self.begin_anew();
-            travelled = self.sums;
-        }
-        self.information.forget(keep);
-        self.information.add(&self.sums);
+        let innovation = balance.as_ref().map(|equation| self.watch_balance(equation));
+        let time_s = self.block.time;
+        let keep = T::one() / (T::one() + time_s / T::lit(AVERAGING_S));
         self.pressures.add_block(&self.block, keep);
         self.innovations.forget(keep);
-        let scale = self.scale[Parameter::Compressibility as usize];
-        self.solution = self.information.solve(self.compressibility / scale, &self.offsets.information);
-        self.innovations.odometer(travelled.chi_square(&self.solution.mean), travelled.count);
-        self.reweigh();
-        self.sums = BlockSums::new();
+        let changed = balance.as_ref().is_some_and(|equation| self.has_changed(equation));
         self.block = Integrals::default();
         self.fed = Integrals::default();
-        if let Some(odometer) = &mut self.position_filter {
-            odometer.weight_sum = T::zero();
+        if changed {
+            let elapsed_s = self.unlearnt_s + time_s;
+            self.begin_anew();
+            return Update::Renewed { elapsed_s, changed, innovation };
+        }
+        self.take_balance(balance, time_s);
+        if self.unlearnt < BALANCES {
+            return Update::Balanced { innovation };
+        }
+        let elapsed_s = self.unlearnt_s;
+        let changed = self.learn();
+        if changed {
+            self.begin_anew();
         }
         Update::Renewed { elapsed_s, changed, innovation }
     }
 
-    /// The leak has changed: what was learnt before it counts for nothing, and neither the odometer
-    /// nor the block just closed may carry the old leak on.
-    fn begin_anew(&mut self) {
-        let nothing = T::lit(1e-8);
-        self.information.forget(nothing);
-        self.pressures.forget(nothing);
+    fn has_changed(&mut self, balance: &Equation<T, N>) -> bool {
+        let slopes_ps = self.slopes_ps.map(|(mean, _)| mean);
+        let inflation = self.innovations.inflation();
+        self.change.update(balance, self.block.time, &self.solution, &slopes_ps, inflation)
+    }
+
+    /// Puts a balance to those that will be learnt from together.
+    fn take_balance(&mut self, balance: Option<Equation<T, N>>, time_s: T) {
+        for earlier in self.balances.iter_mut().flatten() {
+            earlier.age_s += time_s;
+        }
+        if let Some(place) = self.balances.get_mut(self.unlearnt) {
+            *place = balance.map(|equation| Balance { equation, age_s: T::lit(0.5) * time_s });
+        }
+        self.unlearnt += 1;
+        self.unlearnt_s += time_s;
+    }
+
+    /// What the blocks since the last time tell of the parameters. Says whether the leaks have jumped.
+    fn learn(&mut self) -> bool {
+        let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
+        let mean_0 = self.compressibility / self.scale[Parameter::Compressibility as usize];
+        let prior = Prior { mean_0, offsets: &self.offsets.information };
+        let inflation = self.innovations.inflation();
+        let Outlook { now, slopes_ps, jumped } = self.bank.update(&block, &prior, inflation, &self.solution);
+        self.solution = now;
+        self.slopes_ps = slopes_ps;
+        self.innovations.odometer(self.sums.chi_square(&self.solution.mean), self.sums.count);
+        self.reweigh();
+        self.empty_block(0);
+        jumped
+    }
+
+    /// Nothing is to be learnt from; `blocks` count as if they had been there.
+    fn empty_block(&mut self, blocks: usize) {
         self.sums = BlockSums::new();
+        self.balances = [None; BALANCES];
+        self.column_noise = T::zero();
+        self.unlearnt_s = T::zero();
+        self.unlearnt = blocks;
+        if let Some(odometer) = &mut self.position_filter {
+            odometer.weight_sum = T::zero();
+        }
+    }
+
+    /// The leak has changed at once: what was learnt before it counts for nothing, and neither the odometer
+    /// nor the block just closed may carry the old leak on. The next block is learnt from at once.
+    fn begin_anew(&mut self) {
+        self.bank = ModelBank::new(self.settings.forgetting_time_s);
+        let prior = Prior { mean_0: T::zero(), offsets: &self.offsets.information };
+        self.solution = Information::new().solve(&prior).solution();
+        self.slopes_ps = [(T::zero(), T::zero()); LEAKS];
+        self.change = ChangeDetector::new(&self.solution);
+        self.innovations = InnovationMonitor::default();
+        self.pressures.forget(T::lit(1e-8));
         self.memory = None;
         let variance = self.noise.position_m * self.noise.position_m;
         if let (Some(odometer), Some(last)) = (&mut self.position_filter, &self.last) {
             odometer.anchor(last.x_m, variance);
         }
+        self.empty_block(BALANCES - 1);
     }
 
     /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
-    fn whitened_balance(&mut self) -> Option<balance::Equation<T, N>> {
+    fn whitened_balance(&mut self) -> Option<Equation<T, N>> {
         if self.fed.steps < T::lit(2.0) {
             return None;
         }
@@ -292,10 +377,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Some(equation)
     }
 
-    fn add_balance(&mut self, equation: &balance::Equation<T, N>) -> Innovation<T> {
+    fn watch_balance(&mut self, equation: &Equation<T, N>) -> Innovation<T> {
         let (value, variance) = self.solution.predict(equation.left, &equation.columns);
         self.innovations.balance(value, variance);
-        self.sums.add(&equation.columns, equation.left, T::one());
         // Both ends of the block are noisy readings of the pressure.
         if let Some(memory) = self.memory {
             let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
@@ -328,7 +412,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// column.
     fn compensate(&mut self, variance: T) {
         let scale = self.scale[Parameter::Compressibility as usize];
-        self.sums.column_noise += variance * scale * scale;
+        self.column_noise += variance * scale * scale;
     }
 
     /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given spread.

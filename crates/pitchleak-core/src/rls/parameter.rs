@@ -1,3 +1,12 @@
+/// Parameters that are leaks.
+pub(super) const LEAKS: usize = 3;
+
+/// Place of a leak, in the order of [`Leak::ALL`](crate::Leak::ALL), among the parameters.
+#[inline]
+pub(super) const fn leak_column(leak: usize) -> usize {
+    Parameter::Internal as usize + leak
+}
+
 /// Parameters of [`Rls`](super::Rls) in their fixed order: an estimator of N parameters has the first N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,4 +1,5 @@
-use super::information::BlockSums;
+use super::block::BlockSums;
+use super::parameter::{LEAKS, leak_column};
 use crate::Real;
 
 /// Position whitener: a scalar Kalman filter that carries the piston by the flows (the odometer) and is
@@ -21,6 +22,8 @@ pub(super) struct PositionFilter<T, const N: usize> {
     variance_m2: T,
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     sensitivity: [T; N],
+    /// What the leaks' sensitivities add up, each share times its age, s.
+    aged: [T; LEAKS],
     /// Σ 1/S over the block, to compensate pressure noise in the compressibility column.
     pub weight_sum: T,
 }
@@ -32,15 +35,17 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
             position_m: x_m,
             variance_m2: sensor_variance_m2,
             sensitivity: [T::zero(); N],
+            aged: [T::zero(); LEAKS],
             weight_sum: T::zero(),
         }
     }
 
-    /// Carries the piston by `travel_m` − `columns`ᵀθ, whose error has variance `variance_m2`, and compares
+    /// Carries the piston over `dt_s` by `travel_m` − `columns`ᵀθ, whose error has variance `variance_m2`, and compares
     /// with the reading `x_m`; the whitened observation goes to `sums`.
     #[inline]
     pub fn advance(
         &mut self,
+        dt_s: T,
         travel_m: T,
         columns: &[T; N],
         variance_m2: T,
@@ -48,6 +53,12 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
         sensor_variance_m2: T,
         sums: &mut BlockSums<T, N>,
     ) {
+        // What came before is a step older now, what comes is half a step old.
+        let half_s = T::lit(0.5) * dt_s;
+        for i in 0..LEAKS {
+            let (g, c) = (self.sensitivity[leak_column(i)], columns[leak_column(i)]);
+            self.aged[i] += half_s * (g + g + c);
+        }
         for (g, c) in self.sensitivity.iter_mut().zip(columns) {
             *g += *c;
         }
@@ -55,7 +66,7 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
         let variance = self.variance_m2 + variance_m2;
         let weight = T::one() / (variance + sensor_variance_m2);
         let innovation = predicted - x_m;
-        sums.add(&self.sensitivity, innovation, weight);
+        sums.add(&self.sensitivity, &self.aged, innovation, weight);
         self.weight_sum += weight;
         let gain = variance * weight;
         let keep = T::one() - gain;
@@ -63,6 +74,9 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
         self.variance_m2 = keep * variance;
         for g in &mut self.sensitivity {
             *g *= keep;
+        }
+        for aged in &mut self.aged {
+            *aged *= keep;
         }
     }
 

@@ -5,12 +5,17 @@ pub enum Update<T> {
     Started,
     /// The sample was taken in.
     Accepted,
+    /// The sample completed a block of the balance; the estimates will be new after the next.
+    Balanced {
+        /// As that of [`Renewed`](Self::Renewed).
+        innovation: Option<Innovation<T>>,
+    },
     /// The sample completed a block: the estimates are new.
     Renewed {
         /// Time that was watched since the estimates were last new, s: without gaps, for
         /// [`LeakDetector::update`](crate::LeakDetector::update).
         elapsed_s: T,
-        /// The leak has changed: what was learnt before counts for nothing any more.
+        /// The leak has changed at once: what was learnt before counts for nothing any more.
         changed: bool,
         /// What the flow balance of the block had that the estimates before it did not foretell; none where a
         /// chamber had no flow to balance.

@@ -1,0 +1,253 @@
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
+use super::block::Block;
+use super::information::Posterior;
+use super::parameter::LEAKS;
+use super::trend::Elimination;
+use crate::Real;
+
+/// Measures how well a hypothesis foretold a block: ln of the block's probability, less what is the same for
+/// all hypotheses.
+///
+/// With the block's rows H, readings y and what a hypothesis foretold, θ⁻ of covariance P⁻, that is
+///
+/// ```text
+/// −½ |y − H θ⁻|² + ½ bᵀ P⁺ b − ½ ln det(1 + P⁻ HᵀH)        b = Hᵀ(y − H θ⁻)
+/// ```
+///
+/// (Kalman's likelihood by the matrix inversion lemma; Bar-Shalom, Li, Kirubarajan 2001, §5.2 and §11.6). The square is
+/// taken relative to a reference θ common to all, so that nothing cancels in f32.
+pub(super) struct Evidence<'a, T, const N: usize> {
+    block: &'a Block<T, N>,
+    reference: &'a [T; N],
+    /// Hᵀ(y − H θ) at the reference, of levels and slopes.
+    score: ([T; N], [T; LEAKS]),
+}
+
+/// What a hypothesis said before a block.
+pub(super) struct Foretold<T, const N: usize> {
+    pub levels: [T; N],
+    /// Slopes of the leaks, prior units per s.
+    pub slopes_ps: [T; LEAKS],
+    /// Pivots of its information, levels and slopes.
+    pub pivots: ([T; N], [T; LEAKS]),
+}
+
+/// What it says after the block.
+pub(super) struct Learnt<'a, T, const N: usize> {
+    pub levels: &'a Posterior<T, N>,
+    pub slopes: &'a Elimination<T, N>,
+    /// Prior units per s where a slope is one.
+    pub rate_ps: T,
+}
+
+impl<'a, T: Real, const N: usize> Evidence<'a, T, N> {
+    pub fn new(block: &'a Block<T, N>, mean_0: T, reference: &'a [T; N]) -> Self {
+        let mut levels = block.vector;
+        levels[0] += block.column_noise * mean_0;
+        let slopes = block.aged_vector.map(|value| -value);
+        let told = Self { block, reference, score: (levels, slopes) };
+        let score = told.residual(reference, &[T::zero(); LEAKS]);
+        Self { score, ..told }
+    }
+
+    /// The score that is left when levels and slopes are larger by this.
+    fn residual(&self, levels: &[T; N], slopes_ps: &[T; LEAKS]) -> ([T; N], [T; LEAKS]) {
+        let block = self.block;
+        let (mut of_levels, mut of_slopes) = self.score;
+        of_levels[0] += block.column_noise * levels[0];
+        for i in 0..N {
+            for j in 0..N {
+                of_levels[i] -= block.matrix[i][j] * levels[j];
+            }
+        }
+        for i in 0..LEAKS {
+            for j in 0..N {
+                of_levels[j] += block.aged[i][j] * slopes_ps[i];
+                of_slopes[i] += block.aged[i][j] * levels[j];
+            }
+            for j in 0..LEAKS {
+                of_slopes[i] -= block.aged_square[i][j] * slopes_ps[j];
+            }
+        }
+        (of_levels, of_slopes)
+    }
+
+    /// ln of the block's probability as above, and ln of how much the determinant of the hypothesis' information
+    /// has grown.
+    pub fn log_likelihood(&self, before: &Foretold<T, N>, after: &Learnt<'_, T, N>) -> (T, T) {
+        let mut apart = before.levels;
+        for i in 0..N {
+            apart[i] -= self.reference[i];
+        }
+        let (levels, slopes) = self.residual(&apart, &before.slopes_ps);
+        let mut square = T::zero();
+        for i in 0..N {
+            square += apart[i] * (self.score.0[i] + levels[i]);
+        }
+        for i in 0..LEAKS {
+            square += before.slopes_ps[i] * (self.score.1[i] + slopes[i]);
+        }
+        let slopes = slopes.map(|slope| slope * after.rate_ps);
+        let learnt = after.slopes.variance(after.levels, &levels, &slopes);
+        // Noise in column 0 makes its entry of b larger by chance.
+        let by_noise = self.block.column_noise * after.levels.variance_0();
+        let growth = log_growth(before, after);
+        (T::lit(0.5) * (square + learnt - by_noise - growth), growth)
+    }
+}
+
+/// ln of how much the determinant of the information has grown; the pivots one by one, as their product may be
+/// beyond f32.
+fn log_growth<T: Real, const N: usize>(before: &Foretold<T, N>, after: &Learnt<'_, T, N>) -> T {
+    let ratio = |after: &[T], before: &[T]| {
+        after.iter().zip(before).fold(T::one(), |product, (after, before)| product * (*after / *before))
+    };
+    let levels = ratio(after.levels.pivots(), &before.pivots.0);
+    let slopes = ratio(&after.slopes.pivots, &before.pivots.1);
+    (levels * slopes).min(T::max_value()).libm_ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::balance::Equation;
+    use super::super::block::{Balance, BlockSums};
+    use super::super::information::{Information, Prior};
+    use super::super::trend::Trend;
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+    use std::vec::Vec;
+
+    const OFFSETS: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
+    const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &OFFSETS };
+    const MEMORY_S: f64 = 0.02;
+    /// Age of the odometer within a block of 0.5 s, s.
+    const AGE_S: f64 = 0.3;
+
+    struct Row {
+        f: [f64; 4],
+        y: f64,
+        age_s: f64,
+    }
+
+    /// Seven rows of the odometer, then two balances: regressors that turn, readings at random.
+    fn rows(block: u32) -> Vec<Row> {
+        (0..9)
+            .map(|k| {
+                let t = f64::from(block * 9 + k);
+                let f = [t.sin(), (0.7 * t).cos(), (1.9 * t + 1.0).sin(), (0.3 * t).sin()].map(|f| 2.0 * f);
+                Row {
+                    f,
+                    y: 3.0 * (17.0 * t).sin(),
+                    age_s: [AGE_S + 0.25, 0.375, 0.125][k.saturating_sub(6) as usize],
+                }
+            })
+            .collect()
+    }
+
+    fn block(rows: &[Row]) -> Block<f64, 4> {
+        let (odometer, balances) = rows.split_at(7);
+        let mut sums = BlockSums::new();
+        for row in odometer {
+            sums.add(&row.f, &[1, 2, 3].map(|i| AGE_S * row.f[i]), row.y, 1.0);
+        }
+        let balance = |row: &Row| {
+            Some(Balance { equation: Equation { left: row.y, columns: row.f }, age_s: row.age_s })
+        };
+        Block::new(0.5, &sums, &[balance(&balances[0]), balance(&balances[1])], 0.0)
+    }
+
+    /// ln N(y; H m, 1 + H P Hᵀ) without the constant, and the posterior, by dense matrices.
+    fn dense(
+        rows: &[Row],
+        rate_ps: f64,
+        mean: &DVector<f64>,
+        cov: &DMatrix<f64>,
+    ) -> (f64, DVector<f64>, DMatrix<f64>) {
+        let h = DMatrix::from_fn(rows.len(), 7, |r, c| {
+            if c < 4 { rows[r].f[c] } else { -rate_ps * rows[r].age_s * rows[r].f[c - 3] }
+        });
+        let error = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.y)) - &h * mean;
+        let spread = DMatrix::identity(rows.len(), rows.len()) + &h * cov * h.transpose();
+        let inverse = spread.clone().try_inverse().unwrap();
+        let log = -0.5 * (error.dot(&(&inverse * &error)) + spread.determinant().ln());
+        let gain = cov * h.transpose() * inverse;
+        (log, mean + &gain * error, cov - &gain * h * cov)
+    }
+
+    fn shift(mean: &DVector<f64>, cov: &DMatrix<f64>, moved: f64, keep: f64) -> (DVector<f64>, DMatrix<f64>) {
+        let mut turn = DMatrix::identity(7, 7);
+        (0..3).for_each(|i| turn[(1 + i, 4 + i)] = moved);
+        let information = cov.clone().try_inverse().unwrap() - DMatrix::identity(7, 7);
+        let back = turn.clone().try_inverse().unwrap();
+        // The prior stands, what the data told fades and moves on.
+        let vector = cov.clone().try_inverse().unwrap() * mean;
+        let faded = back.transpose() * information * &back * keep + DMatrix::identity(7, 7);
+        let cov = faded.try_inverse().unwrap();
+        let mean = &cov * (back.transpose() * vector * keep);
+        (mean, cov)
+    }
+
+    #[test]
+    fn is_the_probability_of_the_block_by_dense_algebra() {
+        let mut constant = Information::<f64, 4>::new();
+        let mut trend = Trend::<f64, 4>::new(MEMORY_S);
+        let rate_ps = trend.rate_ps();
+        let (mut steady, mut moving) =
+            ((DVector::zeros(7), DMatrix::identity(7, 7)), (DVector::zeros(7), DMatrix::identity(7, 7)));
+        // Without slopes: their prior has no width.
+        (4..7).for_each(|i| steady.1[(i, i)] = 0.0);
+        for index in 0..5 {
+            let rows = rows(index);
+            let block = block(&rows);
+            let reference = [0.1, -0.2, 0.3, 0.05];
+            let evidence = Evidence::new(&block, 0.0, &reference);
+
+            let none = Elimination::no_slopes();
+            let levels = constant.solve(&PRIOR);
+            let pivots = (*levels.pivots(), none.pivots);
+            let before = Foretold { levels: levels.mean, slopes_ps: [0.0; 3], pivots };
+            constant.add(&block);
+            let after = constant.solve(&PRIOR);
+            let (stays, _) =
+                evidence.log_likelihood(&before, &Learnt { levels: &after, slopes: &none, rate_ps: 0.0 });
+
+            trend.advance(block.time_s);
+            let (information, slopes) = trend.eliminate_slopes();
+            let levels = information.solve(&PRIOR);
+            let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
+            let pivots = (*levels.pivots(), slopes.pivots);
+            let before = Foretold { levels: levels.mean, slopes_ps, pivots };
+            trend.add(&block);
+            let (information, slopes) = trend.eliminate_slopes();
+            let after = information.solve(&PRIOR);
+            let (changes, _) =
+                evidence.log_likelihood(&before, &Learnt { levels: &after, slopes: &slopes, rate_ps });
+
+            let (log_steady, mean, cov) = dense(&rows, 0.0, &steady.0, &steady.1);
+            steady = (mean, cov);
+            let keep = 1.0 / (1.0 + block.time_s / MEMORY_S);
+            moving = shift(&moving.0, &moving.1, rate_ps * block.time_s, keep);
+            let (log_moving, mean, cov) = dense(&rows, rate_ps, &moving.0, &moving.1);
+            moving = (mean, cov);
+
+            let difference = log_moving - log_steady;
+            assert!((changes - stays - difference).abs() < 1e-9 * difference.abs().max(1.0), "block {index}");
+            let found = slopes.slopes(&after.mean);
+            for i in 0..4 {
+                assert!((after.mean[i] - moving.0[i]).abs() < 1e-9);
+                let mut one = [0.0; 4];
+                one[i] = 1.0;
+                assert!((slopes.variance(&after, &one, &[0.0; 3]) - moving.1[(i, i)]).abs() < 1e-9);
+            }
+            for i in 0..3 {
+                assert!((found[i] - moving.0[4 + i]).abs() < 1e-9);
+                let mut one = [0.0; 3];
+                one[i] = 1.0;
+                let variance = slopes.variance(&after, &[0.0; 4], &one);
+                assert!((variance - moving.1[(4 + i, 4 + i)]).abs() < 1e-9);
+            }
+        }
+    }
+}
