@@ -1,0 +1,119 @@
+use crate::result::PitchleakResult;
+use pitchleak_core::{
+    AlarmSettings, Cylinder, Fluid, LeakDetector, PerLeak, Rls, RlsError, RlsSettings, SensorSpread, Sensors,
+};
+
+/// The cylinder; A is the piston side.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PitchleakCylinder {
+    /// Piston area of chamber A, m².
+    pub area_a_m2: f32,
+    /// Piston area of chamber B, less the rod, m².
+    pub area_b_m2: f32,
+    /// Stroke, m.
+    pub stroke_m: f32,
+    /// Piston, rod and what moves with them, kg.
+    pub moving_mass_kg: f32,
+    /// Oil in port and hose of chamber A at x = 0, m³.
+    pub dead_volume_a_m3: f32,
+    /// Oil in port and hose of chamber B at full stroke, m³.
+    pub dead_volume_b_m3: f32,
+}
+
+/// The oil.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PitchleakFluid {
+    /// Bulk modulus, Pa.
+    pub bulk_modulus_pa: f32,
+    /// How well it is known, one standard deviation, Pa.
+    pub bulk_modulus_std_pa: f32,
+}
+
+/// How far a sensor's reading may be off, one standard deviation each, in the sensor's SI unit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PitchleakSensor {
+    /// White noise of one reading.
+    pub noise_std: f32,
+    /// Constant offset; estimated by `Pitchleak6` and `Pitchleak9`.
+    pub bias_std: f32,
+    /// Scale error, as a share of the reading; estimated by `Pitchleak9`.
+    pub gain_std: f32,
+}
+
+/// All that is declared.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PitchleakRig {
+    /// The cylinder.
+    pub cylinder: PitchleakCylinder,
+    /// Its oil.
+    pub fluid: PitchleakFluid,
+    /// Flow meter of chamber A, m³/s.
+    pub flow_a: PitchleakSensor,
+    /// Flow meter of chamber B, m³/s.
+    pub flow_b: PitchleakSensor,
+    /// Both pressure sensors, Pa.
+    pub pressure: PitchleakSensor,
+    /// Position sensor, m.
+    pub position: PitchleakSensor,
+    /// Internal leak that raises an alarm, m³/s.
+    pub threshold_internal_m3s: f32,
+    /// External leak of chamber A that raises an alarm, m³/s.
+    pub threshold_external_a_m3s: f32,
+    /// External leak of chamber B that raises an alarm, m³/s.
+    pub threshold_external_b_m3s: f32,
+    /// A longer step, s, is a gap: nothing is integrated over it. 0.5 is usual.
+    pub max_step_s: f32,
+}
+
+impl PitchleakRig {
+    pub(crate) fn estimator<const N: usize>(&self) -> Result<Rls<f32, N>, PitchleakResult> {
+        let PitchleakCylinder {
+            area_a_m2,
+            area_b_m2,
+            stroke_m,
+            moving_mass_kg,
+            dead_volume_a_m3,
+            dead_volume_b_m3,
+        } = self.cylinder;
+        let cylinder =
+            Cylinder { area_a_m2, area_b_m2, stroke_m, moving_mass_kg, dead_volume_a_m3, dead_volume_b_m3 };
+        let PitchleakFluid { bulk_modulus_pa, bulk_modulus_std_pa } = self.fluid;
+        let fluid = Fluid { bulk_modulus_pa, bulk_modulus_std_pa };
+        let spread = |sensor: PitchleakSensor| SensorSpread {
+            noise_std: sensor.noise_std,
+            bias_std: sensor.bias_std,
+            gain_std: sensor.gain_std,
+        };
+        let sensors = Sensors {
+            flow_a: spread(self.flow_a),
+            flow_b: spread(self.flow_b),
+            pressure: spread(self.pressure),
+            position: spread(self.position),
+            // The estimator does without it.
+            force: SensorSpread::default(),
+        };
+        let settings = RlsSettings { max_step_s: self.max_step_s, ..RlsSettings::default() };
+        Rls::new(cylinder, fluid, &sensors, settings).map_err(|error| match error {
+            RlsError::Sensors => PitchleakResult::BadSensors,
+            _ => PitchleakResult::BadCylinder,
+        })
+    }
+
+    pub(crate) fn detector(&self) -> Result<LeakDetector<f32>, PitchleakResult> {
+        let threshold_m3s = PerLeak {
+            internal: self.threshold_internal_m3s,
+            external_a: self.threshold_external_a_m3s,
+            external_b: self.threshold_external_b_m3s,
+        };
+        let all =
+            threshold_m3s.internal > 0.0 && threshold_m3s.external_a > 0.0 && threshold_m3s.external_b > 0.0;
+        if !all {
+            return Err(PitchleakResult::BadThreshold);
+        }
+        Ok(LeakDetector::new(AlarmSettings { threshold_m3s, ..AlarmSettings::default() }))
+    }
+}

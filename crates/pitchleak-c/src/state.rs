@@ -1,0 +1,46 @@
+//! The state as bytes: postcard of a name, a version, the number of parameters and the estimator, then a CRC-32; the
+//! same on every machine.
+
+use crate::result::PitchleakResult;
+use crate::running::Estimator;
+use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
+
+/// Goes up whenever the estimator keeps other things: a test holds the form.
+const VERSION: u8 = 1;
+const NAME: [u8; 4] = *b"ptlk";
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Form {
+    name: [u8; 4],
+    version: u8,
+    parameters: u8,
+}
+
+impl Form {
+    const fn of(parameters: usize) -> Self {
+        Self { name: NAME, version: VERSION, parameters: parameters as u8 }
+    }
+}
+
+pub(crate) fn save<const N: usize>(
+    estimator: &Estimator<N>,
+    bytes: &mut [u8],
+) -> Result<usize, PitchleakResult> {
+    let state = (Form::of(N), estimator);
+    let written = postcard::to_slice_crc32(&state, bytes, CRC.digest());
+    written.map(|written| written.len()).map_err(|_| PitchleakResult::TooSmall)
+}
+
+pub(crate) fn restore<const N: usize>(bytes: &[u8]) -> Result<Estimator<N>, PitchleakResult> {
+    let (form, _) = postcard::take_from_bytes::<Form>(bytes).map_err(|_| PitchleakResult::Damaged)?;
+    if form.name != NAME {
+        return Err(PitchleakResult::Damaged);
+    }
+    if form != Form::of(N) {
+        return Err(PitchleakResult::OtherVersion);
+    }
+    let state = postcard::from_bytes_crc32::<(Form, Estimator<N>)>(bytes, CRC.digest());
+    state.map(|(_, estimator)| estimator).map_err(|_| PitchleakResult::Damaged)
+}
