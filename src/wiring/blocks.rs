@@ -26,6 +26,8 @@ pub(super) struct Block {
     /// ∫dt, s, and Σ dt², s².
     pub time_s: f64,
     pub time_square_s2: f64,
+    /// Time of its end since the middle of all blocks, s.
+    pub after_middle_s: f64,
 }
 
 /// One chamber's integrals.
@@ -65,7 +67,7 @@ pub(super) fn blocks(records: &[Record], cylinder: &Cylinder<f64>) -> Vec<Block>
         }
         sum.add(last, now, cylinder);
         if sum.time_s >= BLOCK_S && sum.steps >= BLOCK_STEPS {
-            match std::mem::take(&mut sum).block(follows) {
+            match std::mem::take(&mut sum).block(follows, now.t_s) {
                 Some(block) => {
                     follows = true;
                     blocks.push(block);
@@ -74,7 +76,14 @@ pub(super) fn blocks(records: &[Record], cylinder: &Cylinder<f64>) -> Vec<Block>
             }
         }
     }
+    centre_time(&mut blocks);
     blocks
+}
+
+fn centre_time(blocks: &mut [Block]) {
+    let ends = [blocks.first(), blocks.last()].map(|block| block.map_or(0.0, |block| block.after_middle_s));
+    let middle_s = 0.5 * (ends[0] + ends[1]);
+    blocks.iter_mut().for_each(|block| block.after_middle_s -= middle_s);
 }
 
 impl Sum {
@@ -99,7 +108,7 @@ impl Sum {
         self.fed_b += u32::from(qb.is_some());
     }
 
-    fn block(self, follows: bool) -> Option<Block> {
+    fn block(self, follows: bool, after_middle_s: f64) -> Option<Block> {
         let fed = match (self.fed_a == self.steps, self.fed_b == self.steps) {
             (true, true) => Fed::Both,
             (true, false) => Fed::OnlyA,
@@ -107,6 +116,6 @@ impl Sum {
             (false, false) => return None,
         };
         let Self { a, b, travel_m, time_s, time_square_s2, .. } = self;
-        Some(Block { follows, fed, a, b, travel_m, time_s, time_square_s2 })
+        Some(Block { follows, fed, a, b, travel_m, time_s, time_square_s2, after_middle_s })
     }
 }

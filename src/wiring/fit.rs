@@ -5,10 +5,11 @@ use super::blocks::{Block, Chamber, Fed, blocks};
 use crate::rig::Rig;
 use crate::trace::Record;
 use nalgebra::{SMatrix, SVector};
-use pitchleak_core::{Cylinder, Sensors};
+use pitchleak_core::{Cylinder, Estimate, Leak, PerLeak, Sensors};
 
-/// 1/β less its prior mean; the three leaks; the meters' offsets; the gains of meters and position sensor.
-const PARAMETERS: usize = 9;
+/// 1/β less its prior mean; the three leaks; the meters' offsets; the gains of meters and position sensor; the drifts of
+/// the meters' zeros; the slopes of the three leaks.
+const PARAMETERS: usize = 14;
 type Vector = SVector<f64, PARAMETERS>;
 
 /// Prior standard deviations of the parameters, SI.
@@ -17,6 +18,13 @@ pub(super) struct Priors(Vector);
 
 /// A sensor that nobody declared wrong may be off by so much, 1 σ: of full scale, of the reading.
 const UNDECLARED_SHARE: f64 = 0.05;
+/// A meter's zero that nobody declared wrong may be off by this share of full scale, 1 σ, and drift as far through a trace.
+const UNDECLARED_ZERO_SHARE: f64 = 0.01;
+/// Where these parameters stand: of leaks in their order, of meters A and B.
+const LEAKS: usize = 1;
+const OFFSETS: usize = 4;
+const DRIFTS: usize = 9;
+const SLOPES: usize = 11;
 /// A leak of the meter's whole range at this share of the pressure sensor's is the widest looked for, 1 σ.
 const LEAK_AT_SHARE: f64 = 0.1;
 
@@ -37,7 +45,39 @@ impl Priors {
             sensors.flow_a.gain_std,
             sensors.flow_b.gain_std,
             sensors.position.gain_std,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
         ]))
+    }
+
+    /// The same rig with meters whose zeros are off and drift, as undeclared ones are now and then.
+    pub fn with_zeros_off(mut self, rig: &Rig, duration_s: f64) -> Self {
+        let Self(spread) = &mut self;
+        let full_scales = [rig.instruments.flow_a.full_scale, rig.instruments.flow_b.full_scale];
+        for (meter, full_scale) in full_scales.into_iter().enumerate() {
+            let usual = UNDECLARED_ZERO_SHARE * full_scale;
+            spread[OFFSETS + meter] = spread[OFFSETS + meter].max(usual);
+            spread[DRIFTS + meter] = usual / duration_s.max(1.0);
+        }
+        self
+    }
+
+    /// The same rig with leaks that change by anything from end to end.
+    pub fn with_changing_leaks(mut self, duration_s: f64) -> Self {
+        for leak in 0..3 {
+            self.0[SLOPES + leak] = self.0[LEAKS + leak] / duration_s.max(1.0);
+        }
+        self
+    }
+
+    /// The same rig without this leak.
+    pub fn without(mut self, leak: Leak) -> Self {
+        self.0[LEAKS + leak as usize] = 0.0;
+        self.0[SLOPES + leak as usize] = 0.0;
+        self
     }
 
     /// The same rig with sensors that may be off as undeclared ones are now and then.
@@ -51,7 +91,7 @@ impl Priors {
             UNDECLARED_SHARE,
             UNDECLARED_SHARE,
         ];
-        for (spread, usual) in spread.iter_mut().skip(4).zip(usual) {
+        for (spread, usual) in spread.iter_mut().skip(OFFSETS).zip(usual) {
             *spread = spread.max(usual);
         }
         Self(spread)
@@ -70,6 +110,8 @@ pub(super) struct Fit {
     /// In prior standard deviations.
     parameters: Vector,
     std: Vector,
+    /// Units of the parameters, SI.
+    units: Vector,
     compressibility_per_pa: f64,
 }
 
@@ -97,6 +139,28 @@ impl Fit {
 
     fn leaks(&self, Priors(spread): &Priors) -> [f64; 3] {
         [1, 2, 3].map(|at: usize| (self.parameters[at] * spread[at]).max(0.0))
+    }
+
+    /// A parameter in SI; its spread grows with the misfit.
+    fn estimate(&self, at: usize) -> Estimate<f64> {
+        let inflation = self.worst().max(1.0).sqrt();
+        Estimate { value: self.parameters[at], std: inflation * self.std[at] }.scaled(self.units[at])
+    }
+
+    /// Leak coefficients, m³/(s·Pa).
+    pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
+        PerLeak::from_fn(|leak| self.estimate(LEAKS + leak as usize))
+    }
+
+    /// Zeros of meters A and B in the middle of the records, m³/s.
+    pub fn offsets_m3s(&self) -> [Estimate<f64>; 2] {
+        [self.estimate(OFFSETS), self.estimate(OFFSETS + 1)]
+    }
+
+    /// χ² of all rows, and of the parameters against their priors.
+    pub fn chi_square(&self) -> f64 {
+        let sums = self.ratios.iter().zip(self.rows).map(|(ratio, rows)| ratio.unwrap_or(0.0) * rows as f64);
+        sums.sum::<f64>() + self.penalty
     }
 
     /// The larger of the two ratios.
@@ -224,6 +288,7 @@ impl System {
             ratios: [ratio(&series[0]), ratio(&series[1])],
             rows: [series[0].len(), series[1].len()],
             penalty: parameters.norm_squared(),
+            units: self.priors,
             compressibility_per_pa: self.compressibility_per_pa + parameters[0] * self.priors[0],
             parameters,
             std: variances.map(f64::sqrt),
@@ -273,16 +338,23 @@ impl System {
         let compression = of.a * a.compression + of.b * b.compression;
         let travel = of.position * block.travel_m;
         let (flow_a, flow_b) = (of.a * a.flow_m3, of.b * b.flow_m3);
+        let internal = (of.a - of.b) * (a.pressure - b.pressure);
+        let (at_a, at_b) = (of.a * a.pressure, of.b * b.pressure);
         let columns = Vector::from([
             compression,
-            (of.a - of.b) * (a.pressure - b.pressure),
-            of.a * a.pressure,
-            of.b * b.pressure,
+            internal,
+            at_a,
+            at_b,
             of.a * block.time_s,
             of.b * block.time_s,
             flow_a,
             flow_b,
             -travel,
+            of.a * block.time_s * block.after_middle_s,
+            of.b * block.time_s * block.after_middle_s,
+            internal * block.after_middle_s,
+            at_a * block.after_middle_s,
+            at_b * block.after_middle_s,
         ]);
         Row {
             left: flow_a + flow_b - travel - self.compressibility_per_pa * compression,

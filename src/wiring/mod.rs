@@ -12,11 +12,13 @@ mod mistake;
 mod noise;
 mod readings;
 mod signs;
+mod zeros;
 
 pub use excerpt::Excerpt;
 pub use explanation::{Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
 pub use readings::Readings;
+pub use zeros::{ZeroCheck, zero_check};
 
 use crate::rig::Rig;
 use crate::signal::Signal;
