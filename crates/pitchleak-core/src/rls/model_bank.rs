@@ -174,10 +174,11 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
                 best = k;
             }
         }
-        let (trend, levels) = (&self.trends[best - 1], &found[best]);
+        let mut slopes = [(T::zero(), T::zero()); LEAKS];
+        let trend = best.checked_sub(1).and_then(|k| self.trends.get(k));
+        let (Some(trend), Some(levels)) = (trend, found.get(best)) else { return slopes };
         let (_, elimination) = trend.eliminate_slopes();
         let mean = elimination.slopes(&levels.mean);
-        let mut slopes = [(T::zero(), T::zero()); LEAKS];
         for i in 0..LEAKS {
             let mut one = [T::zero(); LEAKS];
             one[i] = trend.rate_ps();
@@ -248,27 +249,44 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
                 best = k;
             }
         }
-        for k in 0..HYPOTHESES {
-            if self.recent[k] > T::lit(REFUTED) {
-                continue;
+        // The best is never refuted: its recent evidence is zero.
+        if best == 0 {
+            for k in 0..TRENDS {
+                if self.is_refuted(k + 1) && self.trends[k].memory_s > T::lit(RECENT_S) {
+                    self.trends[k] = Trend::from_levels(self.trends[k].memory_s, self.constant);
+                    self.restart(k + 1);
+                }
             }
-            if best == 0 && k > 0 && self.trends[k - 1].memory_s > T::lit(RECENT_S) {
-                self.trends[k - 1] = Trend::from_levels(self.trends[k - 1].memory_s, self.constant);
-            } else if k == 0 && best > 0 {
-                self.constant = self.trends[best - 1].eliminate_slopes().0;
-            } else if k < best {
-                self.trends[k - 1] = Trend::from_trend(self.trends[k - 1].memory_s, &self.trends[best - 1]);
-            } else {
-                continue;
+        }
+        let Some(source) = best.checked_sub(1).and_then(|k| self.trends.get(k)).copied() else { return };
+        if self.is_refuted(0) {
+            self.constant = source.eliminate_slopes().0;
+            self.restart(0);
+        }
+        for k in 0..TRENDS {
+            if k + 1 < best && self.is_refuted(k + 1) {
+                self.trends[k] = Trend::from_trend(self.trends[k].memory_s, &source);
+                self.restart(k + 1);
             }
-            self.log_weights[k] = T::lit(ANEW);
-            self.recent[k] = T::lit(ANEW);
+        }
+    }
+
+    fn is_refuted(&self, hypothesis: usize) -> bool {
+        self.recent.get(hypothesis).is_some_and(|recent| *recent <= T::lit(REFUTED))
+    }
+
+    fn restart(&mut self, hypothesis: usize) {
+        for weights in [&mut self.log_weights, &mut self.recent] {
+            if let Some(weight) = weights.get_mut(hypothesis) {
+                *weight = T::lit(ANEW);
+            }
         }
     }
 }
 
 /// Takes a block into leaks that stay; gives what is known then, ln of the block's probability and the growth of the
 /// determinant.
+#[inline(never)] // once in the flash, not for each caller
 fn update_levels<T: Real, const N: usize>(
     information: &mut Information<T, N>,
     block: &Block<T, N>,
@@ -286,6 +304,7 @@ fn update_levels<T: Real, const N: usize>(
     (levels, gain, growth)
 }
 
+#[inline(never)]
 fn update_trend<T: Real, const N: usize>(
     trend: &mut Trend<T, N>,
     block: &Block<T, N>,

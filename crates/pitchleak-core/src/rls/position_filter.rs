@@ -43,6 +43,7 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
     /// Carries the piston over `dt_s` by `travel_m` − `columns`ᵀθ, whose error has variance `variance_m2`, and compares
     /// with the reading `x_m`; the whitened observation goes to `sums`.
     #[inline]
+    #[expect(clippy::too_many_arguments, reason = "the step, what its flows say, and the reading")]
     pub fn advance(
         &mut self,
         dt_s: T,

@@ -118,6 +118,7 @@ impl<T: Real, const N: usize> Trend<T, N> {
     }
 
     /// The levels' information with the slopes eliminated (Schur complement), and how the slopes follow.
+    #[inline(never)] // once in the flash, not for each caller
     pub fn eliminate_slopes(&self) -> (Information<T, N>, Elimination<T, N>) {
         let (root, pivots) = self.slope_root();
         let mut half = self.cross;
@@ -129,7 +130,8 @@ impl<T: Real, const N: usize> Trend<T, N> {
                     let above = half[k][j];
                     half[i][j] -= factor * above;
                 }
-                half_vector[i] = half_vector[i] - factor * half_vector[k];
+                let known = half_vector[k];
+                half_vector[i] -= factor * known;
             }
             for j in 0..N {
                 half[i][j] *= root[i][i];

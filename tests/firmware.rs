@@ -1,0 +1,234 @@
+//! The core on a Cortex-M4F in an emulator: the host's estimates, and what they cost.
+//!
+//! Needs qemu-system-arm and the target thumbv7em-none-eabihf, so `.ci/run` asks for it by name. The table in
+//! docs/edge.md is the one printed here; `PITCHLEAK_WRITE_TABLE=1` puts it there.
+
+#![allow(clippy::unwrap_used)]
+
+use pitchleak::Rig;
+use pitchleak::core::{
+    AlarmSettings, LeakDetector, PaperEstimator, PaperGains, Rls, RlsSettings, Sample, SensorSpread, Sensors,
+    Update,
+};
+use pitchleak::trace::{Record, TraceReader};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Instructions of one tick of the system timer: 25 MHz, and a nanosecond for each.
+const TICK: u32 = 40;
+const BEGIN: &str = "<!-- firmware table: begin -->\n";
+const END: &str = "<!-- firmware table: end -->\n";
+
+/// Programs of the firmware, and what the table calls them.
+const PROGRAMS: [(&str, &str); 4] =
+    [("rls4", "N = 4"), ("rls6", "N = 6"), ("rls9", "N = 9"), ("paper", "paper's law")];
+/// Farthest that a microcontroller's estimates may be from the host's, in standard deviations of the estimate.
+const FARTHEST: f64 = 0.01;
+
+/// Values and standard deviations of κ and the three leak coefficients.
+type Told = [f64; 8];
+
+struct Run {
+    told: Vec<Told>,
+    mean: u32,
+    worst: u32,
+    watch: u32,
+    state: u32,
+    stack: u32,
+    flash: u32,
+}
+
+#[test]
+#[ignore = "needs qemu-system-arm; .ci/run runs it"]
+fn a_microcontroller_tells_what_the_host_tells() {
+    build();
+    let rig = Rig::load("data/traces/rig.toml").unwrap();
+    let records = records(&rig);
+    let mut table = String::from(HEADER);
+    for (program, title) in PROGRAMS {
+        let sensors = sensors(&rig, program);
+        let run = emulate(program, &rig, &sensors, &records);
+        let host = on_host(program, &rig, &sensors, &records);
+        assert_eq!(run.told.len(), host.len(), "{program}: as many renewals");
+        let apart = farthest(&run.told, &host);
+        write_row(&mut table, title, &run, apart);
+        assert!(apart.is_none_or(|apart| apart <= FARTHEST), "{program}: {apart:?}");
+    }
+    println!("{table}");
+    check_table(&table);
+}
+
+const HEADER: &str = "\
+| estimator | instructions per sample, mean | worst | alarms, worst | state, bytes | stack, bytes | flash, bytes | farthest from the host, std |
+|---|---|---|---|---|---|---|---|
+";
+
+fn write_row(table: &mut String, title: &str, run: &Run, apart: Option<f64>) {
+    let Run { mean, worst, watch, state, stack, flash, .. } = run;
+    let apart = apart.map_or("–".to_owned(), |apart| format!("{apart:.4}"));
+    writeln!(table, "| {title} | {mean} | {worst} | {watch} | {state} | {stack} | {flash} | {apart} |")
+        .unwrap();
+}
+
+/// The largest |f32 − f64| in standard deviations of the estimate; none where there is no such thing.
+fn farthest(found: &[Told], host: &[Told]) -> Option<f64> {
+    let apart = found
+        .iter()
+        .zip(host)
+        .flat_map(|(found, host)| (0..4).map(move |k| (found[2 * k] - host[2 * k]).abs() / host[2 * k + 1]));
+    apart.filter(|apart| apart.is_finite()).reduce(f64::max)
+}
+
+fn firmware() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware")
+}
+
+fn build() {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--locked", "--release"]).current_dir(firmware());
+    // The settings of a build on the host are none of the firmware's.
+    for (key, _) in std::env::vars().filter(|(key, _)| key.starts_with("CARGO_PROFILE_")) {
+        cargo.env_remove(key);
+    }
+    assert!(cargo.status().unwrap().success());
+}
+
+fn records(rig: &Rig) -> Vec<Record> {
+    let mut reader = TraceReader::open("data/traces/both.csv.gz", rig).unwrap();
+    let mut record = Record::default();
+    std::iter::from_fn(|| reader.next_record(&mut record).unwrap().then_some(record)).collect()
+}
+
+/// The rig's own for four parameters; with offsets of half a percent for six, with gains of as much for nine.
+fn sensors(rig: &Rig, program: &str) -> Sensors<f64> {
+    let mut sensors = rig.sensors();
+    let declare = |sensor: &mut SensorSpread<f64>| {
+        if program == "rls6" || program == "rls9" {
+            sensor.bias_std = 0.5 * sensor.noise_std;
+        }
+        if program == "rls9" {
+            sensor.gain_std = 0.005;
+        }
+    };
+    let Sensors { flow_a, flow_b, pressure, position, .. } = &mut sensors;
+    [flow_a, flow_b, pressure, position].into_iter().for_each(declare);
+    sensors
+}
+
+fn emulate(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Run {
+    let folder = folder(program);
+    std::fs::write(folder.join("trace.f32"), trace(rig, sensors, records)).unwrap();
+    let binary = firmware().join("target/thumbv7em-none-eabihf/release").join(program);
+    let output = Command::new("qemu-system-arm")
+        .args(["-machine", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-icount", "shift=0", "-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(&binary)
+        .current_dir(&folder)
+        .output()
+        .unwrap();
+    let text = [output.stdout, output.stderr].concat();
+    let text = String::from_utf8(text).unwrap();
+    let numbers = |line: &str| {
+        line.split(' ').skip(1).map(|word| u32::from_str_radix(word, 16).unwrap()).collect::<Vec<_>>()
+    };
+    let of_kind = |kind: &'static str| text.lines().filter(move |line| line.starts_with(kind));
+    let told =
+        |line| <[u32; 8]>::try_from(numbers(line)).unwrap().map(|bits| f64::from(f32::from_bits(bits)));
+    let cost = numbers(of_kind("cost").next().unwrap_or_else(|| panic!("the program ends: {text}")));
+    let [updates, ticks, worst, watch, state, stack] = cost.try_into().unwrap();
+    assert_eq!(updates as usize, records.len());
+    Run {
+        told: of_kind("told").map(told).collect(),
+        mean: u32::try_from(u64::from(ticks) * u64::from(TICK) / u64::from(updates)).unwrap(),
+        worst: worst * TICK,
+        watch: watch * TICK,
+        state,
+        stack,
+        flash: flash(&binary),
+    }
+}
+
+fn folder(program: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(program);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// What the firmware reads: the rig, then the samples.
+fn trace(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Vec<u8> {
+    let c = &rig.cylinder;
+    let mut numbers =
+        vec![c.area_a_m2, c.area_b_m2, c.stroke_m, c.moving_mass_kg, c.dead_volume_a_m3, c.dead_volume_b_m3];
+    numbers.extend([rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa]);
+    let Sensors { flow_a, flow_b, pressure, position, force } = sensors;
+    for sensor in [flow_a, flow_b, pressure, position, force] {
+        numbers.extend([sensor.noise_std, sensor.bias_std, sensor.gain_std]);
+    }
+    for record in records {
+        let Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n } = record.sample;
+        numbers.extend([record.step_s(), x_m, pa_pa, pb_pa]);
+        numbers.extend([qa_m3s, qb_m3s, force_n].map(|reading| reading.unwrap_or(f64::NAN)));
+    }
+    numbers.into_iter().flat_map(|number| (number as f32).to_le_bytes()).collect()
+}
+
+/// Bytes that are written into the flash: code, constants, and what variables start with.
+fn flash(binary: &Path) -> u32 {
+    let output = Command::new("arm-none-eabi-size").arg(binary).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let sizes: Vec<u32> =
+        text.lines().nth(1).unwrap().split_whitespace().take(2).map(|n| n.parse().unwrap()).collect();
+    sizes.iter().sum()
+}
+
+fn on_host(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Vec<Told> {
+    match program {
+        "rls4" => rls::<4>(rig, sensors, records),
+        "rls6" => rls::<6>(rig, sensors, records),
+        "rls9" => rls::<9>(rig, sensors, records),
+        _ => paper(rig, records),
+    }
+}
+
+fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Vec<Told> {
+    let mut rls = Rls::<f64, N>::new(rig.cylinder, rig.fluid, sensors, RlsSettings::default()).unwrap();
+    let mut detector = LeakDetector::new(AlarmSettings::default());
+    let mut told = Vec::new();
+    for record in records {
+        if let Update::Renewed { elapsed_s, .. } = rls.update(record.step_s(), &record.sample) {
+            detector.update(elapsed_s, &rls.mean_leaks_m3s());
+            let found = rls.estimates();
+            let (kappa, leaks) = (found.compressibility_per_pa, found.leaks_m3spa);
+            let all = [kappa, leaks.internal, leaks.external_a, leaks.external_b];
+            told.push(std::array::from_fn(|k| if k % 2 == 0 { all[k / 2].value } else { all[k / 2].std }));
+        }
+    }
+    told
+}
+
+fn paper(rig: &Rig, records: &[Record]) -> Vec<Told> {
+    let gains = PaperGains::scaled(&rig.cylinder, &rig.fluid, 10.0, 3e-5);
+    let mut paper = PaperEstimator::new(rig.cylinder, rig.fluid, gains, 5.0, 100.0).unwrap();
+    let mut told = Vec::new();
+    for record in records {
+        if let Update::Renewed { .. } = paper.update(record.step_s(), &record.sample) {
+            let leaks = paper.leak_coefficients();
+            let kappa = 1.0 / paper.bulk_modulus_pa();
+            told.push([kappa, 0.0, leaks.internal, 0.0, leaks.external_a, 0.0, leaks.external_b, 0.0]);
+        }
+    }
+    told
+}
+
+fn check_table(table: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/edge.md");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (before, rest) = text.split_once(BEGIN).unwrap();
+    let (stands, after) = rest.split_once(END).unwrap();
+    if std::env::var_os("PITCHLEAK_WRITE_TABLE").is_some() {
+        std::fs::write(&path, [before, BEGIN, table, END, after].concat()).unwrap();
+    } else {
+        assert_eq!(stands, table, "docs/edge.md has another table");
+    }
+}
