@@ -33,6 +33,11 @@ impl EffectUncertainty {
         Ok(Self { shifted: shifted.filter_map(with_estimator).collect::<Result<_, _>>()? })
     }
 
+    /// How many effects are uncertain.
+    pub fn count(&self) -> usize {
+        self.shifted.len()
+    }
+
     /// Takes in a record as read.
     #[inline]
     pub fn push(&mut self, record: &Record) {

@@ -1,3 +1,4 @@
+use super::known::known_or_not;
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
 use pitchleak_core::{
@@ -88,25 +89,26 @@ impl Estimator {
 
     /// Leak coefficients, m³/(s·Pa); the paper's law knows no spread, it is zero there.
     pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
-        each!(self,
+        known_or_not(each!(self,
             rls => rls.leak_coefficients(),
             chain => chain.leak_coefficients().map(|value| Estimate { value, std: 0.0 })
-        )
+        ))
     }
 
     /// Mean leak flows over the estimator's memory, m³/s; `None` for the paper's law.
     pub fn mean_leaks_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
-        each!(self, rls => Some(rls.mean_leaks_m3s()), _chain => None)
+        each!(self, rls => Some(known_or_not(rls.mean_leaks_m3s())), _chain => None)
     }
 
     /// Leak flows at `pressures`, m³/s; `None` for the paper's law.
     pub fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> Option<PerLeak<Estimate<f64>>> {
-        each!(self, rls => Some(rls.leak_flows_m3s(pressures)), _chain => None)
+        each!(self, rls => Some(known_or_not(rls.leak_flows_m3s(pressures))), _chain => None)
     }
 
     /// Biases found of the pressure sensors A and B, Pa; zero where the rig file declares none.
     pub fn pressure_biases_pa(&self) -> [f64; 2] {
-        each!(self, rls => rls.pressure_biases_pa().map(|bias| bias.value), _chain => [0.0; 2])
+        let biases = each!(self, rls => rls.pressure_biases_pa(), _chain => return [0.0; 2]);
+        biases.map(|bias| if bias.value.is_finite() { bias.value } else { 0.0 })
     }
 
     /// The bulk modulus, from the interval of the compressibility.
@@ -116,9 +118,13 @@ impl Estimator {
             chain => return BulkModulus { value: chain.bulk_modulus_pa(), spread: None }
         );
         let value = 1.0 / compressibility.value;
+        let spread_pa = compressibility.std * value * value;
+        if !(value.is_finite() && spread_pa.is_finite()) {
+            return BulkModulus { value: f64::NAN, spread: None };
+        }
         let [low, high] = compressibility.ci95();
         let stiffest = if low > 0.0 { 1.0 / low } else { f64::INFINITY };
-        BulkModulus { value, spread: Some((compressibility.std * value * value, [1.0 / high, stiffest])) }
+        BulkModulus { value, spread: Some((spread_pa, [1.0 / high, stiffest])) }
     }
 }
 

@@ -4,14 +4,17 @@ mod correction;
 mod effect_uncertainty;
 mod estimate_file;
 mod estimator;
+mod known;
 mod pressures;
 mod scoring;
+mod state;
 mod stream;
 mod summary;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
-pub use stream::{RestoreError, Stream};
+pub use state::RestoreError;
+pub use stream::Stream;
 
 use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::Rig;
@@ -109,6 +112,15 @@ impl Replay {
             scoring: Scoring::default(),
             alarms: Vec::new(),
             rig: rig.clone(),
+        })
+    }
+
+    /// Whether each part is one that a replay of this rig has.
+    fn fits_its_rig(&self) -> bool {
+        Self::new(&self.rig).is_ok_and(|fresh| {
+            std::mem::discriminant(&fresh.estimator) == std::mem::discriminant(&self.estimator)
+                && fresh.correction.is_some() == self.correction.is_some()
+                && fresh.doubt.count() == self.doubt.count()
         })
     }
 

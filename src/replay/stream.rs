@@ -1,4 +1,5 @@
 use super::Replay;
+use super::state::{self, RestoreError};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{BadRows, Record, RowValidator, TraceError, TraceFault, TraceReader};
@@ -15,44 +16,44 @@ pub struct Stream {
     pub epoch_ns: Option<i64>,
 }
 
-/// Error returned by [`Stream::restore`].
-#[derive(Debug, thiserror::Error)]
-pub enum RestoreError {
-    /// Not what [`Stream::save`] wrote, or cut short.
-    #[error("not a saved estimator: {0}")]
-    Content(String),
-    /// Written by a version that keeps other things.
-    #[error("saved by another version (`{0}`, this one reads `{SCHEMA}`): start the estimator anew")]
-    Version(String),
-}
-
-/// Name and version of the saved form.
-const SCHEMA: &str = "pitchleak.state/2";
-
 impl Stream {
-    /// All that the stream knows, to the last bit, rig included: CBOR (RFC 8949) of a name and the state.
+    /// All that the stream knows, to the last bit, rig included, and a checksum.
     ///
     /// # Errors
     /// None in practice: every part has its form.
     pub fn save(&self) -> Result<Vec<u8>, RestoreError> {
-        let mut bytes = Vec::new();
-        let content = |error: ciborium::ser::Error<std::io::Error>| RestoreError::Content(error.to_string());
-        ciborium::into_writer(SCHEMA, &mut bytes).map_err(content)?;
-        ciborium::into_writer(self, &mut bytes).map_err(content)?;
-        Ok(bytes)
+        state::write(self)
     }
 
     /// The stream that [`save`](Self::save) wrote.
     ///
     /// # Errors
-    /// [`RestoreError`].
-    pub fn restore(mut bytes: &[u8]) -> Result<Self, RestoreError> {
-        let content = |error: ciborium::de::Error<std::io::Error>| RestoreError::Content(error.to_string());
-        let schema: String = ciborium::from_reader(&mut bytes).map_err(content)?;
-        if schema != SCHEMA {
-            return Err(RestoreError::Version(schema.chars().take(40).collect()));
+    /// [`RestoreError`], where a single bit is another, too.
+    pub fn restore(bytes: &[u8]) -> Result<Self, RestoreError> {
+        let stream: Self = state::read(bytes)?;
+        let fits = stream.replay.fits_its_rig() && stream.validator_fits();
+        if fits && state::has_no_nan(&stream) {
+            Ok(stream)
+        } else {
+            Err(RestoreError::Content("its parts don't fit each other".to_owned()))
         }
-        ciborium::from_reader(&mut bytes).map_err(content)
+    }
+
+    /// The same, where the rig is this one, by whatever name.
+    ///
+    /// # Errors
+    /// [`RestoreError`].
+    pub fn restore_for(bytes: &[u8], rig: &Rig) -> Result<Self, RestoreError> {
+        let stream = Self::restore(bytes)?;
+        if stream.rig().to_toml() == rig.to_toml() {
+            return Ok(stream);
+        }
+        Err(RestoreError::Rig { saved: stream.rig().name.clone(), wanted: rig.name.clone() })
+    }
+
+    /// Whether rows are held against what this rig may read.
+    fn validator_fits(&self) -> bool {
+        self.validator.as_ref().is_none_or(|validator| validator.is_for(self.rig()))
     }
 
     /// The rig that the stream runs for.

@@ -1,11 +1,15 @@
 //! From a finished replay to its report.
 
 use super::Replay;
+use super::known::is_known;
 use crate::report::{
     EstimateEntry, Estimates, FlowMeterOffsets, Leakage, ReplayReport, TraceSummary, Verdict,
 };
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Excitation, ExcitationReport, Parameter, PerLeak};
+use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak};
+
+/// Why an estimate says nothing that is no finite number.
+const NO_NUMBER: &str = "the readings lead to no finite number";
 
 impl Replay {
     /// The report on the trace so far.
@@ -23,8 +27,13 @@ impl Replay {
             trace,
             estimates,
             leakage,
-            flow_meter_offsets: found.and_then(|found| found.flow_offsets_m3s).map(FlowMeterOffsets::new),
-            normalised_innovation: found.map(|found| found.normalised_innovation),
+            flow_meter_offsets: found
+                .and_then(|found| found.flow_offsets_m3s)
+                .filter(finite)
+                .map(FlowMeterOffsets::new),
+            normalised_innovation: found
+                .map(|found| found.normalised_innovation)
+                .filter(|chambers| chambers.iter().all(|value| value.is_finite())),
             changed_at_s: self.changed_at_s,
             alarms: self.alarms.clone(),
             score: self.scoring.scores(),
@@ -40,7 +49,7 @@ impl Replay {
             let leakage = Leakage::new(size);
             Leakage {
                 net_mean_lpm: Some(net.value * LPM_PER_M3S),
-                std_lpm: leakage.std_lpm.filter(|_| knows_spread),
+                std_lpm: leakage.std_lpm.filter(|_| knows_spread && is_known(&size)),
                 ..leakage
             }
         })
@@ -51,6 +60,9 @@ impl Replay {
         let entries = self.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
             let unit = EstimateEntry::COEFFICIENT_UNIT;
             match excitation {
+                _ if !is_known(&coefficient) => {
+                    EstimateEntry::without_spread(coefficient.value, unit).not_identifiable(NO_NUMBER)
+                }
                 None => EstimateEntry::without_spread(coefficient.value, unit),
                 Some(excitation) => judged(EstimateEntry::new(coefficient, unit), &excitation),
             }
@@ -65,7 +77,12 @@ impl Replay {
 
     fn bulk_modulus(&self, excitation: Option<Excitation<f64>>) -> EstimateEntry {
         let found = self.estimator.bulk_modulus();
-        let bare = EstimateEntry::without_spread(found.value, EstimateEntry::BULK_MODULUS_UNIT);
+        let unit = EstimateEntry::BULK_MODULUS_UNIT;
+        if !found.value.is_finite() {
+            return EstimateEntry::without_spread(self.rig.fluid.bulk_modulus_pa, unit)
+                .not_identifiable(NO_NUMBER);
+        }
+        let bare = EstimateEntry::without_spread(found.value, unit);
         let entry = match found.spread {
             None => bare,
             Some((std, ci95)) => EstimateEntry { std: Some(std), ci95: Some(ci95), ..bare },
@@ -92,6 +109,10 @@ impl Replay {
             )
         })
     }
+}
+
+fn finite(offsets: &[Estimate<f64>; 2]) -> bool {
+    offsets.iter().all(|offset| offset.value.is_finite() && offset.std.is_finite())
 }
 
 /// The entry, marked where the trace does not identify the parameter.

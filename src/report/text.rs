@@ -30,6 +30,11 @@ impl Palette {
 }
 
 impl Palette {
+    /// What it writes between words.
+    pub fn codes(&self) -> [&'static str; 5] {
+        [self.fault, self.sound, self.caution, self.faint, self.reset]
+    }
+
     pub(crate) fn faint(&self) -> (&'static str, &'static str) {
         (self.faint, self.reset)
     }

@@ -1,6 +1,6 @@
 //! `[effects]`: what a diagnosis found and the declared model lacks.
 
-use super::bound::Bound;
+use super::bound::{self, Bound};
 use super::document::Section;
 use super::error::RigError;
 use crate::units::Dimension;
@@ -54,7 +54,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
         let size = if section.is_table(id) {
             read_table(effect, &section.section(id)?)?
         } else {
-            EffectValue::new(section.required(id, Dimension::Share, bound(effect))?, None)
+            EffectValue::new(section.required(id, Dimension::Share, size(effect))?, None)
         };
         if set.set(effect, size.value, size.constants).is_err() {
             return Err(section.impossible(id, &size.value.to_string(), "at most eight effects at a time"));
@@ -68,8 +68,8 @@ fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigErr
     let shape_ids = effect.constants().iter().map(|parameter| parameter.spec().id);
     let keys: Vec<&str> = ["value", "std"].into_iter().chain(shape_ids).collect();
     entry.allow(&keys)?;
-    let value = entry.required("value", Dimension::Share, bound(effect))?;
-    let std = entry.quantity("std", Dimension::Share, Bound::from_zero(1e15))?;
+    let value = entry.required("value", Dimension::Share, size(effect))?;
+    let std = entry.quantity("std", Dimension::Share, bound::EFFECT_STD)?;
     let mut size = EffectValue::new(value, std);
     for parameter in effect.constants() {
         let spec = EffectConstant::spec(*parameter);
@@ -81,6 +81,6 @@ fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigErr
     Ok(size)
 }
 
-fn bound(effect: Effect) -> Bound {
+pub(super) fn size(effect: Effect) -> Bound {
     Bound::between(effect.spec().lower, effect.spec().upper)
 }

@@ -1,4 +1,4 @@
-use super::bound::Bound;
+use super::bound::{self, Bound};
 use super::document::Section;
 use super::error::RigError;
 use crate::units::{Dimension, LPM_PER_M3S};
@@ -50,15 +50,20 @@ impl Instrument {
         }
     }
 
-    fn read(sensors: &Section<'_>, key: &str, dimension: Dimension) -> Result<Option<Self>, RigError> {
+    fn read(
+        sensors: &Section<'_>,
+        key: &str,
+        dimension: Dimension,
+        full_scale: Bound,
+    ) -> Result<Option<Self>, RigError> {
         let sheet = sensors.section(key)?;
         if !sheet.is_present() {
             return Ok(None);
         }
         sheet.allow(&["full_scale", "accuracy", "bias", "gain"])?;
-        let share = |key| sheet.quantity(key, Dimension::Share, Bound::from_zero(1.0));
+        let share = |key| sheet.quantity(key, Dimension::Share, bound::SHARE);
         Ok(Some(Self {
-            full_scale: sheet.required("full_scale", dimension, Bound::above_zero(1e10))?,
+            full_scale: sheet.required("full_scale", dimension, full_scale)?,
             accuracy: share("accuracy")?.unwrap_or(Self::PAPER_ACCURACY),
             bias: share("bias")?.unwrap_or(0.0),
             gain: share("gain")?.unwrap_or(0.0),
@@ -100,11 +105,16 @@ impl Instruments {
         }
     }
 
+    /// Full scale of the larger flow meter: no leak that is judged by them is larger, m³/s.
+    pub(super) fn largest_flow_m3s(&self) -> f64 {
+        self.flow_a.full_scale.max(self.flow_b.full_scale)
+    }
+
     /// A sensor that the file leaves out is the paper's.
     pub(super) fn read(sensors: &Section<'_>, cylinder: &Cylinder<f64>) -> Result<Self, RigError> {
         sensors.allow(&["flow", "flow_a", "flow_b", "pressure", "position", "force"])?;
         let default = Self::paper(cylinder);
-        let flow = |key| Instrument::read(sensors, key, Dimension::Flow);
+        let flow = |key| Instrument::read(sensors, key, Dimension::Flow, bound::FLOW_SCALE);
         let (both, flow_a, flow_b) = (flow("flow")?, flow("flow_a")?, flow("flow_b")?);
         if both.is_some() && (flow_a.is_some() || flow_b.is_some()) {
             return Err(sensors.impossible(
@@ -113,12 +123,15 @@ impl Instruments {
                 "either `flow` or `flow_a` and `flow_b`",
             ));
         }
+        let other = |key, dimension, full_scale| Instrument::read(sensors, key, dimension, full_scale);
         Ok(Self {
             flow_a: flow_a.or(both).unwrap_or(default.flow_a),
             flow_b: flow_b.or(both).unwrap_or(default.flow_b),
-            pressure: Instrument::read(sensors, "pressure", Dimension::Pressure)?.unwrap_or(default.pressure),
-            position: Instrument::read(sensors, "position", Dimension::Length)?.unwrap_or(default.position),
-            force: Instrument::read(sensors, "force", Dimension::Force)?.unwrap_or(default.force),
+            pressure: other("pressure", Dimension::Pressure, bound::PRESSURE_SCALE)?
+                .unwrap_or(default.pressure),
+            position: other("position", Dimension::Length, bound::POSITION_SCALE)?
+                .unwrap_or(default.position),
+            force: other("force", Dimension::Force, bound::FORCE_SCALE)?.unwrap_or(default.force),
         })
     }
 }

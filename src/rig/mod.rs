@@ -14,9 +14,9 @@ pub use instruments::{Instrument, Instruments};
 pub use settings::{ColumnMap, EstimatorKind, EstimatorSettings, ForeignColumn};
 
 use crate::units::Dimension;
-use bound::Bound;
 use document::{Document, Section};
 use pitchleak_core::{AlarmSettings, Cylinder, EffectSet, Fluid, Sensors};
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -63,7 +63,7 @@ impl Rig {
     /// Reads a rig file.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, RigError> {
         let file = path.as_ref().display().to_string();
-        match std::fs::read_to_string(path) {
+        match read_bounded(path.as_ref()) {
             Ok(text) => Self::parse(&text, &file),
             Err(source) => Err(RigError::Read { file, source }),
         }
@@ -116,15 +116,27 @@ impl Rig {
     }
 }
 
+/// No rig file is longer, bytes; a device or a trace given for one may have no end.
+const LONGEST_FILE: u64 = 1 << 20;
+
+fn read_bounded(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(LONGEST_FILE + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > LONGEST_FILE {
+        return Err(std::io::Error::new(ErrorKind::InvalidData, "longer than a megabyte: no rig file"));
+    }
+    Ok(text)
+}
+
 fn read_cylinder(section: &Section<'_>) -> Result<Cylinder<f64>, RigError> {
     section.allow(&["area_a", "area_b", "stroke", "moving_mass", "dead_volume_a", "dead_volume_b"])?;
-    let area = |key| section.required(key, Dimension::Area, Bound::above_zero(10.0));
-    let volume = |key| section.quantity(key, Dimension::Volume, Bound::from_zero(10.0));
+    let area = |key| section.required(key, Dimension::Area, bound::AREA);
+    let volume = |key| section.quantity(key, Dimension::Volume, bound::DEAD_VOLUME);
     Ok(Cylinder {
         area_a_m2: area("area_a")?,
         area_b_m2: area("area_b")?,
-        stroke_m: section.required("stroke", Dimension::Length, Bound::above_zero(100.0))?,
-        moving_mass_kg: section.required("moving_mass", Dimension::Mass, Bound::above_zero(1e7))?,
+        stroke_m: section.required("stroke", Dimension::Length, bound::STROKE)?,
+        moving_mass_kg: section.required("moving_mass", Dimension::Mass, bound::MOVING_MASS)?,
         dead_volume_a_m3: volume("dead_volume_a")?.unwrap_or(0.0),
         dead_volume_b_m3: volume("dead_volume_b")?.unwrap_or(0.0),
     })
@@ -133,8 +145,8 @@ fn read_cylinder(section: &Section<'_>) -> Result<Cylinder<f64>, RigError> {
 /// A prior of a quarter of β where the file gives none, as for the paper's rig.
 fn read_fluid(section: &Section<'_>) -> Result<Fluid<f64>, RigError> {
     section.allow(&["bulk_modulus", "bulk_modulus_std"])?;
-    let bulk_modulus_pa = section.required("bulk_modulus", Dimension::Pressure, Bound::between(1e6, 1e11))?;
-    let std = section.quantity("bulk_modulus_std", Dimension::Pressure, Bound::from_zero(1e11))?;
+    let bulk_modulus_pa = section.required("bulk_modulus", Dimension::Pressure, bound::BULK_MODULUS)?;
+    let std = section.quantity("bulk_modulus_std", Dimension::Pressure, bound::BULK_MODULUS_STD)?;
     Ok(Fluid { bulk_modulus_pa, bulk_modulus_std_pa: std.unwrap_or(bulk_modulus_pa / 4.0) })
 }
 

@@ -1,6 +1,6 @@
 //! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`.
 
-use super::bound::Bound;
+use super::bound;
 use super::document::Section;
 use super::error::RigError;
 use super::instruments::Instruments;
@@ -83,9 +83,6 @@ impl ForeignColumn {
 /// `[columns]`: the foreign name of each mapped signal.
 pub type ColumnMap = BTreeMap<Signal, ForeignColumn>;
 
-const SECONDS: Bound = Bound::above_zero(1e7);
-const GAIN: Bound = Bound::above_zero(1e12);
-
 impl EstimatorSettings {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
         section.allow(&["kind", "forgetting_time", "filter_cutoff", "block_time", "gains"])?;
@@ -98,15 +95,11 @@ impl EstimatorSettings {
         gains.allow(&["lambda", "gamma"])?;
         Ok(Self {
             kind,
-            forgetting_time_s: section.quantity("forgetting_time", Dimension::Time, SECONDS)?,
-            filter_cutoff_hz: section.quantity(
-                "filter_cutoff",
-                Dimension::Frequency,
-                Bound::above_zero(1e5),
-            )?,
-            block_time_s: section.quantity("block_time", Dimension::Time, SECONDS)?,
-            lambda_per_s: gains.quantity("lambda", Dimension::Share, GAIN)?,
-            gamma: gains.quantity("gamma", Dimension::Share, GAIN)?,
+            forgetting_time_s: section.quantity("forgetting_time", Dimension::Time, bound::MEMORY)?,
+            filter_cutoff_hz: section.quantity("filter_cutoff", Dimension::Frequency, bound::CUTOFF)?,
+            block_time_s: section.quantity("block_time", Dimension::Time, bound::MEMORY)?,
+            lambda_per_s: gains.quantity("lambda", Dimension::Share, bound::GAIN)?,
+            gamma: gains.quantity("gamma", Dimension::Share, bound::GAIN)?,
         })
     }
 }
@@ -119,15 +112,18 @@ pub(super) fn read_alarms(
 ) -> Result<AlarmSettings<f64>, RigError> {
     section.allow(&["internal", "external_a", "external_b", "hysteresis", "hold_time"])?;
     let default = AlarmSettings::default();
-    let most = instruments.flow_a.full_scale.max(instruments.flow_b.full_scale);
-    let flow = |key| section.quantity(key, Dimension::Flow, Bound::above_zero(most));
-    let hysteresis = section.quantity("hysteresis", Dimension::Share, Bound::from_zero(1.0))?;
-    let hold_time = section.quantity("hold_time", Dimension::Time, Bound::from_zero(1e7))?;
+    let within = bound::threshold(instruments.largest_flow_m3s());
+    let flow = |key, usual: f64| {
+        section.quantity(key, Dimension::Flow, within).map(|given| given.unwrap_or(within.nearest(usual)))
+    };
+    let hysteresis = section.quantity("hysteresis", Dimension::Share, bound::SHARE)?;
+    let hold_time = section.quantity("hold_time", Dimension::Time, bound::HOLD_TIME)?;
+    let usual = default.threshold_m3s;
     Ok(AlarmSettings {
         threshold_m3s: PerLeak {
-            internal: flow("internal")?.unwrap_or(default.threshold_m3s.internal),
-            external_a: flow("external_a")?.unwrap_or(default.threshold_m3s.external_a),
-            external_b: flow("external_b")?.unwrap_or(default.threshold_m3s.external_b),
+            internal: flow("internal", usual.internal)?,
+            external_a: flow("external_a", usual.external_a)?,
+            external_b: flow("external_b", usual.external_b)?,
         },
         clear_share: hysteresis.map_or(default.clear_share, |share| 1.0 - share),
         hold_time_s: hold_time.unwrap_or(default.hold_time_s),
@@ -146,12 +142,17 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
         let name =
             entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
         let unit = read_unit(&entry, signal)?;
-        let scale = entry.quantity("scale", Dimension::Share, Bound::between(-1e12, 1e12))?.unwrap_or(1.0);
-        if scale == 0.0 {
-            return Err(entry.impossible("scale", "0", "a number that keeps the readings apart"));
+        let scale = entry.quantity("scale", Dimension::Share, bound::OFFSET)?.unwrap_or(1.0);
+        if !bound::SCALE.holds(scale.abs()) {
+            let value = scale.to_string();
+            return Err(entry.impossible(
+                "scale",
+                &value,
+                "a number that keeps the readings apart, from 1e-12 on",
+            ));
         }
         let offset = match signal.dimension() {
-            Some(dimension) => entry.quantity("offset", dimension, Bound::between(-1e12, 1e12))?,
+            Some(dimension) => entry.quantity("offset", dimension, bound::OFFSET)?,
             None => None,
         };
         columns.insert(

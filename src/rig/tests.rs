@@ -74,13 +74,13 @@ fn errors_name_file_line_key_and_the_values_allowed() {
         ),
         (
             declared().replace("12.6 cm^2", "-12.6 cm^2"),
-            "rig.toml:2: `cylinder.area_a` is -0.00126 m^2; it must be above 0 to 10 m^2",
+            "rig.toml:2: `cylinder.area_a` is -0.00126 m^2; it must be from 0.000001 to 10 m^2",
         ),
         (declared().replace("\"12.6 cm^2\"", "nan"), "rig.toml:2: `cylinder.area_a` is NaN"),
         (declared().replace("\"12.6 cm^2\"", "[1]"), "rig.toml:2: `cylinder.area_a` must be a quantity"),
         (
             declared().replace("stroke = \"0.2 m\"", ""),
-            "rig.toml:1: missing key `cylinder.stroke`: above 0 to 100 m",
+            "rig.toml:1: missing key `cylinder.stroke`: from 0.001 to 100 m",
         ),
         (declared().replace("[fluid]", "[fluids]"), "rig.toml:6: unknown key `fluids`"),
         (declared().replace("20 L/min", "20 cfm"), "rig.toml:10: `sensors.flow.full_scale`: unit `cfm`"),
@@ -121,4 +121,64 @@ proptest! {
         rig.instruments.force.accuracy = accuracy;
         prop_assert_eq!(Rig::parse(&rig.to_toml(), Rig::PAPER_NAME).unwrap(), rig);
     }
+
+    /// Whatever a fit came to.
+    #[test]
+    fn every_rig_that_is_written_can_be_read(
+        numbers in prop::collection::vec(any::<f64>(), 19),
+        settings in prop::collection::vec(prop::option::of(any::<f64>()), 5),
+        effects in prop::collection::vec((0..Effect::ALL.len(), any::<f64>(), prop::option::of(any::<f64>())), 0..12),
+        name in ".*",
+        scale in any::<f64>(),
+    ) {
+        let mut rig = Rig::paper();
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s] = numbers[..] else { return Ok(()) };
+        let cylinder = &mut rig.cylinder;
+        (cylinder.area_a_m2, cylinder.area_b_m2, cylinder.stroke_m, cylinder.moving_mass_kg) = (a, b, c, d);
+        (cylinder.dead_volume_a_m3, cylinder.dead_volume_b_m3) = (e, f);
+        (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa) = (g, h);
+        rig.instruments.flow_a = Instrument { full_scale: i, accuracy: j, bias: k, gain: l };
+        (rig.instruments.flow_b.full_scale, rig.instruments.pressure.full_scale) = (m, n);
+        (rig.instruments.position.full_scale, rig.instruments.force.full_scale) = (o, p);
+        (rig.alarms.threshold_m3s.internal, rig.alarms.clear_share, rig.alarms.hold_time_s) = (q, r, s);
+        let estimator = &mut rig.estimator;
+        (estimator.forgetting_time_s, estimator.block_time_s) = (settings[0], settings[1]);
+        (estimator.filter_cutoff_hz, estimator.lambda_per_s, estimator.gamma) = (settings[2], settings[3], settings[4]);
+        for (effect, value, std) in effects {
+            rig.effects.insert(Effect::ALL[effect], EffectValue::new(value, std));
+        }
+        let unit = Signal::PressureA.dimension().and_then(|dimension| dimension.units().first().copied());
+        let column = ForeignColumn { scale, offset: scale, ..ForeignColumn::new(name, unit) };
+        rig.columns.insert(Signal::PressureA, column);
+        let text = rig.to_toml();
+        let again = Rig::parse(&text, "rig.toml").map_err(|error| TestCaseError::fail(format!("{error}\n{text}")))?;
+        // A ninth effect stands as a comment.
+        let said: Vec<_> = text.lines().filter(|line| !line.starts_with('#')).collect();
+        let again = again.to_toml();
+        prop_assert_eq!(again.lines().collect::<Vec<_>>(), said);
+    }
+}
+
+#[test]
+fn what_no_machine_has_is_refused() {
+    for (line, value) in [
+        ("area_a = \"12.6 cm^2\"", "area_a = 5e-324"),
+        ("stroke = \"0.2 m\"", "stroke = 1e-9"),
+        ("moving_mass = \"20 kg\"", "moving_mass = 1e-300"),
+        ("full_scale = \"20 L/min\"", "full_scale = 1e-200"),
+        ("full_scale = \"16 MPa\"", "full_scale = 1e-12"),
+    ] {
+        assert!(declared().contains(line), "{line}");
+        assert!(message(&declared().replace(line, value)).contains("it must be from"), "{value}");
+    }
+}
+
+/// Its default alarm would be above what its meters show.
+#[test]
+fn small_flow_meters_have_alarms_within_their_range() {
+    let rig = Rig::parse(&declared().replace("20 L/min", "0.05 L/min"), "rig.toml").unwrap();
+    assert!(
+        rig.alarms.threshold_m3s.iter().all(|(_, threshold)| *threshold <= rig.instruments.flow_a.full_scale)
+    );
+    assert_eq!(Rig::parse(&rig.to_toml(), "rig.toml").unwrap(), rig);
 }

@@ -1,6 +1,9 @@
+use super::bound::{self, Bound};
+use super::effects;
 use super::{ForeignColumn, Instrument, Rig};
 use crate::signal::Signal;
 use crate::units::Dimension;
+use pitchleak_core::EffectSet;
 use std::fmt::Write;
 
 /// A quantity that reads back to the same number.
@@ -8,21 +11,27 @@ fn quantity(value: f64, dimension: Dimension) -> String {
     toml_text(format!("{value} {}", dimension.si()).trim_end())
 }
 
+/// The same, within what the reader takes.
+fn within(value: f64, dimension: Dimension, bound: Bound) -> String {
+    quantity(bound.nearest(value), dimension)
+}
+
 fn toml_text(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-fn instrument(key: &str, sheet: &Instrument, dimension: Dimension) -> String {
-    let Instrument { full_scale, accuracy, bias, gain } = sheet;
-    let full_scale = quantity(*full_scale, dimension);
+fn instrument(key: &str, sheet: &Instrument, dimension: Dimension, scale: Bound) -> String {
+    let full_scale = within(sheet.full_scale, dimension, scale);
+    let [accuracy, bias, gain] =
+        [sheet.accuracy, sheet.bias, sheet.gain].map(|share| bound::SHARE.nearest(share));
     format!(
         "{key} = {{ full_scale = {full_scale}, accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?} }}\n"
     )
 }
 
 impl Rig {
-    /// The rig as a file that reads back to the same numbers. Comments of the file it came from
-    /// are not kept.
+    /// The rig as a file that reads back to the same numbers; of a rig made by hand, to the nearest that a file may
+    /// have. Comments of the file it came from are not kept.
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
         self.write_machine(&mut out);
@@ -35,50 +44,53 @@ impl Rig {
     fn write_machine(&self, out: &mut String) {
         let cylinder = &self.cylinder;
         let keys = [
-            ("area_a", cylinder.area_a_m2, Dimension::Area),
-            ("area_b", cylinder.area_b_m2, Dimension::Area),
-            ("stroke", cylinder.stroke_m, Dimension::Length),
-            ("moving_mass", cylinder.moving_mass_kg, Dimension::Mass),
-            ("dead_volume_a", cylinder.dead_volume_a_m3, Dimension::Volume),
-            ("dead_volume_b", cylinder.dead_volume_b_m3, Dimension::Volume),
+            ("area_a", cylinder.area_a_m2, Dimension::Area, bound::AREA),
+            ("area_b", cylinder.area_b_m2, Dimension::Area, bound::AREA),
+            ("stroke", cylinder.stroke_m, Dimension::Length, bound::STROKE),
+            ("moving_mass", cylinder.moving_mass_kg, Dimension::Mass, bound::MOVING_MASS),
+            ("dead_volume_a", cylinder.dead_volume_a_m3, Dimension::Volume, bound::DEAD_VOLUME),
+            ("dead_volume_b", cylinder.dead_volume_b_m3, Dimension::Volume, bound::DEAD_VOLUME),
         ];
         out.push_str("[cylinder]\n");
-        put(out, &keys.map(|(key, value, dimension)| (key, Some(quantity(value, dimension)))));
+        put(out, &keys.map(|(key, value, dimension, bound)| (key, Some(within(value, dimension, bound)))));
         out.push_str("\n[fluid]\n");
+        let pressure = |value, bound| Some(within(value, Dimension::Pressure, bound));
         put(
             out,
             &[
-                ("bulk_modulus", Some(quantity(self.fluid.bulk_modulus_pa, Dimension::Pressure))),
-                ("bulk_modulus_std", Some(quantity(self.fluid.bulk_modulus_std_pa, Dimension::Pressure))),
+                ("bulk_modulus", pressure(self.fluid.bulk_modulus_pa, bound::BULK_MODULUS)),
+                ("bulk_modulus_std", pressure(self.fluid.bulk_modulus_std_pa, bound::BULK_MODULUS_STD)),
             ],
         );
         let sheets = &self.instruments;
         out.push_str("\n[sensors]\n");
-        out.push_str(&instrument("flow_a", &sheets.flow_a, Dimension::Flow));
-        out.push_str(&instrument("flow_b", &sheets.flow_b, Dimension::Flow));
-        out.push_str(&instrument("pressure", &sheets.pressure, Dimension::Pressure));
-        out.push_str(&instrument("position", &sheets.position, Dimension::Length));
-        out.push_str(&instrument("force", &sheets.force, Dimension::Force));
+        out.push_str(&instrument("flow_a", &sheets.flow_a, Dimension::Flow, bound::FLOW_SCALE));
+        out.push_str(&instrument("flow_b", &sheets.flow_b, Dimension::Flow, bound::FLOW_SCALE));
+        out.push_str(&instrument("pressure", &sheets.pressure, Dimension::Pressure, bound::PRESSURE_SCALE));
+        out.push_str(&instrument("position", &sheets.position, Dimension::Length, bound::POSITION_SCALE));
+        out.push_str(&instrument("force", &sheets.force, Dimension::Force, bound::FORCE_SCALE));
     }
 
     fn write_settings(&self, out: &mut String) {
         let estimator = &self.estimator;
-        let seconds = |value: Option<f64>| value.map(|v| quantity(v, Dimension::Time));
-        let number = |value: Option<f64>| value.map(|v| format!("{v:?}"));
+        let seconds = |value: Option<f64>, bound| value.map(|v| within(v, Dimension::Time, bound));
+        let number = |value: Option<f64>, bound: Bound| value.map(|v| format!("{:?}", bound.nearest(v)));
+        let cutoff = |v| within(v, Dimension::Frequency, bound::CUTOFF);
         out.push_str("\n[estimator]\n");
         put(
             out,
             &[
                 ("kind", Some(toml_text(estimator.kind.name()))),
-                ("forgetting_time", seconds(estimator.forgetting_time_s)),
-                ("filter_cutoff", estimator.filter_cutoff_hz.map(|v| quantity(v, Dimension::Frequency))),
-                ("block_time", seconds(estimator.block_time_s)),
-                ("gains.lambda", number(estimator.lambda_per_s)),
-                ("gains.gamma", number(estimator.gamma)),
+                ("forgetting_time", seconds(estimator.forgetting_time_s, bound::MEMORY)),
+                ("filter_cutoff", estimator.filter_cutoff_hz.map(cutoff)),
+                ("block_time", seconds(estimator.block_time_s, bound::MEMORY)),
+                ("gains.lambda", number(estimator.lambda_per_s, bound::GAIN)),
+                ("gains.gamma", number(estimator.gamma, bound::GAIN)),
             ],
         );
         let threshold = self.alarms.threshold_m3s;
-        let flow = |value| Some(quantity(value, Dimension::Flow));
+        let most = bound::FLOW_SCALE.nearest(self.instruments.largest_flow_m3s());
+        let flow = |value| Some(within(value, Dimension::Flow, bound::threshold(most)));
         out.push_str("\n[alarms]\n");
         put(
             out,
@@ -86,8 +98,8 @@ impl Rig {
                 ("internal", flow(threshold.internal)),
                 ("external_a", flow(threshold.external_a)),
                 ("external_b", flow(threshold.external_b)),
-                ("hysteresis", number(Some(1.0 - self.alarms.clear_share))),
-                ("hold_time", seconds(Some(self.alarms.hold_time_s))),
+                ("hysteresis", number(Some(1.0 - self.alarms.clear_share), bound::SHARE)),
+                ("hold_time", seconds(Some(self.alarms.hold_time_s), bound::HOLD_TIME)),
             ],
         );
     }
@@ -107,11 +119,21 @@ impl Rig {
             return;
         }
         out.push_str("\n[effects]\n");
+        let mut room = EffectSet::default();
         for (effect, size) in &self.effects {
-            let std = size.std.map_or(String::new(), |std| format!(", std = {std:?}"));
-            let _ = write!(out, "{effect} = {{ value = {:?}{std}", size.value);
-            for parameter in effect.constants() {
-                let _ = write!(out, ", {} = {:?}", parameter.spec().id, size.constants.get(*parameter));
+            let value = effects::size(*effect).nearest(size.value);
+            let constants = effect.constants().iter().map(|constant| {
+                let spec = constant.spec();
+                (spec.id, Bound::between(spec.lower, spec.upper).nearest(size.constants.get(*constant)))
+            });
+            if room.set(*effect, value, Default::default()).is_err() {
+                let _ = writeln!(out, "# {effect}: no room for more");
+                continue;
+            }
+            let std = size.std.map(|std| ("std", bound::EFFECT_STD.nearest(std)));
+            let _ = write!(out, "{effect} = {{ value = {value:?}");
+            for (key, value) in std.into_iter().chain(constants) {
+                let _ = write!(out, ", {key} = {value:?}");
             }
             out.push_str(" }\n");
         }
@@ -126,11 +148,12 @@ impl ForeignColumn {
         if let Some(unit) = self.unit {
             let _ = write!(out, ", unit = {}", toml_text(unit.text));
         }
-        if (self.scale - 1.0).abs() > 0.0 {
-            let _ = write!(out, ", scale = {:?}", self.scale);
+        let scale = bound::SCALE.nearest(self.scale.abs()).copysign(self.scale);
+        if (scale - 1.0).abs() > 0.0 {
+            let _ = write!(out, ", scale = {scale:?}");
         }
         if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
-            let _ = write!(out, ", offset = {}", quantity(self.offset, dimension));
+            let _ = write!(out, ", offset = {}", within(self.offset, dimension, bound::OFFSET));
         }
         out + " }"
     }

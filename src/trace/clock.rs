@@ -2,6 +2,10 @@
 
 /// A step this many times the usual one is a gap.
 const GAP_FACTOR: f64 = 5.0;
+/// A first step longer than this counts as a pause, s; the second then says how long steps are.
+const LONGEST_FIRST_STEP_S: f64 = 1.0;
+/// Times closer than this are the same, s.
+const LEAST_STEP_S: f64 = 1e-9;
 /// So many rows in order, all before the last good one, are a clock that was set back.
 const RESTART_ROWS: u32 = 10;
 /// So many steps of a new length in a row are a new sampling rate.
@@ -33,6 +37,7 @@ pub(super) struct Clock {
     unusual_steps: u32,
     rows_back: u32,
     last_back_s: f64,
+    began_with_pause: bool,
 }
 
 impl Clock {
@@ -47,12 +52,17 @@ impl Clock {
             self.last_s = Some(t_s);
             return Step::First;
         };
-        if t_s <= last_s {
+        let dt_s = t_s - last_s;
+        // False for a NaN too.
+        if !(dt_s >= LEAST_STEP_S) {
             return self.back(t_s, last_s);
         }
         self.rows_back = 0;
         self.last_s = Some(t_s);
-        let dt_s = t_s - last_s;
+        if self.usual_s.is_none() && dt_s > LONGEST_FIRST_STEP_S && !self.began_with_pause {
+            self.began_with_pause = true;
+            return Step::Next { dt_s, regular: false, gap: true };
+        }
         let usual_s = *self.usual_s.get_or_insert(dt_s);
         let regular = dt_s < 1.5 * usual_s && usual_s < 1.5 * dt_s;
         let gap = dt_s > GAP_FACTOR * usual_s;
@@ -110,7 +120,25 @@ mod tests {
     fn a_gap_at_the_very_start_does_not_hide_the_rate() {
         let times = std::iter::once(0.0).chain((0..100).map(|i| 10.0 + f64::from(i) * 0.01));
         let steps = steps(times.chain([12.0]));
+        assert_eq!(gaps(&steps), 2);
+    }
+
+    #[test]
+    fn a_first_row_far_too_early_is_before_a_gap() {
+        let times = std::iter::once(-3600.0).chain((0..100).map(|i| f64::from(i) * 0.01));
+        let steps = steps(times);
+        assert_eq!(steps.get(1), Some(&Step::Next { dt_s: 3600.0, regular: false, gap: true }));
         assert_eq!(gaps(&steps), 1);
+    }
+
+    #[test]
+    fn a_slow_trace_is_one_all_the_same() {
+        assert_eq!(gaps(&steps((0..100).map(|i| 10.0 * f64::from(i)))), 1);
+    }
+
+    #[test]
+    fn no_step_is_so_short_that_speeds_overflow() {
+        assert_eq!(steps([0.0, 5e-324, 1e-300]).get(2), Some(&Step::Back { last_s: 0.0 }));
     }
 
     #[test]

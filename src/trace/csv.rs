@@ -25,6 +25,8 @@ struct Splitting {
     delimiter: u8,
     layout: Layout,
     epoch: Epoch,
+    /// Lengths of the last cells of the row read last and of the one before.
+    last_cells: [usize; 2],
 }
 
 impl CsvRows {
@@ -33,7 +35,7 @@ impl CsvRows {
         let mut records = Records::new(stream.bytes);
         let (delimiter, headers) = read_header(&mut records)?;
         let layout = Layout::new(&headers, map)?;
-        let splitting = Splitting { delimiter, layout, epoch: Epoch::default() };
+        let splitting = Splitting { delimiter, layout, epoch: Epoch::default(), last_cells: [0; 2] };
         Ok(Self { records, splitting, gzip: stream.gzip })
     }
 
@@ -60,6 +62,10 @@ impl RowSource for CsvRows {
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
         match self.records.next() {
             Ok(record) => match self.splitting.read(&record, row) {
+                Ok(()) if record.unended && self.splitting.may_be_cut() => Ok(Next::CutOff(format!(
+                    "line {} is the last, has no line end and may be cut",
+                    record.line
+                ))),
                 Ok(()) => Ok(Next::Row),
                 Err(fault) => Ok(Next::Bad(self.splitting.describe(&record, &fault))),
             },
@@ -105,14 +111,19 @@ fn sniff(records: &mut Records) -> Result<u8, Stop> {
 }
 
 impl Splitting {
+    /// Whether the row read last ends before its last cell may have been whole: in fewer characters than the one before.
+    fn may_be_cut(&self) -> bool {
+        let [last, before] = self.last_cells;
+        last < before
+    }
+
     #[inline]
     fn read(&mut self, record: &Record<'_>, row: &mut Row) -> Result<(), Fault> {
         *row = Row { line: record.line, ..Row::empty() };
         match record.text {
-            Text::Plain(text) => {
-                self.read_cells(Plain { text, delimiter: self.delimiter, at: 0, ended: false }, row)
-            }
-            Text::Unquoted(text, ends) => self.read_cells(Unquoted { text, ends, at: 0 }, row),
+            Text::Plain(text) => self
+                .read_cells(Plain { text, delimiter: self.delimiter, at: 0, length: 0, ended: false }, row),
+            Text::Unquoted(text, ends) => self.read_cells(Unquoted { text, ends, at: 0, length: 0 }, row),
         }
     }
 
@@ -136,6 +147,7 @@ impl Splitting {
             };
             read.map_err(|reason| Fault { column: Some(index), reason })?;
         }
+        self.last_cells = [cells.length(), self.last_cells[0]];
         if cells.ended() {
             check_present(&self.layout.columns, row)
         } else {
@@ -177,6 +189,9 @@ trait Cells<'a> {
     /// Passes over a cell and gives its text.
     fn cell(&mut self) -> &'a [u8];
 
+    /// Bytes of the cell read last, without blanks around it.
+    fn length(&self) -> usize;
+
     /// Reads a cell as a number; NaN where it is empty.
     #[inline]
     fn number(&mut self) -> Result<f64, BadReason> {
@@ -189,6 +204,8 @@ struct Plain<'a> {
     text: &'a [u8],
     delimiter: u8,
     at: usize,
+    /// Bytes of the cell before.
+    length: usize,
     ended: bool,
 }
 
@@ -204,8 +221,14 @@ impl<'a> Cells<'a> for Plain<'a> {
         let end = memchr::memchr(self.delimiter, rest);
         self.ended = end.is_none();
         let cell = end.map_or(rest, |end| rest.get(..end).unwrap_or_default());
+        self.length = cell.trim_ascii().len();
         self.at += cell.len() + 1;
         cell
+    }
+
+    #[inline(always)]
+    fn length(&self) -> usize {
+        self.length
     }
 
     /// Most cells are a number and no more: its end is the cell's.
@@ -216,6 +239,7 @@ impl<'a> Cells<'a> for Plain<'a> {
             let ended = length == rest.len();
             if value.is_finite() && (ended || rest.get(length) == Some(&self.delimiter)) {
                 self.ended = ended;
+                self.length = length;
                 self.at += length + 1;
                 return Ok(value);
             }
@@ -230,6 +254,7 @@ struct Unquoted<'a> {
     /// Of the cells that are left.
     ends: &'a [usize],
     at: usize,
+    length: usize,
 }
 
 impl<'a> Cells<'a> for Unquoted<'a> {
@@ -240,8 +265,12 @@ impl<'a> Cells<'a> for Unquoted<'a> {
     fn cell(&mut self) -> &'a [u8] {
         let Some((&end, ends)) = self.ends.split_first() else { return &[] };
         let cell = self.text.get(self.at..end).unwrap_or_default();
-        (self.at, self.ends) = (end, ends);
+        (self.at, self.ends, self.length) = (end, ends, cell.trim_ascii().len());
         cell
+    }
+
+    fn length(&self) -> usize {
+        self.length
     }
 }
 

@@ -12,7 +12,7 @@ const SLACK: f64 = 0.05;
 /// No sensor reads more than this many times its full scale.
 const OVERRANGE: f64 = 2.0;
 
-#[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Range {
     signal: Signal,
     least: f64,
@@ -20,8 +20,8 @@ struct Range {
 }
 
 /// The possible range of every reading that has one.
-#[derive(Clone, serde::Serialize, serde::Deserialize)]
-pub(super) struct Ranges([Range; 8]);
+#[derive(Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Ranges([Range; 12]);
 
 impl Ranges {
     pub(super) fn of(rig: &Rig) -> Self {
@@ -49,6 +49,12 @@ impl Ranges {
             // Absolute zero, and where oil burns.
             Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
             both_ways(Signal::Speed, 100.0),
+            // Three thousand years either way; where seconds are still told apart to 20 µs.
+            Range { signal: Signal::Time, least: -1e11, most: 1e11 },
+            // As much as the largest meter that a rig may have.
+            both_ways(Signal::LeakInternal, 10.0),
+            both_ways(Signal::LeakExternalA, 10.0),
+            both_ways(Signal::LeakExternalB, 10.0),
         ])
     }
 
@@ -68,7 +74,12 @@ impl Ranges {
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
         let source = match signal {
             Signal::Position => "the stroke",
-            Signal::Temperature | Signal::Speed => "what is possible",
+            Signal::Temperature
+            | Signal::Speed
+            | Signal::Time
+            | Signal::LeakInternal
+            | Signal::LeakExternalA
+            | Signal::LeakExternalB => "what is possible",
             _ => "the range of the sensor in the rig file",
         };
         format!("{value} {unit} is outside {source} ({least} to {most} {unit})")

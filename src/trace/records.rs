@@ -15,6 +15,8 @@ pub(super) struct Record<'a> {
     /// The line it starts on, from 1.
     pub(super) line: u64,
     pub(super) text: Text<'a>,
+    /// The stream ends before the line does.
+    pub(super) unended: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -101,7 +103,8 @@ impl Records {
             }
             None => Text::Plain(self.buffer.get(start..start + found.text).unwrap_or_default()),
         };
-        Record { line, text }
+        let unended = self.finished.is_some() && self.buffer.get(start + found.length - 1) != Some(&b'\n');
+        Record { line, text, unended }
     }
 
     #[inline]

@@ -29,6 +29,11 @@ impl RowValidator {
         Self { ranges: Ranges::of(rig), clock: Clock::default(), bad_rows: BadRows::Skip, quality }
     }
 
+    /// Whether it holds rows against what `rig` may read.
+    pub(crate) fn is_for(&self, rig: &Rig) -> bool {
+        self.ranges == Ranges::of(rig)
+    }
+
     /// What was noticed so far.
     pub fn quality(&self) -> &TraceQuality {
         &self.quality

@@ -457,3 +457,35 @@ fn columns_of_a_table_are_of_one_length() {
     let message = read_table(vec![batch(0..0)]).unwrap_err().to_string();
     assert_eq!(message, "table: no usable row: the trace has only a header");
 }
+
+/// `0.1234` cut to `0.12` is another number.
+#[test]
+fn a_last_row_that_may_be_cut_is_not_used() {
+    let whole = "t_s,x_m,pa_pa,pb_pa\n0,0.1,1e5,250000.5\n0.01,0.1,1e5,250000.5\n0.02,0.1,1e5,250000.5";
+    let rows = |text: &str| {
+        let stream = Box::new(std::io::Cursor::new(text.as_bytes().to_vec()));
+        let mut reader = TraceReader::from_stream("t", stream, &Rig::paper()).unwrap();
+        let mut record = Record::default();
+        while reader.next_record(&mut record).unwrap() {}
+        (reader.quality().rows, reader.quality().cut_off.is_some())
+    };
+    assert_eq!(rows(whole), (3, false), "no line end, and as long as the others");
+    assert_eq!(rows(&format!("{whole}\n")), (3, false));
+    for cut in 1..8 {
+        assert_eq!(rows(&whole[..whole.len() - cut]), (2, true), "{cut} characters cut");
+    }
+    assert_eq!(rows(&format!("{}\n", &whole[..whole.len() - 3])), (3, false), "ended lines are whole");
+}
+
+#[test]
+fn times_and_references_that_cannot_be_are_bad_rows() {
+    for (time, reference) in [("1e160", "0"), ("-1e300", "0"), ("0.01", "1e308"), ("0.01", "-1e30")] {
+        let text =
+            format!("t_s,x_m,pa_pa,pb_pa,q_int_m3s\n0,0.1,1e5,1e5,0\n{time},0.1,1e5,1e5,{reference}\n");
+        let stream = Box::new(std::io::Cursor::new(text.into_bytes()));
+        let mut reader = TraceReader::from_stream("t", stream, &Rig::paper()).unwrap();
+        let mut record = Record::default();
+        while reader.next_record(&mut record).unwrap() {}
+        assert_eq!((reader.quality().rows, reader.quality().skipped), (1, 1), "{time} {reference}");
+    }
+}

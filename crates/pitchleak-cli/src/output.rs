@@ -1,19 +1,21 @@
 //! Standard output and standard error.
 
 use pitchleak::report::Palette;
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
 
 /// Writes `text` to standard output.
 pub fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
+    out.write_all(harmless(text).as_bytes())?;
     out.flush()
 }
 
 /// One line on standard error; if that is gone too, so be it.
 pub fn complain(kind: &str, message: &dyn Display) {
-    let _ = writeln!(io::stderr().lock(), "{kind}: {message}");
+    let message = message.to_string().replace('\n', "\\n");
+    let _ = writeln!(io::stderr().lock(), "{kind}: {}", harmless(&message));
 }
 
 /// A warning line each.
@@ -28,4 +30,43 @@ pub fn palette() -> Palette {
     let forbidden = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())
         || std::env::var_os("TERM").is_some_and(|term| term == "dumb");
     if io::stdout().is_terminal() && !forbidden { Palette::ANSI } else { Palette::PLAIN }
+}
+
+/// The text with what would steer a terminal made visible: names of files and columns are anybody's. Line ends and our
+/// own colours stay.
+fn harmless(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(steers) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(next) = rest.chars().next() {
+        let colour = Palette::ANSI.codes().into_iter().find(|code| rest.starts_with(code));
+        let length = colour.map_or(next.len_utf8(), str::len);
+        match colour {
+            None if steers(next) => out.extend(next.escape_default()),
+            _ => out.push_str(&rest[..length]),
+        }
+        rest = &rest[length..];
+    }
+    Cow::Owned(out)
+}
+
+/// Control characters but the line end, and those that turn the direction of writing.
+fn steers(c: char) -> bool {
+    (c.is_control() && c != '\n') || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_steer_no_terminal() {
+        assert_eq!(harmless("a\x1b]0;title\x07\u{202e}\r\n"), "a\\u{1b}]0;title\\u{7}\\u{202e}\\r\n");
+        assert_eq!(harmless("\x1b[8mhidden"), "\\u{1b}[8mhidden");
+        let ours = Palette::ANSI.codes().join("leak 0.5 L/min ± 0.1\n");
+        assert_eq!(harmless(&ours), ours);
+        assert!(matches!(harmless("plain: µ 漏"), Cow::Borrowed(_)));
+    }
 }

@@ -1,7 +1,7 @@
 use crate::errors::{output_error, trace_error, value_error};
 use crate::rig::Rig;
 use crate::source::Source;
-use crate::table::{NAME, is_plain};
+use crate::table::{Lent, NAME, is_plain};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pitchleak::Rig as EngineRig;
 use pitchleak::output::{self, Inputs};
@@ -50,6 +50,13 @@ impl<'py> Readings<'py> {
         Ok(Self::Array(numbers.cast::<PyArray1<f64>>()?.readonly()))
     }
 
+    fn array(&self) -> Option<&Bound<'py, PyArray1<f64>>> {
+        match self {
+            Self::Array(array) => Some(array),
+            Self::Number(_) | Self::Other(_) => None,
+        }
+    }
+
     fn slice(&self) -> PyResult<&[f64]> {
         match self {
             Self::Number(value) => Ok(std::slice::from_ref(value)),
@@ -89,10 +96,7 @@ impl Estimator {
 
     /// Takes over the stream that `saved` gave, of an estimator of the same rig.
     fn restore(&self, py: Python<'_>, saved: &[u8]) -> PyResult<()> {
-        let stream = Stream::restore(saved).map_err(value_error)?;
-        if *stream.rig() != self.rig.0 {
-            return Err(value_error("the saved estimator has another rig"));
-        }
+        let stream = Stream::restore_for(saved, &self.rig.0).map_err(value_error)?;
         *self.lock(py)? = Running { stream, layout: None };
         Ok(())
     }
@@ -148,6 +152,8 @@ impl Estimator {
         let done = if batch.iter().all(|column| column.len() == 1) {
             self.lock(py)?.take(given, batch, self)
         } else {
+            let arrays = readings.iter().filter_map(Readings::array);
+            let _held = arrays.map(|array| Lent::new(array.clone())).collect::<PyResult<Vec<_>>>()?;
             py.detach(|| match self.running.lock() {
                 Ok(mut running) => running.take(given, batch, self),
                 // Only a panic in here could have poisoned it.

@@ -30,7 +30,7 @@ impl Source<'_> {
             }),
             Self::Table(table) => {
                 let table = table.get();
-                let lent = table.lend(py);
+                let lent = table.lend(py)?;
                 let batches = table.slices(&lent)?;
                 py.detach(|| {
                     let reader = TraceReader::from_table(NAME, table.layout(), batches, rig)?;

@@ -8,10 +8,11 @@ use arrow_array::{Array, RecordBatch};
 use arrow_buffer::ScalarBuffer;
 use arrow_cast::cast;
 use arrow_schema::{DataType, TimeUnit};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyWeakrefReference;
 use pyo3_arrow::input::AnyRecordBatch;
 
 /// What the columns of a table are read as, by their headers.
@@ -126,22 +127,18 @@ impl Table {
     }
 
     /// What keeps the arrays as they are while they are read.
-    pub fn lend<'py>(&self, py: Python<'py>) -> Vec<Vec<Option<PyReadonlyArray1<'py, f64>>>> {
+    pub fn lend<'py>(&self, py: Python<'py>) -> PyResult<Vec<Vec<Option<Lent<'py>>>>> {
         let lend = |column: &Column| match column {
-            Column::Numpy(array) => Some(array.bind(py).readonly()),
-            _ => None,
+            Column::Numpy(array) => Lent::new(array.bind(py).clone()).map(Some),
+            _ => Ok(None),
         };
         self.batches.iter().map(|batch| batch.iter().map(lend).collect()).collect()
     }
 
     /// The values, those of numpy arrays from `lent`.
-    pub fn slices<'a>(
-        &'a self,
-        lent: &'a [Vec<Option<PyReadonlyArray1<'_, f64>>>],
-    ) -> PyResult<Vec<Vec<&'a [f64]>>> {
-        let slice = |(column, lent): (&'a Column, &'a Option<PyReadonlyArray1<'_, f64>>)| match (column, lent)
-        {
-            (Column::Numpy(_), Some(array)) => Ok(array.as_slice()?),
+    pub fn slices<'a>(&'a self, lent: &'a [Vec<Option<Lent<'_>>>]) -> PyResult<Vec<Vec<&'a [f64]>>> {
+        let slice = |(column, lent): (&'a Column, &'a Option<Lent<'_>>)| match (column, lent) {
+            (Column::Numpy(_), Some(array)) => array.as_slice(),
             (Column::Arrow(buffer), _) => Ok(&buffer[..]),
             (Column::Converted(values), _) => Ok(&values[..]),
             (Column::Ignored | Column::Numpy(_), _) => Ok(&[][..]),
@@ -151,6 +148,29 @@ impl Table {
             .zip(lent)
             .map(|(batch, lent)| batch.iter().zip(lent).map(slice).collect())
             .collect()
+    }
+}
+
+/// An array that is being read. Another thread may write into it meanwhile, but not free its memory: numpy's `resize`
+/// refuses where weak references to the array or the one that it views are alive, even with `refcheck=False`.
+pub struct Lent<'py> {
+    array: PyReadonlyArray1<'py, f64>,
+    _held: Vec<Bound<'py, PyWeakrefReference>>,
+}
+
+impl<'py> Lent<'py> {
+    pub fn new(array: Bound<'py, PyArray1<f64>>) -> PyResult<Self> {
+        let mut held = Vec::new();
+        let mut owner = array.clone().into_any();
+        while owner.cast::<PyUntypedArray>().is_ok() {
+            held.push(PyWeakrefReference::new(&owner)?);
+            owner = owner.getattr("base")?;
+        }
+        Ok(Self { array: array.readonly(), _held: held })
+    }
+
+    pub fn as_slice(&self) -> PyResult<&[f64]> {
+        Ok(self.array.as_slice()?)
     }
 }
 

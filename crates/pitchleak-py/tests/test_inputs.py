@@ -1,5 +1,6 @@
 """Whatever comes in: a right answer or an exception that names column and row."""
 
+import threading
 import warnings
 
 import hypothesis.extra.numpy as hnp
@@ -185,3 +186,37 @@ def test_nothing_at_all():
         with pytest.raises(pl.TraceError, match="no usable row"):
             pl.replay(frame)
     assert pl.Estimator(pl.Rig.paper()).extend(sound(0)) == 0
+
+
+def test_an_array_that_is_read_keeps_its_memory(rig):
+    """Another thread that resized a column, `refcheck=False`, once ended the process."""
+    count = 400_000
+    columns = {
+        "t_s": np.arange(count) * 0.01,
+        "x_m": np.full(count, 0.1),
+        "pa_pa": np.full(count, 5e6),
+        "pb_pa": np.full(count, 4e6),
+    }
+    refused, stop = [], threading.Event()
+
+    def resize():
+        while not stop.is_set():
+            for column in columns.values():
+                try:
+                    column.resize(2 * count, refcheck=False)
+                    column.resize(count, refcheck=False)
+                except ValueError as failure:
+                    refused.append(failure)
+
+    for _ in range(10):
+        thread = threading.Thread(target=resize)
+        stop.clear()
+        thread.start()
+        try:
+            pl.replay(columns, rig)
+        except ValueError:
+            pass  # Caught between two sizes.
+        finally:
+            stop.set()
+            thread.join()
+    assert refused

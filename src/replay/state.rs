@@ -1,0 +1,91 @@
+//! A running replay as bytes: its name and version, the state in CBOR (RFC 8949), and a checksum over both.
+
+use flate2::Crc;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Why bytes give no running replay.
+#[derive(Debug, thiserror::Error)]
+pub enum RestoreError {
+    /// Not what was saved, or cut short.
+    #[error("not a saved estimator: {0}")]
+    Content(String),
+    /// Not as it was saved: a byte is wrong, missing or too many.
+    #[error("the saved estimator is damaged: its checksum is wrong")]
+    Checksum,
+    /// Written by a version that keeps other things.
+    #[error("saved by another version (`{0}`, this one reads `{SCHEMA}`): start the estimator anew")]
+    Version(String),
+    /// Of another rig.
+    #[error("the saved estimator has another rig ({saved}, not {wanted})")]
+    Rig {
+        /// Name of the rig in it.
+        saved: String,
+        /// Name of the rig it should have.
+        wanted: String,
+    },
+}
+
+/// Name and version of the saved form, …
+const SCHEMA: &str = "pitchleak.state/3";
+/// … which begins every state as a text of CBOR.
+const HEAD: &[u8] = b"\x71pitchleak.state/3";
+/// The same without the version.
+const ANY_HEAD: &[u8] = b"\x71pitchleak.state/";
+/// Bytes of the checksum at the end: CRC-32 of all before it, little-endian. It finds every single wrong bit and every
+/// burst of up to 32.
+const CHECKSUM: usize = 4;
+
+/// The bytes of a state.
+pub(super) fn write(state: &impl Serialize) -> Result<Vec<u8>, RestoreError> {
+    let mut bytes = HEAD.to_vec();
+    ciborium::into_writer(state, &mut bytes).map_err(|error| RestoreError::Content(error.to_string()))?;
+    let sum = checksum(&bytes);
+    bytes.extend(sum);
+    Ok(bytes)
+}
+
+/// The state of the bytes.
+pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, RestoreError> {
+    if bytes.get(..HEAD.len()) != Some(HEAD) {
+        return Err(foreign(bytes));
+    }
+    let (content, sum) = bytes.split_at_checked(bytes.len() - CHECKSUM).unwrap_or_default();
+    if sum != checksum(content) {
+        return Err(RestoreError::Checksum);
+    }
+    let malformed = |error: ciborium::de::Error<std::io::Error>| RestoreError::Content(error.to_string());
+    let mut rest = content.get(HEAD.len()..).unwrap_or_default();
+    let state = ciborium::from_reader(&mut rest).map_err(malformed)?;
+    if rest.is_empty() { Ok(state) } else { Err(RestoreError::Content("more than one".to_owned())) }
+}
+
+fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
+    let mut crc = Crc::new();
+    crc.update(bytes);
+    crc.sum().to_le_bytes()
+}
+
+/// What else begins so, or doesn't.
+fn foreign(bytes: &[u8]) -> RestoreError {
+    match bytes.strip_prefix(ANY_HEAD).and_then(|rest| rest.first()) {
+        Some(version) if version.is_ascii_digit() => {
+            RestoreError::Version(format!("pitchleak.state/{}", char::from(*version)))
+        }
+        _ => RestoreError::Content("it begins with other bytes".to_owned()),
+    }
+}
+
+/// Whether every number in a state is one; infinities stand for bounds that are not there.
+pub(super) fn has_no_nan(state: &impl Serialize) -> bool {
+    let mut stack: Vec<ciborium::Value> = ciborium::Value::serialized(state).into_iter().collect();
+    while let Some(value) = stack.pop() {
+        match value {
+            ciborium::Value::Float(number) if number.is_nan() => return false,
+            ciborium::Value::Array(values) => stack.extend(values),
+            ciborium::Value::Map(entries) => stack.extend(entries.into_iter().map(|(_, value)| value)),
+            _ => {}
+        }
+    }
+    true
+}

@@ -1,0 +1,113 @@
+//! A saved estimator goes on as it was, or is refused: nothing in between.
+
+#![allow(clippy::unwrap_used)]
+
+use pitchleak::Rig;
+use pitchleak::core::PerLeak;
+use pitchleak::replay::{RestoreError, Stream};
+use pitchleak::trace::{BadRows, TraceReader};
+use pitchleak_testkit::Motion;
+use pitchleak_testkit::rig::with_sensors_of;
+use pitchleak_testkit::trace_text::file;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn part(range: std::ops::Range<usize>) -> String {
+    let motion = Motion::sines(PerLeak { internal: 1.2e-11, external_a: 0.0, external_b: 0.0 });
+    file(&motion.rows(range.end as u32)[range])
+}
+
+fn extend(stream: &mut Stream, text: String) {
+    let rig = stream.rig().clone();
+    let reader =
+        TraceReader::from_stream("t", Box::new(std::io::Cursor::new(text.into_bytes())), &rig).unwrap();
+    stream.extend(reader).unwrap();
+}
+
+/// Every estimator there is, with and without effects, part of a trace taken in.
+fn streams() -> Vec<Stream> {
+    let plain = with_sensors_of("1 %");
+    let declared = |bias, gain| {
+        plain.replace("bias = \"0 %\", gain = \"0 %\"", &format!("bias = {bias}, gain = {gain}"))
+    };
+    let (offsets, gains) = (declared(0.001, 0.0), declared(0.001, 0.002));
+    let effects = plain.clone() + "[effects]\nposition_gain = { value = 0.01, std = 0.002 }\n";
+    let paper = plain.clone() + "[estimator]\nkind = \"paper\"\n";
+    let stream = |text: &String| {
+        let mut stream = Stream::new(&Rig::parse(text, "rig.toml").unwrap(), BadRows::Skip).unwrap();
+        extend(&mut stream, part(0..1500));
+        stream
+    };
+    [plain, offsets, gains, effects, paper].iter().map(stream).collect()
+}
+
+/// Of 6000, 782 were once read as other numbers.
+#[test]
+fn no_single_wrong_bit_is_read() {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    for stream in streams() {
+        let saved = stream.save().unwrap();
+        assert!(Stream::restore(&saved).is_ok());
+        for _ in 0..1200 {
+            let mut bytes = saved.clone();
+            let (at, bit) = (random.random_range(0..bytes.len()), random.random_range(0..8));
+            bytes[at] ^= 1 << bit;
+            assert!(Stream::restore(&bytes).is_err(), "bit {bit} of byte {at} of {}", bytes.len());
+        }
+    }
+}
+
+#[test]
+fn nothing_missing_and_nothing_more_is_read() {
+    for stream in streams() {
+        let saved = stream.save().unwrap();
+        for length in [0, 1, 17, 18, 19, 22, saved.len() / 2, saved.len() - 1] {
+            assert!(Stream::restore(&saved[..length]).is_err(), "{length} bytes");
+        }
+        assert!(matches!(Stream::restore(&[&saved[..], b"\0"].concat()), Err(RestoreError::Checksum)));
+        assert!(matches!(Stream::restore(&[&saved[..], &saved[..]].concat()), Err(RestoreError::Checksum)));
+        let older = [b"\x71pitchleak.state/2", &saved[18..]].concat();
+        assert!(
+            matches!(Stream::restore(&older), Err(RestoreError::Version(version)) if version.ends_with('2'))
+        );
+    }
+}
+
+#[test]
+fn a_state_of_another_rig_is_refused() {
+    let streams = streams();
+    let saved: Vec<_> = streams.iter().map(|stream| stream.save().unwrap()).collect();
+    for (own, bytes) in saved.iter().enumerate() {
+        for (other, stream) in streams.iter().enumerate() {
+            assert_eq!(Stream::restore_for(bytes, stream.rig()).is_ok(), own == other, "{own} for {other}");
+        }
+    }
+    let renamed = Rig { name: "moved.toml".to_owned(), ..streams[0].rig().clone() };
+    assert!(Stream::restore_for(&saved[0], &renamed).is_ok(), "a file may move");
+}
+
+/// A number that was changed with its checksum put right gives no panic and no NaN.
+#[test]
+fn forged_numbers_lead_to_no_nan() {
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let (mut taken, mut tried) = (0, 0);
+    for stream in streams() {
+        let saved = stream.save().unwrap();
+        for _ in 0..200 {
+            let mut bytes = saved[..saved.len() - 4].to_vec();
+            let (at, bit) = (random.random_range(18..bytes.len()), random.random_range(0..8));
+            bytes[at] ^= 1 << bit;
+            let mut crc = flate2::Crc::new();
+            crc.update(&bytes);
+            bytes.extend(crc.sum().to_le_bytes());
+            tried += 1;
+            let Ok(mut forged) = Stream::restore(&bytes) else { continue };
+            taken += 1;
+            extend(&mut forged, part(1500..1800));
+            let report = forged.report("t").unwrap();
+            let text = report.to_text(&pitchleak::report::Palette::PLAIN);
+            assert!(!text.contains("NaN") && !text.contains("inf"), "bit {bit} of byte {at}: {text}");
+        }
+    }
+    assert!(taken > 0 && taken < tried);
+}
