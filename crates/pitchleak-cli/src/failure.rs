@@ -1,3 +1,4 @@
+use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::figure::FigureError;
 use pitchleak::output::OutputError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
@@ -16,6 +17,9 @@ pub enum Failure {
     /// The trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// The traces' roles.
+    #[error(transparent)]
+    Roles(#[from] FittedAndJudged),
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),
