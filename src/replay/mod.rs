@@ -202,6 +202,11 @@ impl Replay {
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
+    /// Alarms so far, in the order of time.
+    pub fn alarms(&self) -> &[Alarm] {
+        &self.alarms
+    }
+
     /// The rig.
     pub fn rig(&self) -> &Rig {
         &self.rig

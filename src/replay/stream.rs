@@ -2,7 +2,9 @@ use super::Replay;
 use super::state::{self, RestoreError};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
-use crate::trace::{BadRows, Record, RowValidator, TraceError, TraceFault, TraceReader};
+use crate::trace::{
+    BadRows, LineLayout, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader, read_line,
+};
 use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
@@ -95,6 +97,25 @@ impl Stream {
         };
         self.validator = Some(reader.into_validator());
         ended
+    }
+
+    /// Takes in one line of a live feed, the `line`th: its cells, as `layout` names them.
+    ///
+    /// # Errors
+    /// Where a bad row is fatal.
+    pub fn take_line(
+        &mut self,
+        layout: &LineLayout,
+        line: u64,
+        cells: &[&[u8]],
+    ) -> Result<Taken, TraceFault> {
+        let (rig, bad_rows) = (self.replay.rig(), self.bad_rows);
+        let validator = self.validator.get_or_insert_with(|| layout.validator(rig, bad_rows));
+        let mut record = Record::default();
+        Ok(match read_line(layout, line, cells, &mut self.epoch_ns, validator, &mut record)? {
+            None => Taken::Good { renewed: self.replay.push(&record) },
+            Some(bad) => Taken::Bad(bad),
+        })
     }
 
     /// Time of the last good row, s; none before the first.

@@ -121,68 +121,83 @@ impl Splitting {
     fn read(&mut self, record: &Record<'_>, row: &mut Row) -> Result<(), Fault> {
         *row = Row { line: record.line, ..Row::empty() };
         match record.text {
-            Text::Plain(text) => self
-                .read_cells(Plain { text, delimiter: self.delimiter, at: 0, length: 0, ended: false }, row),
-            Text::Unquoted(text, ends) => self.read_cells(Unquoted { text, ends, at: 0, length: 0 }, row),
-        }
-    }
-
-    #[inline(always)]
-    fn read_cells<'a>(&mut self, mut cells: impl Cells<'a>, row: &mut Row) -> Result<(), Fault> {
-        for (index, column) in self.layout.columns.iter().enumerate() {
-            if cells.ended() {
-                return Err(Fault { column: None, reason: BadReason::ShortRow });
+            Text::Plain(text) => {
+                let cells = Plain { text, delimiter: self.delimiter, at: 0, length: 0, ended: false };
+                read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
-            let read = match &column.content {
-                Content::Number(signal, unit) => {
-                    cells.number().map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value))))
-                }
-                Content::Ignored => {
-                    cells.cell();
-                    Ok(())
-                }
-                Content::Timestamp => {
-                    self.epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds))
-                }
-            };
-            read.map_err(|reason| Fault { column: Some(index), reason })?;
-        }
-        self.last_cells = [cells.length(), self.last_cells[0]];
-        if cells.ended() {
-            check_present(&self.layout.columns, row)
-        } else {
-            Err(Fault { column: None, reason: BadReason::LongRow })
+            Text::Unquoted(text, ends) => {
+                let cells = Unquoted { text, ends, at: 0, length: 0 };
+                read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
+            }
         }
     }
 
     #[cold]
     fn describe(&self, record: &Record<'_>, fault: &Fault) -> BadRow {
-        let cells = record.cells(self.delimiter);
-        let columns = &self.layout.columns;
-        let detail = match fault.reason {
-            BadReason::ShortRow | BadReason::LongRow => {
-                format!("{} cells, {} expected", cells.len(), columns.len())
-            }
-            BadReason::Missing => "empty".to_owned(),
-            reason => {
-                let cell = fault.column.and_then(|index| cells.get(index));
-                let cell = cell.map(|cell| String::from_utf8_lossy(cell)).unwrap_or_default();
-                let cell = cell.trim();
-                match cell.parse::<f64>() {
-                    // Not quoted, so that no output of ours ever holds such a word.
-                    Ok(value) if !value.is_finite() => "not a finite number".to_owned(),
-                    _ => format!("`{}` is {}", shorten(cell, 40), reason.text()),
-                }
-            }
-        };
-        let column = fault.column.and_then(|index| columns.get(index));
-        let column = column.map(|column| shorten(&column.header, 40));
-        BadRow { line: record.line, counted: Counted::Lines, column, reason: fault.reason, detail }
+        describe(&self.layout, record.line, &record.cells(self.delimiter), fault)
     }
 }
 
+/// Reads the cells of a row as their columns say; `last_cells` are the lengths of the last cells of rows.
+#[inline(always)]
+pub(super) fn read_cells<'a>(
+    layout: &Layout,
+    epoch: &mut Epoch,
+    last_cells: &mut [usize; 2],
+    mut cells: impl Cells<'a>,
+    row: &mut Row,
+) -> Result<(), Fault> {
+    for (index, column) in layout.columns.iter().enumerate() {
+        if cells.ended() {
+            return Err(Fault { column: None, reason: BadReason::ShortRow });
+        }
+        let read = match &column.content {
+            Content::Number(signal, unit) => {
+                cells.number().map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value))))
+            }
+            Content::Ignored => {
+                cells.cell();
+                Ok(())
+            }
+            Content::Timestamp => epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds)),
+        };
+        read.map_err(|reason| Fault { column: Some(index), reason })?;
+    }
+    *last_cells = [cells.length(), last_cells[0]];
+    if cells.ended() {
+        check_present(&layout.columns, row)
+    } else {
+        Err(Fault { column: None, reason: BadReason::LongRow })
+    }
+}
+
+/// Words for a bad row of these cells.
+#[cold]
+pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Fault) -> BadRow {
+    let columns = &layout.columns;
+    let detail = match fault.reason {
+        BadReason::ShortRow | BadReason::LongRow => {
+            format!("{} cells, {} expected", cells.len(), columns.len())
+        }
+        BadReason::Missing => "empty".to_owned(),
+        reason => {
+            let cell = fault.column.and_then(|index| cells.get(index));
+            let cell = cell.map(|cell| String::from_utf8_lossy(cell)).unwrap_or_default();
+            let cell = cell.trim();
+            match cell.parse::<f64>() {
+                // Not quoted, so that no output of ours ever holds such a word.
+                Ok(value) if !value.is_finite() => "not a finite number".to_owned(),
+                _ => format!("`{}` is {}", shorten(cell, 40), reason.text()),
+            }
+        }
+    };
+    let column = fault.column.and_then(|index| columns.get(index));
+    let column = column.map(|column| shorten(&column.header, 40));
+    BadRow { line, counted: Counted::Lines, column, reason: fault.reason, detail }
+}
+
 /// The cells of one record, one after the other.
-trait Cells<'a> {
+pub(super) trait Cells<'a> {
     /// Whether the last one has been read.
     fn ended(&self) -> bool;
 

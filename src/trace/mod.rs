@@ -6,6 +6,7 @@ mod csv;
 mod error;
 mod file;
 mod format;
+mod line;
 mod parquet;
 mod quality;
 mod range;
@@ -16,6 +17,8 @@ mod stamp;
 mod table;
 
 pub use error::{TraceError, TraceFault};
+pub(crate) use line::read as read_line;
+pub use line::{LineLayout, Taken};
 pub use quality::{BadReason, BadRow, Counted, TraceQuality};
 pub use row_validator::RowValidator;
 pub use stamp::seconds_between;

@@ -61,10 +61,18 @@ impl RowValidator {
         layout: &Layout,
         record: &mut Record,
     ) -> Result<bool, TraceFault> {
+        match self.check(row, layout, record) {
+            None => Ok(true),
+            Some(bad) => self.skip(bad).map(|()| false),
+        }
+    }
+
+    /// As [`take`](Self::take); a bad row is told, and neither counted nor skipped yet.
+    #[inline]
+    pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
             let detail = self.ranges.describe(signal, row.get(signal));
-            self.skip(bad_cell(row, layout, signal, BadReason::OutOfRange, detail))?;
-            return Ok(false);
+            return Some(bad_cell(row, layout, signal, BadReason::OutOfRange, detail));
         }
         let t_s = row.get(Signal::Time);
         let (dt_s, after_gap) = match self.clock.step(t_s) {
@@ -83,13 +91,12 @@ impl RowValidator {
             }
             Step::Back { last_s } => {
                 let detail = format!("{t_s} s is not after {last_s} s");
-                self.skip(bad_cell(row, layout, Signal::Time, BadReason::TimeBack, detail))?;
-                return Ok(false);
+                return Some(bad_cell(row, layout, Signal::Time, BadReason::TimeBack, detail));
             }
         };
         *record = Record { dt_s, after_gap, ..readings(row) };
         self.quality.count_row(record);
-        Ok(true)
+        None
     }
 
     #[cold]

@@ -12,6 +12,16 @@ pub(super) struct Epoch {
 }
 
 impl Epoch {
+    /// Goes on counting from a first stamp, ns since 1970.
+    pub(super) fn since(first_ns: Option<i64>) -> Self {
+        Self { first: first_ns.and_then(|ns| Timestamp::from_nanosecond(i128::from(ns)).ok()) }
+    }
+
+    /// The first stamp, ns since 1970.
+    pub(super) fn first_ns(&self) -> Option<i64> {
+        self.first.and_then(|first| i64::try_from(first.as_nanosecond()).ok())
+    }
+
     /// Seconds since the first stamp read; NaN for an empty cell. A stamp without an offset is read
     /// as UTC, so that a day of 24 h has 24 h.
     pub(super) fn seconds(&mut self, cell: &[u8]) -> Result<f64, BadReason> {

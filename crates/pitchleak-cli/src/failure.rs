@@ -1,5 +1,6 @@
 use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::figure::FigureError;
+use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::reproduce::ReproduceError;
@@ -23,6 +24,15 @@ pub enum Failure {
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// Standard input.
+    #[error("cannot read standard input: {0}")]
+    Input(io::Error),
+    /// The configuration of a watch.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The state of a watch.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// Standard output.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] io::Error),

@@ -268,7 +268,11 @@ fn bad_rig_files_are_refused_in_one_line() {
             &["rig.toml:4", "`cylinder.strok`", "allowed here: area_a"],
         ),
         ("wrong unit", PAPER.replace("9.4 cm^2", "9.4 bar"), &["rig.toml:3", "`bar`", "m^2, cm^2, mm^2"]),
-        ("impossible", PAPER.replace("0.2 m", "-0.2 m"), &["rig.toml:4", "cylinder.stroke", "from 0.001 to 100 m"]),
+        (
+            "impossible",
+            PAPER.replace("0.2 m", "-0.2 m"),
+            &["rig.toml:4", "cylinder.stroke", "from 0.001 to 100 m"],
+        ),
         ("missing", PAPER.split("[fluid]").next().unwrap().to_owned(), &["missing key `fluid.bulk_modulus`"]),
         ("no TOML", "area: 3".to_owned(), &["rig.toml:1", "not a TOML file"]),
         ("no text", "\u{0}".to_owned(), &["rig.toml"]),

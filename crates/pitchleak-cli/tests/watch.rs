@@ -1,0 +1,281 @@
+//! `pitchleak watch` from outside: the numbers of `replay`, in every format, interrupted or not.
+
+#![allow(clippy::unwrap_used)]
+
+use flate2::read::GzDecoder;
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Read, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_pitchleak");
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data")
+}
+
+/// Every trace of `data` with its rig, if it has one.
+fn traces() -> Vec<(PathBuf, Option<PathBuf>)> {
+    let rig = data().join("traces/rig.toml");
+    let folder = |name: &str, rig: Option<PathBuf>| {
+        let files = std::fs::read_dir(data().join(name)).unwrap().map(|entry| entry.unwrap().path());
+        let traces = files.filter(|path| path.to_string_lossy().ends_with(".csv.gz"));
+        traces.map(|path| (path, rig.clone())).collect::<Vec<_>>()
+    };
+    let found = [folder("traces", Some(rig)), folder("hopsan", None)].concat();
+    assert!(found.len() >= 8);
+    found
+}
+
+fn text(trace: &Path) -> String {
+    let mut text = String::new();
+    GzDecoder::new(std::fs::File::open(trace).unwrap()).read_to_string(&mut text).unwrap();
+    text
+}
+
+fn watch(arguments: &[&str], rig: Option<&Path>) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.arg("watch").args(arguments);
+    if let Some(rig) = rig {
+        command.arg("--rig").arg(rig);
+    }
+    command
+}
+
+fn spawn(command: &mut Command) -> Child {
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::inherit()).spawn().unwrap()
+}
+
+/// Feeds `input`; gives what comes out.
+fn feed(command: &mut Command, input: String) -> Vec<Value> {
+    let mut child = spawn(command);
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+fn of_kind<'a>(events: &'a [Value], kind: &'a str) -> impl Iterator<Item = &'a Value> {
+    events.iter().filter(move |event| event["type"] == kind)
+}
+
+/// The rows as JSON, each for the cylinders named.
+fn ndjson(csv: &str, cylinders: &[&str]) -> String {
+    let mut lines = csv.lines();
+    let names: Vec<_> = lines.next().unwrap().split(',').collect();
+    let mut text = String::new();
+    for line in lines {
+        let cells = names.iter().zip(line.split(',')).filter(|(_, cell)| !cell.is_empty());
+        let members: Vec<_> = cells.map(|(name, cell)| format!("\"{name}\": {cell}")).collect();
+        for cylinder in cylinders {
+            writeln!(text, "{{\"cylinder\": \"{cylinder}\", {}}}", members.join(", ")).unwrap();
+        }
+    }
+    text
+}
+
+fn influx(csv: &str) -> String {
+    let mut lines = csv.lines();
+    let names: Vec<_> = lines.next().unwrap().split(',').collect();
+    let mut text = String::new();
+    for line in lines {
+        let cells = names.iter().zip(line.split(',')).filter(|(_, cell)| !cell.is_empty());
+        let fields: Vec<_> = cells.map(|(name, cell)| format!("{name}={cell}")).collect();
+        writeln!(text, "pitch,cylinder=T7/B2 {}", fields.join(",")).unwrap();
+    }
+    text
+}
+
+fn replayed(trace: &Path, rig: Option<&Path>) -> Value {
+    let mut command = Command::new(PROGRAM);
+    command.args(["replay", "--json"]).arg(trace);
+    if let Some(rig) = rig {
+        command.arg("--rig").arg(rig);
+    }
+    let output = command.output().unwrap();
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Every number of the last estimate, and the alarms, are those of the replay.
+fn assert_replayed(events: &[Value], replay: &Value) {
+    let last = of_kind(events, "estimate").last().unwrap();
+    for leak in ["internal", "external_a", "external_b"] {
+        for key in ["mean_lpm", "std_lpm"] {
+            assert_eq!(last["leakage"][leak][key], replay["leakage"][leak][key], "{leak} {key}");
+        }
+    }
+    assert_eq!(last["faults"], replay["verdict"]["faults"]);
+    let alarms: Vec<_> =
+        of_kind(events, "alarm").map(|alarm| [&alarm["t_s"], &alarm["fault"], &alarm["state"]]).collect();
+    let expected = replay["alarms"].as_array().unwrap();
+    let expected: Vec<_> =
+        expected.iter().map(|alarm| [&alarm["time_s"], &alarm["fault"], &alarm["state"]]).collect();
+    assert_eq!(alarms, expected);
+}
+
+#[test]
+fn the_numbers_are_those_of_replay_on_every_trace() {
+    for (trace, rig) in traces() {
+        let csv = text(&trace);
+        // Beside the trace there is no rig for a replay of its own choice.
+        let rig = rig.unwrap_or_else(|| data().join("traces/rig.toml"));
+        let replay = replayed(&trace, Some(&rig));
+        assert_replayed(&feed(&mut watch(&[], Some(&rig)), csv.clone()), &replay);
+        assert_replayed(&feed(&mut watch(&[], Some(&rig)), ndjson(&csv, &["T7/B2"])), &replay);
+        assert_replayed(&feed(&mut watch(&[], Some(&rig)), influx(&csv)), &replay);
+    }
+}
+
+#[test]
+fn cylinders_do_not_mix() {
+    let (trace, rig) = (data().join("traces/both.csv.gz"), data().join("traces/rig.toml"));
+    let events = feed(&mut watch(&[], Some(&rig)), ndjson(&text(&trace), &["T7/B1", "T7/B2"]));
+    let replay = replayed(&trace, Some(&rig));
+    for name in ["T7/B1", "T7/B2"] {
+        let own: Vec<_> = events.iter().filter(|event| event["cylinder"] == name).cloned().collect();
+        assert_replayed(&own, &replay);
+        // One estimate a second, and the last.
+        assert_eq!(of_kind(&own, "estimate").count(), 40);
+    }
+}
+
+#[test]
+fn an_interrupted_run_says_what_one_run_says() {
+    let rig = data().join("traces/rig.toml");
+    let input = ndjson(&text(&data().join("traces/both.csv.gz")), &["T7/B2"]);
+    let whole = feed(&mut watch(&[], Some(&rig)), input.clone());
+    let lines: Vec<_> = input.split_inclusive('\n').collect();
+    for at in [1, 777, 2049, 3999] {
+        let folder = tempfile::tempdir().unwrap();
+        let state = folder.path().join("state");
+        let arguments = ["--state", state.to_str().unwrap()];
+        let mut parts = Vec::new();
+        for part in [&lines[..at], &lines[at..]] {
+            let events = feed(&mut watch(&arguments, Some(&rig)), part.concat());
+            // The last estimate of a run tells of its end; in the one run nothing is said then.
+            parts.extend(events.into_iter().filter(|event| is_said(event, &whole)));
+        }
+        assert_eq!(parts, whole, "interrupted after {at}");
+    }
+}
+
+fn is_said(event: &Value, whole: &[Value]) -> bool {
+    whole.iter().any(|other| other["type"] == event["type"] && other["t_s"] == event["t_s"])
+}
+
+#[test]
+fn a_signal_ends_it_with_its_state_saved() {
+    let rig = data().join("traces/rig.toml");
+    let input = ndjson(&text(&data().join("traces/both.csv.gz")), &["T7/B2"]);
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--state", folder.path().to_str().unwrap()];
+    let mut child = spawn(&mut watch(&arguments, Some(&rig)));
+    let mut stdin = child.stdin.take().unwrap();
+    let mut stdout = BufReader::new(child.stdout.take().unwrap()).lines();
+    let (first, rest) = input.split_at(input.match_indices('\n').nth(1999).unwrap().0 + 1);
+    stdin.write_all(first.as_bytes()).unwrap();
+    // An estimate is there while the input stays open: nothing waits for its end.
+    let mut last = String::new();
+    while !last.contains("\"t_s\":19.0,") {
+        last = stdout.next().unwrap().unwrap();
+    }
+    Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(child.wait().unwrap().success());
+    drop(stdin);
+    let events = feed(&mut watch(&arguments, Some(&rig)), rest.to_owned());
+    let whole = feed(&mut watch(&[], Some(&rig)), input);
+    assert_eq!(of_kind(&events, "estimate").last(), of_kind(&whole, "estimate").last());
+}
+
+#[test]
+fn what_is_of_no_use_is_counted() {
+    let good = r#"{"t_s": T, "x_mm": 100, "pa_bar": 50, "pb_bar": 40, "qa_lpm": 0, "qb_lpm": 0}"#;
+    let mut input = String::new();
+    for k in 0..200 {
+        writeln!(input, "{}", good.replace('T', &format!("{}", f64::from(k) * 0.01))).unwrap();
+        writeln!(input, "{}", good.replace('T', &format!("{}", f64::from(k) * 0.01))).unwrap();
+        input.push_str("{\"t_s\": 1, \n[[[[\n{\"cylinder\": \"n\", \"t_s\": 1}\n");
+        writeln!(input, "{}", good.replace("50", "5e9").replace('T', "99")).unwrap();
+    }
+    let events = feed(&mut watch(&[], None), input);
+    let count = |kind: &str| -> u64 {
+        of_kind(&events, "notice")
+            .filter(|event| event["kind"] == kind)
+            .map(|event| event["count"].as_u64().unwrap())
+            .sum()
+    };
+    assert_eq!(
+        [count("time_back"), count("unreadable"), count("columns"), count("out_of_range")],
+        [200, 400, 200, 200]
+    );
+    assert!(events.len() < 20, "{events:?}");
+}
+
+#[test]
+fn a_damaged_state_is_told_and_the_one_before_is_used() {
+    let rig = data().join("traces/rig.toml");
+    let csv = text(&data().join("traces/both.csv.gz"));
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--state", folder.path().to_str().unwrap()];
+    let first = feed(&mut watch(&arguments, Some(&rig)), csv);
+    feed(&mut watch(&arguments, Some(&rig)), String::new());
+    let newest = folder.path().join("watch.state");
+    let mut bytes = std::fs::read(&newest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&newest, &bytes).unwrap();
+    let output = watch(&arguments, Some(&rig)).stdin(Stdio::null()).output().unwrap();
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("damaged"));
+    assert!(first.len() > 40);
+    std::fs::write(&newest, &bytes).unwrap();
+    std::fs::write(folder.path().join("watch.state.before"), "x").unwrap();
+    let output = watch(&arguments, Some(&rig)).stdin(Stdio::null()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let other = watch(&arguments, None).stdin(Stdio::null()).output().unwrap();
+    assert_eq!(other.status.code(), Some(2));
+}
+
+/// Telegraf's configuration runs a command that takes Telegraf's lines and gives lines that it reads.
+#[test]
+fn the_command_of_telegraf_speaks_its_protocol() {
+    let packaging = data().join("../packaging");
+    let telegraf = std::fs::read_to_string(packaging.join("telegraf.conf")).unwrap();
+    let command = telegraf.lines().find_map(|line| line.trim().strip_prefix("command = ")).unwrap();
+    let words: Vec<String> = serde_json::from_str(command).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::copy(packaging.join("watch.toml"), at("watch.toml")).unwrap();
+    std::fs::copy(data().join("traces/rig.toml"), at("rig.toml")).unwrap();
+    let placed = words[1..].iter().map(|word| match word.as_str() {
+        "/etc/pitchleak/watch.toml" => at("watch.toml"),
+        "/var/lib/pitchleak" => at("state"),
+        other => other.to_owned(),
+    });
+    let mut child = spawn(Command::new(PROGRAM).args(placed));
+    let mut input = String::new();
+    for (k, line) in text(&data().join("traces/both.csv.gz")).lines().skip(1).take(500).enumerate() {
+        let cells: Vec<_> = line.split(',').collect();
+        let names = ["x_mm", "pa_bar", "pb_bar", "qa_lpm", "qb_lpm"];
+        let fields: Vec<_> =
+            names.iter().zip(&cells[1..]).map(|(name, cell)| format!("{name}={cell}")).collect();
+        let time_ns = 1_700_000_000_000_000_000_u64 + 10_000_000 * k as u64;
+        writeln!(input, "pitch,cylinder=T7\\ B2,host=gw {} {time_ns}", fields.join(",")).unwrap();
+    }
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
+    let output = String::from_utf8(child.wait_with_output().unwrap().stdout).unwrap();
+    writer.join().unwrap().unwrap();
+    let estimates: Vec<_> =
+        output.lines().filter(|line| line.starts_with("pitchleak,cylinder=T7\\ B2 ")).collect();
+    assert_eq!(estimates.len(), 5);
+    assert!(estimates[0].ends_with(" 1700000001000000000"), "{}", estimates[0]);
+    assert!(output.contains("pitchleak_alarm,cylinder=T7\\ B2,fault=internal id=\"T7 B2:internal:raised:17"));
+}

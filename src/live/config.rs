@@ -1,0 +1,96 @@
+//! Which cylinders there are, and their rigs.
+
+use crate::Rig;
+use crate::rig::RigError;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What to watch.
+#[derive(Clone, Debug)]
+pub struct LiveConfig {
+    /// Rig of each cylinder that is not named; none where only named ones are watched.
+    pub rig: Option<Rig>,
+    /// Rigs of cylinders by name.
+    pub cylinders: BTreeMap<String, Rig>,
+    /// Time between two estimates, s of samples.
+    pub interval_s: f64,
+}
+
+/// Error returned by [`LiveConfig::load`].
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read {file}: {source}")]
+    Read {
+        /// As named by the user.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is no configuration.
+    #[error("{file}: {why}")]
+    Content {
+        /// As named by the user.
+        file: String,
+        /// What is wrong, and where.
+        why: String,
+    },
+    /// A rig file that it names.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    rig: Option<PathBuf>,
+    interval_s: Option<f64>,
+    #[serde(default)]
+    cylinders: BTreeMap<String, Entry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    rig: PathBuf,
+}
+
+impl LiveConfig {
+    /// One rig for all cylinders, and an estimate a second.
+    pub fn of(rig: Rig) -> Self {
+        Self { rig: Some(rig), cylinders: BTreeMap::new(), interval_s: 1.0 }
+    }
+
+    /// Reads a configuration: `rig` for all cylinders, `[cylinders."T7/B2"] rig = …` for one of its own (paths from the
+    /// file's folder), `interval_s`. Without `rig`, other cylinders than those named are not watched.
+    ///
+    /// # Errors
+    /// Where the file or a rig file that it names cannot be used.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { file: file.clone(), source })?;
+        let content = |why: String| ConfigError::Content { file: file.clone(), why };
+        let document: Document =
+            toml::from_str(&text).map_err(|error| content(error.to_string().trim().replace('\n', " ")))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let load = |rig: &PathBuf| Rig::load(folder.join(rig));
+        let interval_s = document.interval_s.unwrap_or(1.0);
+        if !(interval_s > 0.0 && interval_s <= 86_400.0) {
+            return Err(content(format!("interval_s = {interval_s}: above 0 and at most 86400 is allowed")));
+        }
+        let named = document.cylinders.iter().map(|(name, entry)| Ok((name.clone(), load(&entry.rig)?)));
+        let cylinders = named.collect::<Result<BTreeMap<_, _>, RigError>>()?;
+        let rig = document.rig.as_ref().map(load).transpose()?;
+        if rig.is_none() && cylinders.is_empty() {
+            return Err(content("neither `rig` nor a cylinder under `[cylinders]`".to_owned()));
+        }
+        Ok(Self { rig, cylinders, interval_s })
+    }
+
+    /// The rig of a cylinder; none where it is not watched.
+    pub fn rig_of(&self, cylinder: &str) -> Option<&Rig> {
+        self.cylinders.get(cylinder).or(self.rig.as_ref())
+    }
+}

@@ -1,0 +1,170 @@
+//! What goes out.
+
+use crate::report::Leakage;
+use pitchleak_core::{AlarmState, Leak, PerLeak};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// How events are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OutputFormat {
+    /// A JSON object a line.
+    #[default]
+    Ndjson,
+    /// Influx line protocol.
+    Influx,
+}
+
+/// One line of the output.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Event {
+    /// What is known of a cylinder.
+    Estimate(EstimateEvent),
+    /// An alarm raised or cleared.
+    Alarm(AlarmEvent),
+    /// Lines that were left out.
+    Notice(NoticeEvent),
+}
+
+/// What is known of a cylinder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EstimateEvent {
+    /// None where the lines name none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cylinder: String,
+    /// Time of the sample, s; since the first one where lines have time stamps.
+    pub t_s: f64,
+    /// Leaks whose alarm stands.
+    pub faults: Vec<Leak>,
+    /// Mean leak flows since the start, or since the leak changed.
+    pub leakage: PerLeak<LiveLeakage>,
+    /// Time of the sample, ns since 1970, where lines have time stamps.
+    #[serde(skip)]
+    pub time_ns: Option<i64>,
+}
+
+/// Mean flow of a leak.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LiveLeakage {
+    /// Mean size of the flow, L/min.
+    pub mean_lpm: f64,
+    /// Standard deviation of its error, L/min; none from the paper's law.
+    pub std_lpm: Option<f64>,
+}
+
+impl From<Leakage> for LiveLeakage {
+    fn from(leakage: Leakage) -> Self {
+        Self { mean_lpm: leakage.mean_lpm, std_lpm: leakage.std_lpm }
+    }
+}
+
+/// An alarm raised or cleared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AlarmEvent {
+    /// Follows from the samples alone: a repeated alarm has the same.
+    pub id: String,
+    /// None where the lines name none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cylinder: String,
+    /// Time of the sample, s.
+    pub t_s: f64,
+    /// Which leak.
+    pub fault: Leak,
+    /// What happened.
+    pub state: AlarmState,
+    /// The leak as known by then.
+    #[serde(flatten)]
+    pub leakage: LiveLeakage,
+    /// As of [`EstimateEvent`].
+    #[serde(skip)]
+    pub time_ns: Option<i64>,
+}
+
+/// Lines that were left out.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoticeEvent {
+    /// None where the lines name none, or cannot be read.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cylinder: String,
+    /// Time of the cylinder's last good sample, s; none before it.
+    pub t_s: Option<f64>,
+    /// What is wrong with them.
+    pub kind: String,
+    /// How many since the last notice of this kind.
+    pub count: u64,
+    /// The first of them.
+    pub text: String,
+}
+
+impl Event {
+    /// The event as a line, without its end.
+    ///
+    /// # Errors
+    /// None in practice: every field has its form.
+    pub fn line(&self, format: OutputFormat) -> Result<String, serde_json::Error> {
+        match format {
+            OutputFormat::Ndjson => serde_json::to_string(self),
+            OutputFormat::Influx => self.influx(),
+        }
+    }
+
+    fn influx(&self) -> Result<String, serde_json::Error> {
+        let (name, cylinder, time_ns) = match self {
+            Self::Estimate(event) => ("pitchleak", &event.cylinder, event.time_ns),
+            Self::Alarm(event) => ("pitchleak_alarm", &event.cylinder, event.time_ns),
+            Self::Notice(event) => ("pitchleak_notice", &event.cylinder, None),
+        };
+        let mut line = tagged(name, "cylinder", cylinder);
+        let quoted = |text: &str| text.replace('\\', "\\\\").replace('"', "\\\"");
+        // Writing to a string does not fail.
+        let _ = match self {
+            Self::Estimate(event) => {
+                let mut values = format!("t_s={}", event.t_s);
+                for leak in Leak::ALL {
+                    let LiveLeakage { mean_lpm, std_lpm } = event.leakage[leak];
+                    let _ = write!(values, ",{}_mean_lpm={mean_lpm}", name_of(leak)?);
+                    if let Some(std_lpm) = std_lpm {
+                        let _ = write!(values, ",{}_std_lpm={std_lpm}", name_of(leak)?);
+                    }
+                    let _ = write!(values, ",{}_alarm={}", name_of(leak)?, event.faults.contains(&leak));
+                }
+                write!(line, " {values}")
+            }
+            Self::Alarm(event) => {
+                line = tagged(&line, "fault", &name_of(event.fault)?);
+                let raised = event.state == AlarmState::Raised;
+                let (id, mean) = (quoted(&event.id), event.leakage.mean_lpm);
+                write!(line, " id=\"{id}\",t_s={},raised={raised},mean_lpm={mean}", event.t_s)
+            }
+            Self::Notice(event) => {
+                line = tagged(&line, "kind", &event.kind);
+                write!(line, " count={}u,text=\"{}\"", event.count, quoted(&event.text))
+            }
+        };
+        if let Some(time_ns) = time_ns {
+            let _ = write!(line, " {time_ns}");
+        }
+        Ok(line)
+    }
+}
+
+/// With a tag; one without a value is left out.
+fn tagged(series: &str, tag: &str, value: &str) -> String {
+    if value.is_empty() {
+        return series.to_owned();
+    }
+    let mut text = format!("{series},{tag}=");
+    for c in value.chars().map(|c| if c.is_control() { ' ' } else { c }) {
+        if [' ', ',', '=', '\\'].contains(&c) {
+            text.push('\\');
+        }
+        text.push(c);
+    }
+    text
+}
+
+/// As in JSON.
+fn name_of(leak: Leak) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_value(leak)?.as_str().unwrap_or_default().to_owned())
+}

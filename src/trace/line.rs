@@ -1,0 +1,90 @@
+//! Rows that come one by one as text, such as the lines of a live feed.
+
+use super::columns::Layout;
+use super::csv::{Cells, describe, read_cells};
+use super::error::TraceFault;
+use super::quality::{BadRow, Counted};
+use super::row::Row;
+use super::row_validator::RowValidator;
+use super::stamp::Epoch;
+use super::{BadRows, Record};
+use crate::rig::Rig;
+
+/// What the cells of a line hold, by their names, which are those of a trace's columns.
+#[derive(Clone, Debug)]
+pub struct LineLayout(Layout);
+
+impl LineLayout {
+    /// The layout of cells of these names.
+    ///
+    /// # Errors
+    /// As for the header row of a trace.
+    pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
+        Layout::new(names, &rig.columns).map(|layout| Self(Layout { counted: Counted::Lines, ..layout }))
+    }
+
+    /// A validator for lines like these.
+    pub(crate) fn validator(&self, rig: &Rig, bad_rows: BadRows) -> RowValidator {
+        let mut validator = RowValidator::new(rig, &self.0);
+        validator.set_bad_rows(bad_rows);
+        validator
+    }
+}
+
+/// What became of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Taken {
+    /// It is in the estimates; says whether they are new.
+    Good {
+        /// Whether the estimates are new.
+        renewed: bool,
+    },
+    /// It was counted and left out.
+    Bad(BadRow),
+}
+
+/// Reads the cells of a line into `record`; a bad row is an error only where those are fatal.
+pub(crate) fn read(
+    layout: &LineLayout,
+    line: u64,
+    cells: &[&[u8]],
+    epoch_ns: &mut Option<i64>,
+    validator: &mut RowValidator,
+    record: &mut Record,
+) -> Result<Option<BadRow>, TraceFault> {
+    let LineLayout(layout) = layout;
+    let mut row = Row { line, ..Row::empty() };
+    let mut epoch = Epoch::since(*epoch_ns);
+    let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
+    *epoch_ns = epoch.first_ns();
+    let bad = match read {
+        Ok(()) => validator.check(&row, layout, record),
+        Err(fault) => Some(describe(layout, line, cells, &fault)),
+    };
+    if let Some(bad) = &bad {
+        validator.skip(bad.clone())?;
+    }
+    Ok(bad)
+}
+
+/// Cells that were split before.
+struct LineCells<'a> {
+    cells: &'a [&'a [u8]],
+    at: usize,
+}
+
+impl<'a> Cells<'a> for LineCells<'a> {
+    fn ended(&self) -> bool {
+        self.at >= self.cells.len()
+    }
+
+    fn cell(&mut self) -> &'a [u8] {
+        let cell = self.cells.get(self.at).copied().unwrap_or_default();
+        self.at += 1;
+        cell
+    }
+
+    fn length(&self) -> usize {
+        self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
+    }
+}
