@@ -16,7 +16,7 @@ impl Rig {
         let [bulk_modulus_pa, bulk_modulus_std_pa] = file.read()?;
         let spread = || {
             let [noise_std, bias_std, gain_std] = file.read()?;
-            Some(SensorSpread { noise_std, bias_std, gain_std })
+            Some(SensorSpread { noise_std, bias_std, gain_std, ..SensorSpread::default() })
         };
         Some(Self {
             cylinder: Cylinder {

@@ -11,7 +11,6 @@ mod replacement;
 mod tests;
 
 pub use inputs::Inputs;
-pub(crate) use inputs::{Identity, identity};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;

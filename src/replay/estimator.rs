@@ -129,7 +129,9 @@ impl Estimator {
 }
 
 fn has_biases(sensors: &Sensors<f64>) -> bool {
-    [sensors.flow_a, sensors.flow_b, sensors.pressure].iter().any(|s| s.bias_std > 0.0)
+    [sensors.flow_a, sensors.flow_b, sensors.pressure]
+        .iter()
+        .any(|s| s.bias_std > 0.0 || s.drift_std_ph > 0.0)
 }
 
 fn has_gains(sensors: &Sensors<f64>) -> bool {

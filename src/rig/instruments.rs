@@ -15,6 +15,8 @@ pub struct Instrument {
     pub bias: f64,
     /// How far the scale may be off, 1 σ, as a share of the reading.
     pub gain: f64,
+    /// How far the offset may drift in an hour, 1 σ, as a share of full scale.
+    pub drift: f64,
 }
 
 /// The data sheets of all sensors of a rig.
@@ -38,7 +40,7 @@ impl Instrument {
 
     /// A sensor of the paper's accuracy.
     pub fn of_full_scale(full_scale: f64) -> Self {
-        Self { full_scale, accuracy: Self::PAPER_ACCURACY, bias: 0.0, gain: 0.0 }
+        Self { full_scale, accuracy: Self::PAPER_ACCURACY, bias: 0.0, gain: 0.0, drift: 0.0 }
     }
 
     /// The declared spread as the estimators use it.
@@ -46,6 +48,7 @@ impl Instrument {
         SensorSpread {
             bias_std: self.bias * self.full_scale,
             gain_std: self.gain,
+            drift_std_ph: self.drift * self.full_scale,
             ..SensorSpread::of_full_scale(self.full_scale, self.accuracy)
         }
     }
@@ -60,13 +63,14 @@ impl Instrument {
         if !sheet.is_present() {
             return Ok(None);
         }
-        sheet.allow(&["full_scale", "accuracy", "bias", "gain"])?;
+        sheet.allow(&["full_scale", "accuracy", "bias", "gain", "drift"])?;
         let share = |key| sheet.quantity(key, Dimension::Share, bound::SHARE);
         Ok(Some(Self {
             full_scale: sheet.required("full_scale", dimension, full_scale)?,
             accuracy: share("accuracy")?.unwrap_or(Self::PAPER_ACCURACY),
             bias: share("bias")?.unwrap_or(0.0),
             gain: share("gain")?.unwrap_or(0.0),
+            drift: sheet.quantity("drift", Dimension::Share, bound::DRIFT_PER_HOUR)?.unwrap_or(0.0),
         }))
     }
 }

@@ -27,7 +27,7 @@ fn the_contracts_file_is_the_papers_rig() {
 #[test]
 fn optional_sections_are_read() {
     let text = declared().replace("flow = {", "flow_a = {")
-        + r#"flow_b = { full_scale = 1e-4, accuracy = 0.005, bias = "1 %", gain = "20 %" }
+        + r#"flow_b = { full_scale = 1e-4, accuracy = 0.005, bias = "1 %", gain = "20 %", drift = "3 %" }
 [estimator]
 kind = "paper"
 forgetting_time = "30 s"
@@ -47,7 +47,7 @@ load_offset = 12
     let rig = Rig::parse(&text, "rig.toml").unwrap();
     assert_eq!(
         rig.instruments.flow_b,
-        Instrument { full_scale: 1e-4, accuracy: 0.005, bias: 0.01, gain: 0.2 }
+        Instrument { full_scale: 1e-4, accuracy: 0.005, bias: 0.01, gain: 0.2, drift: 0.03 }
     );
     assert_eq!(rig.estimator.kind, EstimatorKind::Paper);
     assert_eq!(rig.estimator.filter_cutoff_hz, Some(5.0));
@@ -137,7 +137,7 @@ proptest! {
         (cylinder.area_a_m2, cylinder.area_b_m2, cylinder.stroke_m, cylinder.moving_mass_kg) = (a, b, c, d);
         (cylinder.dead_volume_a_m3, cylinder.dead_volume_b_m3) = (e, f);
         (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa) = (g, h);
-        rig.instruments.flow_a = Instrument { full_scale: i, accuracy: j, bias: k, gain: l };
+        rig.instruments.flow_a = Instrument { full_scale: i, accuracy: j, bias: k, gain: l, drift: 0.5 * l };
         (rig.instruments.flow_b.full_scale, rig.instruments.pressure.full_scale) = (m, n);
         (rig.instruments.position.full_scale, rig.instruments.force.full_scale) = (o, p);
         (rig.alarms.threshold_m3s.internal, rig.alarms.clear_share, rig.alarms.hold_time_s) = (q, r, s);

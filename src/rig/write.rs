@@ -24,8 +24,9 @@ fn instrument(key: &str, sheet: &Instrument, dimension: Dimension, scale: Bound)
     let full_scale = within(sheet.full_scale, dimension, scale);
     let [accuracy, bias, gain] =
         [sheet.accuracy, sheet.bias, sheet.gain].map(|share| bound::SHARE.nearest(share));
+    let drift = bound::DRIFT_PER_HOUR.nearest(sheet.drift);
     format!(
-        "{key} = {{ full_scale = {full_scale}, accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?} }}\n"
+        "{key} = {{ full_scale = {full_scale}, accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?}, drift = {drift:?} }}\n"
     )
 }
 

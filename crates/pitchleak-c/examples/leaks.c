@@ -11,10 +11,10 @@
 static const PitchleakRig rig = {
     {12.6e-4f, 9.4e-4f, 0.2f, 20.0f, 50e-6f, 50e-6f}, /* areas, stroke, mass, dead volumes */
     {0.8e9f, 0.2e9f},                                 /* bulk modulus, and how well it is known */
-    {0.0667f * LPM, 0.0f, 0.0f},                      /* flow meter A: noise, offset, gain, 1 sigma each */
-    {0.0667f * LPM, 0.0f, 0.0f},                      /* flow meter B */
-    {53e3f, 0.0f, 0.0f},                              /* pressures */
-    {0.667e-3f, 0.0f, 0.0f},                          /* position */
+    {0.0667f * LPM, 0.0f, 0.0f, 0.0f},                /* flow meter A: noise, offset, gain, drift an hour, 1 sigma each */
+    {0.0667f * LPM, 0.0f, 0.0f, 0.0f},                /* flow meter B */
+    {53e3f, 0.0f, 0.0f, 0.0f},                        /* pressures */
+    {0.667e-3f, 0.0f, 0.0f, 0.0f},                    /* position */
     0.1f * LPM, 0.1f * LPM, 0.1f * LPM,               /* alarms */
     0.5f,                                             /* a longer step is a gap */
 };

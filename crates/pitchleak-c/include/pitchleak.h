@@ -105,6 +105,8 @@ typedef struct PitchleakSensor {
   float bias_std;
   // Scale error, as a share of the reading; estimated by `Pitchleak9`.
   float gain_std;
+  // How far the offset may drift in an hour; followed by `Pitchleak6` and `Pitchleak9`.
+  float drift_std_ph;
 } PitchleakSensor;
 
 // All that is declared.
@@ -324,7 +326,7 @@ PitchleakResult pitchleak9_restore(struct Pitchleak9 *estimator, const uint8_t *
 PITCHLEAK_ASSERT(sizeof(Pitchleak4) == 8 * PITCHLEAK4_WORDS && PITCHLEAK_ALIGNOF(Pitchleak4) == 8);
 PITCHLEAK_ASSERT(sizeof(Pitchleak6) == 8 * PITCHLEAK6_WORDS && PITCHLEAK_ALIGNOF(Pitchleak6) == 8);
 PITCHLEAK_ASSERT(sizeof(Pitchleak9) == 8 * PITCHLEAK9_WORDS && PITCHLEAK_ALIGNOF(Pitchleak9) == 8);
-PITCHLEAK_ASSERT(sizeof(PitchleakRig) == 96 && sizeof(PitchleakSample) == 20 && sizeof(PitchleakFound) == 68);
+PITCHLEAK_ASSERT(sizeof(PitchleakRig) == 112 && sizeof(PitchleakSample) == 20 && sizeof(PitchleakFound) == 68);
 PITCHLEAK_ASSERT(sizeof(PitchleakResult) == 4);
 #undef PITCHLEAK_ASSERT
 #undef PITCHLEAK_ALIGNOF

@@ -41,6 +41,8 @@ pub struct PitchleakSensor {
     pub bias_std: f32,
     /// Scale error, as a share of the reading; estimated by `Pitchleak9`.
     pub gain_std: f32,
+    /// How far the offset may drift in an hour; followed by `Pitchleak6` and `Pitchleak9`.
+    pub drift_std_ph: f32,
 }
 
 /// All that is declared.
@@ -87,6 +89,7 @@ impl PitchleakRig {
             noise_std: sensor.noise_std,
             bias_std: sensor.bias_std,
             gain_std: sensor.gain_std,
+            drift_std_ph: sensor.drift_std_ph,
         };
         let sensors = Sensors {
             flow_a: spread(self.flow_a),

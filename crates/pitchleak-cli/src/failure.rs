@@ -1,4 +1,3 @@
-use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::figure::FigureError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
@@ -18,9 +17,6 @@ pub enum Failure {
     /// The trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The traces' roles.
-    #[error(transparent)]
-    Roles(#[from] FittedAndJudged),
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),

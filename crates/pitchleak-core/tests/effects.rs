@@ -148,7 +148,8 @@ fn what_carries_the_noise_of_the_left_side_is_in_proportion_to_it() {
 /// What is known of a sensor's error beforehand is what its data sheet says, each of its own.
 #[test]
 fn a_sensors_declared_error_is_the_prior_of_its_effect() {
-    let spread = |k: f64| SensorSpread { noise_std: 99.0, bias_std: k, gain_std: 10.0 * k };
+    let spread =
+        |k: f64| SensorSpread { noise_std: 99.0, bias_std: k, gain_std: 10.0 * k, drift_std_ph: 99.0 };
     let sensors = Sensors {
         flow_a: spread(1.0),
         flow_b: spread(2.0),

@@ -10,6 +10,8 @@ pub struct SensorSpread<T> {
     pub bias_std: T,
     /// Scale error, as a share of the reading.
     pub gain_std: T,
+    /// How far the offset may drift in an hour.
+    pub drift_std_ph: T,
 }
 
 /// The declared spread of every sensor of a rig.
@@ -32,14 +34,20 @@ impl<T: Real> SensorSpread<T> {
     /// A sensor of `full_scale` whose white noise has 3 σ = `accuracy` · full scale, with neither
     /// offset nor scale error.
     pub fn of_full_scale(full_scale: T, accuracy: T) -> Self {
-        Self { noise_std: full_scale * accuracy / T::lit(3.0), bias_std: T::zero(), gain_std: T::zero() }
+        Self {
+            noise_std: full_scale * accuracy / T::lit(3.0),
+            bias_std: T::zero(),
+            gain_std: T::zero(),
+            drift_std_ph: T::zero(),
+        }
     }
 }
 
 impl<T: Real> SensorSpread<T> {
     /// Whether every spread is a number and none is negative.
     pub fn is_physical(&self) -> bool {
-        [self.noise_std, self.bias_std, self.gain_std].iter().all(|std| std.is_finite() && *std >= T::zero())
+        let Self { noise_std, bias_std, gain_std, drift_std_ph } = *self;
+        [noise_std, bias_std, gain_std, drift_std_ph].iter().all(|std| std.is_finite() && *std >= T::zero())
     }
 }
 

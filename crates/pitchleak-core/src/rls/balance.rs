@@ -1,3 +1,6 @@
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
 use crate::{Cylinder, Real, Sample};
 
 /// Integrals of one chamber's continuity equation (theory: Q = A ẋ + κ V Ṗ + leaks, κ = 1/β), by the
@@ -85,6 +88,18 @@ pub(super) struct Equation<T, const N: usize> {
     pub left: T,
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub columns: [T; N],
+}
+
+impl<T: Real, const N: usize> Equation<T, N> {
+    /// Left side less columnsᵀθ.
+    #[inline]
+    pub fn remainder(&self, theta: &[T; N]) -> T {
+        let mut left = self.left;
+        for i in 0..N {
+            left -= self.columns[i] * theta[i];
+        }
+        left
+    }
 }
 
 /// w_a·(chamber A) + w_b·(chamber B), in prior units: `scale` holds each parameter's prior standard

@@ -116,8 +116,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     fn gains(&self) -> [Estimate<T>; 3] {
         [
-            self.parameter(Parameter::GainA),
-            self.parameter(Parameter::GainB),
+            of_reading(self.parameter(Parameter::GainA)),
+            of_reading(self.parameter(Parameter::GainB)),
             self.parameter(Parameter::GainPosition),
         ]
     }
@@ -141,7 +141,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Weights of the offsets found in `flows`·offsets + `pressures`·biases (SI), m³/s or Pa per prior unit.
     fn per_offset(&self, [flow_a, flow_b]: [T; 2], [share_a, share_b]: [T; 2]) -> [T; 2] {
         let [[aa, ab], [ba, bb]] = self.offsets.pressure_per_offset;
-        let bias_pa = self.sensors.pressure.bias_std;
+        let bias_pa = self.sensors_now().pressure.bias_std;
         let [unit_a, unit_b] = OFFSETS.map(|o| self.scale.get(o as usize).copied().unwrap_or(T::zero()));
         [
             flow_a * unit_a + bias_pa * (share_a * aa + share_b * ba),
@@ -161,7 +161,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let [[aa, ab], [ba, bb]] = self.offsets.pressure_spread;
         let [share_a, share_b] = pressures;
         let hidden = share_a * share_a * aa + share_a * share_b * (ab + ba) + share_b * share_b * bb;
-        let bias_pa = self.sensors.pressure.bias_std;
+        let bias_pa = self.sensors_now().pressure.bias_std;
         let variance = found.max(T::zero()) + bias_pa * bias_pa * hidden.max(T::zero());
         Estimate { value: per_a * mean_a + per_b * mean_b, std: variance.sqrt() }
     }
@@ -198,6 +198,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
     pub(super) fn mean_pressures_pa(&self) -> PerLeak<T> {
         self.pressures.means().sizes_pa
     }
+}
+
+/// A share of the reading that is wrong, γ/(1 + γ), as a share of the truth, γ.
+fn of_reading<T: Real>(share: Estimate<T>) -> Estimate<T> {
+    let rest = T::one() - share.value;
+    Estimate { value: share.value / rest, std: share.std / (rest * rest) }
 }
 
 #[cfg(test)]

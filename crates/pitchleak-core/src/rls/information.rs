@@ -124,6 +124,22 @@ impl<T: Real, const N: usize> Information<T, N> {
         self.column_noise += block.column_noise;
     }
 
+    /// Parameter `own` has moved by something of this variance: M − M e (1/q + eᵀM e)⁻¹ eᵀM, by the matrix inversion lemma.
+    pub fn diffuse(&mut self, own: usize, variance: T) {
+        let mut column = [T::zero(); N];
+        for i in 0..N {
+            column[i] = self.entry(own, i);
+        }
+        let share = variance / (T::one() + variance * column[own]);
+        let told = share * self.vector[own];
+        for i in 0..N {
+            for j in 0..=i {
+                self.matrix[i][j] -= share * column[i] * column[j];
+            }
+            self.vector[i] -= told * column[i];
+        }
+    }
+
     /// Entry of the symmetric matrix.
     #[inline]
     pub fn entry(&self, i: usize, j: usize) -> T {

@@ -34,6 +34,7 @@ mod prior;
 mod trend;
 mod update;
 mod weights;
+mod zero_drift;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use balance::{Equation, Integrals, combine};
@@ -52,9 +53,10 @@ use parameter::LEAKS;
 pub use parameter::Parameter;
 use position_filter::PositionFilter;
 use pressure_means::PressureMeans;
-use prior::prior_spread;
+use prior::{offset_units, prior_spread};
 pub use update::{Innovation, Update};
 use weights::Weights;
+use zero_drift::ZeroDrift;
 
 /// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
 const AVERAGING_S: f64 = 60.0;
@@ -106,6 +108,7 @@ pub struct Rls<T, const N: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     scale: [T; N],
     offsets: OffsetPrior<T>,
+    drift: ZeroDrift<T>,
     last: Option<Sample<T>>,
     both: Weights<T>,
     only_a: Weights<T>,
@@ -155,7 +158,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         error::check(&cylinder, &fluid, sensors, &settings)?;
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
-        let offsets = OffsetPrior::new(&cylinder, sensors, &no_leak);
+        let offsets = OffsetPrior::new(&cylinder, sensors, offset_units(&cylinder, sensors), &no_leak);
         let solution =
             Information::new().solve(&Prior { mean_0: T::zero(), offsets: &offsets.information }).solution();
         Ok(Self {
@@ -166,6 +169,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             compressibility: T::one() / fluid.bulk_modulus_pa,
             scale: prior_spread(&cylinder, &fluid, sensors),
             offsets,
+            drift: ZeroDrift::default(),
             last: None,
             both: Weights::both(&cylinder, &noise, &no_leak),
             only_a: Weights::only_a(&cylinder, &noise, &no_leak),
@@ -237,7 +241,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
             combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
         let gain = Parameter::GainPosition as usize;
         if N > gain {
-            equation.columns[gain] = -equation.left * self.scale[gain];
+            // The gain acts on the piston's travel: what the flows say less what the leaks take.
+            equation.columns[gain] = -equation.remainder(&self.solution.mean) * self.scale[gain];
         }
         let variance = weights.odometer_variance * step.time_square;
         odometer.advance(
@@ -305,8 +310,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn learn(&mut self) -> bool {
         let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
         let mean_0 = self.compressibility / self.scale[Parameter::Compressibility as usize];
+        let drifted = self.drifted();
         let prior = Prior { mean_0, offsets: &self.offsets.information };
         let inflation = self.innovations.inflation();
+        self.bank.drift_zeros(&drifted);
         let Outlook { now, slopes_ps, jumped } = self.bank.update(&block, &prior, inflation, &self.solution);
         self.solution = now;
         self.slopes_ps = slopes_ps;
@@ -314,6 +321,20 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.reweigh();
         self.empty_block(0);
         jumped
+    }
+
+    /// By how much zeros may have drifted since the estimates were renewed, variances in prior units.
+    fn drifted(&mut self) -> [T; 2] {
+        if N <= Parameter::OffsetB as usize {
+            return [T::zero(); 2];
+        }
+        let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
+        self.drift.advance(self.unlearnt_s, &self.cylinder, &self.sensors, &leaks)
+    }
+
+    /// The sensors, as far off as they may have drifted by now.
+    fn sensors_now(&self) -> Sensors<T> {
+        self.drift.widened(&self.sensors)
     }
 
     /// Nothing is to be learnt from; `blocks` count as if they had been there.
@@ -431,7 +452,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
         self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);
         if N > Parameter::OffsetB as usize {
-            self.offsets = OffsetPrior::new(&self.cylinder, &self.sensors, &leaks);
+            self.offsets = OffsetPrior::new(
+                &self.cylinder,
+                &self.sensors_now(),
+                offset_units(&self.cylinder, &self.sensors),
+                &leaks,
+            );
         }
     }
 

@@ -4,7 +4,7 @@
 use super::block::Block;
 use super::evidence::{Evidence, Foretold, Learnt};
 use super::information::{Information, Posterior, Prior, Solution};
-use super::parameter::{LEAKS, leak_column};
+use super::parameter::{LEAKS, Parameter, leak_column};
 use super::trend::{Elimination, Trend};
 use crate::Real;
 
@@ -85,6 +85,18 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             log_weights,
             recent: [T::zero(); HYPOTHESES],
             suspected: None,
+        }
+    }
+
+    /// The offsets of chambers A and B have moved by something of these variances.
+    pub fn drift_zeros(&mut self, variances: &[T; 2]) {
+        for (offset, variance) in [Parameter::OffsetA, Parameter::OffsetB].into_iter().zip(variances) {
+            if *variance > T::zero() && (offset as usize) < N {
+                self.constant.diffuse(offset as usize, *variance);
+                for trend in &mut self.trends {
+                    trend.diffuse(offset as usize, *variance);
+                }
+            }
         }
     }
 

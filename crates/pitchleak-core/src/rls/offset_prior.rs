@@ -1,4 +1,3 @@
-use super::prior::offset_units;
 use crate::{Cylinder, PerLeak, Real, Sensors};
 
 /// What is known beforehand of the two offsets that the continuity equations of a leaking cylinder show.
@@ -21,8 +20,13 @@ pub(super) struct OffsetPrior<T> {
 }
 
 impl<T: Real> OffsetPrior<T> {
-    pub fn new(cylinder: &Cylinder<T>, sensors: &Sensors<T>, leaks: &PerLeak<T>) -> Self {
-        let [unit_a, unit_b] = offset_units(cylinder, sensors);
+    /// Of `sensors` as far off as they may be by now; `units` of the offsets, m³/s.
+    pub fn new(
+        cylinder: &Cylinder<T>,
+        sensors: &Sensors<T>,
+        [unit_a, unit_b]: [T; 2],
+        leaks: &PerLeak<T>,
+    ) -> Self {
         let floor = T::lit(1e-9) * cylinder.area_a_m2 * cylinder.stroke_m;
         let square = |bias: T, unit: T| (bias.max(floor) / unit) * (bias.max(floor) / unit);
         let (d_a, d_b) = (square(sensors.flow_a.bias_std, unit_a), square(sensors.flow_b.bias_std, unit_b));
@@ -57,6 +61,7 @@ fn product<T: Real>(a: &[[T; 2]; 2], b: &[[T; 2]; 2]) -> [[T; 2]; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::prior::offset_units;
     use super::*;
     use nalgebra::Matrix2;
 
@@ -72,7 +77,7 @@ mod tests {
         sensors.flow_b.bias_std = 3e-6;
         sensors.pressure.bias_std = 9e4;
         let leaks = PerLeak { internal: 5e-11, external_a: 7e-12, external_b: 2e-12 };
-        let prior = OffsetPrior::new(&cylinder, &sensors, &leaks);
+        let prior = OffsetPrior::new(&cylinder, &sensors, offset_units(&cylinder, &sensors), &leaks);
         let unit = Matrix2::from_diagonal(&offset_units(&cylinder, &sensors).into());
         let j = Matrix2::new(5.7e-11, -5e-11, -5e-11, 5.2e-11) * 9e4;
         let meters = Matrix2::new(4e-12, 0.0, 0.0, 9e-12);
@@ -91,7 +96,8 @@ mod tests {
         sensors.flow_b.bias_std = 2e-6;
         sensors.pressure.bias_std = 9e4;
         let cylinder = Cylinder::paper();
-        let prior = OffsetPrior::new(&cylinder, &sensors, &PerLeak::default());
+        let prior =
+            OffsetPrior::new(&cylinder, &sensors, offset_units(&cylinder, &sensors), &PerLeak::default());
         let [unit, _] = offset_units(&cylinder, &sensors);
         assert!((prior.information[0][0] * (2e-6 / unit).powi(2) - 1.0).abs() < 1e-12);
         assert!(matrix(prior.pressure_per_offset).norm() < 1e-12);

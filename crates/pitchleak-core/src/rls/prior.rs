@@ -31,13 +31,14 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
     spread
 }
 
-/// Units of the offsets of chambers A and B, m³/s: the meter's bias, and what the pressures' bias drives
+/// Units of the offsets of chambers A and B, m³/s: the meter's bias and what it drifts in an hour, and what the pressures' bias drives
 /// through a leak that empties the cylinder in 20 s at 1 MPa.
 pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, sensors: &Sensors<T>) -> [T; 2] {
     let volume = cylinder.area_a_m2 * cylinder.stroke_m;
     let through_leak = volume * T::lit(5e-8) * sensors.pressure.bias_std;
-    [sensors.flow_a, sensors.flow_b]
-        .map(|meter| meter.bias_std.libm_hypot(through_leak).max(T::lit(1e-9) * volume))
+    [sensors.flow_a, sensors.flow_b].map(|meter| {
+        meter.bias_std.libm_hypot(meter.drift_std_ph).libm_hypot(through_leak).max(T::lit(1e-9) * volume)
+    })
 }
 
 #[cfg(test)]

@@ -103,6 +103,25 @@ impl<T: Real, const N: usize> Trend<T, N> {
         }
     }
 
+    /// Parameter `own`, which has no slope, has moved by something of this variance: as
+    /// [`Information::diffuse`], of levels and slopes together.
+    pub fn diffuse(&mut self, own: usize, variance: T) {
+        let levels = &self.levels;
+        let share = variance / (T::one() + variance * levels.matrix[own][own]);
+        let column = self.cross.map(|row| row[own]);
+        for i in 0..LEAKS {
+            let through = share * column[i];
+            for j in 0..N {
+                self.cross[i][j] -= through * levels.entry(own, j);
+            }
+            for j in 0..LEAKS {
+                self.slopes[i][j] -= through * column[j];
+            }
+            self.slope_vector[i] -= through * levels.vector[own];
+        }
+        self.levels.diffuse(own, variance);
+    }
+
     pub fn add(&mut self, block: &Block<T, N>) {
         self.levels.add(block);
         let rate = self.rate_ps();
