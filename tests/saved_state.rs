@@ -111,3 +111,78 @@ fn forged_numbers_lead_to_no_nan() {
     }
     assert!(taken > 0 && taken < tried);
 }
+
+/// The state as a tree, changed and sealed again.
+fn forged(saved: &[u8], change: impl Fn(&mut ciborium::Value)) -> Vec<u8> {
+    let mut value: ciborium::Value = ciborium::from_reader(&saved[18..saved.len() - 4]).unwrap();
+    change(&mut value);
+    let mut bytes = saved[..18].to_vec();
+    ciborium::into_writer(&value, &mut bytes).unwrap();
+    sealed(bytes)
+}
+
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let mut crc = flate2::Crc::new();
+    crc.update(&bytes);
+    bytes.extend(crc.sum().to_le_bytes());
+    bytes
+}
+
+/// Every value of a tree.
+fn each(value: &mut ciborium::Value, visit: &mut impl FnMut(&mut ciborium::Value)) {
+    visit(value);
+    match value {
+        ciborium::Value::Array(values) => values.iter_mut().for_each(|value| each(value, visit)),
+        ciborium::Value::Map(entries) => entries.iter_mut().for_each(|(_, value)| each(value, visit)),
+        _ => {}
+    }
+}
+
+/// The rig's text, with `from` become `to`.
+fn in_rig_text(value: &mut ciborium::Value, from: &str, to: &str) {
+    each(value, &mut |value| {
+        if let ciborium::Value::Text(text) = value {
+            *text = text.replace(from, to);
+        }
+    });
+}
+
+#[test]
+fn parts_that_do_not_fit_each_other_are_refused() {
+    let saved = streams()[0].save().unwrap();
+    assert!(Stream::restore(&forged(&saved, |_| ())).is_ok(), "unchanged");
+    let floats = std::cell::Cell::new(0);
+    each(
+        &mut ciborium::from_reader(&saved[18..saved.len() - 4]).unwrap(),
+        &mut |value: &mut ciborium::Value| {
+            floats.set(floats.get() + usize::from(value.is_float()));
+        },
+    );
+    assert!(floats.get() > 100);
+    for nan in (0..floats.get()).step_by(17) {
+        let bytes = forged(&saved, |value| {
+            let mut seen = 0;
+            each(value, &mut |value| {
+                if value.is_float() {
+                    if seen == nan {
+                        *value = ciborium::Value::Float(f64::NAN);
+                    }
+                    seen += 1;
+                }
+            });
+        });
+        assert!(Stream::restore(&bytes).is_err(), "NaN for number {nan}");
+    }
+    let effect = "[effects]\nposition_gain = { value = 0.01, std = 0.002 }\n\n[alarms]";
+    for (from, to) in [
+        ("kind = \"rls\"", "kind = \"paper\""),
+        ("stroke = \"0.2 m\"", "stroke = \"0.3 m\""),
+        ("[alarms]", effect),
+    ] {
+        let bytes = forged(&saved, |value| in_rig_text(value, from, to));
+        assert_ne!(bytes, saved);
+        assert!(Stream::restore(&bytes).is_err(), "{to}");
+    }
+    let doubled = sealed([&saved[..saved.len() - 4], &[0]].concat());
+    assert!(matches!(Stream::restore(&doubled), Err(RestoreError::Content(_))), "something after the end");
+}

@@ -98,6 +98,9 @@ pub enum SimulateError {
     /// The supply cannot feed a leak of this mean flow.
     #[error("no leak coefficient gives the mean leak flow asked for: the rig's pressures fall too far")]
     LeakOutOfReach,
+    /// Who asked for it wants no more of it.
+    #[error("stopped")]
+    Stopped,
 }
 
 /// Longest step between two looks at the reference, s; the emulator divides it further.

@@ -10,6 +10,7 @@ use pitchleak_core::{PerLeak, Sensors};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// A scenario with the sensors that record it.
@@ -150,11 +151,15 @@ impl Recording {
     }
 
     /// Writes the trace to `path` (`.csv`, `.csv.gz`, `-` for standard output), and what is true of it
-    /// beside it as `.json`. `done` gets the share that is done.
+    /// beside it as `.json`. `done` gets the share that is done and says whether to go on.
     ///
     /// # Errors
     /// [`RecordingError`].
-    pub fn write(&self, path: &Path, done: impl FnMut(f64)) -> Result<TruthFile, RecordingError> {
+    pub fn write(
+        &self,
+        path: &Path,
+        done: impl FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<TruthFile, RecordingError> {
         match kind(path).ok_or_else(|| RecordingError::Kind { path: path.to_owned() })? {
             Kind::StandardOutput => {
                 let mut out = BufWriter::new(io::stdout());
@@ -177,7 +182,7 @@ impl Recording {
     fn write_rows(
         &self,
         out: &mut impl Write,
-        done: impl FnMut(f64),
+        done: impl FnMut(f64) -> ControlFlow<()>,
     ) -> Result<io::Result<TruthFile>, SimulateError> {
         let leaks_m3spa = self.scenario.leak_coefficients()?;
         let mut writer = match TraceWriter::new(out, TraceLayout::of(&self.scenario)) {
@@ -192,22 +197,21 @@ impl Recording {
         Ok(failure.map_or(Ok(truth), Err))
     }
 
-    /// The trace in memory, and what is true of it.
+    /// The trace in memory, and what is true of it; `done` as for [`write`](Self::write).
     ///
     /// # Errors
     /// [`RecordingError::Simulate`].
-    pub fn columns(&self) -> Result<(Columns, TruthFile), RecordingError> {
+    pub fn columns(
+        &self,
+        done: impl FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<(Columns, TruthFile), RecordingError> {
         let layout = TraceLayout::of(&self.scenario);
         let mut columns = layout.columns();
         let leaks_m3spa = self.scenario.leak_coefficients()?;
-        let truth = self.run(
-            &leaks_m3spa,
-            |_| (),
-            |row| {
-                layout.push(row, &mut columns);
-                true
-            },
-        )?;
+        let truth = self.run(&leaks_m3spa, done, |row| {
+            layout.push(row, &mut columns);
+            true
+        })?;
         Ok((columns, truth))
     }
 
@@ -215,7 +219,7 @@ impl Recording {
     fn run(
         &self,
         leaks_m3spa: &PerLeak<f64>,
-        mut done: impl FnMut(f64),
+        mut done: impl FnMut(f64) -> ControlFlow<()>,
         mut each: impl FnMut(&Row) -> bool,
     ) -> Result<TruthFile, SimulateError> {
         let Self { scenario, noise, biases, sensor_faults, seed, .. } = self;
@@ -223,6 +227,7 @@ impl Recording {
         let Scenario { rig, duration_s, .. } = scenario;
         let mut faults = SensorFaults::new(sensor_faults, &rig.instruments, rig.cylinder.stroke_m, *seed);
         let mut totals = Totals::default();
+        let mut stopped = false;
         scenario.run_while(*leaks_m3spa, |truth| {
             let honest = Reading::at(truth, sensing.read(&truth.sample));
             let shown = faults.show(&honest);
@@ -234,9 +239,12 @@ impl Recording {
             totals.flows_m3s = totals.flows_m3s.zip(truth.leaks_m3s).map(|(sum, flow)| sum + flow.abs());
             totals.position_square += (truth.signals.x_m - truth.position_reference_m).powi(2);
             totals.load_square += (truth.signals.force_n - truth.load_reference_n).powi(2);
-            done(truth.t_s / duration_s);
-            true
+            stopped = done(truth.t_s / duration_s).is_break();
+            !stopped
         })?;
+        if stopped {
+            return Err(SimulateError::Stopped);
+        }
         Ok(self.truth(leaks_m3spa, &totals))
     }
 

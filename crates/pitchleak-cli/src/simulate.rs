@@ -7,6 +7,7 @@ use pitchleak::core::PerLeak;
 use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, share_of_full_scale};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 /// Simulate a rig with known leaks and write what its sensors would have recorded
@@ -136,7 +137,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let recording = arguments.plan().recording(rig)?;
     output::warn(&recording.warnings());
     let bar = progress();
-    recording.write(&arguments.out, |share| bar.set_position((1000.0 * share) as u64))?;
+    recording.write(&arguments.out, |share| {
+        bar.set_position((1000.0 * share) as u64);
+        ControlFlow::Continue(())
+    })?;
     bar.finish_and_clear();
     Ok(Outcome::Done)
 }

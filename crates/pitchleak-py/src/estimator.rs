@@ -5,7 +5,7 @@ use crate::table::{Lent, NAME, is_plain};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pitchleak::Rig as EngineRig;
 use pitchleak::output::{self, Inputs};
-use pitchleak::replay::{ReplayError, Stream};
+use pitchleak::replay::Stream;
 use pitchleak::report::Palette;
 use pitchleak::trace::{BadRows, TableLayout, TraceError, TraceReader};
 use pyo3::prelude::*;
@@ -170,8 +170,8 @@ impl Estimator {
             running.stream.epoch_ns = running.stream.epoch_ns.or(table.get().first_ns());
         }
         source.read(py, &self.rig.0, false, |reader| match self.running.lock() {
-            Ok(mut running) => running.stream.extend(reader).map_err(ReplayError::from),
-            Err(poisoned) => poisoned.into_inner().stream.extend(reader).map_err(ReplayError::from),
+            Ok(mut running) => Ok(running.stream.extend(reader)?),
+            Err(poisoned) => Ok(poisoned.into_inner().stream.extend(reader)?),
         })
     }
 

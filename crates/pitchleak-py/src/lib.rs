@@ -8,6 +8,7 @@ mod linkage;
 mod replay;
 mod reproduce;
 mod rig;
+mod signals;
 mod simulate;
 mod source;
 mod table;

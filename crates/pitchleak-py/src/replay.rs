@@ -2,9 +2,10 @@
 
 use crate::errors::value_error;
 use crate::rig::Rig;
+use crate::signals::Signals;
 use crate::source::Source;
 use numpy::{IntoPyArray, PyArray1};
-use pitchleak::replay::{EstimateRow, ReplayError};
+use pitchleak::replay::EstimateRow;
 use pitchleak::report::Palette;
 use pyo3::prelude::*;
 
@@ -21,8 +22,9 @@ pub fn replay(
     strict: bool,
 ) -> PyResult<Report> {
     let rig = rig.with_estimator(estimator)?;
+    let mut signals = Signals::default();
     let report = source.read(py, &rig, strict, |mut reader| {
-        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
+        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| signals.heed())
     })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }
@@ -41,12 +43,13 @@ pub fn over_time<'py>(
 ) -> PyResult<(String, Columns<'py>)> {
     let rig = rig.with_estimator(estimator)?;
     let mut columns: [Vec<f64>; EstimateRow::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
+    let mut signals = Signals::default();
     let report = source.read(py, &rig, strict, |mut reader| {
         pitchleak::replay::replay(&mut reader, &rig, |replay, record, _| {
             for (column, value) in columns.iter_mut().zip(replay.estimate_row(record).values()) {
                 column.push(value);
             }
-            Ok::<_, ReplayError>(())
+            signals.heed()
         })
     })?;
     let columns =
@@ -58,6 +61,6 @@ pub fn over_time<'py>(
 #[pyfunction]
 pub fn check(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyResult<Report> {
     let report =
-        source.read(py, &rig.0, strict, |mut reader| pitchleak::check::check(&mut reader, &rig.0))?;
+        source.read(py, &rig.0, strict, |mut reader| Ok(pitchleak::check::check(&mut reader, &rig.0)?))?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }

@@ -1,5 +1,6 @@
 use crate::errors::{output_error, value_error};
 use crate::rig::Rig;
+use crate::signals::{Signals, Stopped};
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::core::PerLeak;
 use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, RecordingError, share_of_full_scale};
@@ -7,6 +8,7 @@ use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 /// A number in SI, or a quantity with its unit.
@@ -78,14 +80,23 @@ pub fn simulate<'py>(
 ) -> PyResult<(String, Vec<String>, Arrays<'py>)> {
     let plan = order.plan()?;
     let recording = py.detach(|| plan.recording(rig.0.clone())).map_err(value_error)?;
+    let (mut signals, mut asked) = (Signals::default(), None);
+    let go_on = |_| match signals.heed() {
+        Err(Stopped::Asked(error)) => {
+            asked = Some(error);
+            ControlFlow::Break(())
+        }
+        _ => ControlFlow::Continue(()),
+    };
     let made = py.detach(|| match &out {
-        None => recording.columns(),
-        Some(path) => recording.write(path, |_| ()).map(|truth| (Vec::new(), truth)),
+        None => recording.columns(go_on),
+        Some(path) => recording.write(path, go_on).map(|truth| (Vec::new(), truth)),
     });
-    let (columns, truth) = made.map_err(|error| match error {
-        RecordingError::Output(error) => output_error(py, &error),
-        error => value_error(error),
-    })?;
+    let (columns, truth) = match (made, asked) {
+        (_, Some(error)) => return Err(error),
+        (Err(RecordingError::Output(error)), _) => return Err(output_error(py, &error)),
+        (made, _) => made.map_err(value_error)?,
+    };
     let columns = columns.into_iter().map(|(header, values)| (header, values.into_pyarray(py))).collect();
     Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }

@@ -1,7 +1,7 @@
 use crate::errors::replay_error;
+use crate::signals::Stopped;
 use crate::table::{NAME, Table};
 use pitchleak::Rig;
-use pitchleak::replay::ReplayError;
 use pitchleak::trace::{BadRows, TraceReader};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ impl Source<'_> {
         py: Python<'_>,
         rig: &Rig,
         strict: bool,
-        work: impl FnOnce(TraceReader<'_>) -> Result<T, ReplayError> + Send,
+        work: impl FnOnce(TraceReader<'_>) -> Result<T, Stopped> + Send,
     ) -> PyResult<T> {
         let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
         let done = match self {
@@ -38,6 +38,9 @@ impl Source<'_> {
                 })
             }
         };
-        done.map_err(|error| replay_error(py, &error))
+        done.map_err(|stopped| match stopped {
+            Stopped::Failed(error) => replay_error(py, &error),
+            Stopped::Asked(error) => error,
+        })
     }
 }

@@ -2,8 +2,11 @@
 
 import json
 import math
+import signal
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -120,3 +123,35 @@ def test_linkage():
         linkage.position_m(np.array([0.5, 0.0]))
     with pytest.raises(ValueError, match="lengths of the linkage must be positive"):
         pl.Linkage(crank_radius_m=-1.0)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="no signals to a thread of one's own")
+@pytest.mark.parametrize("call", ["replay", "over_time", "simulate"])
+def test_control_c_ends_a_long_call(call, tmp_path):
+    """It was heeded after the call's end."""
+    count = 4_000_000
+    columns = {
+        "t_s": np.arange(count) * 0.01,
+        "x_m": 0.1 + 0.05 * np.sin(np.arange(count) * 0.01),
+        "pa_pa": np.full(count, 5e6),
+        "pb_pa": np.full(count, 4e6),
+    }
+    out = tmp_path / "trace.csv"
+    run = {
+        "replay": lambda: pl.replay(columns),
+        "over_time": lambda: pl.replay(columns).table,
+        "simulate": lambda: pl.simulate(wind=13, duration=100_000, out=out),
+    }[call]
+    main = threading.get_ident()
+    asked = []
+
+    def ask():
+        asked.append(time.monotonic())
+        signal.pthread_kill(main, signal.SIGINT)
+
+    timer = threading.Timer(0.3, ask)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        run()
+    assert time.monotonic() - asked[0] < 1
+    assert not out.exists()
