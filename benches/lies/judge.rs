@@ -4,7 +4,7 @@ use crate::lie::Lie;
 use crate::plant::{Leaking, rig};
 use pitchleak::core::{Leak, Sample, Sensors};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::report::{Palette, ReplayReport};
+use pitchleak::report::ReplayReport;
 use pitchleak::simulate::{
     Biases, Reading, Row, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
 };
@@ -25,17 +25,10 @@ pub enum Judgement {
 /// A stated figure may be off by this much, or by its own 3 σ, L/min.
 const FIGURE_LPM: f64 = 0.1;
 
-/// Whether a report commits itself to what it says. All that the bench knows of the verdict's form stands here.
-fn is_sure(report: &ReplayReport) -> bool {
-    let text = report.to_text(&Palette::PLAIN);
-    let head = text.split("  ").next().unwrap_or_default();
-    head == "LEAK" || head == "SOUND"
-}
-
-fn judge(report: &ReplayReport, leaking: Leaking, truths: &[Truth]) -> Judgement {
+pub fn judge(report: &ReplayReport, leaking: Leaking, truths: &[Truth]) -> Judgement {
     let right_place = report.verdict.faults.iter().copied().eq(leaking);
     let right_size = report.verdict.faults.iter().all(|leak| is_size(report, *leak, truths));
-    match (is_sure(report), right_place && right_size) {
+    match (report.verdict.status.is_sure(), right_place && right_size) {
         (false, _) => Judgement::InDoubt,
         (true, true) => Judgement::Right,
         (true, false) => Judgement::ConfidentlyWrong,
@@ -54,13 +47,15 @@ fn is_size(report: &ReplayReport, leak: Leak, truths: &[Truth]) -> bool {
 
 /// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie.
 pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> Judgement {
-    let text = recorded(truths, lie, rig(accuracy).sensors(), seed);
+    replayed(truths, lie, accuracy, seed).map_or(Judgement::InDoubt, |report| judge(&report, leaking, truths))
+}
+
+/// The report on it.
+pub fn replayed(truths: &[Truth], lie: &Lie, accuracy: f64, seed: u64) -> Result<ReplayReport, ReplayError> {
     let rig = rig(accuracy);
-    let reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig);
-    let report = reader
-        .map_err(ReplayError::from)
-        .and_then(|mut reader| replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(())));
-    report.map_or(Judgement::InDoubt, |report| judge(&report, leaking, truths))
+    let text = recorded(truths, lie, rig.sensors(), seed);
+    let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig)?;
+    replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
 }
 
 /// The trace as CSV, as users have it.

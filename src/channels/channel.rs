@@ -114,6 +114,14 @@ impl Channel {
         self.last_s = t_s;
     }
 
+    /// Some readings are not looked at: the next one follows from none, whatever it is.
+    pub fn skip_to(&mut self, t_s: f64, value: f64) {
+        if value.to_bits() != self.last.to_bits() && self.repeats > 0 {
+            self.close_run();
+        }
+        (self.last, self.last_step, self.last_bend, self.last_s) = (value, 0.0, 0.0, t_s);
+    }
+
     #[inline]
     fn turn(&mut self, step: f64) {
         if self.readings > 0 {

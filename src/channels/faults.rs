@@ -156,14 +156,18 @@ fn dead(one: &Judged, witnesses: usize, motion: bool, whole: (f64, f64)) -> Opti
     let constant = count as f64 >= DEAD_SHARE * one.channel.readings as f64;
     let zero = value == 0.0;
     let force = one.signal == Signal::Force;
-    if !constant || !motion || (force && zero) || !(zero || witnesses >= 2) {
+    // Only a meter's resolution could make it rest, and nothing rests as long as others scatter.
+    let flow = matches!(one.signal, Signal::FlowA | Signal::FlowB);
+    let moves = motion || (flow && witnesses >= 2);
+    if !constant || !moves || (force && zero) || !(zero || witnesses >= 2) {
         return None;
     }
     let exactly = if zero { "exactly " } else { "" };
     let text = format!(
-        "{} reads {exactly}{} all the time although the cylinder moves",
+        "{} reads {exactly}{} all the time although {}",
         one.signal.name(),
-        one.reading(value)
+        one.reading(value),
+        if motion { "the cylinder moves" } else { "other channels scatter" }
     );
     Some(one.fault(ChannelFaultKind::Dead, whole, text))
 }
@@ -219,7 +223,8 @@ fn clipped(one: &Judged) -> Option<ChannelFault> {
 /// Hardly any reading stands alone, and from one to the next new one it goes many quanta at once.
 fn held(one: &Judged, seldom_repeated: usize, whole: (f64, f64)) -> Option<ChannelFault> {
     let channel = &one.channel;
-    let (runs, singles) = channel.short_runs();
+    let (short_runs, singles) = channel.short_runs();
+    let runs = short_runs + channel.long_runs;
     let jumps = one.scatters() || channel.bend() > one.noise_std;
     if runs < HELD_RUNS
         || singles as f64 > HELD_SINGLES * runs as f64
@@ -229,7 +234,7 @@ fn held(one: &Judged, seldom_repeated: usize, whole: (f64, f64)) -> Option<Chann
     {
         return None;
     }
-    let times = channel.in_short_runs() as f64 / runs as f64;
+    let times = channel.readings as f64 / runs as f64;
     let text = format!("{} repeats each reading about {times:.1} times", one.signal.name());
     Some(one.fault(ChannelFaultKind::Held, whole, text))
 }

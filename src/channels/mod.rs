@@ -63,6 +63,11 @@ pub struct ChannelFault {
     pub suggestion: &'static str,
 }
 
+/// Rows of a piece; the first pieces are looked at whole, then one of so many.
+const PIECE_ROWS: u64 = 512;
+const WHOLE_PIECES: u64 = 32;
+const PIECES: u64 = 8;
+
 /// The channels that are watched.
 const CHANNELS: [Signal; 6] =
     [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
@@ -83,22 +88,45 @@ impl Default for ChannelMonitor {
 }
 
 impl ChannelMonitor {
-    /// Takes in one record.
+    /// Takes in one record. Of a long trace one piece in [`PIECES`] is looked at: a fault that lasts is in it.
     #[inline]
     pub fn add(&mut self, record: &Record) {
-        if self.rows == 0 {
-            self.first_s = record.t_s;
-        }
+        let piece = self.rows / PIECE_ROWS;
+        let begins = self.rows.is_multiple_of(PIECE_ROWS);
         self.rows += 1;
         self.last_s = record.t_s;
+        if piece >= WHOLE_PIECES && !piece.is_multiple_of(PIECES) {
+            return;
+        }
+        if begins {
+            self.begin_piece(record);
+        } else {
+            self.each(record, Channel::add);
+        }
+    }
+
+    #[cold]
+    fn begin_piece(&mut self, record: &Record) {
+        if self.rows == 1 {
+            self.first_s = record.t_s;
+        }
+        if self.rows / PIECE_ROWS > WHOLE_PIECES {
+            self.each(record, Channel::skip_to);
+        } else {
+            self.each(record, Channel::add);
+        }
+    }
+
+    #[inline]
+    fn each(&mut self, record: &Record, take: impl Fn(&mut Channel, f64, f64)) {
         let s = &record.sample;
         let [x, pa, pb, qa, qb, force] = &mut self.channels;
-        x.add(record.t_s, s.x_m);
-        pa.add(record.t_s, s.pa_pa);
-        pb.add(record.t_s, s.pb_pa);
+        take(x, record.t_s, s.x_m);
+        take(pa, record.t_s, s.pa_pa);
+        take(pb, record.t_s, s.pb_pa);
         for (channel, value) in [(qa, s.qa_m3s), (qb, s.qb_m3s), (force, s.force_n)] {
             if let Some(value) = value {
-                channel.add(record.t_s, value);
+                take(channel, record.t_s, value);
             }
         }
     }

@@ -11,7 +11,7 @@ use crate::replay::{ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::TraceReader;
-use crate::wiring::{Excerpt, Wiring, explain};
+use crate::wiring::{Excerpt, Wiring, explain, unit_by_scatter};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -97,7 +97,9 @@ pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, Rep
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
-        wiring: explain(&excerpt.records(), &rig).map(|found| found.wiring(&columns, &rig)),
+        wiring: explain(&excerpt.records(), &rig)
+            .or_else(|| unit_by_scatter(&excerpt, &rig))
+            .map(|found| found.wiring(&columns, &rig)),
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,

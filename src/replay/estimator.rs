@@ -100,6 +100,11 @@ impl Estimator {
         each!(self, rls => Some(known_or_not(rls.mean_leaks_m3s())), _chain => None)
     }
 
+    /// [`Estimates::normalised_innovation`] alone; `None` for the paper's law.
+    pub fn normalised_innovation(&self) -> Option<[f64; 2]> {
+        each!(self, rls => Some(rls.normalised_innovation()), _chain => None)
+    }
+
     /// Leak flows at `pressures`, m³/s; `None` for the paper's law.
     pub fn leak_flows_m3s(&self, pressures: &LeakPressures<f64>) -> Option<PerLeak<Estimate<f64>>> {
         each!(self, rls => Some(known_or_not(rls.leak_flows_m3s(pressures))), _chain => None)

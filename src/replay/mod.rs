@@ -1,30 +1,39 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
+mod consistency;
 mod correction;
 mod effect_uncertainty;
+mod episodes;
 mod estimate_file;
 mod estimator;
 mod known;
 mod pressures;
 mod scoring;
+mod spikes;
 mod state;
 mod stream;
 mod summary;
+mod suspicion;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
 pub use state::RestoreError;
 pub use stream::Stream;
 
+use crate::channels::ChannelMonitor;
 use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use crate::units::LPM_PER_M3S;
+use crate::wiring::Excerpt;
+use consistency::Consistency;
 use correction::Correction;
 use effect_uncertainty::EffectUncertainty;
-use pitchleak_core::{Estimate, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
+use episodes::Episodes;
+use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
+use spikes::Spikes;
 
 /// The estimates after one record, for a file of estimates over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,6 +103,12 @@ pub struct Replay {
     changed_at_s: Option<f64>,
     scoring: Scoring,
     alarms: Vec<Alarm>,
+    episodes: Episodes,
+    channels: ChannelMonitor,
+    consistency: Consistency,
+    spikes: Spikes,
+    /// Time of the last record, s.
+    end_s: f64,
 }
 
 impl Replay {
@@ -111,6 +126,11 @@ impl Replay {
             changed_at_s: None,
             scoring: Scoring::default(),
             alarms: Vec::new(),
+            episodes: Episodes::default(),
+            channels: ChannelMonitor::default(),
+            consistency: Consistency::default(),
+            spikes: Spikes::new(&rig.sensors()),
+            end_s: 0.0,
             rig: rig.clone(),
         })
     }
@@ -127,6 +147,22 @@ impl Replay {
     /// Takes in one record; says whether the estimates are new.
     #[inline]
     pub fn push(&mut self, record: &Record) -> bool {
+        self.channels.add(record);
+        self.end_s = record.t_s;
+        if self.spikes.leave_out(record) {
+            return false;
+        }
+        let left_out_s = self.spikes.take_left_out_s();
+        if left_out_s > 0.0 {
+            self.correct(&Record { dt_s: record.dt_s + left_out_s, ..*record })
+        } else {
+            self.correct(record)
+        }
+    }
+
+    /// Takes in a record that is no spike.
+    #[inline]
+    fn correct(&mut self, record: &Record) -> bool {
         self.doubt.push(record);
         match &mut self.correction {
             None => self.take(record),
@@ -141,16 +177,31 @@ impl Replay {
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
         let update = self.estimator.update(record);
-        if let Update::Renewed { elapsed_s, changed, .. } = update {
-            if changed {
-                self.pressures = TracePressures::default();
-                self.changed_at_s = Some(record.t_s);
+        match update {
+            Update::Balanced { innovation } => self.weigh(innovation),
+            Update::Renewed { elapsed_s, changed, innovation } => {
+                self.weigh(innovation);
+                if changed {
+                    self.pressures = TracePressures::default();
+                    self.changed_at_s = Some(record.t_s);
+                    self.consistency.restarted();
+                } else if let Some([_, odometer]) = self.estimator.normalised_innovation() {
+                    self.consistency.odometer(odometer);
+                }
+                self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
+                self.detect(record.t_s, elapsed_s);
             }
-            self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
-            self.detect(record.t_s, elapsed_s);
+            _ => {}
         }
         self.scoring.add(record);
         matches!(update, Update::Renewed { .. })
+    }
+
+    /// Weighs whether model and noise explain a block.
+    fn weigh(&mut self, innovation: Option<Innovation<f64>>) {
+        if let Some(innovation) = innovation {
+            self.consistency.balance(innovation);
+        }
     }
 
     /// Holds the leak flows against their alarms, `elapsed_s` of watched time after they were held last.
@@ -166,6 +217,7 @@ impl Replay {
         for (fault, change) in self.detector.update(elapsed_s, &flows) {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
+        self.episodes.add(t_s, elapsed_s, flows.map(|flow| flow.value), &self.detector.active());
     }
 
     /// Leak coefficients, m³/(s·Pa); the uncertainty of the rig file's effects widens them.
@@ -252,12 +304,19 @@ pub fn replay<E: From<ReplayError>>(
     mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
 ) -> Result<ReplayReport, E> {
     let mut replay = Replay::new(rig).map_err(ReplayError::from)?;
+    let mut excerpt = Excerpt::default();
     let mut record = Record::default();
     while reader.next_record(&mut record).map_err(ReplayError::from)? {
         let renewed = replay.push(&record);
+        if !replay.spikes.left_out() {
+            excerpt.add(&record);
+        }
         each(&replay, &record, renewed)?;
     }
-    Ok(replay.report(TraceSummary::new(reader.name(), reader.quality())))
+    let summary = TraceSummary::new(reader.name(), reader.quality());
+    let report = replay.report(summary.clone());
+    let suspicions = replay.suspicions(&report.verdict, &excerpt, &reader.columns(&rig.columns));
+    Ok(if suspicions.any() { replay.report_with(summary, &suspicions) } else { report })
 }
 
 #[cfg(test)]

@@ -2,9 +2,13 @@
 
 use super::Replay;
 use super::known::is_known;
+use crate::channels::ChannelFault;
 use crate::report::{
-    EstimateEntry, Estimates, FlowMeterOffsets, Leakage, ReplayReport, TraceSummary, Verdict,
+    EstimateEntry, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Suspicions,
+    TraceSummary, Verdict,
 };
+use crate::rig::EstimatorKind;
+use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak};
 
@@ -14,16 +18,45 @@ const NO_NUMBER: &str = "the readings lead to no finite number";
 impl Replay {
     /// The report on the trace so far.
     pub fn report(&self, trace: TraceSummary) -> ReplayReport {
+        self.report_with(trace, &Suspicions::default())
+    }
+
+    /// The same, where something else than leaks may explain the trace.
+    pub(super) fn report_with(&self, mut trace: TraceSummary, suspicions: &Suspicions) -> ReplayReport {
+        trace.warnings.extend(self.spikes.warning());
         let found = self.estimator.estimates();
         let excitation = found.map(|found| found.excitation);
         let estimates = self.estimates(excitation);
         let leakage = self.leakage(excitation.is_some());
-        let active = self.detector.active();
+        let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        let trend = self.trend(found.as_ref(), &leakage, &threshold_lpm);
+        let episodes = self.episodes.list();
+        let misfit = found.map(|_| self.consistency.misfit());
+        let findings = Findings {
+            active: self.detector.active(),
+            leakage: &leakage,
+            estimates: &estimates,
+            trends: &trend,
+            episodes: &episodes,
+            threshold_lpm,
+            meters_lpm: [self.rig.instruments.flow_a, self.rig.instruments.flow_b]
+                .map(|meter| meter.full_scale * LPM_PER_M3S),
+            fluid: self.rig.fluid,
+            trace: &trace,
+            end_s: self.end_s,
+            misfit,
+            restarts: self.consistency.restarts(),
+            changed_at_s: self.changed_at_s,
+            channels: &self.channel_faults(),
+            suspicions,
+        };
         ReplayReport {
             schema: ReplayReport::SCHEMA,
             rig: self.rig.name.clone(),
             estimator: self.rig.estimator.kind,
-            verdict: Verdict::new(active, &leakage, &estimates, &self.rig.alarms.threshold_m3s, &trace),
+            verdict: Verdict::of(&findings),
+            trend,
+            episodes,
             trace,
             estimates,
             leakage,
@@ -31,13 +64,35 @@ impl Replay {
                 .and_then(|found| found.flow_offsets_m3s)
                 .filter(finite)
                 .map(FlowMeterOffsets::new),
-            normalised_innovation: found
-                .map(|found| found.normalised_innovation)
-                .filter(|chambers| chambers.iter().all(|value| value.is_finite())),
+            normalised_innovation: misfit.map(|misfit| [misfit.balance, misfit.odometer]),
             changed_at_s: self.changed_at_s,
             alarms: self.alarms.clone(),
             score: self.scoring.scores(),
         }
+    }
+
+    /// How the leak flows change at the pressures of [`leakage`](Self::leakage).
+    fn trend(
+        &self,
+        found: Option<&pitchleak_core::Estimates<f64>>,
+        leakage: &PerLeak<Leakage>,
+        threshold_lpm: &PerLeak<f64>,
+    ) -> PerLeak<Option<LeakTrend>> {
+        let pressures = self.pressures.sizes().sizes_pa;
+        PerLeak::from_fn(|leak| {
+            let found = found.filter(|found| found.excitation.leaks[leak].identifiable)?;
+            let Leakage { mean_lpm, std_lpm, .. } = leakage[leak];
+            let slope = found.leak_slopes_m3spa_ps[leak].scaled(pressures[leak] * LPM_PER_M3S);
+            LeakTrend::new(Estimate { value: mean_lpm, std: std_lpm? }, slope, threshold_lpm[leak])
+        })
+    }
+
+    /// Faults of the channels that are read: of the estimators only the paper's law reads the force.
+    pub(super) fn channel_faults(&self) -> Vec<ChannelFault> {
+        let reads_force = self.rig.estimator.kind == EstimatorKind::Paper;
+        let mut faults = self.channels.faults(&self.rig);
+        faults.retain(|fault| reads_force || fault.channel != Signal::Force.name());
+        faults
     }
 
     /// Flows at the mean pressures of the trace, or since the leak changed, eq. (15); the internal one at the mean size of P_L, whatever

@@ -1,9 +1,18 @@
 //! What a replay found, as data (`pitchleak.replay/1`) and as text for people.
 
+mod episode;
+mod reason;
+mod statement;
 mod text;
+mod trend;
+mod verdict;
 
+pub use episode::Episode;
+pub use reason::{Reason, ReasonId};
 pub use text::{Palette, data_line};
 pub(crate) use text::{misfit, rig_line};
+pub use trend::{LeakTrend, ReachTime};
+pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
 
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;
@@ -30,12 +39,16 @@ pub struct ReplayReport {
     /// Offsets of the flow meters, where the rig file says that they may be off.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flow_meter_offsets: Option<FlowMeterOffsets>,
-    /// Innovation squared over its variance, of the flow balance and of the position: about 1 where model
-    /// and declared noise explain the trace, far above where they do not.
+    /// Innovation squared over its variance, of the flow balance and of the position, over the whole trace: about 1 where
+    /// model and declared noise explain it, far above where they do not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normalised_innovation: Option<[f64; 2]>,
     /// What to make of it.
     pub verdict: Verdict,
+    /// How fast each leak changes; none where the data don't tell.
+    pub trend: PerLeak<Option<LeakTrend>>,
+    /// Every leak that the trace showed, in the order of time.
+    pub episodes: Vec<Episode>,
     /// When the leak last changed at once, s: the estimates then began anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changed_at_s: Option<f64>,
@@ -218,30 +231,6 @@ pub struct Alarm {
     pub fault: Leak,
     /// What happened.
     pub state: AlarmState,
-}
-
-/// What an operator acts on.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// The leaks whose alarm stands at the end of the trace.
-    pub faults: Vec<Leak>,
-    /// In a sentence or two.
-    pub text: String,
-}
-
-impl Verdict {
-    /// The verdict on leak flows `leakage` of which `active` are above their alarm `threshold_m3s`, and
-    /// of which `trace` can judge only those that `estimates` calls identifiable.
-    pub fn new(
-        active: PerLeak<bool>,
-        leakage: &PerLeak<Leakage>,
-        estimates: &Estimates,
-        threshold_m3s: &PerLeak<f64>,
-        trace: &TraceSummary,
-    ) -> Self {
-        let faults: Vec<_> = Leak::ALL.into_iter().filter(|leak| active[*leak]).collect();
-        Self { text: text::verdict(&faults, leakage, estimates, threshold_m3s, trace), faults }
-    }
 }
 
 #[cfg(test)]

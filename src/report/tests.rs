@@ -1,10 +1,78 @@
 use super::*;
+use crate::channels::{ChannelFault, ChannelFaultKind};
+use crate::rig::Rig;
+use crate::wiring::{Wiring, ZeroCheck};
 
 fn entry(value: f64, std: f64) -> EstimateEntry {
     EstimateEntry::new(Estimate { value, std }, EstimateEntry::COEFFICIENT_UNIT)
 }
 
-fn report(active: PerLeak<bool>) -> ReplayReport {
+const SOUND: Misfit =
+    Misfit { balance: 1.0, balances: 240, worst_window: 1.2, odometer: 1.0, worst_odometer: 1.1 };
+
+/// What a test changes of a minute's findings.
+struct Found {
+    active: PerLeak<bool>,
+    leakage: PerLeak<Leakage>,
+    estimates: Estimates,
+    trends: PerLeak<Option<LeakTrend>>,
+    episodes: Vec<Episode>,
+    trace: TraceSummary,
+    misfit: Option<Misfit>,
+    restarts: u64,
+    changed_at_s: Option<f64>,
+    channels: Vec<ChannelFault>,
+    suspicions: Suspicions,
+}
+
+impl Found {
+    fn verdict(&self) -> Verdict {
+        Verdict::of(&Findings {
+            active: self.active,
+            leakage: &self.leakage,
+            estimates: &self.estimates,
+            trends: &self.trends,
+            episodes: &self.episodes,
+            threshold_lpm: PerLeak { internal: 0.1, external_a: 0.1, external_b: 0.1 },
+            meters_lpm: [20.0; 2],
+            fluid: Rig::paper().fluid,
+            trace: &self.trace,
+            end_s: 60.0,
+            misfit: self.misfit,
+            restarts: self.restarts,
+            changed_at_s: self.changed_at_s,
+            channels: &self.channels,
+            suspicions: &self.suspicions,
+        })
+    }
+
+    fn report(self) -> ReplayReport {
+        ReplayReport {
+            schema: ReplayReport::SCHEMA,
+            verdict: self.verdict(),
+            trace: self.trace,
+            rig: "rig.toml".to_owned(),
+            estimator: EstimatorKind::Rls,
+            flow_meter_offsets: None,
+            normalised_innovation: None,
+            estimates: self.estimates,
+            leakage: self.leakage,
+            changed_at_s: self.changed_at_s,
+            trend: self.trends,
+            episodes: self.episodes,
+            alarms: vec![Alarm { time_s: 3.25, fault: Leak::Internal, state: AlarmState::Raised }],
+            score: None,
+        }
+    }
+
+    /// Status and ids of the reasons.
+    fn judged(&self) -> (Status, Vec<&'static str>) {
+        let verdict = self.verdict();
+        (verdict.status, verdict.reasons.iter().map(|reason| reason.id.name()).collect())
+    }
+}
+
+fn found(active: PerLeak<bool>) -> Found {
     let estimates = Estimates {
         internal_leak_coefficient: entry(1.2e-11, 2e-14),
         external_leak_a_coefficient: entry(-1e-14, 2e-14),
@@ -17,8 +85,6 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
         external_a: lpm(-0.0004, 0.0011),
         external_b: lpm(0.0, 0.2),
     };
-    let threshold = 0.1 / LPM_PER_M3S;
-    let thresholds = PerLeak { internal: threshold, external_a: threshold, external_b: threshold };
     let trace = TraceSummary {
         path: "h02.csv.gz".to_owned(),
         samples: 6001,
@@ -28,20 +94,32 @@ fn report(active: PerLeak<bool>) -> ReplayReport {
         gaps: 0,
         warnings: Vec::new(),
     };
-    ReplayReport {
-        schema: ReplayReport::SCHEMA,
-        verdict: Verdict::new(active, &leakage, &estimates, &thresholds, &trace),
-        trace,
-        rig: "rig.toml".to_owned(),
-        estimator: EstimatorKind::Rls,
-        flow_meter_offsets: None,
-        normalised_innovation: None,
-        estimates,
+    Found {
+        active,
         leakage,
+        estimates,
+        trends: PerLeak::default(),
+        episodes: Vec::new(),
+        trace,
+        misfit: Some(SOUND),
+        restarts: 0,
         changed_at_s: None,
-        alarms: vec![Alarm { time_s: 3.25, fault: Leak::Internal, state: AlarmState::Raised }],
-        score: None,
+        channels: Vec::new(),
+        suspicions: Suspicions::default(),
     }
+}
+
+fn report(active: PerLeak<bool>) -> ReplayReport {
+    found(active).report()
+}
+
+/// All leaks known, none above its threshold.
+fn sound() -> Found {
+    let mut found = found(PerLeak::default());
+    found.leakage.internal.mean_lpm = 0.01;
+    found.leakage.external_b.std_lpm = Some(0.01);
+    found.estimates.external_leak_b_coefficient = entry(0.0, 3e-14);
+    found
 }
 
 const INTERNAL: PerLeak<bool> = PerLeak { internal: true, external_a: false, external_b: false };
@@ -56,7 +134,7 @@ No external A leak above 0.10 L/min. This trace cannot tell about external B lea
 leak        L/min, 95 %             L/min/bar, 95 %
 internal    0.4785 ± 0.0022         0.07200 ± 0.00024
 external A  -0.0004 ± 0.0022        -0.00006 ± 0.00024
-external B  0.00 ± 0.39             0.000 ± 0.035           not identifiable: pressure B hardly moves
+external B  –                       –                       not identifiable: pressure B hardly moves
 oil         bulk modulus 0.9000 GPa
 
 alarm raised at 3.25 s: internal leak
@@ -71,19 +149,150 @@ estimator  rls
 
 #[test]
 fn no_alarm_is_not_sound_where_the_trace_cannot_tell() {
-    let text = report(PerLeak::default()).to_text(&Palette::PLAIN);
-    assert!(text.starts_with("NOT SURE  No internal or external A leak above"), "{text}");
+    let mut found = found(PerLeak::default());
+    found.leakage.internal.mean_lpm = 0.01;
+    assert_eq!(found.judged(), (Status::NotSure, vec!["not_identifiable"]));
+    let text = found.report().to_text(&Palette::PLAIN);
+    assert!(text.starts_with("NOT SURE  This trace cannot tell about external B leaks."), "{text}");
+    assert!(text.contains("No internal or external A leak above 0.10 L/min."), "{text}");
 }
 
 #[test]
-fn a_negative_leak_is_evidence_against_the_model() {
-    let mut report = report(INTERNAL);
-    report.leakage.external_a.mean_lpm = -0.2;
-    let threshold = PerLeak { internal: 1e-6, external_a: 1e-6, external_b: 1e-6 };
-    report.verdict = Verdict::new(INTERNAL, &report.leakage, &report.estimates, &threshold, &report.trace);
-    let text = report.to_text(&Palette::PLAIN);
+fn sound_is_said_where_every_upper_bound_is_below_the_threshold() {
+    assert_eq!(sound().judged(), (Status::Sound, vec![]));
+    let mut close = sound();
+    close.leakage.internal = Leakage { mean_lpm: 0.06, std_lpm: Some(0.03), net_mean_lpm: None };
+    assert_eq!(close.judged(), (Status::NotSure, vec!["undecided"]));
+    let text = close.verdict().text;
+    assert!(text.contains("Internal leak of 0.060 ± 0.059 L/min: may be above 0.10 L/min or not"), "{text}");
+    assert!(!text.contains("No internal"), "{text}");
+}
+
+#[test]
+fn a_negative_leak_is_evidence_against_the_model_where_it_is_as_large_as_leaks_that_matter() {
+    let mut negative = found(INTERNAL);
+    negative.leakage.external_a.mean_lpm = -0.2;
+    assert_eq!(negative.judged(), (Status::Doubtful, vec!["negative_leak"]));
+    let text = negative.report().to_text(&Palette::PLAIN);
     assert!(text.starts_with("DOUBTFUL  The external A leak comes out negative"), "{text}");
-    assert!(text.contains("Internal leak of 0.4785"), "{text}");
+    assert!(text.contains("internal leak of 0.4785"), "{text}");
+    let mut little = found(INTERNAL);
+    little.leakage.external_a.mean_lpm = -0.02;
+    assert_eq!(little.judged(), (Status::Leak, vec![]));
+}
+
+#[test]
+fn a_misfit_anywhere_in_the_trace_is_a_doubt() {
+    for misfit in [
+        Misfit { balance: 3.0, ..SOUND },
+        Misfit { worst_window: 6.0, ..SOUND },
+        Misfit { worst_odometer: 4.0, ..SOUND },
+    ] {
+        let found = Found { misfit: Some(misfit), ..found(INTERNAL) };
+        assert_eq!(found.judged(), (Status::Doubtful, vec!["model_does_not_fit"]), "{misfit:?}");
+    }
+    let short = Misfit { balance: 3.0, balances: 8, ..SOUND };
+    assert_eq!(Found { misfit: Some(short), ..found(INTERNAL) }.judged().0, Status::Leak);
+}
+
+#[test]
+fn estimates_that_begin_anew_again_and_again_are_a_doubt() {
+    let restless = Found { restarts: 5, changed_at_s: Some(50.0), ..found(INTERNAL) };
+    assert_eq!(restless.judged(), (Status::Doubtful, vec!["keeps_changing"]));
+    assert!(restless.verdict().text.contains("changed at once 5 times, last at 50.00 s"));
+    let once = Found { restarts: 1, changed_at_s: Some(50.0), ..found(INTERNAL) };
+    assert_eq!(once.judged(), (Status::Leak, vec![]));
+    assert!(once.verdict().text.contains("The leaks changed at once at 50.00 s"));
+}
+
+#[test]
+fn a_bulk_modulus_that_no_oil_has_is_a_doubt() {
+    let mut stiff = found(INTERNAL);
+    let value = Estimate { value: 20e9, std: 1e9 };
+    stiff.estimates.bulk_modulus = EstimateEntry::new(value, EstimateEntry::BULK_MODULUS_UNIT);
+    assert_eq!(stiff.judged(), (Status::Doubtful, vec!["bulk_modulus_impossible"]));
+}
+
+#[test]
+fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
+    let stuck = ChannelFault {
+        channel: "pa",
+        kind: ChannelFaultKind::Stuck,
+        from_s: 10.0,
+        to_s: 60.0,
+        text: "pa reads 50 bar from 10 s to 60 s".to_owned(),
+        suggestion: "check the sensor",
+    };
+    let wiring = Wiring {
+        suggestion: "with qa and qb exchanged the residual falls from 29 to 1.0 times the noise".to_owned(),
+        residual_before: Some(29.0),
+        residual_after: Some(1.0),
+        columns: vec!["qa = \"qb_lpm\"".to_owned()],
+        alternatives: Vec::new(),
+    };
+    let misfit = Some(Misfit { balance: 9.0, ..SOUND });
+    let doubtful = Found {
+        channels: vec![stuck],
+        suspicions: Suspicions { wiring: Some(wiring), zeros: None },
+        misfit,
+        ..found(INTERNAL)
+    };
+    assert_eq!(doubtful.judged().1, ["channel_stuck", "wiring", "model_does_not_fit"]);
+    let text = doubtful.report().to_text(&Palette::PLAIN);
+    assert!(text.starts_with("DOUBTFUL  Pa reads 50 bar from 10 s to 60 s. Check the sensor."), "{text}");
+    assert!(text.contains("[columns] qa = \"qb_lpm\""), "{text}");
+}
+
+#[test]
+fn a_leak_that_a_zero_explains_as_well_is_in_doubt() {
+    let none = Estimate { value: 0.0, std: 1e-8 };
+    let off = Estimate { value: 0.2 / LPM_PER_M3S, std: 1e-8 };
+    let zeros = |for_leak: f64| ZeroCheck {
+        for_leak: PerLeak { internal: for_leak, external_a: 0.0, external_b: 0.0 },
+        for_zeros: 0.0,
+        offsets_m3s: [none; 2],
+        offsets_without_m3s: PerLeak::from_fn(|_| [off, none]),
+        leaks_m3spa: PerLeak::default(),
+    };
+    let held = |for_leak| Found {
+        suspicions: Suspicions { wiring: None, zeros: Some(zeros(for_leak)) },
+        ..found(INTERNAL)
+    };
+    assert_eq!(held(30.0).judged(), (Status::Leak, vec![]));
+    assert_eq!(held(3.0).judged(), (Status::Doubtful, vec!["offset_or_leak"]));
+    let text = held(3.0).verdict().text;
+    assert!(text.contains("(qa by 0.2000 ± 0.0012 L/min)"), "{text}");
+}
+
+fn episode(from_s: f64, to_s: Option<f64>) -> Episode {
+    Episode { fault: Leak::Internal, from_s, to_s, mean_lpm: 0.5, peak_lpm: 0.6 }
+}
+
+#[test]
+fn what_happened_earlier_is_in_the_sentence() {
+    let mended = Found { episodes: vec![episode(5.0, Some(20.0))], ..sound() };
+    assert_eq!(mended.judged().0, Status::Sound);
+    assert!(mended.verdict().text.contains("Earlier: internal leak of 0.50 L/min from 5.0 s to 20.0 s."));
+    let intermittent =
+        Found { episodes: vec![episode(5.0, Some(15.0)), episode(40.0, Some(50.0))], ..sound() };
+    let verdict = intermittent.verdict();
+    assert_eq!((verdict.status, verdict.faults), (Status::Leak, vec![Leak::Internal]));
+    assert!(verdict.text.starts_with("Internal leak that comes and goes, 2 times"), "{}", verdict.text);
+}
+
+#[test]
+fn the_papers_law_is_never_sure() {
+    assert_eq!(Found { misfit: None, ..sound() }.judged(), (Status::NotSure, vec!["no_uncertainty"]));
+}
+
+#[test]
+fn a_leak_that_grows_says_when_it_matters() {
+    let mut growing = sound();
+    let (flow, slope) = (Estimate { value: 0.01, std: 1e-3 }, Estimate { value: 1e-4, std: 1e-5 });
+    growing.trends.internal = LeakTrend::new(flow, slope, 0.1);
+    let text = growing.verdict().text;
+    assert!(text.contains("internal leak grows by 0.360 ± 0.071 L/min per hour"), "{text}");
+    assert!(text.contains("it is at 0.10 L/min in 15 min (13 min to 19 min)"), "{text}");
 }
 
 #[test]
@@ -101,6 +310,10 @@ fn json_has_the_contracts_fields_and_no_number_that_is_not_finite() {
     assert_eq!(json["estimates"]["external_leak_b_coefficient"]["value"], serde_json::Value::Null);
     assert_eq!(json["leakage"]["external_b"]["mean_lpm"], serde_json::Value::Null);
     assert_eq!(json["verdict"]["faults"][0], "internal");
+    assert_eq!(json["verdict"]["status"], "leak");
+    assert_eq!(json["verdict"]["reasons"], serde_json::json!([]));
+    assert_eq!(json["trend"]["internal"], serde_json::Value::Null);
+    assert_eq!(json["episodes"], serde_json::json!([]));
     assert_eq!(json["alarms"][0]["fault"], "internal");
     assert_eq!(json["alarms"][0]["state"], "raised");
     assert!(json.get("score").is_none());
@@ -108,15 +321,9 @@ fn json_has_the_contracts_fields_and_no_number_that_is_not_finite() {
 
 #[test]
 fn with_more_bad_rows_than_good_nothing_is_certain() {
-    let mut report = report(INTERNAL);
-    report.trace.skipped = 7000;
-    report.verdict = Verdict::new(
-        INTERNAL,
-        &report.leakage,
-        &report.estimates,
-        &PerLeak { internal: 1e-6, external_a: 1e-6, external_b: 1e-6 },
-        &report.trace,
-    );
-    let text = report.to_text(&Palette::PLAIN);
+    let mut bad = found(INTERNAL);
+    bad.trace.skipped = 7000;
+    assert_eq!(bad.judged(), (Status::Doubtful, vec!["mostly_bad_rows"]));
+    let text = bad.report().to_text(&Palette::PLAIN);
     assert!(text.starts_with("DOUBTFUL  7000 of 13001 rows are bad"), "{text}");
 }

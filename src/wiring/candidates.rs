@@ -20,6 +20,15 @@ fn delays() -> impl Iterator<Item = f64> {
     (4..=22).map(|hundredths| f64::from(hundredths) * 0.01)
 }
 
+/// Flows in another unit, one or both; powers of ten are no evidence, since data sheets are off by such.
+pub(super) fn flow_units() -> Vec<Mistake> {
+    let units = factors(Dimension::Flow, &["L/min", "m^3/h", "gal/min"]);
+    let units = units.into_iter().filter(|factor| (factor.log10() - factor.log10().round()).abs() > 1e-6);
+    let each =
+        |factor| [Readings::Flows, Readings::FlowA, Readings::FlowB].map(|r| Mistake::Scaled(r, factor));
+    units.flat_map(each).collect()
+}
+
 /// All of them.
 pub(super) fn candidates() -> Vec<Mistake> {
     use Readings::{FlowA, FlowB, Flows, Position, PressureA, PressureB, Pressures, Time};

@@ -1,17 +1,54 @@
 use crate::trace::Record;
+use pitchleak_core::Sample;
 
 /// Records in a piece: ten seconds at 100 Hz.
 const PIECE: usize = 1000;
 /// Pieces kept: between half of these and all.
-const PIECES: usize = 12;
+const PIECES: usize = 6;
 
 /// Pieces of a trace, evenly over it, in constant memory however long it is: where there are too many, every other
 /// one goes, and from then on every other one is left out.
 #[derive(Clone, Debug)]
 pub struct Excerpt {
-    pieces: Vec<Vec<Record>>,
+    pieces: Vec<Vec<Kept>>,
     stride: u64,
     seen: u64,
+}
+
+const AFTER_GAP: f64 = -1.0;
+
+/// What the equations need of a record, in a third of its memory; NaN is a flow that is missing.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    t_s: f64,
+    /// Time since the record before, or [`AFTER_GAP`].
+    step_s: f64,
+    x_m: f64,
+    pressures_pa: [f64; 2],
+    flows_m3s: [f64; 2],
+}
+
+impl Kept {
+    fn of(record: &Record, step_s: f64) -> Self {
+        let s = &record.sample;
+        let missing = |flow: Option<f64>| flow.unwrap_or(f64::NAN);
+        Self {
+            t_s: record.t_s,
+            step_s,
+            x_m: s.x_m,
+            pressures_pa: [s.pa_pa, s.pb_pa],
+            flows_m3s: [missing(s.qa_m3s), missing(s.qb_m3s)],
+        }
+    }
+
+    fn record(&self) -> Record {
+        let ([pa_pa, pb_pa], [qa, qb]) = (self.pressures_pa, self.flows_m3s);
+        let measured = |flow: f64| Some(flow).filter(|flow| !flow.is_nan());
+        let sample =
+            Sample { x_m: self.x_m, pa_pa, pb_pa, qa_m3s: measured(qa), qb_m3s: measured(qb), force_n: None };
+        let after_gap = self.step_s < 0.0;
+        Record { t_s: self.t_s, dt_s: self.step_s.max(0.0), after_gap, sample, ..Record::default() }
+    }
 }
 
 impl Default for Excerpt {
@@ -38,7 +75,9 @@ impl Excerpt {
         }
         let after_gap = record.after_gap || (place == 0 && self.stride > 1);
         if let Some(piece) = self.pieces.last_mut().filter(|piece| piece.len() as u64 == place) {
-            piece.push(Record { after_gap, ..*record });
+            // Rows before it may have been left out.
+            let step_s = piece.last().map_or(record.dt_s, |last| record.t_s - last.t_s);
+            piece.push(Kept::of(record, if after_gap { AFTER_GAP } else { step_s }));
         }
     }
 
@@ -54,12 +93,20 @@ impl Excerpt {
         });
         self.stride *= 2;
         for first in self.pieces.iter_mut().filter_map(|piece| piece.first_mut()) {
-            first.after_gap = true;
+            first.step_s = AFTER_GAP;
         }
     }
 
     /// What was kept, pieces parted by [`Record::after_gap`].
     pub fn records(&self) -> Vec<Record> {
-        self.pieces.concat()
+        self.first_records(usize::MAX)
+    }
+
+    /// The first `count` of them.
+    pub fn first_records(&self, count: usize) -> Vec<Record> {
+        let kept = self.pieces.iter().map(Vec::len).sum();
+        let mut records = Vec::with_capacity(count.min(kept));
+        records.extend(self.pieces.iter().flatten().take(count).map(Kept::record));
+        records
     }
 }

@@ -13,10 +13,22 @@ use serde::Serialize;
 pub struct Explanation {
     /// The most likely one, and those that cannot be told from it.
     pub mistakes: Vec<Mistake>,
-    /// Size of the residual in standard deviations of the declared noise, as the wiring is declared …
-    pub residual_before: f64,
-    /// … and with the mistake mended.
-    pub residual_after: f64,
+    /// What speaks for it.
+    pub evidence: Evidence,
+}
+
+/// What speaks for a mistake.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Evidence {
+    /// Size of the residual in standard deviations of the declared noise.
+    Residual {
+        /// As the wiring is declared …
+        before: f64,
+        /// … and with the mistake mended.
+        after: f64,
+    },
+    /// How large the scatter of the readings is as they stand, in that declared; the other channels scatter as declared.
+    Scatter(f64),
 }
 
 /// An [`Explanation`] in words, for a trace whose columns are known.
@@ -24,10 +36,11 @@ pub struct Explanation {
 pub struct Wiring {
     /// The mistake and its evidence, in one sentence.
     pub suggestion: String,
-    /// As in [`Explanation::residual_before`].
-    pub residual_before: f64,
-    /// As in [`Explanation::residual_after`].
-    pub residual_after: f64,
+    /// Size of the residual in standard deviations of the declared noise, as the wiring is declared; none where the
+    /// scatter alone speaks.
+    pub residual_before: Option<f64>,
+    /// The same with the mistake mended.
+    pub residual_after: Option<f64>,
     /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended.
     pub columns: Vec<String>,
     /// Mistakes that explain the trace as well.
@@ -40,19 +53,28 @@ impl Explanation {
         let names: Vec<String> = self.mistakes.iter().map(|mistake| mistake.text()).collect();
         let first = names.first().cloned().unwrap_or_default();
         let alternatives = names.get(1..).unwrap_or_default().to_vec();
-        let (before, after) = (figure(self.residual_before), figure(self.residual_after));
-        let mut suggestion = if self.residual_before > 1.5 * self.residual_after {
-            format!("with {first} the residual falls from {before} to {after} times the noise")
-        } else {
-            format!("with {first} no leak is negative, which it is as the columns are declared")
+        let (mut suggestion, residuals) = match self.evidence {
+            Evidence::Residual { before, after } => {
+                let text = if before > 1.5 * after {
+                    let (before, after) = (figure(before), figure(after));
+                    format!("with {first} the residual falls from {before} to {after} times the noise")
+                } else {
+                    format!("with {first} no leak is negative, which it is as the columns are declared")
+                };
+                (text, Some((before, after)))
+            }
+            Evidence::Scatter(ratio) => (
+                format!("with {first} they scatter as declared, and {ratio:.2} times that as they stand"),
+                None,
+            ),
         };
         if !alternatives.is_empty() {
             suggestion += &format!("; cannot be told apart: {}", names.join(", "));
         }
         Wiring {
             suggestion,
-            residual_before: self.residual_before,
-            residual_after: self.residual_after,
+            residual_before: residuals.map(|(before, _)| before),
+            residual_after: residuals.map(|(_, after)| after),
             columns: self.mistakes.first().map_or_else(Vec::new, |mistake| mistake.mending(columns, rig)),
             alternatives,
         }

@@ -15,7 +15,7 @@ mod signs;
 mod zeros;
 
 pub use excerpt::Excerpt;
-pub use explanation::{Explanation, Wiring};
+pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
 pub use readings::Readings;
 pub use zeros::{ZeroCheck, zero_check};
@@ -50,6 +50,9 @@ const CONTENT_SIGMAS: f64 = 12.0;
 const ENOUGH_ROWS: usize = 40;
 /// Share of the readings that must be possible on the rig.
 const POSSIBLE_SHARE: f64 = 0.99;
+
+/// Rows that show a sensor's scatter to a percent or two.
+const SCATTER_ROWS: usize = 3000;
 
 /// A mistake, and how well it explains the trace.
 #[derive(Clone, Copy, Debug)]
@@ -90,9 +93,19 @@ pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
     }
     Some(Explanation {
         mistakes: with_lost_signs(alike.iter().map(|one| one.mistake).collect(), records),
-        residual_before: declared.worst().sqrt(),
-        residual_after: first.worst().sqrt(),
+        evidence: Evidence::Residual { before: declared.worst().sqrt(), after: first.worst().sqrt() },
     })
+}
+
+/// The unit that flows are recorded in, where they were read in another one, by their scatter alone: at rest the equations
+/// don't tell. Only where the channels that are not mistaken scatter as declared, and those that are by just the
+/// factor between two units.
+pub fn unit_by_scatter(excerpt: &Excerpt, rig: &Rig) -> Option<Explanation> {
+    let ratios = ScatterRatios::of(&excerpt.first_records(SCATTER_ROWS), rig);
+    let found =
+        candidates::flow_units().into_iter().find_map(|mistake| Some((mistake, ratios.betrays(mistake)?)))?;
+    let (mistake, ratio) = found;
+    Some(Explanation { mistakes: vec![mistake], evidence: Evidence::Scatter(ratio) })
 }
 
 /// Mean squares of the normalised residual of the flow balance and of the position against the flows, over all the

@@ -10,6 +10,11 @@ type Reading = fn(&Record) -> Option<f64>;
 /// Scatter within this factor of the declared noise is the declared noise.
 const AGREES: f64 = 1.6;
 
+/// Scatter that alone has to betray a mistake: within this factor of what it would be, …
+const BETRAYS: f64 = 1.06;
+/// … where that of the others is within this factor of the declared one.
+const OTHERS_AGREE: f64 = 1.12;
+
 /// What the sensors' scatter says of a mistake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Verdict {
@@ -21,13 +26,16 @@ pub(super) enum Verdict {
     For,
 }
 
+/// Position, pressures, flows.
+const CHANNELS: usize = 5;
+
 /// The scatter of each sensor's readings over the declared noise.
 pub(super) struct ScatterRatios(Vec<(Signal, f64)>);
 
 impl ScatterRatios {
     pub fn of(records: &[Record], rig: &Rig) -> Self {
         let sensors = rig.sensors();
-        let channels: [(Signal, f64, Reading); 5] = [
+        let channels: [(Signal, f64, Reading); CHANNELS] = [
             (Signal::Position, sensors.position.noise_std, |r| Some(r.sample.x_m)),
             (Signal::PressureA, sensors.pressure.noise_std, |r| Some(r.sample.pa_pa)),
             (Signal::PressureB, sensors.pressure.noise_std, |r| Some(r.sample.pb_pa)),
@@ -38,6 +46,19 @@ impl ScatterRatios {
             Some((signal, scatter(records, reading)? / declared)).filter(|(_, ratio)| ratio.is_finite())
         });
         Self(ratios.collect())
+    }
+
+    /// The scatter of the readings that `mistake` scales, over the declared one, where it alone betrays the mistake.
+    pub fn betrays(&self, mistake: Mistake) -> Option<f64> {
+        let Mistake::Scaled(readings, factor) = mistake else { return None };
+        let within = |ratio: f64, bound: f64| (1.0 / bound..=bound).contains(&ratio);
+        let (scaled, others): (Vec<_>, Vec<_>) =
+            self.0.iter().partition(|(signal, _)| readings.signals().contains(signal));
+        let all = scaled.len() == readings.signals().len() && others.len() + scaled.len() == CHANNELS;
+        let betrayed = all
+            && scaled.iter().all(|(_, ratio)| within(ratio / factor, BETRAYS))
+            && others.iter().all(|(_, ratio)| within(*ratio, OTHERS_AGREE));
+        betrayed.then(|| scaled.first().map(|(_, ratio)| *ratio)).flatten()
     }
 
     /// What the scatter says of `mistake`. Only factors change it, and time in another unit scales no reading.

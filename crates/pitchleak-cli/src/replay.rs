@@ -28,6 +28,10 @@ pub struct Arguments {
     /// Exit with status 1 if a fault is found
     #[arg(long)]
     fail_on_fault: bool,
+
+    /// Exit with status 1 if the verdict is doubtful or not sure
+    #[arg(long)]
+    fail_on_doubt: bool,
 }
 
 const EXAMPLES: &str = "\
@@ -57,5 +61,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };
     output::print(&text)?;
     let fault = arguments.fail_on_fault && !report.verdict.faults.is_empty();
-    Ok(if fault { Outcome::FaultFound } else { Outcome::Done })
+    let doubt = arguments.fail_on_doubt && !report.verdict.status.is_sure();
+    Ok(if fault || doubt { Outcome::FaultFound } else { Outcome::Done })
 }

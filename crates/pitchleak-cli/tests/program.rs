@@ -93,6 +93,23 @@ fn replay_finds_the_leak_and_says_so() {
     assert_eq!(replay(&trace, &["--fail-on-fault"]).status.code(), Some(1));
 }
 
+/// Flows exchanged in the header: nothing is believed, the wires are named, and those who ask learn it by the status.
+#[test]
+fn doubt_is_said_and_ends_with_a_status_for_those_who_ask() {
+    let place = Place::new();
+    let honest = file(&rows(3000));
+    let right = place.write("right.csv", &honest);
+    assert_eq!(replay(&right, &["--fail-on-doubt"]).status.code(), Some(0));
+    let exchanged = honest.replacen("qa_", "q?_", 1).replacen("qb_", "qa_", 1).replacen("q?_", "qb_", 1);
+    let wrong = place.write("wrong.csv", exchanged);
+    let output = replay(&wrong, &["--fail-on-doubt"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stdout(&output).starts_with("DOUBTFUL  "), "{}", stdout(&output));
+    let report = json(&replay(&wrong, &["--json"]));
+    assert_eq!(report["verdict"]["status"], "doubtful");
+    assert_eq!(report["verdict"]["reasons"][0]["id"], "wiring");
+}
+
 /// README shows the report that its first command prints.
 #[test]
 fn the_readme_shows_what_is_printed() {

@@ -141,6 +141,25 @@ def test_a_result_in_every_form(columns, rig):
     assert len(out.plot().get_lines()) == 3 + len(out.alarms)
 
 
+def test_a_verdict_says_what_to_check(columns, rig):
+    sure = pl.replay(columns, rig)
+    assert (sure.verdict.status, sure.verdict.sure, sure.verdict.reasons) == ("leak", True, ())
+    assert str(sure).startswith(str(sure.verdict)) and repr(sure).endswith(f"{sure.verdict}>")
+    assert [episode.fault for episode in sure.episodes] == [alarm.fault for alarm in sure.alarms]
+
+    swapped = columns | {"qa_lpm": columns["qb_lpm"], "qb_lpm": columns["qa_lpm"]}
+    out = pl.replay(swapped, rig)
+    assert (out.verdict.status, out.verdict.sure, out.verdict.word) == ("doubtful", False, "DOUBTFUL")
+    first = out.verdict.reasons[0]
+    assert first.id == "wiring" and "qa and qb exchanged" in first.text and "[columns]" in first.suggestion
+    assert first.text in out.verdict._repr_html_() and first.suggestion in out._repr_html_().replace("&quot;", '"')
+
+    both = pl.replay([columns, swapped], rig)
+    assert list(both.to_pandas()["status"]) == ["leak", "doubtful"]
+    assert both.table["reasons"][1].startswith("wiring")
+    assert repr(both) == "<Replays of 2 cylinders, leaks in 0, in doubt 1>"
+
+
 def test_a_result_does_not_outlive_its_data(columns, rig):
     mine = {name: values.copy() for name, values in columns.items()}
     out = pl.replay(mine, rig)

@@ -50,7 +50,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             flow_offsets_m3s: (N > Parameter::OffsetB as usize).then(|| self.flow_offsets_m3s()),
             gains: (N > Parameter::GainPosition as usize).then(|| self.gains()),
             pressure_biases_pa: self.pressure_biases_pa(),
-            normalised_innovation: self.innovations.ratios(),
+            normalised_innovation: self.normalised_innovation(),
             excitation: self.excitation(&ExcitationSettings::default()),
         }
     }
@@ -120,6 +120,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
             of_reading(self.parameter(Parameter::GainB)),
             self.parameter(Parameter::GainPosition),
         ]
+    }
+
+    /// [`Estimates::normalised_innovation`] alone.
+    pub fn normalised_innovation(&self) -> [T; 2] {
+        self.innovations.ratios()
     }
 
     /// Prior standard deviations of the leak coefficients, m³/(s·Pa).

@@ -19,7 +19,20 @@ from ._inputs import TraceWarning
 from ._pitchleak import Linkage, Rig, RigError, TraceError, __version__
 from ._replay import Replay, Replays, replay
 from ._reproduce import Reproduction, reproduce
-from ._results import Alarm, Estimate, Estimates, Leakage, PerLeak, Score, Trace, Verdict
+from ._results import (
+    Alarm,
+    Episode,
+    Estimate,
+    Estimates,
+    Leakage,
+    PerLeak,
+    ReachTime,
+    Reason,
+    Score,
+    Trace,
+    Trend,
+    Verdict,
+)
 from ._simulate import Simulation, simulate
 
 __all__ = [
@@ -27,6 +40,7 @@ __all__ = [
     "ChannelFault",
     "Check",
     "Diagnosis",
+    "Episode",
     "Estimate",
     "Estimates",
     "Estimator",
@@ -34,7 +48,9 @@ __all__ = [
     "Linkage",
     "PerLeak",
     "Reach",
+    "ReachTime",
     "Reading",
+    "Reason",
     "Replay",
     "Replays",
     "Reproduction",
@@ -45,6 +61,7 @@ __all__ = [
     "Trace",
     "TraceError",
     "TraceWarning",
+    "Trend",
     "Verdict",
     "Wiring",
     "__version__",

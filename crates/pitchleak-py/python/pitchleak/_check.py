@@ -65,9 +65,10 @@ class Wiring:
 
     suggestion: str
     """The mistake and its evidence, in one sentence."""
-    residual_before: float
-    """Size of the residual, in standard deviations of the declared noise, as the columns are declared."""
-    residual_after: float
+    residual_before: float | None
+    """Size of the residual, in standard deviations of the declared noise, as the columns are declared; None where the
+    scatter of the readings alone speaks."""
+    residual_after: float | None
     """The same with the mistake mended."""
     columns: tuple[str, ...] = ()
     """Lines for ``[columns]`` of the rig file that mend it; none where the recording has to be mended."""

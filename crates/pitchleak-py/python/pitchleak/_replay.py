@@ -97,6 +97,8 @@ class Replays(Mapping[Hashable, Replay], Tabular):
         replays = self._replays.values()
         columns: dict[str, Any] = {
             "key": [str(key) for key in self._replays],
+            "status": [replay.verdict.status for replay in replays],
+            "reasons": [", ".join(reason.id for reason in replay.verdict.reasons) for replay in replays],
             "faults": [", ".join(replay.verdict.faults) for replay in replays],
             "samples": [replay.trace.samples for replay in replays],
             "skipped": [replay.trace.skipped for replay in replays],
@@ -108,15 +110,20 @@ class Replays(Mapping[Hashable, Replay], Tabular):
         return columns
 
     def __repr__(self) -> str:
-        leaking = [str(key) for key, replay in self._replays.items() if replay.verdict.faults]
-        return f"<Replays of {len(self)} cylinders, leaks in {', '.join(leaking) or 'none'}>"
+        def named(*statuses: str) -> str:
+            keys = [str(key) for key, replay in self._replays.items() if replay.verdict.status in statuses]
+            return ", ".join(keys) or "none"
+
+        doubt = named("doubtful", "not_sure")
+        unsure = "" if doubt == "none" else f", in doubt {doubt}"
+        return f"<Replays of {len(self)} cylinders, leaks in {named('leak')}{unsure}>"
 
     def _repr_html_(self) -> str:
         rows = []
         for key, replay in self._replays.items():
             flows = [_html.number(flow.mean_lpm, flow.std_lpm) for _, flow in replay.leakage.items()]
-            rows.append((str(key), ", ".join(replay.verdict.faults) or "–", *flows))
-        headers = ("cylinder", "leaks", *(f"{label}, L/min" for label in LABELS.values()))
+            rows.append((str(key), replay.verdict.word, ", ".join(replay.verdict.faults) or "–", *flows))
+        headers = ("cylinder", "verdict", "leaks", *(f"{label}, L/min" for label in LABELS.values()))
         return _html.page(repr(self)[1:-1], _html.table(headers, rows))
 
 

@@ -9,11 +9,13 @@ from ._records import record
 from ._results import (
     LPM_PER_BAR,
     Alarm,
+    Episode,
     Estimates,
     Leakage,
     PerLeak,
     Score,
     Trace,
+    Trend,
     Verdict,
 )
 
@@ -38,6 +40,10 @@ class Report:
     """Mean leak flows, L/min."""
     verdict: Verdict
     """What to make of it."""
+    trend: PerLeak[Trend | None]
+    """How fast each leak changes; None where the data don't tell."""
+    episodes: tuple[Episode, ...] = ()
+    """Every leak that the trace showed, also those that ended before its end."""
     alarms: tuple[Alarm, ...] = ()
     """In the order of time."""
     score: PerLeak[Score] | None = None
@@ -67,7 +73,7 @@ class Report:
     def __repr__(self) -> str:
         trace = self.trace
         size = f"{trace.samples} samples, {trace.duration_s:.1f} s"
-        return f"<{type(self).__name__} {trace.path} ({size}): {self.verdict.text}>"
+        return f"<{type(self).__name__} {trace.path} ({size}): {self.verdict}>"
 
     def _repr_html_(self) -> str:
         coefficients = dict(self.estimates.leaks.items())
@@ -76,14 +82,18 @@ class Report:
             entry = coefficients[leak]
             scaled = [None if v is None else v * LPM_PER_BAR for v in (entry.value, entry.std)]
             judged = "yes" if entry.identifiable else f"no: {entry.reason or 'too little excitation'}"
-            rows.append((LABELS[leak], _html.number(flow.mean_lpm, flow.std_lpm), _html.number(*scaled), judged))
+            known = (_html.number(flow.mean_lpm, flow.std_lpm), _html.number(*scaled))
+            rows.append((LABELS[leak], *(known if entry.identifiable else ("–", "–")), judged))
         headers = ("leak", "L/min, 95 %", "L/min/bar, 95 %", "identifiable")
         trace = self.trace
         footer = (
             f"{trace.path}: {trace.samples} samples over {trace.duration_s:.1f} s, {trace.skipped} rows skipped; "
             f"rig {self.rig}; estimator {self.estimator}"
         )
-        return _html.page(self.verdict.text, _html.table(headers, rows), footer=footer)
+        table = _html.table(headers, rows)
+        reasons = [(reason.text, reason.suggestion or "") for reason in self.verdict.reasons]
+        why = [_html.table(("why", "check"), reasons)] if reasons else []
+        return _html.page(str(self.verdict), *why, table, footer=footer)
 
 
 def parse(cls: type[R], text_json: str, text: str) -> R:

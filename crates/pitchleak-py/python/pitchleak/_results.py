@@ -4,10 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
+from . import _html
+
 T = TypeVar("T")
 U = TypeVar("U")
 
 Leak = Literal["internal", "external_a", "external_b"]
+Status = Literal["leak", "sound", "doubtful", "not_sure"]
 
 #: 1 m³/(s·Pa) in L/min/bar.
 LPM_PER_BAR = 6e9
@@ -115,13 +118,86 @@ class Alarm:
 
 
 @dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a verdict is in doubt or not sure."""
+
+    id: str
+    """What kind: ``model_does_not_fit``, ``channel_stuck``, ``wiring``, … (docs/verdict.md lists them)."""
+    text: str
+    """What was seen."""
+    suggestion: str | None
+    """What to check, or to record."""
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """What an operator acts on."""
 
+    status: Status
+    """``leak`` and ``sound`` are statements that the data support. ``doubtful``: something contradicts the model or the
+    sensors; ``not_sure``: the trace says too little."""
     faults: tuple[Leak, ...]
-    """The leaks whose alarm stands at the end of the trace."""
+    """The leaks whose alarm stands at the end of the trace, and those that come and go."""
     text: str
-    """In a sentence or two."""
+    """In a few sentences."""
+    reasons: tuple[Reason, ...] = ()
+    """Why the status is ``doubtful`` or ``not_sure``, first things first; empty where it is sure."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether the verdict commits itself."""
+        return self.status in ("leak", "sound")
+
+    @property
+    def word(self) -> str:
+        """The word that heads the text: LEAK, SOUND, DOUBTFUL, NOT SURE."""
+        return self.status.replace("_", " ").upper()
+
+    def __str__(self) -> str:
+        return f"{self.word}  {self.text}"
+
+    def _repr_html_(self) -> str:
+        reasons = _html.table(("why", "check"), [(reason.text, reason.suggestion or "") for reason in self.reasons])
+        return _html.page(str(self), *([reasons] if self.reasons else []))
+
+
+@dataclass(frozen=True, slots=True)
+class ReachTime:
+    """A time to come."""
+
+    value: float
+    """Best value, s."""
+    ci95: tuple[float, ...]
+    """The interval that holds it with 95 % probability, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """How fast a leak changes."""
+
+    slope_lpm_per_h: float
+    """L/min per hour, positive where it grows."""
+    std: float
+    """Standard deviation of its error, L/min per hour."""
+    reaches_threshold_in_s: ReachTime | None
+    """Time from the trace's end until the leak is at its alarm's threshold if it goes on like this; None where it is there
+    already, or does not grow beyond doubt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A time in which a leak's alarm stood."""
+
+    fault: Leak
+    """Which leak."""
+    from_s: float
+    """When its alarm was raised, s."""
+    to_s: float | None
+    """When it was cleared, s; None where it stands at the end."""
+    mean_lpm: float
+    """Mean of the estimates meanwhile, L/min."""
+    peak_lpm: float
+    """Largest of them, L/min."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,54 @@
+use crate::report::Episode;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{Leak, PerLeak};
+
+/// The times in which an alarm stood, with what was estimated meanwhile.
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct Episodes {
+    ended: Vec<Episode>,
+    open: PerLeak<Option<Open>>,
+}
+
+/// An episode that goes on.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+struct Open {
+    from_s: f64,
+    time_s: f64,
+    leaked_lpm_s: f64,
+    peak_lpm: f64,
+}
+
+impl Open {
+    fn episode(&self, fault: Leak, to_s: Option<f64>) -> Episode {
+        let mean_lpm = if self.time_s > 0.0 { self.leaked_lpm_s / self.time_s } else { self.peak_lpm };
+        Episode { fault, from_s: self.from_s, to_s, mean_lpm, peak_lpm: self.peak_lpm }
+    }
+}
+
+impl Episodes {
+    /// Takes the leak flows, m³/s, as estimated at `t_s`, `elapsed_s` of watched time after those before, and which alarms
+    /// stand.
+    pub fn add(&mut self, t_s: f64, elapsed_s: f64, flows_m3s: PerLeak<f64>, active: &PerLeak<bool>) {
+        for (fault, flow_m3s) in flows_m3s {
+            let open = &mut self.open[fault];
+            if !active[fault] {
+                self.ended.extend(open.take().map(|open| open.episode(fault, Some(t_s))));
+                continue;
+            }
+            let flow_lpm = flow_m3s * LPM_PER_M3S;
+            let begun = Open { from_s: t_s, time_s: 0.0, leaked_lpm_s: 0.0, peak_lpm: flow_lpm };
+            let open = open.get_or_insert(begun);
+            open.time_s += elapsed_s;
+            open.leaked_lpm_s += flow_lpm * elapsed_s;
+            open.peak_lpm = open.peak_lpm.max(flow_lpm);
+        }
+    }
+
+    /// All of them in the order of their beginnings.
+    pub fn list(&self) -> Vec<Episode> {
+        let open = self.open.iter().filter_map(|(fault, open)| Some(open.as_ref()?.episode(fault, None)));
+        let mut all: Vec<Episode> = self.ended.iter().copied().chain(open).collect();
+        all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        all
+    }
+}

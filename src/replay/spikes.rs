@@ -1,0 +1,141 @@
+//! Single wild readings, as a disturbed cable makes them, are left out before anything is estimated.
+//!
+//! A reading is wild where it steps away from the one before by far more than the channel usually does; where it stays
+//! there, it was none, and the row or two left out are no loss.
+
+use crate::trace::Record;
+use pitchleak_core::Sensors;
+
+/// A step this many times the usual one, beyond so many standard deviations of the declared noise, is wild.
+const USUAL_STEPS: f64 = 10.0;
+const NOISE_STDS: f64 = 8.0;
+/// Wild rows in a row that are left out at the most.
+const MOST_IN_A_ROW: u32 = 2;
+/// Steps over which the usual one is averaged; as long, at first, every reading is taken.
+const MEMORY: u32 = 64;
+
+const CHANNELS: usize = 5;
+
+/// Watches steps; a few instructions per reading.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+pub(super) struct Spikes {
+    /// Position, pressures, flows as last taken.
+    last: [f64; CHANNELS],
+    usual_step: [f64; CHANNELS],
+    least_wild: [f64; CHANNELS],
+    seen: u32,
+    in_a_row: u32,
+    /// Time of the rows left out since the last one taken, s.
+    left_out_s: f64,
+    rows: u64,
+}
+
+impl Spikes {
+    pub fn new(sensors: &Sensors<f64>) -> Self {
+        let spreads = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
+        Self {
+            last: [0.0; CHANNELS],
+            usual_step: [0.0; CHANNELS],
+            least_wild: spreads.map(|spread| NOISE_STDS * spread.noise_std),
+            seen: 0,
+            in_a_row: 0,
+            left_out_s: 0.0,
+            rows: 0,
+        }
+    }
+
+    /// Whether to leave this record out.
+    #[inline]
+    pub fn leave_out(&mut self, record: &Record) -> bool {
+        let s = &record.sample;
+        let [.., last_a, last_b] = self.last;
+        let now = [s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap_or(last_a), s.qb_m3s.unwrap_or(last_b)];
+        let mut steps = now;
+        let mut wild = false;
+        let known = self.last.iter().zip(&self.usual_step).zip(&self.least_wild);
+        for (step, ((last, usual_step), least_wild)) in steps.iter_mut().zip(known) {
+            *step = (*step - last).abs();
+            wild |= *step > USUAL_STEPS * usual_step + least_wild;
+        }
+        if record.after_gap || record.dt_s <= 0.0 {
+            self.last = now;
+            return false;
+        }
+        if wild && self.seen >= MEMORY && self.in_a_row < MOST_IN_A_ROW {
+            self.in_a_row += 1;
+            self.rows += 1;
+            self.left_out_s += record.dt_s;
+            return true;
+        }
+        if self.in_a_row > 0 {
+            // What stays is no spike.
+            self.rows -= if wild { u64::from(self.in_a_row) } else { 0 };
+            self.in_a_row = 0;
+        }
+        self.seen = (self.seen + 1).min(MEMORY);
+        let share = 1.0 / f64::from(self.seen);
+        for (usual_step, step) in self.usual_step.iter_mut().zip(steps) {
+            *usual_step += share * (step - *usual_step);
+        }
+        self.last = now;
+        false
+    }
+
+    /// The time that the rows left out before this one stood for, s; it is then forgotten.
+    #[inline]
+    pub fn take_left_out_s(&mut self) -> f64 {
+        std::mem::take(&mut self.left_out_s)
+    }
+
+    /// Whether the last record was left out.
+    pub fn left_out(&self) -> bool {
+        self.in_a_row > 0
+    }
+
+    /// What a reader of the results should know of it.
+    pub fn warning(&self) -> Option<String> {
+        (self.rows > 0)
+            .then(|| format!("{} rows with a single wild reading (a spike) were left out", self.rows))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+    use crate::simulate::Normal;
+
+    /// A slow motion with noise of which row `wild` reads `pa_pa`.
+    fn left_out(change: impl Fn(usize, &mut Record)) -> Vec<usize> {
+        let sensors = Rig::paper().sensors();
+        let mut spikes = Spikes::new(&sensors);
+        let mut normal = Normal::stream(1, 0);
+        let rows = (0..2000).filter(|k| {
+            let t_s = 0.01 * *k as f64;
+            let mut record = Record { t_s, dt_s: 0.01, ..Record::default() };
+            record.sample.x_m = 0.1 + 0.05 * t_s.sin() + sensors.position.noise_std * normal.draw();
+            record.sample.pa_pa = 5e6 + 1e6 * (3.0 * t_s).sin() + sensors.pressure.noise_std * normal.draw();
+            record.sample.qa_m3s = Some(sensors.flow_a.noise_std * normal.draw());
+            change(*k, &mut record);
+            spikes.leave_out(&record)
+        });
+        rows.collect()
+    }
+
+    #[test]
+    fn a_spike_is_left_out_and_nothing_else_is() {
+        assert_eq!(left_out(|_, _| ()), [] as [usize; 0]);
+        let spiked = left_out(|k, record| {
+            if k == 700 || k == 1400 {
+                record.sample.pa_pa = 16e6;
+            }
+        });
+        assert_eq!(spiked, [700, 1400]);
+    }
+
+    #[test]
+    fn what_stays_is_taken() {
+        let stepped = left_out(|k, record| record.sample.pa_pa += if k < 1000 { 0.0 } else { 4e6 });
+        assert_eq!(stepped, [1000, 1001]);
+    }
+}

@@ -1,0 +1,275 @@
+//! Why a verdict is doubtful or not sure, each with what to check.
+
+use super::Findings;
+use super::statement::{interval, join, with_interval};
+use crate::channels::ChannelFaultKind;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{Estimate, Leak};
+use serde::{Serialize, Serializer};
+
+/// What kind of reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReasonId {
+    /// A channel shows a fault by itself.
+    Channel(ChannelFaultKind),
+    /// A mistake of wiring, sign or unit explains what the columns as declared do not.
+    Wiring,
+    /// More rows are bad than good.
+    MostlyBadRows,
+    /// The trace asks for a bulk modulus that no oil has, or not this one.
+    BulkModulusImpossible,
+    /// A leak comes out negative.
+    NegativeLeak,
+    /// A meter whose zero is off explains the trace as well as a leak does.
+    OffsetOrLeak,
+    /// The estimates began anew again and again.
+    KeepsChanging,
+    /// The residuals are larger than the declared noise can make them.
+    ModelDoesNotFit,
+    /// The trace does not pin a leak down.
+    NotIdentifiable,
+    /// A leak's interval reaches beyond its threshold, and yet not for sure.
+    Undecided,
+    /// The estimator knows no uncertainty.
+    NoUncertainty,
+}
+
+impl ReasonId {
+    /// As in data.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Channel(kind) => kind.id(),
+            Self::Wiring => "wiring",
+            Self::MostlyBadRows => "mostly_bad_rows",
+            Self::BulkModulusImpossible => "bulk_modulus_impossible",
+            Self::NegativeLeak => "negative_leak",
+            Self::OffsetOrLeak => "offset_or_leak",
+            Self::KeepsChanging => "keeps_changing",
+            Self::ModelDoesNotFit => "model_does_not_fit",
+            Self::NotIdentifiable => "not_identifiable",
+            Self::Undecided => "undecided",
+            Self::NoUncertainty => "no_uncertainty",
+        }
+    }
+}
+
+impl Serialize for ReasonId {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// One reason.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reason {
+    /// What kind.
+    pub id: ReasonId,
+    /// What was seen, without a full stop.
+    pub text: String,
+    /// What to check, or to record, without a full stop.
+    pub suggestion: Option<String>,
+}
+
+impl Reason {
+    fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
+        Self { id, text: text.into(), suggestion: Some(suggestion.into()) }
+    }
+}
+
+/// Mean of ν²/S over the trace that still is no misfit, or what chance makes of few innovations …
+pub(super) const MISFIT: f64 = 2.5;
+const CHANCE_SIGMAS: f64 = 5.0;
+/// … and in the worst quarter of a minute: leaks that open and are mended surprise a few blocks.
+const WORST_MISFIT: f64 = 3.0;
+/// The position's worst mean: friction and edges of the motion leave more than in the balance.
+const ODOMETER_MISFIT: f64 = 2.0;
+/// Restarts without an alarm that was raised or cleared: a leak below its threshold may jump now and then.
+const RESTARTS: u64 = 2;
+/// A bulk modulus off by so many of its prior's standard deviations, in the compressibility: the prior is in the estimate
+/// already, so the trace itself asks for more.
+const BULK_MODULUS_SIGMAS: f64 = 3.0;
+/// A negative leak matters from this share of its threshold on, and of the largest leak found: a leak of another law than
+/// C P leaves a little in the others.
+const NEGATIVE_SHARE: f64 = 0.5;
+const NEGATIVE_SHARE_OF_LARGEST: f64 = 0.13;
+const NEGATIVE_SIGMAS: f64 = 3.0;
+
+/// χ² by which a leak has to explain the trace better than zeros that are off: one of 2 % of full scale costs 4.
+const LEAK_OVER_ZEROS: f64 = 4.0;
+/// Zeros that would have to be off by more than this, as shares of full scale, both meters together (root of the sum of
+/// squares), are not: a leak through an orifice would pass for them otherwise.
+const ZEROS_AT_MOST: f64 = 0.023;
+
+/// What contradicts the model or the sensors, the likeliest cause first.
+pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
+    let channels = findings
+        .channels
+        .iter()
+        .map(|fault| Reason::new(ReasonId::Channel(fault.kind), fault.text.clone(), fault.suggestion));
+    let others = [
+        wiring(findings),
+        mostly_bad_rows(findings),
+        bulk_modulus_impossible(findings),
+        negative_leak(findings),
+        offset_or_leak(findings),
+        keeps_changing(findings),
+        model_does_not_fit(findings),
+    ];
+    channels.chain(others.into_iter().flatten()).collect()
+}
+
+/// What the trace says too little of.
+pub(super) fn gaps(findings: &Findings<'_>) -> Vec<Reason> {
+    if findings.misfit.is_none() {
+        let text = "the paper's law knows no uncertainty: its figures may be right or not";
+        return vec![Reason::new(ReasonId::NoUncertainty, text, "replay with `--estimator rls`")];
+    }
+    let (unknown, known): (Vec<_>, Vec<_>) =
+        Leak::ALL.into_iter().partition(|leak| !findings.is_known(*leak));
+    let open: Vec<_> =
+        known.into_iter().filter(|leak| !findings.is_below(*leak) && !findings.active[*leak]).collect();
+    let unknown = (!unknown.is_empty()).then(|| {
+        Reason::new(
+            ReasonId::NotIdentifiable,
+            format!("this trace cannot tell about {} leaks", join(&unknown, "and")),
+            "record longer, with the piston moving and both pressures changing",
+        )
+    });
+    unknown.into_iter().chain(open.into_iter().map(|leak| undecided(findings, leak))).collect()
+}
+
+fn undecided(findings: &Findings<'_>, leak: Leak) -> Reason {
+    let (flow, threshold) = (interval(&findings.leakage[leak]), findings.threshold_lpm[leak]);
+    Reason::new(
+        ReasonId::Undecided,
+        format!("{} leak of {flow} L/min: may be above {threshold:.2} L/min or not", leak.label()),
+        "record longer: the interval narrows with the square root of the time",
+    )
+}
+
+fn wiring(findings: &Findings<'_>) -> Option<Reason> {
+    let wiring = findings.suspicions.wiring.as_ref()?;
+    let suggestion = if wiring.columns.is_empty() {
+        "check how the columns are wired and recorded, and record anew".to_owned()
+    } else {
+        format!("where that is so, mend it in the rig file: [columns] {}", wiring.columns.join("; "))
+    };
+    Some(Reason::new(ReasonId::Wiring, wiring.suggestion.clone(), suggestion))
+}
+
+/// What remains may not stand for the cylinder.
+fn mostly_bad_rows(findings: &Findings<'_>) -> Option<Reason> {
+    let trace = findings.trace;
+    let rows = trace.samples + trace.skipped;
+    (trace.skipped > trace.samples).then(|| {
+        Reason::new(
+            ReasonId::MostlyBadRows,
+            format!("{} of {rows} rows are bad and were skipped", trace.skipped),
+            "see the warnings on what is wrong with them, and `pitchleak columns` on how the file is read",
+        )
+    })
+}
+
+fn bulk_modulus_impossible(findings: &Findings<'_>) -> Option<Reason> {
+    let found = &findings.estimates.bulk_modulus;
+    let declared = &findings.fluid;
+    let relative_prior = declared.bulk_modulus_std_pa / declared.bulk_modulus_pa;
+    // In the compressibility, which is what the equations are linear in.
+    let off = (declared.bulk_modulus_pa / found.value - 1.0).abs();
+    (found.std.is_some() && off > BULK_MODULUS_SIGMAS * relative_prior).then(|| {
+        Reason::new(
+            ReasonId::BulkModulusImpossible,
+            format!(
+                "the trace asks for a bulk modulus of {:.2} GPa where the rig file says {:.2} ± {:.2} GPa",
+                found.value / 1e9,
+                declared.bulk_modulus_pa / 1e9,
+                declared.bulk_modulus_std_pa / 1e9
+            ),
+            "check the units and wires of pressures and position, then dead volumes, hoses and air in the oil",
+        )
+    })
+}
+
+/// Oil does not flow in from outside: something else than the leak is at work, and as strong. What is far below the
+/// threshold harms no verdict.
+fn negative_leak(findings: &Findings<'_>) -> Option<Reason> {
+    let largest = findings.leakage.iter().map(|(_, leakage)| leakage.mean_lpm).fold(0.0, f64::max);
+    let is_negative = |leak: &Leak| {
+        let leakage = &findings.leakage[*leak];
+        let matters =
+            (NEGATIVE_SHARE * findings.threshold_lpm[*leak]).max(NEGATIVE_SHARE_OF_LARGEST * largest);
+        leakage.mean_lpm < -matters
+            && leakage.std_lpm.is_some_and(|std| leakage.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)
+    };
+    let negative: Vec<_> = Leak::ALL.into_iter().filter(is_negative).collect();
+    let first = *negative.first()?;
+    let flow = interval(&findings.leakage[first]);
+    Some(Reason::new(
+        ReasonId::NegativeLeak,
+        format!("the {} leak comes out negative ({flow} L/min), which cannot be", first.label()),
+        "check the zeros of the flow meters, or declare how far they may be off (`bias`); `pitchleak diagnose` looks for \
+         an effect that the rig file lacks",
+    ))
+}
+
+fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
+    let zeros = findings.suspicions.zeros?;
+    let leak = Leak::ALL
+        .into_iter()
+        .find(|leak| findings.active[*leak] && zeros.for_leak[*leak] < LEAK_OVER_ZEROS)?;
+    let offsets = zeros.offsets_without_m3s[leak].map(|offset| offset.scaled(LPM_PER_M3S));
+    let share = |(offset, full_scale): (&Estimate<f64>, f64)| (offset.value / full_scale).powi(2);
+    if offsets.iter().zip(findings.meters_lpm).map(share).sum::<f64>() > ZEROS_AT_MOST.powi(2) {
+        return None;
+    }
+    let off = offsets.iter().zip(["qa", "qb"]).filter(|(offset, _)| offset.value.abs() > 2.0 * offset.std);
+    let off = off
+        .map(|(offset, name)| format!("{name} by {} L/min", with_interval(offset.value, Some(offset.std))));
+    let off: Vec<_> = off.collect();
+    let by = if off.is_empty() { String::new() } else { format!(" ({})", off.join(", ")) };
+    Some(Reason::new(
+        ReasonId::OffsetOrLeak,
+        format!(
+            "zeros of the flow meters that are off{by} explain this trace nearly as well as the {} leak does (χ² {:+.1})",
+            leak.label(),
+            zeros.for_leak[leak]
+        ),
+        "read the meters with their valves shut, or record while the pressures change; how far zeros may be off belongs in \
+         the rig file (`bias`)",
+    ))
+}
+
+fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {
+    let ended = findings.episodes.iter().filter(|episode| episode.to_s.is_some()).count();
+    let explained = (findings.episodes.len() + ended) as u64;
+    (findings.restarts > RESTARTS + explained).then(|| {
+        Reason::new(
+            ReasonId::KeepsChanging,
+            format!(
+                "the estimates began anew {} times, more often than a leak came or went",
+                findings.restarts
+            ),
+            "check for loose contacts, sensors that hang, and changes of the rig during the recording",
+        )
+    })
+}
+
+fn model_does_not_fit(findings: &Findings<'_>) -> Option<Reason> {
+    let misfit = findings.misfit?;
+    let chance = 1.0 + CHANCE_SIGMAS * (2.0 / misfit.balances.max(1) as f64).sqrt();
+    let balance = misfit.balance > chance.max(MISFIT) || misfit.worst_window > WORST_MISFIT;
+    let odometer = misfit.worst_odometer > ODOMETER_MISFIT;
+    (balance || odometer).then(|| {
+        let times = misfit.worst_window.max(misfit.balance).max(misfit.worst_odometer).sqrt();
+        let at_least = if times > 3.5 { "at least " } else { "" };
+        Reason::new(
+            ReasonId::ModelDoesNotFit,
+            format!(
+                "model and declared noise do not explain this trace: its residuals are {at_least}{times:.1} times the \
+                 noise of [sensors]"
+            ),
+            "check whether the sensors are as good as declared and wired as declared (`pitchleak check`); `pitchleak \
+             diagnose` looks for an effect that the model lacks",
+        )
+    })
+}

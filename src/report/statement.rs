@@ -1,0 +1,186 @@
+//! The verdict as sentences.
+
+use super::{Findings, Leakage, Reason, Status};
+use pitchleak_core::{Estimate, Leak};
+
+/// Where to look for a leak.
+fn advice(leak: Leak) -> &'static str {
+    match leak {
+        Leak::Internal => "oil passes the piston seal: plan its change, check the bore for scoring",
+        Leak::ExternalA => "oil leaves the piston-side chamber: check its port, hose, fittings and valve",
+        Leak::ExternalB => "oil leaves the rod-side chamber: check rod seal, port, hose and valve",
+    }
+}
+
+/// The verdict in a few sentences: first why it is in doubt, if it is, then what leaks, then what does not, then what
+/// happened before.
+pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], reasons: &[Reason]) -> String {
+    let mut sentences = Vec::new();
+    if status.is_sure() {
+        sentences.extend(faults.iter().map(|leak| fault(findings, *leak)));
+        sentences.extend(excluded(findings));
+        sentences.extend(unknown(findings));
+    } else {
+        sentences.extend(reasons.iter().take(1).flat_map(why));
+        sentences.extend(apparent(findings, faults));
+        if status == Status::NotSure {
+            sentences.extend(excluded(findings));
+        }
+    }
+    sentences.extend(before(findings));
+    sentences.extend(Leak::ALL.into_iter().filter_map(|leak| grows(findings, leak, status)));
+    sentences.join(" ")
+}
+
+fn why(reason: &Reason) -> impl Iterator<Item = String> {
+    let what = Some(sentence(&reason.text));
+    what.into_iter().chain(reason.suggestion.as_deref().map(sentence))
+}
+
+fn fault(findings: &Findings<'_>, leak: Leak) -> String {
+    let label = capital(leak.label());
+    let episode = findings.episodes.iter().rev().find(|episode| episode.fault == leak);
+    match episode {
+        Some(last) if last.to_s.is_some() => {
+            let count = findings.episodes.iter().filter(|episode| episode.fault == leak).count();
+            format!(
+                "{label} leak that comes and goes, {count} times, last {:.2} L/min on average until {:.1} s: {}.",
+                last.mean_lpm,
+                last.to_s.unwrap_or(last.from_s),
+                advice(leak)
+            )
+        }
+        Some(last) if !findings.is_known(leak) => format!(
+            "{label} leak since {:.1} s, {:.2} L/min on average: {}.",
+            last.from_s,
+            last.mean_lpm,
+            advice(leak)
+        ),
+        _ => format!("{label} leak of {} L/min: {}.", interval(&findings.leakage[leak]), advice(leak)),
+    }
+}
+
+/// Leaks whose upper bound is below the threshold.
+fn excluded(findings: &Findings<'_>) -> Option<String> {
+    let faults = findings.faults();
+    let below: Vec<_> =
+        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && findings.is_below(*leak)).collect();
+    let limit = below.iter().map(|leak| findings.threshold_lpm[*leak]).fold(0.0, f64::max);
+    (!below.is_empty()).then(|| format!("No {} leak above {limit:.2} L/min.", join(&below, "or")))
+}
+
+/// Leaks of which a sure verdict says nothing.
+fn unknown(findings: &Findings<'_>) -> Option<String> {
+    let faults = findings.faults();
+    let open: Vec<_> =
+        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && !findings.is_below(*leak)).collect();
+    (!open.is_empty()).then(|| format!("This trace cannot tell about {} leaks.", join(&open, "and")))
+}
+
+/// What alarms a verdict in doubt stands beside.
+fn apparent(findings: &Findings<'_>, faults: &[Leak]) -> Option<String> {
+    let flow = |leak: &Leak| {
+        let flow =
+            findings.is_known(*leak).then(|| format!(" of {} L/min", interval(&findings.leakage[*leak])));
+        format!("{} leak{}", leak.label(), flow.unwrap_or_default())
+    };
+    let named: Vec<_> = faults.iter().map(flow).collect();
+    (!named.is_empty()).then(|| format!("Until then an apparent {} stays in doubt.", named.join(", ")))
+}
+
+/// Episodes that ended, and sudden changes.
+fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
+    let faults = findings.faults();
+    let ended = Leak::ALL.into_iter().filter(move |leak| !faults.contains(leak)).filter_map(|leak| {
+        let own: Vec<_> = findings.episodes.iter().filter(|episode| episode.fault == leak).collect();
+        let last = own.last()?;
+        let often = if own.len() > 1 { format!(", the last of {} times", own.len()) } else { String::new() };
+        Some(format!(
+            "Earlier: {} leak of {:.2} L/min from {:.1} s to {:.1} s{often}.",
+            leak.label(),
+            last.mean_lpm,
+            last.from_s,
+            last.to_s?
+        ))
+    });
+    let changed = findings.changed_at_s.map(|at_s| match findings.restarts {
+        0 | 1 => format!("The leaks changed at once at {at_s:.2} s: figures are those since then."),
+        restarts => {
+            format!("The leaks changed at once {restarts} times, last at {at_s:.2} s: figures are those since then.")
+        }
+    });
+    ended.collect::<Vec<_>>().into_iter().chain(changed)
+}
+
+fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
+    let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
+    let Estimate { value, std } = trend.slope();
+    let slope = with_interval(value.abs(), Some(std));
+    let verb = if value > 0.0 { "grows" } else { "falls" };
+    let reaches = trend.reaches_threshold_in_s.map(|time| {
+        let [low, high] = time.ci95;
+        format!(
+            ": if it goes on so, it is at {:.2} L/min in {} ({} to {})",
+            findings.threshold_lpm[leak],
+            duration(time.value),
+            duration(low),
+            duration(high)
+        )
+    });
+    Some(format!(
+        "The {} leak {verb} by {slope} L/min per hour{}.",
+        leak.label(),
+        reaches.unwrap_or_default()
+    ))
+}
+
+/// In the unit that people would take.
+fn duration(time_s: f64) -> String {
+    const UNITS: [(f64, &str); 3] = [(86_400.0, "days"), (3600.0, "h"), (60.0, "min")];
+    let unit = UNITS.into_iter().find(|(unit_s, _)| time_s >= 2.0 * unit_s);
+    let (unit_s, name) = unit.unwrap_or((1.0, "s"));
+    format!("{:.0} {name}", time_s / unit_s)
+}
+
+fn sentence(text: &str) -> String {
+    capital(text) + "."
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// "internal, external A or external B".
+pub(super) fn join(leaks: &[Leak], word: &str) -> String {
+    match leaks {
+        [one] => one.label().to_owned(),
+        [head @ .., last] => {
+            let head: Vec<_> = head.iter().map(|leak| leak.label()).collect();
+            format!("{} {word} {}", head.join(", "), last.label())
+        }
+        [] => String::new(),
+    }
+}
+
+/// Mean flow and half width of its 95 % interval, L/min.
+pub(super) fn interval(leakage: &Leakage) -> String {
+    with_interval(leakage.mean_lpm, leakage.std_lpm)
+}
+
+/// Value and half width of the 95 % interval, to two digits of the half width.
+pub(super) fn with_interval(value: f64, std: Option<f64>) -> String {
+    let Some(half) = std.map(|std| Estimate { value, std }.half_width95()).filter(|half| half.is_finite())
+    else {
+        return format!("{value:.4}");
+    };
+    let decimals = if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize } else { 6 };
+    let text = format!("{value:.decimals$} ± {half:.decimals$}");
+    // No minus before a zero.
+    match text.strip_prefix('-') {
+        Some(rest) if !rest.split(' ').next().is_some_and(|v| v.contains(|c| ('1'..='9').contains(&c))) => {
+            rest.to_owned()
+        }
+        _ => text,
+    }
+}

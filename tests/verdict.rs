@@ -1,0 +1,70 @@
+//! The verdict on traces whose sensors lie: is each kind of reason given where it should be, and none where nothing is
+//! wrong?
+
+#[allow(dead_code, reason = "the bench asks more of it")]
+#[path = "../benches/lies/judge.rs"]
+mod judge;
+#[allow(dead_code, reason = "the bench has more of them")]
+#[path = "../benches/lies/lie.rs"]
+mod lie;
+#[path = "../benches/lies/plant.rs"]
+mod plant;
+
+use judge::{Judgement, judge, replayed};
+use lie::{Family, Lie};
+use pitchleak::core::Leak;
+use pitchleak::report::Status;
+use pitchleak::wind::WindCase;
+use plant::{LEAKING, leak_name, truths};
+use rayon::prelude::*;
+
+fn lie(faults: &'static [&'static str]) -> Lie {
+    Lie { family: Family::Mistake, name: "", faults, every: 1 }
+}
+
+/// Every kind of reason that a recording can give.
+#[test]
+fn each_mistake_gives_its_reason() {
+    let internal = Some(Leak::Internal);
+    let cases = [
+        ("channel_dead", WindCase::Mps13, None, &["qa dead"][..]),
+        ("channel_dead", WindCase::Mps5, internal, &["qa dead"]),
+        ("channel_stuck", WindCase::Mps13, internal, &["pa stuck 30 s.."]),
+        ("channel_clipped", WindCase::Mps13, internal, &["qa clipped 1 L/min"]),
+        ("channel_held", WindCase::Mps13, None, &["x held 500 ms"]),
+        ("wiring", WindCase::Mps13, None, &["swap qa qb"]),
+        ("wiring", WindCase::Mps13, Some(Leak::ExternalA), &["qb reversed"]),
+        ("wiring", WindCase::Mps5, internal, &["qa in m3/h", "qb in m3/h"]),
+        ("negative_leak", WindCase::Mps13, None, &["qa offset -1 %"]),
+        ("bulk_modulus_impossible", WindCase::Mps5, Some(Leak::ExternalA), &["swap qa qb", "swap pa pb"]),
+        ("keeps_changing", WindCase::Mps13, internal, &["qb gain 20 %"]),
+        ("model_does_not_fit", WindCase::Mps13, internal, &["qb gain 20 %"]),
+        ("not_identifiable", WindCase::Mps13, None, &["rows lost 3 s.."]),
+    ];
+    for (id, wind, leaking, faults) in cases {
+        let report =
+            replayed(&truths(wind, leaking), &lie(faults), 3e-3, 1).unwrap_or_else(|e| panic!("{e}"));
+        let ids: Vec<_> = report.verdict.reasons.iter().map(|reason| reason.id.name()).collect();
+        assert!(ids.contains(&id), "{faults:?}: {id} is not among {ids:?}: {}", report.verdict.text);
+        assert!(!report.verdict.status.is_sure() && !report.verdict.text.is_empty());
+    }
+}
+
+/// Right columns, honest sensors: sure, and right.
+#[test]
+fn honest_traces_stay_sure() {
+    let cylinders: Vec<_> =
+        WindCase::ALL.into_iter().flat_map(|wind| LEAKING.map(|leaking| (wind, leaking))).collect();
+    let honest = lie(&[]);
+    cylinders.par_iter().for_each(|(wind, leaking)| {
+        let truths = truths(*wind, *leaking);
+        for accuracy in [3e-3, 1e-2] {
+            let report = replayed(&truths, &honest, accuracy, 2).unwrap_or_else(|e| panic!("{e}"));
+            let name = format!("{} at {} m/s, {accuracy}", leak_name(*leaking), wind.mean_mps());
+            let judged = judge(&report, *leaking, &truths);
+            assert_eq!(judged, Judgement::Right, "{name}: {:?}", report.verdict);
+            let status = if leaking.is_some() { Status::Leak } else { Status::Sound };
+            assert_eq!((report.verdict.status, report.verdict.reasons.len()), (status, 0), "{name}");
+        }
+    });
+}
