@@ -193,6 +193,24 @@ fn traces_to_judge_on_are_not_fitted() {
     assert!((answer.after.quality.rmse.chamber_a.unwrap() - 1e-5).abs() < 2e-6);
 }
 
+/// A unit mistaken is no gain of 9: it is named, and no effect is looked for.
+#[test]
+fn mistakes_of_wiring_are_named_instead_of_effects() {
+    let mistakes: [(&str, fn(&mut Series)); 3] = [
+        ("qa and qb exchanged", |s| std::mem::swap(&mut s.qa_m3s, &mut s.qb_m3s)),
+        ("the sign of qa turned", |s| s.qa_m3s.iter_mut().for_each(|q| *q = -*q)),
+        ("x divided by 2.54", |s| s.x_m.iter_mut().for_each(|x| *x *= 2.54)),
+    ];
+    for (name, make) in mistakes {
+        let mut series = trace(None);
+        make(&mut series);
+        let answer = ask(series, &rig());
+        let wiring = answer.wiring.as_ref().map_or("", |wiring| wiring.suggestion.as_str());
+        assert!(wiring.contains(name), "{name}: {wiring}, {:?}", answer.notes);
+        assert!(answer.effects.is_empty() && answer.verdict == Verdict::Unexplained);
+    }
+}
+
 #[test]
 fn the_json_has_the_fields_of_the_interface() {
     let json = serde_json::to_value(ask(trace(Some((Effect::LoadOffset, 200.0))), &rig())).unwrap();

@@ -1,6 +1,7 @@
 //! From what the model leaves over to the physical effect that it lacks.
 //!
-//! 1. `data`: the traces, what is declared of the rig, and the noise that the sensors really carry.
+//! 1. `data`: the traces, what is declared of the rig, the noise that the sensors really carry, and mistakes of wiring,
+//!    beside which no effect is worth a word.
 //! 2. `weak_form`: the equations integrated against hat functions around a linearisation, so that nothing is
 //!    differentiated and the noise of every row follows from the rig file.
 //! 3. `fit`: the declared model by generalised least squares with its priors. A fit is a value; with one more effect
@@ -25,12 +26,12 @@ mod testing;
 mod thresholds;
 mod weak_form;
 
-pub use data::{Declared, Series};
+pub use data::{Declared, FittedAndJudged, Roles, SameFile, Series, Traces};
 pub use equation::{Equation, PerEquation};
 pub use fit::Progress;
 pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
-    Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Size, Verdict,
+    Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
 pub use search::{Candidate, Collinearity};
 
@@ -49,22 +50,27 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let plain = Fit::declared(&problem, progress);
     let before = model_fit(&plain, &test);
     let (excited, excess_before) = (assess::is_excited(&plain), plain.excess_power());
-    let selection = if excited {
+    let miswired = data::miswired(&train, &declared);
+    let beyond_effects = miswired.as_ref().is_some_and(|found| found.is_beyond_effects);
+    let selection = if excited && !beyond_effects {
         search::search(plain, |fit| HeldOut::of(fit, &test).rmse(), progress)
     } else {
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
     let judgement = assess::judge(&selection, excited, excess_before, &checks);
+    let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
     let Selection { fit, effects } = &selection;
     let interactions = search::interactions(fit, effects);
     Diagnosis {
+        samples: Samples::of(&train),
         effects: effects.iter().filter_map(|one| assess::found(fit, one, judgement.confident)).collect(),
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
-        verdict: judgement.verdict,
+        verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },
+        wiring: wiring.map(|found| found.wiring),
         notes: assess::notes(
             fit,
             judgement.complaints,

@@ -1,6 +1,7 @@
 //! What the unit tests of the diagnosis fit: wind-like motion of the paper's cylinder, seen by sensors of 0.1 %.
 
 use super::data::{Declared, Series};
+use crate::rig::Instruments;
 use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, PerLeak, Sample};
 use pitchleak_testkit::{Motion, noisy, seeded, sensors_of};
 
@@ -13,6 +14,7 @@ pub(crate) fn declared() -> Declared {
     Declared {
         cylinder: Cylinder::paper(),
         fluid: Fluid::paper(),
+        instruments: Instruments::paper(&Cylinder::paper()).with_accuracy(1e-3),
         sensors: sensors_of(1e-3),
         effects: EffectSet::default(),
     }

@@ -6,11 +6,11 @@ pub struct Inputs(Vec<(PathBuf, Identity)>);
 
 /// Device and number of the file there.
 #[cfg(unix)]
-type Identity = (u64, u64);
+pub(crate) type Identity = (u64, u64);
 
 /// The path without links; a hard link is another file.
 #[cfg(not(unix))]
-type Identity = PathBuf;
+pub(crate) type Identity = PathBuf;
 
 impl Inputs {
     /// Those among `paths` that are files; `-` is standard input.
@@ -34,7 +34,7 @@ impl Inputs {
 }
 
 #[cfg(unix)]
-fn identity(path: &Path) -> Option<Identity> {
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
     use std::os::unix::fs::MetadataExt;
     let path = if path == Path::new("-") { Path::new("/dev/stdin") } else { path };
     // Not opened: that would take from a pipe, or wait for one.
@@ -43,6 +43,6 @@ fn identity(path: &Path) -> Option<Identity> {
 }
 
 #[cfg(not(unix))]
-fn identity(path: &Path) -> Option<Identity> {
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
     std::fs::canonicalize(path).ok().filter(|path| path.is_file())
 }

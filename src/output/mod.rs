@@ -11,6 +11,7 @@ mod replacement;
 mod tests;
 
 pub use inputs::Inputs;
+pub(crate) use inputs::{Identity, identity};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;

@@ -3,7 +3,7 @@ use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Series, diagnose};
+use pitchleak::diagnose::{Declared, Roles, Series, Traces, diagnose};
 use pitchleak::output::{Inputs, OutputFile, make_folder};
 use pitchleak::trace::{BadRows, TraceReader};
 use std::collections::BTreeMap;
@@ -59,6 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         (None, Some(trace)) => Rig::beside(trace)?,
         (None, None) => Rig::paper(),
     };
+    let roles = Roles::of(&arguments.traces, &arguments.test)?;
+    roles.repeated.iter().for_each(|same| output::warn(&[same.to_string()]));
     let inputs =
         Inputs::of(arguments.traces.iter().chain(&arguments.test).map(PathBuf::as_path).chain(rig.file()));
     let saved = arguments.save_rig.as_ref().map(|path| OutputFile::create(path, &inputs)).transpose()?;
@@ -68,9 +70,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let bad_rows = if arguments.strict { BadRows::Fatal } else { BadRows::Skip };
     let mut warnings = Warnings::default();
     let mut read_all = |paths: &[PathBuf]| -> Result<Vec<Series>, Failure> {
-        paths.iter().map(|path| read(path, &rig, bad_rows, &bar, &mut warnings)).collect()
+        let mut traces = Traces::default();
+        for (number, path) in (1..).zip(paths) {
+            bar.set_message(format!("reading {} ({number} of {})", path.display(), paths.len()));
+            read(path, &rig, bad_rows, &mut traces, &mut warnings)?;
+        }
+        Ok(traces.into_series())
     };
-    let (train, test) = (read_all(&arguments.traces)?, read_all(&arguments.test)?);
+    let (train, test) = (read_all(&roles.fitted)?, read_all(&roles.judged)?);
     bar.suspend(|| output::warn(&in_lines(warnings)));
     bar.set_message("fitting");
     let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
@@ -109,14 +116,13 @@ fn read(
     path: &Path,
     rig: &Rig,
     bad_rows: BadRows,
-    bar: &ProgressBar,
+    traces: &mut Traces,
     warnings: &mut Warnings,
-) -> Result<Series, Failure> {
-    bar.set_message(format!("reading {}", path.display()));
+) -> Result<(), Failure> {
     let mut reader = TraceReader::open(path, rig)?.with_bad_rows(bad_rows);
-    let series = Series::read(&mut reader)?;
+    traces.read(&mut reader, rig)?;
     for warning in reader.quality().warnings() {
         warnings.entry(warning).or_default().push(reader.name().to_owned());
     }
-    Ok(series)
+    Ok(())
 }

@@ -1,3 +1,4 @@
+use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::figure::FigureError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
@@ -17,6 +18,9 @@ pub enum Failure {
     /// The trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// The traces' roles.
+    #[error(transparent)]
+    Roles(#[from] FittedAndJudged),
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),

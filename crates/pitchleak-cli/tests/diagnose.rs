@@ -75,12 +75,57 @@ fn residuals_are_tested_and_drawn() {
 #[test]
 fn several_traces_are_fitted_together_and_others_judged() {
     let folder = folder(0.0);
-    let arguments = ["diagnose", "trace.csv", "trace.csv", "--test", "trace.csv", "--json"];
+    for copy in ["copy.csv", "test.csv"] {
+        fs::copy(folder.path().join("trace.csv"), folder.path().join(copy)).unwrap();
+    }
+    let arguments = ["diagnose", "trace.csv", "copy.csv", "--test", "test.csv", "--json"];
     let found = json(&pitchleak(&folder, &arguments));
+    assert_eq!(
+        (found["samples"]["read"].as_u64(), found["samples"]["fitted"].as_u64()),
+        (Some(8000), Some(8000))
+    );
+    assert!(found["wiring"].is_null());
     assert_eq!(found["verdict"], "no_missing_effect");
     assert!(found["after"]["rmse"]["force_n"].is_null());
     let text = pitchleak(&folder, &["diagnose", "trace.csv"]);
     assert!(String::from_utf8_lossy(&text.stdout).contains("no missing effect"));
+}
+
+#[test]
+fn a_file_is_fitted_once_and_never_judged_on_too() {
+    let folder = folder(0.0);
+    let output = pitchleak(&folder, &["diagnose", "trace.csv", "--test", "./trace.csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(error.contains("./trace.csv is both fitted and judged on (as trace.csv)"), "{error}");
+    let twice = pitchleak(&folder, &["diagnose", "trace.csv", "./trace.csv", "--json"]);
+    assert!(String::from_utf8_lossy(&twice.stderr).contains("./trace.csv is given twice"));
+    assert_eq!(json(&twice), json(&pitchleak(&folder, &["diagnose", "trace.csv", "--json"])));
+}
+
+#[test]
+fn a_mistake_of_wiring_is_named_before_any_effect() {
+    let folder = folder(0.0);
+    let trace = fs::read_to_string(folder.path().join("trace.csv")).unwrap();
+    fs::write(
+        folder.path().join("crossed.csv"),
+        trace.replace("qa_", "q_").replace("qb_", "qa_").replace("q_m", "qb_m"),
+    )
+    .unwrap();
+    let found = json(&pitchleak(&folder, &["diagnose", "crossed.csv", "--json"]));
+    assert!(
+        found["wiring"]["suggestion"].as_str().unwrap().contains("qa and qb exchanged"),
+        "{}",
+        found["wiring"]
+    );
+    assert!(found["wiring"]["residual_before"].as_f64() > found["wiring"]["residual_after"].as_f64());
+    assert_eq!((found["effects"].as_array().unwrap().len(), &found["verdict"]), (0, &"unexplained".into()));
+    let text = pitchleak(&folder, &["diagnose", "crossed.csv"]);
+    let text = String::from_utf8_lossy(&text.stdout).into_owned();
+    assert!(
+        text.contains("wiring: with qa and qb exchanged") && text.contains("qa = { name = \"qb_"),
+        "{text}"
+    );
 }
 
 #[test]

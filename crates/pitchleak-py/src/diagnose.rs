@@ -2,14 +2,17 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::source::Source;
 use crate::threads::detached;
-use pitchleak::diagnose::{Declared, Equation, PerEquation, Series, diagnose as engine_diagnose};
+use pitchleak::diagnose::{
+    Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
+};
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 /// What is left of each equation over time: name, time in s, residual in SI.
 type Residuals = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
-/// Fits traces of one rig together; gives JSON, text, the rig with the effects found, and residuals before
-/// and after.
+/// Fits traces of one rig together; gives JSON, text, the rig with the effects found, residuals before and after, and
+/// warnings.
 #[pyfunction]
 pub fn diagnose(
     py: Python<'_>,
@@ -17,14 +20,21 @@ pub fn diagnose(
     test: Vec<Source<'_>>,
     rig: &Rig,
     strict: bool,
-) -> PyResult<(String, String, Rig, Residuals, Residuals)> {
-    let read_all = |sources: &[Source<'_>]| -> PyResult<Vec<Series>> {
-        let read = |source: &Source<'_>| {
-            source.read(py, &rig.0, strict, |mut reader| Ok(Series::read(&mut reader)?))
-        };
-        sources.iter().map(read).collect()
+) -> PyResult<(String, String, Rig, Residuals, Residuals, Vec<String>)> {
+    let roles = Roles::of(&paths(&train), &paths(&test)).map_err(value_error)?;
+    let read_all = |sources: &[Source<'_>], once: &[PathBuf]| -> PyResult<Vec<Series>> {
+        let (mut traces, mut once) = (Traces::default(), once.iter().peekable());
+        for source in sources {
+            if let Source::Path(path) = source
+                && once.next_if_eq(&path).is_none()
+            {
+                continue;
+            }
+            source.read(py, &rig.0, strict, |mut reader| Ok(traces.read(&mut reader, &rig.0)?))?;
+        }
+        Ok(traces.into_series())
     };
-    let (train, test) = (read_all(&train)?, read_all(&test)?);
+    let (train, test) = (read_all(&train, &roles.fitted)?, read_all(&test, &roles.judged)?);
     let diagnosis = detached(py, || engine_diagnose(&train, &test, &Declared::of(&rig.0), &|| ()))?;
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
@@ -35,7 +45,13 @@ pub fn diagnose(
         saved,
         residuals(&diagnosis.before.residual_over_time),
         residuals(&diagnosis.after.residual_over_time),
+        roles.repeated.iter().map(ToString::to_string).collect(),
     ))
+}
+
+fn paths(sources: &[Source<'_>]) -> Vec<PathBuf> {
+    let path = |source: &Source<'_>| if let Source::Path(path) = source { Some(path.clone()) } else { None };
+    sources.iter().filter_map(path).collect()
 }
 
 fn residuals(over_time: &PerEquation<Vec<(f64, f64)>>) -> Residuals {

@@ -74,8 +74,22 @@ def test_diagnose_is_the_programs(program, tmp_path):
     assert len(found.plot().axes) == 3 and "coulomb_friction" in found._repr_html_()
     before, after = found.residuals_before["force_n"], found.residuals_after["force_n"]
     assert len(before.t_s) == len(before.residual) and np.std(after.residual) < 0.1 * np.std(before.residual)
-    assert pl.diagnose(path, test=[path]).effects[0].id == "coulomb_friction"
+    assert found.effects[0].confident and found.effects[0].doubt is None
+    assert found.wiring is None and found.samples.read == found.samples.fitted == len(read_columns(path)["t_s"])
+    assert pl.diagnose(path, test=[read_columns(path)]).effects[0].id == "coulomb_friction"
+    with pytest.raises(ValueError, match="both fitted and judged on"):
+        pl.diagnose(path, test=[path])
+    with pytest.warns(pl.TraceWarning, match="given twice"):
+        assert pl.diagnose([path, path]).raw == ours
     assert list(found.to_polars()["id"]) == [effect.id for effect in found.effects]
+
+
+def test_diagnose_names_a_mistake_of_wiring():
+    trace = pl.simulate(21, noise="0.3 %", duration=60, fault="swap qa qb")
+    found = pl.diagnose(trace.columns)
+    assert isinstance(found.wiring, pl.Wiring) and "qa and qb exchanged" in found.wiring.suggestion
+    assert found.wiring.residual_before > 3 * found.wiring.residual_after
+    assert found.effects == () and found.raw["wiring"]["suggestion"] in str(found)
 
 
 FORKED = """
@@ -83,7 +97,7 @@ import multiprocessing, sys
 import pitchleak as pl
 
 def diagnosed(path):
-    return pl.diagnose([path, path]).raw
+    return pl.diagnose([path]).raw
 
 if __name__ == "__main__":
     before = diagnosed(sys.argv[1])

@@ -3,6 +3,7 @@
 use super::series::Series;
 use crate::Rig;
 use crate::diagnose::thresholds::{LEAST_STEP_S, RESOLUTION};
+use crate::rig::Instruments;
 use pitchleak_core::{Cylinder, EffectSet, Fluid, SensorSpread, Sensors};
 
 /// What the rig file says, as the diagnosis uses it.
@@ -12,6 +13,8 @@ pub struct Declared {
     pub cylinder: Cylinder<f64>,
     /// Oil.
     pub fluid: Fluid<f64>,
+    /// Data sheets of the sensors.
+    pub instruments: Instruments,
     /// Noise, offsets and gains of the sensors.
     pub sensors: Sensors<f64>,
     /// Effects that are known already.
@@ -32,7 +35,9 @@ impl Declared {
         ] {
             spread.noise_std = spread.noise_std.max(RESOLUTION * sheet.full_scale);
         }
-        Self { cylinder: rig.cylinder, fluid: rig.fluid, sensors, effects: rig.effect_set() }
+        let (cylinder, fluid, instruments, effects) =
+            (rig.cylinder, rig.fluid, rig.instruments, rig.effect_set());
+        Self { cylinder, fluid, instruments, sensors, effects }
     }
 
     /// With the noise of means over `count` samples.
@@ -42,13 +47,18 @@ impl Declared {
         for spread in [flow_a, flow_b, pressure, position, force] {
             *spread = SensorSpread { noise_std: spread.noise_std / root, ..*spread };
         }
+        let Instruments { flow_a, flow_b, pressure, position, force } = &mut self.instruments;
+        for sheet in [flow_a, flow_b, pressure, position, force] {
+            sheet.accuracy /= root;
+        }
         self
     }
 }
 
 /// Traces at the speed of the machine, and what is declared of their means.
 pub(crate) fn thinned(traces: &[Series], declared: &Declared) -> (Vec<Series>, Declared) {
-    let thin: Vec<_> = traces.iter().map(|series| series.thinned(LEAST_STEP_S)).collect();
-    let count = thin.iter().map(|(_, count)| *count).min().unwrap_or(1);
-    (thin.into_iter().map(|(series, _)| series).collect(), declared.averaged(count))
+    let thin: Vec<_> = traces.iter().map(|series| series.thinned(series.samples_per(LEAST_STEP_S))).collect();
+    let merged = thin.iter().filter(|series| !series.is_empty()).map(|series| series.merged);
+    let count = 1 + merged.min().unwrap_or(0);
+    (thin, declared.averaged(count))
 }

@@ -1,12 +1,18 @@
 //! The traces and what is declared of them.
 
 mod declared;
+mod files;
 mod motion;
 mod sensor_noise;
 mod series;
+mod traces;
+mod wiring;
 
 pub use declared::Declared;
 pub(crate) use declared::thinned;
+pub use files::{FittedAndJudged, Roles, SameFile};
 pub(crate) use motion::Motion;
 pub(crate) use sensor_noise::{SensorCheck, check_sensors, effective};
 pub use series::Series;
+pub use traces::Traces;
+pub(crate) use wiring::miswired;

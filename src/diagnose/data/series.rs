@@ -1,7 +1,9 @@
 //! A trace as columns, cut into stretches without a gap.
 
+use crate::rig::ColumnMap;
 use crate::trace::{Record, TraceError, TraceReader};
 use pitchleak_core::Sample;
+use std::ops::Range;
 
 /// One trace in SI units. A flow or force is NaN where it was not measured: that balance rests there.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +26,12 @@ pub struct Series {
     pub force_n: Vec<f64>,
     /// Oil temperature, K.
     pub temp_k: Vec<f64>,
+    /// The columns of the file, as they were read; empty where there is none.
+    pub columns: ColumnMap,
+    /// Further samples of the recording in each one, which is their mean: none in the recording itself.
+    pub merged: usize,
+    /// Samples of the recording that are not held here.
+    pub left_out: u64,
 }
 
 /// A pause that cannot be mistaken for a step, s.
@@ -49,45 +57,97 @@ impl Series {
     pub fn read(reader: &mut TraceReader<'_>) -> Result<Self, TraceError> {
         let mut series = Self { name: reader.name().to_owned(), ..Self::default() };
         let mut record = Record::default();
-        // Time goes on over a restart of the clock, with a gap there.
         let mut t_s = 0.0;
         while reader.next_record(&mut record)? {
-            t_s += if record.after_gap { record.dt_s.max(GAP_S) } else { record.dt_s };
+            t_s += Self::step_to(&record);
             series.push(t_s, &record.sample, record.temperature_k);
         }
         Ok(series)
     }
 
-    /// Means over so many neighbours that a step lasts at least `least_s`: the machine moves slower
-    /// than that, and white noise falls with the root. A flow missing within is missing.
-    pub(crate) fn thinned(&self, least_s: f64) -> (Self, usize) {
-        let count = (least_s / self.step_s().max(1e-9) + 1e-6) as usize;
+    /// Time from the record before, s: it goes on over a restart of the clock, with a gap there.
+    pub(super) fn step_to(record: &Record) -> f64 {
+        if record.after_gap { record.dt_s.max(GAP_S) } else { record.dt_s }
+    }
+
+    /// The samples as records.
+    pub(super) fn records(&self) -> impl Iterator<Item = Record> + '_ {
+        let read = |value: f64| value.is_finite().then_some(value);
+        let longest = 1.5 * self.step_s();
+        (0..self.len()).map(move |at| {
+            let dt_s = if at == 0 { 0.0 } else { self.t_s[at] - self.t_s[at - 1] };
+            let sample = Sample {
+                x_m: self.x_m[at],
+                pa_pa: self.pa_pa[at],
+                pb_pa: self.pb_pa[at],
+                qa_m3s: read(self.qa_m3s[at]),
+                qb_m3s: read(self.qb_m3s[at]),
+                force_n: read(self.force_n[at]),
+            };
+            let after_gap = at == 0 || !(dt_s > 0.0 && dt_s <= longest);
+            Record { t_s: self.t_s[at], dt_s, after_gap, sample, ..Record::default() }
+        })
+    }
+
+    /// Neighbours whose mean lasts `least_s`.
+    pub(super) fn samples_per(&self, least_s: f64) -> usize {
+        (least_s / self.step_s().max(1e-9) + 1e-6) as usize
+    }
+
+    /// Means over `count` neighbours: where these are faster than the machine, nothing but white noise is lost. A flow
+    /// missing within is missing.
+    pub(super) fn thinned(&self, count: usize) -> Self {
         if count < 2 {
-            return (self.clone(), 1);
+            return self.clone();
         }
-        let mut thin = Self { name: self.name.clone(), ..Self::default() };
-        for range in self.stretches() {
-            for group in range.collect::<Vec<_>>().chunks_exact(count) {
-                let mean = |values: &[f64]| group.iter().map(|i| values[*i]).sum::<f64>() / count as f64;
-                let into = [
-                    (&mut thin.t_s, &self.t_s),
-                    (&mut thin.x_m, &self.x_m),
-                    (&mut thin.pa_pa, &self.pa_pa),
-                    (&mut thin.pb_pa, &self.pb_pa),
-                    (&mut thin.qa_m3s, &self.qa_m3s),
-                    (&mut thin.qb_m3s, &self.qb_m3s),
-                    (&mut thin.force_n, &self.force_n),
-                    (&mut thin.temp_k, &self.temp_k),
-                ];
-                into.into_iter().for_each(|(out, values)| out.push(mean(values)));
+        let mut thin = Self { merged: (self.merged + 1) * count - 1, ..self.like() };
+        for stretch in self.stretches() {
+            for start in stretch.clone().step_by(count) {
+                let group = start..start + count;
+                if group.end <= stretch.end {
+                    let mean = |values: &[f64]| values.iter().sum::<f64>() / count as f64;
+                    thin.append(self, group, |out, values| out.push(mean(values)));
+                }
             }
         }
-        (thin, count)
+        thin
+    }
+
+    /// A series without samples of the same trace.
+    pub(super) fn like(&self) -> Self {
+        let (name, columns) = (self.name.clone(), self.columns.clone());
+        Self { name, columns, merged: self.merged, left_out: self.left_out, ..Self::default() }
+    }
+
+    /// Adds all samples of `more`.
+    pub(super) fn extend(&mut self, more: &Self) {
+        self.merged = self.merged.min(more.merged);
+        self.append(more, 0..more.len(), |out, values| out.extend_from_slice(values));
+    }
+
+    /// Adds what `add` makes of each column's samples in `range`.
+    fn append(&mut self, from: &Self, range: Range<usize>, add: impl Fn(&mut Vec<f64>, &[f64])) {
+        let into = [
+            (&mut self.t_s, &from.t_s),
+            (&mut self.x_m, &from.x_m),
+            (&mut self.pa_pa, &from.pa_pa),
+            (&mut self.pb_pa, &from.pb_pa),
+            (&mut self.qa_m3s, &from.qa_m3s),
+            (&mut self.qb_m3s, &from.qb_m3s),
+            (&mut self.force_n, &from.force_n),
+            (&mut self.temp_k, &from.temp_k),
+        ];
+        into.into_iter().for_each(|(out, values)| add(out, &values[range.clone()]));
     }
 
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.t_s.len()
+    }
+
+    /// Samples of the recording that are held, each or as a mean.
+    pub fn held(&self) -> u64 {
+        self.len() as u64 * (self.merged as u64 + 1)
     }
 
     /// Whether there is no sample.

@@ -8,7 +8,7 @@ use super::regression::{Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
-use crate::diagnose::weak_form::{Linearisation, Term, WeakForm};
+use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
 
@@ -60,7 +60,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn declared(problem: &'a Problem<'a>, progress: Progress<'_>) -> Self {
         let constants = vec![problem.usual_constants; problem.terms.len()];
         let structure = Structure { active: problem.declared_terms(), constants };
-        Self::around(problem, structure, problem.start.clone(), PerEquation::default()).settled(progress)
+        Self::settled(problem, structure, problem.start.clone(), PerEquation::default(), progress)
     }
 
     /// Best fit with one more effect.
@@ -82,7 +82,7 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let (structure, at) = self.left_by(old);
         let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
-        Self::around(self.problem, structure, at, self.equation_error).settled(progress)
+        Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
@@ -101,14 +101,26 @@ impl<'a> Fit<'a> {
         old.iter().fold((self.structure.clone(), self.solved()), gone)
     }
 
-    /// One linearisation and its solution.
+    /// One linearisation and its solution, with the columns of all that could be fitted.
     fn around(
         problem: &'a Problem<'a>,
         structure: Structure,
         at: Linearisation,
         assumed_error: PerEquation<f64>,
     ) -> Self {
-        let columns = (problem.terms.as_slice(), structure.constants.as_slice());
+        let every: Vec<usize> = (0..problem.terms.len()).collect();
+        Self::with_columns(&every, problem, structure, at, assumed_error)
+    }
+
+    /// The same with the columns of some terms alone, all that are fitted among them.
+    fn with_columns(
+        places: &[usize],
+        problem: &'a Problem<'a>,
+        structure: Structure,
+        at: Linearisation,
+        assumed_error: PerEquation<f64>,
+    ) -> Self {
+        let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
         let weak_form = WeakForm::new(problem.traces, &problem.sensors, at, columns, assumed_error);
         let WeakForm { at, rows, whitening, .. } = &weak_form;
         let regression = Regression::new(rows, whitening, &weak_form.shared_noise(&problem.terms));
@@ -135,16 +147,27 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Linearises anew until a further time would change nothing that matters.
-    fn settled(mut self, progress: Progress<'_>) -> Self {
+    /// Linearises anew until a further time would change nothing that matters. Columns of what is not fitted cost
+    /// most and matter to candidates only: they are built once, at the end.
+    fn settled(
+        problem: &'a Problem<'a>,
+        structure: Structure,
+        at: Linearisation,
+        assumed_error: PerEquation<f64>,
+        progress: Progress<'_>,
+    ) -> Self {
+        let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
+            Self::with_columns(&structure.active, problem, structure.clone(), at, assumed_error)
+        };
+        let mut fit = round(at, assumed_error);
         for _ in 1..MOST_ROUNDS {
-            if self.has_converged() {
+            if fit.has_converged() {
                 break;
             }
             progress();
-            self = Self::around(self.problem, self.structure.clone(), self.solved(), self.equation_error);
+            fit = round(fit.solved(), fit.equation_error);
         }
-        self
+        Self::around(problem, structure, fit.weak_form.at, fit.assumed_error)
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and

@@ -5,6 +5,7 @@ use crate::diagnose::equation::Equation;
 use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FOLDS, PIECES};
 use crate::diagnose::weak_form::{Rows, SharedNoise, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 
 /// What is known of a term beside the data, as an increment from the linearisation.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +53,8 @@ impl Regression {
         let (y, columns, scale, grams, total) = (vec![], vec![], vec![], vec![], DMatrix::zeros(0, 0));
         let mut new = Self { piece_of, y, columns, scale, counted, grams, total };
         new.y = new.counting(whitening.whiten(&rows.y));
-        let columns = rows.columns.iter().map(|column| normalised(new.counting(whitening.whiten(column))));
-        (new.columns, new.scale) = columns.unzip();
+        let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
+        (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
         new.grams = new.products();
         for noise in shared {
             new.take_off(noise, whitening, 1.0 / shared.len() as f64);
@@ -84,9 +85,11 @@ impl Regression {
     fn products(&self) -> Vec<DMatrix<f64>> {
         let mut grams = vec![DMatrix::zeros(self.width(), self.width()); PIECES];
         let all = self.all();
-        for (a, left) in all.iter().enumerate() {
-            for (b, right) in all.iter().enumerate().take(a + 1) {
-                for (gram, sum) in grams.iter_mut().zip(self.by_piece(left, right)) {
+        let line = |a: usize| all[..=a].iter().map(|right| self.by_piece(all[a], right)).collect();
+        let lines: Vec<Vec<[f64; PIECES]>> = (0..all.len()).into_par_iter().map(line).collect();
+        for (a, line) in lines.into_iter().enumerate() {
+            for (b, sums) in line.into_iter().enumerate() {
+                for (gram, sum) in grams.iter_mut().zip(sums) {
                     gram[(a, b)] = sum;
                     gram[(b, a)] = sum;
                 }

@@ -122,7 +122,7 @@ mod tests {
     use crate::diagnose::equation::PerEquation;
     use crate::diagnose::fit::Problem;
     use crate::diagnose::testing::{declared, torn_seal};
-    use crate::diagnose::weak_form::{DECLARED, Term, WeakForm};
+    use crate::diagnose::weak_form::{Columns, DECLARED, Term, WeakForm};
     use nalgebra::DMatrix;
     use pitchleak_core::Effect;
 
@@ -131,7 +131,8 @@ mod tests {
         let (traces, declared) = ([torn_seal(20)], declared());
         let problem = Problem::new(&traces, &declared, &[]);
         let constants = vec![problem.usual_constants; problem.terms.len()];
-        let columns = (problem.terms.as_slice(), constants.as_slice());
+        let places: Vec<usize> = (0..problem.terms.len()).collect();
+        let columns = Columns { terms: &problem.terms, constants: &constants, places: &places };
         let start = problem.start.clone();
         let form = WeakForm::new(&traces, &problem.sensors, start, columns, PerEquation::default());
         test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));

@@ -17,7 +17,6 @@ pub struct FoundEffect {
     /// Whether the name can be believed: false while much is left that no effect explains.
     pub confident: bool,
     /// Why not.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub doubt: Option<&'static str>,
     /// By how much the held-out error of the balance it mends most falls when it is added.
     pub rmse_reduction_percent: f64,

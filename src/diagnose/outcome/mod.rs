@@ -8,7 +8,9 @@ pub use effects::{Calibration, FoundEffect, Interaction, Size};
 pub use leaks::{HoldLeak, Holds, LeakEstimate, LeakEstimates};
 pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
+use super::data::Series;
 use super::equation::PerEquation;
+use crate::wiring::Wiring;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -55,15 +57,36 @@ pub struct ModelFit {
     pub residual_over_time: PerEquation<Vec<(f64, f64)>>,
 }
 
+/// How much of the traces was fitted: all, or pieces evenly over those that are too long.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Samples {
+    /// Samples of the traces.
+    pub read: u64,
+    /// Those among them that were fitted.
+    pub fitted: u64,
+}
+
+impl Samples {
+    pub(super) fn of(traces: &[Series]) -> Self {
+        let fitted = traces.iter().map(Series::held).sum();
+        Self { read: fitted + traces.iter().map(|series| series.left_out).sum::<u64>(), fitted }
+    }
+}
+
 /// All that a diagnosis found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
+    /// How much was fitted.
+    pub samples: Samples,
     /// Best fit of the declared model.
     pub before: ModelFit,
     /// With the effects.
     pub after: ModelFit,
     /// The effects, strongest first.
     pub effects: Vec<FoundEffect>,
+    /// The mistake of wiring, sign or unit that explains the traces. Then no effect was looked for, unless the mistake
+    /// is one that a sensor's lag or offset might have done.
+    pub wiring: Option<Wiring>,
     /// Pairs of these effects that act on each other.
     pub interactions: Vec<Interaction>,
     /// Offsets and gains that the rig file declares possible, as found with the effects.

@@ -3,16 +3,19 @@
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::outcome::{
     BinnedResidual, Calibration, Diagnosis, EquationResidual, FoundEffect, Holds, Interaction, LeakEstimates,
-    Quality, Size, Verdict,
+    Quality, Samples, Size, Verdict,
 };
+use crate::wiring::Wiring;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 #[derive(Serialize)]
 struct Document<'a> {
     schema: &'static str,
+    samples: Samples,
     before: QualityFields<'a>,
     effects: &'a [FoundEffect],
+    wiring: Option<&'a Wiring>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     interactions: &'a [Interaction],
     after: QualityFields<'a>,
@@ -56,8 +59,10 @@ impl Serialize for Diagnosis {
         let PerEquation { chamber_a, chamber_b, force } = after.noise_ratio;
         Document {
             schema: "pitchleak.diagnose/1",
+            samples: self.samples,
             before: (&before.quality).into(),
             effects,
+            wiring: self.wiring.as_ref(),
             interactions,
             after: (&after.quality).into(),
             calibration,

@@ -1,10 +1,14 @@
 //! A diagnosis as text for people.
 
 use super::labels::{name, people_unit};
-use crate::diagnose::outcome::{Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, Verdict};
+use crate::diagnose::outcome::{Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, Samples, Verdict};
 use crate::diagnose::thresholds::CI95_SIGMA;
 use crate::units::LPM_PER_M3S as LPM;
+use crate::wiring::Wiring;
 use std::fmt::Write;
+
+/// Where less of the traces than this was fitted, they were fitted in pieces: ends that fill no mean aside.
+const PIECES_SHARE: f64 = 0.9;
 
 impl Verdict {
     /// What it says, in a sentence.
@@ -24,7 +28,11 @@ impl Verdict {
 impl Diagnosis {
     /// A few lines for people.
     pub fn to_text(&self) -> String {
-        let mut out = format!("{}\n", self.verdict.sentence());
+        let mut out = String::new();
+        match &self.wiring {
+            Some(wiring) => write_wiring(&mut out, wiring),
+            None => out = format!("{}\n", self.verdict.sentence()),
+        }
         self.effects.iter().for_each(|effect| write_effect(&mut out, effect));
         if self.verdict != Verdict::InsufficientExcitation {
             self.write_errors(&mut out);
@@ -32,6 +40,10 @@ impl Diagnosis {
             self.write_bins(&mut out);
             self.write_leaks(&mut out);
             self.write_holds(&mut out);
+        }
+        let Samples { read, fitted } = self.samples;
+        if (fitted as f64) < PIECES_SHARE * read as f64 {
+            let _ = writeln!(out, "note: fitted {fitted} of {read} samples: pieces, evenly over the traces");
         }
         for note in &self.notes {
             let _ = writeln!(out, "note: {note}");
@@ -88,6 +100,17 @@ impl Diagnosis {
             let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
         }
     }
+}
+
+/// Wiring comes before any verdict: what the channels say is wrong.
+fn write_wiring(out: &mut String, wiring: &Wiring) {
+    let _ = writeln!(out, "wiring: {}", wiring.suggestion);
+    if wiring.columns.is_empty() {
+        out.push_str("Mend the recording; until then no effect is worth looking for.\n");
+        return;
+    }
+    out.push_str("If so, mend it in the rig file and diagnose again:\n\n  [columns]\n");
+    wiring.columns.iter().for_each(|line| _ = writeln!(out, "  {line}"));
 }
 
 fn write_effect(out: &mut String, effect: &FoundEffect) {

@@ -1,6 +1,7 @@
 //! The rows of all traces around one linearisation, with their whitening.
 
-use super::hats::Integrand;
+use super::column::Steps;
+use super::hats::{ActiveTerm, Integrand};
 use super::linearisation::Linearisation;
 use super::noise_model::NoiseModel;
 use super::rows::Rows;
@@ -12,6 +13,7 @@ use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
+use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
 pub(crate) struct WeakForm<'a> {
@@ -19,23 +21,43 @@ pub(crate) struct WeakForm<'a> {
     sensors: &'a Sensors<f64>,
     pub(crate) at: Linearisation,
     motions: Vec<Motion>,
+    steps: OnceLock<Steps>,
     pub(crate) rows: Rows,
     pub(crate) whitening: Whitening,
 }
 
+/// Which columns are built.
+#[derive(Clone, Copy)]
+pub(crate) struct Columns<'a> {
+    pub(crate) terms: &'a [Term],
+    /// Of each term.
+    pub(crate) constants: &'a [EffectConstants<f64>],
+    /// Places of the terms that get a column; those of the others stay empty.
+    pub(crate) places: &'a [usize],
+}
+
+impl Columns<'_> {
+    fn integrand<'b>(&self, at: &'b Linearisation) -> Integrand<'b> {
+        let terms: Vec<Term> = self.places.iter().map(|place| self.terms[*place]).collect();
+        let constants: Vec<_> = self.places.iter().map(|place| self.constants[*place]).collect();
+        Integrand::new(at, &terms, &constants)
+    }
+}
+
 impl<'a> WeakForm<'a> {
-    /// A column for each of `terms` with its constants; `equation_error` as in [`NoiseModel`].
+    /// `equation_error` as in [`NoiseModel`].
     pub(crate) fn new(
         traces: &'a [Series],
         sensors: &'a Sensors<f64>,
         at: Linearisation,
-        (terms, constants): (&[Term], &[EffectConstants<f64>]),
+        columns: Columns<'_>,
         equation_error: PerEquation<f64>,
     ) -> Self {
         let motions = motions(traces, sensors, &at);
-        let rows = Rows::build(traces, &motions, &Integrand::new(&at, terms, constants), BLOCK_S);
+        let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
+        let rows = rows.at_places(columns.places, columns.terms.len());
         let whitening = Whitening::new(&rows, &NoiseModel { at: &at, sensors, equation_error });
-        Self { traces, sensors, at, motions, rows, whitening }
+        Self { traces, sensors, at, motions, steps: OnceLock::new(), rows, whitening }
     }
 
     /// The noise of these rows, had the equations this error.
@@ -51,9 +73,9 @@ impl<'a> WeakForm<'a> {
 
     /// The column of one term, whitened.
     pub(crate) fn white_column(&self, term: Term, constants: EffectConstants<f64>) -> Vec<f64> {
-        let integrand = Integrand::new(&self.at, &[term], &[constants]);
-        let rows = Rows::build(self.traces, &self.motions, &integrand, BLOCK_S);
-        rows.columns.first().map(|column| self.whitening.whiten(column)).unwrap_or_default()
+        let steps = self.steps.get_or_init(|| Steps::of(self.traces, &self.motions, &self.at, BLOCK_S));
+        let column = steps.column(&ActiveTerm::new(term, constants), &self.at, &self.rows);
+        self.whitening.whiten(&column)
     }
 }
 

@@ -92,12 +92,65 @@ impl Hats {
 /// What is integrated: the model's residual and the terms' columns around a linearisation.
 pub(crate) struct Integrand<'a> {
     pub(crate) at: &'a Linearisation,
-    terms: Vec<(Term, bool, EffectConstants<f64>)>,
+    terms: Vec<ActiveTerm>,
+}
+
+/// A term whose column is built.
+#[derive(Clone, Copy)]
+pub(super) struct ActiveTerm {
+    term: Term,
+    in_force: bool,
+    constants: EffectConstants<f64>,
+}
+
+impl ActiveTerm {
+    pub(super) fn new(term: Term, constants: EffectConstants<f64>) -> Self {
+        Self { term, in_force: term.in_force(), constants }
+    }
+}
+
+/// One step of a trace, corrected for the sensor effects of a linearisation.
+#[derive(Clone, Copy)]
+pub(super) struct Step {
+    dt_s: f64,
+    /// As the chambers see it: speed from the position.
+    seen: Signals<f64>,
+    /// As friction feels it.
+    felt: Signals<f64>,
+}
+
+impl Step {
+    /// The step that ends at sample `number`, and its readings as they are.
+    pub(super) fn ending_at(
+        number: usize,
+        series: &Series,
+        motion: &Motion,
+        at: &Linearisation,
+    ) -> (Self, Signals<f64>) {
+        let dt_s = series.t_s[number] - series.t_s[number - 1];
+        let means = mean_signals(series, motion, number, dt_s);
+        let felt = Signals { v_mps: means.felt_v_mps, ..means.reading };
+        let (seen, felt) = (at.effects.correct(&means.reading), at.effects.correct(&felt));
+        (Self { dt_s, seen, felt }, means.reading)
+    }
+
+    fn integral(&self, value: f64) -> f64 {
+        let integral = value * self.dt_s;
+        if integral.is_finite() { integral } else { 0.0 }
+    }
+
+    /// What one unit of a term leaves over, integrated.
+    pub(super) fn column(&self, active: &ActiveTerm, at: &Linearisation) -> PerEquation<f64> {
+        let ActiveTerm { term, in_force, constants } = active;
+        let mut unit = PerEquation::from(at.unit_term(*term, &self.seen, constants));
+        unit.force = if *in_force { at.unit_term(*term, &self.felt, constants).force_n } else { 0.0 };
+        unit.map(|value| self.integral(value))
+    }
 }
 
 impl<'a> Integrand<'a> {
     pub(crate) fn new(at: &'a Linearisation, terms: &[Term], constants: &[EffectConstants<f64>]) -> Self {
-        let terms = terms.iter().zip(constants).map(|(term, constants)| (*term, term.in_force(), *constants));
+        let terms = terms.iter().zip(constants).map(|(term, constants)| ActiveTerm::new(*term, *constants));
         Self { at, terms: terms.collect() }
     }
 
@@ -107,19 +160,14 @@ impl<'a> Integrand<'a> {
 
     /// Integrals over the step that ends at sample `number`, into `out`.
     pub(crate) fn step(&self, series: &Series, motion: &Motion, number: usize, out: &mut Integrals) {
-        let dt = series.t_s[number] - series.t_s[number - 1];
-        let seen = mean_signals(series, motion, number, dt);
-        let felt = Signals { v_mps: seen.felt_v_mps, ..seen.reading };
-        let reading = seen.reading;
-        let (seen, felt) = (self.at.effects.correct(&reading), self.at.effects.correct(&felt));
-        let over_step = |value: f64| if (value * dt).is_finite() { value * dt } else { 0.0 };
+        let (step, reading) = Step::ending_at(number, series, motion, self.at);
+        let Step { dt_s: dt, seen, felt } = step;
+        let over_step = |value: f64| step.integral(value);
         let mut residual = PerEquation::from(self.at.residual(&seen));
         residual.force = self.at.residual(&felt).force_n;
         out.residual = residual.map(over_step);
-        for ((term, in_force, constants), column) in self.terms.iter().zip(&mut out.columns) {
-            let mut unit = PerEquation::from(self.at.unit_term(*term, &seen, constants));
-            unit.force = if *in_force { self.at.unit_term(*term, &felt, constants).force_n } else { 0.0 };
-            *column = unit.map(over_step);
+        for (term, column) in self.terms.iter().zip(&mut out.columns) {
+            *column = step.column(term, self.at);
         }
         let missing = |value: f64| if value.is_finite() { 0.0 } else { dt };
         let unsure = felt.v_mps.is_nan() || felt.v_mps.abs() < motion.least_sure_mps();

@@ -1,6 +1,7 @@
 //! The equations integrated against hats at a linearisation, and the known noise of what they leave over.
 
 mod at_linearisation;
+mod column;
 mod hats;
 mod linearisation;
 mod noise_model;
@@ -9,7 +10,7 @@ mod shared_noise;
 mod terms;
 mod whitening;
 
-pub(crate) use at_linearisation::{WeakForm, residual_rows};
+pub(crate) use at_linearisation::{Columns, WeakForm, residual_rows};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise_model::NoiseModel;
 pub(crate) use rows::{Entry, Row, Rows};

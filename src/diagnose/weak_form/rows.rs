@@ -42,12 +42,39 @@ pub(crate) struct Rows {
     pub(crate) entries: Vec<Entry>,
     /// What the model leaves over at the linearisation.
     pub(crate) y: Vec<f64>,
-    /// One column per term.
+    /// One column per term; empty where it was not asked for.
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
 /// Numbers set aside for the stretches of one trace.
 const MOST_STRETCHES: usize = 1 << 32;
+/// Blocks that are integrated in one go: enough that the block before, which each part needs too, costs nothing, and
+/// few enough for all cores to have work.
+const PART_BLOCKS: usize = 512;
+
+/// Some samples of a stretch, of which all blocks but the first end a hat.
+pub(super) struct Part {
+    pub(super) trace: usize,
+    stretch: usize,
+    pub(super) samples: Range<usize>,
+    pub(super) samples_per_block: usize,
+}
+
+/// The parts of all traces. Each begins with the last block of the part before.
+pub(super) fn parts(traces: &[Series], block_s: f64) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for (trace, series) in traces.iter().enumerate() {
+        let samples_per_block = ((block_s / series.step_s().max(1e-9)).round() as usize).max(1);
+        for (stretch, range) in series.stretches().into_iter().enumerate() {
+            let stretch = trace * MOST_STRETCHES + stretch;
+            for from in range.clone().step_by(PART_BLOCKS * samples_per_block) {
+                let until = (from + (PART_BLOCKS + 1) * samples_per_block).min(range.end);
+                parts.push(Part { trace, stretch, samples: from..until, samples_per_block });
+            }
+        }
+    }
+    parts
+}
 
 impl Rows {
     /// The rows of all traces, in their order, on all cores; `motions` has one entry per trace, `block_s` is the
@@ -58,9 +85,12 @@ impl Rows {
         integrand: &Integrand<'_>,
         block_s: f64,
     ) -> Self {
-        let of_trace =
-            |(number, (series, motion))| Self::of_trace(number, series, motion, integrand, block_s);
-        let parts: Vec<Self> = traces.par_iter().zip(motions).enumerate().map(of_trace).collect();
+        let of_part = |part: &Part| {
+            let mut rows = Self::empty(integrand.width());
+            rows.add_part(&traces[part.trace], &motions[part.trace], part, integrand);
+            rows
+        };
+        let parts: Vec<Self> = parts(traces, block_s).par_iter().map(of_part).collect();
         let mut all = Self::empty(integrand.width());
         parts.into_iter().for_each(|part| all.append(part));
         all
@@ -70,20 +100,11 @@ impl Rows {
         Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
     }
 
-    fn of_trace(
-        number: usize,
-        series: &Series,
-        motion: &Motion,
-        integrand: &Integrand<'_>,
-        block_s: f64,
-    ) -> Self {
-        let mut rows = Self::empty(integrand.width());
-        let samples = ((block_s / series.step_s().max(1e-9)).round() as usize).max(1);
-        for (stretch, range) in series.stretches().into_iter().enumerate() {
-            let stretch = number * MOST_STRETCHES + stretch;
-            rows.add_stretch(series, motion, range, (stretch, samples), integrand);
-        }
-        rows
+    /// The same with its columns at these places among `count`.
+    pub(crate) fn at_places(self, places: &[usize], count: usize) -> Self {
+        let mut columns = vec![vec![]; count];
+        places.iter().zip(self.columns).for_each(|(place, column)| columns[*place] = column);
+        Self { columns, ..self }
     }
 
     fn append(&mut self, part: Self) {
@@ -96,16 +117,10 @@ impl Rows {
         }
     }
 
-    fn add_stretch(
-        &mut self,
-        series: &Series,
-        motion: &Motion,
-        range: Range<usize>,
-        (stretch, samples): (usize, usize),
-        integrand: &Integrand<'_>,
-    ) {
+    fn add_part(&mut self, series: &Series, motion: &Motion, part: &Part, integrand: &Integrand<'_>) {
         let mut hats = Hats::new(integrand.width());
         let mut step = Integrals::zero(integrand.width());
+        let (samples, range) = (part.samples_per_block, part.samples.clone());
         let mut in_block = 0;
         for at in range.clone() {
             if at > range.start {
@@ -119,7 +134,7 @@ impl Rows {
             }
             in_block = 0;
             if let Some(hat) = hats.end_block(samples) {
-                self.add_row(stretch, series.t_s[at + 1 - samples], samples, &hat);
+                self.add_row(part.stretch, series.t_s[at + 1 - samples], samples, &hat);
             }
         }
     }

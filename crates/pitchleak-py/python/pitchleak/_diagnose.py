@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _html, _inputs, _pitchleak
+from ._check import Wiring
 from ._pitchleak import Rig
 from ._records import record
 from ._tabular import Tabular, optional
@@ -50,6 +51,10 @@ class Effect:
     """Standard deviation of it."""
     unit: str
     """SI; 1 for a share."""
+    confident: bool = False
+    """Whether the name can be believed."""
+    doubt: str | None = None
+    """Why not."""
     rmse_reduction_percent: float | None = None
     """By how much the held-out error of the balance it mends most falls, %."""
     p_value: float | None = None
@@ -62,6 +67,76 @@ class Effect:
     """When this is the cause."""
     remedy: str = ""
     """What to do about it."""
+    shape: dict[str, float] = field(default_factory=dict)
+    """Constants in which the effect is not linear, as fitted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interaction:
+    """Two effects that act on each other."""
+
+    effects: tuple[str, ...]
+    """The two."""
+    sigma: float
+    """Score of the product of their terms, in standard deviations."""
+    mended_percent: float
+    """Share of the whitened sum of squares that it would mend, %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A sensor's error that the rig file declares possible, as these traces show it."""
+
+    id: str
+    """Name as in the table of effects."""
+    value: float
+    """Its size, in ``unit``."""
+    std: float
+    """Standard deviation of it."""
+    unit: str
+    """SI; 1 for a share."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoldLeak:
+    """Flow that leaves one chamber while the piston stands, and what motion predicts for it."""
+
+    count: int
+    """Holds of 1 s."""
+    mean_pressure_pa: float
+    """Mean pressure in them, Pa."""
+    leak_m3s: float
+    """Mean leak flow, m³/s."""
+    std_m3s: float
+    """Its standard deviation, m³/s."""
+    predicted_before_m3s: float
+    """The same flow from the declared model, fitted to what moves."""
+    predicted_before_std_m3s: float
+    """Its standard deviation, m³/s."""
+    predicted_after_m3s: float
+    """The same with the effects found."""
+    predicted_after_std_m3s: float
+    """Its standard deviation, m³/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Holds:
+    """Leaks at rest against those found in motion; None for a chamber never held under pressure."""
+
+    chamber_a: HoldLeak | None
+    """Out of chamber A."""
+    chamber_b: HoldLeak | None
+    """Out of chamber B."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """How much of the traces was fitted: all, or pieces evenly over those that are too long."""
+
+    read: int
+    """Samples of the traces."""
+    fitted: int
+    """Those among them that were fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +219,16 @@ class Diagnosis(Tabular):
     """The answer."""
     notes: tuple[str, ...] = ()
     """What speaks for it."""
+    wiring: Wiring | None = None
+    """The mistake of wiring, sign or unit that explains the traces; then no effect is worth looking for."""
+    interactions: tuple[Interaction, ...] = ()
+    """Effects that act on each other."""
+    calibration: tuple[Calibration, ...] = ()
+    """Offsets and gains that the rig file declares possible, as found with the effects."""
+    holds: Holds | None = None
+    """Leaks while the piston stands, against those found in motion; None without such holds."""
+    samples: Samples | None = None
+    """How much was fitted."""
     raw: dict[str, Any] = field(init=False, default_factory=dict)
     """Every field of ``pitchleak diagnose --json``."""
     rig: Rig = field(init=False)
@@ -157,7 +242,7 @@ class Diagnosis(Tabular):
     @property
     def table(self) -> Mapping[str, Any]:
         """A row per effect."""
-        names = ("id", "value", "std", "unit", "rmse_reduction_percent", "p_value")
+        names = ("id", "value", "std", "unit", "confident", "rmse_reduction_percent", "p_value")
         columns: dict[str, Any] = {name: [getattr(e, name) for e in self.effects] for name in names}
         return columns | {"confusable_with": [", ".join(effect.confusable_with) for effect in self.effects]}
 
@@ -212,7 +297,8 @@ def diagnose(
     """Finds the physical effect that the model lacks.
 
     ``data`` is a trace as :func:`replay` takes it, or a list of traces of one rig that are fitted
-    together; ``test`` are the traces to judge on, else blocks that each fit leaves out.
+    together; ``test`` are the traces to judge on, else blocks that each fit leaves out. A file that is in both is a
+    ``ValueError``; one that is given twice is read once, with a :class:`TraceWarning`.
 
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, effects={"viscous_friction": 3000.0}, noise="0.1 %", duration=60)
@@ -228,7 +314,8 @@ def diagnose(
     rig = _inputs.rig_for(train[0], rig)
     fitted = [_inputs.source(trace, rig) for trace in train]
     judged = [_inputs.source(trace, rig) for trace in judged_on]
-    report, text, found_rig, before, after = _pitchleak.diagnose(fitted, judged, rig, strict)
+    report, text, found_rig, before, after, warnings = _pitchleak.diagnose(fitted, judged, rig, strict)
+    _inputs.warn(warnings)
     raw = json.loads(report)
     result = record(Diagnosis, raw)
     courses = [
