@@ -196,7 +196,8 @@ fn traces_to_judge_on_are_not_fitted() {
 /// A unit mistaken is no gain of 9: it is named, and no effect is looked for.
 #[test]
 fn mistakes_of_wiring_are_named_instead_of_effects() {
-    let mistakes: [(&str, fn(&mut Series)); 3] = [
+    type Make = fn(&mut Series);
+    let mistakes: [(&str, Make); 3] = [
         ("qa and qb exchanged", |s| std::mem::swap(&mut s.qa_m3s, &mut s.qb_m3s)),
         ("the sign of qa turned", |s| s.qa_m3s.iter_mut().for_each(|q| *q = -*q)),
         ("x divided by 2.54", |s| s.x_m.iter_mut().for_each(|x| *x *= 2.54)),
