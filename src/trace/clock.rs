@@ -53,8 +53,7 @@ impl Clock {
             return Step::First;
         };
         let dt_s = t_s - last_s;
-        // False for a NaN too.
-        if !(dt_s >= LEAST_STEP_S) {
+        if dt_s < LEAST_STEP_S || dt_s.is_nan() {
             return self.back(t_s, last_s);
         }
         self.rows_back = 0;
