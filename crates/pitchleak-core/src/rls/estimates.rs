@@ -146,7 +146,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Weights of the offsets found in `flows`·offsets + `pressures`·biases (SI), m³/s or Pa per prior unit.
     fn per_offset(&self, [flow_a, flow_b]: [T; 2], [share_a, share_b]: [T; 2]) -> [T; 2] {
         let [[aa, ab], [ba, bb]] = self.offsets.pressure_per_offset;
-        let bias_pa = self.sensors_now().pressure.bias_std;
+        let bias_pa = self.zeros.now().pressure.bias_std;
         let [unit_a, unit_b] = OFFSETS.map(|o| self.scale.get(o as usize).copied().unwrap_or(T::zero()));
         [
             flow_a * unit_a + bias_pa * (share_a * aa + share_b * ba),
@@ -166,7 +166,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let [[aa, ab], [ba, bb]] = self.offsets.pressure_spread;
         let [share_a, share_b] = pressures;
         let hidden = share_a * share_a * aa + share_a * share_b * (ab + ba) + share_b * share_b * bb;
-        let bias_pa = self.sensors_now().pressure.bias_std;
+        let bias_pa = self.zeros.now().pressure.bias_std;
         let variance = found.max(T::zero()) + bias_pa * bias_pa * hidden.max(T::zero());
         Estimate { value: per_a * mean_a + per_b * mean_b, std: variance.sqrt() }
     }
@@ -247,7 +247,7 @@ mod tests {
     fn offsets(rls: &Rls<f64, 6>) -> (Vector2<f64>, Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
         let mean = OFFSETS.map(|o| rls.parameter(o).value / rls.scale[o as usize]);
         let covariance = Matrix2::from_fn(|i, j| rls.covariance(OFFSETS[i], OFFSETS[j]));
-        let bias_pa = rls.sensors.pressure.bias_std;
+        let bias_pa = rls.zeros.pressure.bias_std;
         let per_offset = rls.offsets.pressure_per_offset;
         let hidden = rls.offsets.pressure_spread;
         (

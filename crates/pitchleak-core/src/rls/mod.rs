@@ -34,7 +34,7 @@ mod prior;
 mod trend;
 mod update;
 mod weights;
-mod zero_drift;
+mod zeros;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use balance::{Equation, Integrals, combine};
@@ -56,7 +56,7 @@ use pressure_means::PressureMeans;
 use prior::{offset_units, prior_spread};
 pub use update::{Innovation, Update};
 use weights::Weights;
-use zero_drift::ZeroDrift;
+use zeros::Zeros;
 
 /// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
 const AVERAGING_S: f64 = 60.0;
@@ -103,12 +103,11 @@ pub struct Rls<T, const N: usize> {
     cylinder: Cylinder<T>,
     noise: NoiseStd<T>,
     settings: RlsSettings<T>,
-    sensors: Sensors<T>,
     compressibility: T,
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     scale: [T; N],
     offsets: OffsetPrior<T>,
-    drift: ZeroDrift<T>,
+    zeros: Zeros<T>,
     last: Option<Sample<T>>,
     both: Weights<T>,
     only_a: Weights<T>,
@@ -158,18 +157,18 @@ impl<T: Real, const N: usize> Rls<T, N> {
         error::check(&cylinder, &fluid, sensors, &settings)?;
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
-        let offsets = OffsetPrior::new(&cylinder, sensors, offset_units(&cylinder, sensors), &no_leak);
+        let zeros = Zeros::of(sensors);
+        let offsets = OffsetPrior::new(&cylinder, &zeros, offset_units(&cylinder, &zeros), &no_leak);
         let solution =
             Information::new().solve(&Prior { mean_0: T::zero(), offsets: &offsets.information }).solution();
         Ok(Self {
             cylinder,
             noise,
             settings,
-            sensors: *sensors,
             compressibility: T::one() / fluid.bulk_modulus_pa,
             scale: prior_spread(&cylinder, &fluid, sensors),
             offsets,
-            drift: ZeroDrift::default(),
+            zeros,
             last: None,
             both: Weights::both(&cylinder, &noise, &no_leak),
             only_a: Weights::only_a(&cylinder, &noise, &no_leak),
@@ -329,12 +328,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             return [T::zero(); 2];
         }
         let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
-        self.drift.advance(self.unlearnt_s, &self.cylinder, &self.sensors, &leaks)
-    }
-
-    /// The sensors, as far off as they may have drifted by now.
-    fn sensors_now(&self) -> Sensors<T> {
-        self.drift.widened(&self.sensors)
+        self.zeros.advance(self.unlearnt_s, &self.cylinder, &leaks)
     }
 
     /// Nothing is to be learnt from; `blocks` count as if they had been there.
@@ -454,8 +448,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if N > Parameter::OffsetB as usize {
             self.offsets = OffsetPrior::new(
                 &self.cylinder,
-                &self.sensors_now(),
-                offset_units(&self.cylinder, &self.sensors),
+                &self.zeros.now(),
+                offset_units(&self.cylinder, &self.zeros),
                 &leaks,
             );
         }

@@ -1,4 +1,5 @@
-use crate::{Cylinder, PerLeak, Real, Sensors};
+use super::zeros::Zeros;
+use crate::{Cylinder, PerLeak, Real};
 
 /// What is known beforehand of the two offsets that the continuity equations of a leaking cylinder show.
 ///
@@ -20,17 +21,17 @@ pub(super) struct OffsetPrior<T> {
 }
 
 impl<T: Real> OffsetPrior<T> {
-    /// Of `sensors` as far off as they may be by now; `units` of the offsets, m³/s.
+    /// Of `zeros` as far off as they may be by now; `units` of the offsets, m³/s.
     pub fn new(
         cylinder: &Cylinder<T>,
-        sensors: &Sensors<T>,
+        zeros: &Zeros<T>,
         [unit_a, unit_b]: [T; 2],
         leaks: &PerLeak<T>,
     ) -> Self {
         let floor = T::lit(1e-9) * cylinder.area_a_m2 * cylinder.stroke_m;
         let square = |bias: T, unit: T| (bias.max(floor) / unit) * (bias.max(floor) / unit);
-        let (d_a, d_b) = (square(sensors.flow_a.bias_std, unit_a), square(sensors.flow_b.bias_std, unit_b));
-        let (to_a, to_b) = (sensors.pressure.bias_std / unit_a, sensors.pressure.bias_std / unit_b);
+        let (d_a, d_b) = (square(zeros.flow_a.bias_std, unit_a), square(zeros.flow_b.bias_std, unit_b));
+        let (to_a, to_b) = (zeros.pressure.bias_std / unit_a, zeros.pressure.bias_std / unit_b);
         let c = leaks.internal;
         let j = [[(c + leaks.external_a) * to_a, -c * to_a], [-c * to_b, (c + leaks.external_b) * to_b]];
         let [[aa, ab], [ba, bb]] = j;
@@ -63,6 +64,7 @@ fn product<T: Real>(a: &[[T; 2]; 2], b: &[[T; 2]; 2]) -> [[T; 2]; 2] {
 mod tests {
     use super::super::prior::offset_units;
     use super::*;
+    use crate::Sensors;
     use nalgebra::Matrix2;
 
     fn matrix(m: [[f64; 2]; 2]) -> Matrix2<f64> {
@@ -76,9 +78,10 @@ mod tests {
         sensors.flow_a.bias_std = 2e-6;
         sensors.flow_b.bias_std = 3e-6;
         sensors.pressure.bias_std = 9e4;
+        let zeros = Zeros::of(&sensors);
         let leaks = PerLeak { internal: 5e-11, external_a: 7e-12, external_b: 2e-12 };
-        let prior = OffsetPrior::new(&cylinder, &sensors, offset_units(&cylinder, &sensors), &leaks);
-        let unit = Matrix2::from_diagonal(&offset_units(&cylinder, &sensors).into());
+        let prior = OffsetPrior::new(&cylinder, &zeros, offset_units(&cylinder, &zeros), &leaks);
+        let unit = Matrix2::from_diagonal(&offset_units(&cylinder, &zeros).into());
         let j = Matrix2::new(5.7e-11, -5e-11, -5e-11, 5.2e-11) * 9e4;
         let meters = Matrix2::new(4e-12, 0.0, 0.0, 9e-12);
         let information = (meters + j * j.transpose()).try_inverse().unwrap();
@@ -96,9 +99,9 @@ mod tests {
         sensors.flow_b.bias_std = 2e-6;
         sensors.pressure.bias_std = 9e4;
         let cylinder = Cylinder::paper();
-        let prior =
-            OffsetPrior::new(&cylinder, &sensors, offset_units(&cylinder, &sensors), &PerLeak::default());
-        let [unit, _] = offset_units(&cylinder, &sensors);
+        let zeros = Zeros::of(&sensors);
+        let prior = OffsetPrior::new(&cylinder, &zeros, offset_units(&cylinder, &zeros), &PerLeak::default());
+        let [unit, _] = offset_units(&cylinder, &zeros);
         assert!((prior.information[0][0] * (2e-6 / unit).powi(2) - 1.0).abs() < 1e-12);
         assert!(matrix(prior.pressure_per_offset).norm() < 1e-12);
         assert!((matrix(prior.pressure_spread) - Matrix2::identity()).norm() < 1e-12);

@@ -1,3 +1,4 @@
+use super::zeros::Zeros;
 use crate::{Cylinder, Fluid, Real, Sensors};
 
 /// Prior standard deviation of each parameter, SI; of the offsets only the unit that they are counted in
@@ -12,7 +13,7 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
     let tiny = T::lit(1e-9);
     let leak = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(8e3) / fluid.bulk_modulus_pa;
     let relative = (fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa).max(T::lit(1e-6));
-    let [offset_a, offset_b] = offset_units(cylinder, sensors);
+    let [offset_a, offset_b] = offset_units(cylinder, &Zeros::of(sensors));
     let all = [
         relative / fluid.bulk_modulus_pa,
         leak,
@@ -33,10 +34,10 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
 
 /// Units of the offsets of chambers A and B, m³/s: the meter's bias and what it drifts in an hour, and what the pressures' bias drives
 /// through a leak that empties the cylinder in 20 s at 1 MPa.
-pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, sensors: &Sensors<T>) -> [T; 2] {
+pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, zeros: &Zeros<T>) -> [T; 2] {
     let volume = cylinder.area_a_m2 * cylinder.stroke_m;
-    let through_leak = volume * T::lit(5e-8) * sensors.pressure.bias_std;
-    [sensors.flow_a, sensors.flow_b].map(|meter| {
+    let through_leak = volume * T::lit(5e-8) * zeros.pressure.bias_std;
+    [zeros.flow_a, zeros.flow_b].map(|meter| {
         meter.bias_std.libm_hypot(meter.drift_std_ph).libm_hypot(through_leak).max(T::lit(1e-9) * volume)
     })
 }
