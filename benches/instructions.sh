@@ -26,7 +26,7 @@ done <<END
 paper-law 61
 paper 113
 rls 700
-rls-offsets 1280
-rls-gains 2480
+rls-offsets 1290
+rls-gains 2520
 END
 exit $failed

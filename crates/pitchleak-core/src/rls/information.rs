@@ -149,7 +149,7 @@ impl<T: Real, const N: usize> Information<T, N> {
     /// Posterior mean, and what its covariance follows from: the factors of A = M + prior.
     ///
     /// Noise in column 0 (errors in variables) is taken out of A and of the vector.
-    #[inline(never)] // once in the flash, not for each caller
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn solve(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
         let factors = self.factor(prior.offsets);
         Posterior { mean: factors.solve(self.vector, prior.mean_0), factors }

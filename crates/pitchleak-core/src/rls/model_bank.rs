@@ -298,7 +298,7 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
 
 /// Takes a block into leaks that stay; gives what is known then, ln of the block's probability and the growth of the
 /// determinant.
-#[inline(never)] // once in the flash, not for each caller
+#[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
 fn update_levels<T: Real, const N: usize>(
     information: &mut Information<T, N>,
     block: &Block<T, N>,
@@ -316,7 +316,7 @@ fn update_levels<T: Real, const N: usize>(
     (levels, gain, growth)
 }
 
-#[inline(never)]
+#[cfg_attr(target_os = "none", inline(never))]
 fn update_trend<T: Real, const N: usize>(
     trend: &mut Trend<T, N>,
     block: &Block<T, N>,

@@ -137,7 +137,7 @@ impl<T: Real, const N: usize> Trend<T, N> {
     }
 
     /// The levels' information with the slopes eliminated (Schur complement), and how the slopes follow.
-    #[inline(never)] // once in the flash, not for each caller
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn eliminate_slopes(&self) -> (Information<T, N>, Elimination<T, N>) {
         let (root, pivots) = self.slope_root();
         let mut half = self.cross;
