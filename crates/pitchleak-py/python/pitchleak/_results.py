@@ -180,8 +180,8 @@ class Trend:
     std: float
     """Standard deviation of its error, L/min per hour."""
     reaches_threshold_in_s: ReachTime | None
-    """Time from the trace's end until the leak is at its alarm's threshold if it goes on like this; None where it is there
-    already, or does not grow beyond doubt."""
+    """Time from the trace's end until the leak is at its alarm's threshold if it goes on like this; None where it is
+    there already, or does not grow beyond doubt."""
 
 
 @dataclass(frozen=True, slots=True)
