@@ -65,8 +65,8 @@ pub struct ChannelFault {
 
 /// Rows of a piece; the first pieces are looked at whole, then one of so many.
 const PIECE_ROWS: u64 = 512;
-const WHOLE_PIECES: u64 = 32;
-const PIECES: u64 = 8;
+const WHOLE_PIECES: u64 = 16;
+const PIECES: u64 = 16;
 
 /// The channels that are watched.
 const CHANNELS: [Signal; 6] =

@@ -11,8 +11,9 @@ const USUAL_STEPS: f64 = 10.0;
 const NOISE_STDS: f64 = 8.0;
 /// Wild rows in a row that are left out at the most.
 const MOST_IN_A_ROW: u32 = 2;
-/// Steps over which the usual one is averaged; as long, at first, every reading is taken.
-const MEMORY: u32 = 64;
+/// Steps over which the usual one is averaged; as long, at first, every reading is taken. Later one of so many is enough.
+const MEMORY: u64 = 64;
+const THINNED: u64 = 4;
 
 const CHANNELS: usize = 5;
 
@@ -23,7 +24,9 @@ pub(super) struct Spikes {
     last: [f64; CHANNELS],
     usual_step: [f64; CHANNELS],
     least_wild: [f64; CHANNELS],
-    seen: u32,
+    /// The smallest wild step.
+    wild_step: [f64; CHANNELS],
+    seen: u64,
     in_a_row: u32,
     /// Time of the rows left out since the last one taken, s.
     left_out_s: f64,
@@ -36,6 +39,7 @@ impl Spikes {
         Self {
             last: [0.0; CHANNELS],
             usual_step: [0.0; CHANNELS],
+            wild_step: [f64::INFINITY; CHANNELS],
             least_wild: spreads.map(|spread| NOISE_STDS * spread.noise_std),
             seen: 0,
             in_a_row: 0,
@@ -52,33 +56,53 @@ impl Spikes {
         let now = [s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap_or(last_a), s.qb_m3s.unwrap_or(last_b)];
         let mut steps = now;
         let mut wild = false;
-        let known = self.last.iter().zip(&self.usual_step).zip(&self.least_wild);
-        for (step, ((last, usual_step), least_wild)) in steps.iter_mut().zip(known) {
+        for ((step, last), wild_step) in steps.iter_mut().zip(&self.last).zip(&self.wild_step) {
             *step = (*step - last).abs();
-            wild |= *step > USUAL_STEPS * usual_step + least_wild;
+            wild |= *step > *wild_step;
         }
-        if record.after_gap || record.dt_s <= 0.0 {
-            self.last = now;
-            return false;
+        if (wild || self.in_a_row > 0) && self.is_spike(wild, record) {
+            return true;
         }
-        if wild && self.seen >= MEMORY && self.in_a_row < MOST_IN_A_ROW {
+        self.last = now;
+        self.seen += 1;
+        if self.seen <= MEMORY || self.seen.is_multiple_of(THINNED) {
+            self.learn(&steps, record);
+        }
+        false
+    }
+
+    /// Whether a record that steps away, or follows one that did, is to be left out.
+    #[cold]
+    fn is_spike(&mut self, wild: bool, record: &Record) -> bool {
+        let follows = !record.after_gap && record.dt_s > 0.0;
+        if wild && follows && self.in_a_row < MOST_IN_A_ROW {
             self.in_a_row += 1;
             self.rows += 1;
             self.left_out_s += record.dt_s;
             return true;
         }
-        if self.in_a_row > 0 {
-            // What stays is no spike.
-            self.rows -= if wild { u64::from(self.in_a_row) } else { 0 };
-            self.in_a_row = 0;
+        // What stays is no spike.
+        self.rows -= if wild { u64::from(self.in_a_row) } else { 0 };
+        self.in_a_row = 0;
+        false
+    }
+
+    /// What is usual.
+    fn learn(&mut self, steps: &[f64; CHANNELS], record: &Record) {
+        if record.after_gap || record.dt_s <= 0.0 {
+            return;
         }
-        self.seen = (self.seen + 1).min(MEMORY);
-        let share = 1.0 / f64::from(self.seen);
+        let share = 1.0 / self.seen.min(MEMORY) as f64;
         for (usual_step, step) in self.usual_step.iter_mut().zip(steps) {
             *usual_step += share * (step - *usual_step);
         }
-        self.last = now;
-        false
+        if self.seen >= MEMORY {
+            for ((wild, usual), least) in
+                self.wild_step.iter_mut().zip(&self.usual_step).zip(&self.least_wild)
+            {
+                *wild = USUAL_STEPS * usual + least;
+            }
+        }
     }
 
     /// The time that the rows left out before this one stood for, s; it is then forgotten.

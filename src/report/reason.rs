@@ -97,8 +97,10 @@ const NEGATIVE_SIGMAS: f64 = 3.0;
 /// χ² by which a leak has to explain the trace better than zeros that are off: one of 2 % of full scale costs 4.
 const LEAK_OVER_ZEROS: f64 = 4.0;
 /// Zeros that would have to be off by more than this, as shares of full scale, both meters together (root of the sum of
-/// squares), are not: a leak through an orifice would pass for them otherwise.
+/// squares), for a leak that is larger than one zero may be off, are not: a leak through an orifice would pass for them
+/// otherwise.
 const ZEROS_AT_MOST: f64 = 0.023;
+const ZERO_AT_MOST: f64 = 0.02;
 
 /// What contradicts the model or the sensors, the likeliest cause first.
 pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
@@ -219,7 +221,10 @@ fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
         .find(|leak| findings.active[*leak] && zeros.for_leak[*leak] < LEAK_OVER_ZEROS)?;
     let offsets = zeros.offsets_without_m3s[leak].map(|offset| offset.scaled(LPM_PER_M3S));
     let share = |(offset, full_scale): (&Estimate<f64>, f64)| (offset.value / full_scale).powi(2);
-    if offsets.iter().zip(findings.meters_lpm).map(share).sum::<f64>() > ZEROS_AT_MOST.powi(2) {
+    let zeros_share = offsets.iter().zip(findings.meters_lpm).map(share).sum::<f64>().sqrt();
+    let [a, b] = findings.meters_lpm;
+    let leak_share = findings.leakage[leak].mean_lpm / a.min(b);
+    if zeros_share > ZEROS_AT_MOST && leak_share > ZERO_AT_MOST {
         return None;
     }
     let off = offsets.iter().zip(["qa", "qb"]).filter(|(offset, _)| offset.value.abs() > 2.0 * offset.std);
