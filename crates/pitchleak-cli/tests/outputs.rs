@@ -53,6 +53,8 @@ fn no_command_writes_over_what_it_reads() {
     let at = folder.path();
     symlink(at.join("t.csv"), at.join("link.csv")).unwrap();
     fs::hard_link(at.join("t.csv"), at.join("hard.csv")).unwrap();
+    fs::copy(at.join("t.csv"), at.join("other.csv")).unwrap();
+    symlink(at.join("other.csv"), at.join("other-link.csv")).unwrap();
     fs::copy(at.join("t.csv"), at.join("gz.csv.gz")).unwrap();
     fs::copy(at.join("t.csv"), at.join("truth.json")).unwrap();
     fs::copy(at.join("r.toml"), at.join("rig.csv")).unwrap();
@@ -66,7 +68,8 @@ fn no_command_writes_over_what_it_reads() {
         "replay t.csv --rig rig.csv --out rig.csv",
         "diagnose t.csv --save-rig t.csv",
         "diagnose t.csv --rig r.toml --save-rig r.toml",
-        "diagnose t.csv --test hard.csv --save-rig link.csv",
+        "diagnose t.csv --test other.csv --save-rig other-link.csv",
+        "diagnose other.csv --test hard.csv --save-rig link.csv",
         "simulate --position x.csv --load 0 --out x.csv",
         "simulate --position 0.1 --load 0 --rig rig.csv --out rig.csv",
         "simulate --position 0.1 --load 0 --oil-temp t.csv --out t.csv",
