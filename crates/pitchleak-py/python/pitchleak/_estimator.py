@@ -22,7 +22,7 @@ class Estimator(_pitchleak.Estimator):
     >>> trace = pl.simulate(wind=13, leak_external_a="0.5 L/min", duration=10)
     >>> est = pl.Estimator(pl.Rig.paper())
     >>> est.extend(trace.columns)
-    39
+    19
     >>> est.state().estimates == pl.replay(trace.columns).estimates
     True
     >>> pl.Estimator.from_bytes(est.saved()).state() == est.state()
