@@ -88,7 +88,7 @@ impl Default for ChannelMonitor {
 }
 
 impl ChannelMonitor {
-    /// Takes in one record. Of a long trace one piece in [`PIECES`] is looked at: a fault that lasts is in it.
+    /// Takes in one record. Of a long trace one piece in a few is looked at: a fault that lasts is in it.
     #[inline]
     pub fn add(&mut self, record: &Record) {
         let piece = self.rows / PIECE_ROWS;

@@ -89,6 +89,8 @@ def test_missing_flows_rest_whatever_they_are_written_as(columns, rig):
     assert pl.replay(masked, rig).raw == expected.raw
 
 
+# Whole litres per minute jump like spikes, and are left out as such, in all three.
+@pytest.mark.filterwarnings("ignore:.*spike")
 def test_whole_numbers_and_single_precision_are_numbers(columns, rig):
     rounded = {name: np.round(values) for name, values in columns.items()} | {"t_s": columns["t_s"]}
     expected = pl.replay(rounded, rig)
