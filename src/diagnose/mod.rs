@@ -49,7 +49,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let problem = Problem::new(&train, &declared, &checks);
     let plain = Fit::declared(&problem, progress);
     let before = model_fit(&plain, &test);
-    let (excited, excess_before) = (assess::is_excited(&plain), plain.excess_power());
+    let excited = assess::is_excited(&plain);
     let miswired = data::miswired(&train, &declared);
     let beyond_effects = miswired.as_ref().is_some_and(|found| found.is_beyond_effects);
     let selection = if excited && !beyond_effects {
@@ -58,7 +58,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let judgement = assess::judge(&selection, excited, excess_before, &checks);
+    let judgement = assess::judge(&selection, excited, &checks);
     let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
@@ -66,13 +66,13 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let interactions = search::interactions(fit, effects);
     Diagnosis {
         samples: Samples::of(&train),
-        effects: effects.iter().filter_map(|one| assess::found(fit, one, judgement.confident)).collect(),
+        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &checks)).collect(),
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },
         wiring: wiring.map(|found| found.wiring),
         notes: assess::notes(
-            fit,
+            &selection,
             judgement.complaints,
             &before,
             (!effects.is_empty()).then_some(&after),

@@ -70,6 +70,9 @@ pub(crate) const DERIVATIVE_STEP: f64 = 1e-2;
 /// half as much as one of them.
 pub(crate) const NOISE_DRAWS: u64 = 4;
 
+/// At most this share of what is new in a column counts as noise of its own. Chosen: beyond a half the correction is a guess.
+pub(crate) const MOST_NOISE_SHARE: f64 = 0.5;
+
 // The fit.
 
 /// The oil stays within so many standard deviations of its prior, and at this share of 1/β at least: what is softer
@@ -141,9 +144,17 @@ pub(crate) const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
 /// by nearly one, so that four of five are found.
 pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
-/// Effects that leave more than this share of the power beyond the sensors' noise are not to be believed. Chosen:
+/// An effect is not to be believed where more is left in its equations than this share of what it and they have together. Chosen:
 /// nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
+/// Bins of equal count in which what is left is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
+/// [`FEWEST_ROWS`] each in 20 s.
+pub(crate) const SHAPE_BINS: usize = 6;
+/// An effect that mends less than this share of what another of the same equation does may be that one's error. Chosen: a law that
+/// is wrong by 3 % leaves that much.
+pub(crate) const LEAST_SHARE_BESIDE: f64 = 1e-3;
+/// A leak this many standard deviations below zero takes confidence from the effects of its chamber. Chosen: two.
+pub(crate) const DOUBTED_LEAK_SIGMA: f64 = 2.0;
 /// A leak this many standard deviations below zero is evidence against the model. Chosen: three.
 pub(crate) const NEGATIVE_SIGMA: f64 = 3.0;
 /// A leak known to within this flow at the mean pressure is identified, m³/s. Chosen: 0.1 L/min.

@@ -1,16 +1,23 @@
 //! What is said of each effect.
 
+use super::confidence;
+use crate::diagnose::data::SensorCheck;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Calibration, FoundEffect};
-use crate::diagnose::search::Selected;
+use crate::diagnose::search::{Selected, Selection};
 use pitchleak_core::{Effect, Estimate};
 
-const DOUBT: &str = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be believed without a measurement of its own";
-
 /// An effect of the answer.
-pub(crate) fn found(fit: &Fit<'_>, one: &Selected, confident: bool) -> Option<FoundEffect> {
+pub(crate) fn found(
+    selection: &Selection<'_>,
+    one: &Selected,
+    checks: &[SensorCheck],
+) -> Option<FoundEffect> {
+    let fit = &selection.fit;
+    let doubt = confidence::doubts(selection, one, checks);
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
+    let std = confidence::std_with_oil(fit, one.term).unwrap_or(std);
     let spec = effect.spec();
     let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
     let constants = fit.constants(one.term);
@@ -20,8 +27,8 @@ pub(crate) fn found(fit: &Fit<'_>, one: &Selected, confident: bool) -> Option<Fo
         value,
         std: std * fit.dispersion(fit.bounded.chi2).sqrt(),
         unit: spec.unit,
-        confident,
-        doubt: (!confident).then_some(DOUBT),
+        confident: doubt.is_none(),
+        doubt,
         rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
         p_value: one.p_value,
         separated_by: separation(effect, &one.confusable_with),

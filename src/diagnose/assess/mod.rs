@@ -1,6 +1,7 @@
 //! What is left once a model is fitted, and what it says about the model.
 
 mod adequacy;
+mod confidence;
 mod effects;
 mod excitation;
 mod held_out;

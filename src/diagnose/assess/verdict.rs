@@ -1,34 +1,26 @@
 //! The answer in a word, and the sentences that speak for it.
 
 use super::adequacy::{complaints, ripples};
+use super::confidence::ratio_note;
 use super::leaks::negative_leaks;
 use crate::diagnose::data::SensorCheck;
-use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
 use crate::diagnose::search::Selection;
-use crate::diagnose::thresholds::{MOST_ROUNDS, UNMENDED_SHARE};
+use crate::diagnose::thresholds::MOST_ROUNDS;
 
 /// What the search makes of the traces.
 pub(crate) struct Judgement {
     pub(crate) verdict: Verdict,
-    /// Whether the effects' names can be believed.
-    pub(crate) confident: bool,
     /// What speaks against the model with the effects.
     pub(crate) complaints: Vec<String>,
 }
 
-/// Judges the model with the effects; `excess_before` is the power that the declared model leaves beyond the noise.
-pub(crate) fn judge(
-    selection: &Selection<'_>,
-    excited: bool,
-    excess_before: f64,
-    checks: &[SensorCheck],
-) -> Judgement {
+/// Judges the model with the effects.
+pub(crate) fn judge(selection: &Selection<'_>, excited: bool, checks: &[SensorCheck]) -> Judgement {
     let Selection { fit, effects } = selection;
     let mut complaints = complaints(fit);
     complaints.extend(ripples(checks));
-    let beaten = effects.iter().any(|one| one.beaten_by_nameless);
-    if beaten {
+    if effects.iter().any(|one| one.beaten_by_nameless) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
     }
     let verdict = match (excited, effects.is_empty(), complaints.is_empty()) {
@@ -38,13 +30,12 @@ pub(crate) fn judge(
         (true, false, true) => Verdict::Explained,
         (true, false, false) => Verdict::PartlyExplained,
     };
-    let mends_nearly_all = !beaten && fit.excess_power() < UNMENDED_SHARE * excess_before;
-    Judgement { verdict, confident: verdict == Verdict::Explained || mends_nearly_all, complaints }
+    Judgement { verdict, complaints }
 }
 
 /// All sentences for people: `after` is none where no effect was named.
 pub(crate) fn notes(
-    fit: &Fit<'_>,
+    Selection { fit, effects }: &Selection<'_>,
     complaints: Vec<String>,
     before: &ModelFit,
     after: Option<&ModelFit>,
@@ -58,6 +49,7 @@ pub(crate) fn notes(
     }));
     let after = after.map(|after| negative_leaks(&after.leaks, "the model with the effects"));
     notes.extend(after.into_iter().flatten());
+    notes.extend(effects.iter().filter_map(|one| ratio_note(fit, one)));
     if !fit.has_converged() {
         notes.push(format!("the fit still moved after {MOST_ROUNDS} linearisations: estimates may be off by more than they say"));
     }

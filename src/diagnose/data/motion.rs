@@ -3,7 +3,7 @@
 
 use super::series::Series;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
-use pitchleak_core::{Model, Sensors};
+use pitchleak_core::{EffectSet, Model, Sensors, Signals};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
 pub(crate) struct Motion {
@@ -16,17 +16,28 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    pub(crate) fn of(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> Self {
+    /// Of a trace whose sensors have these `effects`, which are undone.
+    pub(crate) fn of(
+        series: &Series,
+        model: &Model<f64>,
+        effects: &EffectSet<f64>,
+        sensors: &Sensors<f64>,
+    ) -> Self {
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         if has(&series.qa_m3s) || has(&series.qb_m3s) {
-            Self::from_flow(series, model, sensors)
+            Self::from_flow(series, model, effects, sensors)
         } else {
-            Self::from_position(series, sensors)
+            Self::from_position(series, effects, sensors)
         }
     }
 
-    fn from_flow(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> Self {
-        let raw = raw_speed(series, model);
+    fn from_flow(
+        series: &Series,
+        model: &Model<f64>,
+        effects: &EffectSet<f64>,
+        sensors: &Sensors<f64>,
+    ) -> Self {
+        let raw = raw_speed(series, model, effects);
         let rms = root_mean_square(&raw);
         let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
             .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
@@ -36,9 +47,10 @@ impl Motion {
         Self { v_mps, std_mps: std / ((2 * half + 1) as f64).sqrt(), rms_mps: rms }
     }
 
-    fn from_position(series: &Series, sensors: &Sensors<f64>) -> Self {
+    fn from_position(series: &Series, effects: &EffectSet<f64>, sensors: &Sensors<f64>) -> Self {
         let half = longest_half(series.step_s()).max(1);
-        let v_mps = slope(&series.t_s, &series.x_m, half);
+        let true_speed = |v_mps: f64| effects.correct(&Signals { v_mps, ..Signals::default() }).v_mps;
+        let v_mps: Vec<f64> = slope(&series.t_s, &series.x_m, half).into_iter().map(true_speed).collect();
         let n = (2 * half + 1) as f64;
         let std = sensors.position.noise_std * (12.0 / (n * n * n)).sqrt() / series.step_s().max(1e-9);
         let rms_mps = root_mean_square(&v_mps);
@@ -64,7 +76,7 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
 }
 
 /// Speed from eq. (1), both chambers averaged where both have a meter.
-fn raw_speed(series: &Series, model: &Model<f64>) -> Vec<f64> {
+fn raw_speed(series: &Series, model: &Model<f64>, effects: &EffectSet<f64>) -> Vec<f64> {
     let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks_m3spa, model.fluid.bulk_modulus_pa);
     let rate = |values: &[f64], at: usize| {
         let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
@@ -73,12 +85,24 @@ fn raw_speed(series: &Series, model: &Model<f64>) -> Vec<f64> {
     };
     (0..series.len())
         .map(|at| {
-            let (x, pa, pb) = (series.x_m[at], series.pa_pa[at], series.pb_pa[at]);
-            let past = leaks.internal * (pa - pb);
-            let stored_a = cylinder.volume_a_m3(x) / bulk * rate(&series.pa_pa, at);
-            let stored_b = cylinder.volume_b_m3(x) / bulk * rate(&series.pb_pa, at);
-            let a = (series.qa_m3s[at] - past - leaks.external_a * pa - stored_a) / cylinder.area_a_m2;
-            let b = -(series.qb_m3s[at] + past - leaks.external_b * pb - stored_b) / cylinder.area_b_m2;
+            let reading = Signals {
+                x_m: series.x_m[at],
+                pa_pa: series.pa_pa[at],
+                pb_pa: series.pb_pa[at],
+                dpa_pas: rate(&series.pa_pa, at),
+                dpb_pas: rate(&series.pb_pa, at),
+                qa_m3s: series.qa_m3s[at],
+                qb_m3s: series.qb_m3s[at],
+                dqa_m3s2: rate(&series.qa_m3s, at),
+                dqb_m3s2: rate(&series.qb_m3s, at),
+                ..Signals::default()
+            };
+            let seen = effects.correct(&reading);
+            let past = leaks.internal * (seen.pa_pa - seen.pb_pa);
+            let stored_a = cylinder.volume_a_m3(seen.x_m) / bulk * seen.dpa_pas;
+            let stored_b = cylinder.volume_b_m3(seen.x_m) / bulk * seen.dpb_pas;
+            let a = (seen.qa_m3s - past - leaks.external_a * seen.pa_pa - stored_a) / cylinder.area_a_m2;
+            let b = -(seen.qb_m3s + past - leaks.external_b * seen.pb_pa - stored_b) / cylinder.area_b_m2;
             match (a.is_finite(), b.is_finite()) {
                 (true, true) => (a + b) / 2.0,
                 (true, false) => a,

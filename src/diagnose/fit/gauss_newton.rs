@@ -123,7 +123,12 @@ impl<'a> Fit<'a> {
         let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
         let weak_form = WeakForm::new(problem.traces, &problem.sensors, at, columns, assumed_error);
         let WeakForm { at, rows, whitening, .. } = &weak_form;
-        let regression = Regression::new(rows, whitening, &weak_form.shared_noise(&problem.terms));
+        let mut shared = weak_form.shared_noise(&problem.white, columns);
+        if assumed_error != PerEquation::default() {
+            // The equations' error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
+            shared.iter_mut().for_each(|noise| noise.columns.retain(|column| column.is_left_side));
+        }
+        let regression = Regression::new(rows, whitening, &shared);
         let mut priors = problem.increments(at);
         let free = regression.solve(&structure.active, &priors);
         let held_compressibility = beyond_range(problem, at, &free);
@@ -215,8 +220,17 @@ impl<'a> Fit<'a> {
     /// Value and standard deviation of a fitted term.
     pub(crate) fn estimate(&self, term: usize) -> Option<Estimate<f64>> {
         let at = self.bounded.terms.iter().position(|one| *one == term)?;
+        let (lower, upper) = self.problem.terms[term].bounds();
         let value = self.weak_form.at.value(self.problem.terms[term]) + self.bounded.value[at];
-        Some(Estimate { value, std: self.bounded.std[at] })
+        Some(Estimate { value: value.clamp(lower, upper), std: self.bounded.std[at] })
+    }
+
+    /// Whether a fitted term lies at an end of what physics allows, or within its standard deviation of it.
+    pub(crate) fn is_at_bound(&self, term: usize) -> bool {
+        let (lower, upper) = self.problem.terms[term].bounds();
+        // Zero is the end of one-sided effects, where they are not named.
+        let ends = [lower, upper].map(|end| if end == 0.0 { f64::INFINITY } else { end });
+        self.estimate(term).is_some_and(|own| ends.iter().any(|end| (own.value - end).abs() <= own.std))
     }
 
     /// Whether more is left than the sensors' noise.
@@ -232,18 +246,32 @@ impl<'a> Fit<'a> {
     fn noise_ratios(&self, equation_error: PerEquation<f64>) -> PerEquation<f64> {
         PerEquation::from_fn(|equation| {
             let rows = &self.weak_form.rows;
-            let entry = rows.entries.iter().find(|entry| entry.equation == equation);
+            let entry = rows.entries.iter().find(|entry| entry.equation == equation && rows.counts(entry));
             let variance = |error| {
                 let noise = self.weak_form.noise(error);
-                entry.map_or(1.0, |entry| noise.white_variance(&rows.rows[entry.row], equation))
+                entry.map_or(1.0, |entry| noise.white_variance(entry.row, equation))
             };
             (variance(equation_error) / variance(PerEquation::default())).sqrt()
         })
     }
 
-    /// Power of what is left beyond the sensors' noise, as a multiple of that, over the equations.
-    pub(crate) fn excess_power(&self) -> f64 {
-        self.noise_ratio().iter().map(|(_, ratio)| ratio.powi(2) - 1.0).sum()
+    /// How much of a term's whitened column stands in each equation, as sums of squares.
+    pub(crate) fn squares(&self, term: usize) -> PerEquation<f64> {
+        let mut squares = PerEquation::default();
+        for (entry, value) in self.weak_form.rows.entries.iter().zip(&self.regression.columns[term]) {
+            squares[entry.equation] += value * value;
+        }
+        squares
+    }
+
+    /// Standard deviation of the bulk modulus as a share of it: the prior's where the data would take it beyond its range.
+    pub(crate) fn oil_share(&self) -> f64 {
+        let oil = self.problem.place(Term::InverseBulk).and_then(|place| {
+            let (own, prior) = (self.estimate(place)?, self.problem.priors[place]?);
+            let std = if self.held_compressibility.is_some() { prior.std } else { own.std };
+            Some(std / own.value)
+        });
+        oil.unwrap_or(0.0)
     }
 
     /// How much larger the residual is than the declared noise: 1 for a model that is complete.

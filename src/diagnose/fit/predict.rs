@@ -5,7 +5,7 @@ use super::regression::{self, Solution};
 use crate::diagnose::data::Series;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{BLOCK_S, FOLDS};
-use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, residual_rows};
+use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, WeakForm, residual_rows};
 use pitchleak_core::effects::EffectKind;
 use pitchleak_core::{Effect, Estimate, Signals};
 
@@ -60,13 +60,15 @@ impl Fit<'_> {
         });
         let sensors = &self.problem.sensors;
         let rows = residual_rows(traces, sensors, &tight, block_s);
-        let noise = NoiseModel { at: &solved, sensors, equation_error: PerEquation::default() };
+        let sensitivities = WeakForm::sensitivities(&rows, sensors, &solved);
+        let (at, equation_error) = (&solved, PerEquation::default());
+        let noise = NoiseModel { at, sensors, equation_error, rows: &rows, sensitivities: &sensitivities };
         let entries = rows.entries.iter().zip(&rows.y).filter(|(entry, _)| entry.equation != Equation::Force);
         entries
             .map(|(entry, residual)| {
                 let (chamber, row) = (entry.equation, rows.rows[entry.row]);
                 let flow =
-                    Estimate { value: residual / row.block_s, std: noise.mean_flow_std(&row, chamber) };
+                    Estimate { value: residual / row.block_s, std: noise.mean_flow_std(entry.row, chamber) };
                 MeanFlow { chamber, row, flow }
             })
             .collect()

@@ -11,6 +11,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) traces: &'a [Series],
     /// With the noise that the sensors really carry.
     pub(crate) sensors: Sensors<f64>,
+    /// The same without ripples, which average away within a block: what columns share with the residual.
+    pub(super) white: Sensors<f64>,
     pub(crate) terms: Vec<Term>,
     pub(crate) priors: Vec<Option<Prior>>,
     /// The constants that every effect starts from.
@@ -24,7 +26,8 @@ impl<'a> Problem<'a> {
         let terms = all_terms();
         Self {
             traces,
-            sensors: effective(&declared.sensors, checks),
+            sensors: effective(&declared.sensors, checks, |_| true),
+            white: effective(&declared.sensors, checks, |check| !check.is_ripple()),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,
             usual_constants: friction_constants(traces, declared),
@@ -62,8 +65,10 @@ impl<'a> Problem<'a> {
 fn friction_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
     let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: PerLeak::default() };
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
-    let speeds: Vec<(f64, f64)> =
-        traces.iter().map(|series| least(&Motion::of(series, &model, &declared.sensors))).collect();
+    let speeds: Vec<(f64, f64)> = traces
+        .iter()
+        .map(|series| least(&Motion::of(series, &model, &declared.effects, &declared.sensors)))
+        .collect();
     let within = |parameter: EffectConstant, speed: f64| {
         let spec = parameter.spec();
         speed.clamp(spec.lower, spec.upper)

@@ -2,8 +2,8 @@
 //! Gram matrix per fold, so that trying a candidate costs a small solve, not a pass over the data.
 
 use crate::diagnose::equation::Equation;
-use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FOLDS, PIECES};
-use crate::diagnose::weak_form::{Rows, SharedNoise, Whitening};
+use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FOLDS, MOST_NOISE_SHARE, PIECES};
+use crate::diagnose::weak_form::{NoisyColumn, Rows, SharedNoise, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
@@ -26,8 +26,22 @@ pub(crate) struct Regression {
     pub(crate) scale: Vec<f64>,
     /// Entries that count.
     pub(crate) counted: Vec<bool>,
+    /// Share of each unit column's square that is noise and stays in its Gram entry.
+    pub(super) noise_share: Vec<f64>,
     grams: Vec<DMatrix<f64>>,
     pub(super) total: DMatrix<f64>,
+}
+
+/// [`SharedNoise`], whitened; columns in units of the regression's.
+struct WhiteNoise {
+    rows: Vec<f64>,
+    columns: Vec<WhiteColumn>,
+}
+
+struct WhiteColumn {
+    term: usize,
+    is_left_side: bool,
+    white: Vec<f64>,
 }
 
 /// A fit of some terms.
@@ -50,14 +64,17 @@ impl Regression {
         let counted: Vec<bool> = rows.entries.iter().map(|entry| rows.counts(entry)).collect();
         let total_rows = rows.rows.len().max(1);
         let piece_of: Vec<usize> = rows.entries.iter().map(|e| e.row * PIECES / total_rows).collect();
-        let (y, columns, scale, grams, total) = (vec![], vec![], vec![], vec![], DMatrix::zeros(0, 0));
-        let mut new = Self { piece_of, y, columns, scale, counted, grams, total };
+        let (y, columns, scale, noise_share) = (vec![], vec![], vec![], vec![]);
+        let (grams, total) = (vec![], DMatrix::zeros(0, 0));
+        let mut new = Self { piece_of, y, columns, scale, counted, noise_share, grams, total };
         new.y = new.counting(whitening.whiten(&rows.y));
         let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
         (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
         new.grams = new.products();
-        for noise in shared {
-            new.take_off(noise, whitening, 1.0 / shared.len() as f64);
+        let shared: Vec<WhiteNoise> = shared.iter().map(|noise| new.white_noise(noise, whitening)).collect();
+        new.noise_share = new.noise_shares(&shared);
+        for noise in &shared {
+            new.take_off(noise, 1.0 / shared.len() as f64);
         }
         new.total = sum_of(&new.grams);
         new
@@ -102,6 +119,7 @@ impl Regression {
     pub(crate) fn with_column(&self, term: usize, white: Vec<f64>) -> Self {
         let mut new = self.clone();
         (new.columns[term], new.scale[term]) = normalised(self.counting(white));
+        new.noise_share[term] = 0.0;
         let products: Vec<_> =
             new.all().into_iter().map(|other| new.by_piece(&new.columns[term], other)).collect();
         for (other, sums) in products.into_iter().enumerate() {
@@ -119,26 +137,41 @@ impl Regression {
         white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect()
     }
 
-    fn take_off(&mut self, noise: &SharedNoise, whitening: &Whitening, weight: f64) {
-        let rows = whitening.whiten(&noise.rows);
-        let columns: Vec<(usize, Vec<f64>)> = noise
-            .columns
-            .iter()
-            .filter(|(term, _)| self.shows(*term))
-            .map(|(term, column)| {
-                let white = whitening.whiten(column);
-                (*term, white.into_iter().map(|v| v / self.scale[*term]).collect())
-            })
-            .collect();
+    fn white_noise(&self, noise: &SharedNoise, whitening: &Whitening) -> WhiteNoise {
+        let shown = noise.columns.par_iter().filter(|column| self.shows(column.term));
+        let column = |column: &NoisyColumn| {
+            let white = self.counting(whitening.whiten(&column.noise)).into_iter();
+            let (term, is_left_side) = (column.term, column.is_left_side);
+            WhiteColumn { term, is_left_side, white: white.map(|v| v / self.scale[term]).collect() }
+        };
+        WhiteNoise {
+            rows: self.counting(whitening.whiten(&noise.rows)),
+            columns: shown.map(column).collect(),
+        }
+    }
+
+    fn noise_shares(&self, shared: &[WhiteNoise]) -> Vec<f64> {
+        let mut shares = vec![0.0; self.columns.len()];
+        for column in shared.iter().flat_map(|noise| &noise.columns).filter(|column| !column.is_left_side) {
+            shares[column.term] += column.white.iter().map(|v| v * v).sum::<f64>() / shared.len() as f64;
+        }
+        shares
+    }
+
+    /// Of columns that are the left side itself all products. Of the others that with what is left, which holds at the solution and
+    /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
+    fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
         let y = self.columns.len();
-        for (i, piece) in self.piece_of.iter().enumerate().filter(|(i, _)| self.counted[*i]) {
-            let gram = &mut self.grams[*piece];
-            for (a, left) in &columns {
-                let with_rows = weight * left[i] * rows[i];
-                gram[(*a, y)] -= with_rows;
-                gram[(y, *a)] -= with_rows;
-                for (b, right) in &columns {
-                    gram[(*a, *b)] -= weight * left[i] * right[i];
+        for a in &noise.columns {
+            let with_rows = self.by_piece(&a.white, &noise.rows);
+            for (gram, sum) in self.grams.iter_mut().zip(with_rows) {
+                gram[(a.term, y)] -= weight * sum;
+                gram[(y, a.term)] -= weight * sum;
+            }
+            for b in noise.columns.iter().filter(|b| a.is_left_side && b.is_left_side) {
+                let sums = self.by_piece(&a.white, &b.white);
+                for (gram, sum) in self.grams.iter_mut().zip(sums) {
+                    gram[(a.term, b.term)] -= weight * sum;
                 }
             }
         }
@@ -207,9 +240,19 @@ impl Regression {
         let scaled = &inverse * &right;
         let chi2 = chi2 - right.dot(&scaled);
         let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
-        let std =
-            terms.iter().enumerate().map(|(i, t)| inverse[(i, i)].max(0.0).sqrt() / self.scale[*t]).collect();
+        let std = terms
+            .iter()
+            .enumerate()
+            .map(|(i, t)| self.scatter(inverse[(i, i)], *t).sqrt() / self.scale[*t])
+            .collect();
         Solution { terms, value, std, chi2, scaled, inverse }
+    }
+
+    /// Variance of a unit column's size, which the Gram matrix alone gives as `quiet`: of what is new in the column only the
+    /// part that is no noise tells its size.
+    fn scatter(&self, quiet: f64, term: usize) -> f64 {
+        let noise = (self.noise_share[term] * quiet.max(0.0)).min(MOST_NOISE_SHARE);
+        quiet.max(0.0) / (1.0 - noise).powi(2)
     }
 
     /// Whitened sum of squares of each fold under the fit to the other folds.

@@ -14,10 +14,11 @@ pub struct FoundEffect {
     pub std: f64,
     /// SI; 1 for a share.
     pub unit: &'static str,
-    /// Whether the name can be believed: false while much is left that no effect explains.
+    /// Whether the name can be believed, by itself: no rival fits as well, little is left where it acts, no larger effect beside it could
+    /// pass for it, and neither its value nor a leak beside it is impossible.
     pub confident: bool,
     /// Why not.
-    pub doubt: Option<&'static str>,
+    pub doubt: Option<String>,
     /// By how much the held-out error of the balance it mends most falls when it is added.
     pub rmse_reduction_percent: f64,
     /// Chance of so large a score without the effect.

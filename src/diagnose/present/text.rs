@@ -118,7 +118,7 @@ fn write_effect(out: &mut String, effect: &FoundEffect) {
     let _ = writeln!(out, "\n{}: {:.4e} ± {:.1e}{unit}", effect.id, effect.value, effect.std);
     let _ = writeln!(out, "  {}", effect.cause);
     let _ = writeln!(out, "  To do: {}", effect.remedy);
-    if let Some(doubt) = effect.doubt {
+    if let Some(doubt) = &effect.doubt {
         let _ = writeln!(out, "  Doubtful: {doubt}.");
     }
     if let Some(separation) = &effect.separated_by {

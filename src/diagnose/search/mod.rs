@@ -12,7 +12,7 @@ mod trials;
 pub(crate) use candidates::{nameless_chi2_drop, open};
 pub use collinearity::{Candidate, Collinearity};
 pub(crate) use interaction::interactions;
-pub(crate) use selection::{Selected, Selection};
+pub(crate) use selection::{Selected, Selection, loss};
 
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::{Fit, Progress};

@@ -46,7 +46,7 @@ impl<'a> Selection<'a> {
 }
 
 /// By how much the sum of squares rises without some of the effects.
-pub(super) fn loss(fit: &Fit<'_>, terms: &[usize]) -> f64 {
+pub(crate) fn loss(fit: &Fit<'_>, terms: &[usize]) -> f64 {
     fit.solve_without(terms).chi2 - fit.free.chi2
 }
 

@@ -5,7 +5,8 @@ use super::hats::{ActiveTerm, Integrand};
 use super::linearisation::Linearisation;
 use super::noise_model::NoiseModel;
 use super::rows::Rows;
-use super::shared_noise::SharedNoise;
+use super::sensitivity::Sensitivity;
+use super::shared_noise::{SharedNoise, Slopes};
 use super::terms::Term;
 use super::whitening::Whitening;
 use crate::diagnose::data::{Motion, Series};
@@ -13,6 +14,7 @@ use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
@@ -23,6 +25,7 @@ pub(crate) struct WeakForm<'a> {
     motions: Vec<Motion>,
     steps: OnceLock<Steps>,
     pub(crate) rows: Rows,
+    sensitivities: Vec<PerEquation<Sensitivity>>,
     pub(crate) whitening: Whitening,
 }
 
@@ -56,19 +59,33 @@ impl<'a> WeakForm<'a> {
         let motions = motions(traces, sensors, &at);
         let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
         let rows = rows.at_places(columns.places, columns.terms.len());
-        let whitening = Whitening::new(&rows, &NoiseModel { at: &at, sensors, equation_error });
-        Self { traces, sensors, at, motions, steps: OnceLock::new(), rows, whitening }
+        let sensitivities = Self::sensitivities(&rows, sensors, &at);
+        let noise =
+            NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities: &sensitivities };
+        let whitening = Whitening::new(&rows, &noise);
+        Self { traces, sensors, at, motions, steps: OnceLock::new(), rows, sensitivities, whitening }
     }
 
     /// The noise of these rows, had the equations this error.
     pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
-        NoiseModel { at: &self.at, sensors: self.sensors, equation_error }
+        let Self { at, rows, sensors, sensitivities, .. } = self;
+        NoiseModel { at, sensors, equation_error, rows, sensitivities }
     }
 
-    /// Realisations of the noise that the columns of `terms` share with the residual.
-    pub(crate) fn shared_noise(&self, terms: &[Term]) -> Vec<SharedNoise> {
-        let noise = self.noise(PerEquation::default());
-        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, terms, number)).collect()
+    /// How the sensors' noise enters each of the rows.
+    pub(crate) fn sensitivities(
+        rows: &Rows,
+        sensors: &Sensors<f64>,
+        at: &Linearisation,
+    ) -> Vec<PerEquation<Sensitivity>> {
+        rows.rows.par_iter().map(|row| Sensitivity::of(at, sensors, row)).collect()
+    }
+
+    /// Realisations of the noise of `sensors` that the columns share with the residual.
+    pub(crate) fn shared_noise(&self, sensors: &Sensors<f64>, columns: Columns<'_>) -> Vec<SharedNoise> {
+        let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
+        let slopes = Slopes::of(&self.rows, &noise, columns);
+        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, &slopes, number)).collect()
     }
 
     /// The column of one term, whitened.
@@ -90,5 +107,5 @@ pub(crate) fn residual_rows(
 }
 
 fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
-    traces.iter().map(|series| Motion::of(series, &at.model, sensors)).collect()
+    traces.iter().map(|series| Motion::of(series, &at.model, &at.effects, sensors)).collect()
 }

@@ -2,6 +2,7 @@
 
 use super::terms::Term;
 use crate::diagnose::data::Declared;
+use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{DERIVATIVE_STEP, LEAST_COMPRESSIBILITY, OIL_SIGMA};
 use pitchleak_core::effects::{EffectConstants, EffectKind};
 use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals, Terms};
@@ -14,6 +15,11 @@ pub(crate) struct Linearisation {
     pub(crate) effects: EffectSet<f64>,
     /// Values of 1/β that the rig file leaves possible, per Pa.
     pub(crate) compressibility: (f64, f64),
+}
+
+/// The same instant with the motion that forces feel (`data/motion.rs`).
+pub(crate) fn as_felt(seen: &Signals<f64>, felt: &Signals<f64>) -> Signals<f64> {
+    Signals { v_mps: felt.v_mps, a_mps2: felt.a_mps2, ..*seen }
 }
 
 /// Whether two instants agree in all that physical effects depend on.
@@ -43,6 +49,33 @@ impl Linearisation {
     pub(crate) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         self.model.residual(at).plus(-1.0, known)
+    }
+
+    /// What is left of the equations at readings as the sensors show them: the chambers by the position's own speed,
+    /// the forces by speed and acceleration of `felt`.
+    pub(crate) fn both_residuals(&self, reading: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
+        let seen = self.effects.correct(reading);
+        self.residual_of(&seen, &as_felt(&seen, felt))
+    }
+
+    /// The same at corrected readings.
+    pub(crate) fn residual_of(&self, seen: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
+        let mut residual = PerEquation::from(self.residual(seen));
+        residual.force = self.residual(felt).force_n;
+        residual
+    }
+
+    /// What one unit of a term leaves there.
+    pub(crate) fn both_unit_terms(
+        &self,
+        (term, in_force): (Term, bool),
+        constants: &EffectConstants<f64>,
+        seen: &Signals<f64>,
+        felt: &Signals<f64>,
+    ) -> PerEquation<f64> {
+        let mut unit = PerEquation::from(self.unit_term(term, seen, constants));
+        unit.force = if in_force { self.unit_term(term, felt, constants).force_n } else { 0.0 };
+        unit
     }
 
     /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what

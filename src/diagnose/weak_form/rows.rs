@@ -200,7 +200,7 @@ mod tests {
             series.push(t, &sample, None);
         }
         let at = Linearisation::declared(&declared);
-        let motion = Motion::of(&series, &at.model, &declared.sensors);
+        let motion = Motion::of(&series, &at.model, &at.effects, &declared.sensors);
         let integrand = Integrand::new(&at, &[Term::Internal], &[EffectConstants::default()]);
         Rows::build(&[series], &[motion], &integrand, 0.1)
     }

@@ -1,19 +1,28 @@
-//! The noise that some columns share with what the model leaves over, drawn again and again.
+//! What columns share with what the model leaves over, drawn again and again: noise of the same sensors.
 
+use super::at_linearisation::Columns;
 use super::noise_model::{HatWeights, NoiseModel, hat_weights};
 use super::rows::{Entry, Row, Rows};
+use super::sensitivity::Channel;
 use super::terms::Term;
-use crate::diagnose::equation::{Equation, PerEquation};
-use pitchleak_core::effects::{EffectConstants, LeftSide};
-use pitchleak_core::{Model, Signals};
+use crate::diagnose::equation::PerEquation;
+use pitchleak_core::effects::EffectConstants;
+use rayon::prelude::*;
 
-/// One realisation of the noise that some columns share with the residual, because they are the left
-/// side of the equation itself.
+/// One realisation of the noise that some columns share with the residual.
 pub(crate) struct SharedNoise {
     /// In the rows.
     pub(crate) rows: Vec<f64>,
     /// In the columns that have it.
-    pub(crate) columns: Vec<(usize, Vec<f64>)>,
+    pub(crate) columns: Vec<NoisyColumn>,
+}
+
+/// The noise of one column.
+pub(crate) struct NoisyColumn {
+    pub(crate) term: usize,
+    /// Whether the column is in proportion to the equations' left side.
+    pub(crate) is_left_side: bool,
+    pub(crate) noise: Vec<f64>,
 }
 
 /// Signs without an order, each as likely as the other (splitmix64), the same on every machine.
@@ -29,11 +38,8 @@ impl Rademacher {
     }
 }
 
-/// Noise of one sensor in each row: through differences of block means, or through hats.
-struct InRows {
-    difference: Vec<f64>,
-    hat: Vec<f64>,
-}
+/// Noise of one sensor in each row: through hats (0), and through differences of block means (1).
+type InRows = [Vec<f64>; 2];
 
 /// Unit white noise seen by each row. A hat's noise is that of its two blocks, which it shares with its
 /// neighbours, and its own, in the shares that give the known covariances.
@@ -48,60 +54,86 @@ fn draw(rows: &[Row], signs: &mut Rademacher) -> InRows {
         if known.0 != row.samples {
             known = (row.samples, hat_weights(row.samples));
         }
-        let HatWeights { own, next } = known.1;
+        let (own, next) = (known.1.own[0][0], known.1.next[0][0]);
         let step_s = row.block_s / row.samples as f64;
         difference.push((right - left) / (row.samples as f64).sqrt());
         let shared = next.max(0.0).sqrt() * (left + right);
         hat.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
     }
-    InRows { difference, hat }
+    [hat, difference]
 }
 
 impl SharedNoise {
     /// The `number`th realisation.
-    pub(crate) fn draw(rows: &Rows, noise: &NoiseModel<'_>, terms: &[Term], number: u64) -> Self {
+    pub(crate) fn draw(rows: &Rows, noise: &NoiseModel<'_>, slopes: &Slopes, number: u64) -> Self {
         let mut signs = Rademacher(number);
-        let [position, flow_a, flow_b] = std::array::from_fn(|_| draw(&rows.rows, &mut signs));
-        let moved = |entry: &Entry| noise.sensors.position.noise_std * position.difference[entry.row];
-        let metered = |entry: &Entry| match entry.equation {
-            Equation::ChamberA => noise.sensors.flow_a.noise_std * flow_a.hat[entry.row],
-            Equation::ChamberB => noise.sensors.flow_b.noise_std * flow_b.hat[entry.row],
-            Equation::Force => 0.0,
+        let of_channel = |channel: Channel| {
+            let std = channel.noise_std(noise.sensors, noise.at);
+            draw(&rows.rows, &mut signs).map(|drawn| drawn.into_iter().map(|v| std * v).collect())
         };
-        let swept = |entry: &Entry| match entry.equation {
-            Equation::Force => 0.0,
-            chamber => noise.swept_area(chamber) * moved(entry),
-        };
-        let column = |term: Term, carried: LeftSide| {
-            let of_entry = |entry: &Entry| {
-                let at = &rows.rows[entry.row].mean;
-                let noise_of_one = match (carried, entry.equation) {
-                    (LeftSide::Speed, Equation::ChamberA | Equation::ChamberB) => moved(entry),
-                    (LeftSide::FlowA, Equation::ChamberA) | (LeftSide::FlowB, Equation::ChamberB) => {
-                        metered(entry)
-                    }
-                    _ => return 0.0,
-                };
-                slope(term, carried, at, &noise.at.model)[entry.equation] * noise_of_one
+        let drawn: [InRows; Channel::ALL.len()] = Channel::ALL.map(of_channel);
+        let in_row = |entry: &Entry| {
+            let sensitivity = &noise.sensitivities[entry.row][entry.equation].0;
+            let of_one = |(gains, drawn): (&[f64; 3], &InRows)| {
+                gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row]
             };
-            rows.entries.iter().map(of_entry).collect()
+            sensitivity.iter().zip(&drawn).map(of_one).sum()
         };
-        let carrying = terms.iter().enumerate().filter_map(|(i, term)| Some((i, *term, term.carries()?)));
-        Self {
-            rows: rows.entries.iter().map(|entry| metered(entry) - swept(entry)).collect(),
-            columns: carrying.map(|(i, term, carried)| (i, column(term, carried))).collect(),
-        }
+        let columns = slopes.0.iter().map(|(place, term, slopes)| {
+            let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];
+            let in_column = |entry: &Entry| {
+                let signals = term.noisy_in().iter().zip(&slopes[entry.row]);
+                let of_one = |((channel, order), slope): (&(Channel, usize), &PerEquation<f64>)| {
+                    slope[entry.equation] * noise_of(*channel, *order)[entry.row]
+                };
+                signals.map(of_one).sum()
+            };
+            let noise = rows.entries.iter().map(in_column).collect();
+            NoisyColumn { term: *place, is_left_side: term.is_left_side(), noise }
+        });
+        Self { rows: rows.entries.iter().map(in_row).collect(), columns: columns.collect() }
     }
 }
 
-/// By how much a term grows with the speed or the flow of its equation's left side, in which it is linear.
-fn slope(term: Term, carried: LeftSide, at: &Signals<f64>, model: &Model<f64>) -> PerEquation<f64> {
-    let rest = Signals { v_mps: 0.0, qa_m3s: 0.0, qb_m3s: 0.0, ..*at };
-    let one = match carried {
-        LeftSide::Speed => Signals { v_mps: 1.0, ..rest },
-        LeftSide::FlowA => Signals { qa_m3s: 1.0, ..rest },
-        LeftSide::FlowB => Signals { qb_m3s: 1.0, ..rest },
+/// By how much the terms that carry noise grow with each signal they carry it from: place, term, and row by row.
+pub(crate) struct Slopes(Vec<(usize, Term, Vec<Vec<PerEquation<f64>>>)>);
+
+impl Slopes {
+    pub(crate) fn of(rows: &Rows, noise: &NoiseModel<'_>, columns: Columns<'_>) -> Self {
+        let carrying = columns.places.iter().filter(|place| !columns.terms[**place].noisy_in().is_empty());
+        let of_term = |place: &usize| {
+            let (term, constants) = (columns.terms[*place], &columns.constants[*place]);
+            (*place, term, slopes(rows, noise, term, constants))
+        };
+        let carrying: Vec<&usize> = carrying.collect();
+        Self(carrying.into_par_iter().map(of_term).collect())
+    }
+}
+
+/// Those of one term, row by row.
+fn slopes(
+    rows: &Rows,
+    noise: &NoiseModel<'_>,
+    term: Term,
+    constants: &EffectConstants<f64>,
+) -> Vec<Vec<PerEquation<f64>>> {
+    let term = (term, term.in_force());
+    let of_row = |row: &Row| {
+        let seen = noise.at.effects.correct(&row.mean);
+        let slope = |(channel, order): &(Channel, usize)| {
+            let std = channel.noise_std(noise.sensors, noise.at);
+            channel.slope(*order, &seen, (std, row.block_s), |at| {
+                let mut unit = noise.at.both_unit_terms(term, constants, at, at);
+                // Forces feel another speed than the position's.
+                if *channel == Channel::FeltSpeed {
+                    (unit.chamber_a, unit.chamber_b) = (0.0, 0.0);
+                } else {
+                    unit.force = 0.0;
+                }
+                unit
+            })
+        };
+        term.0.noisy_in().iter().map(slope).collect()
     };
-    let term = |at: &Signals<f64>| term.unit_term(at, model, &EffectConstants::default());
-    term(&one).plus(-1.0, term(&rest)).into()
+    rows.rows.iter().map(of_row).collect()
 }

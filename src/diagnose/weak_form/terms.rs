@@ -1,6 +1,7 @@
 //! The unknowns of the fit: the declared model's own four constants, every effect of the core's
 //! table, and a few products of signals without a name that only serve to say "something else is there".
 
+use super::sensitivity::Channel;
 use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
 use pitchleak_core::{Effect, Model, Signals, Terms};
 
@@ -147,13 +148,34 @@ impl Term {
         }
     }
 
-    /// The signal of the equations' left side to which the term is in proportion, so that its column carries the
-    /// noise of what the model leaves over.
-    pub(crate) fn carries(self) -> Option<LeftSide> {
+    /// The signals whose noise the column carries beside what the model leaves over: the channel, and whether its value (0) or
+    /// its rate (1). The others' columns are quiet against what they vary.
+    pub(crate) fn noisy_in(self) -> &'static [(Channel, usize)] {
+        const SPEED: &[(Channel, usize)] = &[(Channel::Position, 1)];
+        const STORAGE: &[(Channel, usize)] = &[(Channel::PressureA, 1), (Channel::PressureB, 1)];
+        const FORCE: &[(Channel, usize)] = &[(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
+        let effect = match self {
+            Self::InverseBulk => return STORAGE,
+            Self::Nameless(Nameless::DirectionLeak) => return SPEED,
+            Self::Effect(effect) => effect,
+            _ => return &[],
+        };
+        match (effect.spec().carries, effect.spec().kind) {
+            (Some(LeftSide::Speed), _) => SPEED,
+            (Some(LeftSide::FlowA), _) => &[(Channel::FlowA, 0)],
+            (Some(LeftSide::FlowB), _) => &[(Channel::FlowB, 0)],
+            (None, kind) if kind != EffectKind::Sensor && self.in_force() => FORCE,
+            (None, EffectKind::Storage) => STORAGE,
+            _ => &[],
+        }
+    }
+
+    /// Whether the column is in proportion to what the equations have on their left side, Q or A ẋ.
+    pub(crate) fn is_left_side(self) -> bool {
         match self {
-            Self::Effect(effect) => effect.spec().carries,
-            Self::Nameless(Nameless::DirectionLeak) => Some(LeftSide::Speed),
-            _ => None,
+            Self::Effect(effect) => effect.spec().carries.is_some(),
+            Self::Nameless(product) => product == Nameless::DirectionLeak,
+            _ => false,
         }
     }
 

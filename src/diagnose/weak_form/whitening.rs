@@ -24,7 +24,7 @@ impl Whitening {
             }
             let mut line = [0.0; BAND + 1];
             for d in (0..=BAND.min(i)).rev() {
-                let covariance = noise.between(rows, i, i - d, known.1);
+                let covariance = noise.between(i, i - d, known.1);
                 // L_{i,j} = (Σ_{i,j} − Σ_{l<j} L_{i,l} L_{j,l}) / L_{j,j}
                 let done: f64 = (1..=BAND - d)
                     .filter(|e| i >= d + e)
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::diagnose::equation::PerEquation;
     use crate::diagnose::testing::{declared, sound};
-    use crate::diagnose::weak_form::{Linearisation, residual_rows};
+    use crate::diagnose::weak_form::{Linearisation, WeakForm, residual_rows};
     use nalgebra::{DMatrix, DVector};
     use pitchleak_testkit::white_noise;
 
@@ -67,10 +67,12 @@ mod tests {
         let at = Linearisation::declared(&declared);
         let rows = residual_rows(&[sound(5), sound(3)], &declared.sensors, &at, 0.1);
         let equation_error = PerEquation { chamber_a: 1e-14, chamber_b: 0.0, force: 0.0 };
-        let noise = NoiseModel { at: &at, sensors: &declared.sensors, equation_error };
+        let sensitivities = WeakForm::sensitivities(&rows, &declared.sensors, &at);
+        let (sensors, sensitivities) = (&declared.sensors, sensitivities.as_slice());
+        let noise = NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities };
         let n = rows.entries.len();
         let hats = hat_weights(rows.rows[0].samples);
-        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(&rows, i.max(j), i.min(j), hats));
+        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(i.max(j), i.min(j), hats));
         let factor = dense.cholesky().expect("a covariance");
         let v: Vec<f64> = white_noise(1).take(n).collect();
         let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");

@@ -1,0 +1,34 @@
+//! Whether the diagnosis is sure where it may be, and only there: sound rigs, two effects at once, and effects that no
+//! table has, by a plant of its own.
+//!
+//! `cargo bench --bench confidence` prints the figures of `docs/closing-the-loop.md`. After `--`: a kind (`sound`, `long`, `two`,
+//! `outside`), a number that thins the cases out, and `each` for a line per case.
+
+mod cases;
+mod plant;
+mod tally;
+
+use cases::Case;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let stride = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(1_usize).max(1);
+    let kinds = ["sound", "long", "two", "outside"];
+    let wanted = |kind: &str| {
+        !arguments.iter().any(|a| kinds.contains(&a.as_str())) || arguments.iter().any(|a| a == kind)
+    };
+    let all: [(&str, Vec<Case>); 4] = [
+        ("sound", cases::sound(stride)),
+        ("long", cases::long(24 / stride)),
+        ("two", cases::two(96 / stride)),
+        ("outside", cases::outside(208 / stride)),
+    ];
+    let each = arguments.iter().any(|a| a == "each");
+    for (kind, cases) in all.into_iter().filter(|(kind, _)| wanted(kind)) {
+        let answers = tally::ask_all(&cases);
+        if each {
+            answers.iter().for_each(|(case, answer)| println!("{}", tally::line(case, answer)));
+        }
+        println!("{kind}: {}", tally::summary(&answers));
+    }
+}

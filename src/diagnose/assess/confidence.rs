@@ -1,0 +1,152 @@
+//! Whether a named effect stands by itself: each is held against its rivals, against what is left, against the effects
+//! beside it, and against what physics allows.
+
+use super::adequacy;
+use crate::diagnose::data::SensorCheck;
+use crate::diagnose::equation::{Equation, PerEquation};
+use crate::diagnose::fit::Fit;
+use crate::diagnose::search::{self, Selected, Selection};
+use crate::diagnose::thresholds::{DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE};
+use crate::diagnose::weak_form::Term;
+use pitchleak_core::effects::EffectKind;
+
+/// Reasons not to believe the name of an effect or its value; none when both can be believed.
+pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
+    own_doubts(selection, one, checks).or_else(|| doubtful_company(selection, one, checks))
+}
+
+/// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
+fn doubtful_company(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
+    let fit = &selection.fit;
+    let (acts, ratio) = (acts_in(fit, one.term), fit.noise_ratio());
+    let is_doubtful = |other: &&Selected| {
+        let also = acts_in(fit, other.term);
+        let is_shared = |equation: Equation| acts[equation] && also[equation] && ratio[equation] > 1.0;
+        other.term != one.term
+            && Equation::ALL.into_iter().any(is_shared)
+            && own_doubts(selection, other, checks).is_some()
+    };
+    let other = selection.effects.iter().find(is_doubtful)?;
+    let id = fit.problem.terms[other.term].effect()?.spec().id;
+    Some(format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"))
+}
+
+fn own_doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
+    let fit = &selection.fit;
+    let reasons: Vec<String> = [
+        rivals(one),
+        remainder(fit, one),
+        company(selection, one),
+        bounds(fit, one),
+        leaks(fit, one),
+        ripple(checks),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    (!reasons.is_empty()).then(|| reasons.join("; "))
+}
+
+/// A sensor's noise is none.
+fn ripple(checks: &[SensorCheck]) -> Option<String> {
+    (!adequacy::ripples(checks).is_empty())
+        .then(|| "a sensor's fast noise is regular, which no noise is".to_owned())
+}
+
+/// In which equations an effect shows.
+fn acts_in(fit: &Fit<'_>, term: usize) -> PerEquation<bool> {
+    let squares = fit.squares(term);
+    let all: f64 = squares.iter().map(|(_, square)| square).sum();
+    PerEquation::from_fn(|equation| squares[equation] > 0.01 * all)
+}
+
+/// Others fit as well in its place.
+fn rivals(one: &Selected) -> Option<String> {
+    let ids: Vec<&str> = one.confusable_with.iter().map(|rival| rival.spec().id).collect();
+    (!ids.is_empty()).then(|| format!("these traces do not tell it from {}", ids.join(", ")))
+}
+
+/// What is left where it acts is not small beside what it mends.
+fn remainder(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    if one.beaten_by_nameless {
+        return Some("a product of signals without a name fits better".to_owned());
+    }
+    let acts = acts_in(fit, one.term);
+    let excess = |equation: Equation| {
+        let count = fit.innovations(equation).len() as f64;
+        if acts[equation] { count * (1.0 - fit.noise_ratio()[equation].powi(-2)) } else { 0.0 }
+    };
+    let left: f64 = Equation::ALL.into_iter().map(excess).sum::<f64>() + adequacy::nameless_excess(fit);
+    let mended = search::loss(fit, &[one.term]);
+    (left > UNMENDED_SHARE * (mended + left)).then(|| {
+        "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
+         believed without a measurement of its own"
+            .to_owned()
+    })
+}
+
+/// It is as small as the error that another named effect, of the same equation, may have in its law.
+fn company(selection: &Selection<'_>, one: &Selected) -> Option<String> {
+    let fit = &selection.fit;
+    let acts = acts_in(fit, one.term);
+    let shares_equation = |other: &&Selected| {
+        let also = acts_in(fit, other.term);
+        Equation::ALL.into_iter().any(|equation| acts[equation] && also[equation])
+    };
+    let own = search::loss(fit, &[one.term]);
+    let others = selection.effects.iter().filter(|other| other.term != one.term);
+    let large = others
+        .filter(shares_equation)
+        .max_by(|a, b| search::loss(fit, &[a.term]).total_cmp(&search::loss(fit, &[b.term])))?;
+    let id = fit.problem.terms[large.term].effect()?.spec().id;
+    (own < LEAST_SHARE_BESIDE * search::loss(fit, &[large.term])).then(|| {
+        format!("it is so small beside {id} that a small error in the law of that would pass for it")
+    })
+}
+
+/// Its value is at an end of what physics allows.
+fn bounds(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    fit.is_at_bound(one.term).then(|| "its value is at the end of what is possible".to_owned())
+}
+
+/// With it a leak comes out below zero.
+fn leaks(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let acts = acts_in(fit, one.term);
+    let impossible = |(term, name, equations): (Term, &str, &[Equation])| {
+        let own = fit.estimate(fit.problem.place(term)?)?;
+        let is_negative = own.value < -DOUBTED_LEAK_SIGMA * own.std;
+        let is_near = equations.iter().any(|equation| acts[*equation]);
+        (is_negative && is_near)
+            .then(|| format!("with it the {name} is {:.1} sigma below zero", -own.value / own.std))
+    };
+    let (a, b) = (Equation::ChamberA, Equation::ChamberB);
+    [
+        (Term::Internal, "internal leak", &[a, b][..]),
+        (Term::ExternalA, "external leak A", &[a][..]),
+        (Term::ExternalB, "external leak B", &[b][..]),
+    ]
+    .into_iter()
+    .find_map(impossible)
+}
+
+/// Standard deviation of an effect's value where it is only known over the bulk modulus, as a dead volume is; else none.
+pub(crate) fn std_with_oil(fit: &Fit<'_>, term: usize) -> Option<f64> {
+    let spec = fit.problem.terms[term].effect()?.spec();
+    let is_volume = spec.kind == EffectKind::Storage && spec.constants.is_empty() && spec.unit == "m3";
+    let own = fit.estimate(term).filter(|_| is_volume)?;
+    Some(own.std.hypot(own.value * fit.oil_share()))
+}
+
+/// A sentence where only the ratio of a volume to the bulk modulus is known.
+pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let id = fit.problem.terms[one.term].effect()?.spec().id;
+    let (own, std) = (fit.estimate(one.term)?, std_with_oil(fit, one.term)?);
+    let percent = |std: f64| 100.0 * std / own.value;
+    (own.std < 0.5 * std && own.value > 0.0).then(|| {
+        format!(
+            "{id}: only its ratio to the bulk modulus is well known (to {:.1} %); the volume itself no better than the oil ({:.0} %)",
+            percent(own.std),
+            percent(std)
+        )
+    })
+}

@@ -1,0 +1,59 @@
+//! A small piece of the bench of confidence (`cargo bench --bench confidence`): sound rigs, two effects at once, effects that no
+//! table has.
+
+#[allow(dead_code, reason = "the bench asks more of it")]
+#[path = "../benches/confidence/cases.rs"]
+mod cases;
+#[allow(dead_code, reason = "the bench asks more of it")]
+#[path = "../benches/confidence/plant.rs"]
+mod plant;
+#[allow(dead_code, reason = "the bench prints more of it")]
+#[path = "../benches/confidence/tally.rs"]
+mod tally;
+
+use cases::Case;
+use pitchleak::diagnose::{Diagnosis, Verdict};
+
+/// Every `stride`th from `first`.
+fn asked(cases: Vec<Case>, first: usize, stride: usize) -> Vec<(Case, Diagnosis)> {
+    if cfg!(debug_assertions) {
+        eprintln!("too slow without optimisation: nothing tested");
+        return vec![];
+    }
+    tally::ask_all(&cases.into_iter().skip(first).step_by(stride).collect::<Vec<_>>())
+}
+
+fn lines(answers: &[(Case, Diagnosis)]) -> String {
+    answers.iter().map(|(case, answer)| tally::line(case, answer) + "\n").collect()
+}
+
+#[test]
+fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
+    let answers = asked(cases::sound(1), 2, 9);
+    let sound = answers.iter().filter(|(_, answer)| answer.verdict == Verdict::NoMissingEffect).count();
+    let named = answers.iter().any(|(_, answer)| !answer.effects.is_empty());
+    assert!(!named && sound + 1 >= answers.len(), "{sound} of {}:\n{}", answers.len(), lines(&answers));
+}
+
+#[test]
+fn two_effects_are_both_named_and_their_values_hold() {
+    let answers = asked(cases::two(24), 0, 2);
+    let is_explained = |(case, answer): &&(Case, Diagnosis)| {
+        answer.verdict == Verdict::Explained && tally::all_named(case, answer)
+    };
+    let explained = answers.iter().filter(is_explained).count();
+    for (case, answer) in &answers {
+        assert!(tally::first_is_true(case, answer), "{}", tally::line(case, answer));
+        let worst = tally::deviations(case, answer).into_iter().fold(0.0, f64::max);
+        assert!(worst < 4.5, "{}", tally::line(case, answer));
+    }
+    assert!(10 * explained >= 8 * answers.len(), "{explained} of {}:\n{}", answers.len(), lines(&answers));
+}
+
+#[test]
+fn an_effect_that_no_table_has_is_never_surely_explained_by_another() {
+    for (case, answer) in asked(cases::outside(26), 0, 2) {
+        let surely = answer.effects.iter().any(|effect| effect.confident);
+        assert!(!(surely && answer.verdict == Verdict::Explained), "{}", tally::line(&case, &answer));
+    }
+}
