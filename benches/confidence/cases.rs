@@ -121,7 +121,7 @@ impl Case {
             late = Some(shown);
             hanging = hanging.clamp(now.x - own.backlash, now.x + own.backlash);
             count += 1;
-            if (count - 1) % every != 0 {
+            if !(count - 1).is_multiple_of(every) {
                 return;
             }
             let mut qa = shown.qa * (1.0 + own.flow_gain_a) + own.flow_offset_a;
@@ -169,14 +169,14 @@ pub fn sound(stride: usize) -> Vec<Case> {
             }
         }
     }
-    let step = |case: &(usize, Case)| case.0 % stride == 0;
+    let step = |case: &(usize, Case)| case.0.is_multiple_of(stride);
     all.into_iter().enumerate().filter(step).map(|(_, case)| case).collect()
 }
 
 /// Sound rigs for ten minutes and for an hour.
 pub fn long(count: usize) -> Vec<Case> {
     let case = |number: usize| {
-        let hour = number % 4 == 0;
+        let hour = number.is_multiple_of(4);
         Case {
             size: SIZES[number % 5],
             rate_hz: if hour { 20.0 } else { [20.0, 50.0, 100.0][number % 3] },
@@ -240,7 +240,7 @@ pub fn outside(count: usize) -> Vec<Case> {
     let case = |number: usize| {
         let size = SIZES[number / 13 % 4];
         let (area, volume) = (size * size, size * size * size);
-        let large = if number / 13 % 2 == 0 { 1.0 } else { 3.0 };
+        let large = if (number / 13).is_multiple_of(2) { 1.0 } else { 3.0 };
         let mut case = Case {
             size,
             rate_hz: [100.0, 50.0, 200.0][number / 13 % 3],

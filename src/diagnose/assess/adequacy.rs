@@ -53,22 +53,21 @@ pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
 /// Variables on which what is left depends, in whatever shape: its means in bins of equal count against each, by χ².
 fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = &'static str> {
     let residual = whitened_residual(fit, equation);
-    let names = residual.into_iter().flat_map(|residual| {
+    residual.into_iter().flat_map(|residual| {
         let EquationResidual { white, variables, .. } = residual;
         let depends = move |(name, values): (&'static str, Vec<f64>)| {
             let p = binned_p(&white, &values)?;
             (p < LEAST_P / RESIDUAL_TESTS as f64).then_some(name)
         };
         variables.into_iter().filter_map(depends)
-    });
-    names
+    })
 }
 
 /// Chance of means this large in bins of equal count; none where there are too few.
 fn binned_p(white: &[f64], values: &[f64]) -> Option<f64> {
     let mut pairs: Vec<(f64, f64)> =
         values.iter().zip(white).filter(|(value, _)| value.is_finite()).map(|(v, w)| (*v, *w)).collect();
-    let varies = pairs.iter().any(|pair| pair.0 != pairs[0].0);
+    let varies = pairs.iter().any(|pair| pair.0.to_bits() != pairs[0].0.to_bits());
     if !varies || pairs.len() < SHAPE_BINS * FEWEST_ROWS {
         return None;
     }

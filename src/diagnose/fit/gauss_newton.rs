@@ -88,7 +88,9 @@ impl<'a> Fit<'a> {
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
     pub(crate) fn vacated(&self, term: usize) -> Self {
         let (structure, at) = self.left_by(&[term]);
-        let vacated = Self::around(self.problem, structure, at, self.equation_error);
+        let every: Vec<usize> = (0..self.problem.terms.len()).collect();
+        let vacated =
+            Self::with_columns(&every, self.problem, structure, (at, self.solved()), self.equation_error);
         Self { equation_error: self.equation_error, ..vacated }
     }
 
@@ -109,19 +111,20 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let every: Vec<usize> = (0..problem.terms.len()).collect();
-        Self::with_columns(&every, problem, structure, at, assumed_error)
+        Self::with_columns(&every, problem, structure, (at.clone(), at), assumed_error)
     }
 
-    /// The same with the columns of some terms alone, all that are fitted among them.
+    /// The same with the columns of some terms alone, all that are fitted among them, and the noise taken elsewhere.
     fn with_columns(
         places: &[usize],
         problem: &'a Problem<'a>,
         structure: Structure,
-        at: Linearisation,
+        (at, noise_at): (Linearisation, Linearisation),
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
-        let weak_form = WeakForm::new(problem.traces, &problem.sensors, at, columns, assumed_error);
+        let weak_form =
+            WeakForm::new(problem.traces, &problem.sensors, (at, noise_at), columns, assumed_error);
         let WeakForm { at, rows, whitening, .. } = &weak_form;
         let mut shared = weak_form.shared_noise(&problem.white, columns);
         if assumed_error != PerEquation::default() {
@@ -162,7 +165,7 @@ impl<'a> Fit<'a> {
         progress: Progress<'_>,
     ) -> Self {
         let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
-            Self::with_columns(&structure.active, problem, structure.clone(), at, assumed_error)
+            Self::with_columns(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
         };
         let mut fit = round(at, assumed_error);
         for _ in 1..MOST_ROUNDS {

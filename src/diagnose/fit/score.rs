@@ -134,7 +134,8 @@ mod tests {
         let places: Vec<usize> = (0..problem.terms.len()).collect();
         let columns = Columns { terms: &problem.terms, constants: &constants, places: &places };
         let start = problem.start.clone();
-        let form = WeakForm::new(&traces, &problem.sensors, start, columns, PerEquation::default());
+        let form =
+            WeakForm::new(&traces, &problem.sensors, (start.clone(), start), columns, PerEquation::default());
         test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));
     }
 

@@ -25,6 +25,8 @@ pub(crate) struct WeakForm<'a> {
     motions: Vec<Motion>,
     steps: OnceLock<Steps>,
     pub(crate) rows: Rows,
+    /// Where the noise is taken.
+    noise_at: Linearisation,
     sensitivities: Vec<PerEquation<Sensitivity>>,
     pub(crate) whitening: Whitening,
 }
@@ -48,27 +50,38 @@ impl Columns<'_> {
 }
 
 impl<'a> WeakForm<'a> {
-    /// `equation_error` as in [`NoiseModel`].
+    /// With the noise that the sensors bring at `noise_at`, and `equation_error` as in [`NoiseModel`].
     pub(crate) fn new(
         traces: &'a [Series],
         sensors: &'a Sensors<f64>,
-        at: Linearisation,
+        (at, noise_at): (Linearisation, Linearisation),
         columns: Columns<'_>,
         equation_error: PerEquation<f64>,
     ) -> Self {
         let motions = motions(traces, sensors, &at);
         let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
         let rows = rows.at_places(columns.places, columns.terms.len());
-        let sensitivities = Self::sensitivities(&rows, sensors, &at);
+        let sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
+        let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
-            NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities: &sensitivities };
+            NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
         let whitening = Whitening::new(&rows, &noise);
-        Self { traces, sensors, at, motions, steps: OnceLock::new(), rows, sensitivities, whitening }
+        Self {
+            traces,
+            sensors,
+            at,
+            motions,
+            steps: OnceLock::new(),
+            rows,
+            noise_at,
+            sensitivities,
+            whitening,
+        }
     }
 
     /// The noise of these rows, had the equations this error.
     pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
-        let Self { at, rows, sensors, sensitivities, .. } = self;
+        let Self { noise_at: at, rows, sensors, sensitivities, .. } = self;
         NoiseModel { at, sensors, equation_error, rows, sensitivities }
     }
 

@@ -181,7 +181,7 @@ impl<'a> Integrand<'a> {
             *column = step.column(term, self.at);
         }
         let missing = |value: f64| if value.is_finite() { 0.0 } else { dt };
-        let unsure = !(means.felt_v_mps.abs() >= motion.least_sure_mps());
+        let unsure = means.felt_v_mps.is_nan() || means.felt_v_mps.abs() < motion.least_sure_mps();
         out.time_s = dt;
         out.unsure_s = if unsure { dt } else { 0.0 };
         out.missing_s = PerEquation {

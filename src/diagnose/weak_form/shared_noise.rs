@@ -79,10 +79,10 @@ impl SharedNoise {
             };
             sensitivity.iter().zip(&drawn).map(of_one).sum()
         };
-        let columns = slopes.0.iter().map(|(place, term, slopes)| {
+        let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];
             let in_column = |entry: &Entry| {
-                let signals = term.noisy_in().iter().zip(&slopes[entry.row]);
+                let signals = term.noisy_in().iter().zip(&by_row[entry.row]);
                 let of_one = |((channel, order), slope): (&(Channel, usize), &PerEquation<f64>)| {
                     slope[entry.equation] * noise_of(*channel, *order)[entry.row]
                 };
@@ -95,15 +95,22 @@ impl SharedNoise {
     }
 }
 
-/// By how much the terms that carry noise grow with each signal they carry it from: place, term, and row by row.
-pub(crate) struct Slopes(Vec<(usize, Term, Vec<Vec<PerEquation<f64>>>)>);
+/// By how much the terms that carry noise grow with each signal they carry it from.
+pub(crate) struct Slopes(Vec<SlopesOfTerm>);
+
+struct SlopesOfTerm {
+    place: usize,
+    term: Term,
+    /// By row, in the order of [`Term::noisy_in`].
+    by_row: Vec<Vec<PerEquation<f64>>>,
+}
 
 impl Slopes {
     pub(crate) fn of(rows: &Rows, noise: &NoiseModel<'_>, columns: Columns<'_>) -> Self {
         let carrying = columns.places.iter().filter(|place| !columns.terms[**place].noisy_in().is_empty());
         let of_term = |place: &usize| {
             let (term, constants) = (columns.terms[*place], &columns.constants[*place]);
-            (*place, term, slopes(rows, noise, term, constants))
+            SlopesOfTerm { place: *place, term, by_row: slopes(rows, noise, term, constants) }
         };
         let carrying: Vec<&usize> = carrying.collect();
         Self(carrying.into_par_iter().map(of_term).collect())
