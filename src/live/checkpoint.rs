@@ -1,29 +1,62 @@
 //! The estimators' state in a folder: written whole or not at all, the generation before kept.
 
 use super::cylinder::Cylinder;
+use super::event::NoticeEvent;
 use super::watch::Watch;
 use crate::Rig;
-use crate::output::{self, Inputs, OutputError};
+use crate::output::{self, OutputError};
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Name and version of the saved form.
-const SCHEMA: &str = "pitchleak.watch/1";
+/// Name and version of the saved form: the cylinders by name, each with its estimator's own bytes, and a checksum.
+const SCHEMA: &str = "pitchleak.watch/2";
 const NAME: &str = "watch.state";
 const BEFORE: &str = "watch.state.before";
+/// Being written.
+const NEW: &str = "watch.state.new";
+/// Found damaged, and kept for whoever asks why.
+const DAMAGED: &str = "watch.state.damaged";
 
 /// The folder.
+#[derive(Clone, Debug)]
 pub struct Checkpoint {
     folder: PathBuf,
+}
+
+/// What a [`Watch`] knew at one moment, to be written while it goes on.
+pub struct Snapshot(BTreeMap<String, Cylinder>);
+
+impl Snapshot {
+    /// As of now.
+    pub fn of(watch: &Watch) -> Self {
+        Self(watch.cylinders.clone())
+    }
+
+    /// As in the file.
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        let mut bytes = Vec::new();
+        ciborium::into_writer(&(SCHEMA, &self.0), &mut bytes).map_err(|error| error.to_string())?;
+        bytes.extend(checksum(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
 }
 
 /// Why there is no checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// It cannot be written.
+    /// There is no folder for it.
     #[error(transparent)]
-    Output(#[from] OutputError),
+    Folder(#[from] OutputError),
+    /// The disk does not take it.
+    #[error("cannot write {file}: {source}")]
+    Write {
+        /// Which.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
     /// Neither generation can be used.
     #[error("{file}: {why}: move it away to begin anew")]
     Content {
@@ -45,41 +78,67 @@ impl Checkpoint {
         Ok(Self { folder })
     }
 
-    /// Writes what `watch` knows.
+    /// Writes what was known; says how many bytes it took.
     ///
     /// # Errors
-    /// Where the disk does not take it; then the one before is still there.
-    pub fn save(&self, watch: &Watch) -> Result<(), CheckpointError> {
-        let path = self.folder.join(NAME);
-        let content = |why: String| CheckpointError::Content { file: path.display().to_string(), why };
-        let mut bytes = Vec::new();
-        ciborium::into_writer(&(SCHEMA, &watch.cylinders), &mut bytes)
-            .map_err(|error| content(error.to_string()))?;
-        bytes.extend(checksum(&bytes).to_le_bytes());
-        // One of the two is whole at any time.
-        if path.exists() {
-            let moved = fs::rename(&path, self.folder.join(BEFORE));
-            moved.map_err(|source| OutputError::Write { path: path.clone(), source })?;
+    /// Where the disk does not take it; then both generations are still there.
+    pub fn save(&self, snapshot: &Snapshot) -> Result<usize, CheckpointError> {
+        let file = self.file(NAME);
+        let bytes = snapshot
+            .bytes()
+            .map_err(|why| CheckpointError::Content { file: file.display().to_string(), why })?;
+        match self.write(&bytes) {
+            Ok(()) => Ok(bytes.len()),
+            Err(source) => Err(CheckpointError::Write { file: file.display().to_string(), source }),
         }
-        Ok(output::write(&path, bytes, &Inputs::default())?)
     }
 
-    /// Goes on from the last checkpoint, if there is one; gives what is to be said of a damaged one.
+    /// The new one is on the disk before either name is touched.
+    fn write(&self, bytes: &[u8]) -> io::Result<()> {
+        let mut new = File::create(self.file(NEW))?;
+        new.write_all(bytes)?;
+        new.sync_all()?;
+        match fs::rename(self.file(NAME), self.file(BEFORE)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        fs::rename(self.file(NEW), self.file(NAME))?;
+        File::open(&self.folder)?.sync_all()
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Goes on from the last checkpoint, if there is one. Where that is damaged or missing, the one before it is taken, and
+    /// a notice says so.
     ///
     /// # Errors
     /// Where there are checkpoints and none can be used, or one is of another rig.
-    pub fn restore(&self, watch: &mut Watch) -> Result<Option<String>, CheckpointError> {
-        let (newest, before) = (self.folder.join(NAME), self.folder.join(BEFORE));
+    pub fn restore(&self, watch: &mut Watch) -> Result<Option<NoticeEvent>, CheckpointError> {
+        let newest = self.file(NAME);
         let damage = match read(&newest) {
             None => None,
             Some(Ok(cylinders)) => return self.put(watch, cylinders).map(|()| None),
             Some(Err(why)) => Some(why),
         };
-        match (read(&before), damage) {
+        match (read(&self.file(BEFORE)), damage) {
             (Some(Ok(cylinders)), damage) => {
                 self.put(watch, cylinders)?;
-                let why = damage.unwrap_or_else(|| "not there".to_owned());
-                Ok(Some(format!("{}: {why}: the one before is used", newest.display())))
+                if damage.is_some() {
+                    // Else the next checkpoint would put it in the place of the good one.
+                    let aside = fs::rename(&newest, self.file(DAMAGED));
+                    let file = newest.display().to_string();
+                    aside.map_err(|source| CheckpointError::Write { file, source })?;
+                }
+                let why = damage.unwrap_or_else(|| "missing".to_owned());
+                Ok(Some(NoticeEvent {
+                    cylinder: String::new(),
+                    t_s: None,
+                    kind: "checkpoint".to_owned(),
+                    count: 1,
+                    text: format!("{}: {why}: the one before is used", newest.display()),
+                }))
             }
             (None, None) => Ok(None),
             (_, Some(why)) | (Some(Err(why)), None) => {
@@ -92,7 +151,7 @@ impl Checkpoint {
         for (name, cylinder) in &cylinders {
             // By whatever name.
             if watch.config().rig_of(name).map(Rig::to_toml) != Some(cylinder.rig().to_toml()) {
-                let file = self.folder.join(NAME).display().to_string();
+                let file = self.file(NAME).display().to_string();
                 let why = format!("of another rig than `{name}` has now");
                 return Err(CheckpointError::Content { file, why });
             }
@@ -113,10 +172,16 @@ fn read(path: &Path) -> Option<Result<BTreeMap<String, Cylinder>, String>> {
     if checksum(body) != u32::from_le_bytes(*sum) {
         return Some(Err("damaged".to_owned()));
     }
+    let version = format!("of another version, this one reads `{SCHEMA}`");
+    // A list of two whose first is the version.
+    if body.get(2..2 + SCHEMA.len()) != Some(SCHEMA.as_bytes()) {
+        return Some(Err(version));
+    }
     let read = ciborium::from_reader::<(String, BTreeMap<String, Cylinder>), _>(body);
     Some(match read {
-        Ok((schema, cylinders)) if schema == SCHEMA => Ok(cylinders),
-        _ => Err(format!("of another version, this one reads `{SCHEMA}`")),
+        Ok((_, cylinders)) => Ok(cylinders),
+        Err(ciborium::de::Error::Semantic(_, why)) => Err(why),
+        Err(_) => Err(version),
     })
 }
 

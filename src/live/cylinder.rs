@@ -9,11 +9,11 @@ use crate::trace::{BadRows, LineLayout, Taken, TraceFault};
 use pitchleak_core::RlsError;
 use serde::{Deserialize, Serialize};
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Cylinder {
+    /// Its alarms are those not yet said.
+    #[serde(with = "stream_bytes")]
     stream: Stream,
-    /// Alarms said so far.
-    alarms: usize,
     /// Intervals that had begun at the last sample: a new one asks for an estimate.
     intervals: Option<f64>,
     /// Time of the last estimate said, s.
@@ -25,7 +25,7 @@ pub(super) struct Cylinder {
 impl Cylinder {
     pub(super) fn new(rig: &Rig) -> Result<Self, RlsError> {
         let stream = Stream::new(rig, BadRows::Skip)?;
-        Ok(Self { stream, alarms: 0, intervals: None, told_s: None, notices: Notices::default() })
+        Ok(Self { stream, intervals: None, told_s: None, notices: Notices::default() })
     }
 
     pub(super) fn rig(&self) -> &Rig {
@@ -49,7 +49,7 @@ impl Cylinder {
                 self.notice(name, kind, bad.to_string(), events);
             }
             Taken::Good { renewed } => {
-                if renewed && self.stream.replay().alarms().len() > self.alarms {
+                if renewed && !self.stream.replay().alarms().is_empty() {
                     self.tell_alarms(name, events);
                 }
                 self.tell_estimate_if_due(name, interval_s, events);
@@ -83,21 +83,20 @@ impl Cylinder {
     fn tell_estimate(&mut self, name: &str, events: &mut Vec<Event>) {
         let (Some(t_s), Some(report)) = (self.stream.time_s(), self.stream.report(name)) else { return };
         self.told_s = Some(t_s);
-        let leakage = report.leakage.map(LiveLeakage::from);
-        let time_ns = self.time_ns(t_s);
-        let cylinder = name.to_owned();
         events.push(Event::Estimate(EstimateEvent {
-            cylinder,
+            cylinder: name.to_owned(),
             t_s,
+            status: report.verdict.status,
             faults: report.verdict.faults,
-            leakage,
-            time_ns,
+            leakage: report.leakage.map(LiveLeakage::from),
+            trend: report.trend,
+            time_ns: self.time_ns(t_s),
         }));
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
         let Some(ReplayReport { leakage, alarms, .. }) = self.stream.report(name) else { return };
-        for alarm in alarms.iter().skip(self.alarms) {
+        for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
             let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));
             let words = [serde_json::to_value(alarm.fault), serde_json::to_value(alarm.state)]
@@ -112,10 +111,28 @@ impl Cylinder {
                 time_ns,
             }));
         }
-        self.alarms = alarms.len();
+        self.stream.forget_alarms();
     }
 
     fn time_ns(&self, t_s: f64) -> Option<i64> {
         self.stream.epoch_ns.map(|epoch_ns| epoch_ns.saturating_add((t_s * 1e9).round() as i64))
+    }
+}
+
+/// A stream as its own bytes, which are checked as they are read.
+mod stream_bytes {
+    use super::Stream;
+    use ciborium::Value;
+    use serde::{Deserialize, Deserializer, Serializer, de, ser};
+
+    pub(super) fn serialize<S: Serializer>(stream: &Stream, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_bytes(&stream.save().map_err(ser::Error::custom)?)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Stream, D::Error> {
+        let Value::Bytes(bytes) = Value::deserialize(deserializer)? else {
+            return Err(de::Error::custom("bytes expected"));
+        };
+        Stream::restore(&bytes).map_err(de::Error::custom)
     }
 }

@@ -1,6 +1,6 @@
 //! What goes out.
 
-use crate::report::Leakage;
+use crate::report::{LeakTrend, Leakage, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -35,10 +35,14 @@ pub struct EstimateEvent {
     pub cylinder: String,
     /// Time of the sample, s; since the first one where lines have time stamps.
     pub t_s: f64,
-    /// Leaks whose alarm stands.
+    /// What a replay's verdict on the samples so far would be, before it weighs wiring and zeros over a whole trace.
+    pub status: Status,
+    /// Leaks whose alarm stands, and those that come and go.
     pub faults: Vec<Leak>,
     /// Mean leak flows since the start, or since the leak changed.
     pub leakage: PerLeak<LiveLeakage>,
+    /// How fast each leak changes; none where the data don't tell.
+    pub trend: PerLeak<Option<LeakTrend>>,
     /// Time of the sample, ns since 1970, where lines have time stamps.
     #[serde(skip)]
     pub time_ns: Option<i64>,
@@ -120,12 +124,16 @@ impl Event {
         // Writing to a string does not fail.
         let _ = match self {
             Self::Estimate(event) => {
-                let mut values = format!("t_s={}", event.t_s);
+                let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
                 for leak in Leak::ALL {
                     let LiveLeakage { mean_lpm, std_lpm } = event.leakage[leak];
                     let _ = write!(values, ",{}_mean_lpm={mean_lpm}", name_of(leak)?);
                     if let Some(std_lpm) = std_lpm {
                         let _ = write!(values, ",{}_std_lpm={std_lpm}", name_of(leak)?);
+                    }
+                    if let Some(trend) = event.trend[leak] {
+                        let _ =
+                            write!(values, ",{}_slope_lpm_per_h={}", name_of(leak)?, trend.slope_lpm_per_h);
                     }
                     let _ = write!(values, ",{}_alarm={}", name_of(leak)?, event.faults.contains(&leak));
                 }

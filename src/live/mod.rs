@@ -14,7 +14,7 @@ mod ndjson;
 mod notices;
 mod watch;
 
-pub use checkpoint::{Checkpoint, CheckpointError};
+pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};
 pub use config::{ConfigError, LiveConfig};
 pub use event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent, OutputFormat};
 pub use format::LineFormat;

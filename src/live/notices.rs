@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 const EVERY_S: f64 = 60.0;
 
 /// What was wrong since the last notice of each kind.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Notices(BTreeMap<String, Kind>);
 
+#[derive(Clone)]
 struct Kind {
     told_s: Option<f64>,
     count: u64,

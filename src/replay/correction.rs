@@ -11,7 +11,7 @@ const MEMORY_S: f64 = 0.05;
 const USUAL_TEMPERATURE_K: f64 = 313.15;
 
 /// Makes of each record what a rig without the effects would have shown.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Correction {
     effects: EffectSet<f64>,
     model: Model<f64>,
@@ -22,7 +22,7 @@ pub(super) struct Correction {
 }
 
 /// Derivatives of the signals.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct Rates {
     x: FadingMemoryFilter<f64>,
     pa: FadingMemoryFilter<f64>,

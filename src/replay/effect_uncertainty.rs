@@ -10,7 +10,7 @@ use pitchleak_core::{Effect, Estimate, PerLeak, RlsError};
 /// One more estimator for each uncertain effect, which takes it to be a standard deviation larger: the leaks
 /// it finds are off by what that uncertainty costs, to first order. The file gives no correlations, so the
 /// effects count as independent.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct EffectUncertainty {
     shifted: Vec<(Correction, Estimator)>,
 }

@@ -2,6 +2,9 @@ use crate::report::Episode;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Leak, PerLeak};
 
+/// Ended episodes that are kept where others are forgotten: enough to tell whether each leak comes and goes.
+const KEPT: usize = 64;
+
 /// The times in which an alarm stood, with what was estimated meanwhile.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Episodes {
@@ -44,11 +47,34 @@ impl Episodes {
         }
     }
 
+    /// Drops all but the last.
+    pub fn forget(&mut self) {
+        let beyond = self.ended.len().saturating_sub(KEPT);
+        self.ended.drain(..beyond);
+    }
+
     /// All of them in the order of their beginnings.
     pub fn list(&self) -> Vec<Episode> {
         let open = self.open.iter().filter_map(|(fault, open)| Some(open.as_ref()?.episode(fault, None)));
         let mut all: Vec<Episode> = self.ended.iter().copied().chain(open).collect();
         all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
         all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_leak_that_comes_and_goes_for_years_takes_no_more_memory() {
+        let mut episodes = Episodes::default();
+        for k in 0..10_000 {
+            let active = PerLeak { internal: k % 2 == 0, ..PerLeak::default() };
+            episodes.add(f64::from(k), 1.0, PerLeak::default(), &active);
+            episodes.forget();
+        }
+        let list = episodes.list();
+        assert_eq!((list.len(), list.last().map(|last| last.from_s)), (KEPT, Some(9998.0)));
     }
 }

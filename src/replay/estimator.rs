@@ -13,7 +13,7 @@ const PAPER_GAMMA: f64 = 3e-5;
 const PAPER_CUTOFF_HZ: f64 = 5.0;
 
 /// The estimator that a rig file asks for.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub enum Estimator {
     /// Leaks and compressibility.
     Plain(Box<Rls<f64, 4>>),
@@ -26,7 +26,7 @@ pub enum Estimator {
 }
 
 /// The paper's law, waiting for its sample rate.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct PaperChain {
     rig: Rig,
     waiting: Option<Record>,

@@ -91,7 +91,7 @@ impl EstimateRow {
 }
 
 /// A running replay.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Replay {
     rig: Rig,
     correction: Option<Correction>,
@@ -257,6 +257,11 @@ impl Replay {
     /// Alarms so far, in the order of time.
     pub fn alarms(&self) -> &[Alarm] {
         &self.alarms
+    }
+
+    fn forget_alarms(&mut self) {
+        self.alarms.clear();
+        self.episodes.forget();
     }
 
     /// The rig.

@@ -9,7 +9,7 @@ use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
 /// would, to the last bit.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Stream {
     replay: Replay,
     validator: Option<RowValidator>,
@@ -121,6 +121,11 @@ impl Stream {
     /// Time of the last good row, s; none before the first.
     pub fn time_s(&self) -> Option<f64> {
         self.validator.as_ref().and_then(RowValidator::time_s)
+    }
+
+    /// Drops the alarms so far, and all but the last episodes of each leak: a stream without end would grow with them.
+    pub fn forget_alarms(&mut self) {
+        self.replay.forget_alarms();
     }
 
     /// The running replay.

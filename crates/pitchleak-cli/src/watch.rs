@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use clap::Args;
 use pitchleak::Rig;
-use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Watch};
+use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Snapshot, Watch};
 use std::io::{self, BufRead};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -70,13 +70,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     };
     let mut watch = Watch::new(config, arguments.format);
     let checkpoint = arguments.state.as_deref().map(Checkpoint::new).transpose()?;
-    if let Some(checkpoint) = &checkpoint {
-        output::warn(&checkpoint.restore(&mut watch)?.into_iter().collect::<Vec<_>>());
-    }
     let format = if arguments.influx_out { OutputFormat::Influx } else { OutputFormat::Ndjson };
+    if let Some(notice) =
+        checkpoint.as_ref().map(|checkpoint| checkpoint.restore(&mut watch)).transpose()?.flatten()
+    {
+        output::complain("warning", &notice.text);
+        print(&[Event::Notice(notice)], format)?;
+    }
     let outcome = serve(&mut watch, &inputs()?, checkpoint.as_ref(), format);
     if let Some(checkpoint) = &checkpoint {
-        checkpoint.save(&watch)?;
+        checkpoint.save(&Snapshot::of(&watch))?;
     }
     outcome.map(|()| Outcome::Done)
 }
@@ -105,7 +108,7 @@ fn serve(
         events.clear();
         if let Some(checkpoint) = checkpoint.filter(|_| saved.elapsed() >= CHECKPOINT) {
             // A disk that is full now may have room later: the samples go on.
-            if let Err(error) = checkpoint.save(watch) {
+            if let Err(error) = checkpoint.save(&Snapshot::of(watch)) {
                 output::complain("warning", &error);
             }
             saved = Instant::now();

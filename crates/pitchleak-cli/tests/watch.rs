@@ -111,7 +111,9 @@ fn assert_replayed(events: &[Value], replay: &Value) {
             assert_eq!(last["leakage"][leak][key], replay["leakage"][leak][key], "{leak} {key}");
         }
     }
+    assert_eq!(last["status"], replay["verdict"]["status"]);
     assert_eq!(last["faults"], replay["verdict"]["faults"]);
+    assert_eq!(last["trend"], replay["trend"]);
     let alarms: Vec<_> =
         of_kind(events, "alarm").map(|alarm| [&alarm["t_s"], &alarm["fault"], &alarm["state"]]).collect();
     let expected = replay["alarms"].as_array().unwrap();
@@ -234,7 +236,18 @@ fn a_damaged_state_is_told_and_the_one_before_is_used() {
     let output = watch(&arguments, Some(&rig)).stdin(Stdio::null()).output().unwrap();
     assert!(output.status.success());
     assert!(String::from_utf8_lossy(&output.stderr).contains("damaged"));
+    let notice: Value =
+        serde_json::from_slice(output.stdout.split(|byte| *byte == b'\n').next().unwrap()).unwrap();
+    assert_eq!([&notice["type"], &notice["kind"]], ["notice", "checkpoint"]);
     assert!(first.len() > 40);
+    // It did not take the place of the good one.
+    std::fs::remove_file(&newest).unwrap();
+    let output = watch(&arguments, Some(&rig)).stdin(Stdio::null()).output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stdout).contains("missing: the one before is used"));
+    assert_eq!(
+        std::fs::read(&newest).unwrap(),
+        std::fs::read(folder.path().join("watch.state.before")).unwrap()
+    );
     std::fs::write(&newest, &bytes).unwrap();
     std::fs::write(folder.path().join("watch.state.before"), "x").unwrap();
     let output = watch(&arguments, Some(&rig)).stdin(Stdio::null()).output().unwrap();
@@ -243,23 +256,72 @@ fn a_damaged_state_is_told_and_the_one_before_is_used() {
     assert_eq!(other.status.code(), Some(2));
 }
 
+/// Puts what a configuration names under a folder of the test.
+fn placed(text: &str, folder: &Path) -> String {
+    let packaging = data().join("../packaging");
+    std::fs::copy(packaging.join("watch.toml"), folder.join("watch.toml")).unwrap();
+    std::fs::copy(data().join("traces/rig.toml"), folder.join("rig.toml")).unwrap();
+    let folder = folder.to_str().unwrap();
+    let program = Path::new(PROGRAM).parent().unwrap().to_str().unwrap();
+    text.replace("/etc/pitchleak", folder)
+        .replace("/var/lib/pitchleak", &format!("{folder}/state"))
+        .replace("/run/pitchleak", folder)
+        .replace("pitchleak watch", &format!("{program}/pitchleak watch"))
+}
+
+#[test]
+fn the_shell_pipe_takes_samples_in_and_gives_events_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let script = std::fs::read_to_string(data().join("../packaging/watch.sh")).unwrap();
+    std::fs::write(at("watch.sh"), placed(&script, folder.path())).unwrap();
+    let input = ndjson(&text(&data().join("traces/both.csv.gz")), &["T7/B2"]);
+    std::fs::write(at("samples"), input).unwrap();
+    let mut pipe = Command::new("sh");
+    pipe.arg(at("watch.sh")).env("SOURCE", format!("cat {}", at("samples"))).env("SINK", "cat");
+    let replay = replayed(&data().join("traces/both.csv.gz"), Some(&data().join("traces/rig.toml")));
+    let output = pipe.output().unwrap();
+    assert!(output.status.success());
+    let output = String::from_utf8(output.stdout).unwrap();
+    let events: Vec<Value> = output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_replayed(&events, &replay);
+    assert!(Path::new(&at("state/watch.state")).exists());
+}
+
+/// Redpanda Connect itself is not here: its two commands are run as it runs them, one fed on standard input, the other
+/// read.
+#[test]
+fn the_commands_of_redpanda_connect_speak_to_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = |file: &str| {
+        let text = std::fs::read_to_string(data().join("../packaging/redpanda-connect").join(file)).unwrap();
+        let text = placed(&text, folder.path());
+        let value =
+            |key: &str| text.lines().find_map(|line| line.trim().strip_prefix(key)).unwrap().to_owned();
+        let mut command = Command::new(value("name: "));
+        command.args(serde_json::from_str::<Vec<String>>(&value("args: ")).unwrap());
+        command
+    };
+    let made = Command::new("mkfifo").arg(folder.path().join("events")).status().unwrap();
+    assert!(made.success());
+    let reader = spawn(command("events.yaml").stdin(Stdio::null()));
+    let input = ndjson(&text(&data().join("traces/both.csv.gz")), &["T7/B2"]);
+    assert!(feed(&mut command("samples.yaml"), input).is_empty());
+    let output = String::from_utf8(reader.wait_with_output().unwrap().stdout).unwrap();
+    let events: Vec<Value> = output.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let replay = replayed(&data().join("traces/both.csv.gz"), Some(&data().join("traces/rig.toml")));
+    assert_replayed(&events, &replay);
+}
+
 /// Telegraf's configuration runs a command that takes Telegraf's lines and gives lines that it reads.
 #[test]
 fn the_command_of_telegraf_speaks_its_protocol() {
-    let packaging = data().join("../packaging");
-    let telegraf = std::fs::read_to_string(packaging.join("telegraf.conf")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let telegraf = std::fs::read_to_string(data().join("../packaging/telegraf.conf")).unwrap();
+    let telegraf = placed(&telegraf, folder.path());
     let command = telegraf.lines().find_map(|line| line.trim().strip_prefix("command = ")).unwrap();
     let words: Vec<String> = serde_json::from_str(command).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    std::fs::copy(packaging.join("watch.toml"), at("watch.toml")).unwrap();
-    std::fs::copy(data().join("traces/rig.toml"), at("rig.toml")).unwrap();
-    let placed = words[1..].iter().map(|word| match word.as_str() {
-        "/etc/pitchleak/watch.toml" => at("watch.toml"),
-        "/var/lib/pitchleak" => at("state"),
-        other => other.to_owned(),
-    });
-    let mut child = spawn(Command::new(PROGRAM).args(placed));
+    let mut child = spawn(Command::new(PROGRAM).args(&words[1..]));
     let mut input = String::new();
     for (k, line) in text(&data().join("traces/both.csv.gz")).lines().skip(1).take(500).enumerate() {
         let cells: Vec<_> = line.split(',').collect();
