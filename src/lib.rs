@@ -33,6 +33,7 @@ pub mod cramer_rao;
 pub mod curve;
 pub mod diagnose;
 pub mod figure;
+pub mod fleet;
 pub mod live;
 pub mod openfast;
 pub mod output;

@@ -37,6 +37,16 @@ impl Palette {
         [self.fault, self.sound, self.caution, self.faint, self.reset]
     }
 
+    /// How a verdict's word is set.
+    pub(crate) fn verdict(&self, status: Status) -> (&'static str, &'static str) {
+        let colour = match status {
+            Status::Leak => self.fault,
+            Status::Sound => self.sound,
+            Status::Doubtful | Status::NotSure => self.caution,
+        };
+        (colour, self.reset)
+    }
+
     pub(crate) fn faint(&self) -> (&'static str, &'static str) {
         (self.faint, self.reset)
     }
@@ -95,12 +105,8 @@ impl ReplayReport {
 
     fn write_verdict(&self, out: &mut String, palette: &Palette) {
         let Verdict { status, text, .. } = &self.verdict;
-        let colour = match status {
-            Status::Leak => palette.fault,
-            Status::Sound => palette.sound,
-            Status::Doubtful | Status::NotSure => palette.caution,
-        };
-        let _ = writeln!(out, "{colour}{}{}  {text}", status.word(), palette.reset);
+        let (colour, reset) = palette.verdict(*status);
+        let _ = writeln!(out, "{colour}{}{reset}  {text}", status.word());
     }
 
     /// Reasons beyond the one that the verdict names.

@@ -1,8 +1,8 @@
 use pitchleak_core::Estimate;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How fast a leak changes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeakTrend {
     /// L/min per hour, positive where it grows.
     pub slope_lpm_per_h: f64,
@@ -14,7 +14,7 @@ pub struct LeakTrend {
 }
 
 /// A time to come.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReachTime {
     /// Best value, s.
     pub value: f64,

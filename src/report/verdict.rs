@@ -6,10 +6,10 @@ use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::wiring::{Wiring, ZeroCheck};
 use pitchleak_core::{Estimate, Fluid, Leak, PerLeak};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The word that heads a report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// Oil leaks, and the data support that.

@@ -58,6 +58,10 @@ impl RowSource for CsvRows {
         &self.splitting.layout
     }
 
+    fn epoch_ns(&self) -> Option<i64> {
+        self.splitting.epoch.first_ns()
+    }
+
     #[inline]
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
         match self.records.next() {

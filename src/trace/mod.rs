@@ -183,6 +183,11 @@ impl<'a> TraceReader<'a> {
         self.rows.layout().has(signal)
     }
 
+    /// The time stamp from which its seconds count, ns since 1970; none before the first row, and where it has no stamps.
+    pub fn epoch_ns(&self) -> Option<i64> {
+        self.rows.epoch_ns()
+    }
+
     /// What was noticed so far.
     pub fn quality(&self) -> &TraceQuality {
         self.validator.quality()

@@ -14,6 +14,11 @@ pub(super) trait RowSource {
     /// Reads the next row into `row`.
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault>;
 
+    /// The time stamp from which its seconds count, ns since 1970; none before the first row, and where it has no stamps.
+    fn epoch_ns(&self) -> Option<i64> {
+        None
+    }
+
     /// This is the part of a trace after its first `rows` rows. Files, numbered by lines, are whole.
     fn count_from(&mut self, _rows: u64) {}
 }

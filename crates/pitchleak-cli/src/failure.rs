@@ -1,5 +1,6 @@
 use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::figure::FigureError;
+use pitchleak::fleet::FleetError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
@@ -24,6 +25,20 @@ pub enum Failure {
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// The traces of a fleet.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// Some traces of a fleet; the others were.
+    #[error("{errors} of {traces} traces could not be judged")]
+    NotJudged {
+        /// Those that were not.
+        errors: usize,
+        /// All.
+        traces: usize,
+    },
+    /// Ctrl-C, or the signal to end.
+    #[error("interrupted: nothing is written")]
+    Interrupted,
     /// Standard input.
     #[error("cannot read standard input: {0}")]
     Input(io::Error),
@@ -60,6 +75,11 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The program's exit status: 130, as shells know it, after Ctrl-C.
+    pub fn status(&self) -> u8 {
+        if matches!(self, Self::Interrupted) { 130 } else { 2 }
+    }
+
     /// Whether the reader of standard output is gone.
     pub fn is_broken_pipe(&self) -> bool {
         let cause = match self {

@@ -4,6 +4,7 @@ mod check;
 mod completions;
 mod diagnose;
 mod failure;
+mod fleet;
 mod input;
 mod output;
 mod replay;
@@ -23,7 +24,8 @@ struct Cli {
 }
 
 const EXIT_STATUS: &str = "\
-Exit status: 0 done; 1 a fault was found and --fail-on-fault was given; 2 bad input or usage.
+Exit status: 0 done; 1 a fault was found and --fail-on-fault was given; 2 bad input or usage, or, at the
+end of `fleet`, traces that could not be judged.
 Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
@@ -31,6 +33,7 @@ enum Command {
     Replay(replay::Arguments),
     Diagnose(diagnose::Arguments),
     Check(check::Arguments),
+    Fleet(fleet::Arguments),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Fleet(arguments) => fleet::run(&arguments),
         Command::Watch(arguments) => watch::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
@@ -61,7 +65,7 @@ fn main() -> ExitCode {
         Err(failure) if failure.is_broken_pipe() => ExitCode::SUCCESS,
         Err(failure) => {
             output::complain("error", &failure);
-            ExitCode::from(2)
+            ExitCode::from(failure.status())
         }
     }
 }

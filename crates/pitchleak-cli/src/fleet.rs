@@ -1,0 +1,87 @@
+use crate::failure::Failure;
+use crate::{Outcome, output};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use pitchleak::fleet::{
+    FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
+};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Judge the traces of many cylinders on all cores: a row per cylinder and trace
+///
+/// A trace that can't be read is told, stands in the table with its error, and makes the exit status 2 once all others
+/// are judged.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Traces, or patterns that name them (in quotes: `*` within a folder, `**` through folders)
+    #[arg(value_name = "GLOB", required = true)]
+    traces: Vec<String>,
+
+    /// Rig file of all traces, or a CSV table of rig files with the header `trace,rig` or `trace,rig,cylinder`, where
+    /// `trace` may be a pattern [default: rig.toml beside each trace, else the built-in rig wu2011]
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+
+    /// Write the table: .parquet, .csv or .csv.gz
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Print counts and rows as JSON (schema pitchleak.fleet/1)
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  pitchleak fleet 'farm/**/*.csv.gz' --out fleet.parquet
+  pitchleak fleet 'logs/2026-05-*.csv' --rig rigs.csv --out may.csv
+  pitchleak fleet farm/T7/*/*.csv --json | jq '.rows[] | select(.status == \"leak\") | .cylinder'";
+
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let rigs = FleetRig::from_file(arguments.rig.clone());
+    let traces = FleetTrace::find(&arguments.traces, &rigs)?;
+    let inputs = FleetTrace::inputs(&traces, &rigs);
+    let stop = stop_at_signal()?;
+    let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
+    let bar = progress(traces.len());
+    let judged = |row: &FleetRow| {
+        bar.inc(1);
+        if let Some(error) = &row.error {
+            bar.suspend(|| output::complain("error", error));
+        }
+    };
+    let rows = judge_all(&traces, judged, &stop).map_err(|Stopped| Failure::Interrupted)?;
+    bar.finish_and_clear();
+    if let Some(file) = file {
+        file.write(&FleetTable::of(&rows))?;
+    }
+    let report = FleetReport::of(&rows);
+    output::print(&if arguments.json {
+        report.to_json()? + "\n"
+    } else {
+        report.to_text(&output::palette())
+    })?;
+    match report.counts.error {
+        0 => Ok(Outcome::Done),
+        errors => Err(Failure::NotJudged { errors, traces: rows.len() }),
+    }
+}
+
+/// Ctrl-C ends the run soon, and leaves nothing half-written behind.
+fn stop_at_signal() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&stop);
+    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
+        .map_err(|error| Failure::Output(io::Error::other(error)))?;
+    Ok(stop)
+}
+
+/// On standard error; hidden where that is no terminal.
+fn progress(traces: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} traces, {eta} left");
+    ProgressBar::new(traces as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}

@@ -1,0 +1,83 @@
+//! Traces through the replay, on all cores.
+
+use super::{FleetRow, FleetTrace, TraceIdentity};
+use crate::Rig;
+use crate::replay::{ReplayError, replay};
+use crate::trace::{TraceError, TraceReader};
+use jiff::Timestamp;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Nobody wants to know any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped;
+
+enum Ended {
+    Failed(ReplayError),
+    Stopped,
+}
+
+impl From<ReplayError> for Ended {
+    fn from(error: ReplayError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// A time in ns since 1970; none where the calendar has none.
+pub fn timestamp(ns: i64) -> Option<Timestamp> {
+    Timestamp::from_nanosecond(i128::from(ns)).ok()
+}
+
+/// Judges one trace as a replay of it does. A trace that can't be read is a row too.
+///
+/// # Errors
+/// [`Stopped`] soon after `go_on` says no; it is asked after each sample.
+pub fn judge(trace: &FleetTrace, go_on: impl FnMut() -> bool) -> Result<FleetRow, Stopped> {
+    let name = trace.path.display().to_string();
+    match &trace.rig {
+        Ok(rig) => judge_opened(&name, &trace.identity, rig, TraceReader::open(&trace.path, rig), go_on),
+        Err(error) => Ok(FleetRow::failed(&trace.identity, name, error.to_string())),
+    }
+}
+
+/// As [`judge`], from what opening a trace gave; `name` is the trace's.
+///
+/// # Errors
+/// As [`judge`].
+pub fn judge_opened(
+    name: &str,
+    identity: &TraceIdentity,
+    rig: &Rig,
+    opened: Result<TraceReader<'_>, TraceError>,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<FleetRow, Stopped> {
+    let replayed = opened.map_err(|error| Ended::Failed(error.into())).and_then(|mut reader| {
+        let report = replay(&mut reader, rig, |_, _, _| if go_on() { Ok(()) } else { Err(Ended::Stopped) })?;
+        let begins = reader.epoch_ns().and_then(timestamp).or(identity.begins);
+        Ok(FleetRow::of(&TraceIdentity { begins, ..identity.clone() }, &report, rig))
+    });
+    match replayed {
+        Ok(row) => Ok(row),
+        Err(Ended::Failed(error)) => Ok(FleetRow::failed(identity, name.to_owned(), error.to_string())),
+        Err(Ended::Stopped) => Err(Stopped),
+    }
+}
+
+/// Judges every trace, on all cores of rayon's pool; `each` sees the rows as they come. The rows are in the order of the
+/// traces. Memory: a row a trace, and for each core what a replay needs.
+///
+/// # Errors
+/// [`Stopped`] soon after `stop` is set.
+pub fn judge_all(
+    traces: &[FleetTrace],
+    each: impl Fn(&FleetRow) + Sync,
+    stop: &AtomicBool,
+) -> Result<Vec<FleetRow>, Stopped> {
+    // One trace after the other from a common queue: they differ in length.
+    let rows = traces.par_iter().with_max_len(1).map(|trace| {
+        let row = judge(trace, || !stop.load(Ordering::Relaxed))?;
+        each(&row);
+        Ok(row)
+    });
+    rows.collect()
+}

@@ -1,0 +1,30 @@
+//! Many traces of many cylinders: each judged as a replay judges it, on all cores, a row for each.
+//!
+//! [`FleetTrace::find`] says which traces there are, of which cylinder, recorded when, with which rig file; [`judge_all`]
+//! replays them; [`FleetTable`] is the table for other programs, [`FleetReport`] JSON and text for people. A file that
+//! can't be read is a row with its error, so that nothing is lost.
+
+mod errors;
+mod identity;
+mod judge;
+mod report;
+mod rig_table;
+mod row;
+mod table;
+mod traces;
+mod trend;
+mod write;
+
+pub use errors::FleetError;
+pub use identity::TraceIdentity;
+pub use judge::{Stopped, judge, judge_all, judge_opened, timestamp};
+pub use report::{Counts, FleetReport};
+pub use rig_table::RigTable;
+pub use row::{FleetLeak, FleetRow};
+pub use table::{FleetColumn, FleetTable};
+pub use traces::{FleetRig, FleetTrace};
+pub use trend::{CylinderTrend, LongTrend};
+pub use write::FleetFile;
+
+#[cfg(test)]
+mod tests;

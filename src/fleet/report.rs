@@ -1,0 +1,184 @@
+//! A fleet as JSON, and in short for people.
+
+use super::{CylinderTrend, FleetRow, LongTrend};
+use crate::report::{Palette, Status};
+use pitchleak_core::Leak;
+use serde::Serialize;
+use std::collections::HashSet;
+use std::fmt::Write;
+
+/// What was found of a fleet, as `fleet --json` prints it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FleetReport<'a> {
+    /// `pitchleak.fleet/1`.
+    pub schema: &'static str,
+    /// Traces.
+    pub traces: usize,
+    /// Cylinders.
+    pub cylinders: usize,
+    /// Traces by what was found.
+    pub counts: Counts,
+    /// How leaks change over the traces of a cylinder, where there are three or more with dates.
+    pub trends: Vec<CylinderTrend>,
+    /// A row per cylinder and trace.
+    pub rows: &'a [FleetRow],
+}
+
+/// Traces by what was found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Oil leaks.
+    pub leak: usize,
+    /// Nothing leaks.
+    pub sound: usize,
+    /// Something contradicts the model or the sensors.
+    pub doubtful: usize,
+    /// The trace says too little.
+    pub not_sure: usize,
+    /// The trace could not be judged.
+    pub error: usize,
+}
+
+const S_PER_DAY: f64 = 86_400.0;
+
+/// Lines of single traces in the text.
+const LINES: usize = 20;
+
+impl<'a> FleetReport<'a> {
+    /// Name and version of the JSON form.
+    pub const SCHEMA: &'static str = "pitchleak.fleet/1";
+
+    /// The report on `rows`.
+    pub fn of(rows: &'a [FleetRow]) -> Self {
+        let mut counts = Counts::default();
+        for row in rows {
+            *match row.status {
+                Some(Status::Leak) => &mut counts.leak,
+                Some(Status::Sound) => &mut counts.sound,
+                Some(Status::Doubtful) => &mut counts.doubtful,
+                Some(Status::NotSure) => &mut counts.not_sure,
+                None => &mut counts.error,
+            } += 1;
+        }
+        let cylinders = rows.iter().map(|row| row.cylinder.as_str()).collect::<HashSet<_>>().len();
+        Self {
+            schema: Self::SCHEMA,
+            traces: rows.len(),
+            cylinders,
+            counts,
+            trends: CylinderTrend::all(rows),
+            rows,
+        }
+    }
+
+    /// JSON.
+    ///
+    /// # Errors
+    /// None in practice: every field has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self)
+    }
+
+    /// How many of which verdict, and a line for each trace that asks for somebody, the worst first.
+    pub fn to_text(&self, palette: &Palette) -> String {
+        let Counts { leak, sound, doubtful, not_sure, error } = self.counts;
+        let mut text = format!(
+            "{} of {}: {leak} leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
+            count(self.traces, "trace"),
+            count(self.cylinders, "cylinder")
+        );
+        if error > 0 {
+            let _ = write!(text, ", {error} not judged");
+        }
+        text.push('\n');
+        let mut worst: Vec<_> = self.rows.iter().filter(|row| row.status != Some(Status::Sound)).collect();
+        worst.sort_by(|a, b| urgency(a).cmp(&urgency(b)).then(b.worst_lpm().total_cmp(&a.worst_lpm())));
+        if !worst.is_empty() {
+            text.push('\n');
+        }
+        for row in worst.iter().take(LINES) {
+            text.push_str(&line(row, palette));
+        }
+        if worst.len() > LINES {
+            let _ = writeln!(text, "… and {} more", worst.len() - LINES);
+        }
+        self.write_trends(&mut text);
+        text
+    }
+
+    /// The leaks that grow from trace to trace beyond doubt, the fastest first.
+    fn write_trends(&self, text: &mut String) {
+        let mut growing = Vec::new();
+        for CylinderTrend { cylinder, leaks } in &self.trends {
+            let significant = leaks.iter().filter_map(|(leak, long)| Some((leak, long.as_ref()?)));
+            growing.extend(
+                significant.filter(|(_, long)| long.grows()).map(|(leak, long)| (cylinder, leak, long)),
+            );
+        }
+        growing.sort_by(|(_, _, a), (_, _, b)| b.trend.slope_lpm_per_h.total_cmp(&a.trend.slope_lpm_per_h));
+        if !growing.is_empty() {
+            text.push('\n');
+        }
+        for (cylinder, leak, long) in growing.iter().take(LINES) {
+            text.push_str(&trend_line(cylinder, *leak, long));
+        }
+        if growing.len() > LINES {
+            let _ = writeln!(text, "… and {} more", growing.len() - LINES);
+        }
+    }
+}
+
+fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+fn urgency(row: &FleetRow) -> u8 {
+    match row.status {
+        Some(Status::Leak) => 0,
+        Some(Status::Doubtful) => 1,
+        Some(Status::NotSure) => 2,
+        None => 3,
+        Some(Status::Sound) => 4,
+    }
+}
+
+fn line(row: &FleetRow, palette: &Palette) -> String {
+    let word = row.status.map_or("ERROR", Status::word);
+    let (colour, reset) = row.status.map_or(palette.caution(), |status| palette.verdict(status));
+    let found = match (&row.error, row.status) {
+        (Some(error), _) => error.clone(),
+        (None, Some(Status::Leak)) => leaks(row),
+        (None, _) => row.reasons.join(", "),
+    };
+    let place = match &row.error {
+        // Names the file by itself.
+        Some(_) => String::new(),
+        None if row.path.starts_with(&row.cylinder) => format!("{}  ", row.path),
+        None => format!("{}  {}  ", row.cylinder, row.path),
+    };
+    format!("{colour}{word:<8}{reset}  {place}{found}\n")
+}
+
+fn leaks(row: &FleetRow) -> String {
+    let flow = |leak: &Leak| {
+        let of = row.leaks.map(|leaks| leaks[*leak])?;
+        let spread = of.ci95.map_or_else(String::new, |[low, high]| format!(" ± {:.3}", (high - low) / 2.0));
+        Some(format!("{} {:.3}{spread} L/min", leak.label(), of.mean_lpm))
+    };
+    row.faults.iter().filter_map(flow).collect::<Vec<_>>().join(", ")
+}
+
+fn trend_line(cylinder: &str, leak: Leak, long: &LongTrend) -> String {
+    let monthly = long.trend.slope().scaled(24.0 * 30.0);
+    let reached = long.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
+        let [low, high] = time.ci95.map(|s| s / S_PER_DAY);
+        format!("; at its threshold in {:.0} days ({low:.0} to {high:.0})", time.value / S_PER_DAY)
+    });
+    format!(
+        "GROWS     {cylinder}  {} by {:.3} ± {:.3} L/min a month over {} traces{reached}\n",
+        leak.label(),
+        monthly.value,
+        monthly.half_width95(),
+        long.traces
+    )
+}

@@ -1,0 +1,149 @@
+//! One cylinder and trace.
+
+use super::TraceIdentity;
+use crate::report::{LeakTrend, ReplayReport, Status};
+use crate::rig::Rig;
+use crate::units::LPM_PER_M3S;
+use jiff::Timestamp;
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use serde::{Deserialize, Serialize};
+
+/// What is known of a cylinder from one trace: the report of its replay in short, or why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FleetRow {
+    /// Which cylinder.
+    pub cylinder: String,
+    /// The trace as it was named.
+    pub path: String,
+    /// When the trace begins: by its time stamps, else by its name; none where neither says.
+    pub begins: Option<Timestamp>,
+    /// Path of the rig file, or `wu2011`; none where it can't be used.
+    pub rig: Option<String>,
+    /// The verdict in a word; none where the trace could not be judged.
+    pub status: Option<Status>,
+    /// Leaks to act on.
+    pub faults: Vec<Leak>,
+    /// Ids of the reasons of a verdict in doubt, first things first.
+    pub reasons: Vec<String>,
+    /// Flows and their trends.
+    pub leaks: Option<PerLeak<FleetLeak>>,
+    /// Times at which an alarm was raised.
+    pub alarms: u64,
+    /// Good rows.
+    pub samples: u64,
+    /// Bad rows.
+    pub skipped: u64,
+    /// Pauses.
+    pub gaps: u64,
+    /// From the first to the last good row, s.
+    pub duration_s: Option<f64>,
+    /// Samples per second where they come regularly.
+    pub sample_rate_hz: Option<f64>,
+    /// What to know of the data.
+    pub warnings: Vec<String>,
+    /// Why the trace could not be judged.
+    pub error: Option<String>,
+}
+
+/// One leak of a cylinder.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FleetLeak {
+    /// Mean size of its flow, L/min.
+    pub mean_lpm: f64,
+    /// Standard deviation of its error, L/min; none where the estimator gives none.
+    pub std_lpm: Option<f64>,
+    /// The interval that holds the flow with 95 % probability, L/min.
+    pub ci95: Option<[f64; 2]>,
+    /// The alarm's threshold, L/min.
+    pub threshold_lpm: f64,
+    /// Whether the trace pins it down.
+    pub identifiable: bool,
+    /// How fast it changes; none where the data don't tell.
+    pub trend: Option<LeakTrend>,
+}
+
+impl FleetRow {
+    /// What a replay found.
+    pub fn of(identity: &TraceIdentity, report: &ReplayReport, rig: &Rig) -> Self {
+        let trace = &report.trace;
+        let raised = report.alarms.iter().filter(|alarm| alarm.state == pitchleak_core::AlarmState::Raised);
+        Self {
+            cylinder: identity.cylinder.clone(),
+            path: trace.path.clone(),
+            begins: identity.begins,
+            rig: Some(report.rig.clone()),
+            status: Some(report.verdict.status),
+            faults: report.verdict.faults.clone(),
+            reasons: report.verdict.reasons.iter().map(|reason| reason.id.name().to_owned()).collect(),
+            leaks: Some(PerLeak::from_fn(|leak| FleetLeak::of(report, rig, leak))),
+            alarms: raised.count() as u64,
+            samples: trace.samples,
+            skipped: trace.skipped,
+            gaps: trace.gaps,
+            duration_s: Some(trace.duration_s),
+            sample_rate_hz: trace.sample_rate_hz,
+            warnings: trace.warnings.clone(),
+            error: None,
+        }
+    }
+
+    /// A trace that could not be judged.
+    pub fn failed(identity: &TraceIdentity, path: String, error: String) -> Self {
+        Self {
+            cylinder: identity.cylinder.clone(),
+            path,
+            begins: identity.begins,
+            rig: None,
+            status: None,
+            faults: Vec::new(),
+            reasons: Vec::new(),
+            leaks: None,
+            alarms: 0,
+            samples: 0,
+            skipped: 0,
+            gaps: 0,
+            duration_s: None,
+            sample_rate_hz: None,
+            warnings: Vec::new(),
+            error: Some(error),
+        }
+    }
+
+    /// Bytes that [`from_bytes`](Self::from_bytes) reads back, numbers to the last bit: for a row that another process
+    /// made.
+    ///
+    /// # Errors
+    /// None in practice: memory takes every byte.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, impl std::error::Error> {
+        let mut bytes = Vec::new();
+        ciborium::into_writer(self, &mut bytes).map(|()| bytes)
+    }
+
+    /// The row that gave these bytes.
+    ///
+    /// # Errors
+    /// Where they are those of no row.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, impl std::error::Error> {
+        ciborium::from_reader(bytes)
+    }
+
+    /// The largest flow among the leaks to act on, L/min.
+    pub fn worst_lpm(&self) -> f64 {
+        let flow = |leak: &Leak| self.leaks.map_or(0.0, |leaks| leaks[*leak].mean_lpm);
+        self.faults.iter().map(flow).fold(0.0, f64::max)
+    }
+}
+
+impl FleetLeak {
+    fn of(report: &ReplayReport, rig: &Rig, leak: Leak) -> Self {
+        let flow = report.leakage[leak];
+        Self {
+            mean_lpm: flow.mean_lpm,
+            std_lpm: flow.std_lpm,
+            ci95: flow.std_lpm.map(|std| Estimate { value: flow.mean_lpm, std }.ci95()),
+            threshold_lpm: rig.alarms.threshold_m3s[leak] * LPM_PER_M3S,
+            identifiable: report.estimates.leaks()[leak].identifiable,
+            trend: report.trend[leak],
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! A leak's course over the traces of days and months.
+
+use super::FleetRow;
+use crate::report::{LeakTrend, Status};
+use jiff::Timestamp;
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::collections::HashMap;
+
+/// How the leaks of a cylinder change from trace to trace.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CylinderTrend {
+    /// Which cylinder.
+    pub cylinder: String,
+    /// None for a leak that fewer than three dated traces pin down without doubt.
+    pub leaks: PerLeak<Option<LongTrend>>,
+}
+
+/// A straight line through the flows of one leak.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LongTrend {
+    /// Traces that it rests on.
+    pub traces: usize,
+    /// Middle of the first trace.
+    pub from: Timestamp,
+    /// Middle of the last trace.
+    pub to: Timestamp,
+    /// The line's flow at the last trace, L/min.
+    pub mean_lpm: f64,
+    /// Standard deviation of its error, L/min.
+    pub std_lpm: f64,
+    /// How much the flows scatter about the line beyond their own standard deviations, L/min: temperature, load, …
+    pub scatter_lpm: f64,
+    /// The slope, and when the line is at the alarm's threshold, from the last trace on.
+    #[serde(flatten)]
+    pub trend: LeakTrend,
+}
+
+/// One trace's flow of one leak, L/min.
+struct Point {
+    at: Timestamp,
+    flow: Estimate<f64>,
+    threshold_lpm: f64,
+}
+
+impl CylinderTrend {
+    /// The trends of every cylinder that has one, in the order in which the cylinders come. Traces whose verdict is
+    /// doubtful are left out: their figures can't be believed.
+    pub fn all(rows: &[FleetRow]) -> Vec<Self> {
+        let mut order = Vec::new();
+        let mut by_cylinder: HashMap<&str, Vec<&FleetRow>> = HashMap::new();
+        for row in rows {
+            let own = by_cylinder.entry(&row.cylinder).or_default();
+            if own.is_empty() {
+                order.push(row.cylinder.as_str());
+            }
+            own.push(row);
+        }
+        let trend = |cylinder: &str| {
+            let own = by_cylinder.get(cylinder)?;
+            let leaks = PerLeak::from_fn(|leak| LongTrend::of(own, leak));
+            let any = leaks.iter().any(|(_, trend)| trend.is_some());
+            any.then(|| Self { cylinder: cylinder.to_owned(), leaks })
+        };
+        order.into_iter().filter_map(trend).collect()
+    }
+}
+
+impl LongTrend {
+    /// Whether the leak grows, with 95 % probability.
+    pub fn grows(&self) -> bool {
+        self.trend.is_significant() && self.trend.slope_lpm_per_h > 0.0
+    }
+
+    fn of(rows: &[&FleetRow], leak: Leak) -> Option<Self> {
+        let mut points: Vec<_> = rows.iter().filter_map(|row| Point::of(row, leak)).collect();
+        points.sort_by_key(|point| point.at);
+        let (first, last) = (points.first()?, points.last()?);
+        let days = |point: &Point| last.at.duration_until(point.at).as_secs_f64() / 86_400.0;
+        let values: Vec<_> = points.iter().map(|point| (days(point), point.flow)).collect();
+        let line = Line::through(&values)?;
+        let slope_ps = line.slope.scaled(1.0 / 86_400.0);
+        Some(Self {
+            traces: points.len(),
+            from: first.at,
+            to: last.at,
+            mean_lpm: line.level.value,
+            std_lpm: line.level.std,
+            scatter_lpm: line.scatter,
+            trend: LeakTrend::new(line.level, slope_ps, last.threshold_lpm)?,
+        })
+    }
+}
+
+impl Point {
+    fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
+        let found = row.leaks?[leak];
+        let std = found.std_lpm.filter(|std| *std > 0.0)?;
+        let half = jiff::SignedDuration::try_from_secs_f64(row.duration_s? / 2.0).ok()?;
+        let at = row.begins?.checked_add(half).ok()?;
+        let believed = found.identifiable && row.status != Some(Status::Doubtful);
+        believed.then_some(Self {
+            at,
+            flow: Estimate { value: found.mean_lpm, std },
+            threshold_lpm: found.threshold_lpm,
+        })
+    }
+}
+
+/// y = level + slope·t.
+struct Line {
+    level: Estimate<f64>,
+    slope: Estimate<f64>,
+    scatter: f64,
+}
+
+/// Sums of weights, of weighted times and values, and what follows from them.
+struct Sums {
+    weight: f64,
+    t: f64,
+    tt: f64,
+    level: f64,
+    slope: f64,
+}
+
+impl Sums {
+    fn of(points: &[(f64, Estimate<f64>)], weights: &[f64]) -> Option<Self> {
+        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+            points.iter().zip(weights).map(|((t, y), w)| w * of(*t, y.value)).sum()
+        };
+        let (weight, t, tt) = (sum(&|_, _| 1.0), sum(&|t, _| t), sum(&|t, _| t * t));
+        let (y, ty) = (sum(&|_, y| y), sum(&|t, y| t * y));
+        let determinant = weight * tt - t * t;
+        // Traces of one moment have no slope.
+        (determinant > 1e-9 * weight * tt).then(|| Self {
+            weight,
+            t,
+            tt,
+            level: (tt * y - t * ty) / determinant,
+            slope: (weight * ty - t * y) / determinant,
+        })
+    }
+
+    fn determinant(&self) -> f64 {
+        self.weight * self.tt - self.t * self.t
+    }
+
+    /// Weighted sum of the squares of what the line leaves over.
+    fn residual(&self, points: &[(f64, Estimate<f64>)], weights: &[f64]) -> f64 {
+        let square =
+            |((t, y), w): (&(f64, Estimate<f64>), &f64)| w * (y.value - self.level - self.slope * t).powi(2);
+        points.iter().zip(weights).map(square).sum()
+    }
+
+    /// Weight times what is not leverage, over all points.
+    fn free_weight(&self, points: &[(f64, Estimate<f64>)], weights: &[f64]) -> f64 {
+        let one = |((t, _), w): (&(f64, Estimate<f64>), &f64)| {
+            let leverage = w * (self.tt - 2.0 * t * self.t + t * t * self.weight) / self.determinant();
+            w * (1.0 - leverage)
+        };
+        points.iter().zip(weights).map(one).sum()
+    }
+}
+
+impl Line {
+    /// Regression with a scatter between traces beside their own errors: its variance by moments (DerSimonian & Laird
+    /// 1986, "Meta-analysis in clinical trials"), the intervals by Student's t and the weighted residual, never below 1 (Knapp
+    /// & Hartung 2003, "Improved tests for a random effects meta-regression with a single covariate"). The standard
+    /// deviations are such that 1.96 of them are the half of the 95 % interval.
+    fn through(points: &[(f64, Estimate<f64>)]) -> Option<Self> {
+        let freedom = points.len().checked_sub(2).filter(|freedom| *freedom > 0)? as f64;
+        let own: Vec<_> = points.iter().map(|(_, y)| y.std.powi(-2)).collect();
+        let sums = Sums::of(points, &own)?;
+        let excess = sums.residual(points, &own) - freedom;
+        let variance = (excess / sums.free_weight(points, &own)).max(0.0);
+        let weights: Vec<_> = points.iter().map(|(_, y)| (y.std.powi(2) + variance).recip()).collect();
+        let sums = Sums::of(points, &weights)?;
+        let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
+        let unit = Estimate { value: 0.0, std: 1.0 };
+        let inflation = (sums.residual(points, &weights) / freedom).max(1.0).sqrt() * t / unit.half_width95();
+        let std = |of: f64| (of / sums.determinant()).sqrt() * inflation;
+        Some(Self {
+            level: Estimate { value: sums.level, std: std(sums.tt) },
+            slope: Estimate { value: sums.slope, std: std(sums.weight) },
+            scatter: variance.sqrt(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn days(count: usize, slope: f64, scatter: f64, rng: &mut ChaCha8Rng) -> Vec<(f64, Estimate<f64>)> {
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
+        let day = |k: usize| {
+            let std = 0.002 + 0.001 * (k % 3) as f64;
+            let t = k as f64 - (count - 1) as f64;
+            (t, Estimate { value: 0.05 + slope * t + scatter * normal() + std * normal(), std })
+        };
+        (0..count).map(day).collect()
+    }
+
+    #[test]
+    fn an_exact_line_is_found() {
+        let points: Vec<_> = (0..5)
+            .map(|k| {
+                (f64::from(k), Estimate { value: 0.1 + 0.01 * f64::from(k), std: 0.001 * f64::from(k + 1) })
+            })
+            .collect();
+        let line = Line::through(&points).unwrap();
+        assert!((line.slope.value - 0.01).abs() < 1e-12 && (line.level.value - 0.1).abs() < 1e-12);
+        assert!(line.scatter.abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_traces_or_one_moment_have_no_trend() {
+        let point = |t| (t, Estimate { value: 0.1, std: 0.01 });
+        assert!(Line::through(&[point(0.0), point(1.0)]).is_none());
+        assert!(Line::through(&[point(1.0), point(1.0), point(1.0)]).is_none());
+    }
+
+    #[test]
+    fn the_interval_of_the_slope_holds_it_whatever_the_traces_scatter_and_however_few_they_are() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for (count, scatter) in [(4, 0.0), (4, 0.02), (10, 0.01), (60, 0.0), (60, 0.02)] {
+            let runs = 400;
+            let mut held = 0;
+            for _ in 0..runs {
+                let line = Line::through(&days(count, 0.001, scatter, &mut rng)).unwrap();
+                held += u32::from((line.slope.value - 0.001).abs() < line.slope.half_width95());
+            }
+            // 95 % less three standard deviations of the count.
+            assert!(held >= 367, "{count} traces, scatter {scatter}: {held} of {runs}");
+        }
+    }
+
+    #[test]
+    fn the_scatter_between_traces_is_found() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let line = Line::through(&days(200, 0.001, 0.02, &mut rng)).unwrap();
+        assert!((0.017..0.023).contains(&line.scatter), "{}", line.scatter);
+    }
+}

@@ -1,0 +1,76 @@
+//! Parquet: one row group, Snappy, every column optional.
+
+use crate::fleet::{FleetColumn, FleetTable};
+use crate::output::OutputFile;
+use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::schema::types::Type;
+use std::io;
+use std::sync::Arc;
+
+pub(super) fn write(table: &FleetTable, file: &mut OutputFile) -> io::Result<()> {
+    write_all(table, file).map_err(|error| match error {
+        ParquetError::External(source) => match source.downcast::<io::Error>() {
+            Ok(source) => *source,
+            Err(other) => io::Error::other(other),
+        },
+        other => io::Error::other(other),
+    })
+}
+
+fn write_all(table: &FleetTable, file: &mut OutputFile) -> Result<(), ParquetError> {
+    let fields = table.columns().iter().map(|(name, column)| Ok(Arc::new(field(name, column)?)));
+    let fields = fields.collect::<Result<Vec<_>, ParquetError>>()?;
+    let schema = Arc::new(Type::group_type_builder("fleet").with_fields(fields).build()?);
+    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
+    let mut group = writer.next_row_group()?;
+    let mut columns = table.columns().iter();
+    while let (Some(mut writer), Some((_, column))) = (group.next_column()?, columns.next()) {
+        fill(&mut writer, column)?;
+        writer.close()?;
+    }
+    group.close()?;
+    writer.close().map(|_| ())
+}
+
+fn field(name: &str, column: &FleetColumn) -> Result<Type, ParquetError> {
+    let utc_ms = LogicalType::timestamp(true, TimeUnit::MILLIS);
+    let (physical, logical) = match column {
+        FleetColumn::Texts(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        FleetColumn::Times(_) => (Physical::INT64, Some(utc_ms)),
+        FleetColumn::Numbers(_) => (Physical::DOUBLE, None),
+        FleetColumn::Counts(_) => (Physical::INT64, None),
+        FleetColumn::Flags(_) => (Physical::BOOLEAN, None),
+    };
+    let field = Type::primitive_type_builder(name, physical).with_repetition(Repetition::OPTIONAL);
+    field.with_logical_type(logical).build()
+}
+
+fn fill(writer: &mut SerializedColumnWriter<'_>, column: &FleetColumn) -> Result<(), ParquetError> {
+    match column {
+        FleetColumn::Texts(values) => {
+            put::<ByteArrayType, _>(writer, values, |text| ByteArray::from(text.as_str()))
+        }
+        FleetColumn::Times(values) => put::<Int64Type, _>(writer, values, |time| time.as_millisecond()),
+        FleetColumn::Numbers(values) => put::<DoubleType, _>(writer, values, |number| *number),
+        FleetColumn::Counts(values) => {
+            put::<Int64Type, _>(writer, values, |count| i64::try_from(*count).unwrap_or(i64::MAX))
+        }
+        FleetColumn::Flags(values) => put::<BoolType, _>(writer, values, |flag| *flag),
+    }
+}
+
+/// The values that are there, and for every row whether one is.
+fn put<D: DataType, V>(
+    writer: &mut SerializedColumnWriter<'_>,
+    values: &[Option<V>],
+    encode: impl Fn(&V) -> D::T,
+) -> Result<(), ParquetError> {
+    let present: Vec<D::T> = values.iter().flatten().map(encode).collect();
+    let levels: Vec<i16> = values.iter().map(|value| i16::from(value.is_some())).collect();
+    writer.typed::<D>().write_batch(&present, Some(&levels), None).map(|_| ())
+}
