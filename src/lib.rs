@@ -37,6 +37,7 @@ pub mod fleet;
 pub mod live;
 pub mod openfast;
 pub mod output;
+pub mod page;
 pub mod reference;
 pub mod replay;
 pub mod report;

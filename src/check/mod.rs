@@ -7,10 +7,10 @@ mod text;
 pub use readings::Reading;
 
 use crate::channels::{ChannelFault, ChannelMonitor};
-use crate::replay::{ReplayError, replay};
+use crate::replay::{Replay, ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
-use crate::trace::TraceReader;
+use crate::trace::{Record, TraceReader};
 use crate::wiring::{Excerpt, Wiring, explain, unit_by_scatter};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
@@ -74,21 +74,26 @@ impl CheckReport {
     }
 }
 
-/// Checks a whole trace with the default estimator, which knows what it does not know.
+/// Checks a whole trace with the default estimator, which knows what it does not know; `each` sees what [`replay`] shows.
 ///
 /// # Errors
 /// As [`replay`].
-pub fn check(reader: &mut TraceReader<'_>, rig: &Rig) -> Result<CheckReport, ReplayError> {
+pub fn check(
+    reader: &mut TraceReader<'_>,
+    rig: &Rig,
+    mut each: impl FnMut(&Replay, &Record, bool),
+) -> Result<CheckReport, ReplayError> {
     let mut rig = rig.clone();
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();
     let mut monitor = ChannelMonitor::default();
     let mut excerpt = Excerpt::default();
     let columns = reader.columns(&rig.columns);
-    let replayed = replay(reader, &rig, |_, record, _| {
+    let replayed = replay(reader, &rig, |replay, record, renewed| {
         extremes.add(record);
         monitor.add(record);
         excerpt.add(record);
+        each(replay, record, renewed);
         Ok::<_, ReplayError>(())
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);

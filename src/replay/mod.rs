@@ -109,6 +109,9 @@ pub struct Replay {
     spikes: Spikes,
     /// Time of the last record, s.
     end_s: f64,
+    /// Of the last block, in its own standard deviations.
+    #[serde(skip)]
+    innovation: Option<f64>,
 }
 
 impl Replay {
@@ -131,6 +134,7 @@ impl Replay {
             consistency: Consistency::default(),
             spikes: Spikes::new(&rig.sensors()),
             end_s: 0.0,
+            innovation: None,
             rig: rig.clone(),
         })
     }
@@ -201,23 +205,36 @@ impl Replay {
     fn weigh(&mut self, innovation: Option<Innovation<f64>>) {
         if let Some(innovation) = innovation {
             self.consistency.balance(innovation);
+            self.innovation = Some(innovation.value / innovation.variance.sqrt());
         }
     }
 
     /// Holds the leak flows against their alarms, `elapsed_s` of watched time after they were held last.
     fn detect(&mut self, t_s: f64, elapsed_s: f64) {
+        let flows = self.watched_flows_m3s();
+        for (fault, change) in self.detector.update(elapsed_s, &flows) {
+            self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
+        }
+        self.episodes.add(t_s, elapsed_s, flows.map(|flow| flow.value), &self.detector.active());
+    }
+
+    /// Leak flows as they are held against their alarms, m³/s: means over the estimator's memory; of the paper's law, which
+    /// knows no uncertainty, at the mean pressures of the trace.
+    pub fn watched_flows_m3s(&self) -> PerLeak<Estimate<f64>> {
         let flows = self.estimator.mean_leaks_m3s().map(|flows| {
             self.doubt.widen(with_effects(self.correction.as_ref(), flows), |correction, estimator| {
                 with_effects(Some(correction), estimator.mean_leaks_m3s().unwrap_or_default())
             })
         });
-        let flows = flows.unwrap_or_else(|| {
+        flows.unwrap_or_else(|| {
             with_effects(self.correction.as_ref(), self.exact_flows_m3s(&self.pressures.sizes()))
-        });
-        for (fault, change) in self.detector.update(elapsed_s, &flows) {
-            self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
-        }
-        self.episodes.add(t_s, elapsed_s, flows.map(|flow| flow.value), &self.detector.active());
+        })
+    }
+
+    /// What the flow balance of the last block had that the estimates before it did not foretell, in standard deviations;
+    /// none before the first, and from the paper's law.
+    pub fn innovation(&self) -> Option<f64> {
+        self.innovation
     }
 
     /// Leak coefficients, m³/(s·Pa); the uncertainty of the rig file's effects widens them.

@@ -9,6 +9,7 @@ mod verdict;
 
 pub use episode::Episode;
 pub use reason::{Reason, ReasonId};
+pub(crate) use statement::{advice, capital, interval, with_interval};
 pub use text::{Palette, data_line};
 pub(crate) use text::{misfit, rig_line};
 pub use trend::{LeakTrend, ReachTime};

@@ -3,6 +3,8 @@ use crate::input::Input;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::check::check;
+use pitchleak::page::{History, Page, PageFile};
+use std::path::PathBuf;
 
 /// Check a trace: data quality, excitation, what it can and cannot identify
 #[derive(Args)]
@@ -11,6 +13,10 @@ pub struct Arguments {
     #[command(flatten)]
     input: Input,
 
+    /// Write the result as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+
     /// Print the result as JSON (schema pitchleak.check/1)
     #[arg(long)]
     json: bool,
@@ -18,8 +24,18 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rig = arguments.input.rig()?;
+    let inputs = arguments.input.files(&rig);
+    let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
+    let mut history = page.is_some().then(History::default);
     let (mut reader, bar) = arguments.input.open(&rig)?;
-    let report = check(&mut reader, &rig)?;
+    let report = check(&mut reader, &rig, |replay, record, renewed| {
+        if let Some(history) = &mut history {
+            history.add(replay, record, renewed);
+        }
+    })?;
+    if let Some((page, history)) = page.zip(history) {
+        page.finish(&Page::of_check(&report, &rig, &history))?;
+    }
     bar.finish_and_clear();
     output::warn(&report.trace.warnings);
     let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };

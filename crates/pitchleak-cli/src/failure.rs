@@ -3,6 +3,7 @@ use pitchleak::figure::FigureError;
 use pitchleak::fleet::FleetError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
+use pitchleak::page::PageError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::reproduce::ReproduceError;
 use pitchleak::rig::RigError;
@@ -54,6 +55,9 @@ pub enum Failure {
     /// The file of estimates.
     #[error(transparent)]
     Estimates(#[from] EstimateFileError),
+    /// The page of a report.
+    #[error(transparent)]
+    Page(#[from] PageError),
     /// A figure.
     #[error(transparent)]
     Figure(#[from] FigureError),

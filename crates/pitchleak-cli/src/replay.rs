@@ -2,6 +2,7 @@ use crate::failure::Failure;
 use crate::input::Input;
 use crate::{Outcome, output};
 use clap::Args;
+use pitchleak::page::{History, Page, PageFile};
 use pitchleak::replay::{EstimateFile, replay};
 use pitchleak::rig::EstimatorKind;
 use std::path::PathBuf;
@@ -21,6 +22,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
+    /// Write the report as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+
     /// Print the report as JSON (schema pitchleak.replay/1)
     #[arg(long)]
     json: bool,
@@ -37,6 +42,7 @@ pub struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   pitchleak replay trace.csv.gz
+  pitchleak replay trace.csv --report report.html
   pitchleak replay trace.csv --rig turbine7.toml --json | jq .verdict
   zcat log.csv.gz | pitchleak replay - --rig turbine7.toml --fail-on-fault";
 
@@ -50,12 +56,22 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     rig.estimator.kind = arguments.estimator.unwrap_or(rig.estimator.kind);
     let inputs = arguments.input.files(&rig);
     let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
+    let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
+    let mut history = page.is_some().then(History::default);
     let (mut reader, bar) = arguments.input.open(&rig)?;
-    let report = replay(&mut reader, &rig, |replay, record, _| match &mut file {
-        None => Ok(()),
-        Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
+    let report = replay(&mut reader, &rig, |replay, record, renewed| {
+        if let Some(history) = &mut history {
+            history.add(replay, record, renewed);
+        }
+        match &mut file {
+            None => Ok(()),
+            Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
+        }
     })?;
     file.map(EstimateFile::finish).transpose()?;
+    if let Some((page, history)) = page.zip(history) {
+        page.finish(&Page::of_replay(&report, &rig, &history))?;
+    }
     bar.finish_and_clear();
     output::warn(&report.trace.warnings);
     let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };

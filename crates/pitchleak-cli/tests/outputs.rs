@@ -58,6 +58,7 @@ fn no_command_writes_over_what_it_reads() {
     fs::copy(at.join("t.csv"), at.join("gz.csv.gz")).unwrap();
     fs::copy(at.join("t.csv"), at.join("truth.json")).unwrap();
     fs::copy(at.join("r.toml"), at.join("rig.csv")).unwrap();
+    fs::copy(at.join("t.csv"), at.join("t.html")).unwrap();
     let before = contents(at);
     for arguments in [
         "replay t.csv --out t.csv",
@@ -66,6 +67,8 @@ fn no_command_writes_over_what_it_reads() {
         "replay t.csv --out hard.csv",
         "replay gz.csv.gz --out gz.csv.gz",
         "replay t.csv --rig rig.csv --out rig.csv",
+        "replay t.html --report t.html",
+        "check t.html --report ./t.html",
         "diagnose t.csv --save-rig t.csv",
         "diagnose t.csv --rig r.toml --save-rig r.toml",
         "diagnose t.csv --test other.csv --save-rig other-link.csv",

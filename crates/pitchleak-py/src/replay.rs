@@ -60,7 +60,8 @@ pub fn over_time<'py>(
 /// Data quality, excitation, what a trace can and cannot identify.
 #[pyfunction]
 pub fn check(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyResult<Report> {
-    let report =
-        source.read(py, &rig.0, strict, |mut reader| Ok(pitchleak::check::check(&mut reader, &rig.0)?))?;
+    let report = source.read(py, &rig.0, strict, |mut reader| {
+        Ok(pitchleak::check::check(&mut reader, &rig.0, |_, _, _| ())?)
+    })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }

@@ -1,0 +1,119 @@
+//! Every kind of page in a browser: it opens without a complaint, draws its charts, follows the cursor and zooms. Needs
+//! `chromium`; run with `-- --ignored`.
+
+use pitchleak::Rig;
+use pitchleak::check::check;
+use pitchleak::page::{History, Page};
+use pitchleak::replay::{ReplayError, replay};
+use pitchleak::trace::TraceReader;
+use std::path::Path;
+use std::process::Command;
+
+/// Moves the pointer over the first chart, then drags over half of it, and leaves what came of it in the document.
+const VISITOR: &str = r#"
+  const over = document.querySelector(".u-over");
+  const { left, top, width, height } = over.getBoundingClientRect();
+  const say = (name, value) => { document.documentElement.dataset[name] = value; };
+  const pointer = (type, share, target = over) => target.dispatchEvent(new MouseEvent(type, {
+    bubbles: true, button: 0, movementX: 1, clientX: left + share * width, clientY: top + height / 2 }));
+  pointer("mouseenter", 0.5); pointer("mousemove", 0.5);
+  setTimeout(() => {
+    say("clock", document.getElementById("clock").textContent);
+    say("cursors", [...document.querySelectorAll(".u-cursor-x")].filter((line) => /translate\([1-9]/.test(line.style.transform)).length);
+    pointer("mousedown", 0.25); pointer("mousemove", 0.75); pointer("mouseup", 0.75, document);
+    setTimeout(() => {
+      say("zoomed", document.documentElement.dataset.from + " to " + document.documentElement.dataset.to);
+      say("requests", performance.getEntriesByType("resource").length);
+    }, 300);
+  }, 300);
+"#;
+
+/// What chromium makes of a page: its document after the scripts ran, and its log.
+fn visit(page: &str, options: &[&str]) -> (String, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("page.html");
+    std::fs::write(&path, page).expect("writes");
+    let profile = format!("--user-data-dir={}", folder.path().join("profile").display());
+    let usual = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--enable-logging=stderr",
+        "--virtual-time-budget=5000",
+        "--dump-dom",
+    ];
+    let mut command = Command::new("chromium");
+    command.args(usual).args(options).arg(profile).arg(format!("file://{}", path.display()));
+    let output = command.output().expect("chromium runs");
+    let text = |bytes| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+/// The value that a script left in the document's element.
+fn left<'a>(document: &'a str, name: &str) -> Option<&'a str> {
+    let (_, rest) = document.split_once(&format!(" data-{name}=\""))?;
+    rest.split('"').next()
+}
+
+fn assert_opens(page: &str) {
+    let charts = page.matches("data-chart=").count();
+    assert!(charts > 0, "no chart");
+    let dark = "--blink-settings=preferredColorScheme=0";
+    for options in [&["--window-size=1280,900"][..], &["--window-size=390,844"], &[dark]] {
+        let (document, log) = visit(page, options);
+        let complaints: Vec<_> = log.lines().filter(|line| line.contains("CONSOLE")).collect();
+        assert!(complaints.is_empty(), "{options:?}: {complaints:?}");
+        assert_eq!(left(&document, "drawn"), Some(charts.to_string().as_str()), "{options:?}");
+        assert_eq!(document.matches("<canvas").count(), charts, "{options:?}");
+    }
+}
+
+fn assert_cursor_and_zoom_work(page: &str) {
+    let (head, rest) = page.split_once("script-src 'sha256-").expect("a policy");
+    let (_, rest) = rest.split_once('\'').expect("a hash");
+    let open = format!("{head}script-src 'unsafe-inline'{rest}");
+    let page = open.replace("</body>", &format!("<script>{{{VISITOR}}}</script></body>"));
+    let (document, log) = visit(&page, &["--window-size=1280,4000"]);
+    assert!(!log.contains("CONSOLE"), "{log}");
+    assert_eq!(left(&document, "requests"), Some("0"));
+    let clock = left(&document, "clock").and_then(|text| text.strip_suffix(" s")).expect("a time");
+    assert!((clock.parse::<f64>().expect("a number") - 20.0).abs() < 0.2, "{clock}");
+    let zoomed = left(&document, "zoomed").expect("zoomed");
+    let ends: Vec<f64> = zoomed.split(" to ").map(|end| end.parse().expect("a time")).collect();
+    assert!((ends[0] - 10.0).abs() < 0.5 && (ends[1] - 30.0).abs() < 0.5, "{zoomed}");
+    assert!(left(&document, "cursors").expect("cursors").parse::<usize>().expect("a number") > 3);
+}
+
+fn rig() -> Rig {
+    Rig::load("data/traces/rig.toml").expect("a rig")
+}
+
+const TRACE: &str = "data/traces/external_a.csv.gz";
+
+fn replayed(path: impl AsRef<Path>, rig: &Rig) -> String {
+    let mut reader = TraceReader::open(path, rig).expect("a trace");
+    let mut history = History::default();
+    let report = replay(&mut reader, rig, |replay, record, renewed| {
+        history.add(replay, record, renewed);
+        Ok::<_, ReplayError>(())
+    });
+    Page::of_replay(&report.expect("replays"), rig, &history).to_html()
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_replay() {
+    let page = replayed(TRACE, &rig());
+    assert_opens(&page);
+    assert_cursor_and_zoom_work(&page);
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_check() {
+    let rig = rig();
+    let mut reader = TraceReader::open(TRACE, &rig).expect("a trace");
+    let mut history = History::default();
+    let report = check(&mut reader, &rig, |replay, record, renewed| history.add(replay, record, renewed));
+    assert_opens(&Page::of_check(&report.expect("checks"), &rig, &history).to_html());
+}
