@@ -135,6 +135,7 @@ const PRESSURE: &[Unit] = &[
     times("MPa", Some("mpa"), 1e6),
     times("GPa", None, 1e9),
     times("bar", Some("bar"), 1e5),
+    times("mbar", None, 1e2),
     // Pound-force (4.4482216152605 N, exact) per square inch.
     times("psi", Some("psi"), 4.448_221_615_260_5 / (0.0254 * 0.0254)),
 ];

@@ -88,6 +88,9 @@ pub struct TraceSummary {
     pub sample_rate_hz: Option<f64>,
     /// Pauses much longer than the usual step.
     pub gaps: u64,
+    /// How the file was read, where it is not as this program writes one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reading: Option<String>,
     /// What a reader of the results should know of the data, a line each.
     pub warnings: Vec<String>,
 }
@@ -102,6 +105,7 @@ impl TraceSummary {
             duration_s: quality.duration_s,
             sample_rate_hz: quality.sample_rate_hz(),
             gaps: quality.gaps,
+            reading: quality.reading.clone(),
             warnings: quality.warnings(),
         }
     }

@@ -92,6 +92,7 @@ fn found(active: PerLeak<bool>) -> Found {
         duration_s: 60.0,
         sample_rate_hz: Some(100.000_000_001),
         gaps: 0,
+        reading: None,
         warnings: Vec::new(),
     };
     Found {

@@ -11,7 +11,9 @@ mod write;
 pub use effects::{EffectMap, EffectValue};
 pub use error::{Fault, Place, RigError};
 pub use instruments::{Instrument, Instruments};
-pub use settings::{ColumnMap, EstimatorKind, EstimatorSettings, ForeignColumn};
+pub use settings::{
+    ColumnMap, CsvSettings, Decimal, Delimiter, EstimatorKind, EstimatorSettings, ForeignColumn,
+};
 
 use crate::units::Dimension;
 use document::{Document, Section};
@@ -37,6 +39,8 @@ pub struct Rig {
     pub alarms: AlarmSettings<f64>,
     /// `[columns]`.
     pub columns: ColumnMap,
+    /// `[csv]`.
+    pub csv: CsvSettings,
     /// `[effects]`: what a diagnosis found.
     pub effects: EffectMap,
 }
@@ -56,6 +60,7 @@ impl Rig {
             estimator: EstimatorSettings::default(),
             alarms: AlarmSettings::default(),
             columns: ColumnMap::new(),
+            csv: CsvSettings::default(),
             effects: EffectMap::new(),
         }
     }
@@ -90,7 +95,7 @@ impl Rig {
             document.fail(error.span().map(|span| span.start), Fault::Syntax(message))
         })?;
         let root = Section::root(&document, table.get_ref());
-        root.allow(&["cylinder", "fluid", "sensors", "estimator", "alarms", "columns", "effects"])?;
+        root.allow(&["cylinder", "fluid", "sensors", "estimator", "alarms", "columns", "csv", "effects"])?;
         let cylinder = read_cylinder(&root.section("cylinder")?)?;
         let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
         Ok(Self {
@@ -101,6 +106,7 @@ impl Rig {
             estimator: EstimatorSettings::read(&root.section("estimator")?)?,
             alarms: settings::read_alarms(&root.section("alarms")?, &instruments)?,
             columns: settings::read_columns(&root.section("columns")?)?,
+            csv: CsvSettings::read(&root.section("csv")?)?,
             effects: effects::read(&root.section("effects")?)?,
         })
     }

@@ -4,7 +4,9 @@ use super::bound;
 use super::document::Section;
 use super::error::RigError;
 use super::instruments::Instruments;
+use crate::header;
 use crate::signal::Signal;
+use crate::times::{TimeFormat, TimeKind, Zone};
 use crate::units::{self, Dimension, Unit};
 use pitchleak_core::{AlarmSettings, PerLeak};
 use std::collections::BTreeMap;
@@ -66,12 +68,22 @@ pub struct ForeignColumn {
     pub scale: f64,
     /// … and what is then added, SI.
     pub offset: f64,
+    /// How a timestamp is written; none where its cells are to say it.
+    pub format: Option<TimeKind>,
+    /// Where a timestamp's clock hangs.
+    pub zone: Option<Zone>,
 }
 
 impl ForeignColumn {
     /// A column whose numbers are read as they are.
     pub fn new(name: impl Into<String>, unit: Option<Unit>) -> Self {
-        Self { name: name.into(), unit, scale: 1.0, offset: 0.0 }
+        Self { name: name.into(), unit, scale: 1.0, offset: 0.0, format: None, zone: None }
+    }
+
+    /// `Head pressure [bar]`, with the unit that it ends with.
+    fn by_header(header: &str, dimension: Dimension) -> Option<Self> {
+        let (_, found) = header::split(header, dimension)?;
+        Some(Self { offset: found.offset_si, ..Self::new(header, Some(found.unit)) })
     }
 
     /// The unit of its numbers, scale and offset included.
@@ -131,14 +143,140 @@ pub(super) fn read_alarms(
     })
 }
 
+/// `[csv]`: what a text file of numbers leaves open; the file says what this doesn't.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct CsvSettings {
+    /// What stands between two cells.
+    pub delimiter: Option<Delimiter>,
+    /// What stands before the decimals.
+    pub decimal: Option<Decimal>,
+    /// How times are written.
+    pub time: Option<TimeFormat>,
+}
+
+/// What stands between two cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Delimiter {
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
+    /// `|`
+    Bar,
+}
+
+impl Delimiter {
+    /// All, by their names.
+    pub const NAMES: [(&'static str, Self); 4] =
+        [("comma", Self::Comma), ("semicolon", Self::Semicolon), ("tab", Self::Tab), ("bar", Self::Bar)];
+
+    /// The byte itself.
+    pub fn byte(self) -> u8 {
+        match self {
+            Self::Comma => b',',
+            Self::Semicolon => b';',
+            Self::Tab => b'\t',
+            Self::Bar => b'|',
+        }
+    }
+
+    /// As it is called.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, delimiter)| *delimiter == self).map_or("", |(name, _)| name)
+    }
+
+    /// By its name, or as it is.
+    pub fn by_name(name: &str) -> Option<Self> {
+        let known =
+            |(known, delimiter): &(&str, Self)| *known == name || name.as_bytes() == [delimiter.byte()];
+        Self::NAMES.into_iter().find(known).map(|(_, delimiter)| delimiter)
+    }
+}
+
+/// What stands before the decimals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Decimal {
+    /// 0.5
+    #[default]
+    Point,
+    /// 0,5
+    Comma,
+}
+
+impl Decimal {
+    /// All, by their names.
+    pub const NAMES: [(&'static str, Self); 2] = [("point", Self::Point), ("comma", Self::Comma)];
+
+    /// As it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Comma => "comma",
+        }
+    }
+
+    /// By its name, or as it is.
+    pub fn by_name(name: &str) -> Option<Self> {
+        match name {
+            "point" | "." => Some(Self::Point),
+            "comma" | "," => Some(Self::Comma),
+            _ => None,
+        }
+    }
+}
+
+impl CsvSettings {
+    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
+        section.allow(&["delimiter", "decimal", "time_format", "zone"])?;
+        let allowed = |names: &[&str]| names.join(" or ");
+        let delimiter = match section.text("delimiter")? {
+            None => None,
+            Some(name) => Some(Delimiter::by_name(name).ok_or_else(|| {
+                section.impossible("delimiter", name, &allowed(&Delimiter::NAMES.map(|(name, _)| name)))
+            })?),
+        };
+        let decimal = match section.text("decimal")? {
+            None => None,
+            Some(name) => Some(Decimal::by_name(name).ok_or_else(|| {
+                section.impossible("decimal", name, &allowed(&Decimal::NAMES.map(|(name, _)| name)))
+            })?),
+        };
+        let kind = read_time_kind(section, "time_format")?;
+        let zone = read_zone(section)?;
+        let time =
+            (kind.is_some() || zone.is_some()).then(|| TimeFormat { kind: kind.unwrap_or_default(), zone });
+        Ok(Self { delimiter, decimal, time })
+    }
+}
+
+fn read_time_kind(section: &Section<'_>, key: &str) -> Result<Option<TimeKind>, RigError> {
+    let Some(name) = section.text(key)? else { return Ok(None) };
+    TimeKind::by_name(name).map(Some).ok_or_else(|| section.impossible(key, name, TimeKind::ALLOWED))
+}
+
+fn read_zone(section: &Section<'_>) -> Result<Option<Zone>, RigError> {
+    let Some(name) = section.text("zone")? else { return Ok(None) };
+    let allowed = "a zone such as Europe/Berlin, CET or +01:00";
+    Zone::by_name(name).map(Some).ok_or_else(|| section.impossible("zone", name, allowed))
+}
+
 /// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar", scale = -1.0, offset = "2 bar" }`: minus
-/// what the column says, plus 2 bar.
+/// what the column says, plus 2 bar. A header that ends with its unit will do: `pa = "Head pressure [bar]"`.
 pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError> {
     section.allow(&Signal::ALL.map(Signal::name))?;
     let mut columns = ColumnMap::new();
     for signal in section.keys().filter_map(Signal::by_name) {
+        if !section.is_table(signal.name()) {
+            columns.insert(signal, read_header(section, signal)?);
+            continue;
+        }
         let entry = section.section(signal.name())?;
-        entry.allow(&["name", "unit", "scale", "offset"])?;
+        match signal.dimension() {
+            Some(_) => entry.allow(&["name", "unit", "scale", "offset"])?,
+            None => entry.allow(&["name", "unit", "scale", "offset", "format", "zone"])?,
+        }
         let name =
             entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
         let unit = read_unit(&entry, signal)?;
@@ -155,12 +293,27 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
             Some(dimension) => entry.quantity("offset", dimension, bound::OFFSET)?,
             None => None,
         };
-        columns.insert(
-            signal,
-            ForeignColumn { name: name.to_owned(), unit, scale, offset: offset.unwrap_or(0.0) },
-        );
+        let offset = offset.unwrap_or(0.0);
+        let (format, zone) = (read_time_kind(&entry, "format")?, read_zone(&entry)?);
+        let name = name.to_owned();
+        columns.insert(signal, ForeignColumn { name, unit, scale, offset, format, zone });
     }
     Ok(columns)
+}
+
+/// `pa = "Head pressure [bar]"`.
+fn read_header(section: &Section<'_>, signal: Signal) -> Result<ForeignColumn, RigError> {
+    let key = signal.name();
+    let Some(header) = section.text(key)? else {
+        return Err(section.missing(key, "the column's header, or { name = …, unit = … }"));
+    };
+    match signal.dimension() {
+        None => Ok(ForeignColumn::new(header, None)),
+        Some(dimension) => ForeignColumn::by_header(header, dimension).ok_or_else(|| {
+            let allowed = format!("a header that ends with its unit, e.g. \"{header} [{}]\", or {{ name = …, unit = … }} with a unit of {}", dimension.si(), dimension.suffixes());
+            section.impossible(key, header, &allowed)
+        }),
+    }
 }
 
 fn read_unit(entry: &Section<'_>, signal: Signal) -> Result<Option<Unit>, RigError> {

@@ -1,6 +1,6 @@
 use super::bound::{self, Bound};
 use super::effects;
-use super::{ForeignColumn, Instrument, Rig};
+use super::{CsvSettings, ForeignColumn, Instrument, Rig};
 use crate::signal::Signal;
 use crate::units::Dimension;
 use pitchleak_core::EffectSet;
@@ -38,6 +38,7 @@ impl Rig {
         self.write_machine(&mut out);
         self.write_settings(&mut out);
         self.write_columns(&mut out);
+        self.write_csv(&mut out);
         self.write_effects(&mut out);
         out
     }
@@ -115,6 +116,23 @@ impl Rig {
         }
     }
 
+    fn write_csv(&self, out: &mut String) {
+        if self.csv == CsvSettings::default() {
+            return;
+        }
+        let CsvSettings { delimiter, decimal, time } = &self.csv;
+        out.push_str("\n[csv]\n");
+        put(
+            out,
+            &[
+                ("delimiter", delimiter.map(|delimiter| toml_text(delimiter.name()))),
+                ("decimal", decimal.map(|decimal| toml_text(decimal.name()))),
+                ("time_format", time.as_ref().map(|time| toml_text(&time.kind.to_string()))),
+                ("zone", time.as_ref().and_then(|time| Some(toml_text(&time.zone.as_ref()?.to_string())))),
+            ],
+        );
+    }
+
     fn write_effects(&self, out: &mut String) {
         if self.effects.is_empty() {
             return;
@@ -155,6 +173,12 @@ impl ForeignColumn {
         }
         if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
             let _ = write!(out, ", offset = {}", within(self.offset, dimension, bound::OFFSET));
+        }
+        if let Some(format) = &self.format {
+            let _ = write!(out, ", format = {}", toml_text(&format.to_string()));
+        }
+        if let Some(zone) = &self.zone {
+            let _ = write!(out, ", zone = {}", toml_text(&zone.to_string()));
         }
         out + " }"
     }

@@ -4,6 +4,7 @@ use super::error::TraceFault;
 use super::quality::Counted;
 use crate::rig::{ColumnMap, ForeignColumn};
 use crate::signal::Signal;
+use crate::times::TimeFormat;
 use crate::units::Unit;
 
 /// What one column of the file is read as.
@@ -40,6 +41,10 @@ pub(super) struct Layout {
     pub(super) absent: Vec<String>,
     /// How rows are numbered in messages.
     pub(super) counted: Counted,
+    /// How time stamps are written.
+    pub(super) time: TimeFormat,
+    /// How the file was read where it is not as the contract writes one.
+    pub(super) reading: Option<String>,
 }
 
 impl Layout {
@@ -47,7 +52,13 @@ impl Layout {
     pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
         let mut columns: Vec<_> = headers.iter().map(|header| bind(header.trim(), map)).collect();
         prefer_time(&mut columns);
-        let layout = Self { columns, absent: absent(headers, map), counted: Counted::Lines };
+        let layout = Self {
+            columns,
+            absent: absent(headers, map),
+            counted: Counted::Lines,
+            time: declared_time(map),
+            reading: None,
+        };
         layout.check_doubled()?;
         layout.check_units()?;
         layout.check_missing(map)?;
@@ -73,7 +84,10 @@ impl Layout {
                 let own = || ForeignColumn::new(&column.header, unit.or_else(si));
                 Some((signal, read.cloned().unwrap_or_else(own)))
             }
-            Content::Timestamp => Some((Signal::Timestamp, ForeignColumn::new(&column.header, None))),
+            Content::Timestamp => {
+                let own = || ForeignColumn::new(&column.header, None);
+                Some((Signal::Timestamp, map.get(&Signal::Timestamp).cloned().unwrap_or_else(own)))
+            }
             Content::Ignored => None,
         };
         self.columns.iter().filter_map(entry).collect()
@@ -86,8 +100,8 @@ impl Layout {
     }
 
     pub(super) fn ignored(&self) -> Vec<String> {
-        let ignored = self.columns.iter().filter(|column| column.content == Content::Ignored);
-        ignored.map(|column| shorten(&column.header, 40)).collect()
+        let is_named = |column: &&Column| column.content == Content::Ignored && !column.header.is_empty();
+        self.columns.iter().filter(is_named).map(|column| shorten(&column.header, 40)).collect()
     }
 
     fn check_doubled(&self) -> Result<(), TraceFault> {
@@ -138,6 +152,7 @@ impl Layout {
                 signal: words.to_owned(),
                 accepted: accepted(signal, map),
                 found: shorten(&headers.join(", "), 160),
+                hint: String::new(),
             });
         }
         Ok(())
@@ -155,14 +170,30 @@ fn bind(header: &str, map: &ColumnMap) -> Column {
 }
 
 fn bind_by_suffix(header: &str) -> Content {
-    if header == Signal::Timestamp.name() {
-        return Content::Timestamp;
+    match standard(header) {
+        Some((signal, Some(unit))) => number(signal, unit),
+        Some(_) => Content::Timestamp,
+        None => Content::Ignored,
     }
-    let split = header.rsplit_once('_').and_then(|(name, suffix)| {
-        let signal = Signal::by_name(name)?;
-        Some(number(signal, signal.dimension()?.by_suffix(suffix)?))
-    });
-    split.unwrap_or(Content::Ignored)
+}
+
+/// The signal of a header as the contract writes it, and its unit; a timestamp has none.
+pub(super) fn standard(header: &str) -> Option<(Signal, Option<Unit>)> {
+    if header == Signal::Timestamp.name() {
+        return Some((Signal::Timestamp, None));
+    }
+    let (name, suffix) = header.rsplit_once('_')?;
+    let signal = Signal::by_name(name)?;
+    Some((signal, Some(signal.dimension()?.by_suffix(suffix)?)))
+}
+
+/// As `[columns]` says it; ISO 8601 where it doesn't.
+fn declared_time(map: &ColumnMap) -> TimeFormat {
+    let declared = map.get(&Signal::Timestamp);
+    TimeFormat {
+        kind: declared.and_then(|column| column.format.clone()).unwrap_or_default(),
+        zone: declared.and_then(|column| column.zone.clone()),
+    }
 }
 
 fn number(signal: Signal, unit: Unit) -> Content {

@@ -1,18 +1,21 @@
 //! Rows of a CSV stream as numbers in SI.
 
 use super::columns::{Content, Layout, shorten};
+use super::dialect::Dialect;
+use super::encoding::Encoding;
 use super::error::TraceFault;
 use super::format::{Format, Stream};
 use super::quality::{BadReason, BadRow, Counted};
 use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_present};
 use super::stamp::Epoch;
-use crate::rig::ColumnMap;
+use crate::rig::{Decimal, Rig};
 use crate::signal::Signal;
+use crate::times::TimeKind;
 
 /// Text is whatever no other format knows as its own.
 pub(super) const FORMAT: Format =
-    Format { starts_with: b"", open: |stream, map| Ok(Box::new(CsvRows::open(stream, map)?)) };
+    Format { starts_with: b"", open: |stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?)) };
 
 struct CsvRows {
     records: Records,
@@ -23,6 +26,7 @@ struct CsvRows {
 /// How a record is split, and into what.
 struct Splitting {
     delimiter: u8,
+    decimal: Decimal,
     layout: Layout,
     epoch: Epoch,
     /// Lengths of the last cells of the row read last and of the one before.
@@ -30,12 +34,15 @@ struct Splitting {
 }
 
 impl CsvRows {
-    /// Reads the header.
-    fn open(stream: Stream, map: &ColumnMap) -> Result<Self, TraceFault> {
-        let mut records = Records::new(stream.bytes);
-        let (delimiter, headers) = read_header(&mut records)?;
-        let layout = Layout::new(&headers, map)?;
-        let splitting = Splitting { delimiter, layout, epoch: Epoch::default(), last_cells: [0; 2] };
+    /// Reads all before the first row.
+    fn open(stream: Stream, rig: &Rig) -> Result<Self, TraceFault> {
+        let encoding = Encoding::of(&stream.start);
+        let mut records = Records::new(encoding.decode(stream.bytes));
+        let dialect = Dialect::find(&mut records, encoding, rig)?;
+        dialect.skip_header(&mut records).map_err(stopped_early)?;
+        let Dialect { delimiter, decimal, layout, .. } = dialect;
+        let epoch = Epoch::new(layout.time.clone());
+        let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
         Ok(Self { records, splitting, gzip: stream.gzip })
     }
 
@@ -78,40 +85,13 @@ impl RowSource for CsvRows {
     }
 }
 
-/// The header's cells and their delimiter.
-fn read_header(records: &mut Records) -> Result<(u8, Vec<String>), TraceFault> {
-    let stopped = |stop| match stop {
+/// Before the first row.
+pub(super) fn stopped_early(stop: Stop) -> TraceFault {
+    match stop {
         Stop::End => TraceFault::Empty,
         Stop::TooLong => TraceFault::TooLong(1),
         Stop::Failed(source) => TraceFault::Read { line: 0, source },
-    };
-    let delimiter = sniff(records).map_err(stopped)?;
-    let mut cells = records.next().map_err(stopped)?.cells(delimiter);
-    if let Some(first) = cells.first_mut() {
-        *first = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first);
-        if first.starts_with(b"\xff\xfe") || first.starts_with(b"\xfe\xff") {
-            return Err(TraceFault::Format("text in UTF-16: save it as UTF-8"));
-        }
     }
-    if cells.iter().any(|cell| cell.contains(&0)) {
-        return Err(TraceFault::Format("not a CSV file: the header row is binary"));
-    }
-    let headers = cells.into_iter().map(|cell| String::from_utf8_lossy(cell).into_owned());
-    Ok((delimiter, headers.collect()))
-}
-
-/// The delimiter that splits the header most often: a comma, else a semicolon or a tab.
-fn sniff(records: &mut Records) -> Result<u8, Stop> {
-    let (mut best, mut most) = (b',', 0);
-    for delimiter in [b',', b';', b'\t'] {
-        records.split_at(delimiter);
-        let cells = records.peek()?.cells(delimiter).len();
-        if cells > most {
-            (best, most) = (delimiter, cells);
-        }
-    }
-    records.split_at(best);
-    Ok(best)
 }
 
 impl Splitting {
@@ -126,11 +106,12 @@ impl Splitting {
         *row = Row { line: record.line, ..Row::empty() };
         match record.text {
             Text::Plain(text) => {
-                let cells = Plain { text, delimiter: self.delimiter, at: 0, length: 0, ended: false };
+                let (delimiter, decimal) = (self.delimiter, self.decimal);
+                let cells = Plain { text, delimiter, decimal, at: 0, length: 0, ended: false };
                 read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
             Text::Unquoted(text, ends) => {
-                let cells = Unquoted { text, ends, at: 0, length: 0 };
+                let cells = Unquoted { text, ends, decimal: self.decimal, at: 0, length: 0 };
                 read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
         }
@@ -191,6 +172,9 @@ pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Faul
             match cell.parse::<f64>() {
                 // Not quoted, so that no output of ours ever holds such a word.
                 Ok(value) if !value.is_finite() => "not a finite number".to_owned(),
+                _ if reason == BadReason::NotATime => {
+                    format!("`{}` is {}", shorten(cell, 40), expected_time(&layout.time.kind))
+                }
                 _ => format!("`{}` is {}", shorten(cell, 40), reason.text()),
             }
         }
@@ -198,6 +182,13 @@ pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Faul
     let column = fault.column.and_then(|index| columns.get(index));
     let column = column.map(|column| shorten(&column.header, 40));
     BadRow { line, counted: Counted::Lines, column, reason: fault.reason, detail }
+}
+
+fn expected_time(kind: &TimeKind) -> String {
+    match kind {
+        TimeKind::Iso => "not a time in ISO 8601".to_owned(),
+        kind => format!("not a time in the format `{kind}`"),
+    }
 }
 
 /// The cells of one record, one after the other.
@@ -211,10 +202,16 @@ pub(super) trait Cells<'a> {
     /// Bytes of the cell read last, without blanks around it.
     fn length(&self) -> usize;
 
+    /// What stands before the decimals.
+    fn decimal(&self) -> Decimal {
+        Decimal::Point
+    }
+
     /// Reads a cell as a number; NaN where it is empty.
     #[inline]
     fn number(&mut self) -> Result<f64, BadReason> {
-        read_number(self.cell())
+        let decimal = self.decimal();
+        read_number(self.cell(), decimal)
     }
 }
 
@@ -222,6 +219,7 @@ pub(super) trait Cells<'a> {
 struct Plain<'a> {
     text: &'a [u8],
     delimiter: u8,
+    decimal: Decimal,
     at: usize,
     /// Bytes of the cell before.
     length: usize,
@@ -254,6 +252,9 @@ impl<'a> Cells<'a> for Plain<'a> {
     #[inline(always)]
     fn number(&mut self) -> Result<f64, BadReason> {
         let rest = self.text.get(self.at..).unwrap_or_default();
+        if self.decimal == Decimal::Comma {
+            return read_number(self.cell(), Decimal::Comma);
+        }
         if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(rest) {
             let ended = length == rest.len();
             if value.is_finite() && (ended || rest.get(length) == Some(&self.delimiter)) {
@@ -263,7 +264,7 @@ impl<'a> Cells<'a> for Plain<'a> {
                 return Ok(value);
             }
         }
-        read_number(self.cell())
+        read_number(self.cell(), Decimal::Point)
     }
 }
 
@@ -272,11 +273,16 @@ struct Unquoted<'a> {
     text: &'a [u8],
     /// Of the cells that are left.
     ends: &'a [usize],
+    decimal: Decimal,
     at: usize,
     length: usize,
 }
 
 impl<'a> Cells<'a> for Unquoted<'a> {
+    fn decimal(&self) -> Decimal {
+        self.decimal
+    }
+
     fn ended(&self) -> bool {
         self.ends.is_empty()
     }
@@ -295,11 +301,31 @@ impl<'a> Cells<'a> for Unquoted<'a> {
 
 /// A cell with whatever blanks around its number; NaN where it is empty.
 #[cold]
-fn read_number(cell: &[u8]) -> Result<f64, BadReason> {
-    let cell = cell.trim_ascii();
+fn read_number(cell: &[u8], decimal: Decimal) -> Result<f64, BadReason> {
+    let mut cell = cell.trim_ascii();
     if cell.is_empty() {
         return Ok(f64::NAN);
     }
+    let mut with_point = [0; LONGEST_NUMBER];
+    if decimal == Decimal::Comma {
+        cell = pointed(cell, &mut with_point).ok_or(BadReason::NotANumber)?;
+    }
     let value = fast_float2::parse::<f64, _>(cell).ok().filter(|value| value.is_finite());
     value.ok_or(BadReason::NotANumber)
+}
+
+/// No number has more digits, bytes.
+const LONGEST_NUMBER: usize = 64;
+
+/// The cell with a point for its comma; none where it has a point already, which would stand between thousands.
+fn pointed<'a>(cell: &[u8], into: &'a mut [u8; LONGEST_NUMBER]) -> Option<&'a [u8]> {
+    let into = into.get_mut(..cell.len())?;
+    for (to, from) in into.iter_mut().zip(cell) {
+        *to = match from {
+            b'.' => return None,
+            b',' => b'.',
+            other => *other,
+        };
+    }
+    Some(into)
 }

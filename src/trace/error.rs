@@ -31,8 +31,16 @@ pub enum TraceFault {
     /// Another kind of file.
     #[error("{0}")]
     Format(&'static str),
+    /// The file can be read in several ways.
+    #[error("{what}: {settle}")]
+    Ambiguous {
+        /// What is not clear.
+        what: String,
+        /// What says it.
+        settle: String,
+    },
     /// A signal that every trace must have is not there.
-    #[error("no column for {signal}: {accepted} expected; the header has {found}")]
+    #[error("no column for {signal}: {accepted} expected; the header has {found}{hint}")]
     MissingColumn {
         /// E.g. `position`.
         signal: String,
@@ -40,9 +48,13 @@ pub enum TraceFault {
         accepted: String,
         /// The header row, shortened.
         found: String,
+        /// Columns that may be it, as the lines of `[columns]` that would say so; empty, or led by a semicolon.
+        hint: String,
     },
     /// Two columns of one signal.
-    #[error("columns `{first}` and `{second}` both give `{signal}`: keep one")]
+    #[error(
+        "columns `{first}` and `{second}` both give `{signal}`: keep one, or name it under [columns] of the rig file"
+    )]
     DoubledColumn {
         /// The name of the signal.
         signal: &'static str,

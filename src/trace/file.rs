@@ -3,7 +3,7 @@
 use super::error::TraceFault;
 use super::format::{Format, Rows, Stream};
 use super::{csv, parquet};
-use crate::rig::ColumnMap;
+use crate::rig::Rig;
 use std::io::{BufReader, Cursor, Read};
 
 /// Every format; the first that fits is taken.
@@ -13,7 +13,7 @@ const FORMATS: &[Format] = &[parquet::FORMAT, csv::FORMAT];
 const MAGIC: usize = 4;
 
 /// Opens a trace file of any format, compressed or not.
-pub(super) fn open(bytes: Box<dyn Read + Send>, map: &ColumnMap) -> Result<Rows, TraceFault> {
+pub(super) fn open(bytes: Box<dyn Read + Send>, rig: &Rig) -> Result<Rows, TraceFault> {
     let (mut start, mut bytes) = peek(bytes)?;
     let gzip = start.starts_with(b"\x1f\x8b");
     if gzip {
@@ -21,7 +21,7 @@ pub(super) fn open(bytes: Box<dyn Read + Send>, map: &ColumnMap) -> Result<Rows,
         (start, bytes) = peek(Box::new(flate2::bufread::MultiGzDecoder::new(buffered)))?;
     }
     match FORMATS.iter().find(|format| start.starts_with(format.starts_with)) {
-        Some(format) => (format.open)(Stream { bytes, gzip }, map),
+        Some(format) => (format.open)(Stream { start, bytes, gzip }, rig),
         None => Err(TraceFault::Empty),
     }
 }

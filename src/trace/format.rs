@@ -2,20 +2,22 @@
 
 use super::error::TraceFault;
 use super::row::RowSource;
-use crate::rig::ColumnMap;
+use crate::rig::Rig;
 use std::io::Read;
 
 /// One format, registered in `file.rs`.
 pub(super) struct Format {
     /// First bytes of every such file, four at most.
     pub(super) starts_with: &'static [u8],
-    pub(super) open: fn(Stream, &ColumnMap) -> Result<Rows, TraceFault>,
+    pub(super) open: fn(Stream, &Rig) -> Result<Rows, TraceFault>,
 }
 
 pub(super) type Rows = Box<dyn RowSource + Send>;
 
 /// A trace's bytes, decompressed.
 pub(super) struct Stream {
+    /// The first bytes once more.
+    pub(super) start: Vec<u8>,
     pub(super) bytes: Box<dyn Read + Send>,
     /// Whether they come out of gzip, which may break off.
     pub(super) gzip: bool,

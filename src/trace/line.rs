@@ -20,7 +20,10 @@ impl LineLayout {
     /// # Errors
     /// As for the header row of a trace.
     pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
-        Layout::new(names, &rig.columns).map(|layout| Self(Layout { counted: Counted::Lines, ..layout }))
+        Layout::new(names, &rig.columns).map(|layout| {
+            let time = rig.csv.time.clone().unwrap_or(layout.time);
+            Self(Layout { counted: Counted::Lines, time, ..layout })
+        })
     }
 
     /// A validator for lines like these.
@@ -54,7 +57,7 @@ pub(crate) fn read(
 ) -> Result<Option<BadRow>, TraceFault> {
     let LineLayout(layout) = layout;
     let mut row = Row { line, ..Row::empty() };
-    let mut epoch = Epoch::since(*epoch_ns);
+    let mut epoch = Epoch::since(*epoch_ns, layout.time.clone());
     let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
     *epoch_ns = epoch.first_ns();
     let bad = match read {

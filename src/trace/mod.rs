@@ -1,8 +1,12 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
+mod bind;
 mod clock;
 mod columns;
 mod csv;
+mod decimal;
+mod dialect;
+mod encoding;
 mod error;
 mod file;
 mod format;
@@ -15,6 +19,7 @@ mod row;
 mod row_validator;
 mod stamp;
 mod table;
+mod table_text;
 
 pub use error::{TraceError, TraceFault};
 pub(crate) use line::read as read_line;
@@ -118,7 +123,7 @@ impl TraceReader<'static> {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
-        match file::open(stream, &rig.columns) {
+        match file::open(stream, rig) {
             Ok(rows) => Ok(Self::over(name, rows, rig)),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }

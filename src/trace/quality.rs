@@ -13,7 +13,7 @@ const KEPT: usize = 5;
 pub enum BadReason {
     /// A cell is not a finite number.
     NotANumber,
-    /// A time stamp is not ISO 8601.
+    /// A time stamp is not in the format of its column.
     NotATime,
     /// A cell that every row must have is empty.
     Missing,
@@ -32,7 +32,7 @@ impl BadReason {
     pub fn text(self) -> &'static str {
         match self {
             Self::NotANumber => "not a number",
-            Self::NotATime => "not a time in ISO 8601",
+            Self::NotATime => "not a time",
             Self::Missing => "missing value",
             Self::ShortRow => "too few cells",
             Self::LongRow => "too many cells",
@@ -107,6 +107,9 @@ pub struct TraceQuality {
     pub flow_rests: [u64; 2],
     /// Columns that no signal is read from.
     pub ignored_columns: Vec<String>,
+    /// How the file was read, where it is not as this program writes one.
+    #[serde(default)]
+    pub reading: Option<String>,
     /// Mapped columns that the header does not have.
     pub absent_columns: Vec<String>,
     /// Why the rest of a broken stream was not read.

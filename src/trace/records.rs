@@ -88,10 +88,13 @@ impl Records {
         Ok(self.record(line, start, &found))
     }
 
-    /// As [`next`](Self::next), and the record is the next one still.
-    pub(super) fn peek(&mut self) -> Result<Record<'_>, Stop> {
-        let found = self.find()?;
-        Ok(self.record(self.next_line(), self.start, &found))
+    /// What is still to be read, so many bytes of it at the least, or all: then the second is `true`.
+    pub(super) fn look_ahead(&mut self, bytes: usize) -> Result<(&[u8], bool), Stop> {
+        while self.filled - self.start < bytes && self.finished.is_none() {
+            self.refill()?;
+        }
+        let pending = self.buffer.get(self.start..self.filled).unwrap_or_default();
+        Ok((pending, self.finished.is_some()))
     }
 
     #[inline]

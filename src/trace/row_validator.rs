@@ -24,6 +24,7 @@ impl RowValidator {
         let quality = TraceQuality {
             ignored_columns: layout.ignored(),
             absent_columns: layout.absent.clone(),
+            reading: layout.reading.clone(),
             ..TraceQuality::default()
         };
         Self { ranges: Ranges::of(rig), clock: Clock::default(), bad_rows: BadRows::Skip, quality }

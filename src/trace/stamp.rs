@@ -1,38 +1,45 @@
-//! Time stamps in ISO 8601 as seconds since the first of a trace.
+//! Time stamps as seconds since the first of a trace.
 
 use super::quality::BadReason;
-use jiff::Timestamp;
-use jiff::civil::DateTime;
-use jiff::tz::TimeZone;
+use crate::times::TimeFormat;
 
 /// The first time stamp of a trace, from which its seconds count.
 #[derive(Default)]
 pub(super) struct Epoch {
-    first: Option<Timestamp>,
+    format: TimeFormat,
+    first_ns: Option<i128>,
+    last_ns: Option<i128>,
 }
 
 impl Epoch {
+    /// Stamps in this format.
+    pub(super) fn new(format: TimeFormat) -> Self {
+        Self { format, first_ns: None, last_ns: None }
+    }
+
     /// Goes on counting from a first stamp, ns since 1970.
-    pub(super) fn since(first_ns: Option<i64>) -> Self {
-        Self { first: first_ns.and_then(|ns| Timestamp::from_nanosecond(i128::from(ns)).ok()) }
+    pub(super) fn since(first_ns: Option<i64>, format: TimeFormat) -> Self {
+        Self { first_ns: first_ns.map(i128::from), ..Self::new(format) }
     }
 
     /// The first stamp, ns since 1970.
     pub(super) fn first_ns(&self) -> Option<i64> {
-        self.first.and_then(|first| i64::try_from(first.as_nanosecond()).ok())
+        self.first_ns.and_then(|first_ns| i64::try_from(first_ns).ok())
     }
 
     /// Seconds since the first stamp read; NaN for an empty cell. A stamp without an offset is read
-    /// as UTC, so that a day of 24 h has 24 h.
+    /// as UTC where no zone is known, so that a day of 24 h has 24 h.
     pub(super) fn seconds(&mut self, cell: &[u8]) -> Result<f64, BadReason> {
         let cell = cell.trim_ascii();
         if cell.is_empty() {
             return Ok(f64::NAN);
         }
         let text = std::str::from_utf8(cell).map_err(|_| BadReason::NotATime)?;
-        let stamp = parse(text).ok_or(BadReason::NotATime)?;
-        let first = *self.first.get_or_insert(stamp);
-        Ok(seconds_between(first.as_nanosecond(), stamp.as_nanosecond()))
+        let reading = self.format.kind.read(text).ok_or(BadReason::NotATime)?;
+        let stamp_ns = self.format.instant_ns(reading, self.last_ns).ok_or(BadReason::NotATime)?;
+        self.last_ns = Some(stamp_ns);
+        let first_ns = *self.first_ns.get_or_insert(stamp_ns);
+        Ok(seconds_between(first_ns, stamp_ns))
     }
 }
 
@@ -42,13 +49,6 @@ pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
     // Whole seconds apart, so that a trace of a year still has its nanoseconds.
     let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
     whole as f64 + rest as f64 / 1e9
-}
-
-fn parse(text: &str) -> Option<Timestamp> {
-    text.parse::<Timestamp>().ok().or_else(|| {
-        let civil: DateTime = text.parse().ok()?;
-        TimeZone::UTC.to_timestamp(civil).ok()
-    })
 }
 
 #[cfg(test)]

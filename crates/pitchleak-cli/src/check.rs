@@ -37,6 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         page.finish(&Page::of_check(&report, &rig, &history))?;
     }
     bar.finish_and_clear();
+    output::note(&report.trace);
     output::warn(&report.trace.warnings);
     let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };
     output::print(&text)?;

@@ -1,4 +1,5 @@
 use crate::failure::Failure;
+use crate::text_format::TextFormat;
 use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -51,14 +52,18 @@ pub struct Arguments {
     /// Write the rig file with the effects found in it
     #[arg(long, value_name = "FILE")]
     save_rig: Option<PathBuf>,
+
+    #[command(flatten)]
+    text_format: TextFormat,
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let rig = match (&arguments.rig, arguments.traces.first()) {
+    let mut rig = match (&arguments.rig, arguments.traces.first()) {
         (Some(path), _) => Rig::load(path)?,
         (None, Some(trace)) => Rig::beside(trace)?,
         (None, None) => Rig::paper(),
     };
+    arguments.text_format.settle(&mut rig);
     let roles = Roles::of(&arguments.traces, &arguments.test)?;
     roles.repeated.iter().for_each(|same| output::warn(&[same.to_string()]));
     let inputs =
@@ -121,7 +126,8 @@ fn read(
 ) -> Result<(), Failure> {
     let mut reader = TraceReader::open(path, rig)?.with_bad_rows(bad_rows);
     traces.read(&mut reader, rig)?;
-    for warning in reader.quality().warnings() {
+    let reading = reader.quality().reading.iter().map(|reading| format!("read with {reading}"));
+    for warning in reading.chain(reader.quality().warnings()) {
         warnings.entry(warning).or_default().push(reader.name().to_owned());
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The arguments that say what to read.
 
 use crate::failure::Failure;
+use crate::text_format::TextFormat;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
@@ -21,14 +22,19 @@ pub struct Input {
     /// End at the first bad row instead of skipping it
     #[arg(long)]
     strict: bool,
+
+    #[command(flatten)]
+    text_format: TextFormat,
 }
 
 impl Input {
     pub fn rig(&self) -> Result<Rig, Failure> {
-        Ok(match &self.rig {
+        let mut rig = match &self.rig {
             Some(path) => Rig::load(path)?,
             None => Rig::beside(&self.trace)?,
-        })
+        };
+        self.text_format.settle(&mut rig);
+        Ok(rig)
     }
 
     /// The files read, which are not to be written over.

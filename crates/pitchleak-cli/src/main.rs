@@ -10,6 +10,7 @@ mod output;
 mod replay;
 mod reproduce;
 mod simulate;
+mod text_format;
 mod watch;
 
 use clap::{Parser, Subcommand};

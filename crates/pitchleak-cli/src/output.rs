@@ -1,6 +1,6 @@
 //! Standard output and standard error.
 
-use pitchleak::report::Palette;
+use pitchleak::report::{Palette, TraceSummary};
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
@@ -16,6 +16,13 @@ pub fn print(text: &str) -> io::Result<()> {
 pub fn complain(kind: &str, message: &dyn Display) {
     let message = message.to_string().replace('\n', "\\n");
     let _ = writeln!(io::stderr().lock(), "{kind}: {}", harmless(&message));
+}
+
+/// How a trace was read.
+pub fn note(trace: &TraceSummary) {
+    if let Some(reading) = &trace.reading {
+        complain("note", &format!("{} read with {reading}", trace.path));
+    }
 }
 
 /// A warning line each.

@@ -1,0 +1,180 @@
+//! The first lines of a text file as a table: where its header is, and what its first rows say.
+
+use super::bind::{Bound, bind};
+use super::encoding::text;
+use super::error::TraceFault;
+use super::records::Records;
+use crate::header::HeaderUnit;
+use crate::rig::{Delimiter, Rig};
+use std::io::Cursor;
+
+/// No preamble is longer, lines.
+const LONGEST_PREAMBLE: usize = 100;
+/// So many rows say how a file is written.
+const ROWS: usize = 1000;
+/// A trace has this many columns at least: time, position, two pressures.
+const LEAST_CELLS: usize = 4;
+
+/// One record, its cells without blanks around them.
+#[derive(Clone, Debug)]
+pub(super) struct TextRow {
+    /// From 1.
+    pub(super) line: u64,
+    pub(super) cells: Vec<String>,
+}
+
+/// A header, and rows below it.
+pub(super) struct TextTable {
+    pub(super) delimiter: Delimiter,
+    pub(super) header_line: u64,
+    pub(super) headers: Vec<String>,
+    /// The row of units below the header.
+    pub(super) units: Option<TextRow>,
+    pub(super) rows: Vec<TextRow>,
+    /// What the columns hold, or why they don't say it.
+    pub(super) bound: Result<Bound, TraceFault>,
+    /// There is no header: the first line holds numbers.
+    pub(super) headless: bool,
+}
+
+impl TextTable {
+    /// The table that `ahead`, the start of a file or all of it, is: split at `delimiter`, else at the one that makes a
+    /// trace of it, or the most of it.
+    pub(super) fn find(ahead: &[u8], whole: bool, delimiter: Option<Delimiter>, rig: &Rig) -> Option<Self> {
+        let tried = delimiter
+            .map_or_else(|| Delimiter::NAMES.map(|(_, delimiter)| delimiter).to_vec(), |one| vec![one]);
+        let mut best: Option<(usize, Self)> = None;
+        for delimiter in tried {
+            let table = Self::split(ahead, whole, delimiter, rig)?;
+            if table.bound.is_ok() {
+                return Some(table);
+            }
+            let cells = table.headers.len();
+            let fitting =
+                table.rows.iter().filter(|row| row.cells.len() == cells && is_data(&row.cells)).count();
+            let score = if cells > 1 { (1 + fitting) * cells } else { 0 };
+            if best.as_ref().is_none_or(|(most, _)| score > *most) {
+                best = Some((score, table));
+            }
+        }
+        best.map(|(_, table)| table)
+    }
+
+    fn split(ahead: &[u8], whole: bool, delimiter: Delimiter, rig: &Rig) -> Option<Self> {
+        let rows = rows(ahead, whole, delimiter);
+        let wide = |row: &TextRow| row.cells.len() >= LEAST_CELLS;
+        let may_name = |row: &TextRow| wide(row) && !is_data(&row.cells);
+        let named = rows.iter().take(LONGEST_PREAMBLE).enumerate().filter(|(_, row)| may_name(row));
+        for (index, _) in named {
+            let table = Self::under(&rows, index, delimiter, rig)?;
+            if table.bound.is_ok() {
+                return Some(table);
+            }
+        }
+        let is_data_row = |row: &TextRow| wide(row) && is_data(&row.cells);
+        let first_data = rows.iter().take(LONGEST_PREAMBLE).position(is_data_row);
+        match first_data {
+            Some(0) => {
+                let table = Self::under(&rows, 0, delimiter, rig)?;
+                Some(Self { headless: true, ..table })
+            }
+            Some(data) => {
+                let above = |count: usize| data.checked_sub(count).and_then(|index| rows.get(index));
+                let units = above(1).is_some_and(is_units) && above(2).is_some_and(wide);
+                Self::under(&rows, data - if units { 2 } else { 1 }, delimiter, rig)
+            }
+            None => Self::under(&rows, 0, delimiter, rig),
+        }
+    }
+
+    /// The table whose header is this row.
+    fn under(rows: &[TextRow], header: usize, delimiter: Delimiter, rig: &Rig) -> Option<Self> {
+        let row = rows.get(header)?;
+        let mut headers = row.cells.clone();
+        if let Some(first) = headers.first_mut() {
+            *first = first.trim_start_matches(['#', '%']).trim_start_matches("//").trim().to_owned();
+        }
+        let units = rows.get(header + 1).filter(|row| is_units(row)).cloned();
+        let rows = rows.get(header + 1 + usize::from(units.is_some())..).unwrap_or_default().to_vec();
+        fit_trailing(&mut headers, &rows);
+        let bound = bind(&headers, units.as_ref().map(|row| row.cells.as_slice()), &rows, rig);
+        Some(Self { delimiter, header_line: row.line, headers, units, rows, bound, headless: false })
+    }
+
+    /// The last line before the rows.
+    pub(super) fn last_header_line(&self) -> u64 {
+        self.units.as_ref().map_or(self.header_line, |row| row.line)
+    }
+
+    /// What stands in a column, empty cells left out.
+    pub(super) fn column(&self, index: usize) -> Vec<&str> {
+        column(&self.rows, index)
+    }
+}
+
+/// What stands in a column of `rows`, empty cells left out.
+pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
+    rows.iter()
+        .filter_map(|row| row.cells.get(index))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
+        .collect()
+}
+
+fn rows(ahead: &[u8], whole: bool, delimiter: Delimiter) -> Vec<TextRow> {
+    let mut records = Records::new(Box::new(Cursor::new(ahead.to_vec())));
+    records.split_at(delimiter.byte());
+    let mut rows = Vec::new();
+    while let Ok(record) = records.next() {
+        if (record.unended && !whole && !rows.is_empty()) || rows.len() == ROWS {
+            break;
+        }
+        let cells = record.cells(delimiter.byte());
+        rows.push(TextRow {
+            line: record.line,
+            cells: cells
+                .into_iter()
+                .map(|cell| text(cell).trim().trim_start_matches('\u{feff}').to_owned())
+                .collect(),
+        });
+    }
+    // `sep=;` says how a spreadsheet is to split the rest.
+    if rows.first().is_some_and(|row| row.cells.first().is_some_and(|cell| cell.starts_with("sep="))) {
+        rows.remove(0);
+    }
+    rows
+}
+
+/// A delimiter at the end of every row, or of the header alone, adds a cell without a name.
+fn fit_trailing(headers: &mut Vec<String>, rows: &[TextRow]) {
+    let of_length = |length: usize| rows.iter().filter(move |row| row.cells.len() == length);
+    let most = |count: usize| 2 * count > rows.len();
+    let length = headers.len();
+    if headers.last().is_some_and(String::is_empty) && most(of_length(length - 1).count()) {
+        headers.pop();
+    } else if most(of_length(length + 1).filter(|row| row.cells.last().is_some_and(String::is_empty)).count())
+    {
+        headers.push(String::new());
+    }
+}
+
+/// Whether most cells are numbers or times.
+fn is_data(cells: &[String]) -> bool {
+    let filled = || cells.iter().filter(|cell| !cell.is_empty());
+    let values = filled().filter(|cell| cell.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c)));
+    2 * values.count() > filled().count()
+}
+
+/// Whether most cells are units, in brackets or not.
+fn is_units(row: &TextRow) -> bool {
+    let filled = || row.cells.iter().filter(|cell| !bare_unit(cell).is_empty());
+    let units = filled().filter(|cell| HeaderUnit::is_known(bare_unit(cell))).count();
+    units >= 2 && 2 * units >= filled().count()
+}
+
+/// Without brackets and dashes around it.
+pub(super) fn bare_unit(cell: &str) -> &str {
+    let cell = cell.trim_matches(['-', ' ']);
+    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
+}
