@@ -295,7 +295,8 @@ fn plain_layouts_give_the_original() {
 fn what_can_be_read_in_two_ways_is_refused_with_what_settles_it() {
     let rows = original();
     let stamped = |time, time_name| Layout { time, time_name: Some(time_name), ..PLAIN };
-    let cases: [(Layout, fn(String) -> String, &str); 12] = [
+    type Change = fn(String) -> String;
+    let cases: [(Layout, Change, &str); 12] = [
         (stamped(Time::AmbiguousSlashes, "timestamp"), |text| text, "format = \"dmy\""),
         (stamped(Time::WholeSeconds, "timestamp"), |text| text, "fractions of a second"),
         (stamped(Time::Seconds, "Time"), |text| text, "pitchleak columns"),
