@@ -26,18 +26,40 @@ pub struct Checkpoint {
 }
 
 /// What a [`Watch`] knew at one moment, to be written while it goes on.
-pub struct Snapshot(BTreeMap<String, Cylinder>);
+pub struct Snapshot {
+    cylinders: BTreeMap<String, Cylinder>,
+    unsent: Vec<String>,
+}
+
+/// What a checkpoint holds.
+type Saved = (String, BTreeMap<String, Cylinder>, Vec<String>);
+
+/// What there is to say of a checkpoint that was gone on from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Restored {
+    /// What is wrong with the newest one.
+    pub notice: Option<NoticeEvent>,
+    /// See [`Snapshot::with_unsent`].
+    pub unsent: Vec<String>,
+}
 
 impl Snapshot {
     /// As of now.
     pub fn of(watch: &Watch) -> Self {
-        Self(watch.cylinders.clone())
+        Self { cylinders: watch.cylinders.clone(), unsent: Vec::new() }
+    }
+
+    /// With what follows from the samples so far and has not reached anybody yet: whoever goes on has to send it.
+    #[must_use]
+    pub fn with_unsent(self, unsent: Vec<String>) -> Self {
+        Self { unsent, ..self }
     }
 
     /// As in the file.
     fn bytes(&self) -> Result<Vec<u8>, String> {
         let mut bytes = Vec::new();
-        ciborium::into_writer(&(SCHEMA, &self.0), &mut bytes).map_err(|error| error.to_string())?;
+        ciborium::into_writer(&(SCHEMA, &self.cylinders, &self.unsent), &mut bytes)
+            .map_err(|error| error.to_string())?;
         bytes.extend(checksum(&bytes).to_le_bytes());
         Ok(bytes)
     }
@@ -115,15 +137,18 @@ impl Checkpoint {
     ///
     /// # Errors
     /// Where there are checkpoints and none can be used, or one is of another rig.
-    pub fn restore(&self, watch: &mut Watch) -> Result<Option<NoticeEvent>, CheckpointError> {
+    pub fn restore(&self, watch: &mut Watch) -> Result<Restored, CheckpointError> {
         let newest = self.file(NAME);
         let damage = match read(&newest) {
             None => None,
-            Some(Ok(cylinders)) => return self.put(watch, cylinders).map(|()| None),
+            Some(Ok((_, cylinders, unsent))) => {
+                self.put(watch, cylinders)?;
+                return Ok(Restored { notice: None, unsent });
+            }
             Some(Err(why)) => Some(why),
         };
         match (read(&self.file(BEFORE)), damage) {
-            (Some(Ok(cylinders)), damage) => {
+            (Some(Ok((_, cylinders, unsent))), damage) => {
                 self.put(watch, cylinders)?;
                 if damage.is_some() {
                     // Else the next checkpoint would put it in the place of the good one.
@@ -132,15 +157,16 @@ impl Checkpoint {
                     aside.map_err(|source| CheckpointError::Write { file, source })?;
                 }
                 let why = damage.unwrap_or_else(|| "missing".to_owned());
-                Ok(Some(NoticeEvent {
+                let notice = Some(NoticeEvent {
                     cylinder: String::new(),
                     t_s: None,
                     kind: "checkpoint".to_owned(),
                     count: 1,
                     text: format!("{}: {why}: the one before is used", newest.display()),
-                }))
+                });
+                Ok(Restored { notice, unsent })
             }
-            (None, None) => Ok(None),
+            (None, None) => Ok(Restored::default()),
             (_, Some(why)) | (Some(Err(why)), None) => {
                 Err(CheckpointError::Content { file: newest.display().to_string(), why })
             }
@@ -161,8 +187,8 @@ impl Checkpoint {
     }
 }
 
-/// The cylinders of a checkpoint; none where there is no file.
-fn read(path: &Path) -> Option<Result<BTreeMap<String, Cylinder>, String>> {
+/// A checkpoint; none where there is no file.
+fn read(path: &Path) -> Option<Result<Saved, String>> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
@@ -173,13 +199,12 @@ fn read(path: &Path) -> Option<Result<BTreeMap<String, Cylinder>, String>> {
         return Some(Err("damaged".to_owned()));
     }
     let version = format!("of another version, this one reads `{SCHEMA}`");
-    // A list of two whose first is the version.
+    // A list whose first is the version.
     if body.get(2..2 + SCHEMA.len()) != Some(SCHEMA.as_bytes()) {
         return Some(Err(version));
     }
-    let read = ciborium::from_reader::<(String, BTreeMap<String, Cylinder>), _>(body);
-    Some(match read {
-        Ok((_, cylinders)) => Ok(cylinders),
+    Some(match ciborium::from_reader::<Saved, _>(body) {
+        Ok(saved) => Ok(saved),
         Err(ciborium::de::Error::Semantic(_, why)) => Err(why),
         Err(_) => Err(version),
     })

@@ -1,11 +1,14 @@
 //! One cylinder's estimator, and what it has to say.
 
+use super::config::LiveConfig;
 use super::event::{AlarmEvent, EstimateEvent, Event, LiveLeakage};
+use super::history::History;
 use super::notices::Notices;
+use super::order::{Order, Turn};
 use crate::Rig;
 use crate::replay::Stream;
 use crate::report::ReplayReport;
-use crate::trace::{BadRows, LineLayout, Taken, TraceFault};
+use crate::trace::{BadRows, LineLayout, Taken};
 use pitchleak_core::RlsError;
 use serde::{Deserialize, Serialize};
 
@@ -18,44 +21,83 @@ pub(super) struct Cylinder {
     intervals: Option<f64>,
     /// Time of the last estimate said, s.
     told_s: Option<f64>,
+    /// Of samples that come in messages.
+    order: Order,
+    history: History,
     #[serde(skip)]
     notices: Notices,
+}
+
+/// A line, taken apart.
+pub(super) struct Line<'a> {
+    /// The cylinder's.
+    pub name: &'a str,
+    pub layout: &'a LineLayout,
+    pub number: u64,
+    pub cells: &'a [&'a [u8]],
 }
 
 impl Cylinder {
     pub(super) fn new(rig: &Rig) -> Result<Self, RlsError> {
         let stream = Stream::new(rig, BadRows::Skip)?;
-        Ok(Self { stream, intervals: None, told_s: None, notices: Notices::default() })
+        Ok(Self {
+            stream,
+            intervals: None,
+            told_s: None,
+            order: Order::default(),
+            history: History::default(),
+            notices: Notices::default(),
+        })
     }
 
     pub(super) fn rig(&self) -> &Rig {
         self.stream.rig()
     }
 
-    /// Takes in a line; `interval_s` is the time between two estimates.
-    pub(super) fn take(
-        &mut self,
-        name: &str,
-        interval_s: f64,
-        layout: &LineLayout,
-        line: u64,
-        cells: &[&[u8]],
-        events: &mut Vec<Event>,
-    ) -> Result<(), TraceFault> {
-        match self.stream.take_line(layout, line, cells)? {
-            Taken::Bad(bad) => {
+    /// Takes in a line.
+    pub(super) fn take(&mut self, config: &LiveConfig, line: &Line<'_>, events: &mut Vec<Event>) {
+        match self.stream.take_line(line.layout, line.number, line.cells) {
+            Ok(Taken::Bad(bad)) => {
                 let kind = serde_json::to_value(bad.reason).unwrap_or_default();
                 let kind = kind.as_str().unwrap_or("bad");
-                self.notice(name, kind, bad.to_string(), events);
+                self.notice(line.name, kind, bad.to_string(), events);
             }
-            Taken::Good { renewed } => {
+            Ok(Taken::Good { renewed }) => {
                 if renewed && !self.stream.replay().alarms().is_empty() {
-                    self.tell_alarms(name, events);
+                    self.tell_alarms(line.name, events);
                 }
-                self.tell_estimate_if_due(name, interval_s, events);
+                self.tell_estimate_if_due(line.name, config.interval_s, events);
+            }
+            Err(fault) => self.notice(line.name, "unreadable", fault.to_string(), events),
+        }
+    }
+
+    /// Takes in a line if it is its turn: one that came before changes nothing, to the last bit.
+    pub(super) fn take_in_turn(
+        &mut self,
+        config: &LiveConfig,
+        resent: bool,
+        line: &Line<'_>,
+        events: &mut Vec<Event>,
+    ) {
+        let Some(t_s) = line.layout.time_s(self.stream.epoch_ns, line.cells) else {
+            return self.notice(line.name, "not_a_time", "no time can be read".to_owned(), events);
+        };
+        let turn = self.order.turn(t_s, resent, config.set_back_after_s);
+        // By its own count, which a restart does not begin anew.
+        let line = &Line { number: self.order.count(), ..*line };
+        match turn {
+            Turn::Next => self.take(config, line, events),
+            Turn::Late => {
+                let kind = if resent { "sent_again" } else { "late" };
+                self.notice(line.name, kind, format!("{t_s} s is not after the last sample"), events);
+            }
+            Turn::SetBack => {
+                let text = format!("samples go on from {t_s} s: the clock was set back");
+                self.notice(line.name, "clock_set_back", text, events);
+                self.take(config, line, events);
             }
         }
-        Ok(())
     }
 
     /// Counts a line that was left out.
@@ -67,7 +109,7 @@ impl Cylinder {
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
         if self.stream.time_s() != self.told_s {
-            self.tell_estimate(name, events);
+            events.extend(self.estimate(name).map(Event::Estimate));
         }
         events.extend(self.notices.rest(name, self.stream.time_s()).into_iter().map(Event::Notice));
     }
@@ -75,15 +117,20 @@ impl Cylinder {
     fn tell_estimate_if_due(&mut self, name: &str, interval_s: f64, events: &mut Vec<Event>) {
         let intervals = self.stream.time_s().map(|t_s| (t_s / interval_s).floor());
         let before = std::mem::replace(&mut self.intervals, intervals);
-        if before.is_some() && before != intervals {
-            self.tell_estimate(name, events);
+        if before.is_none() || before == intervals {
+            return;
         }
+        let Some(estimate) = self.estimate(name) else { return };
+        self.told_s = Some(estimate.t_s);
+        let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
+        let ended = self.history.add(at_s, &estimate);
+        events.extend(ended.into_iter().map(|summary| Event::Summary(summary.of(&estimate))));
+        events.push(Event::Estimate(estimate));
     }
 
-    fn tell_estimate(&mut self, name: &str, events: &mut Vec<Event>) {
-        let (Some(t_s), Some(report)) = (self.stream.time_s(), self.stream.report(name)) else { return };
-        self.told_s = Some(t_s);
-        events.push(Event::Estimate(EstimateEvent {
+    fn estimate(&self, name: &str) -> Option<EstimateEvent> {
+        let (t_s, report) = (self.stream.time_s()?, self.stream.report(name)?);
+        Some(EstimateEvent {
             cylinder: name.to_owned(),
             t_s,
             status: report.verdict.status,
@@ -91,7 +138,7 @@ impl Cylinder {
             leakage: report.leakage.map(LiveLeakage::from),
             trend: report.trend,
             time_ns: self.time_ns(t_s),
-        }));
+        })
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {

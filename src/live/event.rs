@@ -1,5 +1,6 @@
 //! What goes out.
 
+use super::history::{LeakSummary, Span};
 use crate::report::{LeakTrend, Leakage, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
@@ -25,6 +26,8 @@ pub enum Event {
     Alarm(AlarmEvent),
     /// Lines that were left out.
     Notice(NoticeEvent),
+    /// What the leaks were in an hour or a day.
+    Summary(SummaryEvent),
 }
 
 /// What is known of a cylinder.
@@ -85,6 +88,25 @@ pub struct AlarmEvent {
     pub time_ns: Option<i64>,
 }
 
+/// What the leaks were in an hour or a day.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SummaryEvent {
+    /// None where the lines name none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cylinder: String,
+    /// Hour or day.
+    pub span: Span,
+    /// Its begin, s since 1970, or as the samples count where they have no time stamps.
+    pub from_s: f64,
+    /// Estimates in it.
+    pub estimates: u64,
+    /// Each leak.
+    pub leakage: PerLeak<LeakSummary>,
+    /// As of [`EstimateEvent`], of its begin.
+    #[serde(skip)]
+    pub time_ns: Option<i64>,
+}
+
 /// Lines that were left out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoticeEvent {
@@ -118,6 +140,7 @@ impl Event {
             Self::Estimate(event) => ("pitchleak", &event.cylinder, event.time_ns),
             Self::Alarm(event) => ("pitchleak_alarm", &event.cylinder, event.time_ns),
             Self::Notice(event) => ("pitchleak_notice", &event.cylinder, None),
+            Self::Summary(event) => ("pitchleak_summary", &event.cylinder, event.time_ns),
         };
         let mut line = tagged(name, "cylinder", cylinder);
         let quoted = |text: &str| text.replace('\\', "\\\\").replace('"', "\\\"");
@@ -148,6 +171,19 @@ impl Event {
             Self::Notice(event) => {
                 line = tagged(&line, "kind", &event.kind);
                 write!(line, " count={}u,text=\"{}\"", event.count, quoted(&event.text))
+            }
+            Self::Summary(event) => {
+                line = tagged(&line, "span", if event.span == Span::Hour { "hour" } else { "day" });
+                let mut values = format!("estimates={}u", event.estimates);
+                for leak in Leak::ALL {
+                    let (name, leakage) = (name_of(leak)?, event.leakage[leak]);
+                    let LeakSummary { mean_lpm, max_lpm, .. } = leakage;
+                    let _ = write!(values, ",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}");
+                    if let Some(trend) = leakage.trend_lpm_per_day {
+                        let _ = write!(values, ",{name}_slope_lpm_per_day={}", trend.slope);
+                    }
+                }
+                write!(line, " {values}")
             }
         };
         if let Some(time_ns) = time_ns {

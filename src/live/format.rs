@@ -44,6 +44,18 @@ pub(super) struct Fields<'a> {
 pub(super) const CYLINDER: &str = "cylinder";
 
 impl<'a> Fields<'a> {
+    /// With a name for the cylinder where the line names none.
+    pub(super) fn into_owned(self, cylinder: &str) -> Fields<'static> {
+        let owned =
+            |cells: Vec<Cow<'_, str>>| cells.into_iter().map(|cell| cell.into_owned().into()).collect();
+        let named = Some(self.cylinder.into_owned()).filter(|name| !name.is_empty());
+        Fields {
+            cylinder: named.unwrap_or_else(|| cylinder.to_owned()).into(),
+            names: owned(self.names),
+            cells: owned(self.cells),
+        }
+    }
+
     pub(super) fn push(&mut self, name: Cow<'a, str>, cell: Cow<'a, str>) {
         if name == CYLINDER {
             self.cylinder = cell;

@@ -1,21 +1,28 @@
-//! Live operation: samples of many cylinders come in as lines, estimates, alarms and notices go out.
+//! Live operation: samples of many cylinders come in as lines or messages, estimates, alarms and notices go out.
 //!
 //! [`Watch`] does no input or output of its own and reads no clock: what it says follows from the lines alone, and each
 //! cylinder's numbers are those of a [`replay`](mod@crate::replay) of its lines, to the last bit.
 
+mod batch;
 mod checkpoint;
 mod config;
 mod csv;
 mod cylinder;
 mod event;
 mod format;
+mod history;
 mod influx;
+mod layouts;
 mod ndjson;
+mod neuron;
 mod notices;
+mod order;
 mod watch;
 
-pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};
-pub use config::{ConfigError, LiveConfig};
-pub use event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent, OutputFormat};
+pub use batch::{Batch, BatchFormat};
+pub use checkpoint::{Checkpoint, CheckpointError, Restored, Snapshot};
+pub use config::{ConfigError, LiveConfig, LiveDocument};
+pub use event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent, OutputFormat, SummaryEvent};
 pub use format::LineFormat;
+pub use history::{DayTrend, LeakSummary, Span};
 pub use watch::Watch;

@@ -17,7 +17,7 @@ pub(super) fn parse(line: &str) -> Result<Fields<'_>, String> {
 }
 
 /// Without the quotes of a string; null is a missing value.
-fn cell(value: &str) -> Cow<'_, str> {
+pub(super) fn cell(value: &str) -> Cow<'_, str> {
     if value == "null" {
         return Cow::Borrowed("");
     }

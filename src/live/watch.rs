@@ -1,20 +1,17 @@
+use super::batch::{self, Batch};
 use super::config::LiveConfig;
-use super::cylinder::Cylinder;
+use super::cylinder::{Cylinder, Line};
 use super::event::Event;
 use super::format::{Fields, LineFormat, Parser};
+use super::layouts::Layouts;
 use super::notices::Notices;
-use crate::trace::LineLayout;
-use std::borrow::Cow;
+use crate::Rig;
 use std::collections::BTreeMap;
 
-/// Cylinders beyond these are left out: a feed that invents names must not eat the memory.
-const MOST_CYLINDERS: usize = 10_000;
 /// A longer name is none.
 const LONGEST_NAME: usize = 200;
-/// Sets of names that are remembered with what they mean.
-const LAYOUTS: usize = 16;
 
-/// Watches many cylinders, line by line.
+/// Watches many cylinders, line by line or message by message.
 pub struct Watch {
     config: LiveConfig,
     parser: Option<Parser>,
@@ -24,6 +21,9 @@ pub struct Watch {
     notices: Notices,
     lines: u64,
 }
+
+/// Why a line belongs to no cylinder: the kind of the notice, and its words.
+type Refusal = (&'static str, String);
 
 impl Watch {
     /// Watches what `config` says; the first line tells the format where it is not given.
@@ -43,6 +43,11 @@ impl Watch {
         &self.config
     }
 
+    /// Cylinders of which samples came.
+    pub fn cylinders(&self) -> usize {
+        self.cylinders.len()
+    }
+
     /// Takes in a line, without its end; what there is to say goes to `events`. No line is an error: one that is of no
     /// use is counted.
     pub fn take(&mut self, line: &[u8], events: &mut Vec<Event>) {
@@ -51,7 +56,32 @@ impl Watch {
         if line.is_empty() {
             return;
         }
-        if let Err((kind, text)) = self.take_sample(line, events) {
+        if let Err((kind, text)) = self.take_line(line, events) {
+            self.notice(kind, text, events);
+        }
+    }
+
+    /// Takes in a message, its samples in the order of their times and each once; what there is to say goes to `events`. No
+    /// message is an error: what is of no use is counted.
+    pub fn take_batch(&mut self, batch: &Batch<'_>, events: &mut Vec<Event>) {
+        let mut refusals: Vec<Refusal> = Vec::new();
+        let mut samples = Vec::new();
+        let parsed = batch::parse(batch, |fields| match fields {
+            Ok(fields) => samples.push((f64::INFINITY, fields.into_owned(batch.cylinder))),
+            Err(why) => refusals.push(("unreadable", why)),
+        });
+        refusals.extend(parsed.err().map(|why| ("unreadable", why)));
+        for (t_s, fields) in &mut samples {
+            *t_s = self.time_s(fields).unwrap_or(f64::INFINITY);
+        }
+        samples.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        for (_, fields) in &samples {
+            self.lines += 1;
+            refusals.extend(self.take_fields(fields, events, |cylinder, config, line, events| {
+                cylinder.take_in_turn(config, batch.resent, line, events);
+            }));
+        }
+        for (kind, text) in refusals {
             self.notice(kind, text, events);
         }
     }
@@ -67,61 +97,86 @@ impl Watch {
         for (name, cylinder) in &mut self.cylinders {
             cylinder.finish(name, events);
         }
+        self.tell_counted(events);
+    }
+
+    /// Says what was counted and not said of lines that belong to no cylinder: they have no time, by which the next notice
+    /// could be due.
+    pub fn tell_counted(&mut self, events: &mut Vec<Event>) {
         events.extend(self.notices.rest("", None).into_iter().map(Event::Notice));
     }
 
-    fn take_sample(&mut self, line: &[u8], events: &mut Vec<Event>) -> Result<(), (&'static str, String)> {
+    fn take_line(&mut self, line: &[u8], events: &mut Vec<Event>) -> Result<(), Refusal> {
         let line = std::str::from_utf8(line).map_err(|_| ("unreadable", "not UTF-8".to_owned()))?;
-        let parser = self.parser.get_or_insert_with(|| Parser::new(LineFormat::of(line)));
-        let parsed = parser.parse(line).map_err(|why| ("unreadable", why))?;
-        let Some(Fields { cylinder: name, names, cells }) = parsed else { return Ok(()) };
-        if !self.cylinders.contains_key(name.as_ref()) {
-            let cylinder = begin(&self.config, &name, self.cylinders.len())?;
-            self.cylinders.insert(name.clone().into_owned(), cylinder);
-        }
-        let Some(cylinder) = self.cylinders.get_mut(name.as_ref()) else { return Ok(()) };
-        let layout = match self.layouts.find(&names, cylinder) {
-            Ok(layout) => layout,
-            Err(why) => {
-                cylinder.notice(&name, "columns", format!("line {}: {why}", self.lines), events);
-                return Ok(());
+        let mut parser = self.parser.take().unwrap_or_else(|| Parser::new(LineFormat::of(line)));
+        let taken = match parser.parse(line) {
+            Err(why) => Err(("unreadable", why)),
+            Ok(None) => Ok(()),
+            Ok(Some(fields)) => {
+                let refused = self.take_fields(&fields, events, Cylinder::take);
+                refused.map_or(Ok(()), Err)
             }
         };
-        let cells: Vec<&[u8]> = cells.iter().map(|cell| cell.as_bytes()).collect();
-        let interval_s = self.config.interval_s;
-        cylinder
-            .take(&name, interval_s, layout, self.lines, &cells, events)
-            .map_err(|fault| ("unreadable", fault.to_string()))
+        self.parser = Some(parser);
+        taken
+    }
+
+    /// Gives a sample to its cylinder; says why, where there is none for it.
+    fn take_fields(
+        &mut self,
+        fields: &Fields<'_>,
+        events: &mut Vec<Event>,
+        take: impl FnOnce(&mut Cylinder, &LiveConfig, &Line<'_>, &mut Vec<Event>),
+    ) -> Option<Refusal> {
+        let name = fields.cylinder.as_ref();
+        let layout = match rig_of(&self.config, &self.cylinders, name) {
+            Ok(rig) => self.layouts.find(&fields.names, rig),
+            Err(refusal) => return Some(refusal),
+        };
+        let layout = match layout {
+            Ok(layout) => layout,
+            Err(why) => {
+                let Some(cylinder) = self.cylinders.get_mut(name) else { return Some(("columns", why)) };
+                cylinder.notice(name, "columns", format!("line {}: {why}", self.lines), events);
+                return None;
+            }
+        };
+        if !self.cylinders.contains_key(name) {
+            match Cylinder::new(self.config.rig_of(name)?) {
+                Ok(cylinder) => self.cylinders.insert(name.to_owned(), cylinder),
+                Err(error) => return Some(("unknown_cylinder", error.to_string())),
+            };
+        }
+        let cylinder = self.cylinders.get_mut(name)?;
+        let cells = cells(fields);
+        take(cylinder, &self.config, &Line { name, layout, number: self.lines, cells: &cells }, events);
+        None
+    }
+
+    /// Time of a sample, s since 1970, or as its sender counts.
+    fn time_s(&mut self, fields: &Fields<'_>) -> Option<f64> {
+        let rig = rig_of(&self.config, &self.cylinders, &fields.cylinder).ok()?;
+        self.layouts.find(&fields.names, rig).ok()?.time_s(Some(0), &cells(fields))
     }
 }
 
-fn begin(config: &LiveConfig, name: &str, there_are: usize) -> Result<Cylinder, (&'static str, String)> {
+fn cells<'a>(fields: &'a Fields<'_>) -> Vec<&'a [u8]> {
+    fields.cells.iter().map(|cell| cell.as_bytes()).collect()
+}
+
+/// The rig by which a cylinder is or would be watched.
+fn rig_of<'a>(
+    config: &'a LiveConfig,
+    cylinders: &'a BTreeMap<String, Cylinder>,
+    name: &str,
+) -> Result<&'a Rig, Refusal> {
+    if let Some(cylinder) = cylinders.get(name) {
+        return Ok(cylinder.rig());
+    }
     let shown = || name.chars().take(40).collect::<String>();
-    if there_are >= MOST_CYLINDERS || name.len() > LONGEST_NAME || name.contains(char::is_control) {
+    let full = cylinders.len() >= config.most_cylinders;
+    if full || name.len() > LONGEST_NAME || name.contains(char::is_control) {
         return Err(("too_many_cylinders", format!("`{}` is left out", shown())));
     }
-    let rig = config.rig_of(name).ok_or_else(|| ("unknown_cylinder", format!("`{}` has no rig", shown())))?;
-    Cylinder::new(rig).map_err(|error| ("unknown_cylinder", error.to_string()))
-}
-
-/// What sets of names mean, the last used first.
-#[derive(Default)]
-struct Layouts(Vec<(String, Vec<String>, LineLayout)>);
-
-impl Layouts {
-    fn find(&mut self, names: &[Cow<'_, str>], cylinder: &Cylinder) -> Result<&LineLayout, String> {
-        let rig = cylinder.rig();
-        let known = self.0.iter().position(|(rig_name, known, _)| *rig_name == rig.name && known == names);
-        match known {
-            Some(0) => {}
-            Some(at) => self.0.swap(0, at),
-            None => {
-                let names: Vec<String> = names.iter().map(|name| name.clone().into_owned()).collect();
-                let layout = LineLayout::new(&names, rig).map_err(|fault| fault.to_string())?;
-                self.0.insert(0, (rig.name.clone(), names, layout));
-                self.0.truncate(LAYOUTS);
-            }
-        }
-        self.0.first().map(|(_, _, layout)| layout).ok_or_else(String::new)
-    }
+    config.rig_of(name).ok_or_else(|| ("unknown_cylinder", format!("`{}` has no rig", shown())))
 }

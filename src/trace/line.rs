@@ -1,6 +1,6 @@
 //! Rows that come one by one as text, such as the lines of a live feed.
 
-use super::columns::Layout;
+use super::columns::{Column, Content, Layout};
 use super::csv::{Cells, describe, read_cells};
 use super::error::TraceFault;
 use super::quality::{BadRow, Counted};
@@ -9,6 +9,7 @@ use super::row_validator::RowValidator;
 use super::stamp::Epoch;
 use super::{BadRows, Record};
 use crate::rig::Rig;
+use crate::signal::Signal;
 
 /// What the cells of a line hold, by their names, which are those of a trace's columns.
 #[derive(Clone, Debug)]
@@ -24,6 +25,20 @@ impl LineLayout {
             let time = rig.csv.time.clone().unwrap_or(layout.time);
             Self(Layout { counted: Counted::Lines, time, ..layout })
         })
+    }
+
+    /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); none where it cannot be read.
+    pub(crate) fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Option<f64> {
+        let is_time =
+            |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));
+        let at = self.0.columns.iter().position(is_time)?;
+        let mut cells = LineCells { cells, at };
+        let time_s = match self.0.columns.get(at)?.content {
+            Content::Timestamp => Epoch::since(epoch_ns).seconds(cells.cell()),
+            Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
+            Content::Ignored => return None,
+        };
+        time_s.ok().filter(|time_s| time_s.is_finite())
     }
 
     /// A validator for lines like these.

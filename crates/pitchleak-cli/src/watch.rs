@@ -71,9 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut watch = Watch::new(config, arguments.format);
     let checkpoint = arguments.state.as_deref().map(Checkpoint::new).transpose()?;
     let format = if arguments.influx_out { OutputFormat::Influx } else { OutputFormat::Ndjson };
-    if let Some(notice) =
-        checkpoint.as_ref().map(|checkpoint| checkpoint.restore(&mut watch)).transpose()?.flatten()
-    {
+    let restored = checkpoint.as_ref().map(|checkpoint| checkpoint.restore(&mut watch)).transpose()?;
+    if let Some(notice) = restored.and_then(|restored| restored.notice) {
         output::complain("warning", &notice.text);
         print(&[Event::Notice(notice)], format)?;
     }

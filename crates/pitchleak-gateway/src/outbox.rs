@@ -1,0 +1,151 @@
+//! What waits to be sent, in bounded memory.
+
+use crate::broker::{Keeping, Message, Ticket};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tokio::sync::Notify;
+
+/// Messages at most of which each counts.
+const MOST_EACH: usize = 10_000;
+/// Topics at most of which the last message counts.
+const MOST_TOPICS: usize = 50_000;
+
+/// Filled by the service, emptied by the network thread.
+#[derive(Default)]
+pub struct Outbox {
+    waiting: Mutex<Waiting>,
+    filled: Notify,
+}
+
+#[derive(Default)]
+struct Waiting {
+    tickets: VecDeque<Ticket>,
+    each: VecDeque<Message>,
+    /// Topics in the order of their first message.
+    topics: VecDeque<String>,
+    latest: BTreeMap<String, Message>,
+    closing: bool,
+}
+
+/// What is to be sent next.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Next {
+    Acknowledge(Ticket),
+    Publish(Message),
+    /// Nothing is left, and nothing will come.
+    Close,
+}
+
+impl Outbox {
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn put(&self, message: Message) {
+        let mut waiting = self.waiting();
+        match message.keeping {
+            Keeping::Each(_) if waiting.each.len() < MOST_EACH => waiting.each.push_back(message),
+            // The service still has it, and hands it over again after a restart.
+            Keeping::Each(_) => {}
+            Keeping::Latest => {
+                let topic = message.topic.clone();
+                let there_are = waiting.latest.len();
+                if let Some(older) = waiting.latest.get_mut(&topic) {
+                    *older = message;
+                } else if there_are < MOST_TOPICS {
+                    waiting.topics.push_back(topic.clone());
+                    waiting.latest.insert(topic, message);
+                }
+            }
+        }
+        drop(waiting);
+        self.filled.notify_one();
+    }
+
+    pub fn acknowledge(&self, tickets: Vec<Ticket>) {
+        self.waiting().tickets.extend(tickets);
+        self.filled.notify_one();
+    }
+
+    /// Puts back what could not be handed over.
+    pub fn put_back(&self, next: Next) {
+        let mut waiting = self.waiting();
+        match next {
+            Next::Acknowledge(ticket) => waiting.tickets.push_front(ticket),
+            Next::Publish(message) if message.keeping != Keeping::Latest => waiting.each.push_front(message),
+            Next::Publish(_) | Next::Close => {}
+        }
+        drop(waiting);
+        self.filled.notify_one();
+    }
+
+    /// After this, [`next`](Self::next) gives [`Next::Close`] once nothing else is left.
+    pub fn close(&self) {
+        self.waiting().closing = true;
+        self.filled.notify_one();
+    }
+
+    /// The next thing to send; waits until there is one.
+    pub async fn next(&self) -> Next {
+        loop {
+            if let Some(next) = self.waiting().next() {
+                return next;
+            }
+            self.filled.notified().await;
+        }
+    }
+}
+
+impl Waiting {
+    fn next(&mut self) -> Option<Next> {
+        if let Some(ticket) = self.tickets.pop_front() {
+            return Some(Next::Acknowledge(ticket));
+        }
+        if let Some(message) = self.each.pop_front() {
+            return Some(Next::Publish(message));
+        }
+        while let Some(topic) = self.topics.pop_front() {
+            if let Some(message) = self.latest.remove(&topic) {
+                return Some(Next::Publish(message));
+            }
+        }
+        self.closing.then_some(Next::Close)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(topic: &str, payload: &str, keeping: Keeping) -> Message {
+        Message { topic: topic.to_owned(), payload: payload.to_owned(), keeping }
+    }
+
+    #[test]
+    fn of_estimates_the_last_counts_and_of_alarms_each() {
+        let outbox = Outbox::default();
+        outbox.put(message("a/estimate", "1", Keeping::Latest));
+        outbox.put(message("b/estimate", "1", Keeping::Latest));
+        outbox.put(message("a/estimate", "2", Keeping::Latest));
+        outbox.put(message("a/alarm", "1", Keeping::Each(0)));
+        outbox.put(message("a/alarm", "2", Keeping::Each(1)));
+        outbox.close();
+        let mut payloads = Vec::new();
+        while let Some(Next::Publish(message)) = outbox.waiting().next() {
+            payloads.push(message.topic + message.payload.as_str());
+        }
+        assert_eq!(payloads, ["a/alarm1", "a/alarm2", "a/estimate2", "b/estimate1"]);
+        assert_eq!(outbox.waiting().next(), Some(Next::Close));
+    }
+
+    #[test]
+    fn a_broker_that_is_away_for_long_costs_no_more_memory() {
+        let outbox = Outbox::default();
+        for k in 0..100_000 {
+            outbox.put(message("a/estimate", "1", Keeping::Latest));
+            outbox.put(message("a/alarm", "1", Keeping::Each(k)));
+        }
+        let waiting = outbox.waiting();
+        assert_eq!((waiting.each.len(), waiting.topics.len()), (MOST_EACH, 1));
+    }
+}

@@ -1,0 +1,116 @@
+use super::{Mosquitto, certificates, data, wait_until};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex};
+
+/// The program, its configuration and its state.
+pub struct Gateway {
+    child: Option<Child>,
+    folder: tempfile::TempDir,
+    /// What it said on standard error, of all its runs.
+    pub said: Arc<Mutex<String>>,
+}
+
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_pitchleak-gateway");
+
+impl Gateway {
+    /// Not started yet. `change` makes the configuration another.
+    pub fn new(broker: &Mosquitto, change: impl FnOnce(String) -> String) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("password"), "correct\n").unwrap();
+        let text = format!(
+            "state = \"state\"\ncheckpoint_s = 0.2\n\
+             [broker]\nhost = \"localhost\"\nport = {}\nca_file = \"{}/authority.pem\"\nuser = \"tester\"\npassword_file = \"password\"\n\
+             [[samples]]\ntopic = \"pitch/+/+/samples\"\nformat = \"json\"\n\
+             [http]\nlisten = \"127.0.0.1:0\"\n\
+             [watch]\nrig = \"{}/traces/rig.toml\"\nmost_cylinders = 50\n",
+            broker.tls_port,
+            certificates().display(),
+            data().display()
+        );
+        std::fs::write(folder.path().join("gateway.toml"), change(text)).unwrap();
+        Self { child: None, folder, said: Arc::default() }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn start(&mut self) {
+        let mut child =
+            Command::new(PROGRAM).arg(self.path("gateway.toml")).stderr(Stdio::piped()).spawn().unwrap();
+        let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let said = Arc::clone(&self.said);
+        std::thread::spawn(move || {
+            for line in lines.map_while(Result::ok) {
+                said.lock().unwrap().push_str(&format!("{line}\n"));
+            }
+        });
+        self.child = Some(child);
+    }
+
+    /// Waits until it says so.
+    pub fn wait_for(&self, words: &str) {
+        wait_until(words, || self.said.lock().unwrap().contains(words));
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.as_ref().unwrap().id()
+    }
+
+    /// At any moment.
+    pub fn kill(&mut self) {
+        let mut child = self.child.take().unwrap();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        self.said.lock().unwrap().clear();
+    }
+
+    /// By SIGTERM; its exit status.
+    pub fn end(&mut self) -> Option<i32> {
+        let mut child = self.child.take().unwrap();
+        Command::new("kill").arg(child.id().to_string()).status().unwrap();
+        child.wait().unwrap().code()
+    }
+
+    /// What it answers to a request.
+    pub fn get(&self, path: &str) -> String {
+        let said = self.said.lock().unwrap().clone();
+        let address = said.split("http://").nth(1).unwrap().lines().next().unwrap().to_owned();
+        let mut connection = TcpStream::connect(address).unwrap();
+        connection.write_all(format!("GET {path} HTTP/1.1\r\n\r\n").as_bytes()).unwrap();
+        let mut text = String::new();
+        connection.read_to_string(&mut text).unwrap();
+        text
+    }
+
+    /// A metric's value.
+    pub fn metric(&self, name: &str) -> f64 {
+        let text = self.get("/metrics");
+        let line = text.lines().find(|line| line.starts_with(name) && !line.starts_with('#'));
+        line.and_then(|line| line.rsplit(' ').next()?.parse().ok()).unwrap_or(0.0)
+    }
+
+    pub fn state(&self) -> PathBuf {
+        self.path("state")
+    }
+
+    /// The highest that its memory was, bytes.
+    pub fn peak_memory(&self) -> u64 {
+        let text =
+            std::fs::read_to_string(Path::new("/proc").join(self.id().to_string()).join("status")).unwrap();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+        1024 * line.trim().trim_end_matches(" kB").parse::<u64>().unwrap()
+    }
+}
+
+impl Drop for Gateway {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
