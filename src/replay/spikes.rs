@@ -9,6 +9,8 @@ use pitchleak_core::Sensors;
 /// A step this many times the usual one, beyond so many standard deviations of the declared noise, is wild.
 const USUAL_STEPS: f64 = 10.0;
 const NOISE_STDS: f64 = 8.0;
+/// … and beyond so many steps of the reading's resolution.
+const QUANTA: f64 = 2.5;
 /// Wild rows in a row that are left out at the most.
 const MOST_IN_A_ROW: u32 = 2;
 /// Steps over which the usual one is averaged; as long, at first, every reading is taken. Later one of so many is enough.
@@ -24,6 +26,8 @@ pub(super) struct Spikes {
     last: [f64; CHANNELS],
     usual_step: [f64; CHANNELS],
     least_wild: [f64; CHANNELS],
+    /// The smallest step but none: the reading's resolution, at least.
+    quantum: [f64; CHANNELS],
     /// The smallest wild step.
     wild_step: [f64; CHANNELS],
     seen: u64,
@@ -39,6 +43,7 @@ impl Spikes {
         Self {
             last: [0.0; CHANNELS],
             usual_step: [0.0; CHANNELS],
+            quantum: [f64::INFINITY; CHANNELS],
             wild_step: [f64::INFINITY; CHANNELS],
             least_wild: spreads.map(|spread| NOISE_STDS * spread.noise_std),
             seen: 0,
@@ -93,14 +98,15 @@ impl Spikes {
             return;
         }
         let share = 1.0 / self.seen.min(MEMORY) as f64;
-        for (usual_step, step) in self.usual_step.iter_mut().zip(steps) {
+        let usual = self.usual_step.iter_mut().zip(&mut self.quantum).zip(steps);
+        for ((usual_step, quantum), step) in usual {
             *usual_step += share * (step - *usual_step);
+            *quantum = if *step > 0.0 { quantum.min(*step) } else { *quantum };
         }
         if self.seen >= MEMORY {
-            for ((wild, usual), least) in
-                self.wild_step.iter_mut().zip(&self.usual_step).zip(&self.least_wild)
-            {
-                *wild = USUAL_STEPS * usual + least;
+            let known = self.usual_step.iter().zip(&self.least_wild).zip(&self.quantum);
+            for (wild, ((usual, least), quantum)) in self.wild_step.iter_mut().zip(known) {
+                *wild = (USUAL_STEPS * usual + least).max(QUANTA * quantum);
             }
         }
     }
@@ -155,6 +161,16 @@ mod tests {
             }
         });
         assert_eq!(spiked, [700, 1400]);
+    }
+
+    /// A meter that reads whole litres steps seldom, and far beyond its declared noise.
+    #[test]
+    fn a_coarse_reading_is_no_spike() {
+        let rounded = left_out(|k, record| {
+            let noisy = 0.3 + 0.08 * Normal::stream(2, k as u64).draw();
+            record.sample.qa_m3s = Some(f64::round(noisy) / crate::units::LPM_PER_M3S);
+        });
+        assert_eq!(rounded, [] as [usize; 0]);
     }
 
     #[test]

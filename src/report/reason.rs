@@ -4,7 +4,8 @@ use super::Findings;
 use super::statement::{interval, join, with_interval};
 use crate::channels::ChannelFaultKind;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Estimate, Leak};
+use crate::wiring::ZeroCheck;
+use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
 /// What kind of reason.
@@ -216,17 +217,11 @@ fn negative_leak(findings: &Findings<'_>) -> Option<Reason> {
 
 fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
     let zeros = findings.suspicions.zeros?;
-    let leak = Leak::ALL
-        .into_iter()
-        .find(|leak| findings.active[*leak] && zeros.for_leak[*leak] < LEAK_OVER_ZEROS)?;
+    let leak = Leak::ALL.into_iter().find(|leak| {
+        let explained = zeros.for_leak[*leak] < LEAK_OVER_ZEROS;
+        findings.active[*leak] && explained && may_be_zeros(findings, &zeros, *leak)
+    })?;
     let offsets = zeros.offsets_without_m3s[leak].map(|offset| offset.scaled(LPM_PER_M3S));
-    let share = |(offset, full_scale): (&Estimate<f64>, f64)| (offset.value / full_scale).powi(2);
-    let zeros_share = offsets.iter().zip(findings.meters_lpm).map(share).sum::<f64>().sqrt();
-    let [a, b] = findings.meters_lpm;
-    let leak_share = findings.leakage[leak].mean_lpm / a.min(b);
-    if zeros_share > ZEROS_AT_MOST && leak_share > ZERO_AT_MOST {
-        return None;
-    }
     let off = offsets.iter().zip(["qa", "qb"]).filter(|(offset, _)| offset.value.abs() > 2.0 * offset.std);
     let off = off
         .map(|(offset, name)| format!("{name} by {} L/min", with_interval(offset.value, Some(offset.std))));
@@ -242,6 +237,14 @@ fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
         "read the meters with their valves shut, or record while the pressures change; how far zeros may be off belongs in \
          the rig file (`bias`)",
     ))
+}
+
+/// Whether meters are off by so much now and then.
+fn may_be_zeros(findings: &Findings<'_>, zeros: &ZeroCheck, leak: Leak) -> bool {
+    let [a, b] = findings.meters_lpm;
+    let [off_a, off_b] = zeros.offsets_without_m3s[leak].map(|offset| offset.value * LPM_PER_M3S);
+    (off_a / a).hypot(off_b / b) <= ZEROS_AT_MOST
+        || findings.leakage[leak].mean_lpm <= ZERO_AT_MOST * a.min(b)
 }
 
 fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {

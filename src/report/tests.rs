@@ -265,6 +265,26 @@ fn a_leak_that_a_zero_explains_as_well_is_in_doubt() {
     assert!(text.contains("(qa by 0.2000 ± 0.0012 L/min)"), "{text}");
 }
 
+/// A large leak that only zeros beyond belief explain stands, and hides no smaller one that a zero explains.
+#[test]
+fn a_leak_larger_than_zeros_stands_and_hides_none() {
+    let (none, far) = (Estimate { value: 0.0, std: 1e-8 }, Estimate { value: 0.6 / LPM_PER_M3S, std: 1e-8 });
+    let zeros = ZeroCheck {
+        for_leak: PerLeak::default(),
+        for_zeros: 0.0,
+        offsets_m3s: [none; 2],
+        offsets_without_m3s: PerLeak::from_fn(|_| [far, none]),
+        leaks_m3spa: PerLeak::default(),
+    };
+    let mut large = found(INTERNAL);
+    large.suspicions.zeros = Some(zeros);
+    assert_eq!(large.judged(), (Status::Leak, vec![]));
+    large.active.external_a = true;
+    large.leakage.external_a.mean_lpm = 0.2;
+    assert_eq!(large.judged(), (Status::Doubtful, vec!["offset_or_leak"]));
+    assert!(large.verdict().text.contains("as the external A leak does"));
+}
+
 fn episode(from_s: f64, to_s: Option<f64>) -> Episode {
     Episode { fault: Leak::Internal, from_s, to_s, mean_lpm: 0.5, peak_lpm: 0.6 }
 }
