@@ -50,6 +50,7 @@ pub mod simulate;
 pub mod times;
 pub mod trace;
 pub mod units;
+pub mod viscosity;
 pub mod wind;
 pub mod wiring;
 

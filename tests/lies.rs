@@ -25,9 +25,9 @@ const SLACK: f64 = 0.01;
 /// Right and confidently wrong ones of each row.
 fn read(text: &str) -> BTreeMap<String, (usize, usize)> {
     let line = |line: &str| {
-        let mut cells = line.rsplitn(4, ',');
+        let mut cells = line.rsplitn(5, ',');
         let mut count = || cells.next().and_then(|cell| cell.parse().ok());
-        let (wrong, _doubt, right): (_, usize, _) = (count()?, count()?, count()?);
+        let [_named, wrong, _doubt, right] = [count()?, count()?, count()?, count()?];
         Some((cells.next()?.to_owned(), (right, wrong)))
     };
     text.lines().skip(1).filter_map(line).collect()

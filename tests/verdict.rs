@@ -19,7 +19,7 @@ use plant::{LEAKING, leak_name, truths};
 use rayon::prelude::*;
 
 fn lie(faults: &'static [&'static str]) -> Lie {
-    Lie { family: Family::Mistake, name: "", faults, every: 1 }
+    Lie { family: Family::Mistake, name: "", faults, every: 1, named: None }
 }
 
 /// The kinds of reasons that a minute of wind can give; the others are tested beside the code.

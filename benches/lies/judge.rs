@@ -45,9 +45,16 @@ fn is_size(report: &ReplayReport, leak: Leak, truths: &[Truth]) -> bool {
     off_lpm <= FIGURE_LPM.max(3.0 * stated.std_lpm.unwrap_or(0.0))
 }
 
-/// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie.
-pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> Judgement {
-    replayed(truths, lie, accuracy, seed).map_or(Judgement::InDoubt, |report| judge(&report, leaking, truths))
+/// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
+pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> (Judgement, bool) {
+    let Ok(report) = replayed(truths, lie, accuracy, seed) else { return (Judgement::InDoubt, false) };
+    (judge(&report, leaking, truths), names(&report, lie))
+}
+
+/// Whether the report says what the lie is.
+fn names(report: &ReplayReport, lie: &Lie) -> bool {
+    let Some([id, words]) = lie.named else { return false };
+    report.verdict.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
 }
 
 /// The report on it.

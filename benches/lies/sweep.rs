@@ -16,6 +16,8 @@ pub struct Outcome {
     pub right: usize,
     pub in_doubt: usize,
     pub confidently_wrong: usize,
+    /// Those in doubt with the lie among the reasons.
+    pub named: usize,
 }
 
 impl Outcome {
@@ -33,7 +35,7 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome>
         let outcome = |(accuracy, lie): &(f64, &'static Lie)| {
             let judgements: Vec<_> =
                 (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
-            let count = |which| judgements.iter().filter(|judgement| **judgement == which).count();
+            let count = |which| judgements.iter().filter(|(judgement, _)| *judgement == which).count();
             Outcome {
                 lie,
                 leaking: *leaking,
@@ -42,6 +44,7 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome>
                 right: count(Judgement::Right),
                 in_doubt: count(Judgement::InDoubt),
                 confidently_wrong: count(Judgement::ConfidentlyWrong),
+                named: judgements.iter().filter(|(_, named)| *named).count(),
             }
         };
         cases.par_iter().map(outcome).collect::<Vec<_>>()

@@ -5,7 +5,7 @@ use crate::plant::leak_name;
 use crate::sweep::Outcome;
 use std::fmt::Write;
 
-pub const HEADER: &str = "family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong\n";
+pub const HEADER: &str = "family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named\n";
 
 /// What a row of the bench is about, as the first cells of its line.
 pub fn key(outcome: &Outcome) -> String {
@@ -16,20 +16,28 @@ pub fn key(outcome: &Outcome) -> String {
 
 /// Every row.
 pub fn csv(outcomes: &[Outcome]) -> String {
-    let line =
-        |one: &Outcome| format!("{},{},{},{}\n", key(one), one.right, one.in_doubt, one.confidently_wrong);
+    let line = |one: &Outcome| {
+        let Outcome { right, in_doubt, confidently_wrong, named, .. } = one;
+        format!("{},{right},{in_doubt},{confidently_wrong},{named}\n", key(one))
+    };
     HEADER.to_owned() + &outcomes.iter().map(line).collect::<String>()
 }
 
-/// Runs, and those right, in doubt, confidently wrong, of the outcomes that match.
-fn sums(outcomes: &[Outcome], matches: impl Fn(&Outcome) -> bool) -> [usize; 4] {
-    outcomes.iter().filter(|one| matches(one)).fold([0; 4], |[runs, right, doubt, wrong], one| {
-        [runs + one.runs(), right + one.right, doubt + one.in_doubt, wrong + one.confidently_wrong]
+/// Runs, and those right, in doubt, confidently wrong, named, of the outcomes that match.
+fn sums(outcomes: &[Outcome], matches: impl Fn(&Outcome) -> bool) -> [usize; 5] {
+    outcomes.iter().filter(|one| matches(one)).fold([0; 5], |[runs, right, doubt, wrong, named], one| {
+        [
+            runs + one.runs(),
+            right + one.right,
+            doubt + one.in_doubt,
+            wrong + one.confidently_wrong,
+            named + one.named,
+        ]
     })
 }
 
-fn line(out: &mut String, name: &str, [runs, right, doubt, wrong]: [usize; 4]) {
-    let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {wrong} |");
+fn line(out: &mut String, name: &str, [runs, right, doubt, wrong, named]: [usize; 5]) {
+    let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {named} | {wrong} |");
 }
 
 /// The tables for people.
@@ -38,7 +46,7 @@ pub fn summary(outcomes: &[Outcome]) -> String {
     let head = |out: &mut String, title: &str, what: &str| {
         let _ = write!(
             out,
-            "## {title}\n\n| {what} | runs | right | in doubt | confidently wrong |\n|---|---|---|---|---|\n"
+            "## {title}\n\n| {what} | runs | right | in doubt | of these named | confidently wrong |\n|---|---|---|---|---|---|\n"
         );
     };
     head(&mut out, "By family", "family");

@@ -109,7 +109,7 @@ impl Cylinder {
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
         if self.stream.time_s() != self.told_s {
-            events.extend(self.estimate(name).map(Event::Estimate));
+            events.extend(self.estimate(name).map(|told| Event::Estimate(Box::new(told))));
         }
         events.extend(self.notices.rest(name, self.stream.time_s()).into_iter().map(Event::Notice));
     }
@@ -125,7 +125,7 @@ impl Cylinder {
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
         events.extend(ended.into_iter().map(|summary| Event::Summary(summary.of(&estimate))));
-        events.push(Event::Estimate(estimate));
+        events.push(Event::Estimate(Box::new(estimate)));
     }
 
     fn estimate(&self, name: &str) -> Option<EstimateEvent> {

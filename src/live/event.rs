@@ -21,7 +21,7 @@ pub enum OutputFormat {
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Event {
     /// What is known of a cylinder.
-    Estimate(EstimateEvent),
+    Estimate(Box<EstimateEvent>),
     /// An alarm raised or cleared.
     Alarm(AlarmEvent),
     /// Lines that were left out.

@@ -14,6 +14,7 @@ mod state;
 mod stream;
 mod summary;
 mod suspicion;
+mod temperature;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
@@ -34,6 +35,7 @@ use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak,
 use pressures::TracePressures;
 use scoring::Scoring;
 use spikes::Spikes;
+use temperature::OilTemperature;
 
 /// The estimates after one record, for a file of estimates over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,6 +109,7 @@ pub struct Replay {
     channels: ChannelMonitor,
     consistency: Consistency,
     spikes: Spikes,
+    oil: OilTemperature,
     /// Time of the last record, s.
     end_s: f64,
     /// Of the last block, in its own standard deviations.
@@ -133,6 +136,7 @@ impl Replay {
             channels: ChannelMonitor::default(),
             consistency: Consistency::default(),
             spikes: Spikes::new(&rig.sensors()),
+            oil: OilTemperature::default(),
             end_s: 0.0,
             innovation: None,
             rig: rig.clone(),
@@ -180,6 +184,7 @@ impl Replay {
     #[inline]
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
+        self.oil.add(record);
         let update = self.estimator.update(record);
         match update {
             Update::Balanced { innovation } => self.weigh(innovation),

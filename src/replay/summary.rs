@@ -79,11 +79,14 @@ impl Replay {
         threshold_lpm: &PerLeak<f64>,
     ) -> PerLeak<Option<LeakTrend>> {
         let pressures = self.pressures.sizes().sizes_pa;
+        let thinning = self.oil.thinning_ps();
         PerLeak::from_fn(|leak| {
             let found = found.filter(|found| found.excitation.leaks[leak].identifiable)?;
             let Leakage { mean_lpm, std_lpm, .. } = leakage[leak];
             let slope = found.leak_slopes_m3spa_ps[leak].scaled(pressures[leak] * LPM_PER_M3S);
-            LeakTrend::new(Estimate { value: mean_lpm, std: std_lpm? }, slope, threshold_lpm[leak])
+            let flow = Estimate { value: mean_lpm, std: std_lpm? };
+            let trend = LeakTrend::new(flow, slope, threshold_lpm[leak])?;
+            Some(thinning.map_or(trend, |thinning| trend.apart(flow, thinning)))
         })
     }
 

@@ -5,7 +5,7 @@ use crate::channels::ChannelFaultKind;
 use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
 use crate::trace::Record;
-use crate::wiring::{Excerpt, ZeroCheck, explain, unit_by_scatter, zero_check};
+use crate::wiring::{Excerpt, ZeroCheck, explain, sensor_error, unit_by_scatter, zero_check};
 
 impl Replay {
     /// What an excerpt of the trace, whose columns were read by `columns`, says against `verdict`.
@@ -14,12 +14,18 @@ impl Replay {
         if self.channel_faults().iter().any(|fault| fault.kind != ChannelFaultKind::Coarse) {
             return Suspicions::default();
         }
-        let found = match verdict.status {
-            Status::Doubtful => explain(&excerpt.records(), &self.rig),
-            _ => unit_by_scatter(excerpt, &self.rig),
+        let doubtful = verdict.status == Status::Doubtful;
+        let wiring = if doubtful {
+            explain(&excerpt.records(), &self.rig)
+        } else {
+            unit_by_scatter(excerpt, &self.rig)
         };
+        let sensor =
+            if doubtful && wiring.is_none() { sensor_error(&excerpt.records(), &self.rig) } else { None };
         let zeros = if verdict.status == Status::Leak { self.zeros(excerpt) } else { None };
-        Suspicions { wiring: found.map(|found| found.wiring(columns, &self.rig)), zeros }
+        let [wiring, sensor] =
+            [wiring, sensor].map(|found| found.map(|found| found.wiring(columns, &self.rig)));
+        Suspicions { wiring, sensor, zeros }
     }
 
     /// Leaks since they changed last against zeros of the meters, unless the rig file declares how far those may be off: the

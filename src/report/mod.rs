@@ -12,7 +12,7 @@ pub use reason::{Reason, ReasonId};
 pub(crate) use statement::{advice, capital, interval, with_interval};
 pub use text::{Palette, data_line};
 pub(crate) use text::{misfit, rig_line};
-pub use trend::{LeakTrend, ReachTime};
+pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
 pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
 
 use crate::rig::EstimatorKind;

@@ -4,7 +4,7 @@ use super::Findings;
 use super::statement::{interval, join, with_interval};
 use crate::channels::ChannelFaultKind;
 use crate::units::LPM_PER_M3S;
-use crate::wiring::ZeroCheck;
+use crate::wiring::{Wiring, ZeroCheck};
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
@@ -15,6 +15,8 @@ pub enum ReasonId {
     Channel(ChannelFaultKind),
     /// A mistake of wiring, sign or unit explains what the columns as declared do not.
     Wiring,
+    /// A sensor whose gain or zero is off explains what the declared sensors do not.
+    SensorError,
     /// More rows are bad than good.
     MostlyBadRows,
     /// The trace asks for a bulk modulus that no oil has, or not this one.
@@ -41,6 +43,7 @@ impl ReasonId {
         match self {
             Self::Channel(kind) => kind.id(),
             Self::Wiring => "wiring",
+            Self::SensorError => "sensor_error",
             Self::MostlyBadRows => "mostly_bad_rows",
             Self::BulkModulusImpossible => "bulk_modulus_impossible",
             Self::NegativeLeak => "negative_leak",
@@ -110,7 +113,12 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
         .iter()
         .map(|fault| Reason::new(ReasonId::Channel(fault.kind), fault.text.clone(), fault.suggestion));
     let others = [
-        wiring(findings),
+        named(
+            ReasonId::Wiring,
+            findings.suspicions.wiring.as_ref(),
+            "how the columns are wired and recorded",
+        ),
+        named(ReasonId::SensorError, findings.suspicions.sensor.as_ref(), "the sensor against another one"),
         mostly_bad_rows(findings),
         bulk_modulus_impossible(findings),
         negative_leak(findings),
@@ -150,14 +158,18 @@ fn undecided(findings: &Findings<'_>, leak: Leak) -> Reason {
     )
 }
 
-fn wiring(findings: &Findings<'_>) -> Option<Reason> {
-    let wiring = findings.suspicions.wiring.as_ref()?;
-    let suggestion = if wiring.columns.is_empty() {
-        "check how the columns are wired and recorded, and record anew".to_owned()
+/// What explains the trace, with the lines that mend it.
+fn named(id: ReasonId, found: Option<&Wiring>, check: &str) -> Option<Reason> {
+    let found = found?;
+    let suggestion = if found.columns.is_empty() {
+        format!("check {check}, and record anew")
     } else {
-        format!("where that is so, mend it in the rig file: [columns] {}", wiring.columns.join("; "))
+        format!(
+            "check {check}; where that is so, mend it in the rig file: [columns] {}",
+            found.columns.join("; ")
+        )
     };
-    Some(Reason::new(ReasonId::Wiring, wiring.suggestion.clone(), suggestion))
+    Some(Reason::new(id, found.suggestion.clone(), suggestion))
 }
 
 /// What remains may not stand for the cylinder.

@@ -127,9 +127,15 @@ fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> 
             duration(high)
         )
     });
+    let oil = trend.oil.map(|oil| {
+        let [with, beyond] = [oil.with_viscosity, oil.beyond_viscosity]
+            .map(|part| with_interval(part.slope_lpm_per_h, Some(part.std)));
+        format!(" ({with} of it follows the oil's viscosity, {beyond} does not)")
+    });
     Some(format!(
-        "The {} leak {verb} by {slope} L/min per hour{}.",
+        "The {} leak {verb} by {slope} L/min per hour{}{}.",
         leak.label(),
+        oil.unwrap_or_default(),
         reaches.unwrap_or_default()
     ))
 }

@@ -234,7 +234,7 @@ fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
     let misfit = Some(Misfit { balance: 9.0, ..SOUND });
     let doubtful = Found {
         channels: vec![stuck],
-        suspicions: Suspicions { wiring: Some(wiring), zeros: None },
+        suspicions: Suspicions { wiring: Some(wiring), ..Suspicions::default() },
         misfit,
         ..found(INTERNAL)
     };
@@ -256,7 +256,7 @@ fn a_leak_that_a_zero_explains_as_well_is_in_doubt() {
         leaks_m3spa: PerLeak::default(),
     };
     let held = |for_leak| Found {
-        suspicions: Suspicions { wiring: None, zeros: Some(zeros(for_leak)) },
+        suspicions: Suspicions { zeros: Some(zeros(for_leak)), ..Suspicions::default() },
         ..found(INTERNAL)
     };
     assert_eq!(held(30.0).judged(), (Status::Leak, vec![]));

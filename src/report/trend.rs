@@ -11,6 +11,32 @@ pub struct LeakTrend {
     /// Time from the trace's end until the leak is at its alarm's threshold if it goes on like this; none where it is there
     /// already, or does not grow beyond doubt.
     pub reaches_threshold_in_s: Option<ReachTime>,
+    /// The part of the slope that follows the oil's viscosity, and the rest; none without readings of the oil's temperature.
+    pub oil: Option<OilShare>,
+}
+
+/// A slope in two parts, L/min per hour.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OilShare {
+    /// What a leak of this size through a narrow gap gains as the oil thins (Hagen and Poiseuille): the oil's.
+    pub with_viscosity: Slope,
+    /// What is left: the seal's, or the connector's.
+    pub beyond_viscosity: Slope,
+}
+
+/// Part of a trend.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Slope {
+    /// L/min per hour.
+    pub slope_lpm_per_h: f64,
+    /// Standard deviation of its error, L/min per hour.
+    pub std: f64,
+}
+
+impl From<Estimate<f64>> for Slope {
+    fn from(Estimate { value, std }: Estimate<f64>) -> Self {
+        Self { slope_lpm_per_h: value, std }
+    }
 }
 
 /// A time to come.
@@ -34,7 +60,19 @@ impl LeakTrend {
             slope_lpm_per_h: slope.value,
             std: slope.std,
             reaches_threshold_in_s: reach_time(flow_lpm, slope_lpm_ps, threshold_lpm),
+            oil: None,
         })
+    }
+
+    /// The same, told apart where the oil thins by `thinning_ps` (share of its viscosity per second) and the leak is `flow_lpm`.
+    pub fn apart(self, flow_lpm: Estimate<f64>, thinning_ps: Estimate<f64>) -> Self {
+        let per_h = thinning_ps.scaled(S_PER_H);
+        let with = Estimate {
+            value: flow_lpm.value * per_h.value,
+            std: (flow_lpm.value * per_h.std).hypot(flow_lpm.std * per_h.value),
+        };
+        let beyond = Estimate { value: self.slope_lpm_per_h - with.value, std: self.std.hypot(with.std) };
+        Self { oil: Some(OilShare { with_viscosity: with.into(), beyond_viscosity: beyond.into() }), ..self }
     }
 
     /// The slope with its spread, L/min per hour.
@@ -81,6 +119,20 @@ mod tests {
         assert!((time.value - 600.0).abs() < 1e-9);
         let [low, high] = time.ci95;
         assert!((480.0..505.0).contains(&low) && (740.0..760.0).contains(&high), "{low} to {high}");
+    }
+
+    #[test]
+    fn warming_oil_has_its_part_of_a_trend() {
+        let flow = Estimate { value: 0.5, std: 0.01 };
+        let trend = LeakTrend::new(flow, Estimate { value: 1e-4, std: 1e-6 }, 0.1).unwrap();
+        assert_eq!(trend.oil, None);
+        let oil = trend.apart(flow, Estimate { value: 2e-4, std: 3e-5 }).oil.unwrap();
+        assert!((oil.with_viscosity.slope_lpm_per_h - 0.36).abs() < 1e-12);
+        assert!(oil.beyond_viscosity.slope_lpm_per_h.abs() < 1e-12);
+        assert!(
+            (oil.with_viscosity.std - 0.054).abs() < 1e-3
+                && oil.beyond_viscosity.std > oil.with_viscosity.std
+        );
     }
 
     #[test]

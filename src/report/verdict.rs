@@ -117,6 +117,8 @@ pub struct Findings<'a> {
 pub struct Suspicions {
     /// A mistake of wiring that does.
     pub wiring: Option<Wiring>,
+    /// A sensor whose gain or zero is off that does.
+    pub sensor: Option<Wiring>,
     /// The leaks held against zeros of the meters.
     pub zeros: Option<ZeroCheck>,
 }
@@ -124,7 +126,7 @@ pub struct Suspicions {
 impl Suspicions {
     /// Whether there is anything to weigh.
     pub fn any(&self) -> bool {
-        self.wiring.is_some() || self.zeros.is_some()
+        self.wiring.is_some() || self.sensor.is_some() || self.zeros.is_some()
     }
 }
 

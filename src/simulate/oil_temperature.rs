@@ -2,6 +2,7 @@ use super::span::{Span, SpanError, split_span};
 use crate::curve::Curve;
 use crate::reference::{ReferenceError, constant_or_file};
 use crate::units::{self, Dimension, UnitError};
+use crate::viscosity::{GRADE_K, viscosity_mm2ps};
 
 /// Temperature of the oil through the trace.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +39,6 @@ pub enum OilTemperatureError {
 
 /// Coldest and hottest oil, K.
 const RANGE_K: std::ops::RangeInclusive<f64> = 233.15..=423.15;
-/// Sizes of leaks hold at 40 °C, where ISO 3448 grades oil.
-const GRADE_K: f64 = 313.15;
 
 impl OilTemperature {
     /// `40 °C`, `20 °C -> 60 °C @ 0 s..600 s`, or a CSV file with `t_s` and `temp_c`.
@@ -71,22 +70,11 @@ impl OilTemperature {
         }
     }
 
-    /// How much more a laminar leak lets through at this time than at 40 °C: the inverse ratio of the
+    /// How much more a laminar leak lets through at this time than at 40 °C, where its size holds: the inverse ratio of the
     /// viscosities. The oil's thermal expansion (0.07 % per kelvin) is left out.
     pub fn leak_factor(&self, t_s: f64) -> f64 {
         viscosity_mm2ps(GRADE_K) / viscosity_mm2ps(self.at(t_s))
     }
-}
-
-/// Kinematic viscosity of a mineral oil ISO VG 32, mm²/s, by Walther's law (ASTM D341):
-/// lg lg(ν + 0.7) = A − B lg T, through 32 mm²/s at 40 °C (ISO 3448) and 5.4 mm²/s at 100 °C (viscosity index
-/// about 100).
-fn viscosity_mm2ps(temp_k: f64) -> f64 {
-    let walther = |nu: f64| libm::log10(libm::log10(nu + 0.7));
-    let (at_40, at_100) = (walther(32.0), walther(5.4));
-    let slope = (at_40 - at_100) / (libm::log10(373.15) - libm::log10(GRADE_K));
-    let level = at_40 - slope * (libm::log10(temp_k) - libm::log10(GRADE_K));
-    libm::pow(10.0, libm::pow(10.0, level)) - 0.7
 }
 
 #[cfg(test)]
@@ -94,13 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn warm_oil_is_thin() {
-        assert!(
-            (viscosity_mm2ps(313.15) - 32.0).abs() < 1e-9 && (viscosity_mm2ps(373.15) - 5.4).abs() < 1e-9
-        );
-        // Tables of mineral oils VG 32: about 300 mm²/s at 0 °C and 87 mm²/s at 20 °C.
-        assert!((viscosity_mm2ps(273.15) - 300.0).abs() < 40.0, "{}", viscosity_mm2ps(273.15));
-        assert!((viscosity_mm2ps(293.15) - 87.0).abs() < 5.0, "{}", viscosity_mm2ps(293.15));
+    fn warm_oil_leaks_more() {
         let warming = OilTemperature::of("40 °C -> 60 °C @ 10 s..20 s", 60.0).expect("a ramp");
         assert!((warming.at(15.0) - 323.15).abs() < 1e-9 && (warming.leak_factor(5.0) - 1.0).abs() < 1e-12);
         assert!(warming.leak_factor(30.0) > 1.9 && warming.leak_factor(30.0) < 2.3);

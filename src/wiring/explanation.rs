@@ -4,7 +4,7 @@ use super::mistake::{Exchange, Mistake};
 use super::readings::Readings;
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
-use crate::units::Unit;
+use crate::units::{LPM_PER_M3S, Unit};
 use pitchleak_core::ATMOSPHERE_PA;
 use serde::Serialize;
 
@@ -29,6 +29,8 @@ pub enum Evidence {
     },
     /// How large the scatter of the readings is as they stand, in that declared; the other channels scatter as declared.
     Scatter(f64),
+    /// So many readings are positive and as large as the negative flow that the piston's motion gives.
+    Motion(usize),
 }
 
 /// An [`Explanation`] in words, for a trace whose columns are known.
@@ -67,6 +69,12 @@ impl Explanation {
                 format!("with {first} they scatter as declared, and {ratio:.2} times that as they stand"),
                 None,
             ),
+            Evidence::Motion(readings) => (
+                format!(
+                    "with {first} {readings} readings follow the piston's motion; they are never negative as they stand"
+                ),
+                None,
+            ),
         };
         if !alternatives.is_empty() {
             suggestion += &format!("; cannot be told apart: {}", names.join(", "));
@@ -100,6 +108,12 @@ impl Mistake {
             }
             Self::Scaled(readings, factor) => format!("{} times {}", readings.text(), number(1.0 / factor)),
             Self::Absolute(readings) => format!("{} taken as absolute pressure", readings.text()),
+            Self::Zero(readings, by_m3s) if by_m3s > 0.0 => {
+                format!("{} L/min taken off {}", number(by_m3s * LPM_PER_M3S), readings.text())
+            }
+            Self::Zero(readings, by_m3s) => {
+                format!("{} L/min added to {}", number(-by_m3s * LPM_PER_M3S), readings.text())
+            }
             Self::Late(readings, by_s) => format!("{} moved {:.0} ms earlier", readings.text(), 1e3 * by_s),
         }
     }
@@ -130,6 +144,7 @@ impl Mistake {
                 .filter_map(|signal| line(*signal, *signal, &|column| in_unit(column, *signal, 1.0 / factor)))
                 .collect(),
             Self::Absolute(readings) => each(readings, &|column| linear(column, 1.0, -ATMOSPHERE_PA)),
+            Self::Zero(readings, by_m3s) => each(readings, &|column| linear(column, 1.0, -by_m3s)),
             Self::Size(_) | Self::Late(..) => Vec::new(),
         }
     }

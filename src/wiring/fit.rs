@@ -5,10 +5,10 @@ use super::blocks::{Block, Chamber, Fed, blocks};
 use crate::rig::Rig;
 use crate::trace::Record;
 use nalgebra::{SMatrix, SVector};
-use pitchleak_core::{Cylinder, Estimate, Leak, PerLeak, Sensors};
+use pitchleak_core::{Cylinder, Estimate, Leak, Parameter, PerLeak, Sensors};
 
-/// 1/β less its prior mean; the three leaks; the meters' offsets; the gains of meters and position sensor; the drifts of
-/// the meters' zeros; the slopes of the three leaks.
+/// The estimator's nine in their order (1/β less its prior mean; the three leaks; the meters' offsets; the gains of meters
+/// and position sensor); the drifts of the meters' zeros; the slopes of the three leaks.
 const PARAMETERS: usize = 14;
 type Vector = SVector<f64, PARAMETERS>;
 
@@ -20,6 +20,9 @@ pub(super) struct Priors(Vector);
 const UNDECLARED_SHARE: f64 = 0.05;
 /// A meter's zero that nobody declared wrong may be off by this share of full scale, 1 σ, and drift as far through a trace.
 const UNDECLARED_ZERO_SHARE: f64 = 0.01;
+/// A gain that is off by far, 1 σ, and a zero, share of full scale.
+const WILD_GAIN: f64 = 0.2;
+const WILD_ZERO_SHARE: f64 = 0.1;
 /// Where these parameters stand: of leaks in their order, of meters A and B.
 const LEAKS: usize = 1;
 const OFFSETS: usize = 4;
@@ -80,6 +83,16 @@ impl Priors {
         self
     }
 
+    /// The same rig with one sensor whose gain or zero may be off by far.
+    pub fn with_error(mut self, error: Parameter, rig: &Rig) -> Self {
+        self.0[error as usize] = match error {
+            Parameter::OffsetA => WILD_ZERO_SHARE * rig.instruments.flow_a.full_scale,
+            Parameter::OffsetB => WILD_ZERO_SHARE * rig.instruments.flow_b.full_scale,
+            _ => WILD_GAIN,
+        };
+        self
+    }
+
     /// The same rig with sensors that may be off as undeclared ones are now and then.
     pub fn with_sensor_errors(rig: &Rig) -> Self {
         let Self(mut spread) = Self::declared(rig);
@@ -125,15 +138,19 @@ const HOPELESS: f64 = 20.0;
 impl Fit {
     /// Fits the model with these priors; `None` where the records are too few.
     pub fn new(records: &[Record], rig: &Rig, priors: &Priors) -> Option<Self> {
-        let blocks = blocks(records, &rig.cylinder);
+        Self::of(&blocks(records, &rig.cylinder), rig, priors)
+    }
+
+    /// The same from blocks, for many priors on the same records.
+    pub fn of(blocks: &[Block], rig: &Rig, priors: &Priors) -> Option<Self> {
         let mut system = System::new(rig, *priors, [0.0; 3]);
-        let mut found = system.solve(&blocks)?;
+        let mut found = system.solve(blocks)?;
         if found.worst() > HOPELESS {
             return Some(found);
         }
         // Pressure noise reaches the equations through the leaks, which only a fit tells.
         system = System::new(rig, *priors, found.leaks(priors));
-        found = system.solve(&blocks)?;
+        found = system.solve(blocks)?;
         Some(found)
     }
 
@@ -145,6 +162,11 @@ impl Fit {
     fn estimate(&self, at: usize) -> Estimate<f64> {
         let inflation = self.worst().max(1.0).sqrt();
         Estimate { value: self.parameters[at], std: inflation * self.std[at] }.scaled(self.units[at])
+    }
+
+    /// A parameter of the estimator's, SI; of the compressibility what it is off its prior mean.
+    pub fn parameter(&self, parameter: Parameter) -> Estimate<f64> {
+        self.estimate(parameter as usize)
     }
 
     /// Leak coefficients, m³/(s·Pa).

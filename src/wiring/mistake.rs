@@ -29,6 +29,8 @@ pub enum Mistake {
     Scaled(Readings, f64),
     /// Pressures are absolute, not gauge.
     Absolute(Readings),
+    /// Flow readings are this much too large, m³/s.
+    Zero(Readings, f64),
     /// Readings come late by this time, s.
     Late(Readings, f64),
 }
@@ -39,6 +41,7 @@ impl Mistake {
         match self {
             Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value * factor)),
             Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value + ATMOSPHERE_PA)),
+            Self::Zero(readings, by_m3s) => each(records, |r| readings.map(r, |value| value + by_m3s)),
             Self::Size(readings) => each(records, |r| readings.map(r, f64::abs)),
             Self::Late(readings, by_s) => shifted(records, readings, -by_s),
             Self::Exchanged(_) | Self::Sign(_) | Self::OtherEnd => self.mend(records, rig),
@@ -55,6 +58,7 @@ impl Mistake {
             Self::OtherEnd => each(records, |r| Readings::Position.map(r, |x| rig.cylinder.stroke_m - x)),
             Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value / factor)),
             Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value - ATMOSPHERE_PA)),
+            Self::Zero(readings, by_m3s) => each(records, |r| readings.map(r, |value| value - by_m3s)),
             Self::Late(readings, by_s) => shifted(records, readings, by_s),
         }
     }

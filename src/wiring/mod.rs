@@ -11,6 +11,7 @@ mod fit;
 mod mistake;
 mod noise;
 mod readings;
+mod sensor_error;
 mod signs;
 mod zeros;
 
@@ -18,6 +19,7 @@ pub use excerpt::Excerpt;
 pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
 pub use readings::Readings;
+pub use sensor_error::sensor_error;
 pub use zeros::{ZeroCheck, zero_check};
 
 use crate::rig::Rig;
@@ -33,6 +35,9 @@ const FAR: f64 = 4.0;
 const NEAR: f64 = 1.3;
 /// … or as far beyond 1 as chance carries a mean of χ² terms, in standard deviations of it.
 const CHANCE_SIGMAS: f64 = 4.0;
+/// … or that share of the declared wiring's, and this: a leak of another law than C P leaves more than noise.
+const FAR_CONTRAST: f64 = 50.0;
+const NEAR_AT_MOST: f64 = 4.0;
 /// The declared wiring's mean square residual must be this many times the mistake's.
 const CONTRAST: f64 = 4.0;
 /// χ² that a mistake must explain at the least, and that parts two mistakes that can be told apart.
@@ -70,6 +75,10 @@ pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
     let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
     if !contradicted || sensor_errors_explain(records, rig) {
         return None;
+    }
+    if let Some((readings, turned)) = signs::lost(records, rig) {
+        let evidence = Evidence::Motion(turned);
+        return Some(Explanation { mistakes: readings.into_iter().map(Mistake::Size).collect(), evidence });
     }
     let ratios = ScatterRatios::of(records, rig);
     let candidates = candidates::candidates();
@@ -133,7 +142,9 @@ fn explains(fit: &Fit, declared: &Fit) -> bool {
     let enough_rows = fit.row_count() >= ENOUGH_ROWS.min(declared.row_count() / 2);
     let contradiction_gone = declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS && declared.worst() < FAR;
     let explained = drop >= LEAST_DROP && declared.worst() >= CONTRAST * fit.worst();
-    is_near(fit) && fit.is_possible() && enough_rows && (explained || contradiction_gone)
+    let near =
+        is_near(fit) || (fit.worst() <= NEAR_AT_MOST && declared.worst() >= FAR_CONTRAST * fit.worst());
+    near && fit.is_possible() && enough_rows && (explained || contradiction_gone)
 }
 
 /// A size is never negative: only such readings can be sizes.
@@ -224,10 +235,11 @@ fn with_lost_signs(mut mistakes: Vec<Mistake>, records: &[Record]) -> Vec<Mistak
 fn best(mut found: Vec<Scored>, rows: usize) -> Vec<Scored> {
     let score = |one: &Scored| one.fit.mean_chi_square() * rows as f64;
     found.sort_by(|a, b| score(a).total_cmp(&score(b)));
-    let Some(least) = found.first().map(score) else { return found };
+    let Some(first) = found.first() else { return found };
+    let most = score(first) + APART * first.fit.worst().max(1.0);
     let mut alike: Vec<Scored> = Vec::new();
     for one in found {
-        if score(&one) <= least + APART && !alike.iter().any(|other| other.mistake.is_like(one.mistake)) {
+        if score(&one) <= most && !alike.iter().any(|other| other.mistake.is_like(one.mistake)) {
             alike.push(one);
         }
     }

@@ -1,5 +1,6 @@
 //! A meter whose zero is off against a leak: both let oil go missing, the one always, the other with the pressure.
 
+use super::blocks::blocks;
 use super::fit::{Fit, Priors};
 use crate::rig::Rig;
 use crate::trace::Record;
@@ -30,9 +31,10 @@ pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     let duration_s = ends[1] - ends[0];
     let leaks = Priors::declared(rig).with_changing_leaks(duration_s);
     let zeros = leaks.with_zeros_off(rig, duration_s);
-    let declared = Fit::new(records, rig, &leaks)?;
-    let free = Fit::new(records, rig, &zeros)?;
-    let without = PerLeak::from_fn(|leak| Fit::new(records, rig, &zeros.without(leak)).unwrap_or(free));
+    let blocks = blocks(records, &rig.cylinder);
+    let declared = Fit::of(&blocks, rig, &leaks)?;
+    let free = Fit::of(&blocks, rig, &zeros)?;
+    let without = PerLeak::from_fn(|leak| Fit::of(&blocks, rig, &zeros.without(leak)).unwrap_or(free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
     let beyond = |other: &Fit| (other.chi_square() - declared.chi_square()) / inflation;

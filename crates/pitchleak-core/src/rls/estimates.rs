@@ -104,9 +104,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Estimate { value: deviation.value + self.compressibility, std: deviation.std }
     }
 
+    /// Leak coefficients, those below zero as none, m³/(s·Pa).
+    pub(super) fn possible_leaks_m3spa(&self) -> PerLeak<T> {
+        self.leak_coefficients().map(|coefficient| coefficient.value.max(T::zero()))
+    }
+
     fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
         let (one, none) = (T::one(), T::zero());
-        let leaks = self.leak_coefficients().map(|c| c.value.max(none));
+        let leaks = self.possible_leaks_m3spa();
         let c = leaks.internal;
         [
             self.offset_sum([one, none], [c + leaks.external_a, -c]),

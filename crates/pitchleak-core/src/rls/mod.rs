@@ -327,7 +327,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if N <= Parameter::OffsetB as usize {
             return [T::zero(); 2];
         }
-        let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
+        let leaks = self.possible_leaks_m3spa();
         self.zeros.advance(self.unlearnt_s, &self.cylinder, &leaks)
     }
 
@@ -441,7 +441,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// The leaks found decide how much pressure noise the equations carry, and how much of the pressures'
     /// bias.
     fn reweigh(&mut self) {
-        let leaks = self.leak_coefficients().map(|c| c.value.max(T::zero()));
+        let leaks = self.possible_leaks_m3spa();
         self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
         self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
         self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);

@@ -172,6 +172,26 @@ class ReachTime:
 
 
 @dataclass(frozen=True, slots=True)
+class Slope:
+    """Part of a trend."""
+
+    slope_lpm_per_h: float
+    """L/min per hour, positive where it grows."""
+    std: float
+    """Standard deviation of its error, L/min per hour."""
+
+
+@dataclass(frozen=True, slots=True)
+class OilShare:
+    """A trend in two parts."""
+
+    with_viscosity: Slope
+    """What a leak of this size through a narrow gap gains as the oil thins."""
+    beyond_viscosity: Slope
+    """What is left: the seal's, or the connector's."""
+
+
+@dataclass(frozen=True, slots=True)
 class Trend:
     """How fast a leak changes."""
 
@@ -182,6 +202,8 @@ class Trend:
     reaches_threshold_in_s: ReachTime | None
     """Time from the trace's end until the leak is at its alarm's threshold if it goes on like this; None where it is
     there already, or does not grow beyond doubt."""
+    oil: OilShare | None = None
+    """The part that follows the oil's viscosity, and the rest; None without readings of the oil's temperature."""
 
 
 @dataclass(frozen=True, slots=True)
