@@ -34,7 +34,7 @@ impl LineLayout {
         let at = self.0.columns.iter().position(is_time)?;
         let mut cells = LineCells { cells, at };
         let time_s = match self.0.columns.get(at)?.content {
-            Content::Timestamp => Epoch::since(epoch_ns).seconds(cells.cell()),
+            Content::Timestamp => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell()),
             Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
             Content::Ignored => return None,
         };
