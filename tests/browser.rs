@@ -3,8 +3,10 @@
 
 use pitchleak::Rig;
 use pitchleak::check::check;
+use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::page::{History, Page};
 use pitchleak::replay::{ReplayError, replay};
+use pitchleak::reproduce::reproduce;
 use pitchleak::trace::TraceReader;
 use std::path::Path;
 use std::process::Command;
@@ -116,4 +118,22 @@ fn a_check() {
     let mut history = History::default();
     let report = check(&mut reader, &rig, |replay, record, renewed| history.add(replay, record, renewed));
     assert_opens(&Page::of_check(&report.expect("checks"), &rig, &history).to_html());
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_diagnosis() {
+    let mut rig = Rig::paper();
+    (rig.cylinder.moving_mass_kg, rig.fluid.bulk_modulus_pa) = (30.0, 0.9e9);
+    let mut reader = TraceReader::open("data/hopsan/u04.csv.gz", &rig).expect("a trace");
+    let series = Series::read(&mut reader).expect("reads");
+    let diagnosis = diagnose(&[series], &[], &Declared::of(&rig), &|| ());
+    assert_opens(&Page::of_diagnosis(&diagnosis, &rig, &["u04".to_owned()]).to_html());
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_reproduction() {
+    let reproduction = reproduce(2, |_| ()).expect("reproduces");
+    assert_opens(&Page::of_reproduction(&reproduction).expect("draws").to_html());
 }

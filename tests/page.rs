@@ -1,6 +1,7 @@
 //! What every page keeps, whatever the trace: complete in itself, well-formed, harmless, of bounded size.
 
 use pitchleak::Rig;
+use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::page::{History, Page, PageFile};
 use pitchleak::replay::{Replay, ReplayError, replay};
 use pitchleak::report::TraceSummary;
@@ -117,6 +118,27 @@ fn an_hour_at_100_hz_fits_in_a_megabyte() {
     let page = Page::of_replay(&report, &rig, &history).to_html();
     assert_complete_in_itself(&page);
     assert!(page.len() <= 1_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn a_page_of_a_diagnosis_leads_from_the_residual_to_the_effect() {
+    let mut rig = Rig::paper();
+    (rig.cylinder.moving_mass_kg, rig.fluid.bulk_modulus_pa) = (30.0, 0.9e9);
+    let mut reader = TraceReader::open("data/hopsan/u04.csv.gz", &rig).expect("a trace");
+    let series = Series::read(&mut reader).expect("reads");
+    let diagnosis = diagnose(&[series], &[], &Declared::of(&rig), &|| ());
+    let page = Page::of_diagnosis(&diagnosis, &rig, &["<img src=x>".to_owned()]).to_html();
+    assert_complete_in_itself(&page);
+    for part in [
+        "EXPLAINED</h1>",
+        "Coulomb friction",
+        "What it would take to be sure",
+        "not fitted",
+        "Force against",
+        "&lt;img src=x&gt;",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
 }
 
 #[test]

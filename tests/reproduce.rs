@@ -1,5 +1,6 @@
 //! The paper's experiment, end to end: who is how good, against the bound and against the paper.
 
+use pitchleak::page::Page;
 use pitchleak::reproduce::{Row, reproduce};
 use pitchleak_testkit::{NormalScatter, coverage_bounds};
 
@@ -39,7 +40,10 @@ fn documented_lines() -> Vec<String> {
 /// without.
 #[test]
 fn regress_table() {
-    let report = reproduce(SEEDS, |_| ()).expect("runs").report;
+    let reproduction = reproduce(SEEDS, |_| ()).expect("runs");
+    let page = Page::of_reproduction(&reproduction).expect("draws").to_html();
+    assert!(page.contains(">REPRODUCED</h1>") && page.len() <= 1_000_000, "{} bytes", page.len());
+    let report = reproduction.report;
     assert_eq!((report.rows.len(), report.rows_with_bias.len(), report.tracking.len()), (32, 16, 8));
     for (rows, efficiency) in [&report.rows, &report.rows_with_bias].into_iter().zip(EFFICIENCY) {
         let [least, most] = NormalScatter { n: SEEDS }.rms_bounds(efficiency);

@@ -33,6 +33,7 @@ pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
     Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
+pub(crate) use present::labels;
 pub use search::{Candidate, Collinearity};
 
 use assess::{HeldOut, model_fit};

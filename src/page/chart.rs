@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use serde::Serialize;
 
 /// Rows of a table at most.
-const MOST_TABLE_ROWS: usize = 24;
+const MOST_TABLE_ROWS: usize = 16;
 /// A line's numbers keep a 300-thousandth of its span or less.
 const DIGITS: f64 = 5.5;
 
@@ -75,7 +75,7 @@ pub(super) struct Chart {
     pub note: &'static str,
     pub unit: &'static str,
     /// Of the horizontal axis, where it isn't time.
-    pub x_label: &'static str,
+    pub x_label: String,
     pub lines: Vec<Line>,
     pub limits: Vec<Limit>,
     pub spans: Vec<Span>,
@@ -161,18 +161,18 @@ impl Charts {
     }
 
     fn table(&self, chart: &Chart) -> Markup {
-        let x_label = if chart.x_label.is_empty() { "time, s" } else { chart.x_label };
+        let x_label = if chart.x_label.is_empty() { "time, s" } else { chart.x_label.as_str() };
         html! {
             @for same in chart.lines.chunk_by(|a, b| a.x == b.x) {
                 @let x = same.first().and_then(|line| line.x.as_ref()).unwrap_or(&self.t);
                 @let rows = x.len().div_ceil(MOST_TABLE_ROWS).max(1);
                 div .wide {
-                    table {
+                    table .numbers {
                         thead {
                             tr {
                                 th scope="col" { (x_label) }
                                 @for line in same {
-                                    @for head in heads(line) { th .number scope="col" { (line.name) (head) } }
+                                    @for head in heads(line) { th scope="col" { (line.name) (head) } }
                                 }
                             }
                         }
@@ -182,7 +182,7 @@ impl Charts {
                                     th scope="row" { (number_of(times.first().copied().flatten())) }
                                     @for line in same {
                                         @for value in cells(line, number * rows, times.len()) {
-                                            td .number { (number_of(value)) }
+                                            td { (number_of(value)) }
                                         }
                                     }
                                 }

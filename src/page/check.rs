@@ -157,7 +157,7 @@ fn resolution(reach: &Reach, factor: f64, unit: &str) -> String {
 fn reach(report: &CheckReport) -> Markup {
     html! {
         div .wide { table {
-            thead { tr { th scope="col" { "" } th .number scope="col" { "known to (95 %)" } th scope="col" { "" } } }
+            thead { tr { td {} th .number scope="col" { "known to (95 %)" } td {} } }
             tbody { @for (name, reach, factor, unit) in all(report) {
                 tr {
                     th scope="row" { (name) }

@@ -1,7 +1,7 @@
 //! What a screen can show of a trace of any length, in bounded memory: for each stretch of time the least, the
 //! greatest and the median reading.
 
-/// Stretches at most. Where they are used up, they are joined in pairs.
+/// Stretches at most, unless fewer are asked for. Where they are used up, they are joined in pairs.
 const MOST_STRETCHES: usize = 1200;
 /// Length of the first stretches, s: short enough for a row each in any trace.
 const SHORTEST_S: f64 = 1e-6;
@@ -35,6 +35,7 @@ impl Spot {
 pub struct Envelopes<const N: usize> {
     start_s: f64,
     stretch_s: f64,
+    most: usize,
     stretches: Vec<Stretch<N>>,
 }
 
@@ -82,18 +83,23 @@ pub struct Row<const N: usize> {
 
 impl<const N: usize> Default for Envelopes<N> {
     fn default() -> Self {
-        Self { start_s: 0.0, stretch_s: SHORTEST_S, stretches: Vec::new() }
+        Self::of_at_most(MOST_STRETCHES)
     }
 }
 
 impl<const N: usize> Envelopes<N> {
+    /// Of so many stretches, at least half of them where the trace has as many rows.
+    pub fn of_at_most(most: usize) -> Self {
+        Self { start_s: 0.0, stretch_s: SHORTEST_S, most, stretches: Vec::new() }
+    }
+
     /// Takes in what there is at `t_s`, which grows; `after_gap` where the trace pauses before.
     pub fn add(&mut self, t_s: f64, after_gap: bool, spots: &[Option<Spot>; N]) {
         if self.stretches.is_empty() {
             self.start_s = t_s;
         }
         let mut index = self.index(t_s);
-        while index >= MOST_STRETCHES {
+        while index >= self.most {
             self.join_pairs();
             index = self.index(t_s);
         }

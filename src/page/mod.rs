@@ -6,10 +6,12 @@
 
 mod chart;
 mod check;
+mod diagnose;
 mod envelope;
 mod history;
 mod machine;
 mod replay;
+mod reproduce;
 
 pub use history::History;
 
@@ -199,7 +201,7 @@ fn generator() -> String {
 /// Empty until the script fills it.
 fn legend() -> Markup {
     html! {
-        div .legend #legend role="toolbar" aria-label="Legend: values under the cursor, lines to show or hide" hidden {
+        aside .legend #legend aria-label="Legend: values under the cursor, lines to show or hide" hidden {
             output #clock {}
             span .tools {
                 button type="button" aria-label="Zoom in" { "+" } " "

@@ -185,7 +185,7 @@ fn table(report: &ReplayReport) -> Markup {
             table {
                 thead { tr {
                     th scope="col" { "leak" } th .number scope="col" { "L/min, 95 %" } th .number scope="col" { "L/min/bar, 95 %" }
-                    th scope="col" { "trend" } th scope="col" { "" }
+                    th scope="col" { "trend" } td {}
                 } }
                 tbody {
                     @for (leak, entry) in report.estimates.leaks().iter() {

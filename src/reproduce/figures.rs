@@ -20,12 +20,33 @@ const COLUMNS: usize = 2;
 
 type Points = Vec<(f64, f64)>;
 
+/// A figure of several panels.
+pub struct Drawing {
+    /// Short, for links.
+    pub id: &'static str,
+    /// Of its file.
+    pub name: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// Row by row, two to a row.
+    pub panels: Vec<Panel>,
+}
+
 impl Reproduction {
     /// The figures by their file names.
     ///
     /// # Errors
     /// [`ReproduceError::Figure`], [`ReproduceError::Filter`].
     pub fn figures(&self) -> Result<Vec<(&'static str, String)>, ReproduceError> {
+        let draw = |Drawing { name, panels, .. }| Ok((name, svg(&legend_once(panels), COLUMNS)?));
+        self.drawings()?.into_iter().map(draw).collect()
+    }
+
+    /// What is in the figures: like the paper's Fig. 5 to 8.
+    ///
+    /// # Errors
+    /// [`ReproduceError`], where a window cannot be estimated.
+    pub fn drawings(&self) -> Result<Vec<Drawing>, ReproduceError> {
         let of_case = |case: Case| -> Vec<&Run> {
             self.runs
                 .iter()
@@ -35,26 +56,45 @@ impl Reproduction {
                 .collect()
         };
         let first = of_case(Case::One);
-        let mut figures = vec![
-            ("fig5_wind.svg", svg(&first.iter().map(|run| wind(run)).collect::<Vec<_>>(), COLUMNS)?),
-            (
-                "fig6_tracking.svg",
-                svg(&legend_once(first.iter().flat_map(|run| followed(run)).collect()), COLUMNS)?,
-            ),
+        let mut drawings = vec![
+            Drawing {
+                id: "wind",
+                name: "fig5_wind.svg",
+                title: "Wind, as Fig. 5",
+                panels: first.iter().map(|run| wind(run)).collect(),
+            },
+            Drawing {
+                id: "tracking",
+                name: "fig6_tracking.svg",
+                title: "What the rig followed, as Fig. 6",
+                panels: first.iter().flat_map(|run| followed(run)).collect(),
+            },
         ];
         let names = [
-            ("fig7a_leakage_case1.svg", "fig7b_coefficients_case1.svg"),
-            ("fig8a_leakage_case2.svg", "fig8b_coefficients_case2.svg"),
+            [
+                ("leakage-1", "fig7a_leakage_case1.svg", "Leak flows, case 1, as Fig. 7"),
+                ("coefficients-1", "fig7b_coefficients_case1.svg", "Leak coefficients, case 1, as Fig. 7"),
+            ],
+            [
+                ("leakage-2", "fig8a_leakage_case2.svg", "Leak flows, case 2, as Fig. 8"),
+                ("coefficients-2", "fig8b_coefficients_case2.svg", "Leak coefficients, case 2, as Fig. 8"),
+            ],
         ];
-        for (case, (leakage, coefficients)) in Case::ALL.into_iter().zip(names) {
+        for (case, [leakage, coefficients]) in Case::ALL.into_iter().zip(names) {
             let histories =
                 of_case(case).into_iter().map(|run| self.histories(run)).collect::<Result<Vec<_>, _>>()?;
-            let panels =
-                |draw: fn(&Histories) -> [Panel; 2]| legend_once(histories.iter().flat_map(draw).collect());
-            figures.push((leakage, svg(&panels(leak_flows), COLUMNS)?));
-            figures.push((coefficients, svg(&panels(leak_coefficients), COLUMNS)?));
+            let mut add = |(id, name, title), panels: fn(&Histories) -> [Panel; 2]| {
+                drawings.push(Drawing {
+                    id,
+                    name,
+                    title,
+                    panels: histories.iter().flat_map(panels).collect(),
+                });
+            };
+            add(leakage, leak_flows);
+            add(coefficients, leak_coefficients);
         }
-        Ok(figures)
+        Ok(drawings)
     }
 
     /// Writes the figures, `table.txt` and `reproduce.json` into `directory`, which is made if need be.

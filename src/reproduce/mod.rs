@@ -11,6 +11,7 @@ mod table;
 mod trial;
 
 pub use detection::{Delay, Detection, detection};
+pub use figures::Drawing;
 pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
 pub use search::{Candidate, best_gains, paper_rig};
 pub use table::{Bound, ErrorMetrics, Row, Scored};

@@ -6,6 +6,7 @@ use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::diagnose::{Declared, Roles, Series, Traces, diagnose};
 use pitchleak::output::{Inputs, OutputFile, make_folder};
+use pitchleak::page::{Page, PageFile};
 use pitchleak::trace::{BadRows, TraceReader};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -44,6 +45,10 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
 
+    /// Write the result as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+
     /// Write figures (SVG) of what is left of each balance before and after into this directory: over time, its
     /// autocorrelation and distribution, and against each variable
     #[arg(long, value_name = "DIR")]
@@ -69,6 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let inputs =
         Inputs::of(arguments.traces.iter().chain(&arguments.test).map(PathBuf::as_path).chain(rig.file()));
     let saved = arguments.save_rig.as_ref().map(|path| OutputFile::create(path, &inputs)).transpose()?;
+    let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     arguments.out.as_deref().map(make_folder).transpose()?;
     let bar = ProgressBar::new_spinner();
     bar.enable_steady_tick(Duration::from_millis(200));
@@ -91,6 +97,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let written = file.write_all(diagnosis.rig(&rig).to_toml().as_bytes());
         written.map_err(|source| file.error(source))?;
         file.finish()?;
+    }
+    if let Some(page) = page {
+        let names: Vec<_> =
+            roles.fitted.iter().chain(&roles.judged).map(|path| path.display().to_string()).collect();
+        page.finish(&Page::of_diagnosis(&diagnosis, &rig, &names))?;
     }
     if let Some(folder) = &arguments.out {
         for (name, figure) in diagnosis.figures()? {

@@ -2,7 +2,8 @@ use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use pitchleak::output::make_folder;
+use pitchleak::output::{Inputs, make_folder};
+use pitchleak::page::{Page, PageFile};
 use pitchleak::reproduce::{Progress, detection, reproduce};
 use std::path::PathBuf;
 
@@ -13,6 +14,10 @@ pub struct Arguments {
     /// Write the figures (SVG), the table and the report into this directory
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+
+    /// Write the report as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 
     /// Print the report as JSON (schema pitchleak.reproduce/1)
     #[arg(long)]
@@ -29,6 +34,8 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.out.as_deref().map(make_folder).transpose()?;
+    let page =
+        arguments.report.as_ref().map(|path| PageFile::create(path, &Inputs::default())).transpose()?;
     let bar = ProgressBar::new(1);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos:>3}/{len} {msg}, {elapsed}") {
         bar.set_style(style);
@@ -45,6 +52,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     bar.finish_and_clear();
     if let Some(directory) = &arguments.out {
         reproduction.write(directory)?;
+    }
+    if let Some(page) = page {
+        page.finish(&Page::of_reproduction(&reproduction)?)?;
     }
     let report = &reproduction.report;
     output::print(&if arguments.json { report.to_json()? + "\n" } else { report.to_text() })?;

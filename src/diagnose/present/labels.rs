@@ -4,7 +4,7 @@ use crate::diagnose::equation::Equation;
 use crate::units::LPM_PER_M3S;
 
 /// Name of an equation in text and figures.
-pub(super) fn name(equation: Equation) -> &'static str {
+pub(crate) fn name(equation: Equation) -> &'static str {
     match equation {
         Equation::ChamberA => "chamber A",
         Equation::ChamberB => "chamber B",
@@ -13,12 +13,12 @@ pub(super) fn name(equation: Equation) -> &'static str {
 }
 
 /// Factor from SI to people's unit of what an equation leaves over, and that unit.
-pub(super) fn people_unit(equation: Equation) -> (f64, &'static str) {
+pub(crate) fn people_unit(equation: Equation) -> (f64, &'static str) {
     if equation == Equation::Force { (1.0, "N") } else { (LPM_PER_M3S, "L/min") }
 }
 
 /// Name of a variable in text and figures.
-pub(super) fn symbol(variable: &str) -> &'static str {
+pub(crate) fn symbol(variable: &str) -> &'static str {
     match variable {
         "load_pressure_pa" => "P_L",
         "pa_pa" => "P_A",
@@ -35,7 +35,7 @@ pub(super) fn symbol(variable: &str) -> &'static str {
 }
 
 /// Factor to people's unit, and that unit.
-pub(super) fn people(variable: &str) -> (f64, &'static str) {
+pub(crate) fn people(variable: &str) -> (f64, &'static str) {
     match variable {
         "load_pressure_pa" | "pa_pa" | "pb_pa" => (1e-5, "bar"),
         "x_m" => (1e3, "mm"),

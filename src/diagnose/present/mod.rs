@@ -2,7 +2,7 @@
 
 mod figures;
 mod json;
-mod labels;
+pub(crate) mod labels;
 mod residual_text;
 mod rig;
 mod text;

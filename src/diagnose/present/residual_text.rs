@@ -28,7 +28,7 @@ impl Diagnosis {
                     residual.noise_ratio,
                     p(residual.whiteness_p),
                     p(residual.normality_p),
-                    companions(residual)
+                    residual.companions()
                 );
             }
         }
@@ -57,24 +57,26 @@ fn beyond_chance(residual: &EquationResidual) -> Vec<(&'static str, Correlation)
     residual.goes_with(statistics::bonferroni_sigma(CHANCE_RATE, RESIDUAL_TESTS))
 }
 
-/// The same in words.
-fn companions(residual: &EquationResidual) -> String {
-    let found = beyond_chance(residual).into_iter().take(MOST_NAMED);
-    let words: Vec<String> =
-        found.map(|(variable, c)| format!("{} ({:+.0} sigma)", symbol(variable), c.sigma)).collect();
-    if words.is_empty() { "nothing".into() } else { words.join(", ") }
+impl EquationResidual {
+    /// The variables that it goes with, in words.
+    pub(crate) fn companions(&self) -> String {
+        let found = beyond_chance(self).into_iter().take(MOST_NAMED);
+        let words: Vec<String> =
+            found.map(|(variable, c)| format!("{} ({:+.0} sigma)", symbol(variable), c.sigma)).collect();
+        if words.is_empty() { "nothing".into() } else { words.join(", ") }
+    }
 }
 
 impl BinnedResidual {
     /// Whether the traces have the variable, and it moves.
-    pub(super) fn varies(&self) -> bool {
+    pub(crate) fn varies(&self) -> bool {
         let ends = self.at.first().zip(self.at.last());
         ends.is_some_and(|(first, last)| last - first > 1e-9 * last.abs().max(first.abs()))
     }
 
     /// How far the bins' means are from one another, in their standard errors: what a correlation cannot see
     /// of a hump.
-    fn strength(&self) -> f64 {
+    pub(crate) fn strength(&self) -> f64 {
         let pairs = self.mean.iter().zip(&self.std_error).filter(|(_, error)| **error > 0.0);
         pairs.map(|(mean, error)| (mean / error).powi(2)).sum()
     }
