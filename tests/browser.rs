@@ -116,7 +116,10 @@ fn a_check() {
     let rig = rig();
     let mut reader = TraceReader::open(TRACE, &rig).expect("a trace");
     let mut history = History::default();
-    let report = check(&mut reader, &rig, |replay, record, renewed| history.add(replay, record, renewed));
+    let report = check(&mut reader, &rig, |replay, record, renewed| {
+        history.add(replay, record, renewed);
+        Ok::<_, ReplayError>(())
+    });
     assert_opens(&Page::of_check(&report.expect("checks"), &rig, &history).to_html());
 }
 

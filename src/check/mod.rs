@@ -78,11 +78,11 @@ impl CheckReport {
 ///
 /// # Errors
 /// As [`replay`].
-pub fn check(
+pub fn check<E: From<ReplayError>>(
     reader: &mut TraceReader<'_>,
     rig: &Rig,
-    mut each: impl FnMut(&Replay, &Record, bool),
-) -> Result<CheckReport, ReplayError> {
+    mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
+) -> Result<CheckReport, E> {
     let mut rig = rig.clone();
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();
@@ -93,8 +93,7 @@ pub fn check(
         extremes.add(record);
         monitor.add(record);
         excerpt.add(record);
-        each(replay, record, renewed);
-        Ok::<_, ReplayError>(())
+        each(replay, record, renewed)
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;

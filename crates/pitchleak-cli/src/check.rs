@@ -32,6 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
         }
+        Ok::<_, Failure>(())
     })?;
     if let Some((page, history)) = page.zip(history) {
         page.finish(&Page::of_check(&report, &rig, &history))?;

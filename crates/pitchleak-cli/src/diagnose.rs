@@ -136,7 +136,7 @@ fn read(
     warnings: &mut Warnings,
 ) -> Result<(), Failure> {
     let mut reader = TraceReader::open(path, rig)?.with_bad_rows(bad_rows);
-    traces.read(&mut reader, rig)?;
+    traces.read(&mut reader, rig, || Ok::<_, Failure>(()))?;
     let reading = reader.quality().reading.iter().map(|reading| format!("read with {reading}"));
     for warning in reading.chain(reader.quality().warnings()) {
         warnings.entry(warning).or_default().push(reader.name().to_owned());

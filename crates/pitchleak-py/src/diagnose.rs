@@ -1,25 +1,29 @@
 use crate::errors::value_error;
 use crate::rig::Rig;
+use crate::signals::Signals;
 use crate::source::Source;
 use crate::threads::detached;
 use pitchleak::diagnose::{
     Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
 };
 use pyo3::prelude::*;
+use std::cell::Cell;
 use std::path::PathBuf;
 
 /// What is left of each equation over time: name, time in s, residual in SI.
 type Residuals = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
 /// Fits traces of one rig together; gives JSON, text, the rig with the effects found, residuals before and after, and
-/// warnings.
+/// warnings. `progress` is called with the fits done and NaN.
 #[pyfunction]
+#[pyo3(signature = (train, test, rig, strict, progress = None))]
 pub fn diagnose(
     py: Python<'_>,
     train: Vec<Source<'_>>,
     test: Vec<Source<'_>>,
     rig: &Rig,
     strict: bool,
+    progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String, Rig, Residuals, Residuals, Vec<String>)> {
     let roles = Roles::of(&paths(&train), &paths(&test)).map_err(value_error)?;
     let read_all = |sources: &[Source<'_>], once: &[PathBuf]| -> PyResult<Vec<Series>> {
@@ -30,12 +34,22 @@ pub fn diagnose(
             {
                 continue;
             }
-            source.read(py, &rig.0, strict, |mut reader| Ok(traces.read(&mut reader, &rig.0)?))?;
+            let mut signals = Signals::new(None);
+            source
+                .read(py, &rig.0, strict, |mut reader| traces.read(&mut reader, &rig.0, || signals.heed()))?;
         }
         Ok(traces.into_series())
     };
     let (train, test) = (read_all(&train, &roles.fitted)?, read_all(&test, &roles.judged)?);
-    let diagnosis = detached(py, || engine_diagnose(&train, &test, &Declared::of(&rig.0), &|| ()))?;
+    let declared = Declared::of(&rig.0);
+    let diagnosis = detached(py, progress, move |caller| {
+        let fits = Cell::new(0.0);
+        engine_diagnose(&train, &test, &declared, &|| {
+            fits.set(fits.get() + 1.0);
+            // How many there will be, nobody knows.
+            caller.at(fits.get(), f64::NAN);
+        })
+    })?;
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
     let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text());

@@ -4,6 +4,7 @@
 mod diagnose;
 mod errors;
 mod estimator;
+mod fleet;
 mod linkage;
 mod replay;
 mod reproduce;
@@ -26,6 +27,8 @@ mod _pitchleak {
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
+    use crate::fleet::{FleetRow, fleet_json, fleet_row, fleet_save, fleet_table, fleet_text, fleet_traces};
+    #[pymodule_export]
     use crate::linkage::Linkage;
     #[pymodule_export]
     use crate::replay::{check, over_time, replay};
@@ -33,6 +36,8 @@ mod _pitchleak {
     use crate::reproduce::reproduce;
     #[pymodule_export]
     use crate::rig::Rig;
+    #[pymodule_export]
+    use crate::signals::Stop;
     #[pymodule_export]
     use crate::simulate::simulate;
     #[pymodule_export]

@@ -2,6 +2,7 @@ use crate::errors::value_error;
 use numpy::{IntoPyArray, PyReadonlyArrayDyn, ndarray::ArrayViewD};
 use pitchleak::core::{Linkage as Core, LinkageError};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
 /// The slider-crank between blade and cylinder, Wu et al. (2011), eq. (17) and (18).
 ///
@@ -72,6 +73,16 @@ impl Linkage {
     /// Cylinder force that makes a torque (N·m) at a pitch angle (rad), eq. (18), N.
     fn force_n(&self, pitch_rad: f64, torque_nm: f64) -> PyResult<f64> {
         self.0.force_n(pitch_rad, torque_nm).map_err(value_error)
+    }
+
+    /// What pickle and copy make it of again.
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
+        let lengths = PyDict::new(py);
+        lengths.set_item("pivot_distance_m", self.0.pivot_distance_m)?;
+        lengths.set_item("retracted_length_m", self.0.retracted_length_m)?;
+        lengths.set_item("crank_radius_m", self.0.crank_radius_m)?;
+        lengths.set_item("zero_angle_rad", self.0.zero_angle_rad)?;
+        Ok((PyTuple::empty(py), lengths))
     }
 
     fn __repr__(&self) -> String {

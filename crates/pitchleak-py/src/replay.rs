@@ -2,7 +2,7 @@
 
 use crate::errors::value_error;
 use crate::rig::Rig;
-use crate::signals::Signals;
+use crate::signals::{Signals, Stop};
 use crate::source::Source;
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::replay::EstimateRow;
@@ -14,15 +14,17 @@ pub type Report = (String, String);
 
 /// Replays a trace.
 #[pyfunction]
+#[pyo3(signature = (source, rig, estimator, strict, stop = None))]
 pub fn replay(
     py: Python<'_>,
     source: Source<'_>,
     rig: &Rig,
     estimator: Option<&str>,
     strict: bool,
+    stop: Option<&Stop>,
 ) -> PyResult<Report> {
     let rig = rig.with_estimator(estimator)?;
-    let mut signals = Signals::default();
+    let mut signals = Signals::new(stop);
     let report = source.read(py, &rig, strict, |mut reader| {
         pitchleak::replay::replay(&mut reader, &rig, |_, _, _| signals.heed())
     })?;
@@ -43,7 +45,7 @@ pub fn over_time<'py>(
 ) -> PyResult<(String, Columns<'py>)> {
     let rig = rig.with_estimator(estimator)?;
     let mut columns: [Vec<f64>; EstimateRow::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
-    let mut signals = Signals::default();
+    let mut signals = Signals::new(None);
     let report = source.read(py, &rig, strict, |mut reader| {
         pitchleak::replay::replay(&mut reader, &rig, |replay, record, _| {
             for (column, value) in columns.iter_mut().zip(replay.estimate_row(record).values()) {
@@ -60,8 +62,9 @@ pub fn over_time<'py>(
 /// Data quality, excitation, what a trace can and cannot identify.
 #[pyfunction]
 pub fn check(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyResult<Report> {
+    let mut signals = Signals::new(None);
     let report = source.read(py, &rig.0, strict, |mut reader| {
-        Ok(pitchleak::check::check(&mut reader, &rig.0, |_, _, _| ())?)
+        pitchleak::check::check(&mut reader, &rig.0, |_, _, _| signals.heed())
     })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }

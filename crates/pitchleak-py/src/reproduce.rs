@@ -2,17 +2,26 @@ use crate::errors::{output_error, value_error};
 use crate::replay::Report;
 use crate::threads::detached;
 use pitchleak::output::make_folder;
-use pitchleak::reproduce::{ReproduceError, reproduce as engine_reproduce};
+use pitchleak::reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Reruns the paper's experiment; writes its figures and tables into a directory where one is given.
+/// Reruns the paper's experiment; writes its figures and tables into a directory where one is given. `progress` is
+/// called with the pieces done and their number, stage by stage.
 #[pyfunction]
-pub fn reproduce(py: Python<'_>, seeds: u64, out: Option<PathBuf>) -> PyResult<Report> {
+#[pyo3(signature = (seeds, out, progress = None))]
+pub fn reproduce(
+    py: Python<'_>,
+    seeds: u64,
+    out: Option<PathBuf>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Report> {
     if let Some(directory) = &out {
         make_folder(directory).map_err(|error| output_error(py, &error))?;
     }
-    let done = detached(py, || engine_reproduce(seeds, |_| ()))?;
+    let done = detached(py, progress, move |caller| {
+        engine_reproduce(seeds, |Progress { done, count, .. }| caller.at(done as f64, count as f64))
+    })?;
     let done = done.map_err(value_error)?;
     if let Some(directory) = out {
         py.detach(|| done.write(&directory)).map_err(|error| match error {

@@ -70,18 +70,24 @@ pub struct Order {
 type Arrays<'py> = Vec<(&'static str, Bound<'py, PyArray1<f64>>)>;
 
 /// Simulates a rig; gives the truth as JSON, warnings, and the columns of the trace, or none where it is
-/// written to `out`.
+/// written to `out`. `progress` is called with the share that is done and 1.
 #[pyfunction]
+#[pyo3(signature = (order, rig, out, progress = None))]
 pub fn simulate<'py>(
     py: Python<'py>,
     order: Order,
     rig: &Rig,
     out: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<(String, Vec<String>, Arrays<'py>)> {
     let plan = order.plan()?;
     let recording = py.detach(|| plan.recording(rig.0.clone())).map_err(value_error)?;
-    let (mut signals, mut asked) = (Signals::default(), None);
-    let go_on = |_| match signals.heed() {
+    let (mut signals, mut asked) = (Signals::new(None), None);
+    let tell = |py: Python<'_>, share: f64| match &progress {
+        Some(progress) => progress.call1(py, (share, 1.0)).map(|_| ()),
+        None => Ok(()),
+    };
+    let go_on = |share| match signals.heed_and(|py| tell(py, share)) {
         Err(Stopped::Asked(error)) => {
             asked = Some(error);
             ControlFlow::Break(())

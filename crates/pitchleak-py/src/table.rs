@@ -8,23 +8,30 @@ use arrow_array::{Array, RecordBatch};
 use arrow_buffer::ScalarBuffer;
 use arrow_cast::cast;
 use arrow_schema::{DataType, TimeUnit};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyWeakrefReference;
+use pyo3::type_object::PyTypeInfo;
+use pyo3::types::{PyType, PyWeakrefReference};
 use pyo3_arrow::input::AnyRecordBatch;
 
 /// What the columns of a table are read as, by their headers.
 #[pyclass(frozen, module = "pitchleak._pitchleak")]
-pub struct Layout(TableLayout);
+#[derive(Clone)]
+pub struct Layout {
+    read: TableLayout,
+    headers: Vec<String>,
+    rig: Rig,
+}
 
 #[pymethods]
 impl Layout {
     /// Reads headers as those of a trace file.
     #[new]
     fn new(py: Python<'_>, headers: Vec<String>, rig: &Rig) -> PyResult<Self> {
-        TableLayout::new(NAME, &headers, &rig.0).map(Self).map_err(|error| trace_error(py, &error))
+        let read = TableLayout::new(NAME, &headers, &rig.0).map_err(|error| trace_error(py, &error))?;
+        Ok(Self { read, headers, rig: rig.clone() })
     }
 
     /// ``numbers``, ``timestamps`` or ``ignored`` for each header.
@@ -35,7 +42,12 @@ impl Layout {
             ColumnContent::Timestamps => "timestamps",
             ColumnContent::Ignored => "ignored",
         };
-        self.0.contents().map(word).collect()
+        self.read.contents().map(word).collect()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Vec<String>, Rig)) {
+        let this = slf.get();
+        (slf.get_type(), (this.headers.clone(), this.rig.clone()))
     }
 }
 
@@ -48,7 +60,7 @@ const NOT_A_TIME: i64 = i64::MIN;
 /// Columns in memory, and what they hold.
 #[pyclass(frozen, module = "pitchleak._pitchleak")]
 pub struct Table {
-    layout: TableLayout,
+    layout: Layout,
     batches: Vec<Vec<Column>>,
     first_ns: Option<i64>,
 }
@@ -89,18 +101,25 @@ impl Table {
             }
         };
         let columns = columns.into_iter().map(hold).collect::<PyResult<_>>()?;
-        Ok(Self { layout: layout.0.clone(), batches: vec![columns], first_ns })
+        Ok(Self { layout: layout.clone(), batches: vec![columns], first_ns })
     }
 
     /// Anything with the Arrow PyCapsule interface.
     #[staticmethod]
     #[pyo3(signature = (data, rig, first_ns = None))]
-    fn from_arrow(py: Python<'_>, data: AnyRecordBatch, rig: &Rig, first_ns: Option<i64>) -> PyResult<Self> {
-        let (batches, schema) = data.into_table()?.into_inner();
+    fn from_arrow(
+        py: Python<'_>,
+        data: &Bound<'_, PyAny>,
+        rig: &Rig,
+        first_ns: Option<i64>,
+    ) -> PyResult<Self> {
+        // A library that breaks off halfway, or columns that are no table.
+        let read = data.extract::<AnyRecordBatch>().and_then(|data| Ok(data.into_table()?));
+        let (batches, schema) = read.map_err(|error| unreadable(py, &error))?.into_inner();
         let headers: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
-        let layout = Layout::new(py, headers, rig)?.0;
+        let layout = Layout::new(py, headers, rig)?;
         let mut first_ns = first_ns;
-        let batches = batches.iter().map(|batch| arrow_columns(batch, &layout, &mut first_ns));
+        let batches = batches.iter().map(|batch| arrow_columns(batch, &layout.read, &mut first_ns));
         Ok(Self { batches: batches.collect::<PyResult<_>>()?, layout, first_ns })
     }
 
@@ -119,11 +138,27 @@ impl Table {
         };
         self.batches.iter().flatten().map(size).sum()
     }
+
+    /// As one batch of copies, times in seconds: what is read of them is the same.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let lent = this.lend(py)?;
+        let batches = this.slices(&lent)?;
+        let copied = |(index, content): (usize, ColumnContent)| {
+            let parts: Vec<_> = batches.iter().filter_map(|batch| batch.get(index).copied()).collect();
+            (content != ColumnContent::Ignored).then(|| parts.concat().into_pyarray(py))
+        };
+        let columns = this.layout.read.contents().enumerate().map(copied).collect();
+        Ok((slf.get_type().getattr("from_arrays")?, (this.layout.clone(), columns, this.first_ns)))
+    }
 }
+
+/// What [`Table::from_arrays`] makes a table of.
+type Parts<'py> = (Layout, Vec<Option<Bound<'py, PyArray1<f64>>>>, Option<i64>);
 
 impl Table {
     pub fn layout(&self) -> &TableLayout {
-        &self.layout
+        &self.layout.read
     }
 
     /// What keeps the arrays as they are while they are read.
@@ -236,6 +271,15 @@ fn timestamps(name: &str, array: &dyn Array, first_ns: &mut Option<i64>) -> PyRe
         .map_err(|_| wrong_type(name, kind, "timestamps"))?;
     let times = times.as_primitive::<TimestampNanosecondType>();
     Ok(Column::Converted(seconds(times.iter().map(|time| time.unwrap_or(NOT_A_TIME)), first_ns)))
+}
+
+/// Of pyo3-arrow's errors some are a bare `Exception`; Python's own stay what they are.
+fn unreadable(py: Python<'_>, error: &PyErr) -> PyErr {
+    if error.get_type(py).is(PyException::type_object(py)) {
+        let text = error.value(py).to_string().replace('\n', " ");
+        return PyValueError::new_err(format!("no table of columns: {text}"));
+    }
+    error.clone_ref(py)
 }
 
 fn wrong_type(name: &str, found: &DataType, wanted: &str) -> PyErr {

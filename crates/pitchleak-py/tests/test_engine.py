@@ -1,12 +1,11 @@
 """Simulation, check, diagnosis, reproduction, linkage: what the program gives, as objects."""
 
+import copy
 import json
 import math
-import signal
+import pickle
 import subprocess
 import sys
-import threading
-import time
 
 import numpy as np
 import pytest
@@ -116,11 +115,15 @@ def test_a_forked_process_diagnoses_too(tmp_path):
 
 
 def test_reproduce_is_the_programs(program, tmp_path):
-    table = pl.reproduce(1, out=tmp_path)
+    told = []
+    table = pl.reproduce(1, out=tmp_path, progress=lambda done, whole: told.append((done, whole)))
+    assert told and all(0 < done <= whole for done, whole in told)
     assert table.raw == json.loads(program("reproduce", "--seeds", 1, "--json"))
     assert list(tmp_path.glob("*.svg"))
     assert len(table.to_pandas()) == len(table.rows) == 32
     assert table.plot().get_yscale() == "log" and "<table>" in table._repr_html_()
+    assert json.loads(table.to_json()) == table.to_dict() == table.raw
+    assert pickle.loads(pickle.dumps(table)).rows == copy.deepcopy(table).rows == table.rows
     with pytest.raises(ValueError, match="at least 1"):
         pl.reproduce(0)
 
@@ -138,44 +141,3 @@ def test_linkage():
         linkage.position_m(np.array([0.5, 0.0]))
     with pytest.raises(ValueError, match="lengths of the linkage must be positive"):
         pl.Linkage(crank_radius_m=-1.0)
-
-
-@pytest.fixture
-def interruptible():
-    """What a shell starts in the background ignores the signal, and so does its Python."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="no signals to a thread of one's own")
-@pytest.mark.parametrize("call", ["replay", "over_time", "simulate"])
-def test_control_c_ends_a_long_call(call, tmp_path, interruptible):
-    """It was heeded after the call's end."""
-    count = 4_000_000
-    columns = {
-        "t_s": np.arange(count) * 0.01,
-        "x_m": 0.1 + 0.05 * np.sin(np.arange(count) * 0.01),
-        "pa_pa": np.full(count, 5e6),
-        "pb_pa": np.full(count, 4e6),
-    }
-    out = tmp_path / "trace.csv"
-    run = {
-        "replay": lambda: pl.replay(columns),
-        "over_time": lambda: pl.replay(columns).table,
-        "simulate": lambda: pl.simulate(wind=13, duration=100_000, out=out),
-    }[call]
-    main = threading.get_ident()
-    asked = []
-
-    def ask():
-        asked.append(time.monotonic())
-        signal.pthread_kill(main, signal.SIGINT)
-
-    timer = threading.Timer(0.3, ask)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        run()
-    # Within a second by the calls' design; other work on the machine may take more of it.
-    assert time.monotonic() - asked[0] < 5
-    assert not out.exists()

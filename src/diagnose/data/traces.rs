@@ -34,16 +34,22 @@ impl Default for Traces {
 }
 
 impl Traces {
-    /// Reads a trace to its end.
+    /// Reads a trace to its end; `each` is called after every record.
     ///
     /// # Errors
-    /// Those of [`TraceReader::next_record`].
-    pub fn read(&mut self, reader: &mut TraceReader<'_>, rig: &Rig) -> Result<(), TraceError> {
+    /// Those of [`TraceReader::next_record`], and of `each`.
+    pub fn read<E: From<TraceError>>(
+        &mut self,
+        reader: &mut TraceReader<'_>,
+        rig: &Rig,
+        mut each: impl FnMut() -> Result<(), E>,
+    ) -> Result<(), E> {
         let columns = reader.columns(&rig.columns);
         let mut own = Series { name: reader.name().to_owned(), columns, ..Series::default() };
         let (mut piece, mut count, mut t_s, mut in_piece) = (Series::default(), None, 0.0, 0);
         let mut record = Record::default();
         while reader.next_record(&mut record)? {
+            each()?;
             t_s += Series::step_to(&record);
             own.left_out += 1;
             in_piece += 1;
@@ -118,7 +124,7 @@ mod tests {
         let rig = Rig::paper();
         let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text.into_bytes())), &rig)
             .expect("a trace");
-        traces.read(&mut reader, &rig).expect("reads");
+        traces.read(&mut reader, &rig, || Ok::<_, TraceError>(())).expect("reads");
     }
 
     #[test]

@@ -15,6 +15,7 @@ numpy arrays, or a path; its columns are named ``<signal>_<unit>`` as in trace f
 from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
 from ._diagnose import Diagnosis, diagnose
 from ._estimator import Estimator
+from ._fleet import Fleet, FleetLeak, FleetRow, LongTrend, fleet
 from ._inputs import TraceWarning
 from ._pitchleak import Linkage, Rig, RigError, TraceError, __version__
 from ._replay import Replay, Replays, replay
@@ -46,8 +47,12 @@ __all__ = [
     "Estimate",
     "Estimates",
     "Estimator",
+    "Fleet",
+    "FleetLeak",
+    "FleetRow",
     "Leakage",
     "Linkage",
+    "LongTrend",
     "OilShare",
     "PerLeak",
     "Reach",
@@ -71,6 +76,7 @@ __all__ = [
     "__version__",
     "check",
     "diagnose",
+    "fleet",
     "replay",
     "reproduce",
     "simulate",

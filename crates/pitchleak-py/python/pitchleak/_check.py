@@ -3,14 +3,18 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
 from ._pitchleak import Rig
+from ._raw import Raw
 from ._records import record
 from ._report import LABELS
 from ._results import PerLeak, Trace
-from ._tabular import Tabular
+from ._tabular import Tabular, optional
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,7 @@ class Wiring:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check(Tabular):
+class Check(Raw, Tabular):
     """Data quality, excitation, what the trace can and cannot identify. As a table: the signals."""
 
     trace: Trace
@@ -105,6 +109,21 @@ class Check(Tabular):
         """A row per signal."""
         names = ("signal", "unit", "least", "most", "present_percent")
         return {name: [getattr(reading, name) for reading in self.readings] for name in names}
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws how small a leak the trace shows, hatched where it doesn't pin the leak down (needs matplotlib).
+
+        Returns the axes.
+        """
+        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 2.5))[1] if ax is None else ax
+        for leak, reach in self.leaks.items():
+            if reach.resolution is None:
+                axes.barh(LABELS[leak], 0.0)
+            else:
+                axes.barh(LABELS[leak], reach.resolution, hatch=None if reach.identifiable else "//")
+        axes.invert_yaxis()
+        axes.set_xlabel("half of the 95 % interval, L/min")
+        return axes
 
     def __str__(self) -> str:
         return self._text.rstrip()

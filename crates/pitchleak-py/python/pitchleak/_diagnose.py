@@ -10,11 +10,17 @@ import numpy as np
 from . import _html, _inputs, _pitchleak
 from ._check import Wiring
 from ._pitchleak import Rig
+from ._progress import Progress, shown
+from ._raw import Raw
 from ._records import record
 from ._tabular import Tabular, optional
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+#: People's unit in SI and the name of each balance.
+_BALANCES = {"chamber_a_m3s": (60e3, "A, L/min"), "chamber_b_m3s": (60e3, "B, L/min"), "force_n": (1.0, "force, N")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +208,7 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Tabular):
+class Diagnosis(Raw, Tabular):
     """What a diagnosis found. As a table: the effects, strongest first."""
 
     before: Quality
@@ -251,10 +257,9 @@ class Diagnosis(Tabular):
         pyplot = optional("matplotlib.pyplot", "plot")
         present = [name for name, course in self.residuals_before.items() if np.isfinite(course.residual).any()]
         figure = pyplot.figure(figsize=(8, 2.2 * max(len(present), 1))) if figure is None else figure
-        units = {"chamber_a_m3s": (60e3, "A, L/min"), "chamber_b_m3s": (60e3, "B, L/min"), "force_n": (1.0, "force, N")}
         axes = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0] if present else []
         for ax, name in zip(axes, present, strict=True):
-            factor, label = units.get(name, (1.0, name))
+            factor, label = _BALANCES[name]
             for course, when in ((self.residuals_before[name], "before"), (self.residuals_after[name], "after")):
                 ax.plot(course.t_s, factor * course.residual, linewidth=0.8, label=when)
             ax.set_ylabel(label)
@@ -276,9 +281,9 @@ class Diagnosis(Tabular):
             for e in self.effects
         ]
         errors = []
-        for name in ("chamber_a_m3s", "chamber_b_m3s", "force_n"):
-            before, after = getattr(self.before.rmse, name), getattr(self.after.rmse, name)
-            errors.append((name, _html.number(before), _html.number(after)))
+        for name, (factor, label) in _BALANCES.items():
+            rmse = [getattr(quality.rmse, name) for quality in (self.before, self.after)]
+            errors.append((label, *(_html.number(None if one is None else factor * one) for one in rmse)))
         return _html.page(
             self.verdict.replace("_", " "),
             _html.table(("effect", "size, 95 %", "not told from", "cause"), effects),
@@ -293,12 +298,15 @@ def diagnose(
     *,
     test: Any = (),
     strict: bool = False,
+    progress: Progress = True,
 ) -> Diagnosis:
     """Finds the physical effect that the model lacks.
 
     ``data`` is a trace as :func:`replay` takes it, or a list of traces of one rig that are fitted
     together; ``test`` are the traces to judge on, else blocks that each fit leaves out. A file that is in both is a
-    ``ValueError``; one that is given twice is read once, with a :class:`TraceWarning`.
+    ``ValueError``; one that is given twice is read once, with a :class:`TraceWarning`. ``progress`` is True (a count of
+    fits where tqdm is installed and somebody watches), False, or a function of the fits done and NaN: nobody knows how
+    many there will be.
 
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, effects={"viscous_friction": 3000.0}, noise="0.1 %", duration=60)
@@ -314,7 +322,9 @@ def diagnose(
     rig = _inputs.rig_for(train[0], rig)
     fitted = [_inputs.source(trace, rig) for trace in train]
     judged = [_inputs.source(trace, rig) for trace in judged_on]
-    report, text, found_rig, before, after, warnings = _pitchleak.diagnose(fitted, judged, rig, strict)
+    with shown(progress, " fits") as at:
+        found = _pitchleak.diagnose(fitted, judged, rig, strict, at)
+    report, text, found_rig, before, after, warnings = found
     _inputs.warn(warnings)
     raw = json.loads(report)
     result = record(Diagnosis, raw)

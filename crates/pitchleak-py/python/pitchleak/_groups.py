@@ -11,6 +11,10 @@ from ._tabular import optional
 def split(data: Any, by: str) -> dict[Hashable, Any]:
     """Parts in the order in which they first occur, without the column ``by``."""
     library = type(data).__module__.partition(".")[0]
+    if library == "polars" and hasattr(data, "collect"):
+        data = data.collect()
+    if library == "pyarrow" and hasattr(data, "to_table"):
+        data = data.to_table()
     if library == "pandas":
         _require(by, data.columns)
         groups = data.groupby(by, sort=False, dropna=False, observed=True)

@@ -6,8 +6,10 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
+from ._collected import collected
 from ._columns import nanoseconds, numbers
-from ._pitchleak import Layout, Rig, Table
+from ._index import with_index
+from ._pitchleak import Layout, Rig, Table, TraceError
 
 Path: TypeAlias = str | os.PathLike[str]
 Source: TypeAlias = str | Table
@@ -41,6 +43,7 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
     """A path as it is; columns as a table that borrows them."""
     if is_path(data):
         return str(os.fspath(data))
+    data = collected(data, rig)
     if isinstance(data, Mapping) or _is_pandas(data):
         return _from_columns(data, rig, first_ns)
     if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
@@ -70,7 +73,14 @@ def _from_columns(data: Any, rig: Rig, first_ns: int | None) -> Table:
     if len(set(headers)) < len(headers):
         double = next(header for header in headers if headers.count(header) > 1)
         raise ValueError(f"two columns are named `{double}`: keep one")
-    layout = Layout(headers, rig)
+    try:
+        layout = Layout(headers, rig)
+    except TraceError:
+        with_time = with_index(data)
+        if with_time is None:
+            raise
+        data, headers = with_time, list(with_time)
+        layout = Layout(headers, rig)
     read: dict[str, Any] = {"numbers": numbers, "timestamps": nanoseconds}
     columns = [
         read[content](header, data[header]) if content in read else None

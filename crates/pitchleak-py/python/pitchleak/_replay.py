@@ -1,9 +1,7 @@
 """Replay: a trace in, its leaks out."""
 
-import importlib
-import os
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import json
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
@@ -12,14 +10,29 @@ import numpy as np
 
 from . import _html, _inputs, _pitchleak
 from ._groups import split
-from ._pitchleak import Rig
-from ._report import LABELS, Report, parse
+from ._parallel import on_all_cores
+from ._pitchleak import Rig, Stop
+from ._progress import Progress
+from ._report import LABELS, Report, draw_flows, parse
 from ._tabular import Tabular, optional
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _Columns: TypeAlias = list[tuple[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Again:
+    """The same replay once more, with its estimates over time. Pickled, it takes columns in memory along."""
+
+    source: _inputs.Source
+    rig: Rig
+    estimator: str | None
+    strict: bool
+
+    def __call__(self) -> tuple[str, _Columns]:
+        return _pitchleak.over_time(self.source, self.rig, self.estimator, self.strict)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,7 +44,7 @@ class Replay(Report, Tabular):
     a replay itself needs no memory of its own. The data must not have changed in between.
     """
 
-    _again: Callable[[], tuple[str, _Columns]] = field(init=False, repr=False)
+    _again: "_Again" = field(init=False, repr=False)
 
     @cached_property
     def table(self) -> Mapping[str, Any]:
@@ -109,6 +122,18 @@ class Replays(Mapping[Hashable, Replay], Tabular):
             columns[f"{leak}_std_lpm"] = np.array([flow.std_lpm for flow in flows], np.float64)
         return columns
 
+    def to_dict(self) -> dict[str, Any]:
+        """The report of each cylinder, by its key as text."""
+        return {str(key): replay.to_dict() for key, replay in self._replays.items()}
+
+    def to_json(self) -> str:
+        """The same as JSON."""
+        return json.dumps(self.to_dict(), ensure_ascii=False)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws the leak flows of every cylinder with their 95 % intervals (needs matplotlib). Returns the axes."""
+        return draw_flows({str(key): replay.leakage for key, replay in self._replays.items()}, ax)
+
     def __repr__(self) -> str:
         def named(*statuses: str) -> str:
             keys = [str(key) for key, replay in self._replays.items() if replay.verdict.status in statuses]
@@ -135,6 +160,7 @@ def replay(
     estimator: str | None = None,
     strict: bool = False,
     group: None = None,
+    progress: Progress = True,
 ) -> Replays: ...
 @overload
 def replay(
@@ -144,6 +170,7 @@ def replay(
     estimator: str | None = None,
     strict: bool = False,
     group: str,
+    progress: Progress = True,
 ) -> Replays: ...
 @overload
 def replay(
@@ -153,6 +180,7 @@ def replay(
     estimator: str | None = None,
     strict: bool = False,
     group: None = None,
+    progress: Progress = True,
 ) -> Replay: ...
 def replay(
     data: Any,
@@ -161,6 +189,7 @@ def replay(
     estimator: str | None = None,
     strict: bool = False,
     group: str | None = None,
+    progress: Progress = True,
 ) -> Replay | Replays:
     """Estimates the leaks of a recorded trace.
 
@@ -173,7 +202,8 @@ def replay(
     ``strict``, raise :class:`TraceError` with ``column`` and ``row``.
 
     Many cylinders at once, on all cores: a list of such data, or the name of the column that tells them
-    apart as ``group``; the result is then a :class:`Replays`.
+    apart as ``group``; the result is then a :class:`Replays`. ``progress`` is True (a bar over the cylinders
+    where tqdm is installed and somebody watches), False, or a function of the cylinders done and of all.
 
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, leak_internal="0.5 L/min", duration=20)
@@ -184,50 +214,45 @@ def replay(
     (2000,)
     """
     if group is not None:
-        return _many(split(data, group), rig, estimator, strict)
+        return _many(split(data, group), rig, estimator, strict, progress)
     if isinstance(data, (list, tuple)):
-        return _many(dict(enumerate(data)), rig, estimator, strict)
+        return _many(dict(enumerate(data)), rig, estimator, strict, progress)
     out = _one(data, _inputs.rig_for(data, rig), estimator, strict)
     _inputs.warn(out.trace.warnings)
     return out
 
 
-def _one(data: Any, rig: Rig, estimator: str | None, strict: bool) -> Replay:
+def _one(data: Any, rig: Rig, estimator: str | None, strict: bool, stop: Stop | None = None) -> Replay:
     source = _inputs.source(data, rig)
-    report, text = _pitchleak.replay(source, rig, estimator, strict)
+    report, text = _pitchleak.replay(source, rig, estimator, strict, stop)
     out = parse(Replay, report, text)
     object.__setattr__(out, "_json", report)
-    object.__setattr__(out, "_again", lambda: _pitchleak.over_time(source, rig, estimator, strict))
+    object.__setattr__(out, "_again", _Again(source, rig, estimator, strict))
     return out
 
 
 def _many(
-    traces: Mapping[Hashable, Any], rig: Rig | _inputs.Path | None, estimator: str | None, strict: bool
+    traces: Mapping[Hashable, Any],
+    rig: Rig | _inputs.Path | None,
+    estimator: str | None,
+    strict: bool,
+    progress: Progress,
 ) -> Replays:
     rig = None if rig is None else _inputs.rig_for(None, rig)
 
-    def work(item: tuple[Hashable, Any]) -> tuple[Hashable, Replay]:
+    def work(item: tuple[Hashable, Any], stop: Stop) -> Replay:
         key, data = item
         try:
-            return key, _one(data, _inputs.rig_for(data, rig), estimator, strict)
+            return _one(data, _inputs.rig_for(data, rig), estimator, strict, stop)
         except Exception as error:
             error.add_note(f"in cylinder {key!r}")
             raise
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        done = dict(_progress(pool.map(work, traces.items()), len(traces)))
+    replays = on_all_cores(work, list(traces.items()), progress, "cylinder")
+    done = dict(zip(traces, replays, strict=True))
     for key, out in done.items():
         _inputs.warn(out.trace.warnings, str(key))
     return Replays(done)
-
-
-def _progress(items: Iterator[Any], total: int) -> Iterator[Any]:
-    """With a bar where tqdm is installed and somebody watches."""
-    try:
-        tqdm = importlib.import_module("tqdm.auto").tqdm
-    except ImportError:
-        return items
-    return iter(tqdm(items, total=total, unit="cylinder", disable=None))
 
 
 __all__: Sequence[str] = ("Replay", "Replays", "replay")

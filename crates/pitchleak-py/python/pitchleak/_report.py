@@ -1,10 +1,14 @@
 """The report on a trace, as ``pitchleak replay --json`` prints it."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from . import _html
+from ._raw import Raw
 from ._records import record
 from ._results import (
     LPM_PER_BAR,
@@ -18,6 +22,10 @@ from ._results import (
     Trend,
     Verdict,
 )
+from ._tabular import optional
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 R = TypeVar("R", bound="Report")
 
@@ -25,7 +33,7 @@ LABELS = {"internal": "internal", "external_a": "external A", "external_b": "ext
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Report:
+class Report(Raw):
     """What is known of the leaks of one cylinder at the end of its trace."""
 
     trace: Trace
@@ -58,9 +66,9 @@ class Report:
     """Every field of the JSON."""
     _text: str = field(init=False, default="")
 
-    def to_dict(self) -> dict[str, Any]:
-        """Every field, as ``pitchleak replay --json`` prints it."""
-        return dict(self.raw)
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws the leak flows with their 95 % intervals (needs matplotlib). Returns the axes."""
+        return draw_flows({self.trace.path: self.leakage}, ax)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Report) and self.raw == other.raw
@@ -103,3 +111,19 @@ def parse(cls: type[R], text_json: str, text: str) -> R:
     object.__setattr__(report, "raw", raw)
     object.__setattr__(report, "_text", text)
     return report
+
+
+def draw_flows(leakages: Mapping[str, PerLeak[Leakage]], ax: "Axes | None") -> "Axes":
+    """Draws leak flows of cylinders by their names."""
+    axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+    for shift, (leak, label) in zip((-0.15, 0.0, 0.15), LABELS.items(), strict=True):
+        flows = [getattr(leakage, leak) for leakage in leakages.values()]
+        mean = np.array([flow.mean_lpm for flow in flows], np.float64)
+        half = np.nan_to_num(1.96 * np.array([flow.std_lpm for flow in flows], np.float64))
+        axes.errorbar(np.arange(len(flows)) + shift, mean, half, fmt="o", markersize=4, linewidth=1, label=label)
+    axes.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
+    axes.set_xticks(range(len(leakages)), list(leakages), rotation=30 if len(leakages) > 4 else 0)
+    axes.set_xlim(-0.6, max(len(leakages), 1) - 0.4)
+    axes.set_ylabel("leak flow, L/min")
+    axes.legend(loc="best", title="leak, 95 %")
+    return axes

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
 from ._pitchleak import Rig
+from ._progress import Progress, shown
+from ._raw import Raw
 from ._records import record
 from ._results import PerLeak
 from ._tabular import Tabular, optional
@@ -29,7 +31,7 @@ class LeakTruth:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulation(Tabular):
+class Simulation(Raw, Tabular):
     """A simulated trace and what is true of it. As a table: the trace."""
 
     reference: str
@@ -110,6 +112,7 @@ def simulate(
     position_scale: float | None = None,
     blade_inertia: float | None = None,
     out: _inputs.Path | None = None,
+    progress: Progress = True,
 ) -> Simulation:
     """Simulates a rig with known leaks, sampled as its sensors would.
 
@@ -123,7 +126,8 @@ def simulate(
     share of full scale, ``"none"`` or ``"rig"``; ``bias`` the greatest constant offset. ``faults`` are mistakes of
     the sensors (``"qa dead"``, ``"pa offset 10 bar"``, ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see
     ``pitchleak simulate --help``). ``out`` writes the trace (.csv, .csv.gz) and the truth beside it (.json)
-    instead of keeping it.
+    instead of keeping it. ``progress`` is True (a bar where tqdm is installed and somebody watches), False, or a
+    function of the share that is done and 1.
 
     Raises ``ValueError`` naming the argument.
 
@@ -154,7 +158,8 @@ def simulate(
         "blade_inertia": blade_inertia,
     }
     path = None if out is None else os.fspath(out)
-    truth, warnings, columns = _pitchleak.simulate(order, _inputs.rig_for(None, rig), path)
+    with shown(progress, "") as at:
+        truth, warnings, columns = _pitchleak.simulate(order, _inputs.rig_for(None, rig), path, at)
     _inputs.warn(warnings)
     raw = json.loads(truth)
     result = record(Simulation, raw)

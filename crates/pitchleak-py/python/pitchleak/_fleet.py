@@ -1,0 +1,392 @@
+"""Fleet: many traces of many cylinders, judged wherever there are cores."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from . import _html, _inputs, _pitchleak
+from ._parallel import on_all_cores
+from ._pitchleak import Rig, RigError, Stop, TraceError
+from ._progress import Progress, shown
+from ._records import record
+from ._report import LABELS
+from ._results import Leak, PerLeak, ReachTime, Status, Trend
+from ._tabular import Tabular, optional
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    import pyarrow
+    from matplotlib.axes import Axes
+
+Map: TypeAlias = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+Rigs: TypeAlias = Rig | _inputs.Path | Mapping[str, Rig | _inputs.Path]
+
+
+@dataclass(frozen=True, slots=True)
+class FleetLeak:
+    """One leak of one cylinder in one trace."""
+
+    mean_lpm: float | None
+    """Mean size of its flow, L/min."""
+    std_lpm: float | None
+    """Standard deviation of its error, L/min; None where the estimator gives none."""
+    ci95: tuple[float | None, ...] | None
+    """The interval that holds the flow with 95 % probability, L/min."""
+    threshold_lpm: float
+    """The alarm's threshold, L/min."""
+    identifiable: bool
+    """Whether the trace pins it down."""
+    trend: Trend | None
+    """How fast it changes within the trace; None where the data don't tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetRow:
+    """What is known of a cylinder from one trace, or why nothing is."""
+
+    cylinder: str
+    """Which cylinder."""
+    path: str
+    """The trace as it was named; ``data`` for columns in memory."""
+    begins: str | None
+    """When the trace begins, ISO 8601: by its time stamps, else by its name; None where neither says."""
+    rig: str | None
+    """Path of the rig file, or ``wu2011``; None where it can't be used."""
+    status: Status | None
+    """The verdict in a word; None where the trace could not be judged."""
+    faults: tuple[Leak, ...]
+    """Leaks to act on."""
+    reasons: tuple[str, ...]
+    """Ids of the reasons of a verdict in doubt, first things first."""
+    leaks: PerLeak[FleetLeak] | None
+    """Flows and their trends."""
+    alarms: int
+    """How often an alarm was raised."""
+    samples: int
+    """Good rows."""
+    skipped: int
+    """Bad rows."""
+    gaps: int
+    """Pauses."""
+    duration_s: float | None
+    """From the first to the last good row, s."""
+    sample_rate_hz: float | None
+    """Samples per second where they come regularly."""
+    warnings: tuple[str, ...]
+    """What to know of the data."""
+    error: str | None
+    """Why the trace could not be judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class LongTrend:
+    """A straight line through the flows of one leak over many traces."""
+
+    traces: int
+    """Traces that it rests on."""
+    from_: str
+    """Middle of the first trace, ISO 8601."""
+    to: str
+    """Middle of the last trace."""
+    mean_lpm: float
+    """The line's flow at the last trace, L/min."""
+    std_lpm: float
+    """Standard deviation of its error, L/min."""
+    scatter_lpm: float
+    """How much the flows scatter about the line beyond their own standard deviations, L/min."""
+    slope_lpm_per_h: float
+    """L/min per hour, positive where it grows."""
+    std: float
+    """Standard deviation of its error, L/min per hour."""
+    reaches_threshold_in_s: ReachTime | None
+    """Time from the last trace until the line is at the alarm's threshold; None where it is there already, or does not
+    grow beyond doubt."""
+
+
+class Fleet(Tabular):
+    """What was found of many cylinders. As a table: a row per cylinder and trace, with the columns of ``pitchleak fleet
+    --out`` (docs/fleet.md). Fleets of different days are put together by ``+``."""
+
+    __slots__ = ("__dict__", "_rows")
+
+    def __init__(self, rows: Iterable[_pitchleak.FleetRow]) -> None:
+        self._rows = tuple(rows)
+
+    @cached_property
+    def rows(self) -> tuple[FleetRow, ...]:
+        """A row per cylinder and trace."""
+        return tuple(record(FleetRow, raw) for raw in self.to_dict()["rows"])
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Traces by status, and ``error``."""
+        counts: dict[str, int] = self.to_dict()["counts"]
+        return counts
+
+    @cached_property
+    def trends(self) -> dict[str, PerLeak[LongTrend | None]]:
+        """How leaks change over the traces of a cylinder, by cylinder; None for a leak that fewer than three dated
+        traces pin down without doubt."""
+
+        def long(raw: dict[str, Any] | None) -> LongTrend | None:
+            return None if raw is None else record(LongTrend, raw | {"from_": raw["from"]})
+
+        entries = self.to_dict()["trends"]
+        return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in entries}
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """The columns: lists of texts, counts and flags in which None is none, numpy arrays of numbers (NaN) and times
+        in UTC (NaT)."""
+        return {name: _column(kind, values) for name, kind, values in _pitchleak.fleet_table(self._rows)}
+
+    def to_arrow(self) -> "pyarrow.Table":
+        """The table as a :class:`pyarrow.Table`; its schema is the same whatever is missing, and that of the file."""
+        arrow = optional("pyarrow", "arrow")
+        kinds = {
+            "texts": arrow.string(),
+            "times": arrow.timestamp("ms", "UTC"),
+            "numbers": arrow.float64(),
+            "counts": arrow.int64(),
+            "flags": arrow.bool_(),
+        }
+        columns = _pitchleak.fleet_table(self._rows)
+        arrays = [arrow.array(_column(kind, values), kinds[kind], from_pandas=True) for _, kind, values in columns]
+        table: pyarrow.Table = arrow.table(arrays, names=[name for name, _, _ in columns])
+        return table
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The table as a :class:`pandas.DataFrame`."""
+        frame: pandas.DataFrame = optional("pandas", "pandas").DataFrame(dict(self.table))
+        return frame.assign(begins=frame["begins"].dt.tz_localize("UTC"))
+
+    def to_polars(self) -> "polars.DataFrame":
+        """The table as a :class:`polars.DataFrame`; its schema is the same whatever is missing."""
+        library = optional("polars", "polars")
+        kinds = {
+            "texts": library.String,
+            "times": library.Datetime("ms"),
+            "numbers": library.Float64,
+            "counts": library.Int64,
+            "flags": library.Boolean,
+        }
+        columns = _pitchleak.fleet_table(self._rows)
+        series = [library.Series(name, _column(kind, values), kinds[kind]) for name, kind, values in columns]
+        frame: polars.DataFrame = library.DataFrame(series).with_columns(
+            library.selectors.float().fill_nan(None), library.col("begins").dt.replace_time_zone("UTC")
+        )
+        return frame
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every field, as ``pitchleak fleet --json`` prints it."""
+        raw: dict[str, Any] = json.loads(self.to_json())
+        return raw
+
+    def to_json(self) -> str:
+        """As ``pitchleak fleet --json`` prints it."""
+        return _pitchleak.fleet_json(self._rows)
+
+    def save(self, path: _inputs.Path) -> None:
+        """Writes the table: ``.parquet``, ``.csv`` or ``.csv.gz``; the file is replaced as a whole."""
+        _pitchleak.fleet_save(self._rows, os.fspath(path))
+
+    def __add__(self, other: "Fleet") -> "Fleet":
+        return Fleet(self._rows + other._rows) if isinstance(other, Fleet) else NotImplemented
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Fleet) and self.to_json() == other.to_json()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Fleet, (self._rows,)
+
+    def __str__(self) -> str:
+        return _pitchleak.fleet_text(self._rows).rstrip()
+
+    def __repr__(self) -> str:
+        return f"<Fleet: {str(self).partition(chr(10))[0]}>"
+
+    def _repr_html_(self) -> str:
+        shown = sorted((row for row in self.rows if row.status != "sound"), key=_urgency)
+        rows = []
+        for row in shown[:50]:
+            flows = ["–"] * 3
+            if row.leaks is not None:
+                flows = [_html.number(leak.mean_lpm, leak.std_lpm) for _, leak in row.leaks.items()]
+            word = "ERROR" if row.status is None else row.status.replace("_", " ").upper()
+            why = row.error or ", ".join(row.faults or row.reasons)
+            rows.append((row.cylinder, (row.begins or "–")[:10], word, *flows, why))
+        headers = ("cylinder", "day", "verdict", *(f"{label}, L/min" for label in LABELS.values()), "why")
+        more = f"and {len(shown) - 50} more in doubt or leaking" if len(shown) > 50 else ""
+        return _html.page(repr(self)[1:-1], *([_html.table(headers, rows)] if rows else []), footer=more)
+
+    def plot(self, cylinder: str | None = None, ax: "Axes | None" = None) -> "Axes":
+        """Draws the leaks of one cylinder over its traces, with 95 % intervals and the lines of :attr:`trends` (needs
+        matplotlib); where none is named, that with the largest leak. Traces without a date stand in their order, those
+        in doubt are hollow. Returns the axes.
+        """
+        cylinder = self._worst() if cylinder is None else cylinder
+        rows = [row for row in self.rows if row.cylinder == cylinder and row.leaks is not None]
+        if not rows:
+            raise ValueError(f"no trace of `{cylinder}` could be judged")
+        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+        dated = all(row.begins is not None for row in rows)
+        when: Any = np.array([_middle(row) for row in rows]) if dated else np.arange(len(rows))
+        for leak, label in LABELS.items():
+            flows = [getattr(row.leaks, leak) for row in rows]
+            mean = np.array([flow.mean_lpm for flow in flows], np.float64)
+            half = 1.96 * np.array([flow.std_lpm for flow in flows], np.float64)
+            bars = axes.errorbar(when, mean, np.nan_to_num(half), fmt="o", label=label, markersize=4, linewidth=1)
+            color = bars.lines[0].get_color()
+            doubt = [row.status == "doubtful" for row in rows]
+            if any(doubt):
+                axes.plot(when[doubt], mean[doubt], "o", color=color, markerfacecolor="white", markersize=4, zorder=3)
+            trend = getattr(self.trends[cylinder], leak) if dated and cylinder in self.trends else None
+            if trend is not None:
+                ends = [np.datetime64(moment.rstrip("Z")) for moment in (trend.from_, trend.to)]
+                hours = (ends[1] - ends[0]) / np.timedelta64(1, "h")
+                line = [trend.mean_lpm - trend.slope_lpm_per_h * hours, trend.mean_lpm]
+                axes.plot(ends, line, color=color, linewidth=1)
+        axes.set_ylabel("leak flow, L/min")
+        axes.set_title(cylinder, fontsize="medium")
+        axes.legend(loc="best", title="leak")
+        if dated:
+            axes.figure.autofmt_xdate()
+        else:
+            axes.set_xlabel("trace")
+        return axes
+
+    def _worst(self) -> str:
+        if not self.rows:
+            raise ValueError("no trace")
+        return min(self.rows, key=_urgency).cylinder
+
+
+def _column(kind: str, values: list[Any]) -> Any:
+    if kind == "numbers":
+        return np.array(values, np.float64)
+    if kind == "times":
+        return np.array([None if time is None else time.rstrip("Z") for time in values], "datetime64[ms]")
+    return values
+
+
+def _urgency(row: FleetRow) -> tuple[int, float]:
+    """The worst has the least."""
+    order = ("leak", "doubtful", "not_sure", None, "sound")
+    flows = [getattr(row.leaks, leak).mean_lpm or 0.0 for leak in row.faults] if row.leaks else []
+    return order.index(row.status), -max(flows, default=0.0)
+
+
+def _middle(row: FleetRow) -> np.datetime64:
+    begins = np.datetime64((row.begins or "").rstrip("Z"), "ms")
+    return begins + np.timedelta64(round(500.0 * (row.duration_s or 0.0)), "ms")
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """One trace, as it goes to whoever judges it."""
+
+    data: Any
+    cylinder: str
+    begins: str | None
+    rig: Rig | str | None
+
+
+def _judge(job: _Job, stop: Stop | None = None) -> _pitchleak.FleetRow:
+    """Judges one trace; runs in any thread, process or machine that has the file."""
+    rig = job.rig
+    try:
+        if not isinstance(rig, Rig):
+            rig = Rig.paper() if rig is None else Rig.load(rig)
+        source = _inputs.source(job.data, rig)
+    except (OSError, RigError, TraceError) as error:
+        path = str(job.data) if _inputs.is_path(job.data) else "data"
+        return _pitchleak.FleetRow.failed(job.cylinder, job.begins, path, str(error))
+    return _pitchleak.fleet_row(source, job.cylinder, job.begins, rig, stop)
+
+
+def fleet(
+    traces: Any,
+    rigs: Rigs | None = None,
+    *,
+    map: Map | None = None,
+    progress: Progress = True,
+) -> Fleet:
+    """Judges the traces of many cylinders, each as :func:`replay` judges it alone.
+
+    ``traces`` are paths or patterns (``"farm/**/*.parquet"``), one or a list, or data by the names of their cylinders,
+    as :func:`replay` takes it. ``rigs`` is a :class:`Rig` or a rig file for all, a table of rig files (``.csv``,
+    docs/fleet.md), or rigs by the names of the cylinders; left out, it is ``rig.toml`` beside each file, else the
+    built-in one. A trace that can't be used becomes a row with its ``error``, and a :class:`TraceWarning` says so.
+
+    ``map`` is any map, and says where the work is done: the builtin ``map``, that of a process pool, ``joblib``'s in a
+    lambda, a Dask client's; futures are waited for. Left out, it is all cores of this machine. ``progress`` is True
+    (a bar where tqdm is there and somebody watches), False, or a function of the traces done and of all.
+
+    >>> import pitchleak as pl
+    >>> leaks = {"T1/B1": "0 L/min", "T1/B2": "0.5 L/min"}
+    >>> blades = {name: pl.simulate(13, leak_internal=leak, duration=20).columns for name, leak in leaks.items()}
+    >>> found = pl.fleet(blades, map=map)
+    >>> found.table["cylinder"], found.table["status"]
+    (['T1/B1', 'T1/B2'], ['sound', 'leak'])
+    """
+    jobs = _jobs(traces, rigs)
+    if map is None:
+        rows = on_all_cores(_judge, jobs, progress, "trace")
+    else:
+        rows = _gathered(map(_judge, jobs), len(jobs), progress)
+    done = Fleet(rows)
+    failed = [row for row in rows if row.error is not None]
+    if failed:
+        _inputs.warn(
+            [f"{len(failed)} of {len(rows)} traces could not be judged, the first for this: {failed[0].error}"]
+        )
+    return done
+
+
+def _gathered(results: Iterable[Any], count: int, progress: Progress) -> list[_pitchleak.FleetRow]:
+    """Rows, from futures too."""
+    rows: list[_pitchleak.FleetRow] = []
+    with shown(progress, "trace") as at:
+        for item in results:
+            rows.append(item if isinstance(item, _pitchleak.FleetRow) else item.result())
+            at(len(rows), count)
+    return rows
+
+
+def _jobs(traces: Any, rigs: Rigs | None) -> list[_Job]:
+    if isinstance(traces, Mapping):
+        return [_named_job(str(cylinder), data, _rig_of(str(cylinder), rigs)) for cylinder, data in traces.items()]
+    patterns = [traces] if _inputs.is_path(traces) else list(traces)
+    file = os.fspath(rigs) if isinstance(rigs, (str, os.PathLike)) else None
+    found = _pitchleak.fleet_traces([os.fspath(pattern) for pattern in patterns], file)
+    one = rigs if isinstance(rigs, Rig) else None
+    jobs = [_Job(path, cylinder, begins, one or beside) for path, cylinder, begins, beside in found]
+    if not isinstance(rigs, Mapping):
+        return jobs
+    return [_Job(job.data, job.cylinder, job.begins, _rig_of(job.cylinder, rigs)) for job in jobs]
+
+
+def _named_job(cylinder: str, data: Any, rig: Rig | str | None) -> _Job:
+    if rig is None and _inputs.is_path(data):
+        ((path, _, begins, beside),) = _pitchleak.fleet_traces([os.fspath(data)], None)
+        return _Job(path, cylinder, begins, beside)
+    return _Job(data, cylinder, None, rig)
+
+
+def _rig_of(cylinder: str, rigs: Rigs | None) -> Rig | str | None:
+    if isinstance(rigs, Mapping):
+        if cylinder not in rigs:
+            raise KeyError(f"no rig for cylinder `{cylinder}`")
+        rigs = rigs[cylinder]
+    return rigs if rigs is None or isinstance(rigs, Rig) else os.fspath(rigs)
