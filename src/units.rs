@@ -68,6 +68,11 @@ impl Unit {
         self.factor / self.divisor * (other.divisor / other.factor)
     }
 
+    /// A value in SI, in this unit.
+    pub fn from_si(&self, value: f64) -> f64 {
+        (value - self.offset) * self.divisor / self.factor
+    }
+
     /// Whether the unit is the SI unit itself.
     #[allow(clippy::float_cmp)]
     pub fn is_si(&self) -> bool {
@@ -203,6 +208,32 @@ impl Dimension {
     }
 }
 
+impl Dimension {
+    /// The unit that people read it in.
+    pub fn for_people(self) -> Option<Unit> {
+        let text = match self {
+            Self::Length => "mm",
+            Self::Pressure => "bar",
+            Self::Flow => "L/min",
+            Self::Speed => "mm/s",
+            Self::Temperature => "°C",
+            other => other.si(),
+        };
+        self.units().iter().find(|unit| unit.text == text).copied()
+    }
+}
+
+/// A number for people: so many significant digits at the most, and no trailing zeros.
+pub fn readable(value: f64, digits: i32) -> String {
+    if value.abs() < f64::MIN_POSITIVE || !value.is_finite() {
+        return "0".to_owned();
+    }
+    let places = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
+    let text = format!("{value:.places$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
 fn join<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
@@ -270,6 +301,24 @@ mod tests {
         ];
         for (text, dimension, si) in cases {
             assert_eq!(parse(text, dimension), Ok(si), "{text}");
+        }
+    }
+
+    #[test]
+    fn people_read_few_digits() {
+        let cases = [
+            (83_091_022.899_999_99, "83091023"),
+            (830.910_228_999, "830.91"),
+            (-0.25, "-0.25"),
+            (1e-9, "0.000000001"),
+            (0.0, "0"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(readable(value, 5), text);
+        }
+        for dimension in [Dimension::Pressure, Dimension::Length, Dimension::Flow, Dimension::Temperature] {
+            let unit = dimension.for_people().unwrap();
+            assert!((unit.to_si(unit.from_si(300.0)) - 300.0).abs() < 1e-9);
         }
     }
 

@@ -1,5 +1,7 @@
 use super::{CheckReport, Reach};
 use crate::report::{Palette, data_line, misfit, rig_line};
+use crate::signal::Signal;
+use crate::units::{Dimension, readable};
 use std::fmt::Write;
 
 impl CheckReport {
@@ -20,14 +22,11 @@ impl CheckReport {
         let (faint, reset) = palette.faint();
         let _ = writeln!(out, "{faint}{:<12}{:>14}{:>14}   rows{reset}", "signal", "from", "to");
         for reading in &self.readings {
-            let _ = writeln!(
-                out,
-                "{:<12}{:>14}{:>14}   {:.0} %",
-                format!("{}, {}", reading.signal, reading.unit),
-                short(reading.least),
-                short(reading.most),
-                reading.present_percent,
-            );
+            let dimension = Signal::by_name(reading.signal).and_then(Signal::dimension);
+            let Some(unit) = dimension.and_then(Dimension::for_people) else { continue };
+            let [least, most] = [reading.least, reading.most].map(|value| readable(unit.from_si(value), 5));
+            let signal = format!("{}, {}", reading.signal, unit.text);
+            let _ = writeln!(out, "{signal:<12}{least:>14}{most:>14}   {:.0} %", reading.present_percent);
         }
     }
 
@@ -76,21 +75,12 @@ impl CheckReport {
 fn write_reach(out: &mut String, label: &str, reach: &Reach, factor: f64, unit: &str, palette: &Palette) {
     let (caution, reset) = palette.caution();
     let resolution = reach.resolution.filter(|resolution| resolution.is_finite());
-    let resolution = resolution.map(|resolution| format!("± {} {unit}", short(resolution * factor)));
-    let resolution = resolution.unwrap_or_default();
+    let resolution = resolution.map(|resolution| format!("± {} {unit}", readable(resolution * factor, 2)));
+    let resolution = resolution.filter(|_| reach.identifiable).unwrap_or_default();
     let _ = if reach.identifiable {
         writeln!(out, "{label:<14}{resolution}")
     } else {
         let reason = reach.reason.as_deref().unwrap_or("too little excitation");
-        writeln!(out, "{label:<14}{resolution:<20}{caution}not identifiable: {reason}{reset}")
+        writeln!(out, "{label:<14}{caution}not identifiable: {reason}{reset}")
     };
-}
-
-/// Three significant digits or so.
-fn short(value: f64) -> String {
-    match value.abs() {
-        0.0 => "0".to_owned(),
-        size if (1e-3..1e4).contains(&size) => format!("{value:.4}"),
-        _ => format!("{value:.3e}"),
-    }
 }

@@ -3,34 +3,55 @@ use crate::output::{Inputs, OutputError, OutputFile};
 use std::io::Write;
 use std::path::Path;
 
+#[cfg(feature = "parquet")]
+mod parquet;
+
+/// What estimates are written as.
+#[cfg(feature = "parquet")]
+const FORMATS: &str = ".csv, .csv.gz or .parquet";
+/// What estimates are written as.
+#[cfg(not(feature = "parquet"))]
+const FORMATS: &str = ".csv or .csv.gz (.parquet needs the cargo feature `parquet`)";
+
 /// Error returned by [`EstimateFile`].
 #[derive(Debug, thiserror::Error)]
 pub enum EstimateFileError {
     /// Not a kind of file that estimates are written to.
-    #[error("{0}: estimates over time are written as .csv or .csv.gz")]
+    #[error("{0}: estimates over time are written as {FORMATS}")]
     Kind(String),
     /// The file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }
 
-/// A CSV file of estimates over time, a row per record: coefficients in m³/(s·Pa), flows in L/min at the
+/// A file of estimates over time, a row per record: coefficients in m³/(s·Pa), flows in L/min at the
 /// instant's pressures, active alarms as 1. It is there once it is [finished](Self::finish).
-pub struct EstimateFile(OutputFile);
+pub struct EstimateFile(Form);
+
+enum Form {
+    Csv(OutputFile),
+    #[cfg(feature = "parquet")]
+    Parquet(Box<parquet::ParquetFile>),
+}
 
 impl EstimateFile {
-    /// Begins the file, `.csv` or `.csv.gz` by its name, which is none of `inputs`.
+    /// Begins the file, `.csv`, `.csv.gz` or `.parquet` by its name, which is none of `inputs`.
     ///
     /// # Errors
     /// Where it has another name, or cannot be written.
     pub fn create(path: impl AsRef<Path>, inputs: &Inputs) -> Result<Self, EstimateFileError> {
         let name = path.as_ref().display().to_string();
+        #[cfg(feature = "parquet")]
+        if name.ends_with(".parquet") {
+            let file = OutputFile::create(path, inputs)?;
+            return Ok(Self(Form::Parquet(Box::new(parquet::ParquetFile::begin(file, name)?))));
+        }
         if !name.ends_with(".csv") && !name.ends_with(".csv.gz") {
             return Err(EstimateFileError::Kind(name));
         }
-        let mut created = Self(OutputFile::create(path, inputs)?);
-        created.write_line(format_args!("{}", EstimateRow::COLUMNS.join(",")))?;
-        Ok(created)
+        let mut file = OutputFile::create(path, inputs)?;
+        write_line(&mut file, format_args!("{}", EstimateRow::COLUMNS.join(",")))?;
+        Ok(Self(Form::Csv(file)))
     }
 
     /// Writes one row.
@@ -38,11 +59,20 @@ impl EstimateFile {
     /// # Errors
     /// Where the file cannot be written on.
     pub fn write(&mut self, point: &EstimateRow) -> Result<(), EstimateFileError> {
-        let [t_s, numbers @ .., internal, external_a, external_b] = point.values();
+        let values = point.values();
+        let file = match &mut self.0 {
+            Form::Csv(file) => file,
+            #[cfg(feature = "parquet")]
+            Form::Parquet(file) => return file.write(&values),
+        };
+        let [t_s, numbers @ .., internal, external_a, external_b] = values;
         let [a, b, c, d, e, f, g, h, i] = numbers;
-        self.write_line(format_args!(
-            "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
-        ))
+        write_line(
+            file,
+            format_args!(
+                "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
+            ),
+        )
     }
 
     /// Puts the file in its place.
@@ -50,10 +80,14 @@ impl EstimateFile {
     /// # Errors
     /// Where that fails: what was there before is there still.
     pub fn finish(self) -> Result<(), EstimateFileError> {
-        Ok(self.0.finish()?)
+        match self.0 {
+            Form::Csv(file) => Ok(file.finish()?),
+            #[cfg(feature = "parquet")]
+            Form::Parquet(file) => file.finish(),
+        }
     }
+}
 
-    fn write_line(&mut self, line: std::fmt::Arguments<'_>) -> Result<(), EstimateFileError> {
-        writeln!(self.0, "{line}").map_err(|source| self.0.error(source).into())
-    }
+fn write_line(file: &mut OutputFile, line: std::fmt::Arguments<'_>) -> Result<(), EstimateFileError> {
+    writeln!(file, "{line}").map_err(|source| file.error(source).into())
 }

@@ -156,6 +156,9 @@ impl ReplayReport {
 
     fn write_scores(&self, out: &mut String) {
         let Some(scores) = &self.score else { return };
+        if scores.iter().all(|(_, score)| score.is_none()) {
+            return;
+        }
         let _ = writeln!(out, "\nagainst the reference leak flows, in steady state");
         for (leak, score) in scores {
             let Some(score) = score else { continue };

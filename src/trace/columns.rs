@@ -1,8 +1,9 @@
 //! Which column of a header row holds which signal, and in which unit.
 
 use super::error::TraceFault;
+use super::proposal::near;
 use super::quality::Counted;
-use crate::rig::{ColumnMap, ForeignColumn};
+use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
 use crate::times::TimeFormat;
 use crate::units::Unit;
@@ -99,6 +100,14 @@ impl Layout {
         column.map(|column| column.header.as_str())
     }
 
+    /// The unit of the column that holds `signal`; none where it is SI.
+    pub(super) fn unit_of(&self, signal: Signal) -> Option<Unit> {
+        self.columns.iter().find_map(|column| match column.content {
+            Content::Number(known, unit) if known == signal => unit,
+            _ => None,
+        })
+    }
+
     pub(super) fn ignored(&self) -> Vec<String> {
         let is_named = |column: &&Column| column.content == Content::Ignored && !column.header.is_empty();
         self.columns.iter().filter(is_named).map(|column| shorten(&column.header, 40)).collect()
@@ -137,13 +146,7 @@ impl Layout {
     }
 
     fn check_missing(&self, map: &ColumnMap) -> Result<(), TraceFault> {
-        let needed = [
-            (Signal::Time, "time"),
-            (Signal::Position, "piston position"),
-            (Signal::PressureA, "pressure A"),
-            (Signal::PressureB, "pressure B"),
-        ];
-        for (signal, words) in needed {
+        for (signal, words) in REQUIRED {
             if self.gives(signal) {
                 continue;
             }
@@ -157,6 +160,19 @@ impl Layout {
         }
         Ok(())
     }
+}
+
+/// What every trace must have, in words.
+pub(super) const REQUIRED: [(Signal, &str); 4] = [
+    (Signal::Time, "time"),
+    (Signal::Position, "piston position"),
+    (Signal::PressureA, "pressure A"),
+    (Signal::PressureB, "pressure B"),
+];
+
+/// What the headers say one by one, where they do not make a trace together.
+pub(super) fn partly(headers: &[String], rig: &Rig) -> Vec<Content> {
+    headers.iter().map(|header| bind(header.trim(), &rig.columns).content).collect()
 }
 
 fn bind(header: &str, map: &ColumnMap) -> Column {
@@ -219,7 +235,12 @@ fn foreign_unit(header: &str) -> Option<(Signal, &str)> {
 
 fn absent(headers: &[String], map: &ColumnMap) -> Vec<String> {
     let absent = map.values().filter(|column| !headers.iter().any(|h| h.trim() == column.name.trim()));
-    absent.map(|column| shorten(&column.name, 40)).collect()
+    let text = |column: &ForeignColumn| {
+        let near = near(&column.name, headers.iter().map(|header| header.trim()));
+        let near = near.map_or_else(String::new, |near| format!(" (`{}` is near)", shorten(near, 40)));
+        shorten(&column.name, 40) + &near
+    };
+    absent.map(text).collect()
 }
 
 fn accepted(signal: Signal, map: &ColumnMap) -> String {

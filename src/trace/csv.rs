@@ -2,9 +2,8 @@
 
 use super::columns::{Content, Layout, shorten};
 use super::dialect::Dialect;
-use super::encoding::Encoding;
 use super::error::TraceFault;
-use super::format::{Format, Stream};
+use super::format::{Format, Reading, Stream};
 use super::quality::{BadReason, BadRow, Counted};
 use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_present};
@@ -14,8 +13,10 @@ use crate::signal::Signal;
 use crate::times::TimeKind;
 
 /// Text is whatever no other format knows as its own.
-pub(super) const FORMAT: Format =
-    Format { starts_with: b"", open: |stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?)) };
+pub(super) const FORMAT: Format = Format {
+    starts_with: b"",
+    reading: Reading::Rows(|stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?))),
+};
 
 struct CsvRows {
     records: Records,
@@ -36,14 +37,14 @@ struct Splitting {
 impl CsvRows {
     /// Reads all before the first row.
     fn open(stream: Stream, rig: &Rig) -> Result<Self, TraceFault> {
-        let encoding = Encoding::of(&stream.start);
-        let mut records = Records::new(encoding.decode(stream.bytes));
-        let dialect = Dialect::find(&mut records, encoding, rig)?;
+        let gzip = stream.gzip;
+        let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
+        let dialect = Dialect::of(table, encoding, rig)?;
         dialect.skip_header(&mut records).map_err(stopped_early)?;
         let Dialect { delimiter, decimal, layout, .. } = dialect;
         let epoch = Epoch::new(layout.time.clone());
         let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
-        Ok(Self { records, splitting, gzip: stream.gzip })
+        Ok(Self { records, splitting, gzip })
     }
 
     #[cold]

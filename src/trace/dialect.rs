@@ -1,11 +1,14 @@
 //! How a text file of numbers is written: found in its first lines, said where it is not as this program writes one, and
 //! refused where it can be read in two ways.
 
-use super::columns::{Content, Layout, shorten};
+use super::columns::{Content, Layout, REQUIRED, partly, shorten};
 use super::csv::stopped_early;
 use super::decimal::decimal;
 use super::encoding::Encoding;
 use super::error::TraceFault;
+use super::format::Stream;
+use super::inspect::proposals;
+use super::proposal::Proposal;
 use super::records::{Records, Stop};
 use super::stamp::Epoch;
 use super::table_text::TextTable;
@@ -25,8 +28,13 @@ pub(super) struct Dialect {
 }
 
 impl Dialect {
-    /// Of the file that `records` begins.
-    pub(super) fn find(records: &mut Records, encoding: Encoding, rig: &Rig) -> Result<Self, TraceFault> {
+    /// The records of a file, and its first ones as a table.
+    pub(super) fn first_lines(
+        stream: Stream,
+        rig: &Rig,
+    ) -> Result<(Records, Encoding, TextTable), TraceFault> {
+        let encoding = Encoding::of(&stream.start);
+        let mut records = Records::new(encoding.decode(stream.bytes));
         let (ahead, whole) = records.look_ahead(AHEAD).map_err(stopped_early)?;
         let declared = rig.csv.delimiter.or_else(|| separator(ahead));
         let Some(table) = TextTable::find(ahead, whole, declared, rig) else {
@@ -36,16 +44,17 @@ impl Dialect {
         if table.headers.iter().any(|header| header.contains('\0')) {
             return Err(TraceFault::Format("not a CSV file: the header row is binary"));
         }
-        Self::of(table, encoding, rig)
+        Ok((records, encoding, table))
     }
 
-    fn of(mut table: TextTable, encoding: Encoding, rig: &Rig) -> Result<Self, TraceFault> {
+    /// Of the file that begins with this table.
+    pub(super) fn of(mut table: TextTable, encoding: Encoding, rig: &Rig) -> Result<Self, TraceFault> {
         let last_header_line = table.last_header_line();
         let bound = std::mem::replace(&mut table.bound, Err(TraceFault::Empty));
         let (mut layout, foreign) = match bound {
             Ok(bound) => (bound.layout, bound.foreign),
             Err(_) if table.headless => return Err(headless(&table)),
-            Err(fault) => return Err(hinted(fault)),
+            Err(fault) => return Err(hinted(fault, &table, rig)),
         };
         check_shape(&table)?;
         let decimal = match rig.csv.decimal {
@@ -79,10 +88,23 @@ fn separator(ahead: &[u8]) -> Option<Delimiter> {
 }
 
 /// Where foreign names are shown beside what they may be.
-fn hinted(mut fault: TraceFault) -> TraceFault {
-    if let TraceFault::MissingColumn { hint, .. } = &mut fault {
-        *hint = "; `pitchleak columns` on this file proposes a [columns] table".to_owned();
-    }
+fn hinted(mut fault: TraceFault, table: &TextTable, rig: &Rig) -> TraceFault {
+    let TraceFault::MissingColumn { signal, hint, .. } = &mut fault else { return fault };
+    let is_missing = |proposed: &&Proposal| match proposed.signal {
+        Signal::Timestamp => signal == "time",
+        other => REQUIRED.iter().any(|(required, words)| *required == other && words == signal),
+    };
+    *hint = match proposals(table, &partly(&table.headers, rig), rig).iter().find(is_missing) {
+        Some(Proposal { signal, column, .. }) => format!(
+            "; if `{}` is it, say {} = {} under [columns] of the rig file (`pitchleak columns` proposes all)",
+            shorten(&column.name, 40),
+            signal.name(),
+            column.to_toml(*signal)
+        ),
+        None => {
+            "; [columns] of the rig file names foreign columns (`pitchleak columns` proposes some)".to_owned()
+        }
+    };
     fault
 }
 
@@ -125,7 +147,7 @@ fn numbers<'a>(table: &'a TextTable, layout: &Layout) -> Vec<Vec<&'a str>> {
 }
 
 /// As the rig file or the command line says it, else as the cells themselves do.
-fn time_format(
+pub(super) fn time_format(
     cells: &[&str],
     layout: &Layout,
     foreign: &ColumnMap,

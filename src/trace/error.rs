@@ -39,6 +39,9 @@ pub enum TraceFault {
         /// What says it.
         settle: String,
     },
+    /// The file contradicts its own format.
+    #[error("damaged: {0}")]
+    Damaged(String),
     /// A signal that every trace must have is not there.
     #[error("no column for {signal}: {accepted} expected; the header has {found}{hint}")]
     MissingColumn {

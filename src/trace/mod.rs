@@ -10,18 +10,24 @@ mod encoding;
 mod error;
 mod file;
 mod format;
+mod inspect;
+mod inspect_text;
 mod line;
+mod mat;
 mod parquet;
+mod proposal;
 mod quality;
 mod range;
 mod records;
 mod row;
 mod row_validator;
 mod stamp;
+mod stamped;
 mod table;
 mod table_text;
 
 pub use error::{TraceError, TraceFault};
+pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub(crate) use line::read as read_line;
 pub use line::{LineLayout, Taken};
 pub use quality::{BadReason, BadRow, Counted, TraceQuality};
@@ -113,7 +119,11 @@ impl TraceReader<'static> {
         }
         let name = path.display().to_string();
         match File::open(path) {
-            Ok(file) => Self::from_stream(&name, wrap(file), rig),
+            Ok(file) => {
+                // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
+                let again = file.try_clone().ok();
+                Self::from_source(&name, wrap(file), again, rig)
+            }
             Err(error) => Err(TraceError { trace: name, fault: TraceFault::Open(error) }),
         }
     }
@@ -123,7 +133,16 @@ impl TraceReader<'static> {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
-        match file::open(stream, rig) {
+        Self::from_source(name, stream, None, rig)
+    }
+
+    fn from_source(
+        name: &str,
+        stream: Box<dyn Read + Send>,
+        file: Option<File>,
+        rig: &Rig,
+    ) -> Result<Self, TraceError> {
+        match file::open(stream, file, rig) {
             Ok(rows) => Ok(Self::over(name, rows, rig)),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }

@@ -1,9 +1,21 @@
-//! Parquet: known, but not read yet.
+//! Parquet: a flat table of numbers, times typed or as text.
 
-use super::error::TraceFault;
 use super::format::Format;
 
-pub(super) const FORMAT: Format = Format {
-    starts_with: b"PAR1",
-    open: |_, _| Err(TraceFault::Format("Parquet cannot be read yet: export the trace as .csv or .csv.gz")),
-};
+#[cfg(feature = "parquet")]
+mod guard;
+#[cfg(feature = "parquet")]
+mod rows;
+
+#[cfg(feature = "parquet")]
+pub(super) const FORMAT: Format =
+    Format { starts_with: b"PAR1", reading: super::format::Reading::Rows(rows::open) };
+
+#[cfg(not(feature = "parquet"))]
+pub(super) const FORMAT: Format = Format::refused(
+    b"PAR1",
+    "Parquet needs a build with the cargo feature `parquet`: export the trace as .csv or .csv.gz",
+);
+
+#[cfg(all(test, feature = "parquet"))]
+mod tests;

@@ -3,7 +3,7 @@
 use super::row::Row;
 use crate::rig::Rig;
 use crate::signal::Signal;
-use crate::units::Dimension;
+use crate::units::{Dimension, Unit, readable};
 
 /// A vacuum, Pa gauge.
 const VACUUM_PA: f64 = -101_325.0;
@@ -68,8 +68,8 @@ impl Ranges {
         broken.map(|range| range.signal)
     }
 
-    pub(super) fn describe(&self, signal: Signal, value: f64) -> String {
-        let unit = signal.dimension().map_or("", Dimension::si);
+    /// In the unit of the column, which is SI where it is none.
+    pub(super) fn describe(&self, signal: Signal, value: f64, unit: Option<Unit>) -> String {
         let range = self.0.iter().find(|range| range.signal == signal);
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
         let source = match signal {
@@ -82,6 +82,8 @@ impl Ranges {
             | Signal::LeakExternalB => "what is possible",
             _ => "the range of the sensor in the rig file",
         };
-        format!("{value} {unit} is outside {source} ({least} to {most} {unit})")
+        let text = |value: f64| readable(unit.map_or(value, |unit| unit.from_si(value)), 6);
+        let name = unit.map_or_else(|| signal.dimension().map_or("", Dimension::si), |unit| unit.text);
+        format!("{} {name} is outside {source} ({} to {} {name})", text(value), text(least), text(most))
     }
 }

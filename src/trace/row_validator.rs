@@ -7,6 +7,7 @@ use super::row::Row;
 use super::{BadRows, Record};
 use crate::rig::Rig;
 use crate::signal::Signal;
+use crate::units::readable;
 use pitchleak_core::{PerLeak, Sample};
 
 /// From rows to records: what is possible, what time it is, and what was noticed so far. It does not
@@ -72,7 +73,7 @@ impl RowValidator {
     #[inline]
     pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
-            let detail = self.ranges.describe(signal, row.get(signal));
+            let detail = self.ranges.describe(signal, row.get(signal), layout.unit_of(signal));
             return Some(bad_cell(row, layout, signal, BadReason::OutOfRange, detail));
         }
         let t_s = row.get(Signal::Time);
@@ -91,7 +92,7 @@ impl RowValidator {
                 (usual_s, true)
             }
             Step::Back { last_s } => {
-                let detail = format!("{t_s} s is not after {last_s} s");
+                let detail = format!("{} s is not after {} s", readable(t_s, 12), readable(last_s, 12));
                 return Some(bad_cell(row, layout, Signal::Time, BadReason::TimeBack, detail));
             }
         };

@@ -7,6 +7,7 @@ use super::row::{Next, Row, RowSource, check_present};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Unit;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Neighbouring rows: a slice per header, empty where the column is
@@ -52,21 +53,22 @@ impl TableLayout {
 }
 
 /// A column that is read.
-#[derive(Clone, Copy)]
-struct Cells<'a> {
-    signal: Signal,
+pub(super) struct Cells<'a> {
+    pub(super) signal: Signal,
     /// None where the values are in SI already.
-    unit: Option<Unit>,
-    values: &'a [f64],
+    pub(super) unit: Option<Unit>,
+    pub(super) values: Cow<'a, [f64]>,
     /// Its place among the headers.
-    index: usize,
+    pub(super) index: usize,
 }
+
+/// Gives neighbouring rows, a column for each that is read, all of one length; none at the end.
+pub(super) type Batches<'a> = Box<dyn FnMut() -> Result<Option<Vec<Cells<'a>>>, TraceFault> + Send + 'a>;
 
 /// The rows of batches of columns, one after the other.
 pub(super) struct TableRows<'a> {
     layout: Arc<Layout>,
-    /// The last comes first.
-    batches: Vec<Vec<Cells<'a>>>,
+    batches: Batches<'a>,
     current: Vec<Cells<'a>>,
     at: usize,
     length: usize,
@@ -76,24 +78,24 @@ pub(super) struct TableRows<'a> {
 
 impl<'a> TableRows<'a> {
     pub(super) fn new(layout: &TableLayout, batches: Vec<Batch<'a>>) -> Result<Self, TraceFault> {
-        let bound = batches.into_iter().rev().map(|batch| bind(&layout.0, &batch));
-        Ok(Self {
-            layout: Arc::clone(&layout.0),
-            batches: bound.collect::<Result<_, _>>()?,
-            current: Vec::new(),
-            at: 0,
-            length: 0,
-            before: 0,
-        })
+        let bound =
+            batches.into_iter().map(|batch| bind(&layout.0, &batch)).collect::<Result<Vec<_>, _>>()?;
+        let mut bound = bound.into_iter();
+        Ok(Self::over(Arc::clone(&layout.0), Box::new(move || Ok(bound.next()))))
+    }
+
+    /// The rows of whatever gives batches.
+    pub(super) fn over(layout: Arc<Layout>, batches: Batches<'a>) -> Self {
+        Self { layout, batches, current: Vec::new(), at: 0, length: 0, before: 0 }
     }
 
     #[cold]
-    fn next_batch(&mut self) -> bool {
-        let Some(batch) = self.batches.pop() else { return false };
+    fn next_batch(&mut self) -> Result<bool, TraceFault> {
+        let Some(batch) = (self.batches)()? else { return Ok(false) };
         self.before += self.length as u64;
         (self.at, self.length) = (0, batch.first().map_or(0, |cells| cells.values.len()));
         self.current = batch;
-        true
+        Ok(true)
     }
 
     #[cold]
@@ -131,7 +133,7 @@ impl RowSource for TableRows<'_> {
     #[inline]
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
         while self.at == self.length {
-            if !self.next_batch() {
+            if !self.next_batch()? {
                 return Ok(Next::End);
             }
         }
@@ -171,7 +173,7 @@ fn bind<'a>(layout: &Layout, batch: &Batch<'a>) -> Result<Vec<Cells<'a>>, TraceF
                 other_rows: first.values.len(),
             });
         }
-        read.push(Cells { signal, unit, values, index });
+        read.push(Cells { signal, unit, values: Cow::Borrowed(values), index });
     }
     Ok(read)
 }

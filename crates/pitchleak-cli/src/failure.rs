@@ -29,7 +29,7 @@ pub enum Failure {
     /// The traces of a fleet.
     #[error(transparent)]
     Fleet(#[from] FleetError),
-    /// Some traces of a fleet; the others were.
+    /// Some of many traces; the others were.
     #[error("{errors} of {traces} traces could not be judged")]
     NotJudged {
         /// Those that were not.
@@ -37,6 +37,17 @@ pub enum Failure {
         /// All.
         traces: usize,
     },
+    /// A file that is of one trace.
+    #[error("{flag} is of one trace: {traces} are given")]
+    OneTraceOnly {
+        /// The flag that names the file.
+        flag: &'static str,
+        /// Traces given.
+        traces: usize,
+    },
+    /// A manual page of no command.
+    #[error("no command `{0}`; pitchleak --help names them")]
+    NoCommand(String),
     /// Ctrl-C, or the signal to end.
     #[error("interrupted: nothing is written")]
     Interrupted,

@@ -1,11 +1,13 @@
 //! The program `pitchleak`: arguments in, text out, no numerics of its own.
 
 mod check;
+mod columns;
 mod completions;
 mod diagnose;
 mod failure;
 mod fleet;
 mod input;
+mod man;
 mod output;
 mod replay;
 mod reproduce;
@@ -34,11 +36,13 @@ enum Command {
     Replay(replay::Arguments),
     Diagnose(diagnose::Arguments),
     Check(check::Arguments),
+    Columns(columns::Arguments),
     Fleet(fleet::Arguments),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
     Completions(completions::Arguments),
+    Man(man::Arguments),
 }
 
 /// What a command that ran to its end has to say by its exit status.
@@ -53,11 +57,13 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Diagnose(arguments) => diagnose::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Columns(arguments) => columns::run(&arguments),
         Command::Fleet(arguments) => fleet::run(&arguments),
         Command::Watch(arguments) => watch::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
+        Command::Man(arguments) => man::run(&arguments),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

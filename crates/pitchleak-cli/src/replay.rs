@@ -1,5 +1,5 @@
 use crate::failure::Failure;
-use crate::input::Input;
+use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::page::{History, Page, PageFile};
@@ -7,7 +7,7 @@ use pitchleak::replay::{EstimateFile, replay};
 use pitchleak::rig::EstimatorKind;
 use std::path::PathBuf;
 
-/// Replay a trace: estimate its leaks and say what to do
+/// Replay traces: estimate their leaks and say what to do
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -18,15 +18,15 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = estimator)]
     estimator: Option<EstimatorKind>,
 
-    /// Write the estimates over time, a row per sample: .csv or .csv.gz
+    /// Write the estimates over time of one trace, a row per sample: .csv, .csv.gz or .parquet
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Write the report as a page for a browser: .html, complete in itself
+    /// Write the report on one trace as a page for a browser: .html, complete in itself
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 
-    /// Print the report as JSON (schema pitchleak.replay/1)
+    /// Print the report as JSON (schema pitchleak.replay/1), a line for each trace
     #[arg(long)]
     json: bool,
 
@@ -43,6 +43,7 @@ const EXAMPLES: &str = "\
 Examples:
   pitchleak replay trace.csv.gz
   pitchleak replay trace.csv --report report.html
+  pitchleak replay monday/*.csv --json | jq -r '[.trace.path, .verdict.status] | @tsv'
   pitchleak replay trace.csv --rig turbine7.toml --json | jq .verdict
   zcat log.csv.gz | pitchleak replay - --rig turbine7.toml --fail-on-fault";
 
@@ -52,14 +53,20 @@ fn estimator(name: &str) -> Result<EstimatorKind, String> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut rig = arguments.input.rig()?;
-    rig.estimator.kind = arguments.estimator.unwrap_or(rig.estimator.kind);
-    let inputs = arguments.input.files(&rig);
+    arguments.input.check_single("--out", arguments.out.is_some())?;
+    arguments.input.check_single("--report", arguments.report.is_some())?;
+    arguments.input.for_each(|trace| run_one(arguments, trace))
+}
+
+fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> {
+    let kind = &mut trace.rig.estimator.kind;
+    *kind = arguments.estimator.unwrap_or(*kind);
+    let inputs = trace.files();
     let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
-    let (mut reader, bar) = arguments.input.open(&rig)?;
-    let report = replay(&mut reader, &rig, |replay, record, renewed| {
+    let (mut reader, bar) = trace.open()?;
+    let report = replay(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
         }
@@ -70,13 +77,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     })?;
     file.map(EstimateFile::finish).transpose()?;
     if let Some((page, history)) = page.zip(history) {
-        page.finish(&Page::of_replay(&report, &rig, &history))?;
+        page.finish(&Page::of_replay(&report, &trace.rig, &history))?;
     }
     bar.finish_and_clear();
     output::note(&report.trace);
     output::warn(&report.trace.warnings);
-    let text = if arguments.json { report.to_json()? + "\n" } else { report.to_text(&output::palette()) };
-    output::print(&text)?;
+    let json = arguments.json.then(|| report.to_json()).transpose()?;
+    trace.print(json, || report.to_text(&output::palette()))?;
     let fault = arguments.fail_on_fault && !report.verdict.faults.is_empty();
     let doubt = arguments.fail_on_doubt && !report.verdict.status.is_sure();
     Ok(if fault || doubt { Outcome::FaultFound } else { Outcome::Done })

@@ -317,7 +317,7 @@ fn estimates_are_written_over_time() {
     assert_eq!(last.len(), width);
     assert!((last[1] / INTERNAL - 1.0).abs() < 3e-3);
     let refused = place.path("estimates.xlsx").display().to_string();
-    assert_refused(&replay(&trace, &["--out", &refused]), &["estimates.xlsx", ".csv or .csv.gz"]);
+    assert_refused(&replay(&trace, &["--out", &refused]), &["estimates.xlsx", ".csv, .csv.gz or .parquet"]);
 }
 
 #[test]

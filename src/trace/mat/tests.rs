@@ -1,0 +1,163 @@
+use crate::Rig;
+use crate::trace::{Record, TraceError, TraceReader};
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use std::io::{Cursor, Write};
+
+const CLASS_DOUBLE: u32 = 6;
+const CLASS_STRUCT: u32 = 2;
+
+/// Writes elements of either byte order.
+struct Writer {
+    bytes: Vec<u8>,
+    big_endian: bool,
+}
+
+impl Writer {
+    fn word(&mut self, word: u32) {
+        let bytes = if self.big_endian { word.to_be_bytes() } else { word.to_le_bytes() };
+        self.bytes.extend(bytes);
+    }
+
+    fn element(&mut self, kind: u32, data: &[u8]) {
+        self.word(kind);
+        self.word(data.len() as u32);
+        self.bytes.extend(data);
+        self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
+    }
+
+    /// Its inside alone.
+    fn variable(&mut self, class: u32, name: &str, kind: u32, data: &[u8], count: usize) {
+        self.word(6);
+        self.word(8);
+        self.word(class);
+        self.word(0);
+        self.word(5);
+        self.word(8);
+        self.word(count as u32);
+        self.word(1);
+        self.element(1, name.as_bytes());
+        self.element(kind, data);
+    }
+}
+
+fn header(big_endian: bool) -> Vec<u8> {
+    let mut bytes = b"MATLAB 5.0 MAT-file, by a test".to_vec();
+    bytes.resize(124, b' ');
+    bytes.extend(if big_endian { [1, 0] } else { [0, 1] });
+    bytes.extend(if big_endian { b"MI" } else { b"IM" });
+    bytes
+}
+
+const NAMES: [&str; 6] = ["t_s", "x_mm", "pa_bar", "pb_bar", "qa_lpm", "qb_lpm"];
+
+fn signals(row: usize) -> [f64; 6] {
+    let i = row as f64;
+    [0.01 * i, 100.0 + i, 50.0, 40.0, 6.5, -3.5]
+}
+
+fn file(big_endian: bool, compressed: bool, class: u32, rows: usize) -> Vec<u8> {
+    let mut bytes = header(big_endian);
+    for (column, name) in NAMES.iter().enumerate() {
+        let values = (0..rows).map(|row| signals(row)[column]);
+        let data: Vec<u8> = values
+            .flat_map(|value| if big_endian { value.to_be_bytes() } else { value.to_le_bytes() })
+            .collect();
+        let mut inside = Writer { bytes: Vec::new(), big_endian };
+        inside.variable(class, name, 9, &data, rows);
+        let mut whole = Writer { bytes: Vec::new(), big_endian };
+        whole.word(14);
+        whole.word(inside.bytes.len() as u32);
+        whole.bytes.extend(inside.bytes);
+        if compressed {
+            let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+            encoder.write_all(&whole.bytes).unwrap();
+            let packed = encoder.finish().unwrap();
+            whole = Writer { bytes: Vec::new(), big_endian };
+            whole.word(15);
+            whole.word(packed.len() as u32);
+            whole.bytes.extend(packed);
+        }
+        bytes.extend(whole.bytes);
+    }
+    bytes
+}
+
+fn read(bytes: Vec<u8>) -> Result<Vec<Record>, TraceError> {
+    let mut reader = TraceReader::from_stream("trace.mat", Box::new(Cursor::new(bytes)), &Rig::paper())?;
+    let (mut records, mut record) = (Vec::new(), Record::default());
+    while reader.next_record(&mut record)? {
+        records.push(record);
+    }
+    Ok(records)
+}
+
+#[test]
+fn vectors_are_the_columns_of_a_trace() {
+    for (big_endian, compressed) in [(false, false), (false, true), (true, false), (true, true)] {
+        let records = read(file(big_endian, compressed, CLASS_DOUBLE, 50)).unwrap();
+        assert_eq!(records.len(), 50);
+        let last = &records[49];
+        assert_eq!((last.t_s, last.sample.pa_pa, last.sample.qb_m3s), (0.49, 5e6, Some(-3.5 / 60_000.0)));
+    }
+}
+
+#[test]
+fn small_numbers_are_of_any_type() {
+    let mut bytes = header(false);
+    let t: Vec<u8> = (0..20_i16).flat_map(|i| (10 * i).to_le_bytes()).collect();
+    let x: Vec<u8> = (0..20_u8).collect();
+    let p: Vec<u8> = (0..20).flat_map(|_| 50.5_f32.to_le_bytes()).collect();
+    for (name, kind, data) in [("t_ms", 3, t), ("x_mm", 2, x), ("pa_bar", 7, p.clone()), ("pb_bar", 7, p)] {
+        let mut inside = Writer { bytes: Vec::new(), big_endian: false };
+        inside.variable(CLASS_DOUBLE, name, kind, &data, 20);
+        let mut tag = Writer { bytes: Vec::new(), big_endian: false };
+        tag.word(14);
+        tag.word(inside.bytes.len() as u32);
+        bytes.extend(tag.bytes);
+        bytes.extend(inside.bytes);
+    }
+    let records = read(bytes).unwrap();
+    assert_eq!(
+        (records[19].t_s, records[19].sample.x_m, records[19].sample.pa_pa),
+        (0.19, 0.019, 5_050_000.0)
+    );
+}
+
+#[test]
+fn what_is_not_read_is_refused_by_name() {
+    let message = |bytes| read(bytes).unwrap_err().to_string();
+    let text = message(file(false, false, CLASS_STRUCT, 50));
+    assert!(text.contains("variable `t_s` is a struct") && text.contains("-struct"), "{text}");
+    let mut newer = b"MATLAB 7.3 MAT-file".to_vec();
+    newer.resize(600, 0);
+    assert!(message(newer).contains("save -v7"));
+    assert!(message(b"\x89HDF\r\n\x1a\n".to_vec()).contains("HDF5"));
+    assert!(message(b"PK\x03\x04....".to_vec()).contains("Excel"));
+}
+
+#[test]
+fn damage_is_one_line_and_costs_no_memory() {
+    let whole = file(false, true, CLASS_DOUBLE, 50);
+    for length in [0, 4, 100, 128, 130, 136, 140, 200, whole.len() - 1] {
+        let message = read(whole[..length].to_vec()).unwrap_err().to_string();
+        assert!(!message.contains('\n'), "{message}");
+    }
+    let mut huge = file(false, false, CLASS_DOUBLE, 50);
+    // The count of the first variable, and the size of its data.
+    let at = huge.windows(4).position(|bytes| bytes == 50_u32.to_le_bytes()).unwrap();
+    huge[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(read(huge).unwrap_err().to_string().contains("damaged"));
+}
+
+proptest::proptest! {
+    #[test]
+    fn any_byte_may_be_wrong(at in 0..4000_usize, byte in 0..=255_u8, big_endian: bool, compressed: bool) {
+        let mut bytes = file(big_endian, compressed, CLASS_DOUBLE, 20);
+        let at = at % bytes.len();
+        bytes[at] = byte;
+        if let Err(error) = read(bytes) {
+            proptest::prop_assert!(!error.to_string().contains('\n'));
+        }
+    }
+}

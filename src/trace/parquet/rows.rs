@@ -1,0 +1,311 @@
+use super::guard::guarded;
+use crate::rig::Rig;
+use crate::signal::Signal;
+use crate::times::TimeFormat;
+use crate::trace::bind::bind;
+use crate::trace::columns::{Content, Layout, shorten};
+use crate::trace::dialect::time_format;
+use crate::trace::error::TraceFault;
+use crate::trace::format::{Rows, Stream};
+use crate::trace::quality::Counted;
+use crate::trace::stamp::{Epoch, seconds_between};
+use crate::trace::table::{Cells, TableRows};
+use crate::trace::table_text::{TextRow, column};
+use bytes::Bytes;
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, DataType};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// Rows read at a time: their columns stay in the cache.
+const BATCH: usize = 4096;
+/// So many rows say how times are written.
+const SAMPLE: usize = 100;
+
+/// What the cells of a column are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Number,
+    /// Times, so many nanoseconds each.
+    Stamp(i64),
+    Text,
+    Other,
+}
+
+/// A column without a nest.
+struct Field {
+    /// Its place in the file.
+    place: usize,
+    name: String,
+    kind: Kind,
+    /// Whether cells may be missing.
+    optional: bool,
+}
+
+/// A column that is read.
+struct Read {
+    field: usize,
+    place: usize,
+    optional: bool,
+    kind: Kind,
+    content: Content,
+}
+
+pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    guarded(|| open_unguarded(stream, rig))
+}
+
+fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    let file: Arc<dyn FileReader> = match stream.file.take() {
+        Some(file) => Arc::new(SerializedFileReader::new(file).map_err(damaged)?),
+        None => Arc::new(SerializedFileReader::new(Bytes::from(stream.hold()?)).map_err(damaged)?),
+    };
+    let fields = fields(file.as_ref());
+    let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
+    let sample = sample(file.as_ref(), &fields)?;
+    let bound = bind(&names, None, &sample, rig)?;
+    let mut layout = Layout { counted: Counted::Rows, ..bound.layout };
+    let mut read = Vec::new();
+    for (index, (field, bound_column)) in fields.iter().zip(&layout.columns).enumerate() {
+        let fits = match bound_column.content {
+            Content::Ignored => continue,
+            Content::Number(..) => field.kind == Kind::Number,
+            Content::Timestamp => field.kind != Kind::Other,
+        };
+        if !fits {
+            return Err(TraceFault::Ambiguous {
+                what: format!("column `{}` does not hold numbers", shorten(&field.name, 40)),
+                settle: "write it as a column of doubles".to_owned(),
+            });
+        }
+        let Field { place, optional, kind, .. } = *field;
+        read.push(Read { field: index, place, optional, kind, content: bound_column.content });
+    }
+    layout.time = match read.iter().find(|read| read.content == Content::Timestamp) {
+        Some(stamps) if !matches!(stamps.kind, Kind::Stamp(_)) => {
+            time_format(&column(&sample, stamps.field), &layout, &bound.foreign, rig)?
+        }
+        _ => TimeFormat::default(),
+    };
+    let layout = Arc::new(layout);
+    let mut batches = Batches {
+        file,
+        read,
+        group: 0,
+        open: Vec::new(),
+        epoch: Epoch::new(layout.time.clone()),
+        first_ns: None,
+    };
+    Ok(Box::new(TableRows::over(layout, Box::new(move || guarded(|| batches.next())))))
+}
+
+fn damaged(error: ParquetError) -> TraceFault {
+    match error {
+        ParquetError::NYI(what) | ParquetError::General(what) if what.contains("feature") => {
+            TraceFault::Damaged(format!("{what}: write it with snappy or without compression"))
+        }
+        other => TraceFault::Damaged(other.to_string().replace('\n', " ")),
+    }
+}
+
+fn fields(file: &dyn FileReader) -> Vec<Field> {
+    let schema = file.metadata().file_metadata().schema_descr();
+    let flat = |column: &ColumnDescriptor| column.max_rep_level() == 0 && column.max_def_level() <= 1;
+    let fields = schema.columns().iter().enumerate().filter(|(_, column)| flat(column));
+    let fields = fields.map(|(place, column)| Field {
+        place,
+        name: column.name().to_owned(),
+        kind: kind(column),
+        optional: column.max_def_level() > 0,
+    });
+    fields.collect()
+}
+
+fn kind(column: &ColumnDescriptor) -> Kind {
+    let stamp_ns = match (column.logical_type_ref(), column.converted_type()) {
+        (Some(LogicalType::Timestamp(stamp)), _) => match stamp.unit {
+            TimeUnit::MILLIS => Some(1_000_000),
+            TimeUnit::MICROS => Some(1_000),
+            _ => Some(1),
+        },
+        (_, ConvertedType::TIMESTAMP_MILLIS) => Some(1_000_000),
+        (_, ConvertedType::TIMESTAMP_MICROS) => Some(1_000),
+        (Some(LogicalType::Integer(_)) | None, _) => None,
+        (Some(LogicalType::String), _) => return Kind::Text,
+        _ => return Kind::Other,
+    };
+    match (column.physical_type(), stamp_ns) {
+        (Physical::INT64, Some(ns)) => Kind::Stamp(ns),
+        (Physical::INT96, _) => Kind::Stamp(1),
+        (Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE, None)
+            if column.converted_type() != ConvertedType::DECIMAL =>
+        {
+            Kind::Number
+        }
+        (Physical::BYTE_ARRAY, None) if column.converted_type() == ConvertedType::UTF8 => Kind::Text,
+        _ => Kind::Other,
+    }
+}
+
+/// The first rows as text, as those of a file of text are looked at.
+fn sample(file: &dyn FileReader, fields: &[Field]) -> Result<Vec<TextRow>, TraceFault> {
+    let mut rows: Vec<TextRow> = Vec::new();
+    if file.num_row_groups() == 0 {
+        return Ok(rows);
+    }
+    let group = file.get_row_group(0).map_err(damaged)?;
+    for (index, field) in fields.iter().enumerate() {
+        let cells: Vec<String> = match field.kind {
+            Kind::Other => continue,
+            Kind::Stamp(_) => vec!["2000-01-01T00:00:00".to_owned()],
+            Kind::Text => {
+                let mut reader = group.get_column_reader(field.place).map_err(damaged)?;
+                let texts = texts(&mut reader, field.optional, SAMPLE)?;
+                texts.iter().map(|text| String::from_utf8_lossy(text.data()).into_owned()).collect()
+            }
+            Kind::Number => {
+                let mut reader = group.get_column_reader(field.place).map_err(damaged)?;
+                let values = numbers(&mut reader, field.optional, SAMPLE)?;
+                values
+                    .iter()
+                    .map(|value| if value.is_nan() { String::new() } else { value.to_string() })
+                    .collect()
+            }
+        };
+        for (row, cell) in cells.into_iter().enumerate() {
+            if rows.len() == row {
+                rows.push(TextRow { line: row as u64, cells: vec![String::new(); fields.len()] });
+            }
+            if let Some(to) = rows.get_mut(row).and_then(|row| row.cells.get_mut(index)) {
+                *to = cell;
+            }
+        }
+    }
+    Ok(rows)
+}
+
+/// Row group after row group, a few thousand rows at a time.
+struct Batches {
+    file: Arc<dyn FileReader>,
+    read: Vec<Read>,
+    group: usize,
+    /// Of the row group that is being read; none before it is.
+    open: Vec<ColumnReader>,
+    epoch: Epoch,
+    first_ns: Option<i128>,
+}
+
+impl Batches {
+    fn next(&mut self) -> Result<Option<Vec<Cells<'static>>>, TraceFault> {
+        loop {
+            if self.open.is_empty() {
+                if self.group == self.file.num_row_groups() {
+                    return Ok(None);
+                }
+                let group = self.file.get_row_group(self.group).map_err(damaged)?;
+                let open = self.read.iter().map(|read| group.get_column_reader(read.place));
+                self.open = open.collect::<Result<_, _>>().map_err(damaged)?;
+                self.group += 1;
+            }
+            let cells = self.batch()?;
+            let rows = cells.first().map_or(0, |cells| cells.values.len());
+            if cells.iter().any(|cells| cells.values.len() != rows) {
+                return Err(TraceFault::Damaged(
+                    "columns of one row group are of different lengths".to_owned(),
+                ));
+            }
+            if rows > 0 {
+                return Ok(Some(cells));
+            }
+            self.open.clear();
+        }
+    }
+
+    fn batch(&mut self) -> Result<Vec<Cells<'static>>, TraceFault> {
+        let mut cells = Vec::with_capacity(self.read.len());
+        for (read, reader) in self.read.iter().zip(&mut self.open) {
+            let (signal, unit) = match read.content {
+                Content::Number(signal, unit) => (signal, unit),
+                _ => (Signal::Time, None),
+            };
+            let values = match (read.content, read.kind) {
+                (Content::Timestamp, Kind::Stamp(ns)) => {
+                    let stamps = stamps(reader, read.optional)?;
+                    let first_ns = &mut self.first_ns;
+                    let seconds = |stamp: Option<i64>| {
+                        let Some(stamp) = stamp else { return f64::NAN };
+                        let stamp_ns = i128::from(stamp) * i128::from(ns);
+                        seconds_between(*first_ns.get_or_insert(stamp_ns), stamp_ns)
+                    };
+                    stamps.into_iter().map(seconds).collect()
+                }
+                (Content::Timestamp, Kind::Text) => {
+                    let texts = texts(reader, read.optional, BATCH)?;
+                    texts.iter().map(|text| self.epoch.seconds(text.data()).unwrap_or(f64::NAN)).collect()
+                }
+                (Content::Timestamp, _) => {
+                    let values = numbers(reader, read.optional, BATCH)?;
+                    let seconds =
+                        |value: &f64| self.epoch.seconds(value.to_string().as_bytes()).unwrap_or(f64::NAN);
+                    values.iter().map(seconds).collect()
+                }
+                _ => numbers(reader, read.optional, BATCH)?,
+            };
+            cells.push(Cells { signal, unit, values: Cow::Owned(values), index: read.field });
+        }
+        Ok(cells)
+    }
+}
+
+/// The next cells, `missing` where there is none.
+fn read<D: DataType, V: Clone>(
+    reader: &mut ColumnReaderImpl<D>,
+    optional: bool,
+    rows: usize,
+    missing: V,
+    value: impl Fn(D::T) -> V,
+) -> Result<Vec<V>, TraceFault> {
+    let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::new());
+    let defined = optional.then_some(&mut levels);
+    let (records, ..) = reader.read_records(rows, defined, None, &mut values).map_err(damaged)?;
+    let mut values = values.into_iter().map(value);
+    if values.len() == records {
+        return Ok(values.collect());
+    }
+    let cell = |level: &i16| if *level > 0 { values.next() } else { None };
+    Ok(levels.iter().take(records).map(cell).map(|cell| cell.unwrap_or(missing.clone())).collect())
+}
+
+fn numbers(reader: &mut ColumnReader, optional: bool, rows: usize) -> Result<Vec<f64>, TraceFault> {
+    let none = f64::NAN;
+    match reader {
+        ColumnReader::DoubleColumnReader(reader) => read(reader, optional, rows, none, |value| value),
+        ColumnReader::FloatColumnReader(reader) => read(reader, optional, rows, none, f64::from),
+        ColumnReader::Int32ColumnReader(reader) => read(reader, optional, rows, none, f64::from),
+        ColumnReader::Int64ColumnReader(reader) => read(reader, optional, rows, none, |value| value as f64),
+        _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
+    }
+}
+
+fn stamps(reader: &mut ColumnReader, optional: bool) -> Result<Vec<Option<i64>>, TraceFault> {
+    match reader {
+        ColumnReader::Int64ColumnReader(reader) => read(reader, optional, BATCH, None, Some),
+        ColumnReader::Int96ColumnReader(reader) => {
+            read(reader, optional, BATCH, None, |stamp| Some(stamp.to_nanos()))
+        }
+        _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
+    }
+}
+
+fn texts(reader: &mut ColumnReader, optional: bool, rows: usize) -> Result<Vec<ByteArray>, TraceFault> {
+    match reader {
+        ColumnReader::ByteArrayColumnReader(reader) => {
+            read(reader, optional, rows, ByteArray::from(""), |text| text)
+        }
+        _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
+    }
+}

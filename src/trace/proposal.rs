@@ -1,0 +1,289 @@
+//! What foreign columns may be, by their names and by their values: proposed to a person, never read.
+
+use crate::header::{self, HeaderUnit};
+use crate::rig::{Decimal, ForeignColumn, Rig};
+use crate::signal::Signal;
+use crate::times;
+use crate::units::{Dimension, Unit};
+
+/// A column that may hold a signal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The signal.
+    pub signal: Signal,
+    /// How `[columns]` would name it.
+    pub column: ForeignColumn,
+    /// What speaks for it.
+    pub why: Why,
+}
+
+/// What speaks for a proposal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Why {
+    /// Name and unit of the header.
+    Name,
+    /// The name; the unit is one in which its values are possible on this rig.
+    NameAndValues,
+    /// Its values alone, and its place among the columns.
+    Values,
+}
+
+impl Why {
+    /// In words, behind a proposal.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Name => "by its name",
+            Self::NameAndValues => "by its name; the unit by its values: check it",
+            Self::Values => "by its values and place: check it",
+        }
+    }
+}
+
+/// A column that is not read yet.
+pub(super) struct Unread<'a> {
+    pub(super) header: &'a str,
+    /// From the row of units; may be empty.
+    pub(super) unit: &'a str,
+    /// Its first cells, none of them empty.
+    pub(super) cells: Vec<&'a str>,
+}
+
+/// What a word says of a quantity, and of a side.
+const WORDS: [(Signal, &[&str]); 5] = [
+    (Signal::PressureA, &["p", "pressure", "press", "pres", "druck"]),
+    (Signal::FlowA, &["q", "flow", "flowrate", "volumenstrom", "durchfluss"]),
+    (Signal::Position, &["x", "position", "pos", "stroke", "weg", "displacement", "lvdt", "hub", "travel"]),
+    (Signal::Force, &["force", "load", "kraft"]),
+    (Signal::Time, &["t", "time", "zeit", "date", "datum", "timestamp", "elapsed", "clock"]),
+];
+const SIDE_A: &[&str] = &["a", "1", "head", "cap", "bore", "piston", "kolben", "blind"];
+const SIDE_B: &[&str] = &["b", "2", "rod", "annulus", "ring", "stange"];
+
+/// Proposals for the signals that `wanted` names, of columns that are not read.
+pub(super) fn propose(
+    unread: &[Unread<'_>],
+    wanted: &[Signal],
+    decimal: Decimal,
+    rig: &Rig,
+) -> Vec<Proposal> {
+    let mut proposals: Vec<Proposal> = Vec::new();
+    let mut left: Vec<&Unread<'_>> = Vec::new();
+    for column in unread {
+        let open = |signal: &Signal| {
+            wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
+        };
+        match by_name(column, decimal, rig).filter(|proposal| open(&proposal.signal)) {
+            Some(proposal) => proposals.push(proposal),
+            None => left.push(column),
+        }
+    }
+    for column in left {
+        let open = |signal: &Signal| {
+            wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
+        };
+        proposals.extend(by_values(column, decimal, rig, open));
+    }
+    proposals.sort_by_key(|proposal| proposal.signal);
+    proposals
+}
+
+fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal> {
+    let words = words(column.header);
+    let says = |known: &[&str]| {
+        words
+            .iter()
+            .any(|word| known.iter().any(|known| word == known || known.len() > 3 && word.contains(known)))
+    };
+    let quantity = WORDS.iter().find(|(_, known)| says(known)).map(|(signal, _)| *signal)?;
+    let signal = match (quantity, says(SIDE_A), says(SIDE_B)) {
+        (Signal::PressureA | Signal::FlowA, true, false) => quantity,
+        (Signal::PressureA, false, true) => Signal::PressureB,
+        (Signal::FlowA, false, true) => Signal::FlowB,
+        (Signal::PressureA | Signal::FlowA, ..) => return None,
+        _ => quantity,
+    };
+    let dimension = signal.dimension()?;
+    let split = header::parts(column.header).find_map(|(_, unit)| HeaderUnit::by_name(unit, dimension));
+    if let Some(found) = HeaderUnit::by_name(column.unit, dimension).or(split) {
+        let foreign =
+            ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(column.header, Some(found.unit)) };
+        return Some(Proposal { signal, column: foreign, why: Why::Name });
+    }
+    if signal == Signal::Time && times::guess(&column.cells).is_ok() {
+        let foreign = ForeignColumn::new(column.header, None);
+        return Some(Proposal { signal: Signal::Timestamp, column: foreign, why: Why::Name });
+    }
+    let unit = possible_unit(signal, &values(column, decimal), rig)?;
+    Some(Proposal { signal, column: ForeignColumn::new(column.header, Some(unit)), why: Why::NameAndValues })
+}
+
+/// Times rise, flows go both ways, and position comes before the pressures.
+fn by_values(
+    column: &Unread<'_>,
+    decimal: Decimal,
+    rig: &Rig,
+    open: impl Fn(&Signal) -> bool,
+) -> Option<Proposal> {
+    let values = values(column, decimal);
+    if values.len() < 10 {
+        return None;
+    }
+    let rising = values.windows(2).all(|pair| pair.first() < pair.last());
+    let (least, _) = extremes(&values);
+    let tried: &[Signal] = match (rising, least < 0.0) {
+        (true, _) => &[Signal::Time],
+        (false, true) => &[Signal::FlowA, Signal::FlowB],
+        (false, false) => &[Signal::Position, Signal::PressureA, Signal::PressureB],
+    };
+    tried.iter().filter(|signal| open(signal)).find_map(|signal| {
+        let unit = possible_unit(*signal, &values, rig)?;
+        Some(Proposal {
+            signal: *signal,
+            column: ForeignColumn::new(column.header, Some(unit)),
+            why: Why::Values,
+        })
+    })
+}
+
+/// The first unit, of those that are usual, in which the values are possible on the rig.
+fn possible_unit(signal: Signal, values: &[f64], rig: &Rig) -> Option<Unit> {
+    let dimension = signal.dimension()?;
+    let (least, most) = extremes(values);
+    let size = most.max(-least);
+    let sheets = &rig.instruments;
+    let (full_scale, usual): (f64, &[&str]) = match dimension {
+        Dimension::Pressure => (sheets.pressure.full_scale, &["bar", "MPa", "psi", "kPa", "Pa"]),
+        Dimension::Length => (rig.cylinder.stroke_m, &["mm", "m"]),
+        Dimension::Flow => {
+            (sheets.flow_a.full_scale.max(sheets.flow_b.full_scale), &["L/min", "m^3/h", "m^3/s"])
+        }
+        Dimension::Force => (sheets.force.full_scale, &["N", "kN"]),
+        Dimension::Time => {
+            let mut steps: Vec<f64> =
+                values.windows(2).filter_map(|pair| Some(pair.last()? - pair.first()?)).collect();
+            steps.sort_by(f64::total_cmp);
+            let step = *steps.get(steps.len() / 2)?;
+            let name = if step >= 1.0 { "ms" } else { "s" };
+            return (step > 0.0).then(|| dimension.by_suffix(name))?;
+        }
+        _ => return None,
+    };
+    let unit = |name: &&str| dimension.units().iter().find(|unit| unit.text == *name).copied();
+    let possible = |unit: &Unit| {
+        let share = unit.to_si(size) / full_scale;
+        (0.005..1.3).contains(&share)
+    };
+    usual.iter().filter_map(unit).find(possible)
+}
+
+fn values(column: &Unread<'_>, decimal: Decimal) -> Vec<f64> {
+    let read = |cell: &&str| match decimal {
+        Decimal::Point => fast_float2::parse::<f64, _>(cell.as_bytes()).ok(),
+        Decimal::Comma => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
+    };
+    column.cells.iter().filter_map(read).filter(|value| value.is_finite()).collect()
+}
+
+fn extremes(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::MAX, f64::MIN), |(least, most), value| (least.min(*value), most.max(*value)))
+}
+
+/// `HeadPressure_P1 [bar]`: head, pressure, p, 1, bar.
+fn words(header: &str) -> Vec<String> {
+    let mut words: Vec<String> = vec![String::new()];
+    let mut before = ' ';
+    for c in header.chars() {
+        let new = !c.is_alphanumeric()
+            || (c.is_uppercase() && before.is_lowercase())
+            || (c.is_ascii_digit() && !before.is_ascii_digit());
+        if new {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
+            word.extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+/// The name among `names` that `name` may be a slip of.
+pub(super) fn near<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let likeness =
+        |other: &&str| strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase());
+    let best = names.filter(|other| !other.is_empty()).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
+    (likeness(&best) >= 0.7).then_some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn proposed(headers: &[&str], cells: &[&[&str]]) -> Vec<String> {
+        let unread: Vec<_> = headers
+            .iter()
+            .zip(cells)
+            .map(|(header, cells)| Unread { header, unit: "", cells: cells.to_vec() })
+            .collect();
+        let proposals = propose(&unread, &Signal::ALL, Decimal::Point, &Rig::paper());
+        proposals
+            .iter()
+            .map(|found| format!("{} = {}", found.signal.name(), found.column.to_toml(found.signal)))
+            .collect()
+    }
+
+    #[test]
+    fn names_tell_quantity_and_side() {
+        let headers = [
+            "Elapsed (s)",
+            "CylStroke [mm]",
+            "HeadPressure",
+            "Rod pressure [bar]",
+            "FlowHead [l/min]",
+            "Q2 [l/min]",
+        ];
+        let cells: [&[&str]; 6] = [&["0", "1"], &["1", "2"], &["40", "50"], &["30"], &["1"], &["2"]];
+        assert_eq!(
+            proposed(&headers, &cells),
+            [
+                "t = { name = \"Elapsed (s)\", unit = \"s\" }",
+                "x = { name = \"CylStroke [mm]\", unit = \"mm\" }",
+                "pa = { name = \"HeadPressure\", unit = \"bar\" }",
+                "pb = { name = \"Rod pressure [bar]\", unit = \"bar\" }",
+                "qa = { name = \"FlowHead [l/min]\", unit = \"L/min\" }",
+                "qb = { name = \"Q2 [l/min]\", unit = \"L/min\" }",
+            ]
+        );
+        assert_eq!(proposed(&["Pressure", "Flow"], &[&["40"], &["1"]]), [""; 0], "no side");
+    }
+
+    #[test]
+    fn values_tell_where_names_do_not() {
+        let column =
+            |f: fn(f64) -> f64| (0..20).map(|i| format!("{:.3}", f(f64::from(i)))).collect::<Vec<_>>();
+        let columns = [
+            column(|i| 10.0 * i),
+            column(|i| 100.0 + i.sin()),
+            column(|i| 50.0 + i.sin()),
+            column(|i| 40.0 - i.sin()),
+            column(|i| 2.0 * i.sin()),
+        ];
+        let cells: Vec<Vec<&str>> =
+            columns.iter().map(|cells| cells.iter().map(String::as_str).collect()).collect();
+        let cells: Vec<&[&str]> = cells.iter().map(Vec::as_slice).collect();
+        let found = proposed(&["CH0", "CH1", "CH2", "CH3", "CH4"], &cells).join("; ");
+        assert_eq!(
+            found,
+            "t = { name = \"CH0\", unit = \"ms\" }; x = { name = \"CH1\", unit = \"mm\" }; pa = { name = \"CH2\", unit = \"bar\" }; \
+             pb = { name = \"CH3\", unit = \"bar\" }; qa = { name = \"CH4\", unit = \"L/min\" }"
+        );
+    }
+
+    #[test]
+    fn a_slip_has_a_near_name() {
+        let names = ["Head pressure", "Rod pressure", "Flow"];
+        assert_eq!(near("Head presure", names.into_iter()), Some("Head pressure"));
+        assert_eq!(near("Temperature", names.into_iter()), None);
+    }
+}
