@@ -33,7 +33,7 @@ impl Span {
 pub struct LeakSummary {
     /// Mean of the estimates, L/min.
     pub mean_lpm: f64,
-    /// Root mean square of their standard deviations, L/min; none where one gave none.
+    /// Standard deviation of the last one's error, L/min; none where it gave none.
     pub std_lpm: Option<f64>,
     /// Largest of them, L/min.
     pub max_lpm: f64,
@@ -84,8 +84,7 @@ struct Sums {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct LeakSums {
     mean_lpm: f64,
-    /// Negative once an estimate had none.
-    variance_lpm2: f64,
+    std_lpm: Option<f64>,
     max_lpm: f64,
     alarms: u64,
 }
@@ -169,7 +168,7 @@ impl Sums {
         let count = self.estimates as f64;
         let leakage = self.leaks.map(|leak| LeakSummary {
             mean_lpm: leak.mean_lpm / count,
-            std_lpm: (leak.variance_lpm2 >= 0.0).then(|| (leak.variance_lpm2 / count).sqrt()),
+            std_lpm: leak.std_lpm,
             max_lpm: leak.max_lpm,
             alarm_share: leak.alarms as f64 / count,
             trend_lpm_per_day: None,
@@ -183,10 +182,7 @@ impl LeakSums {
         self.mean_lpm += leakage.mean_lpm;
         self.max_lpm = if first { leakage.mean_lpm } else { self.max_lpm.max(leakage.mean_lpm) };
         self.alarms += u64::from(alarm);
-        match leakage.std_lpm {
-            Some(std_lpm) if self.variance_lpm2 >= 0.0 => self.variance_lpm2 += std_lpm * std_lpm,
-            _ => self.variance_lpm2 = -1.0,
-        }
+        self.std_lpm = leakage.std_lpm;
     }
 }
 
@@ -219,7 +215,7 @@ mod tests {
         assert_eq!(hours, [(Span::Hour, 60, hour_s)]);
         let leak = summaries[0].leakage.internal;
         assert_eq!((leak.mean_lpm, leak.max_lpm, leak.alarm_share), (29.5, 59.0, 1.0));
-        assert!((leak.std_lpm.unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!(leak.std_lpm, Some(0.1));
     }
 
     #[test]

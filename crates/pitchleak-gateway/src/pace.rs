@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 const LEAST_IN_FLIGHT: usize = 10;
 /// A broker that has more to say does so sooner.
 const SILENCE: Duration = Duration::from_millis(300);
+/// One that waited for us goes on as soon as it has its acknowledgements.
+const AT_ONCE: Duration = Duration::from_millis(150);
 /// So often in a row it stopped at the same number.
 const STALLS: u32 = 3;
 
@@ -15,8 +17,17 @@ pub struct Pace {
     in_flight: usize,
     asked: Instant,
     delivered: Instant,
-    /// Where it stopped, and how often in a row.
-    stalls: (usize, u32),
+    stall: Stall,
+}
+
+/// Where the broker fell silent.
+#[derive(Default)]
+struct Stall {
+    count: usize,
+    /// How often in a row it went on at once when it had its acknowledgements.
+    times: u32,
+    /// When it had them; none where it had them for another reason.
+    released: Option<Instant>,
 }
 
 /// Whether a checkpoint is due.
@@ -30,20 +41,31 @@ pub enum Due {
 
 impl Pace {
     pub fn new(every: Duration, in_flight: usize, now: Instant) -> Self {
-        Self { every, in_flight, asked: now, delivered: now, stalls: (0, 0) }
+        Self { every, in_flight, asked: now, delivered: now, stall: Stall::default() }
     }
 
     pub fn delivered(&mut self, now: Instant) {
         self.delivered = now;
+        if let Some(released) = self.stall.released.take() {
+            self.stall.times = if now.duration_since(released) < AT_ONCE { self.stall.times + 1 } else { 0 };
+        }
+    }
+
+    /// The broker has its acknowledgements.
+    pub fn acknowledged(&mut self, now: Instant) {
+        if self.stall.released.is_some() {
+            self.stall.released = Some(now);
+        }
     }
 
     /// Whether a checkpoint is due while so many deliveries wait to be acknowledged; if so, it is taken to be written.
     pub fn due(&mut self, now: Instant, unacknowledged: usize) -> Due {
         let silent = now.duration_since(self.delivered) >= SILENCE;
         let due = if unacknowledged >= self.in_flight || now.duration_since(self.asked) >= self.every {
+            self.stall.released = None;
             Due::Now
         } else if silent && unacknowledged >= LEAST_IN_FLIGHT {
-            self.stalled_at(unacknowledged)
+            self.stalled_at(unacknowledged, now)
         } else {
             return Due::NotYet;
         };
@@ -51,14 +73,16 @@ impl Pace {
         due
     }
 
-    fn stalled_at(&mut self, count: usize) -> Due {
-        let (where_before, times) = self.stalls;
-        self.stalls = (count, if where_before == count { times + 1 } else { 1 });
-        if self.stalls.1 < STALLS {
-            return Due::Now;
+    fn stalled_at(&mut self, count: usize, now: Instant) -> Due {
+        if self.stall.count != count {
+            self.stall = Stall { count, times: 0, released: None };
         }
-        self.in_flight = count;
-        Due::NowThatBrokerWaits(count)
+        if self.stall.times >= STALLS {
+            self.in_flight = count;
+            return Due::NowThatBrokerWaits(count);
+        }
+        self.stall.released = Some(now);
+        Due::Now
     }
 }
 
@@ -66,20 +90,41 @@ impl Pace {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_broker_that_waits_is_found_out() {
-        let begin = Instant::now();
-        let mut pace = Pace::new(Duration::from_secs(10), 1000, begin);
-        let mut now = begin;
-        for expected in [Due::Now, Due::Now, Due::NowThatBrokerWaits(20)] {
+    /// Twenty deliveries, silence, a checkpoint, and the next delivery so long after it.
+    fn four_rounds(pause: Duration) -> Vec<Due> {
+        let mut now = Instant::now();
+        let mut pace = Pace::new(Duration::from_secs(10), 1000, now);
+        let mut round = |_| {
             pace.delivered(now);
             assert_eq!(pace.due(now + Duration::from_millis(100), 20), Due::NotYet);
             now += Duration::from_millis(400);
-            assert_eq!(pace.due(now, 20), expected);
-        }
-        pace.delivered(now);
-        assert_eq!(pace.due(now, 20), Due::Now);
-        assert_eq!(pace.due(now, 3), Due::NotYet);
-        assert_eq!(pace.due(now + Duration::from_secs(10), 0), Due::Now);
+            let due = pace.due(now, 20);
+            now += Duration::from_millis(30);
+            pace.acknowledged(now);
+            now += pause;
+            due
+        };
+        (0..4).map(&mut round).collect()
+    }
+
+    #[test]
+    fn a_broker_that_waits_is_found_out() {
+        let dues = four_rounds(Duration::from_millis(5));
+        assert_eq!(dues, [Due::Now, Due::Now, Due::Now, Due::NowThatBrokerWaits(20)]);
+    }
+
+    #[test]
+    fn a_feed_that_comes_in_bursts_is_none() {
+        assert_eq!(four_rounds(Duration::from_millis(600)), [Due::Now; 4]);
+    }
+
+    #[test]
+    fn a_checkpoint_comes_in_time_and_when_the_window_is_full() {
+        let begin = Instant::now();
+        let mut pace = Pace::new(Duration::from_secs(10), 20, begin);
+        pace.delivered(begin);
+        assert_eq!(pace.due(begin, 19), Due::NotYet);
+        assert_eq!(pace.due(begin, 20), Due::Now);
+        assert_eq!(pace.due(begin + Duration::from_secs(10), 0), Due::Now);
     }
 }

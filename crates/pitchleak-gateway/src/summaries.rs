@@ -106,17 +106,19 @@ mod tests {
     fn ninety_days_are_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let summaries = Summaries::new(folder.path().join("summaries")).expect("a folder");
-        for hour in 0..(24 * 100_u32) {
-            let from_s = 1.7e9 + 3600.0 * f64::from(hour);
-            let summary = SummaryEvent {
-                cylinder: "T7/B2".to_owned(),
-                span: Span::Hour,
-                from_s,
-                estimates: 3600,
-                leakage: PerLeak::default(),
-                time_ns: Some((from_s * 1e9) as i64),
-            };
-            summaries.append(&[summary]).expect("room");
+        for day in 0..100_u32 {
+            let hours = (24 * day..24 * (day + 1)).map(|hour| {
+                let from_s = 1.7e9 + 3600.0 * f64::from(hour);
+                SummaryEvent {
+                    cylinder: "T7/B2".to_owned(),
+                    span: Span::Hour,
+                    from_s,
+                    estimates: 3600,
+                    leakage: PerLeak::default(),
+                    time_ns: Some((from_s * 1e9) as i64),
+                }
+            });
+            summaries.append(&hours.collect::<Vec<_>>()).expect("room");
         }
         let mut files: Vec<_> = fs::read_dir(&summaries.folder)
             .expect("a folder")

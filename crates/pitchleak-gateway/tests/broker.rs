@@ -90,6 +90,32 @@ fn killed_at_random_moments_it_ends_as_an_undisturbed_run() {
 }
 
 #[test]
+fn a_network_that_is_cut_and_mended_changes_nothing() {
+    let Some(broker) = Mosquitto::start("max_inflight_messages 0") else { return };
+    let mut gateway = Gateway::new(&broker, |text| text.replace("port =", "keep_alive_s = 5\nport ="));
+    gateway.start();
+    gateway.wait_for("connected");
+    let (cylinders, batches) = (names(2), batches(TRACE, 100));
+    let mut sender = Sender::new(broker.port);
+    for (at, batch) in batches.iter().enumerate() {
+        for cylinder in &cylinders {
+            sender.send(&format!("pitch/{cylinder}/samples"), batch.as_bytes());
+        }
+        if at == batches.len() / 2 {
+            sender.flush();
+            broker.cut();
+            gateway.wait_for("no_broker");
+            wait_until("that is told", || gateway.get("/health").contains("no connection"));
+            broker.mend();
+        }
+    }
+    sender.flush();
+    let (expected, _) = undisturbed(&cylinders, &batches);
+    wait_until("the state is that of the undisturbed run", || state(&gateway.state()) == expected);
+    assert_eq!(gateway.end(), Some(0));
+}
+
+#[test]
 fn a_wrong_authority_and_a_wrong_password_are_refused() {
     let Some(broker) = Mosquitto::start("") else { return };
     let mut foreign = Gateway::new(&broker, |text| text.replace("authority.pem", "another-authority.pem"));

@@ -36,6 +36,19 @@ impl Mosquitto {
         Some(Self { child, folder, tls_port, port })
     }
 
+    /// As if the network were cut: nothing comes through, and nobody is told.
+    pub fn cut(&self) {
+        self.signal("-STOP");
+    }
+
+    pub fn mend(&self) {
+        self.signal("-CONT");
+    }
+
+    fn signal(&self, signal: &str) {
+        Command::new("kill").args([signal, &self.child.id().to_string()]).status().unwrap();
+    }
+
     /// Ends it in order, so that it keeps what it has, and starts it again.
     pub fn restart(&mut self) {
         Command::new("kill").arg(self.child.id().to_string()).status().unwrap();

@@ -174,6 +174,7 @@ impl<B: Broker> Service<B> {
             Ok(bytes) => {
                 self.metrics.saved(bytes, saved.took);
                 self.broker.acknowledge(saved.tickets);
+                self.pace.acknowledged(Instant::now());
             }
             Err(why) => {
                 self.metrics.checkpoint_failures.fetch_add(1, Relaxed);
@@ -251,3 +252,6 @@ pub fn status(base: &str, word: &str) -> Message {
 fn shown(topic: &str) -> String {
     topic.chars().take(80).collect()
 }
+
+#[cfg(test)]
+mod tests;
