@@ -79,11 +79,11 @@ impl Feed {
 
     fn last_estimate(mut self) -> EstimateEvent {
         self.watch.finish(&mut self.events);
-        let estimates = self.events.into_iter().filter_map(|event| match event {
+        let mut estimates = self.events.into_iter().filter_map(|event| match event {
             Event::Estimate(estimate) => Some(estimate),
             _ => None,
         });
-        *estimates.last().unwrap()
+        *estimates.next_back().unwrap()
     }
 }
 
