@@ -94,8 +94,8 @@ pub struct TraceReader<'a> {
 }
 
 impl TraceReader<'static> {
-    /// Opens a trace file, `.csv` or `.csv.gz`, or standard input where `path` is `-`, and reads its
-    /// header. The rig gives foreign column names and the ranges that readings must lie in.
+    /// Opens a trace file, CSV (also gzip), Parquet or MAT by its first bytes, or standard input where `path` is `-`, and
+    /// reads its header. The rig gives foreign column names and the ranges that readings must lie in.
     ///
     /// # Errors
     /// Where the file cannot be read, is no trace, or its header lacks a signal, gives one twice or

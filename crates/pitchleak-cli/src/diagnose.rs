@@ -25,7 +25,7 @@ Examples:
   pitchleak replay trace.csv.gz --rig corrected.toml
   pitchleak diagnose trace.csv.gz --out figures")]
 pub struct Arguments {
-    /// Traces to fit: .csv or .csv.gz, `-` for standard input
+    /// Traces to fit: .csv, .csv.gz, .parquet or .mat, `-` for standard input
     #[arg(value_name = "TRACE", required = true)]
     traces: Vec<PathBuf>,
 

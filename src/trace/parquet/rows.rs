@@ -106,7 +106,11 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
 fn damaged(error: ParquetError) -> TraceFault {
     match error {
         ParquetError::NYI(what) | ParquetError::General(what) if what.contains("feature") => {
-            TraceFault::Damaged(format!("{what}: write it with snappy or without compression"))
+            let codec = what.rsplit(' ').next().unwrap_or_default();
+            TraceFault::Ambiguous {
+                what: format!("compressed by {codec}, which is not read"),
+                settle: "write it with compression=\"snappy\" or none".to_owned(),
+            }
         }
         other => TraceFault::Damaged(other.to_string().replace('\n', " ")),
     }
