@@ -42,7 +42,7 @@ fn documented_lines() -> Vec<String> {
 fn regress_table() {
     let reproduction = reproduce(SEEDS, |_| ()).expect("runs");
     let page = Page::of_reproduction(&reproduction).expect("draws").to_html();
-    assert!(page.contains(">REPRODUCED</h1>") && page.len() <= 1_000_000, "{} bytes", page.len());
+    assert!(page.contains(">ACCURACY MET</h1>") && page.len() <= 1_000_000, "{} bytes", page.len());
     let report = reproduction.report;
     assert_eq!((report.rows.len(), report.rows_with_bias.len(), report.tracking.len()), (32, 16, 8));
     for (rows, efficiency) in [&report.rows, &report.rows_with_bias].into_iter().zip(EFFICIENCY) {

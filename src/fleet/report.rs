@@ -91,8 +91,7 @@ impl<'a> FleetReport<'a> {
             let _ = write!(text, ", {error} not judged");
         }
         text.push('\n');
-        let mut worst: Vec<_> = self.rows.iter().filter(|row| row.status != Some(Status::Sound)).collect();
-        worst.sort_by(|a, b| urgency(a).cmp(&urgency(b)).then(b.worst_lpm().total_cmp(&a.worst_lpm())));
+        let worst = self.worst();
         if !worst.is_empty() {
             text.push('\n');
         }
@@ -106,16 +105,34 @@ impl<'a> FleetReport<'a> {
         text
     }
 
-    /// The leaks that grow from trace to trace beyond doubt, the fastest first.
-    fn write_trends(&self, text: &mut String) {
+    /// The traces that ask for somebody, the worst first.
+    pub(crate) fn worst(&self) -> Vec<&'a FleetRow> {
+        let urgency = |row: &FleetRow| match row.status {
+            Some(Status::Leak) => 0,
+            Some(Status::Doubtful) => 1,
+            Some(Status::NotSure) => 2,
+            None => 3,
+            Some(Status::Sound) => 4,
+        };
+        let mut worst: Vec<_> = self.rows.iter().filter(|row| row.status != Some(Status::Sound)).collect();
+        worst.sort_by(|a, b| urgency(a).cmp(&urgency(b)).then(b.worst_lpm().total_cmp(&a.worst_lpm())));
+        worst
+    }
+
+    /// The leaks that grow from trace to trace beyond doubt, the fastest first, with their cylinders.
+    pub(crate) fn growing(&self) -> Vec<(&str, Leak, &LongTrend)> {
         let mut growing = Vec::new();
         for CylinderTrend { cylinder, leaks } in &self.trends {
-            let significant = leaks.iter().filter_map(|(leak, long)| Some((leak, long.as_ref()?)));
-            growing.extend(
-                significant.filter(|(_, long)| long.grows()).map(|(leak, long)| (cylinder, leak, long)),
-            );
+            let known = leaks.iter().filter_map(|(leak, long)| Some((leak, long.as_ref()?)));
+            let grows = known.filter(|(_, long)| long.grows());
+            growing.extend(grows.map(|(leak, long)| (cylinder.as_str(), leak, long)));
         }
         growing.sort_by(|(_, _, a), (_, _, b)| b.trend.slope_lpm_per_h.total_cmp(&a.trend.slope_lpm_per_h));
+        growing
+    }
+
+    fn write_trends(&self, text: &mut String) {
+        let growing = self.growing();
         if !growing.is_empty() {
             text.push('\n');
         }
@@ -130,16 +147,6 @@ impl<'a> FleetReport<'a> {
 
 fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
-}
-
-fn urgency(row: &FleetRow) -> u8 {
-    match row.status {
-        Some(Status::Leak) => 0,
-        Some(Status::Doubtful) => 1,
-        Some(Status::NotSure) => 2,
-        None => 3,
-        Some(Status::Sound) => 4,
-    }
 }
 
 fn line(row: &FleetRow, palette: &Palette) -> String {

@@ -8,6 +8,7 @@ mod chart;
 mod check;
 mod diagnose;
 mod envelope;
+mod fleet;
 mod history;
 mod machine;
 mod replay;

@@ -5,6 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::fleet::{
     FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
 };
+use pitchleak::page::{Page, PageFile};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,6 +31,10 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
+    /// Write the result as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+
     /// Print counts and rows as JSON (schema pitchleak.fleet/1)
     #[arg(long)]
     json: bool,
@@ -47,6 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let inputs = FleetTrace::inputs(&traces, &rigs);
     let stop = stop_at_signal()?;
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
+    let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let bar = progress(traces.len());
     let judged = |row: &FleetRow| {
         bar.inc(1);
@@ -60,6 +66,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         file.write(&FleetTable::of(&rows))?;
     }
     let report = FleetReport::of(&rows);
+    if let Some(page) = page {
+        page.finish(&Page::of_fleet(&report))?;
+    }
     output::print(&if arguments.json {
         report.to_json()? + "\n"
     } else {

@@ -1,14 +1,7 @@
 //! Every kind of page in a browser: it opens without a complaint, draws its charts, follows the cursor and zooms. Needs
 //! `chromium`; run with `-- --ignored`.
 
-use pitchleak::Rig;
-use pitchleak::check::check;
-use pitchleak::diagnose::{Declared, Series, diagnose};
-use pitchleak::page::{History, Page};
-use pitchleak::replay::{ReplayError, replay};
-use pitchleak::reproduce::reproduce;
-use pitchleak::trace::TraceReader;
-use std::path::Path;
+use super::made;
 use std::process::Command;
 
 /// Moves the pointer over the first chart, then drags over half of it, and leaves what came of it in the document.
@@ -86,26 +79,10 @@ fn assert_cursor_and_zoom_work(page: &str) {
     assert!(left(&document, "cursors").expect("cursors").parse::<usize>().expect("a number") > 3);
 }
 
-fn rig() -> Rig {
-    Rig::load("data/traces/rig.toml").expect("a rig")
-}
-
-const TRACE: &str = "data/traces/external_a.csv.gz";
-
-fn replayed(path: impl AsRef<Path>, rig: &Rig) -> String {
-    let mut reader = TraceReader::open(path, rig).expect("a trace");
-    let mut history = History::default();
-    let report = replay(&mut reader, rig, |replay, record, renewed| {
-        history.add(replay, record, renewed);
-        Ok::<_, ReplayError>(())
-    });
-    Page::of_replay(&report.expect("replays"), rig, &history).to_html()
-}
-
 #[test]
 #[ignore = "needs chromium"]
 fn a_replay() {
-    let page = replayed(TRACE, &rig());
+    let page = made::replayed(made::TRACE, &made::rig());
     assert_opens(&page);
     assert_cursor_and_zoom_work(&page);
 }
@@ -113,30 +90,25 @@ fn a_replay() {
 #[test]
 #[ignore = "needs chromium"]
 fn a_check() {
-    let rig = rig();
-    let mut reader = TraceReader::open(TRACE, &rig).expect("a trace");
-    let mut history = History::default();
-    let report = check(&mut reader, &rig, |replay, record, renewed| {
-        history.add(replay, record, renewed);
-        Ok::<_, ReplayError>(())
-    });
-    assert_opens(&Page::of_check(&report.expect("checks"), &rig, &history).to_html());
+    assert_opens(&made::checked());
 }
 
 #[test]
 #[ignore = "needs chromium"]
 fn a_diagnosis() {
-    let mut rig = Rig::paper();
-    (rig.cylinder.moving_mass_kg, rig.fluid.bulk_modulus_pa) = (30.0, 0.9e9);
-    let mut reader = TraceReader::open("data/hopsan/u04.csv.gz", &rig).expect("a trace");
-    let series = Series::read(&mut reader).expect("reads");
-    let diagnosis = diagnose(&[series], &[], &Declared::of(&rig), &|| ());
-    assert_opens(&Page::of_diagnosis(&diagnosis, &rig, &["u04".to_owned()]).to_html());
+    assert_opens(&made::diagnosed());
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_fleet() {
+    assert_opens(&made::fleet());
 }
 
 #[test]
 #[ignore = "needs chromium"]
 fn a_reproduction() {
-    let reproduction = reproduce(2, |_| ()).expect("reproduces");
-    assert_opens(&Page::of_reproduction(&reproduction).expect("draws").to_html());
+    let page = made::reproduced();
+    assert!(page.len() <= 1_000_000, "{} bytes", page.len());
+    assert_opens(&page);
 }

@@ -1,23 +1,14 @@
 //! What every page keeps, whatever the trace: complete in itself, well-formed, harmless, of bounded size.
 
+mod browser;
+mod made;
+
+use made::{TRACE, diagnosed, fleet, replayed, rig};
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::page::{History, Page, PageFile};
-use pitchleak::replay::{Replay, ReplayError, replay};
+use pitchleak::replay::Replay;
 use pitchleak::report::TraceSummary;
 use pitchleak::trace::{Record, TraceReader};
-
-const TRACE: &str = "data/traces/external_a.csv.gz";
-
-fn page(path: &str, rig: &Rig) -> String {
-    let mut reader = TraceReader::open(path, rig).expect("a trace");
-    let mut history = History::default();
-    let report = replay(&mut reader, rig, |replay, record, renewed| {
-        history.add(replay, record, renewed);
-        Ok::<_, ReplayError>(())
-    });
-    Page::of_replay(&report.expect("replays"), rig, &history).to_html()
-}
 
 /// The page without what is in `<script>` and `<style>`.
 fn markup(page: &str) -> String {
@@ -69,7 +60,7 @@ fn assert_complete_in_itself(page: &str) {
 
 #[test]
 fn a_page_of_a_replay_has_all_its_parts() {
-    let page = page(TRACE, &Rig::load("data/traces/rig.toml").expect("a rig"));
+    let page = replayed(TRACE, &rig());
     assert_complete_in_itself(&page);
     let parts = [
         "LEAK</h1>",
@@ -93,7 +84,7 @@ fn a_page_of_a_replay_has_all_its_parts() {
 
 #[test]
 fn an_hour_at_100_hz_fits_in_a_megabyte() {
-    let rig = Rig::load("data/traces/rig.toml").expect("a rig");
+    let rig = rig();
     let mut reader = TraceReader::open(TRACE, &rig).expect("a trace");
     let (mut records, mut record) = (Vec::new(), Record::default());
     while reader.next_record(&mut record).expect("reads") {
@@ -122,23 +113,33 @@ fn an_hour_at_100_hz_fits_in_a_megabyte() {
 
 #[test]
 fn a_page_of_a_diagnosis_leads_from_the_residual_to_the_effect() {
-    let mut rig = Rig::paper();
-    (rig.cylinder.moving_mass_kg, rig.fluid.bulk_modulus_pa) = (30.0, 0.9e9);
-    let mut reader = TraceReader::open("data/hopsan/u04.csv.gz", &rig).expect("a trace");
-    let series = Series::read(&mut reader).expect("reads");
-    let diagnosis = diagnose(&[series], &[], &Declared::of(&rig), &|| ());
-    let page = Page::of_diagnosis(&diagnosis, &rig, &["<img src=x>".to_owned()]).to_html();
+    let page = diagnosed();
     assert_complete_in_itself(&page);
-    for part in [
-        "EXPLAINED</h1>",
-        "Coulomb friction",
-        "What it would take to be sure",
-        "not fitted",
-        "Force against",
-        "&lt;img src=x&gt;",
-    ] {
+    for part in
+        ["EXPLAINED</h1>", "Coulomb friction", "What it would take to be sure", "not fitted", "Force against"]
+    {
         assert!(page.contains(part), "{part}");
     }
+    assert!(!page.contains("<img"));
+}
+
+#[test]
+fn a_page_of_a_fleet_says_who_asks_for_somebody_and_what_grows() {
+    let page = fleet();
+    assert_complete_in_itself(&page);
+    let parts = [
+        "6 LEAKS</h1>",
+        "1 could not be judged",
+        "One leak grows",
+        "0.30",
+        "internal leak",
+        "days since",
+        "no trace.csv",
+    ];
+    for part in parts {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("<img"));
 }
 
 #[test]
@@ -152,7 +153,7 @@ fn names_of_files_and_columns_do_nothing() {
         format!("{t_s},{},{},30,0.3,-0.2,1,2\n", 50.0 + 10.0 * t_s.sin(), 40.0 + t_s.cos())
     });
     std::fs::write(&path, format!("{header}\n{}", rows.collect::<String>())).expect("writes");
-    let page = page(&path.display().to_string(), &Rig::paper());
+    let page = replayed(&path, &Rig::paper());
     assert_complete_in_itself(&page);
     assert!(page.contains("&lt;script&gt;alert(1)"), "the file's name is missing");
     assert!(page.contains("&lt;img src=x onerror=alert(3)&gt;"), "the column's name is missing");
