@@ -2,7 +2,7 @@
 //! table has, by a plant of its own.
 //!
 //! `cargo bench --bench confidence` prints the figures of `docs/closing-the-loop.md`. After `--`: a kind (`sound`, `long`, `two`,
-//! `outside`), a number that thins the cases out, and `each` for a line per case.
+//! `outside`), a number that thins the cases out, `seeds=7000` for rigs drawn anew, and `each` for a line per case.
 
 mod cases;
 mod plant;
@@ -23,8 +23,10 @@ fn main() {
         ("two", cases::two(96 / stride)),
         ("outside", cases::outside(208 / stride)),
     ];
+    let further = arguments.iter().find_map(|a| a.strip_prefix("seeds=")?.parse().ok()).unwrap_or(0_u64);
     let each = arguments.iter().any(|a| a == "each");
-    for (kind, cases) in all.into_iter().filter(|(kind, _)| wanted(kind)) {
+    for (kind, mut cases) in all.into_iter().filter(|(kind, _)| wanted(kind)) {
+        cases.iter_mut().for_each(|case| case.seed += further);
         let answers = tally::ask_all(&cases);
         if each {
             answers.iter().for_each(|(case, answer)| println!("{}", tally::line(case, answer)));

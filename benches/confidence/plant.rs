@@ -209,7 +209,7 @@ impl Plant {
             };
             clock += if moving { h } else { 0.0 };
             // Ten times slower than the spool and the oil: kept over one step.
-            let aim = self.stroke * (0.5 + 0.13 * motion.at(clock));
+            let aim = self.stroke * (0.5 + 0.13 * motion.at(clock)).clamp(0.06, 0.94);
             let load = self.load * (2.0 + 0.8 * wind.at(t));
             let wanted = (10.0 * (aim - at.x) / self.stroke).clamp(-1.0, 1.0);
             if k as f64 >= WARM_UP_S * RATE_HZ {

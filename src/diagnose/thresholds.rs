@@ -37,10 +37,20 @@ pub(crate) const MOST_SAMPLES: usize = 80_000;
 /// Samples of that length in a piece of a trace too long to be fitted whole. Chosen: 20 s at 100 Hz, so that ends of
 /// pieces cost one hat in a hundred.
 pub(crate) const PIECE_SAMPLES: usize = 2000;
-/// Noise this many times the declared one is remarked upon. Derived: the median of third differences of 600 samples
-/// (6 s at 100 Hz) of white noise is larger by that much at about 3.5 standard deviations (7 %: the median's efficiency is
-/// 0.37, and third differences have 2.3 times the variance of independent ones, Bartlett 1946).
-pub(crate) const NOISIER: f64 = 1.25;
+/// The machine moves no faster than that, Hz. Chosen: wind and pitch control stay below.
+pub(crate) const FASTEST_MOTION_HZ: f64 = 1.4;
+/// Share of such motion that may stay in what is taken for noise. Chosen: a hundredth of the noise of a sensor of 0.1 % for
+/// motion over a twentieth of its full scale.
+pub(crate) const MOTION_LEFT: f64 = 2.5e-4;
+/// Noise beyond the declared one by so many standard deviations of its estimate is taken for the sensor's own. Chosen: once in a
+/// thousand sound rigs for six sensors.
+pub(crate) const NOISIER_SIGMA: f64 = 3.5;
+/// Of the median of sizes of normal numbers against their root mean square. Sourced: Rousseeuw and Croux (1993).
+pub(crate) const MEDIAN_EFFICIENCY: f64 = 0.37;
+/// Regular noise this many times the declared one is a ripple. Chosen: less harms nothing.
+pub(crate) const RIPPLE: f64 = 1.25;
+/// A row's samples are louder than noise where their differences' root mean square is so many standard deviations. Chosen: three.
+pub(crate) const LOUD_SIGMA: f64 = 3.0;
 /// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
 /// samples of white noise has a standard deviation of √(2.3/600) = 0.06 (Bartlett 1946); this is four of them.
 pub(crate) const RIPPLE_COLOUR: f64 = 0.25;
@@ -121,6 +131,8 @@ pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;
 pub(crate) const IN_THE_RUNNING: f64 = 0.4;
 /// Standard deviations by the jackknife that an effect must have beside an unexplained residual. Chosen: three.
 pub(crate) const AGREED_SIGMA: f64 = 3.0;
+/// A lag is not named below this share of the time between two samples. Chosen: integrals between samples are no better than that.
+pub(crate) const LEAST_LAG_SHARE: f64 = 0.01;
 /// Candidates whose fit is this close cannot be told apart. Derived: three standard deviations.
 pub(crate) const CONFUSABLE_CHI2: f64 = 9.0;
 /// A score below this is not worth a search for constants. Derived: three standard deviations.

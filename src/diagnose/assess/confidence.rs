@@ -6,7 +6,7 @@ use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::search::{self, Selected, Selection};
-use crate::diagnose::thresholds::{DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE};
+use crate::diagnose::thresholds::{CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE};
 use crate::diagnose::weak_form::Term;
 use pitchleak_core::effects::EffectKind;
 
@@ -127,6 +127,18 @@ fn leaks(fit: &Fit<'_>, one: &Selected) -> Option<String> {
     ]
     .into_iter()
     .find_map(impossible)
+}
+
+/// By how much a candidate that these traces neither name nor rule out would move an effect's value: a second effect that is too
+/// weak for a name need not be absent.
+pub(crate) fn unnamed_shift(fit: &Fit<'_>, term: usize) -> f64 {
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let is_possible = |candidate: &usize| {
+        let score = fit.score(&fit.free, *candidate);
+        score.is_some_and(|score| score.chi2_drop > CONFUSABLE_CHI2 * dispersion)
+    };
+    let possible = search::open(fit).into_iter().filter(is_possible);
+    possible.filter_map(|candidate| fit.shift_by(candidate, term)).map(f64::abs).fold(0.0, f64::max)
 }
 
 /// Standard deviation of an effect's value where it is only known over the bulk modulus, as a dead volume is; else none.

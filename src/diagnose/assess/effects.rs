@@ -25,7 +25,7 @@ pub(crate) fn found(
     Some(FoundEffect {
         id: spec.id,
         value,
-        std: std * fit.dispersion(fit.bounded.chi2).sqrt(),
+        std: (std * fit.dispersion(fit.bounded.chi2).sqrt()).hypot(confidence::unnamed_shift(fit, one.term)),
         unit: spec.unit,
         confident: doubt.is_none(),
         doubt,

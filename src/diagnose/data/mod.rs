@@ -6,6 +6,7 @@ mod motion;
 mod sensor_noise;
 mod series;
 mod traces;
+mod unresolved;
 mod wiring;
 
 pub use declared::Declared;
@@ -15,4 +16,5 @@ pub(crate) use motion::Motion;
 pub(crate) use sensor_noise::{SensorCheck, check_sensors, effective};
 pub use series::Series;
 pub use traces::Traces;
+pub(crate) use unresolved::Unresolved;
 pub(crate) use wiring::miswired;

@@ -1,7 +1,9 @@
 //! The noise that the signals really carry, held against the data sheets.
 
 use super::series::Series;
-use crate::diagnose::thresholds::{LEAST_STEP_S, NOISIER, RIPPLE_COLOUR};
+use crate::diagnose::thresholds::{
+    FASTEST_MOTION_HZ, MEDIAN_EFFICIENCY, MOTION_LEFT, NOISIER_SIGMA, RIPPLE, RIPPLE_COLOUR,
+};
 use pitchleak_core::Sensors;
 
 /// How the noise of one kind of sensor compares with its data sheet.
@@ -13,11 +15,11 @@ pub(crate) struct SensorCheck {
 
 impl SensorCheck {
     pub(crate) fn is_noisier(&self) -> bool {
-        self.found.std > NOISIER * self.declared_std
+        self.found.std > (1.0 + NOISIER_SIGMA * self.found.scatter) * self.declared_std
     }
 
     pub(crate) fn is_ripple(&self) -> bool {
-        self.is_noisier() && self.found.colour > RIPPLE_COLOUR
+        self.found.std > RIPPLE * self.declared_std && self.found.colour > RIPPLE_COLOUR
     }
 }
 
@@ -71,25 +73,39 @@ pub(crate) fn effective(
 pub(crate) struct FastNoise {
     /// As if it were white, in the signal's unit.
     pub(crate) std: f64,
+    /// Standard deviation of that as a share of it, were the noise white.
+    pub(crate) scatter: f64,
     /// Largest autocorrelation of the differences at nine lags beyond their order, which is zero for white noise.
     pub(crate) colour: f64,
 }
 
-/// Third differences see no motion at 100 Hz; slower samples take sixth ones: of a wave of 1.4 Hz sampled at 20 Hz the third leave 2 %
-/// beside the noise, the sixth 0.02 %.
-fn difference_order(step_s: f64) -> usize {
-    if step_s > 1.5 * LEAST_STEP_S { 6 } else { 3 }
+/// The least order, from three, whose differences see next to nothing of the machine's motion: three at 100 Hz, four at 50, six at 20.
+pub(super) fn difference_order(step_s: f64) -> usize {
+    let turn = 2.0 * (std::f64::consts::PI * FASTEST_MOTION_HZ * step_s).sin();
+    let is_blind =
+        |order: &usize| turn.powi(*order as i32) / binomials(2 * order)[*order].sqrt() < MOTION_LEFT;
+    (3..6).find(is_blind).unwrap_or(6)
+}
+
+/// The binomial coefficients of a row of Pascal's triangle.
+fn binomials(row: usize) -> Vec<f64> {
+    let next = |last: &f64, k: usize| last * (row - k) as f64 / (k + 1) as f64;
+    std::iter::successors(Some((1.0, 0)), |(last, k)| (*k < row).then(|| (next(last, *k), k + 1)))
+        .map(|one| one.0)
+        .collect()
+}
+
+/// So many differences of white noise say as much about its size as one independent number (Bartlett 1946).
+fn correlated(order: usize) -> f64 {
+    let row = binomials(2 * order);
+    row.iter().map(|cell| (cell / row[order]).powi(2)).sum()
 }
 
 /// Differences of an order, oldest first, and their standard deviation for unit white noise.
-fn differences(signal: &[f64], order: usize) -> (Vec<f64>, f64) {
-    let (mut out, mut gain) = (signal.to_vec(), 1.0);
-    for k in 1..=order {
-        out = out.windows(2).map(|w| w[1] - w[0]).collect();
-        // The binomial coefficient of 2k over k.
-        gain *= (4 * k - 2) as f64 / k as f64;
-    }
-    (out, gain.sqrt())
+pub(super) fn differences(signal: &[f64], order: usize) -> (Vec<f64>, f64) {
+    let once = |values: Vec<f64>| values.windows(2).map(|w| w[1] - w[0]).collect();
+    let fast = (0..order).fold(signal.to_vec(), |values, _| once(values));
+    (fast, binomials(2 * order)[order].sqrt())
 }
 
 /// Noise by differences of high order: what the machine does within so few samples is smooth, so that only
@@ -118,7 +134,9 @@ pub(crate) fn fast_noise<'a>(signals: impl Iterator<Item = &'a [f64]>, order: us
     }
     let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
     let colour = lags.map(|lag| (products[lag] / power).abs()).fold(0.0, f64::max);
-    FastNoise { std: median / NORMAL_MEDIAN / gain, colour }
+    let independent = sizes.len() as f64 / correlated(order);
+    let scatter = (0.5 / MEDIAN_EFFICIENCY / independent).sqrt();
+    FastNoise { std: median / NORMAL_MEDIAN / gain, scatter, colour }
 }
 
 /// Median of the size of a standard normal number.
@@ -134,5 +152,12 @@ mod tests {
         assert!(fast_noise(std::iter::once(ripple.as_slice()), 3).colour > 0.9);
         let smooth: Vec<f64> = (0..2000).map(|i| (0.06 * f64::from(i)).sin()).collect();
         assert!(fast_noise(std::iter::once(smooth.as_slice()), 3).std < 1e-4);
+    }
+
+    #[test]
+    fn slow_samples_take_differences_of_higher_order() {
+        assert_eq!([0.005, 0.01, 0.02, 0.05].map(difference_order), [3, 3, 4, 6]);
+        assert!((binomials(6)[3] - 20.0).abs() < 1e-12 && (binomials(6)[1] - 6.0).abs() < 1e-12);
+        assert!((correlated(3) - 2.3).abs() < 0.05, "{}", correlated(3));
     }
 }

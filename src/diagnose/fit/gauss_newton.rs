@@ -314,6 +314,14 @@ impl<'a> Fit<'a> {
         self.regression.solve(&self.structure.active, &priors)
     }
 
+    /// By how much one further term would move the value of a fitted one: no new pass over the data.
+    pub(crate) fn shift_by(&self, further: usize, term: usize) -> Option<f64> {
+        let own = self.bounded.terms.iter().position(|one| *one == term)?;
+        let terms = [self.active(), &[further]].concat();
+        let with = self.regression.solve(&terms, &self.held_priors());
+        Some(with.value.get(own)? - self.bounded.value[own])
+    }
+
     /// Whether a further term with these constants also helps where it was not fitted.
     pub(crate) fn holds_out(&self, term: usize, constants: EffectConstants<f64>) -> bool {
         let priors = self.problem.increments(&self.weak_form.at);

@@ -2,6 +2,7 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective};
+use crate::diagnose::thresholds::LEAST_LAG_SHARE;
 use crate::diagnose::weak_form::{DECLARED, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Model, PerLeak, Sensors};
@@ -15,6 +16,8 @@ pub(crate) struct Problem<'a> {
     pub(super) white: Sensors<f64>,
     pub(crate) terms: Vec<Term>,
     pub(crate) priors: Vec<Option<Prior>>,
+    /// No shorter lag is named.
+    least_lag_s: f64,
     /// The constants that every effect starts from.
     pub(crate) usual_constants: EffectConstants<f64>,
     /// The declared model, from which the fit sets out.
@@ -30,6 +33,7 @@ impl<'a> Problem<'a> {
             white: effective(&declared.sensors, checks, |check| !check.is_ripple()),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,
+            least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
             usual_constants: friction_constants(traces, declared),
             start: Linearisation::declared(declared),
         }
@@ -54,10 +58,11 @@ impl<'a> Problem<'a> {
         self.priors.iter().zip(&self.terms).map(from_there).collect()
     }
 
-    /// Values of a term that physics allows.
+    /// Values of a term that physics allows and samples can show.
     pub(crate) fn allows(&self, term: usize, value: f64) -> bool {
         let (lower, upper) = self.terms[term].bounds();
-        (lower..=upper).contains(&value)
+        let is_lag = self.terms[term].effect().is_some_and(|effect| effect.spec().unit == "s");
+        (lower..=upper).contains(&value) && !(is_lag && value < self.least_lag_s)
     }
 }
 

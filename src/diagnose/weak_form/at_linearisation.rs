@@ -9,7 +9,7 @@ use super::sensitivity::Sensitivity;
 use super::shared_noise::{SharedNoise, Slopes};
 use super::terms::Term;
 use super::whitening::Whitening;
-use crate::diagnose::data::{Motion, Series};
+use crate::diagnose::data::{Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
 use pitchleak_core::Sensors;
@@ -61,7 +61,8 @@ impl<'a> WeakForm<'a> {
         let motions = motions(traces, sensors, &at);
         let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
         let rows = rows.at_places(columns.places, columns.terms.len());
-        let sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
+        let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
+        add_unresolved(&mut sensitivities, &rows, traces, sensors);
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
@@ -117,6 +118,20 @@ pub(crate) fn residual_rows(
     block_s: f64,
 ) -> Rows {
     Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
+}
+
+/// More noise where a trace moves faster than its samples tell.
+fn add_unresolved(
+    sensitivities: &mut [PerEquation<Sensitivity>],
+    rows: &Rows,
+    traces: &[Series],
+    sensors: &Sensors<f64>,
+) {
+    let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
+    for (own, row) in sensitivities.iter_mut().zip(&rows.rows) {
+        let times = unresolved[row.trace()].loudness(row.samples_in(&traces[row.trace()].t_s));
+        *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
+    }
 }
 
 fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {

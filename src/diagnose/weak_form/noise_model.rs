@@ -74,12 +74,12 @@ impl NoiseModel<'_> {
         let stored = volume_m3.abs() / self.at.model.fluid.bulk_modulus_pa;
         let [a, b] = [Channel::PressureA as usize, Channel::PressureB as usize];
         let held = |gain: f64, most: f64| if gain > most { most / gain } else { 1.0 };
-        let leaks = held(own.0[a][0].hypot(own.0[b][0]), leak_gain);
-        let storage = held(own.0[a][1].hypot(own.0[b][1]), stored);
+        let leaks = held(own.gains[a][0].hypot(own.gains[b][0]), leak_gain);
+        let storage = held(own.gains[a][1].hypot(own.gains[b][1]), stored);
         for place in [a, b] {
-            own.0[place][0] *= leaks;
-            own.0[place][1] *= storage;
-            own.0[place][2] *= storage;
+            own.gains[place][0] *= leaks;
+            own.gains[place][1] *= storage;
+            own.gains[place][2] *= storage;
         }
         own
     }
@@ -121,14 +121,15 @@ impl NoiseModel<'_> {
         let steps = [step_s, 1.0, 1.0 / step_s];
         let mut sum = 0.0;
         for (place, channel) in Channel::ALL.into_iter().enumerate() {
-            let (one, other) = (first.0[place], second.0[place]);
+            let (one, other) = (first.gains[place], second.gains[place]);
             let mut of_channel = 0.0;
             for (k, one) in one.into_iter().enumerate().filter(|(_, one)| *one != 0.0) {
                 for (l, other) in other.into_iter().enumerate() {
                     of_channel += one * other * weights[k][l] * steps[k] * steps[l];
                 }
             }
-            sum += of_channel * channel.noise_std(self.sensors, self.at).powi(2);
+            let loudness = first.loudness[place] * second.loudness[place];
+            sum += of_channel * loudness * channel.noise_std(self.sensors, self.at).powi(2);
         }
         let error = if a == b { self.equation_error[a] } else { 0.0 };
         sum + weights[0][0] * step_s * step_s * error

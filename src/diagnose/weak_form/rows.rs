@@ -29,6 +29,19 @@ pub(crate) struct Row {
     pub(crate) stuck: f64,
 }
 
+impl Row {
+    /// Which of the traces it is of.
+    pub(super) fn trace(&self) -> usize {
+        self.stretch / MOST_STRETCHES
+    }
+
+    /// Its samples in the times of its trace.
+    pub(super) fn samples_in(&self, t_s: &[f64]) -> Range<usize> {
+        let peak = t_s.partition_point(|t| *t < self.t_s);
+        peak.saturating_sub(self.samples)..peak + self.samples
+    }
+}
+
 /// One equation of one row: an entry of the regression.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {

@@ -93,11 +93,28 @@ impl Channel {
     }
 }
 
-/// By how much one row of an equation grows with each channel's signal, rate and curvature.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Sensitivity(pub(crate) [[f64; 3]; Channel::ALL.len()]);
+/// How one row of an equation takes up noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sensitivity {
+    /// By how much it grows with each channel's signal, rate and curvature.
+    pub(crate) gains: [[f64; 3]; Channel::ALL.len()],
+    /// The noise of each channel in that of its sensor: more where the trace moves faster than its samples tell.
+    pub(crate) loudness: [f64; Channel::ALL.len()],
+}
+
+impl Default for Sensitivity {
+    fn default() -> Self {
+        Self { gains: [[0.0; 3]; Channel::ALL.len()], loudness: [1.0; Channel::ALL.len()] }
+    }
+}
 
 impl Sensitivity {
+    /// The same where position, pressures, flows and force are so loud.
+    #[must_use]
+    pub(super) fn at_loudness(self, [x, pa, pb, qa, qb, force]: [f64; 6]) -> Self {
+        Self { loudness: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
+    }
+
     /// Of all three equations at a row.
     pub(crate) fn of(at: &Linearisation, sensors: &Sensors<f64>, row: &Row) -> PerEquation<Self> {
         let mut all = PerEquation::<Self>::default();
@@ -110,7 +127,7 @@ impl Sensitivity {
                 };
                 let slope = channel.slope(order, &row.mean, (std, row.block_s), residual);
                 for equation in Equation::ALL {
-                    all[equation].0[place][order] = slope[equation];
+                    all[equation].gains[place][order] = slope[equation];
                 }
             }
         }

@@ -73,11 +73,11 @@ impl SharedNoise {
         };
         let drawn: [InRows; Channel::ALL.len()] = Channel::ALL.map(of_channel);
         let in_row = |entry: &Entry| {
-            let sensitivity = &noise.sensitivities[entry.row][entry.equation].0;
-            let of_one = |(gains, drawn): (&[f64; 3], &InRows)| {
-                gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row]
+            let sensitivity = &noise.sensitivities[entry.row][entry.equation];
+            let of_one = |((gains, loudness), drawn): ((&[f64; 3], &f64), &InRows)| {
+                loudness * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
             };
-            sensitivity.iter().zip(&drawn).map(of_one).sum()
+            sensitivity.gains.iter().zip(&sensitivity.loudness).zip(&drawn).map(of_one).sum()
         };
         let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];
