@@ -221,3 +221,49 @@ fn a_leak_that_grows_from_day_to_day_is_told() {
     let json: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
     assert_eq!(json["trends"][0]["leaks"]["internal"]["traces"], 5);
 }
+
+#[cfg(feature = "parquet")]
+#[test]
+fn time_stamps_of_parquet_say_when() {
+    use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
+    use parquet::data_type::{DoubleType, Int64Type};
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::types::Type;
+    use std::sync::Arc;
+    let farm = TempDir::new().unwrap();
+    let folder = farm.path().join("turbine=T7/blade=B2");
+    fs::create_dir_all(&folder).unwrap();
+    let micros = LogicalType::timestamp(true, TimeUnit::MICROS);
+    let stamp = Type::primitive_type_builder("timestamp", Physical::INT64).with_logical_type(Some(micros));
+    let double = |name| Type::primitive_type_builder(name, Physical::DOUBLE);
+    let columns = [stamp].into_iter().chain(["x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s"].map(double));
+    let field = |column: parquet::schema::types::PrimitiveTypeBuilder<'_>| {
+        Arc::new(column.with_repetition(Repetition::REQUIRED).build().unwrap())
+    };
+    let schema =
+        Type::group_type_builder("schema").with_fields(columns.map(field).collect()).build().unwrap();
+    let out = fs::File::create(folder.join("part-0.parquet")).unwrap();
+    let mut writer = SerializedFileWriter::new(out, Arc::new(schema), Arc::default()).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let motion = Motion::sines(PerLeak { internal: 1.2e-11, external_a: 0.0, external_b: 0.0 });
+    let samples: Vec<_> = (0..3000).map(|k| motion.sample(f64::from(k) * 0.01)).collect();
+    let begins_us = 1_777_615_200_000_000;
+    let stamps: Vec<i64> = (0..3000).map(|k| begins_us + 10_000 * k).collect();
+    let mut column = group.next_column().unwrap().unwrap();
+    column.typed::<Int64Type>().write_batch(&stamps, None, None).unwrap();
+    column.close().unwrap();
+    for number in 0..5 {
+        let reading = |s: &pitchleak_core::Sample<f64>| {
+            [s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap(), s.qb_m3s.unwrap()][number]
+        };
+        let values: Vec<f64> = samples.iter().map(reading).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<DoubleType>().write_batch(&values, None, None).unwrap();
+        column.close().unwrap();
+    }
+    group.close().unwrap();
+    writer.close().unwrap();
+    let rows = rows(&FleetTrace::find(&pattern(&farm, "**/*.parquet"), &FleetRig::Beside).unwrap());
+    assert_eq!((rows[0].cylinder.as_str(), rows[0].error.as_deref()), ("T7/B2", None));
+    assert_eq!(rows[0].begins.unwrap().to_string(), "2026-05-01T06:00:00Z");
+}

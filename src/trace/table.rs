@@ -8,7 +8,7 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Unit;
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Neighbouring rows: a slice per header, empty where the column is
 /// [ignored](ColumnContent::Ignored). NaN is a missing reading.
@@ -74,6 +74,7 @@ pub(super) struct TableRows<'a> {
     length: usize,
     /// Rows before those of `current`.
     before: u64,
+    epoch_ns: Arc<OnceLock<i64>>,
 }
 
 impl<'a> TableRows<'a> {
@@ -86,7 +87,13 @@ impl<'a> TableRows<'a> {
 
     /// The rows of whatever gives batches.
     pub(super) fn over(layout: Arc<Layout>, batches: Batches<'a>) -> Self {
-        Self { layout, batches, current: Vec::new(), at: 0, length: 0, before: 0 }
+        let epoch_ns = Arc::default();
+        Self { layout, batches, current: Vec::new(), at: 0, length: 0, before: 0, epoch_ns }
+    }
+
+    /// With the time stamp from which the seconds of the batches count, ns since 1970, once it is known.
+    pub(super) fn since(self, epoch_ns: Arc<OnceLock<i64>>) -> Self {
+        Self { epoch_ns, ..self }
     }
 
     #[cold]
@@ -124,6 +131,10 @@ impl<'a> TableRows<'a> {
 impl RowSource for TableRows<'_> {
     fn layout(&self) -> &Layout {
         &self.layout
+    }
+
+    fn epoch_ns(&self) -> Option<i64> {
+        self.epoch_ns.get().copied()
     }
 
     fn count_from(&mut self, rows: u64) {

@@ -19,7 +19,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Rows read at a time: their columns stay in the cache.
 const BATCH: usize = 4096;
@@ -92,6 +92,7 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         _ => TimeFormat::default(),
     };
     let layout = Arc::new(layout);
+    let epoch_ns = Arc::default();
     let mut batches = Batches {
         file,
         read,
@@ -99,8 +100,10 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         open: Vec::new(),
         epoch: Epoch::new(layout.time.clone()),
         first_ns: None,
+        epoch_ns: Arc::clone(&epoch_ns),
     };
-    Ok(Box::new(TableRows::over(layout, Box::new(move || guarded(|| batches.next())))))
+    let rows = TableRows::over(layout, Box::new(move || guarded(|| batches.next())));
+    Ok(Box::new(rows.since(epoch_ns)))
 }
 
 fn damaged(error: ParquetError) -> TraceFault {
@@ -201,6 +204,8 @@ struct Batches {
     open: Vec<ColumnReader>,
     epoch: Epoch,
     first_ns: Option<i128>,
+    /// The first stamp, for whoever asks.
+    epoch_ns: Arc<OnceLock<i64>>,
 }
 
 impl Batches {
@@ -223,6 +228,10 @@ impl Batches {
                 ));
             }
             if rows > 0 {
+                let typed = self.first_ns.and_then(|ns| i64::try_from(ns).ok());
+                if let Some(first_ns) = typed.or_else(|| self.epoch.first_ns()) {
+                    self.epoch_ns.get_or_init(|| first_ns);
+                }
                 return Ok(Some(cells));
             }
             self.open.clear();
