@@ -14,6 +14,8 @@
   const timeUnit = (span) => (span > 3 * 86400 ? [86400, "days"] : span > 3 * 3600 ? [3600, "h"] : span > 600 ? [60, "min"] : [1, "s"]);
   const span = data.t.length ? data.t[data.t.length - 1] - data.t[0] : 0;
   const [second, unitOfTime] = timeUnit(span);
+  // Steps of the axis in that unit: a third of a minute is none.
+  const steps = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 20, 30, 60, 120, 200, 500, 1000].map((step) => step * second);
   const decimals = (step) => {
     let count = 0;
     while (count < 6 && Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) > 1e-6 * step * 10 ** count) count++;
@@ -157,7 +159,7 @@
       legend: { show: false },
       scales: { x: { time: false }, y: { range: rangeOf(chart) } },
       axes: [
-        { ...axis, label, labelSize: 20, labelFont: "12px system-ui, sans-serif", size: 30, values: ticks(timed ? second : 1) },
+        { ...axis, label, labelSize: 20, labelFont: "12px system-ui, sans-serif", size: 30, values: ticks(timed ? second : 1), ...(timed && second > 1 ? { incrs: steps } : {}) },
         { ...axis, size: 58, values: ticks(1) },
       ],
       series, bands,
