@@ -45,12 +45,14 @@ pub(super) struct Stream {
     /// Whether they come out of gzip, which may break off.
     pub(super) gzip: bool,
     /// The file that they come from as they are, where it is one: it can be read from anywhere.
+    #[cfg_attr(not(feature = "parquet"), allow(dead_code))]
     pub(super) file: Option<File>,
 }
 
 /// More than this of a file that is not read as a stream is not held, bytes.
 pub(super) const MOST_HELD: u64 = 1 << 30;
 
+#[cfg(feature = "parquet")]
 impl Stream {
     /// All bytes.
     pub(super) fn hold(self) -> Result<Vec<u8>, TraceFault> {
