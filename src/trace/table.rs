@@ -92,6 +92,7 @@ impl<'a> TableRows<'a> {
     }
 
     /// With the time stamp from which the seconds of the batches count, ns since 1970, once it is known.
+    #[cfg(feature = "parquet")]
     pub(super) fn since(self, epoch_ns: Arc<OnceLock<i64>>) -> Self {
         Self { epoch_ns, ..self }
     }

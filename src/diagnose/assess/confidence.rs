@@ -8,6 +8,7 @@ use crate::diagnose::fit::Fit;
 use crate::diagnose::search::{self, Selected, Selection};
 use crate::diagnose::thresholds::{CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE};
 use crate::diagnose::weak_form::Term;
+use pitchleak_core::Effect;
 use pitchleak_core::effects::EffectKind;
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
@@ -37,6 +38,7 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck])
         rivals(one),
         remainder(fit, one),
         company(selection, one),
+        lopsided(selection, one),
         bounds(fit, one),
         leaks(fit, one),
         ripple(checks),
@@ -102,6 +104,22 @@ fn company(selection: &Selection<'_>, one: &Selected) -> Option<String> {
     (own < LEAST_SHARE_BESIDE * search::loss(fit, &[large.term])).then(|| {
         format!("it is so small beside {id} that a small error in the law of that would pass for it")
     })
+}
+
+/// Dry friction that is larger one way is, as long as the piston moves, dry friction and an offset of the load.
+fn lopsided(selection: &Selection<'_>, one: &Selected) -> Option<String> {
+    let effect = |one: &Selected| selection.fit.problem.terms[one.term].effect();
+    let is_dry = |effect: Effect| {
+        matches!(effect, Effect::CoulombFriction | Effect::StribeckFriction | Effect::SealFriction)
+    };
+    let beside = |wanted: &dyn Fn(Effect) -> bool| selection.effects.iter().filter_map(effect).any(wanted);
+    let own = effect(one)?;
+    let both = if own == Effect::LoadOffset {
+        beside(&is_dry)
+    } else {
+        is_dry(own) && beside(&|other| other == Effect::LoadOffset)
+    };
+    both.then(|| "a dry friction that is larger one way passes for dry friction and load_offset".to_owned())
 }
 
 /// Its value is at an end of what physics allows.
