@@ -46,7 +46,7 @@ use std::collections::BTreeMap;
 pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress: Progress<'_>) -> Diagnosis {
     let (test, _) = data::thinned(test, declared);
     let (train, declared) = data::thinned(train, declared);
-    let checks = data::check_sensors(&train, &declared.sensors);
+    let checks = data::check_sensors(&train, &declared);
     let problem = Problem::new(&train, &declared, &checks);
     let plain = Fit::declared(&problem, progress);
     let before = model_fit(&plain, &test);

@@ -85,5 +85,11 @@ pub(crate) fn ripples(checks: &[SensorCheck]) -> Vec<String> {
         format!("{}: fast, regular noise {ratio:.1} times the declared one (a ripple)", check.name)
     };
     let found: Vec<&SensorCheck> = checks.iter().filter(|check| check.is_ripple()).collect();
-    if let [only] = found[..] { vec![sentence(only)] } else { vec![] }
+    if let [only] = found[..]
+        && only.is_its_own()
+    {
+        vec![sentence(only)]
+    } else {
+        vec![]
+    }
 }

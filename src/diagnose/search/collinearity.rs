@@ -38,7 +38,7 @@ impl Collinearity {
     /// their range, and from `also`.
     pub fn of(traces: &[Series], declared: &Declared, also: &[EffectConstants<f64>]) -> Self {
         let (traces, declared) = thinned(traces, declared);
-        let problem = Problem::new(&traces, &declared, &check_sensors(&traces, &declared.sensors));
+        let problem = Problem::new(&traces, &declared, &check_sensors(&traces, &declared));
         let fit = Fit::declared(&problem, &|| ());
         let mut search = Candidates::of(&fit);
         let (candidates, columns): (Vec<_>, Vec<_>) = candidates::open(&fit)
