@@ -28,6 +28,11 @@ fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     effect.constants().iter().filter_map(|parameter| range(fit, *parameter)).collect()
 }
 
+/// Whether an effect has such constants.
+pub(super) fn are_fitted(fit: &Fit<'_>, term: usize) -> bool {
+    !free(fit, term).is_empty()
+}
+
 fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
     let rows = &fit.rows().rows;
     let span = |value: &dyn Fn(&Row) -> f64| {

@@ -30,6 +30,7 @@ pub(crate) fn search<'a>(
         if !all.add_next(progress) {
             break;
         }
+        all.refine_friction(progress);
         all.drop_needless(progress);
         exchange::exchange_all(&mut all, progress);
         let now = error(&all.fit);

@@ -4,6 +4,7 @@ use super::candidates::Candidates;
 use super::constants;
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
+use crate::diagnose::thresholds::{CONFUSABLE_CHI2, LEAST_CLIMB};
 use pitchleak_core::Effect;
 
 /// One effect of the answer, by its place among the problem's terms.
@@ -39,6 +40,15 @@ impl<'a> Selection<'a> {
         Self { fit: declared, effects: vec![] }
     }
 
+    /// Fits friction's constants again beside what has been named since: at the noise of an incomplete model any slip speed will do.
+    pub(super) fn refine_friction(&mut self, progress: Progress<'_>) {
+        for one in self.effects.iter().filter(|one| self.fit.problem.terms[one.term].in_force()) {
+            if let Some(better) = with_better_constants(&self.fit, one.term, progress) {
+                self.fit = better;
+            }
+        }
+    }
+
     pub(super) fn drop_at(&mut self, at: usize, progress: Progress<'_>) {
         let gone = self.effects.remove(at);
         self.fit = self.fit.without(gone.term, progress);
@@ -55,15 +65,23 @@ pub(super) fn with<'a>(fit: &Fit<'a>, old: &[usize], trial: &Trial, progress: Pr
     let term = trial.score.term;
     let with = fit.changed(old, &[(term, trial.constants)], progress);
     let is_usual = trial.constants == fit.problem.usual_constants;
-    if is_usual { with } else { refine_constants(&with, term, progress) }
+    if is_usual { with } else { with_better_constants(&with, term, progress).unwrap_or(with) }
 }
 
-/// Fits the constants of a new effect again, now that what it leaves is no longer in the way.
-fn refine_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>) -> Fit<'a> {
+/// The fit with an effect's constants fitted again, now that what it leaves is no longer in the way; none where they stay. The usual
+/// ones are kept unless the traces speak against them.
+fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>) -> Option<Fit<'a>> {
+    if !constants::are_fitted(fit, term) {
+        return None;
+    }
     let vacated = fit.vacated(term);
     let mut candidates = Candidates::of(&vacated);
+    let present = vacated.score(&vacated.free, term).map_or(0.0, |own| own.chi2_drop);
     let starts = constants::first_scores(&mut candidates, &vacated.free, term);
-    let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop));
-    let best = first.map(|first| constants::best_score(&mut candidates, &vacated.free, first));
-    vacated.with(term, best.map_or(fit.constants(term), |(_, constants)| constants), progress)
+    let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop))?;
+    let (best, found) = constants::best_score(&mut candidates, &vacated.free, first);
+    let is_usual = fit.constants(term) == fit.problem.usual_constants;
+    let needed = if is_usual { CONFUSABLE_CHI2 } else { LEAST_CLIMB };
+    let is_better = best.chi2_drop > present + needed * vacated.dispersion(fit.free.chi2);
+    is_better.then(|| vacated.with(term, found, progress))
 }
