@@ -39,8 +39,6 @@ pub struct Counts {
     pub error: usize,
 }
 
-const S_PER_DAY: f64 = 86_400.0;
-
 /// Lines of single traces in the text.
 const LINES: usize = 20;
 
@@ -137,7 +135,7 @@ impl<'a> FleetReport<'a> {
             text.push('\n');
         }
         for (cylinder, leak, long) in growing.iter().take(LINES) {
-            text.push_str(&trend_line(cylinder, *leak, long));
+            let _ = writeln!(text, "GROWS     {cylinder}  {} by {}", leak.label(), long.rate());
         }
         if growing.len() > LINES {
             let _ = writeln!(text, "… and {} more", growing.len() - LINES);
@@ -150,7 +148,7 @@ fn count(number: usize, what: &str) -> String {
 }
 
 fn line(row: &FleetRow, palette: &Palette) -> String {
-    let word = row.status.map_or("ERROR", Status::word);
+    let word = row.word();
     let (colour, reset) = row.status.map_or(palette.caution(), |status| palette.verdict(status));
     let found = match (&row.error, row.status) {
         (Some(error), _) => error.clone(),
@@ -173,19 +171,4 @@ fn leaks(row: &FleetRow) -> String {
         Some(format!("{} {:.3}{spread} L/min", leak.label(), of.mean_lpm))
     };
     row.faults.iter().filter_map(flow).collect::<Vec<_>>().join(", ")
-}
-
-fn trend_line(cylinder: &str, leak: Leak, long: &LongTrend) -> String {
-    let monthly = long.trend.slope().scaled(24.0 * 30.0);
-    let reached = long.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
-        let [low, high] = time.ci95.map(|s| s / S_PER_DAY);
-        format!("; at its threshold in {:.0} days ({low:.0} to {high:.0})", time.value / S_PER_DAY)
-    });
-    format!(
-        "GROWS     {cylinder}  {} by {:.3} ± {:.3} L/min a month over {} traces{reached}\n",
-        leak.label(),
-        monthly.value,
-        monthly.half_width95(),
-        long.traces
-    )
 }

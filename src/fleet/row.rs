@@ -127,6 +127,11 @@ impl FleetRow {
         ciborium::from_reader(bytes)
     }
 
+    /// As at the head of its line.
+    pub(crate) fn word(&self) -> &'static str {
+        self.status.map_or("ERROR", Status::word)
+    }
+
     /// The largest flow among the leaks to act on, L/min.
     pub fn worst_lpm(&self) -> f64 {
         let flow = |leak: &Leak| self.leaks.map_or(0.0, |leaks| leaks[*leak].mean_lpm);

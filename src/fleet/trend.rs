@@ -1,12 +1,15 @@
 //! A leak's course over the traces of days and months.
 
 use super::FleetRow;
-use crate::report::{LeakTrend, Status};
+use crate::report::{LeakTrend, Status, with_interval};
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::HashMap;
+
+const S_PER_DAY: f64 = 86_400.0;
+const H_PER_MONTH: f64 = 24.0 * 30.0;
 
 /// How the leaks of a cylinder change from trace to trace.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -73,14 +76,29 @@ impl LongTrend {
         self.trend.is_significant() && self.trend.slope_lpm_per_h > 0.0
     }
 
+    /// The slope, L/min a month of 30 days.
+    pub fn monthly_lpm(&self) -> Estimate<f64> {
+        self.trend.slope().scaled(H_PER_MONTH)
+    }
+
+    /// How fast the leak grows, and when it is at its alarm's threshold if it goes on like this, for people.
+    pub(crate) fn rate(&self) -> String {
+        let Estimate { value, std } = self.monthly_lpm();
+        let reached = self.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
+            let [days, low, high] = [time.value, time.ci95[0], time.ci95[1]].map(|s| s / S_PER_DAY);
+            format!("; at its alarm level in {days:.0} days ({low:.0} to {high:.0})")
+        });
+        format!("{} L/min a month over {} traces{reached}", with_interval(value, Some(std)), self.traces)
+    }
+
     fn of(rows: &[&FleetRow], leak: Leak) -> Option<Self> {
         let mut points: Vec<_> = rows.iter().filter_map(|row| Point::of(row, leak)).collect();
         points.sort_by_key(|point| point.at);
         let (first, last) = (points.first()?, points.last()?);
-        let days = |point: &Point| last.at.duration_until(point.at).as_secs_f64() / 86_400.0;
+        let days = |point: &Point| last.at.duration_until(point.at).as_secs_f64() / S_PER_DAY;
         let values: Vec<_> = points.iter().map(|point| (days(point), point.flow)).collect();
         let line = Line::through(&values)?;
-        let slope_ps = line.slope.scaled(1.0 / 86_400.0);
+        let slope_ps = line.slope.scaled(1.0 / S_PER_DAY);
         Some(Self {
             traces: points.len(),
             from: first.at,

@@ -9,7 +9,7 @@ use crate::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend};
 use crate::report::{Status, advice, capital, with_interval};
 use jiff::Timestamp;
 use maud::{Markup, html};
-use pitchleak_core::{Estimate, Leak};
+use pitchleak_core::Leak;
 use std::collections::BTreeMap;
 
 /// Rows that a page shows of each table: beyond, the table that `--out` writes is the place to look.
@@ -19,7 +19,6 @@ const MOST_NAMED: usize = 8;
 /// Growing leaks that are drawn.
 const MOST_DRAWN: usize = 8;
 const S_PER_DAY: f64 = 86_400.0;
-const H_PER_MONTH: f64 = 24.0 * 30.0;
 
 impl Page {
     /// The report of a fleet.
@@ -100,7 +99,7 @@ fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) 
                 title: "Leaks that grow fastest",
                 body: html! {
                     @if growing.is_empty() { p { "None beyond doubt; it takes three dated traces of a cylinder." } }
-                    ul { @for (cylinder, leak, long) in growing.iter().take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ", " (leak.label()) ": " (rate(long)) "." } } }
+                    ul { @for (cylinder, leak, long) in growing.iter().take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ", " (leak.label()) ": " (long.rate()) "." } } }
                 },
             },
         ],
@@ -141,16 +140,11 @@ fn table(rows: &[&FleetRow], none: &str) -> Markup {
 }
 
 fn line(row: &FleetRow) -> Markup {
-    let (word, class) = match row.status {
-        Some(Status::Leak) => ("LEAK", "is-leak"),
-        Some(Status::Sound) => ("SOUND", "is-sound"),
-        Some(other) => (other.word(), "is-caution"),
-        None => ("ERROR", "is-caution"),
-    };
+    let tone = row.status.map_or(Tone::Caution, Tone::from);
     html! {
         tr {
             th scope="row" { bdi { (row.cylinder) } }
-            td class=(class) { (word) }
+            td class=(tone.class()) { (row.word()) }
             @for leak in Leak::ALL {
                 td .number { @match row.leaks.map(|leaks| leaks[leak]) {
                     Some(leak) if leak.identifiable => (interval(&leak)),
@@ -172,15 +166,6 @@ fn day(at: Timestamp) -> String {
 /// Cylinder, leak and trend of one that grows beyond doubt.
 type Growing<'a> = (&'a str, Leak, &'a LongTrend);
 
-fn rate(long: &LongTrend) -> String {
-    let Estimate { value, std } = long.trend.slope().scaled(H_PER_MONTH);
-    let reached = long.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
-        let [low, high] = time.ci95.map(|s| s / S_PER_DAY);
-        format!("; at its alarm level in {:.0} days ({low:.0} to {high:.0})", time.value / S_PER_DAY)
-    });
-    format!("{} L/min a month over {} traces{reached}", with_interval(value, Some(std)), long.traces)
-}
-
 fn trends(report: &FleetReport<'_>, growing: &[Growing<'_>], charts: &mut Charts) -> Markup {
     let mut body = html! {
         @if growing.is_empty() {
@@ -193,7 +178,7 @@ fn trends(report: &FleetReport<'_>, growing: &[Growing<'_>], charts: &mut Charts
     html! {
         div .pair { (body) }
         @if growing.len() > MOST_DRAWN {
-            ul { @for (cylinder, leak, long) in growing.iter().skip(MOST_DRAWN).take(MOST_ROWS) { li { bdi { (cylinder) } ", " (leak.label()) ": " (rate(long)) } } }
+            ul { @for (cylinder, leak, long) in growing.iter().skip(MOST_DRAWN).take(MOST_ROWS) { li { bdi { (cylinder) } ", " (leak.label()) ": " (long.rate()) } } }
         }
     }
 }

@@ -17,6 +17,7 @@ mod reproduce;
 pub use history::History;
 
 use crate::output::{Inputs, OutputError, OutputFile};
+use crate::report::Status;
 use base64::Engine;
 use chart::Charts;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -80,6 +81,16 @@ impl Tone {
             Self::Leak => "is-leak",
             Self::Sound => "is-sound",
             Self::Caution => "is-caution",
+        }
+    }
+}
+
+impl From<Status> for Tone {
+    fn from(status: Status) -> Self {
+        match status {
+            Status::Leak => Self::Leak,
+            Status::Sound => Self::Sound,
+            Status::Doubtful | Status::NotSure => Self::Caution,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::chart::{Chart, Charts, Limit, Span};
 use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, trace};
-use super::{Card, Head, History, Page, Section, Tone};
+use super::{Card, Head, History, Page, Section};
 use crate::report::{
     EstimateEntry, Reason, ReasonId, ReplayReport, Status, advice, capital, data_line, interval,
     with_interval,
@@ -34,11 +34,7 @@ fn head(report: &ReplayReport, rig: &Rig) -> Head {
     let verdict = &report.verdict;
     Head {
         word: verdict.status.word().to_owned(),
-        tone: match verdict.status {
-            Status::Leak => Tone::Leak,
-            Status::Sound => Tone::Sound,
-            Status::Doubtful | Status::NotSure => Tone::Caution,
-        },
+        tone: verdict.status.into(),
         sentence: verdict.text.clone(),
         data: data_line(&report.trace),
         cards: vec![

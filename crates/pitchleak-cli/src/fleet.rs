@@ -1,7 +1,6 @@
 use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::fleet::{
     FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
 };
@@ -53,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let stop = stop_at_signal()?;
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
-    let bar = progress(traces.len());
+    let bar = output::bar(traces.len() as u64, "{bar:40} {pos}/{len} traces, {eta} left");
     let judged = |row: &FleetRow| {
         bar.inc(1);
         if let Some(error) = &row.error {
@@ -87,10 +86,4 @@ fn stop_at_signal() -> Result<Arc<AtomicBool>, Failure> {
     ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
         .map_err(|error| Failure::Output(io::Error::other(error)))?;
     Ok(stop)
-}
-
-/// On standard error; hidden where that is no terminal.
-fn progress(traces: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} traces, {eta} left");
-    ProgressBar::new(traces as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

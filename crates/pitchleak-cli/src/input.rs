@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::text_format::TextFormat;
 use crate::{Outcome, output};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::output::Inputs;
 use pitchleak::trace::{BadRows, TraceReader};
@@ -105,11 +105,9 @@ impl Trace {
 /// A smaller file is read before anyone sees a bar.
 const WORTH_A_BAR: u64 = 8 << 20;
 
-/// On standard error; hidden where that is no terminal.
 fn progress(bytes: u64) -> ProgressBar {
     if bytes < WORTH_A_BAR {
         return ProgressBar::hidden();
     }
-    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {bytes_per_sec}, {eta} left");
-    ProgressBar::new(bytes).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    output::bar(bytes, "{bar:40} {percent:>3} %  {bytes_per_sec}, {eta} left")
 }

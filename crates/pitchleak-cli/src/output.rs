@@ -1,5 +1,6 @@
 //! Standard output and standard error.
 
+use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::report::{Palette, TraceSummary};
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -30,6 +31,12 @@ pub fn warn(warnings: &[String]) {
     for warning in warnings {
         complain("warning", warning);
     }
+}
+
+/// A bar of so many steps on standard error; hidden where that is no terminal.
+pub fn bar(length: u64, template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(length).with_style(style)
 }
 
 /// Colours only on a terminal, and only where nobody forbids them (no-color.org).

@@ -1,7 +1,6 @@
 use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::output::{Inputs, make_folder};
 use pitchleak::page::{Page, PageFile};
 use pitchleak::reproduce::{Progress, detection, reproduce};
@@ -36,10 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.out.as_deref().map(make_folder).transpose()?;
     let page =
         arguments.report.as_ref().map(|path| PageFile::create(path, &Inputs::default())).transpose()?;
-    let bar = ProgressBar::new(1);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos:>3}/{len} {msg}, {elapsed}") {
-        bar.set_style(style);
-    }
+    let bar = output::bar(1, "{bar:40} {pos:>3}/{len} {msg}, {elapsed}");
     let show = |progress: Progress| {
         bar.set_length(progress.count as u64);
         bar.set_message(progress.stage);

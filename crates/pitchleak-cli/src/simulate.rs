@@ -1,7 +1,6 @@
 use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
 use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, share_of_full_scale};
@@ -136,7 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rig = arguments.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
     let recording = arguments.plan().recording(rig)?;
     output::warn(&recording.warnings());
-    let bar = progress();
+    let bar = output::bar(1000, "{bar:40} {percent:>3} %  simulating, {eta} left");
     recording.write(&arguments.out, |share| {
         bar.set_position((1000.0 * share) as u64);
         ControlFlow::Continue(())
@@ -184,9 +183,4 @@ impl Arguments {
             sample_rate_hz: self.sample_rate,
         }
     }
-}
-
-fn progress() -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  simulating, {eta} left");
-    ProgressBar::new(1000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
