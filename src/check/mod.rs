@@ -97,13 +97,14 @@ pub fn check<E: From<ReplayError>>(
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;
+    let records = excerpt.records();
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
-        wiring: explain(&excerpt.records(), &rig)
+        wiring: explain(&records, &rig)
             .or_else(|| unit_by_scatter(&excerpt, &rig))
-            .or_else(|| sensor_error(&excerpt.records(), &rig))
+            .or_else(|| sensor_error(&records, &rig))
             .map(|found| found.wiring(&columns, &rig)),
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),

@@ -150,20 +150,19 @@ impl Event {
                 let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
                 for leak in Leak::ALL {
                     let LiveLeakage { mean_lpm, std_lpm } = event.leakage[leak];
-                    let _ = write!(values, ",{}_mean_lpm={mean_lpm}", name_of(leak)?);
+                    let _ = write!(values, ",{}_mean_lpm={mean_lpm}", leak.id());
                     if let Some(std_lpm) = std_lpm {
-                        let _ = write!(values, ",{}_std_lpm={std_lpm}", name_of(leak)?);
+                        let _ = write!(values, ",{}_std_lpm={std_lpm}", leak.id());
                     }
                     if let Some(trend) = event.trend[leak] {
-                        let _ =
-                            write!(values, ",{}_slope_lpm_per_h={}", name_of(leak)?, trend.slope_lpm_per_h);
+                        let _ = write!(values, ",{}_slope_lpm_per_h={}", leak.id(), trend.slope_lpm_per_h);
                     }
-                    let _ = write!(values, ",{}_alarm={}", name_of(leak)?, event.faults.contains(&leak));
+                    let _ = write!(values, ",{}_alarm={}", leak.id(), event.faults.contains(&leak));
                 }
                 write!(line, " {values}")
             }
             Self::Alarm(event) => {
-                line = tagged(&line, "fault", &name_of(event.fault)?);
+                line = tagged(&line, "fault", event.fault.id());
                 let raised = event.state == AlarmState::Raised;
                 let (id, mean) = (quoted(&event.id), event.leakage.mean_lpm);
                 write!(line, " id=\"{id}\",t_s={},raised={raised},mean_lpm={mean}", event.t_s)
@@ -173,10 +172,10 @@ impl Event {
                 write!(line, " count={}u,text=\"{}\"", event.count, quoted(&event.text))
             }
             Self::Summary(event) => {
-                line = tagged(&line, "span", if event.span == Span::Hour { "hour" } else { "day" });
+                line = tagged(&line, "span", event.span.id());
                 let mut values = format!("estimates={}u", event.estimates);
                 for leak in Leak::ALL {
-                    let (name, leakage) = (name_of(leak)?, event.leakage[leak]);
+                    let (name, leakage) = (leak.id(), event.leakage[leak]);
                     let LeakSummary { mean_lpm, max_lpm, .. } = leakage;
                     let _ = write!(values, ",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}");
                     if let Some(trend) = leakage.trend_lpm_per_day {
@@ -206,9 +205,4 @@ fn tagged(series: &str, tag: &str, value: &str) -> String {
         text.push(c);
     }
     text
-}
-
-/// As in JSON.
-fn name_of(leak: Leak) -> Result<String, serde_json::Error> {
-    Ok(serde_json::to_value(leak)?.as_str().unwrap_or_default().to_owned())
 }

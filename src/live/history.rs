@@ -26,6 +26,14 @@ impl Span {
             Self::Day => 86_400.0,
         }
     }
+
+    /// Its name in files and topics, as in JSON.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Hour => "hour",
+            Self::Day => "day",
+        }
+    }
 }
 
 /// A leak in an hour or a day.

@@ -59,20 +59,11 @@ impl EstimateFile {
     /// # Errors
     /// Where the file cannot be written on.
     pub fn write(&mut self, point: &EstimateRow) -> Result<(), EstimateFileError> {
-        let values = point.values();
-        let file = match &mut self.0 {
-            Form::Csv(file) => file,
+        match &mut self.0 {
+            Form::Csv(file) => write_row(file, point),
             #[cfg(feature = "parquet")]
-            Form::Parquet(file) => return file.write(&values),
-        };
-        let [t_s, numbers @ .., internal, external_a, external_b] = values;
-        let [a, b, c, d, e, f, g, h, i] = numbers;
-        write_line(
-            file,
-            format_args!(
-                "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
-            ),
-        )
+            Form::Parquet(file) => file.write(&point.values()),
+        }
     }
 
     /// Puts the file in its place.
@@ -86,6 +77,17 @@ impl EstimateFile {
             Form::Parquet(file) => file.finish(),
         }
     }
+}
+
+fn write_row(file: &mut OutputFile, point: &EstimateRow) -> Result<(), EstimateFileError> {
+    let [t_s, numbers @ .., internal, external_a, external_b] = point.values();
+    let [a, b, c, d, e, f, g, h, i] = numbers;
+    write_line(
+        file,
+        format_args!(
+            "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
+        ),
+    )
 }
 
 fn write_line(file: &mut OutputFile, line: std::fmt::Arguments<'_>) -> Result<(), EstimateFileError> {

@@ -15,13 +15,14 @@ impl Replay {
             return Suspicions::default();
         }
         let doubtful = verdict.status == Status::Doubtful;
-        let wiring = if doubtful {
-            explain(&excerpt.records(), &self.rig)
+        let [wiring, sensor] = if doubtful {
+            let records = excerpt.records();
+            let wiring = explain(&records, &self.rig);
+            let sensor = if wiring.is_none() { sensor_error(&records, &self.rig) } else { None };
+            [wiring, sensor]
         } else {
-            unit_by_scatter(excerpt, &self.rig)
+            [unit_by_scatter(excerpt, &self.rig), None]
         };
-        let sensor =
-            if doubtful && wiring.is_none() { sensor_error(&excerpt.records(), &self.rig) } else { None };
         let zeros = if verdict.status == Status::Leak { self.zeros(excerpt) } else { None };
         let [wiring, sensor] =
             [wiring, sensor].map(|found| found.map(|found| found.wiring(columns, &self.rig)));

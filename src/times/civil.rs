@@ -32,15 +32,15 @@ pub(super) fn read_date(text: &str, order: DateOrder) -> Option<Reading> {
 pub(super) fn read_of_day(text: &str) -> Option<i128> {
     let mut scan = Scan(text);
     let time = scan.clock().filter(|time| time.has_seconds)?;
-    scan.0.is_empty().then(|| {
-        let seconds = (i128::from(time.hour) * 60 + i128::from(time.minute)) * 60 + i128::from(time.second);
-        seconds * NS_PER_S + i128::from(time.ns)
-    })
+    scan.0.is_empty().then(|| since_midnight_ns([time.hour, time.minute, time.second], time.ns))
 }
 
 pub(super) fn ns_of(time: Time) -> i128 {
-    let seconds = (i128::from(time.hour()) * 60 + i128::from(time.minute())) * 60 + i128::from(time.second());
-    seconds * NS_PER_S + i128::from(time.subsec_nanosecond())
+    since_midnight_ns([time.hour(), time.minute(), time.second()], time.subsec_nanosecond())
+}
+
+fn since_midnight_ns(hours_minutes_seconds: [impl Into<i128>; 3], ns: impl Into<i128>) -> i128 {
+    hours_minutes_seconds.into_iter().fold(0, |sum, part| 60 * sum + part.into()) * NS_PER_S + ns.into()
 }
 
 /// A time of day on the day of the last one, or the next where it would be half a day back.

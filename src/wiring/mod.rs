@@ -25,6 +25,7 @@ pub use zeros::{ZeroCheck, zero_check};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
+use blocks::{Block, blocks};
 use fit::{Fit, Priors};
 use noise::{ScatterRatios, Verdict};
 use rayon::prelude::*;
@@ -71,9 +72,10 @@ struct Scored {
 /// does, or nothing explains them, or too much. Use an [`Excerpt`] of a long trace.
 pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
     let priors = Priors::declared(rig);
-    let declared = Fit::new(records, rig, &priors)?;
+    let blocks = blocks(records, &rig.cylinder);
+    let declared = Fit::of(&blocks, rig, &priors)?;
     let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
-    if !contradicted || sensor_errors_explain(records, rig) {
+    if !contradicted || sensor_errors_explain(&blocks, rig) {
         return None;
     }
     if let Some((readings, turned)) = signs::lost(records, rig) {
@@ -124,8 +126,8 @@ pub fn misfit(records: &[Record], rig: &Rig) -> [Option<f64>; 2] {
 }
 
 /// Offsets and gains of a few percent are commoner than mistakes of wiring: where they explain as much, they do.
-fn sensor_errors_explain(records: &[Record], rig: &Rig) -> bool {
-    Fit::new(records, rig, &Priors::with_sensor_errors(rig))
+fn sensor_errors_explain(blocks: &[Block], rig: &Rig) -> bool {
+    Fit::of(blocks, rig, &Priors::with_sensor_errors(rig))
         .is_some_and(|fit| is_near(&fit) && fit.is_possible())
 }
 

@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 use pitchleak::core::Leak;
-use pitchleak::live::{Span, SummaryEvent};
+use pitchleak::live::SummaryEvent;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
@@ -75,10 +75,11 @@ fn names(summary: &SummaryEvent) -> (String, String) {
 }
 
 fn rows(text: &mut String, from: &str, summary: &SummaryEvent) {
-    let span = if summary.span == Span::Hour { "hour" } else { "day" };
+    let span = summary.span.id();
     let cylinder = summary.cylinder.replace('"', "\"\"");
     let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-    for (leak, name) in Leak::ALL.into_iter().zip(["internal", "external_a", "external_b"]) {
+    for leak in Leak::ALL {
+        let name = leak.id();
         let leakage = summary.leakage[leak];
         let (slope, std) = (
             leakage.trend_lpm_per_day.map(|trend| trend.slope),
@@ -101,6 +102,7 @@ fn rows(text: &mut String, from: &str, summary: &SummaryEvent) {
 mod tests {
     use super::*;
     use pitchleak::core::PerLeak;
+    use pitchleak::live::Span;
 
     #[test]
     fn ninety_days_are_kept() {

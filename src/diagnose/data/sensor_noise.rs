@@ -35,20 +35,19 @@ impl SensorCheck {
 pub(crate) fn check_sensors(traces: &[Series], declared: &Declared) -> Vec<SensorCheck> {
     let Declared { sensors: declared, cylinder, .. } = declared;
     type Column = fn(&Series) -> &[f64];
-    let signals: [(&'static str, f64, Column); 6] = [
-        ("position", declared.position.noise_std, |s| &s.x_m),
-        ("pressure a", declared.pressure.noise_std, |s| &s.pa_pa),
-        ("pressure b", declared.pressure.noise_std, |s| &s.pb_pa),
-        ("flow a", declared.flow_a.noise_std, |s| &s.qa_m3s),
-        ("flow b", declared.flow_b.noise_std, |s| &s.qb_m3s),
-        ("force", declared.force.noise_std, |s| &s.force_n),
+    // Gusts move the load as fast as one can sample; pressures follow it.
+    let unseen_n = (RIPPLE * RIPPLE - 1.0).sqrt() * declared.pressure.noise_std * cylinder.area_a_m2;
+    let signals: [(&'static str, f64, f64, Column); 6] = [
+        ("position", declared.position.noise_std, 0.0, |s| &s.x_m),
+        ("pressure a", declared.pressure.noise_std, 0.0, |s| &s.pa_pa),
+        ("pressure b", declared.pressure.noise_std, 0.0, |s| &s.pb_pa),
+        ("flow a", declared.flow_a.noise_std, 0.0, |s| &s.qa_m3s),
+        ("flow b", declared.flow_b.noise_std, 0.0, |s| &s.qb_m3s),
+        ("force", declared.force.noise_std, unseen_n, |s| &s.force_n),
     ];
     let order = difference_order(traces.iter().map(Series::step_s).fold(0.0, f64::max));
-    let unseen_pa = (RIPPLE * RIPPLE - 1.0).sqrt() * declared.pressure.noise_std;
-    let check = |(name, declared_std, column): (_, _, Column)| {
+    let check = |(name, declared_std, unseen, column): (_, _, _, Column)| {
         let found = fast_noise(traces.iter().map(column), order);
-        // Gusts move the load as fast as one can sample; pressures follow it.
-        let unseen = if name == "force" { unseen_pa * cylinder.area_a_m2 } else { 0.0 };
         SensorCheck { name, declared_std, found, unseen }
     };
     signals.map(check).into()

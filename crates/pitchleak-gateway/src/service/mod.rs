@@ -8,7 +8,7 @@ use crate::metrics::Metrics;
 use crate::pace::{Due, Pace};
 use crate::saver::{Job, Saved};
 use crate::topics;
-use pitchleak::live::{Batch, Event, OutputFormat, Snapshot, Span, SummaryEvent, Watch};
+use pitchleak::live::{Batch, Event, OutputFormat, Snapshot, SummaryEvent, Watch};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -213,8 +213,7 @@ impl<B: Broker> Service<B> {
                     (topic(cylinder, &format!("notice/{}", notice.kind)), Keeping::Latest)
                 }
                 Event::Summary(summary) => {
-                    let kind = if summary.span == Span::Hour { "hour" } else { "day" };
-                    let topic = topic(&summary.cylinder, kind);
+                    let topic = topic(&summary.cylinder, summary.span.id());
                     if self.waiting.summaries.len() < MOST_UNWRITTEN {
                         self.waiting.summaries.push(summary);
                     }
