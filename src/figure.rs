@@ -131,7 +131,7 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
         .draw()
         .map_err(error)?;
     for line in &panel.lines {
-        draw_line(&mut chart, line, low, top)?;
+        draw_line(&mut chart, line, low, high)?;
     }
     if labelled {
         chart
@@ -148,19 +148,54 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
 
 fn draw_line(chart: &mut Chart, line: &Line, low: f64, high: f64) -> Result<(), FigureError> {
     let style = line.ink.colour().stroke_width(line.ink.width());
-    // A curve that leaves the panel stops at its edge.
-    let inside = |p: &(f64, f64)| p.1.is_finite() && p.1 >= low && p.1 <= high;
     let mut label = line.label;
     let stride = line.points.len().div_ceil(MOST_POINTS).max(1);
-    for piece in line.points.split(|p| !inside(p)).filter(|piece| piece.len() > 1) {
-        let points = piece.iter().step_by(stride).copied();
-        let drawn = chart.draw_series(LineSeries::new(points, style)).map_err(error)?;
-        if !label.is_empty() {
-            drawn.label(label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-            label = "";
+    for piece in line.points.split(|p| !p.0.is_finite() || !p.1.is_finite()) {
+        let points: Vec<_> = piece.iter().step_by(stride).copied().collect();
+        for inside in clipped(&points, low, high) {
+            let drawn = chart.draw_series(LineSeries::new(inside, style)).map_err(error)?;
+            if !label.is_empty() {
+                drawn.label(label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+                label = "";
+            }
         }
     }
     Ok(())
+}
+
+/// The parts of a curve between `low` and `high`: one that leaves the panel goes on to its edge and begins again there.
+fn clipped(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut goes_on = false;
+    for pair in points.windows(2) {
+        let &[a, b] = pair else { continue };
+        let Some([from, to]) = within(a, b, low, high) else {
+            goes_on = false;
+            continue;
+        };
+        if !goes_on {
+            parts.push(vec![from]);
+        }
+        parts.last_mut().into_iter().for_each(|part| part.push(to));
+        goes_on = (low..=high).contains(&b.1);
+    }
+    parts
+}
+
+/// The part of a straight line between `low` and `high` (Liang and Barsky 1984, in one direction).
+fn within(a: (f64, f64), b: (f64, f64), low: f64, high: f64) -> Option<[(f64, f64); 2]> {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let [mut from, mut to] = [0.0_f64, 1.0_f64];
+    if dy.abs() > 0.0 {
+        let [enters, leaves] = if dy > 0.0 { [low, high] } else { [high, low] }.map(|edge| (edge - a.1) / dy);
+        (from, to) = (from.max(enters), to.min(leaves));
+    } else if a.1 < low || a.1 > high {
+        return None;
+    }
+    // The ends as they are, so that the next piece goes on in the same place.
+    let at =
+        |share: f64| if share >= 1.0 { b } else { (a.0 + share * dx, (a.1 + share * dy).clamp(low, high)) };
+    (from <= to).then(|| [at(from), at(to)])
 }
 
 /// Least and greatest value, widened by `share` of their distance; never empty.
@@ -198,6 +233,20 @@ mod tests {
         for part in ["A title", "time (s)", "leak (L/min)", "ours", "<polyline"] {
             assert!(text.contains(part), "{part}");
         }
+    }
+
+    #[test]
+    fn a_curve_meets_the_frame_where_it_leaves_and_begins_again_there() {
+        let zigzag = [(0.0, 0.0), (1.0, 2.0), (2.0, 0.0), (3.0, -4.0), (4.0, 4.0)];
+        let parts = clipped(&zigzag, -1.0, 1.0);
+        let expected: [&[(f64, f64)]; 3] = [
+            &[(0.0, 0.0), (0.5, 1.0)],
+            &[(1.5, 1.0), (2.0, 0.0), (2.25, -1.0)],
+            &[(3.375, -1.0), (3.625, 1.0)],
+        ];
+        assert_eq!(parts, expected);
+        assert_eq!(clipped(&[(0.0, 5.0), (1.0, 5.0)], -1.0, 1.0), Vec::<Vec<_>>::new());
+        assert_eq!(clipped(&[(0.0, 1.0), (1.0, 1.0)], -1.0, 1.0), [[(0.0, 1.0), (1.0, 1.0)]]);
     }
 
     #[test]

@@ -9,6 +9,8 @@ const BAND: f64 = 0.05;
 const DWELL_S: f64 = 1.0;
 /// Memory of the measured coefficient, s.
 const COEFFICIENT_MEMORY_S: f64 = 10.0;
+/// A measured coefficient below this share of its largest is that of a leak that was mended: there is nothing to be compared with.
+const MENDED: f64 = 0.01;
 
 /// How one leak's estimate compares with its reference in steady state, that is after convergence;
 /// over all samples where it never converges.
@@ -34,6 +36,9 @@ pub struct Scorer {
     last_s: f64,
     reference: Mean,
     measured: MeasuredCoefficient,
+    /// Largest measured coefficient so far, m³/(s·Pa).
+    #[serde(default)]
+    largest: f64,
     overall: Errors,
     /// Since the error last came into the band, and when that was.
     steady: Option<(f64, Errors)>,
@@ -95,10 +100,16 @@ impl Scorer {
         self.reference.add(reference_m3s.abs());
         self.measured.add(dt_s, reference_m3s, pressure_pa);
         let size_m3s = self.reference.value().max(reference_m3s.abs());
-        if let Some(measured) = self.measured.value().filter(|_| size_m3s > 0.0) {
+        let measured = self.measured.value().filter(|measured| size_m3s > 0.0 && !self.is_mended(*measured));
+        if let Some(measured) = measured {
             let leakage = (leak_flow_m3s - reference_m3s).abs() / size_m3s;
             self.add(t_s, leakage, (coefficient / measured - 1.0).abs());
         }
+    }
+
+    fn is_mended(&mut self, measured: f64) -> bool {
+        self.largest = self.largest.max(measured.abs());
+        measured.abs() < MENDED * self.largest
     }
 
     fn add(&mut self, t_s: f64, leakage: f64, coefficient: f64) {
@@ -186,6 +197,18 @@ mod tests {
         assert_eq!(score.convergence_time_s, None);
         assert!((score.leakage_mean_error_percent - 19.0).abs() < 1e-9);
         assert!((score.leakage_peak_error_percent - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_leak_that_was_mended_is_not_held_against_nothing() {
+        let mut scorer = Scorer::default();
+        for i in 0..20_000 {
+            let (t, mended) = (f64::from(i) * 0.01, i >= 10_000);
+            let truth = if mended { 0.0 } else { COEFFICIENT };
+            scorer.update(t, (truth + 1e-14) * 3e6, truth + 1e-14, truth * 3e6, 3e6);
+        }
+        let score = scorer.score().unwrap();
+        assert!(score.coefficient_peak_error_percent < 101.0 / MENDED, "{score:?}");
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
     Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
-pub(crate) use present::labels;
+pub(crate) use present::{in_a_row::in_a_row, labels};
 pub use search::{Candidate, Collinearity};
 
 use assess::{HeldOut, model_fit};

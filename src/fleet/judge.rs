@@ -4,7 +4,6 @@ use super::{FleetRow, FleetTrace, TraceIdentity};
 use crate::Rig;
 use crate::replay::{ReplayError, replay};
 use crate::trace::{TraceError, TraceReader};
-use jiff::Timestamp;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -21,11 +20,6 @@ impl From<ReplayError> for Ended {
     fn from(error: ReplayError) -> Self {
         Self::Failed(error)
     }
-}
-
-/// A time in ns since 1970; none where the calendar has none.
-pub fn timestamp(ns: i64) -> Option<Timestamp> {
-    Timestamp::from_nanosecond(i128::from(ns)).ok()
 }
 
 /// Judges one trace as a replay of it does. A trace that can't be read is a row too.
@@ -53,7 +47,7 @@ pub fn judge_opened(
 ) -> Result<FleetRow, Stopped> {
     let replayed = opened.map_err(|error| Ended::Failed(error.into())).and_then(|mut reader| {
         let report = replay(&mut reader, rig, |_, _, _| if go_on() { Ok(()) } else { Err(Ended::Stopped) })?;
-        let begins = reader.epoch_ns().and_then(timestamp).or(identity.begins);
+        let begins = reader.clock().and_then(|clock| clock.start()).or(identity.begins);
         Ok(FleetRow::of(&TraceIdentity { begins, ..identity.clone() }, &report, rig))
     });
     match replayed {

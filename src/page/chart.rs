@@ -1,6 +1,7 @@
 //! Charts of a page: what is drawn, as numbers for the page's script and as a table for those who read or print it.
 
-use super::envelope::Range;
+use crate::envelope::Range;
+use crate::times::Clock;
 use maud::{Markup, html};
 use serde::Serialize;
 
@@ -128,13 +129,21 @@ fn extremes<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Charts {
     t: Vec<Option<f64>>,
+    /// What the trace's clock shows where its seconds begin, s since midnight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clock: Option<f64>,
     charts: Vec<Chart>,
 }
 
 impl Charts {
     /// For charts over these times.
     pub fn over(times_s: impl Iterator<Item = f64>) -> Self {
-        Self { t: rounded(times_s.map(Some)), charts: Vec::new() }
+        Self { t: rounded(times_s.map(Some)), ..Self::default() }
+    }
+
+    /// With the trace's clock on the axis.
+    pub fn by(self, clock: Option<&Clock>) -> Self {
+        Self { clock: clock.map(Clock::since_midnight_s), ..self }
     }
 
     /// Gives a chart its place in the text; nothing where there is nothing to draw.

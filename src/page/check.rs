@@ -12,7 +12,7 @@ impl Page {
     /// The report of a check of a trace of `machine`, with what was gathered on the way.
     pub fn of_check(report: &CheckReport, machine: &Rig, history: &History) -> Self {
         let drawn = history.drawn();
-        let mut charts = drawn.charts();
+        let mut charts = drawn.charts().by(report.trace.begins.as_ref());
         let wiring = channels(&report.channels, report.wiring.as_ref());
         let sections = vec![
             Section { id: "channels", title: "Channels and wiring", body: wiring },

@@ -1,10 +1,10 @@
 //! The page of a fleet: who asks for somebody, which leaks grow, and every trace in a row.
 
 use super::chart::{Chart, Charts, Limit, Line};
-use super::envelope::Range;
 use super::history::ink;
 use super::machine::{facts, short};
 use super::{Card, Head, Page, Section, Tone};
+use crate::envelope::Range;
 use crate::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend};
 use crate::report::{Status, advice, capital, with_interval};
 use jiff::Timestamp;

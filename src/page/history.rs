@@ -1,7 +1,7 @@
 //! What a page shows over time, gathered while a trace goes by, in bounded memory.
 
 use super::chart::{Chart, Charts, Ink, Limit, Line};
-use super::envelope::{Envelopes, Range, Row, Spot};
+use crate::envelope::{Envelopes, Range, RisingTime, Row, Spot};
 use crate::replay::Replay;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
@@ -52,9 +52,7 @@ impl Quantity {
 #[derive(Clone, Debug, Default)]
 pub struct History {
     envelopes: Envelopes<QUANTITIES>,
-    last_s: Option<f64>,
-    /// Added to the trace's time where its clock was set back.
-    shift_s: f64,
+    time: RisingTime,
     leaks_lpm: PerLeak<Option<Spot>>,
     odometer: Option<Spot>,
 }
@@ -67,12 +65,9 @@ impl History {
             self.odometer =
                 replay.estimator().normalised_innovation().map(|[_, odometer]| Spot::at(odometer));
         }
-        if let Some(last_s) = self.last_s.filter(|last_s| record.t_s < *last_s) {
-            self.shift_s += last_s - record.t_s;
-        }
-        self.last_s = Some(record.t_s);
         let spots = self.spots(replay, record);
-        self.envelopes.add(record.t_s + self.shift_s, record.after_gap, &spots);
+        let t_s = self.time.after_last(record.t_s);
+        self.envelopes.add(t_s, record.after_gap, &spots);
     }
 
     fn spots(&self, replay: &Replay, record: &Record) -> [Option<Spot>; QUANTITIES] {

@@ -7,7 +7,6 @@
 mod chart;
 mod check;
 mod diagnose;
-mod envelope;
 mod fleet;
 mod history;
 mod machine;
@@ -189,8 +188,16 @@ impl PageFile {
     ///
     /// # Errors
     /// [`PageError::Output`].
-    pub fn finish(mut self, page: &Page) -> Result<(), PageError> {
-        let written = self.0.write_all(page.to_html().as_bytes());
+    pub fn finish(self, page: &Page) -> Result<(), PageError> {
+        self.finish_html(&page.to_html())
+    }
+
+    /// Writes a page that was made before, as [`Page::to_html`] gave it.
+    ///
+    /// # Errors
+    /// [`PageError::Output`].
+    pub fn finish_html(mut self, html: &str) -> Result<(), PageError> {
+        let written = self.0.write_all(html.as_bytes());
         written.map_err(|source| self.0.error(source))?;
         Ok(self.0.finish()?)
     }

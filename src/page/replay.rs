@@ -5,8 +5,8 @@ use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, trace};
 use super::{Card, Head, History, Page, Section};
 use crate::report::{
-    EstimateEntry, Reason, ReasonId, ReplayReport, Status, advice, capital, data_line, interval,
-    with_interval,
+    EstimateEntry, Reason, ReasonId, ReplayReport, Status, TraceSummary, advice, capital, data_line,
+    duration, interval, with_interval,
 };
 use crate::rig::Rig;
 use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
@@ -17,7 +17,7 @@ impl Page {
     /// The report of a replay of `rig`, with what was gathered on the way.
     pub fn of_replay(report: &ReplayReport, rig: &Rig, history: &History) -> Self {
         let drawn = history.drawn();
-        let mut charts = drawn.charts();
+        let mut charts = drawn.charts().by(report.trace.begins.as_ref());
         let sections = vec![
             Section { id: "leaks", title: "Leaks", body: leaks(report, rig, &drawn, &mut charts) },
             Section { id: "signals", title: "Signals", body: signals(&drawn, &mut charts) },
@@ -225,44 +225,68 @@ fn trend(report: &ReplayReport, leak: Leak) -> String {
     format!("{} L/min per hour", with_interval(trend.slope_lpm_per_h, Some(trend.std)))
 }
 
+/// Rows of a table of episodes at most: a page stays small however often a leak comes and goes.
+const MOST_EPISODES: usize = 500;
+
 fn episodes(report: &ReplayReport) -> Markup {
+    let trace = &report.trace;
+    let number = |lpm: f64| format!("{lpm:.3}");
     html! {
-        h3 { "Episodes and alarms" }
-        @if report.episodes.is_empty() {
+        h3 { "Leaks through the trace" }
+        @if let Some(clock) = &trace.begins { p .note { "The trace begins " (clock.start_text()) "." } }
+        @if report.spells.is_empty() {
             p { "No alarm stood at any time." }
         } @else {
             div .wide {
                 table {
                     thead { tr {
-                        th scope="col" { "leak" } th .number scope="col" { "from, s" } th .number scope="col" { "to, s" }
-                        th .number scope="col" { "mean, L/min" } th .number scope="col" { "most, L/min" }
+                        th scope="col" { "leak" } th scope="col" { "from" } th scope="col" { "to" } th .number scope="col" { "times" }
+                        th .number scope="col" { "stood for" } th .number scope="col" { "mean, L/min" } th .number scope="col" { "most, L/min" }
                     } }
                     tbody {
-                        @for episode in &report.episodes {
+                        @for spell in &report.spells {
                             tr {
-                                th scope="row" { (episode.fault.label()) }
-                                td .number { (format!("{:.1}", episode.from_s)) }
-                                td .number { @match episode.to_s { Some(to_s) => (format!("{to_s:.1}")), None => "stands at the end" } }
-                                td .number { (format!("{:.3}", episode.mean_lpm)) }
-                                td .number { (format!("{:.3}", episode.peak_lpm)) }
+                                th scope="row" { (spell.fault.label()) }
+                                td { (trace.time(spell.from_s, 1)) }
+                                td { (end(trace, spell.to_s)) }
+                                td .number { (spell.times) }
+                                td .number { (duration(spell.stood_s)) }
+                                td .number { (number(spell.mean_lpm)) }
+                                td .number { (number(spell.peak_lpm)) }
                             }
                         }
                     }
                 }
             }
         }
-        @if !report.alarms.is_empty() {
+        @if report.episodes.len() > report.spells.len() {
+            details {
+                summary { "Every single one (" (report.episodes.len()) "; above, pauses shorter than a twenty-fourth of the trace are passed over)" }
+                ul {
+                    @for episode in report.episodes.iter().take(MOST_EPISODES) {
+                        li { (episode.fault.label()) " leak, " (trace.time(episode.from_s, 1)) " to " (end(trace, episode.to_s)) ": "
+                            (number(episode.mean_lpm)) " L/min on average, " (number(episode.peak_lpm)) " at most" }
+                    }
+                }
+                @if report.episodes.len() > MOST_EPISODES { p { "… and " (report.episodes.len() - MOST_EPISODES) " more: " code { "--json" } " has all." } }
+            }
+        }
+        @if !report.alarms.is_empty() && report.alarms.len() <= MOST_EPISODES {
             details {
                 summary { "Alarms in the order of time (" (report.alarms.len()) ")" }
                 ul {
                     @for alarm in &report.alarms {
-                        li { (format!("{:.2} s: ", alarm.time_s)) (alarm.fault.label()) " leak "
+                        li { (trace.time(alarm.time_s, 2)) ": " (alarm.fault.label()) " leak "
                             (if alarm.state == AlarmState::Raised { "raised" } else { "cleared" }) }
                     }
                 }
             }
         }
     }
+}
+
+fn end(trace: &TraceSummary, to_s: Option<f64>) -> String {
+    to_s.map_or_else(|| "stands at the end".to_owned(), |to_s| trace.time(to_s, 1))
 }
 
 fn scores(report: &ReplayReport) -> Markup {

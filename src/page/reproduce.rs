@@ -1,9 +1,9 @@
 //! The page of the reproduced experiment: the paper's figures beside ours, and the charts behind them.
 
 use super::chart::{Chart, Charts, Ink, Limit, Line};
-use super::envelope::{Envelopes, Range, Spot};
 use super::machine::{facts, rig, rough, short};
 use super::{Card, Head, Page, Section, Tone};
+use crate::envelope::{Envelopes, Range, Spot};
 use crate::figure::{self, Panel};
 use crate::reproduce::{
     BulkModulusBound, Detection, Drawing, Report, ReproduceError, Reproduction, Row, Scored,

@@ -9,6 +9,7 @@ mod estimator;
 mod known;
 mod pressures;
 mod scoring;
+mod sketch;
 mod spikes;
 mod state;
 mod stream;
@@ -18,6 +19,7 @@ mod temperature;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
+pub use sketch::Sketch;
 pub use state::RestoreError;
 pub use stream::Stream;
 
@@ -340,7 +342,8 @@ pub fn replay<E: From<ReplayError>>(
         }
         each(&replay, &record, renewed)?;
     }
-    let summary = TraceSummary::new(reader.name(), reader.quality());
+    let summary =
+        TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
     let report = replay.report(summary.clone());
     let suspicions = replay.suspicions(&report.verdict, &excerpt, &reader.columns(&rig.columns));
     Ok(if suspicions.any() { replay.report_with(summary, &suspicions) } else { report })

@@ -4,8 +4,8 @@ use super::Replay;
 use super::known::is_known;
 use crate::channels::ChannelFault;
 use crate::report::{
-    EstimateEntry, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Suspicions,
-    TraceSummary, Verdict,
+    EstimateEntry, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell,
+    Suspicions, TraceSummary, Verdict,
 };
 use crate::rig::EstimatorKind;
 use crate::signal::Signal;
@@ -56,6 +56,7 @@ impl Replay {
             estimator: self.rig.estimator.kind,
             verdict: Verdict::of(&findings),
             trend,
+            spells: Spell::of(&episodes, trace.duration_s, self.end_s),
             episodes,
             trace,
             estimates,

@@ -2,6 +2,8 @@
 
 mod episode;
 mod reason;
+mod sketch;
+mod spell;
 mod statement;
 mod text;
 mod trend;
@@ -9,7 +11,8 @@ mod verdict;
 
 pub use episode::Episode;
 pub use reason::{Reason, ReasonId};
-pub(crate) use statement::{advice, capital, interval, with_interval};
+pub use spell::Spell;
+pub(crate) use statement::{advice, capital, duration, interval, with_interval};
 pub use text::{Palette, data_line};
 pub(crate) use text::{misfit, rig_line};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
@@ -17,6 +20,7 @@ pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
 
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;
+use crate::times::Clock;
 use crate::trace::TraceQuality;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{AlarmState, Estimate, Leak, PerLeak};
@@ -50,6 +54,8 @@ pub struct ReplayReport {
     pub trend: PerLeak<Option<LeakTrend>>,
     /// Every leak that the trace showed, in the order of time.
     pub episodes: Vec<Episode>,
+    /// The same in short: episodes of a leak that follow one another closely are told as one.
+    pub spells: Vec<Spell>,
     /// When the leak last changed at once, s: the estimates then began anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changed_at_s: Option<f64>,
@@ -82,6 +88,9 @@ pub struct TraceSummary {
     pub samples: u64,
     /// Bad rows.
     pub skipped: u64,
+    /// The clock of its time stamps, where it has any: what it shows where the trace's seconds begin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub begins: Option<Clock>,
     /// From the first to the last good row, s.
     pub duration_s: f64,
     /// Samples per second where they come regularly; none for a single row.
@@ -102,6 +111,7 @@ impl TraceSummary {
             path: path.to_owned(),
             samples: quality.rows,
             skipped: quality.skipped,
+            begins: None,
             duration_s: quality.duration_s,
             sample_rate_hz: quality.sample_rate_hz(),
             gaps: quality.gaps,
@@ -109,6 +119,35 @@ impl TraceSummary {
             warnings: quality.warnings(),
         }
     }
+
+    /// A time of the trace for people: in seconds with so many decimals where the trace is shorter than ten minutes, else what
+    /// its clock shows, or how long after the start.
+    pub fn time(&self, t_s: f64, decimals: usize) -> String {
+        match &self.begins {
+            _ if self.duration_s < LONG_S => format!("{t_s:.decimals$} s"),
+            Some(clock) => clock.text(t_s, self.duration_s),
+            None => after_start(t_s, self.duration_s),
+        }
+    }
+
+    /// Whether its times are those of a clock.
+    pub(crate) fn is_long(&self) -> bool {
+        self.duration_s >= LONG_S
+    }
+}
+
+/// From here on seconds are no unit for people, s.
+const LONG_S: f64 = 600.0;
+
+/// `8 h 14 min`, or `14 min 20 s` of a trace shorter than an hour.
+fn after_start(t_s: f64, duration_s: f64) -> String {
+    let whole = t_s.round();
+    let (minutes, seconds) = ((whole / 60.0).floor(), whole.rem_euclid(60.0));
+    if duration_s < 3600.0 {
+        return format!("{minutes:.0} min {seconds:02.0} s");
+    }
+    let minutes = (t_s / 60.0).round();
+    format!("{:.0} h {:02.0} min", (minutes / 60.0).floor(), minutes.rem_euclid(60.0))
 }
 
 /// The parameters of eq. (1).

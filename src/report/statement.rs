@@ -44,15 +44,15 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
         Some(last) if last.to_s.is_some() => {
             let count = findings.episodes.iter().filter(|episode| episode.fault == leak).count();
             format!(
-                "{label} leak that comes and goes, {count} times, last {:.2} L/min on average until {:.1} s: {}.",
+                "{label} leak that comes and goes, {count} times, last {:.2} L/min on average until {}: {}.",
                 last.mean_lpm,
-                last.to_s.unwrap_or(last.from_s),
+                findings.trace.time(last.to_s.unwrap_or(last.from_s), 1),
                 advice(leak)
             )
         }
         Some(last) if !findings.is_known(leak) => format!(
-            "{label} leak since {:.1} s, {:.2} L/min on average: {}.",
-            last.from_s,
+            "{label} leak since {}, {:.2} L/min on average: {}.",
+            findings.trace.time(last.from_s, 1),
             last.mean_lpm,
             advice(leak)
         ),
@@ -96,17 +96,22 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
         let last = own.last()?;
         let often = if own.len() > 1 { format!(", the last of {} times", own.len()) } else { String::new() };
         Some(format!(
-            "Earlier: {} leak of {:.2} L/min from {:.1} s to {:.1} s{often}.",
+            "Earlier: {} leak of {:.2} L/min from {} to {}{often}.",
             leak.label(),
             last.mean_lpm,
-            last.from_s,
-            last.to_s?
+            findings.trace.time(last.from_s, 1),
+            findings.trace.time(last.to_s?, 1)
         ))
     });
-    let changed = findings.changed_at_s.map(|at_s| match findings.restarts {
-        0 | 1 => format!("The leaks changed at once at {at_s:.2} s: figures are those since then."),
-        restarts => {
-            format!("The leaks changed at once {restarts} times, last at {at_s:.2} s: figures are those since then.")
+    let changed = findings.changed_at_s.map(|at_s| {
+        let at = findings.trace.time(at_s, 2);
+        match findings.restarts {
+            0 | 1 => format!("The leaks changed at once at {at}: figures are those since then."),
+            restarts => {
+                format!(
+                    "The leaks changed at once {restarts} times, last at {at}: figures are those since then."
+                )
+            }
         }
     });
     ended.collect::<Vec<_>>().into_iter().chain(changed)
@@ -141,7 +146,7 @@ fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> 
 }
 
 /// In the unit that people would take.
-fn duration(time_s: f64) -> String {
+pub(crate) fn duration(time_s: f64) -> String {
     const UNITS: [(f64, &str); 3] = [(86_400.0, "days"), (3600.0, "h"), (60.0, "min")];
     let unit = UNITS.into_iter().find(|(unit_s, _)| time_s >= 2.0 * unit_s);
     let (unit_s, name) = unit.unwrap_or((1.0, "s"));

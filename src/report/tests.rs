@@ -50,7 +50,6 @@ impl Found {
         ReplayReport {
             schema: ReplayReport::SCHEMA,
             verdict: self.verdict(),
-            trace: self.trace,
             rig: "rig.toml".to_owned(),
             estimator: EstimatorKind::Rls,
             flow_meter_offsets: None,
@@ -59,7 +58,9 @@ impl Found {
             leakage: self.leakage,
             changed_at_s: self.changed_at_s,
             trend: self.trends,
+            spells: Spell::of(&self.episodes, self.trace.duration_s, 60.0),
             episodes: self.episodes,
+            trace: self.trace,
             alarms: vec![Alarm { time_s: 3.25, fault: Leak::Internal, state: AlarmState::Raised }],
             score: None,
         }
@@ -89,6 +90,7 @@ fn found(active: PerLeak<bool>) -> Found {
         path: "h02.csv.gz".to_owned(),
         samples: 6001,
         skipped: 0,
+        begins: None,
         duration_s: 60.0,
         sample_rate_hz: Some(100.000_000_001),
         gaps: 0,

@@ -1,8 +1,10 @@
 //! The report as lines of text: verdict first, then what backs it.
 
 use super::reason::MISFIT;
-use super::statement::{interval, with_interval};
+use super::sketch::{write_bars, write_courses};
+use super::statement::{duration, interval, with_interval};
 use super::{EstimateEntry, ReplayReport, Status, TraceSummary, Verdict};
+use crate::replay::Sketch;
 use crate::rig::Rig;
 use crate::units::LPM_PER_BAR;
 use pitchleak_core::AlarmState;
@@ -47,6 +49,10 @@ impl Palette {
         (colour, self.reset)
     }
 
+    pub(super) fn fault(&self) -> (&'static str, &'static str) {
+        (self.fault, self.reset)
+    }
+
     pub(crate) fn faint(&self) -> (&'static str, &'static str) {
         (self.faint, self.reset)
     }
@@ -59,10 +65,15 @@ impl Palette {
 /// One line on the data: how much, how regular, what was lost.
 pub fn data_line(trace: &TraceSummary) -> String {
     let mut line = format!("{} samples over {:.1} s", trace.samples, trace.duration_s);
+    if trace.is_long() {
+        let _ = write!(line, " ({})", duration(trace.duration_s));
+    }
     if let Some(rate) = trace.sample_rate_hz {
         let _ = write!(line, " at {} Hz", (rate * 100.0).round() / 100.0);
     }
-    let _ = write!(line, ", {} rows skipped, {} gaps", trace.skipped, trace.gaps);
+    let plural = |count: u64| if count == 1 { "" } else { "s" };
+    let TraceSummary { skipped, gaps, .. } = *trace;
+    let _ = write!(line, ", {skipped} row{} skipped, {gaps} gap{}", plural(skipped), plural(gaps));
     line
 }
 
@@ -88,13 +99,30 @@ pub(crate) fn rig_line(rig: &str) -> String {
     }
 }
 
+/// More alarms than these are told as spells alone.
+const MOST_ALARMS: usize = 12;
+
 impl ReplayReport {
     /// The report for people, in the colours of `palette`.
     pub fn to_text(&self, palette: &Palette) -> String {
+        self.text(palette, None)
+    }
+
+    /// The same for a terminal that knows Unicode: with a bar of each leak's interval, and its course over the trace.
+    pub fn to_terminal(&self, palette: &Palette, sketch: &Sketch) -> String {
+        self.text(palette, Some(sketch))
+    }
+
+    fn text(&self, palette: &Palette, sketch: Option<&Sketch>) -> String {
         let mut out = String::new();
         self.write_verdict(&mut out, palette);
         self.write_reasons(&mut out, palette);
         self.write_leaks(&mut out, palette);
+        if let Some(sketch) = sketch {
+            write_bars(&mut out, self, sketch, palette);
+            write_courses(&mut out, self, sketch, palette);
+        }
+        self.write_spells(&mut out, palette);
         self.write_alarms(&mut out);
         self.write_scores(&mut out);
         let _ = writeln!(out, "\ntrace      {}: {}", self.trace.path, data_line(&self.trace));
@@ -140,8 +168,26 @@ impl ReplayReport {
         write_row(out, &format!("{:<12}{text:<48}", "oil"), bulk, caution, reset);
     }
 
+    /// What a long trace showed from its beginning on, also where its end shows nothing of it.
+    fn write_spells(&self, out: &mut String, palette: &Palette) {
+        if !self.trace.is_long() && self.alarms.len() <= MOST_ALARMS {
+            return;
+        }
+        let (faint, reset) = palette.faint();
+        let begins = self.trace.begins.as_ref();
+        let since = begins.map_or_else(String::new, |clock| format!(", which begins {}", clock.start_text()));
+        let _ = writeln!(out, "\n{faint}leaks through the trace{since}{reset}");
+        if self.spells.is_empty() {
+            out.push_str("no alarm at any time\n");
+        }
+        for spell in &self.spells {
+            let when = spell.when(&self.trace);
+            let _ = writeln!(out, "{:<12}{when:<32}{}", spell.fault.label(), spell.size());
+        }
+    }
+
     fn write_alarms(&self, out: &mut String) {
-        if self.alarms.is_empty() {
+        if self.alarms.is_empty() || self.alarms.len() > MOST_ALARMS {
             return;
         }
         out.push('\n');
@@ -150,7 +196,8 @@ impl ReplayReport {
                 AlarmState::Raised => "raised",
                 AlarmState::Cleared => "cleared",
             };
-            let _ = writeln!(out, "alarm {state} at {:.2} s: {} leak", alarm.time_s, alarm.fault.label());
+            let at = self.trace.time(alarm.time_s, 2);
+            let _ = writeln!(out, "alarm {state} at {at}: {} leak", alarm.fault.label());
         }
     }
 

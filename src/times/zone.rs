@@ -7,7 +7,7 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Zone {
     name: String,
-    zone: TimeZone,
+    pub(super) zone: TimeZone,
 }
 
 /// Abbreviations that mean one offset only, h. CST, IST and BST mean several.

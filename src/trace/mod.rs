@@ -37,6 +37,7 @@ pub use table::{Batch, ColumnContent, TableLayout};
 
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
+use crate::times::Clock;
 use pitchleak_core::{PerLeak, Sample};
 use row::{Next, Row, RowSource};
 use std::fs::File;
@@ -91,6 +92,8 @@ pub struct TraceReader<'a> {
     row: Row,
     validator: RowValidator,
     done: bool,
+    /// Stamp from which the seconds of columns in memory count.
+    first_ns: Option<i64>,
 }
 
 impl TraceReader<'static> {
@@ -169,7 +172,14 @@ impl<'a> TraceReader<'a> {
 
     fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
         let validator = RowValidator::new(rig, rows.layout());
-        Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false }
+        Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false, first_ns: None }
+    }
+
+    /// Says from which time stamp the seconds of columns in memory count, ns since 1970.
+    #[must_use]
+    pub fn since(mut self, first_ns: Option<i64>) -> Self {
+        self.first_ns = first_ns;
+        self
     }
 
     /// Goes on where another part of the same trace ended; rows of columns in memory count on from there.
@@ -207,9 +217,9 @@ impl<'a> TraceReader<'a> {
         self.rows.layout().has(signal)
     }
 
-    /// The time stamp from which its seconds count, ns since 1970; none before the first row, and where it has no stamps.
-    pub fn epoch_ns(&self) -> Option<i64> {
-        self.rows.epoch_ns()
+    /// The clock of its time stamps; none before the first row, and where it has no stamps.
+    pub fn clock(&self) -> Option<Clock> {
+        Clock::new(self.rows.epoch_ns().or(self.first_ns)?, &self.rows.layout().time)
     }
 
     /// What was noticed so far.

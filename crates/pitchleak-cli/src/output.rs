@@ -46,6 +46,18 @@ pub fn palette() -> Palette {
     if io::stdout().is_terminal() && !forbidden { Palette::ANSI } else { Palette::PLAIN }
 }
 
+/// Whether standard output is a terminal that shows more than letters: by the locale, and on Windows by its own terminal.
+pub fn draws() -> bool {
+    let says_utf8 = |value: std::ffi::OsString| {
+        let value = value.to_string_lossy().to_ascii_lowercase();
+        value.contains("utf-8") || value.contains("utf8")
+    };
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().filter_map(std::env::var_os);
+    let knows = locale.into_iter().find(|value| !value.is_empty()).is_some_and(says_utf8);
+    let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+    io::stdout().is_terminal() && !dumb && (knows || std::env::var_os("WT_SESSION").is_some())
+}
+
 /// The text with what would steer a terminal made visible: names of files and columns are anybody's. Line ends and our
 /// own colours stay.
 fn harmless(text: &str) -> Cow<'_, str> {

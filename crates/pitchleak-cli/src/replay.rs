@@ -3,7 +3,7 @@ use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::page::{History, Page, PageFile};
-use pitchleak::replay::{EstimateFile, replay};
+use pitchleak::replay::{EstimateFile, Sketch, replay};
 use pitchleak::rig::EstimatorKind;
 use std::path::PathBuf;
 
@@ -65,10 +65,14 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
+    let mut sketch = (output::draws() && !arguments.json).then(Sketch::default);
     let (mut reader, bar) = trace.open()?;
     let report = replay(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
+        }
+        if let Some(sketch) = &mut sketch {
+            sketch.add(replay, record, renewed);
         }
         match &mut file {
             None => Ok(()),
@@ -83,7 +87,10 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     output::note(&report.trace);
     output::warn(&report.trace.warnings);
     let json = arguments.json.then(|| report.to_json()).transpose()?;
-    trace.print(json, || report.to_text(&output::palette()))?;
+    trace.print(json, || match &sketch {
+        Some(sketch) => report.to_terminal(&output::palette(), sketch),
+        None => report.to_text(&output::palette()),
+    })?;
     let fault = arguments.fail_on_fault && !report.verdict.faults.is_empty();
     let doubt = arguments.fail_on_doubt && !report.verdict.status.is_sure();
     Ok(if fault || doubt { Outcome::FaultFound } else { Outcome::Done })

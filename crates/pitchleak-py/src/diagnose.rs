@@ -2,10 +2,12 @@ use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::signals::Signals;
 use crate::source::Source;
+use crate::table::NAME;
 use crate::threads::detached;
 use pitchleak::diagnose::{
     Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
 };
+use pitchleak::page::Page;
 use pyo3::prelude::*;
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -13,8 +15,10 @@ use std::path::PathBuf;
 /// What is left of each equation over time: name, time in s, residual in SI.
 type Residuals = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
-/// Fits traces of one rig together; gives JSON, text, the rig with the effects found, residuals before and after, and
-/// warnings. `progress` is called with the fits done and NaN.
+/// JSON, text, page, the rig with the effects found, residuals before and after, and warnings.
+type Found = (String, String, String, Rig, Residuals, Residuals, Vec<String>);
+
+/// Fits traces of one rig together. `progress` is called with the fits done and NaN.
 #[pyfunction]
 #[pyo3(signature = (train, test, rig, strict, progress = None))]
 pub fn diagnose(
@@ -24,8 +28,9 @@ pub fn diagnose(
     rig: &Rig,
     strict: bool,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(String, String, Rig, Residuals, Residuals, Vec<String>)> {
+) -> PyResult<Found> {
     let roles = Roles::of(&paths(&train), &paths(&test)).map_err(value_error)?;
+    let names: Vec<String> = train.iter().chain(&test).map(name).collect();
     let read_all = |sources: &[Source<'_>], once: &[PathBuf]| -> PyResult<Vec<Series>> {
         let (mut traces, mut once) = (Traces::default(), once.iter().peekable());
         for source in sources {
@@ -53,14 +58,23 @@ pub fn diagnose(
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
     let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text());
+    let page = Page::of_diagnosis(&diagnosis, &rig.0, &names).to_html();
     Ok((
         json,
         text,
+        page,
         saved,
         residuals(&diagnosis.before.residual_over_time),
         residuals(&diagnosis.after.residual_over_time),
         roles.repeated.iter().map(ToString::to_string).collect(),
     ))
+}
+
+fn name(source: &Source<'_>) -> String {
+    match source {
+        Source::Path(path) => path.display().to_string(),
+        Source::Table(_) => NAME.to_owned(),
+    }
 }
 
 fn paths(sources: &[Source<'_>]) -> Vec<PathBuf> {

@@ -10,6 +10,7 @@ use pitchleak::fleet::{
     TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
+use pitchleak::page::Page;
 use pitchleak::report::Palette;
 use pitchleak::trace::TraceReader;
 use pyo3::exceptions::{PyFileNotFoundError, PyIsADirectoryError};
@@ -76,7 +77,7 @@ pub fn fleet_row(
     rig: &Rig,
     stop: Option<&Stop>,
 ) -> PyResult<FleetRow> {
-    let mut identity = identity(cylinder, begins)?;
+    let identity = identity(cylinder, begins)?;
     let mut signals = Signals::new(stop);
     let mut asked = None;
     let go_on = || signals.heed().map_err(|stopped| asked = stopped.asked()).is_ok();
@@ -87,12 +88,11 @@ pub fn fleet_row(
         }),
         Source::Table(table) => {
             let table = table.get();
-            let first = table.first_ns().map(pitchleak::fleet::timestamp);
-            identity.begins = first.flatten().or(identity.begins);
             let lent = table.lend(py)?;
             let batches = table.slices(&lent)?;
             py.detach(|| {
-                let opened = TraceReader::from_table(NAME, table.layout(), batches, &rig.0);
+                let opened = TraceReader::from_table(NAME, table.layout(), batches, &rig.0)
+                    .map(|reader| reader.since(table.first_ns()));
                 judge_opened(NAME, &identity, &rig.0, opened, go_on)
             })
         }
@@ -137,6 +137,12 @@ pub fn fleet_json(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
 #[pyfunction]
 pub fn fleet_text(rows: Vec<PyRef<'_, FleetRow>>) -> String {
     FleetReport::of(&cloned(&rows)).to_text(&Palette::PLAIN)
+}
+
+/// The page for a browser.
+#[pyfunction]
+pub fn fleet_page(rows: Vec<PyRef<'_, FleetRow>>) -> String {
+    Page::of_fleet(&FleetReport::of(&cloned(&rows))).to_html()
 }
 
 /// Writes the table into a file.

@@ -6,6 +6,7 @@ mod errors;
 mod estimator;
 mod fleet;
 mod linkage;
+mod page;
 mod replay;
 mod reproduce;
 mod rig;
@@ -27,9 +28,13 @@ mod _pitchleak {
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
-    use crate::fleet::{FleetRow, fleet_json, fleet_row, fleet_save, fleet_table, fleet_text, fleet_traces};
+    use crate::fleet::{
+        FleetRow, fleet_json, fleet_page, fleet_row, fleet_save, fleet_table, fleet_text, fleet_traces,
+    };
     #[pymodule_export]
     use crate::linkage::Linkage;
+    #[pymodule_export]
+    use crate::page::{check_page, replay_page, write_page};
     #[pymodule_export]
     use crate::replay::{check, over_time, replay};
     #[pymodule_export]

@@ -34,7 +34,7 @@ impl Source<'_> {
                 let batches = table.slices(&lent)?;
                 py.detach(|| {
                     let reader = TraceReader::from_table(NAME, table.layout(), batches, rig)?;
-                    work(reader.with_bad_rows(bad_rows))
+                    work(reader.since(table.first_ns()).with_bad_rows(bad_rows))
                 })
             }
         };

@@ -1,5 +1,6 @@
 //! Figures of what is left: over time, its autocorrelation and distribution, and against each variable.
 
+use super::in_a_row::in_a_row;
 use super::labels::{name, people, people_unit, symbol};
 use crate::diagnose::equation::Equation;
 use crate::diagnose::outcome::{BinnedResidual, Diagnosis, EquationResidual};
@@ -39,7 +40,9 @@ impl Diagnosis {
 
     fn over_time(&self, equation: Equation) -> Panel {
         let (factor, _) = people_unit(equation);
-        let scaled = |points: &[(f64, f64)]| in_a_row(points.iter().map(|(t, value)| (*t, value * factor)));
+        let scaled = |points: &[(f64, f64)]| {
+            in_a_row(points).into_iter().map(|(t, value)| (t, value * factor)).collect()
+        };
         let (before, after) = (&self.before.residual_over_time, &self.after.residual_over_time);
         Panel {
             title: format!("{}, held-out samples", name(equation)),
@@ -52,20 +55,6 @@ impl Diagnosis {
             y_range: None,
         }
     }
-}
-
-/// One trace after the other: each begins where the one before ended.
-fn in_a_row(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    let (mut start, mut last) = (0.0, f64::NEG_INFINITY);
-    points
-        .map(|(t, value)| {
-            if t < last {
-                start += last;
-            }
-            last = t;
-            (start + t, value)
-        })
-        .collect()
 }
 
 /// The label of what is left.

@@ -1,7 +1,8 @@
 //! Names and units for people.
 
 use crate::diagnose::equation::Equation;
-use crate::units::LPM_PER_M3S;
+use crate::report::with_interval;
+use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
 
 /// Name of an equation in text and figures.
 pub(crate) fn name(equation: Equation) -> &'static str {
@@ -46,4 +47,23 @@ pub(crate) fn people(variable: &str) -> (f64, &'static str) {
         "direction" => (1.0, ""),
         _ => (1.0, "s"),
     }
+}
+
+/// With its 95 % interval, in people's units.
+pub(crate) fn quantity(value: f64, std: Option<f64>, unit: &str) -> String {
+    let (factor, unit) = match unit {
+        "1" => (100.0, "%"),
+        "Pa" => (1e-5, "bar"),
+        "m" => (1e3, "mm"),
+        "m2" => (1e6, "mm²"),
+        "m3" => (1e6, "ml"),
+        "m3/s" => (LPM_PER_M3S, "L/min"),
+        "m3/(s*Pa)" => (LPM_PER_BAR, "L/min/bar"),
+        "m3/(s*Pa*K)" => (LPM_PER_BAR, "L/min/bar/K"),
+        "m3/(s*sqrt(Pa))" => (LPM_PER_M3S * 1e5_f64.sqrt(), "L/min/√bar"),
+        "Pa*s/m3" => (1e-5 / LPM_PER_M3S, "bar/(L/min)"),
+        "s" => (1e3, "ms"),
+        other => (1.0, other),
+    };
+    format!("{} {unit}", with_interval(value * factor, std.map(|std| std * factor)))
 }

@@ -5,11 +5,11 @@ use crate::diagnose::equation::Equation;
 use crate::diagnose::outcome::{BinnedResidual, Correlation, Diagnosis, EquationResidual};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CHANCE_RATE, RESIDUAL_TESTS};
+use crate::spark::level;
 use std::fmt::Write;
 
 /// Variables named per equation.
 const MOST_NAMED: usize = 3;
-const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 impl Diagnosis {
     /// Size against the sensors' noise, whiteness, normality, and what the residual goes with.
@@ -97,11 +97,6 @@ impl BinnedResidual {
             short(to * scale)
         )
     }
-}
-
-fn level(share: f64) -> char {
-    let index = (share * LEVELS.len() as f64) as usize;
-    LEVELS.get(index).or(LEVELS.last()).copied().unwrap_or(' ')
 }
 
 fn extremes(values: &[f64]) -> [f64; 2] {

@@ -1,9 +1,10 @@
 //! A diagnosis as text for people.
 
-use super::labels::{name, people_unit};
+use super::labels::{name, people_unit, quantity};
 use crate::diagnose::outcome::{Diagnosis, FoundEffect, LeakEstimate, LeakEstimates, Samples, Verdict};
 use crate::diagnose::thresholds::CI95_SIGMA;
-use crate::units::LPM_PER_M3S as LPM;
+use crate::report::with_interval;
+use crate::units::{LPM_PER_BAR, LPM_PER_M3S as LPM};
 use crate::wiring::Wiring;
 use std::fmt::Write;
 
@@ -82,7 +83,7 @@ impl Diagnosis {
     }
 
     fn write_leaks(&self, out: &mut String) {
-        out.push_str("\nleak coefficients, 1e-12 m3/(s Pa)      before                 after\n");
+        out.push_str("\nleak coefficients, L/min/bar, 95 %       before                  after\n");
         let rows = |leaks: &LeakEstimates| {
             [
                 leaks.internal_leak_coefficient,
@@ -95,7 +96,7 @@ impl Diagnosis {
         {
             let text = |leak: LeakEstimate| {
                 let mark = if leak.physical { "" } else { " (impossible)" };
-                format!("{:.3} ± {:.3}{mark}", leak.value * 1e12, leak.std * 1e12)
+                with_interval(leak.value * LPM_PER_BAR, Some(leak.std * LPM_PER_BAR)) + mark
             };
             let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
         }
@@ -114,8 +115,8 @@ fn write_wiring(out: &mut String, wiring: &Wiring) {
 }
 
 fn write_effect(out: &mut String, effect: &FoundEffect) {
-    let unit = if effect.unit == "1" { String::new() } else { format!(" {}", effect.unit) };
-    let _ = writeln!(out, "\n{}: {:.4e} ± {:.1e}{unit}", effect.id, effect.value, effect.std);
+    let _ =
+        writeln!(out, "\n{}: {} (95 %)", effect.id, quantity(effect.value, Some(effect.std), effect.unit));
     let _ = writeln!(out, "  {}", effect.cause);
     let _ = writeln!(out, "  To do: {}", effect.remedy);
     if let Some(doubt) = &effect.doubt {

@@ -13,9 +13,21 @@
   // People's unit for a span of seconds.
   const timeUnit = (span) => (span > 3 * 86400 ? [86400, "days"] : span > 3 * 3600 ? [3600, "h"] : span > 600 ? [60, "min"] : [1, "s"]);
   const span = data.t.length ? data.t[data.t.length - 1] - data.t[0] : 0;
-  const [second, unitOfTime] = timeUnit(span);
+  // A long trace with a clock stands over what the clock shows, in hours since midnight.
+  const clocked = data.clock != null && span > 600;
+  const shift = clocked ? data.clock : 0;
+  if (clocked) data.t = data.t.map((t) => (t == null ? null : t + shift));
+  const [second, unitOfTime] = clocked ? [3600, "clock"] : timeUnit(span);
+  const two = (value) => String(value).padStart(2, "0");
+  const clockText = (t, step) => {
+    const whole = Math.round(t), day = Math.floor(whole / 86400), rest = whole - 86400 * day;
+    const text = `${two(Math.floor(rest / 3600))}:${two(Math.floor(rest / 60) % 60)}` + (step < 60 ? `:${two(rest % 60)}` : "");
+    return day > 0 ? `${text} +${day} d` : text;
+  };
   // Steps of the axis in that unit: a third of a minute is none.
-  const steps = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 20, 30, 60, 120, 200, 500, 1000].map((step) => step * second);
+  const steps = clocked
+    ? [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800]
+    : [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 20, 30, 60, 120, 200, 500, 1000].map((step) => step * second);
   const decimals = (step) => {
     let count = 0;
     while (count < 6 && Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) > 1e-6 * step * 10 ** count) count++;
@@ -25,6 +37,7 @@
     const step = values.length > 1 ? (values[1] - values[0]) / factor : 1;
     return values.map((value) => (value / factor).toFixed(decimals(step)));
   };
+  const clockTicks = (u, values) => values.map((value) => clockText(value, values.length > 1 ? values[1] - values[0] : 1));
   const short = (value) => {
     if (value == null) return "–";
     const size = Math.abs(value);
@@ -64,7 +77,7 @@
     ctx.rect(left, top, width, height);
     ctx.clip();
     for (const { from, to, ink: colour } of chart.spans) {
-      const a = u.valToPos(from, "x", true), b = to == null ? left + width : u.valToPos(to, "x", true);
+      const a = u.valToPos(from + shift, "x", true), b = to == null ? left + width : u.valToPos(to + shift, "x", true);
       ctx.globalAlpha = 0.1;
       ctx.fillStyle = css(`--ink-${colour}`);
       ctx.fillRect(a, top, Math.max(b - a, 1), height);
@@ -151,7 +164,7 @@
       if (line.low) bands.push({ series: [3 * n + 3, 3 * n + 1], fill: () => faded(ink(line), 0.25) });
     });
     const axis = { stroke: () => css("--faint"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
-    const label = timed ? `time, ${unitOfTime}` : chart.x_label;
+    const label = !timed ? chart.x_label : clocked ? "time of day" : `time, ${unitOfTime}`;
     const u = new uPlot({
       width: place.clientWidth,
       height: height(place.clientWidth),
@@ -159,7 +172,7 @@
       legend: { show: false },
       scales: { x: { time: false }, y: { range: rangeOf(chart) } },
       axes: [
-        { ...axis, label, labelSize: 20, labelFont: "12px system-ui, sans-serif", size: 30, values: ticks(timed ? second : 1), ...(timed && second > 1 ? { incrs: steps } : {}) },
+        { ...axis, label, labelSize: 20, labelFont: "12px system-ui, sans-serif", size: 30, values: timed && clocked ? clockTicks : ticks(timed ? second : 1), ...(timed && second > 1 ? { incrs: steps } : {}) },
         { ...axis, size: 58, values: ticks(1) },
       ],
       series, bands,
@@ -185,7 +198,7 @@
   const readouts = [];
   const show = (u) => {
     const at = u.cursor.idx;
-    clock.textContent = at == null ? "point at a chart" : `${(u.data[0][at] / second).toFixed(2)} ${unitOfTime}`;
+    clock.textContent = at == null ? "point at a chart" : clocked ? clockText(u.data[0][at], 1) : `${(u.data[0][at] / second).toFixed(2)} ${unitOfTime}`;
     for (const { value, plot, n } of readouts) value.textContent = at == null || !plot.timed ? "" : short(plot.data[3 * n + 2][at]);
   };
   const element = (tag, text, className) => {

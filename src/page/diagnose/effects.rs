@@ -1,7 +1,8 @@
 //! What the model lacks, each effect with its remedy, doubt and rivals.
 
 use super::super::machine::{facts, prose};
-use super::{quantity, spoken};
+use super::spoken;
+use crate::diagnose::labels::quantity;
 use crate::diagnose::{Diagnosis, FoundEffect};
 use crate::report::capital;
 use maud::{Markup, html};

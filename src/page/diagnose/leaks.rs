@@ -1,6 +1,6 @@
 //! Leaks before and after, in motion and at rest.
 
-use super::quantity;
+use crate::diagnose::labels::quantity;
 use crate::diagnose::{Diagnosis, HoldLeak, LeakEstimate, LeakEstimates};
 use crate::report::{capital, with_interval};
 use crate::units::LPM_PER_M3S;

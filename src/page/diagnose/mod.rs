@@ -10,9 +10,7 @@ use super::chart::Charts;
 use super::machine::{channels, facts, rig};
 use super::{Page, Section};
 use crate::diagnose::Diagnosis;
-use crate::report::with_interval;
 use crate::rig::Rig;
-use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
 use maud::{Markup, html};
 
 impl Page {
@@ -47,25 +45,6 @@ impl Page {
 /// An effect's id as words.
 fn spoken(id: &str) -> String {
     id.replace('_', " ")
-}
-
-/// With its 95 % interval, in people's units.
-fn quantity(value: f64, std: Option<f64>, unit: &str) -> String {
-    let (factor, unit) = match unit {
-        "1" => (100.0, "%"),
-        "Pa" => (1e-5, "bar"),
-        "m" => (1e3, "mm"),
-        "m2" => (1e6, "mm²"),
-        "m3" => (1e6, "ml"),
-        "m3/s" => (LPM_PER_M3S, "L/min"),
-        "m3/(s*Pa)" => (LPM_PER_BAR, "L/min/bar"),
-        "m3/(s*Pa*K)" => (LPM_PER_BAR, "L/min/bar/K"),
-        "m3/(s*sqrt(Pa))" => (LPM_PER_M3S * 1e5_f64.sqrt(), "L/min/√bar"),
-        "Pa*s/m3" => (1e-5 / LPM_PER_M3S, "bar/(L/min)"),
-        "s" => (1e3, "ms"),
-        other => (1.0, other),
-    };
-    format!("{} {unit}", with_interval(value * factor, std.map(|std| std * factor)))
 }
 
 fn made(diagnosis: &Diagnosis, traces: &[String]) -> Markup {

@@ -1,9 +1,9 @@
 //! What each equation leaves over, before and after, over time and against the variables with which it goes.
 
 use super::super::chart::{Chart, Charts, Ink, Line};
-use super::super::envelope::{Envelopes, Range, Spot};
 use crate::diagnose::labels::{name, people, people_unit, symbol};
-use crate::diagnose::{BinnedResidual, Diagnosis, Equation};
+use crate::diagnose::{BinnedResidual, Diagnosis, Equation, in_a_row};
+use crate::envelope::{Envelopes, Range, Spot};
 use crate::report::capital;
 use maud::{Markup, html};
 
@@ -16,30 +16,29 @@ const COLUMNS: usize = 6;
 
 /// What is left over time of each equation, before and after, in people's units; trace after trace.
 pub(super) fn over_time(diagnosis: &Diagnosis) -> Envelopes<COLUMNS> {
-    let mut spots: Vec<(f64, bool, usize, f64)> = Vec::new();
+    let mut spots: Vec<(f64, usize, f64)> = Vec::new();
     for (side, fit) in [&diagnosis.before, &diagnosis.after].into_iter().enumerate() {
         for (number, (equation, points)) in fit.residual_over_time.iter().enumerate() {
             let (factor, _) = people_unit(equation);
-            let (mut start, mut last) = (0.0, f64::NEG_INFINITY);
-            for (t_s, value) in points {
-                let begins = *t_s < last;
-                start += if begins { last - t_s.min(0.0) } else { 0.0 };
-                last = *t_s;
-                spots.push((start + t_s, begins, 2 * number + side, value * factor));
-            }
+            let column = 2 * number + side;
+            spots.extend(in_a_row(points).into_iter().map(|(t, value)| (t, column, value * factor)));
         }
     }
     spots.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut envelopes = Envelopes::default();
+    let mut breaks = false;
     for same in spots.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
+        if same.iter().all(|(.., value)| value.is_nan()) {
+            breaks = true;
+            continue;
+        }
         let mut row = [None; COLUMNS];
-        for (_, _, column, value) in same {
+        for (_, column, value) in same {
             if let Some(place) = row.get_mut(*column) {
                 *place = Some(Spot::at(*value));
             }
         }
-        let begins = same.iter().any(|(_, begins, ..)| *begins);
-        envelopes.add(same.first().map_or(0.0, |first| first.0), begins, &row);
+        envelopes.add(same.first().map_or(0.0, |first| first.0), std::mem::take(&mut breaks), &row);
     }
     envelopes
 }

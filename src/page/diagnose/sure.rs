@@ -1,8 +1,9 @@
 //! Rivals and the measurements that part them.
 
 use super::super::machine::{facts, prose};
-use super::{quantity, spoken};
+use super::spoken;
 use crate::diagnose::Diagnosis;
+use crate::diagnose::labels::quantity;
 use crate::report::capital;
 use maud::{Markup, html};
 

@@ -112,7 +112,7 @@ fn damaged(error: ParquetError) -> TraceFault {
             let codec = what.rsplit(' ').next().unwrap_or_default();
             TraceFault::Ambiguous {
                 what: format!("compressed by {codec}, which is not read"),
-                settle: "write it with compression=\"snappy\" or none".to_owned(),
+                settle: "write it with compression=\"snappy\", \"gzip\", \"lz4\" or none".to_owned(),
             }
         }
         other => TraceFault::Damaged(other.to_string().replace('\n', " ")),

@@ -2,7 +2,7 @@
 
 use crate::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
-use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical};
+use parquet::basic::{Compression, GzipLevel, LogicalType, Repetition, TimeUnit, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
@@ -18,8 +18,12 @@ enum Column {
     Texts(Vec<String>),
 }
 
-/// A file of these columns, in row groups of seven.
 fn file(columns: &[(&str, Column)], rows: usize) -> Vec<u8> {
+    file_by(Compression::SNAPPY, columns, rows)
+}
+
+/// A file of these columns, in row groups of seven.
+fn file_by(compression: Compression, columns: &[(&str, Column)], rows: usize) -> Vec<u8> {
     let field = |(name, column): &(&str, Column)| {
         let (physical, logical) = match column {
             Column::Doubles(_) => (Physical::DOUBLE, None),
@@ -35,7 +39,7 @@ fn file(columns: &[(&str, Column)], rows: usize) -> Vec<u8> {
     };
     let schema =
         Type::group_type_builder("trace").with_fields(columns.iter().map(field).collect()).build().unwrap();
-    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
+    let properties = WriterProperties::builder().set_compression(compression).build();
     let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties)).unwrap();
     for start in (0..rows).step_by(7) {
         let part = start..(start + 7).min(rows);
@@ -122,6 +126,15 @@ fn every_kind_of_time_and_number_is_read() {
         assert!((last.t_s - records[0].t_s - 29.0 * step_s).abs() < 1e-6, "{at}: {}", last.t_s);
         assert_eq!((last.sample.x_m, last.sample.pa_pa, last.sample.pb_pa), (0.029, 5_050_000.0, 4e6));
         assert_eq!((records[3].sample.qa_m3s, last.sample.qa_m3s, last.line), (None, Some(1e-4), 29));
+    }
+}
+
+#[test]
+fn every_compression_that_costs_no_build_is_read() {
+    let plain = read(file_by(Compression::UNCOMPRESSED, &with_time("t_s", doubles(|i| i)), ROWS)).unwrap();
+    for codec in [Compression::SNAPPY, Compression::GZIP(GzipLevel::default()), Compression::LZ4_RAW] {
+        let bytes = file_by(codec, &with_time("t_s", doubles(|i| i)), ROWS);
+        assert_eq!(read(bytes).unwrap(), plain, "{codec}");
     }
 }
 

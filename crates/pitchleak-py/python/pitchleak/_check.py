@@ -1,11 +1,12 @@
 """Check: what a trace is worth before anybody believes its leaks."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
+from ._page import Paged, same
 from ._pitchleak import Rig
 from ._raw import Raw
 from ._records import record
@@ -81,7 +82,7 @@ class Wiring:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check(Raw, Tabular):
+class Check(Raw, Paged, Tabular):
     """Data quality, excitation, what the trace can and cannot identify. As a table: the signals."""
 
     trace: Trace
@@ -103,6 +104,15 @@ class Check(Raw, Tabular):
     raw: dict[str, Any] = field(init=False, default_factory=dict)
     """Every field of ``pitchleak check --json``."""
     _text: str = field(init=False, default="")
+    _json: str = field(init=False, default="")
+    _again: tuple[_inputs.Source, Rig, bool] = field(init=False)
+
+    def to_html(self) -> str:
+        return same(_pitchleak.check_page(*self._again), self._json)
+
+    def _read(self) -> Sequence[str]:
+        source, rig, _ = self._again
+        return [rig.name, *([source] if isinstance(source, str) else [])]
 
     @property
     def table(self) -> Mapping[str, Any]:
@@ -157,10 +167,12 @@ def check(data: Any, rig: Rig | _inputs.Path | None = None, *, strict: bool = Fa
     True
     """
     rig = _inputs.rig_for(data, rig)
-    report, text = _pitchleak.check(_inputs.source(data, rig), rig, strict)
+    source = _inputs.source(data, rig)
+    report, text = _pitchleak.check(source, rig, strict)
     raw = json.loads(report)
     result = record(Check, raw)
-    object.__setattr__(result, "raw", raw)
-    object.__setattr__(result, "_text", text)
+    filled = {"raw": raw, "_text": text, "_json": report, "_again": (source, rig, strict)}
+    for name, value in filled.items():
+        object.__setattr__(result, name, value)
     _inputs.warn(result.trace.warnings)
     return result

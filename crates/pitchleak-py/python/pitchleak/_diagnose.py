@@ -1,7 +1,7 @@
 """Diagnose: from what the model leaves over to the effect that it lacks."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from . import _html, _inputs, _pitchleak
 from ._check import Wiring
+from ._gaps import broken, people_time
+from ._page import Paged
 from ._pitchleak import Rig
 from ._progress import Progress, shown
 from ._raw import Raw
@@ -208,7 +210,7 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Raw, Tabular):
+class Diagnosis(Raw, Paged, Tabular):
     """What a diagnosis found. As a table: the effects, strongest first."""
 
     before: Quality
@@ -244,6 +246,14 @@ class Diagnosis(Raw, Tabular):
     residuals_after: dict[str, Course] = field(init=False, default_factory=dict)
     """What is left with the effects."""
     _text: str = field(init=False, default="")
+    _page: str = field(init=False, default="")
+    _files: tuple[str, ...] = field(init=False, default=())
+
+    def to_html(self) -> str:
+        return self._page
+
+    def _read(self) -> Sequence[str]:
+        return self._files
 
     @property
     def table(self) -> Mapping[str, Any]:
@@ -253,7 +263,7 @@ class Diagnosis(Raw, Tabular):
         return columns | {"confusable_with": [", ".join(effect.confusable_with) for effect in self.effects]}
 
     def plot(self, figure: "Figure | None" = None) -> "Figure":
-        """Draws what is left of each balance over time, before and after (needs matplotlib)."""
+        """Draws what is left of each balance over time, before and after, one trace after the other (needs matplotlib)."""
         pyplot = optional("matplotlib.pyplot", "plot")
         present = [name for name, course in self.residuals_before.items() if np.isfinite(course.residual).any()]
         figure = pyplot.figure(figsize=(8, 2.2 * max(len(present), 1))) if figure is None else figure
@@ -261,11 +271,13 @@ class Diagnosis(Raw, Tabular):
         for ax, name in zip(axes, present, strict=True):
             factor, label = _BALANCES[name]
             for course, when in ((self.residuals_before[name], "before"), (self.residuals_after[name], "after")):
-                ax.plot(course.t_s, factor * course.residual, linewidth=0.8, label=when)
+                t, residual = broken(course.t_s, factor * course.residual)
+                second, unit = people_time(t)
+                ax.plot(t / second, residual, linewidth=0.8, label=when)
             ax.set_ylabel(label)
         if present:
             axes[0].legend(loc="upper right", ncols=2, title=self.verdict.replace("_", " "))
-            axes[-1].set_xlabel("time, s")
+            axes[-1].set_xlabel(f"time, {unit}")
         return figure
 
     def __str__(self) -> str:
@@ -324,7 +336,7 @@ def diagnose(
     judged = [_inputs.source(trace, rig) for trace in judged_on]
     with shown(progress, " fits") as at:
         found = _pitchleak.diagnose(fitted, judged, rig, strict, at)
-    report, text, found_rig, before, after, warnings = found
+    report, text, page, found_rig, before, after, warnings = found
     _inputs.warn(warnings)
     raw = json.loads(report)
     result = record(Diagnosis, raw)
@@ -333,6 +345,7 @@ def diagnose(
         for residuals in (before, after)
     ]
     filled = {"raw": raw, "rig": found_rig, "residuals_before": courses[0], "residuals_after": courses[1]}
-    for name, value in {**filled, "_text": text}.items():
+    files = (rig.name, *(source for source in (*fitted, *judged) if isinstance(source, str)))
+    for name, value in {**filled, "_text": text, "_page": page, "_files": files}.items():
         object.__setattr__(result, name, value)
     return result

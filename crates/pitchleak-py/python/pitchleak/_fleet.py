@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from . import _html, _inputs, _pitchleak
+from ._page import Paged
 from ._parallel import on_all_cores
 from ._pitchleak import Rig, RigError, Stop, TraceError
 from ._progress import Progress, shown
@@ -109,7 +110,7 @@ class LongTrend:
     grow beyond doubt."""
 
 
-class Fleet(Tabular):
+class Fleet(Paged, Tabular):
     """What was found of many cylinders. As a table: a row per cylinder and trace, with the columns of ``pitchleak fleet
     --out`` (docs/fleet.md). Fleets of different days are put together by ``+``."""
 
@@ -195,6 +196,13 @@ class Fleet(Tabular):
     def save(self, path: _inputs.Path) -> None:
         """Writes the table: ``.parquet``, ``.csv`` or ``.csv.gz``; the file is replaced as a whole."""
         _pitchleak.fleet_save(self._rows, os.fspath(path))
+
+    def to_html(self) -> str:
+        return _pitchleak.fleet_page(self._rows)
+
+    def _read(self) -> Sequence[str]:
+        paths = ((row.path, row.rig) for row in self.rows)
+        return [name for both in paths for name in both if name is not None]
 
     def __add__(self, other: "Fleet") -> "Fleet":
         return Fleet(self._rows + other._rows) if isinstance(other, Fleet) else NotImplemented

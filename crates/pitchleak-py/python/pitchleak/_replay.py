@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias, overload
 import numpy as np
 
 from . import _html, _inputs, _pitchleak
+from ._gaps import broken, people_time
 from ._groups import split
+from ._page import Paged, same
 from ._parallel import on_all_cores
 from ._pitchleak import Rig, Stop
 from ._progress import Progress
@@ -34,9 +36,15 @@ class _Again:
     def __call__(self) -> tuple[str, _Columns]:
         return _pitchleak.over_time(self.source, self.rig, self.estimator, self.strict)
 
+    def page(self) -> tuple[str, str]:
+        return _pitchleak.replay_page(self.source, self.rig, self.estimator, self.strict)
+
+    def files(self) -> list[str]:
+        return [self.rig.name, *([self.source] if isinstance(self.source, str) else [])]
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Replay(Report, Tabular):
+class Replay(Report, Paged, Tabular):
     """What a replay found. As a table: the estimates after each sample, with the columns of
     ``pitchleak replay --out``: coefficients in m³/(s·Pa), flows in L/min, alarms as booleans.
 
@@ -56,32 +64,40 @@ class Replay(Report, Tabular):
 
     _json: str = field(init=False, repr=False, default="")
 
+    def to_html(self) -> str:
+        return same(self._again.page(), self._json)
+
+    def _read(self) -> Sequence[str]:
+        return self._again.files()
+
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws the leak flows over time with their 95 % intervals and alarms (needs matplotlib).
+        """Draws the leak flows over time with their 95 % intervals and alarms (needs matplotlib). Lines break where the
+        trace pauses.
 
         The flows are the coefficients at the mean pressures of the trace, so that their course shows what
         is learnt and not how the pressures move. Returns the axes.
         """
         axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
-        table, t = self.table, self.table["t_s"]
+        table = self.table
+        second, unit = people_time(table["t_s"])
         prefixes = {"internal": "internal", "external_a": "external_leak_a", "external_b": "external_leak_b"}
         for leak, flow in self.leakage.items():
             name = f"{prefixes[leak]}_leak_coefficient" if leak == "internal" else f"{prefixes[leak]}_coefficient"
             last = table[name][-1]
             scale = (flow.mean_lpm or 0.0) / last if last else 0.0
-            mean, half = table[name] * scale, 1.96 * table[f"{name}_std"] * abs(scale)
+            t, mean, std = broken(table["t_s"] / second, table[name], table[f"{name}_std"])
+            mean, half = mean * scale, 1.96 * std * abs(scale)
             (line,) = axes.plot(t, mean, label=LABELS[leak], linewidth=1.5)
             axes.fill_between(t, mean - half, mean + half, color=line.get_color(), alpha=0.2, linewidth=0)
             for alarm in self.alarms:
                 if alarm.fault == leak:
                     style = "-" if alarm.state == "raised" else ":"
-                    axes.axvline(alarm.time_s, color=line.get_color(), linestyle=style, linewidth=1)
-        settled = t - t[0] > 0.1 * (t[-1] - t[0])
+                    axes.axvline(alarm.time_s / second, color=line.get_color(), linestyle=style, linewidth=1)
         flows = [flow.mean_lpm or 0.0 for _, flow in self.leakage.items()]
-        if settled.any():
+        if len(table["t_s"]) > 1:
             span = max(max(flows) - min(flows), 0.1)
             axes.set_ylim(min(0.0, *flows) - 0.5 * span, max(0.0, *flows) + 0.5 * span)
-        axes.set_xlabel("time, s")
+        axes.set_xlabel(f"time, {unit}")
         axes.set_ylabel("leak flow, L/min")
         axes.legend(loc="best", title="leak (line: alarm raised)" if self.alarms else "leak")
         return axes

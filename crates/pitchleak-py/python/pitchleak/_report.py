@@ -18,6 +18,7 @@ from ._results import (
     Leakage,
     PerLeak,
     Score,
+    Spell,
     Trace,
     Trend,
     Verdict,
@@ -52,6 +53,8 @@ class Report(Raw):
     """How fast each leak changes; None where the data don't tell."""
     episodes: tuple[Episode, ...] = ()
     """Every leak that the trace showed, also those that ended before its end."""
+    spells: tuple[Spell, ...] = ()
+    """The same in short: episodes of a leak that follow one another closely are one."""
     alarms: tuple[Alarm, ...] = ()
     """In the order of time."""
     score: PerLeak[Score] | None = None

@@ -48,6 +48,8 @@ class Trace:
     """From the first to the last good row, s."""
     sample_rate_hz: float | None
     """Samples per second where they come regularly."""
+    begins: str | None = None
+    """What the clock of the time stamps shows where the trace's seconds begin, ISO 8601; None without such stamps."""
     gaps: int = 0
     """Pauses much longer than the usual step."""
     warnings: tuple[str, ...] = ()
@@ -218,6 +220,26 @@ class Episode:
     """When it was cleared, s; None where it stands at the end."""
     mean_lpm: float
     """Mean of the estimates meanwhile, L/min."""
+    peak_lpm: float
+    """Largest of them, L/min."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spell:
+    """Episodes of one leak that follow one another closely (pauses below a twenty-fourth of the trace), told as one."""
+
+    fault: Leak
+    """Which leak."""
+    from_s: float
+    """When the first alarm was raised, s."""
+    to_s: float | None
+    """When the last one was cleared, s; None where it stands at the end."""
+    times: int
+    """How many episodes."""
+    stood_s: float
+    """How long an alarm stood, all of them together, s."""
+    mean_lpm: float
+    """Mean of the estimates while one stood, L/min."""
     peak_lpm: float
     """Largest of them, L/min."""
 

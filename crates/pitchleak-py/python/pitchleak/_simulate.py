@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
+from ._gaps import broken
 from ._pitchleak import Rig
 from ._progress import Progress, shown
 from ._raw import Raw
@@ -74,7 +75,7 @@ class Simulation(Raw, Tabular):
         axes = figure.subplots(len(rows), 1, sharex=True)
         for ax, names in zip(axes, rows, strict=True):
             for name in names:
-                ax.plot(self.columns["t_s"], self.columns[name], linewidth=0.9, label=name)
+                ax.plot(*broken(self.columns["t_s"], self.columns[name]), linewidth=0.9, label=name)
             ax.legend(loc="upper right", ncols=2)
         axes[-1].set_xlabel("time, s")
         return figure

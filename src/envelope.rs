@@ -61,6 +61,24 @@ struct Spread {
     wait: u32,
 }
 
+/// Times that never go back, however often the clock is set.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RisingTime {
+    last_s: Option<f64>,
+    shift_s: f64,
+}
+
+impl RisingTime {
+    /// `t_s`, counted on where it is before the last one.
+    pub fn after_last(&mut self, t_s: f64) -> f64 {
+        if let Some(last_s) = self.last_s.filter(|last_s| t_s < *last_s) {
+            self.shift_s += last_s - t_s;
+        }
+        self.last_s = Some(t_s);
+        t_s + self.shift_s
+    }
+}
+
 /// Least, median and greatest value of a quantity in one stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {

@@ -1,0 +1,80 @@
+use super::Replay;
+use crate::envelope::{Envelopes, RisingTime, Spot};
+use crate::trace::Record;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{Leak, PerLeak};
+
+/// Stretches of the trace that are kept at most.
+const STRETCHES: usize = 480;
+
+/// What a terminal shows of a replay beside its text, gathered on the way in a few kilobytes: how large each leak was over the
+/// trace, beside its alarm level.
+#[derive(Clone, Debug)]
+pub struct Sketch {
+    flows_lpm: Envelopes<3>,
+    time: RisingTime,
+    paused: bool,
+    threshold_lpm: PerLeak<f64>,
+    ends_s: Option<[f64; 2]>,
+}
+
+impl Default for Sketch {
+    fn default() -> Self {
+        Self {
+            flows_lpm: Envelopes::of_at_most(STRETCHES),
+            time: RisingTime::default(),
+            paused: false,
+            threshold_lpm: PerLeak::default(),
+            ends_s: None,
+        }
+    }
+}
+
+impl Sketch {
+    /// Takes in a record, and the replay that has taken it in before; `renewed` where its estimates are new.
+    pub fn add(&mut self, replay: &Replay, record: &Record, renewed: bool) {
+        self.paused |= record.after_gap;
+        let [first_s, _] = self.ends_s.unwrap_or([record.t_s; 2]);
+        self.ends_s = Some([first_s, record.t_s]);
+        if !renewed {
+            return;
+        }
+        self.threshold_lpm = replay.rig().alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        let flows = replay.watched_flows_m3s();
+        let spots = Leak::ALL.map(|leak| Some(Spot::at(flows[leak].value * LPM_PER_M3S)));
+        let t_s = self.time.after_last(record.t_s);
+        self.flows_lpm.add(t_s, std::mem::take(&mut self.paused), &spots);
+    }
+
+    /// Times of the first and the last record, s.
+    pub fn ends_s(&self) -> [f64; 2] {
+        self.ends_s.unwrap_or_default()
+    }
+
+    /// The alarm levels, L/min.
+    pub fn threshold_lpm(&self) -> PerLeak<f64> {
+        self.threshold_lpm
+    }
+
+    /// Each leak's flow over the trace in at most `columns` stretches of the same length, L/min; none where it pauses.
+    pub fn courses_lpm(&self, columns: usize) -> PerLeak<Vec<Option<f64>>> {
+        let rows = self.flows_lpm.rows();
+        let columns = columns.min(rows.len());
+        let (first, last) = rows.first().zip(rows.last()).map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
+        let column = |t_s: f64| {
+            let share = (t_s - first) / (last - first).max(f64::MIN_POSITIVE);
+            ((share * columns as f64) as usize).min(columns.saturating_sub(1))
+        };
+        PerLeak::from_fn(|leak| {
+            let mut sums = vec![(0.0, 0_u32); columns];
+            for row in &rows {
+                let flow = row.ranges.get(leak as usize).copied().flatten();
+                if let (Some((sum, count)), Some(flow)) = (sums.get_mut(column(row.t_s)), flow) {
+                    *sum += flow.median;
+                    *count += 1;
+                }
+            }
+            sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
+        })
+    }
+}

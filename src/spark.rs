@@ -1,0 +1,22 @@
+//! Heights in a line of text.
+
+const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// The mark for a share of the greatest height.
+pub(crate) fn level(share: f64) -> char {
+    let index = (share * LEVELS.len() as f64) as usize;
+    LEVELS.get(index).or(LEVELS.last()).copied().unwrap_or(' ')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_share_has_its_height() {
+        assert_eq!(
+            [-1.0, 0.0, 0.5, 0.99, 1.0, 7.0, f64::NAN].map(level),
+            ['▁', '▁', '▅', '█', '█', '█', '▁']
+        );
+    }
+}
