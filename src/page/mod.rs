@@ -24,8 +24,13 @@ use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::Path;
 
-const SCRIPT: &str =
-    concat!(include_str!("assets/uplot/uPlot.iife.min.js"), "\n", include_str!("assets/page.js"));
+const SCRIPT: &str = concat!(
+    include_str!("assets/uplot/uPlot.iife.min.js"),
+    "\n",
+    include_str!("assets/page.js"),
+    "\n",
+    include_str!("assets/print.js")
+);
 const STYLE: &str =
     concat!(include_str!("assets/uplot/uPlot.min.css"), "\n", include_str!("assets/page.css"));
 const UPLOT_LICENCE: &str = include_str!("assets/uplot/LICENSE");

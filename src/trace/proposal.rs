@@ -52,7 +52,23 @@ pub(super) struct Unread<'a> {
 const WORDS: [(Signal, &[&str]); 5] = [
     (Signal::PressureA, &["p", "pressure", "press", "pres", "druck"]),
     (Signal::FlowA, &["q", "flow", "flowrate", "volumenstrom", "durchfluss"]),
-    (Signal::Position, &["x", "position", "pos", "stroke", "weg", "displacement", "lvdt", "hub", "travel"]),
+    (
+        Signal::Position,
+        &[
+            "x",
+            "position",
+            "pos",
+            "stroke",
+            "weg",
+            "hub",
+            "kolbenweg",
+            "stellweg",
+            "kolbenhub",
+            "displacement",
+            "lvdt",
+            "travel",
+        ],
+    ),
     (Signal::Force, &["force", "load", "kraft"]),
     (Signal::Time, &["t", "time", "zeit", "date", "datum", "timestamp", "elapsed", "clock"]),
 ];

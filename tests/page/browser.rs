@@ -23,6 +23,15 @@ const VISITOR: &str = r#"
   }, 300);
 "#;
 
+/// Asks axe-core for what shuts out readers who see or move little, and leaves it in the document.
+const AUDITOR: &str = r#"
+  axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) => {
+    const grave = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+    const nodes = ({ nodes }) => nodes.map(({ target }) => target.join(" ")).join(", ");
+    document.documentElement.dataset.barriers = grave.map((one) => `${one.id}: ${nodes(one)}`).join("; ") || "none";
+  });
+"#;
+
 /// What chromium makes of a page: its document after the scripts ran, and its log.
 fn visit(page: &str, options: &[&str]) -> (String, String) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -61,13 +70,49 @@ fn assert_opens(page: &str) {
         assert_eq!(left(&document, "drawn"), Some(charts.to_string().as_str()), "{options:?}");
         assert_eq!(document.matches("<canvas").count(), charts, "{options:?}");
     }
+    assert_open_to_all(page);
+    assert_prints(page, charts);
+}
+
+/// On paper each chart is an SVG with its lines.
+fn assert_prints(page: &str, charts: usize) {
+    let (document, log) = visit(&with_script(page, "dispatchEvent(new Event('beforeprint'))"), &[]);
+    assert!(!log.contains("CONSOLE"), "{log}");
+    assert_eq!(document.matches("<svg class=\"print\"").count(), charts);
+    assert!(document.matches(" d=\"M").count() >= charts, "lines");
+}
+
+/// The page with a script of ours at its end, and a policy that lets it run.
+fn with_script(page: &str, script: &str) -> String {
+    let (head, rest) = page.split_once("script-src 'sha256-").expect("a policy");
+    let (_, rest) = rest.split_once('\'').expect("a hash");
+    let (body, end) = rest.rsplit_once("</body>").expect("a body");
+    format!("{head}script-src 'unsafe-inline'{body}<script>{script}</script></body>{end}")
+}
+
+/// axe-core as a Python package brings it (`.ci/run`): by its path in `AXE`, else in CI's environment.
+fn axe() -> Option<String> {
+    let installed = "target/venv/lib/python3*/site-packages/axe_playwright_python/axe.min.js";
+    let given = std::env::var_os("AXE").map(std::path::PathBuf::from);
+    let found = given.or_else(|| glob::glob(installed).ok()?.find_map(Result::ok))?;
+    Some(std::fs::read_to_string(found).expect("reads axe"))
+}
+
+/// No barrier that axe-core calls serious or critical, on a phone in both themes.
+fn assert_open_to_all(page: &str) {
+    let Some(axe) = axe() else {
+        eprintln!("skipped: no axe-core; AXE names its axe.min.js");
+        return;
+    };
+    let page = with_script(page, &format!("{axe}</script><script>{AUDITOR}"));
+    for theme in [&[][..], &["--blink-settings=preferredColorScheme=0"]] {
+        let (document, _) = visit(&page, &[&["--window-size=390,844"], theme].concat());
+        assert_eq!(left(&document, "barriers"), Some("none"), "{theme:?}");
+    }
 }
 
 fn assert_cursor_and_zoom_work(page: &str) {
-    let (head, rest) = page.split_once("script-src 'sha256-").expect("a policy");
-    let (_, rest) = rest.split_once('\'').expect("a hash");
-    let open = format!("{head}script-src 'unsafe-inline'{rest}");
-    let page = open.replace("</body>", &format!("<script>{{{VISITOR}}}</script></body>"));
+    let page = with_script(page, &format!("{{{VISITOR}}}"));
     let (document, log) = visit(&page, &["--window-size=1280,4000"]);
     assert!(!log.contains("CONSOLE"), "{log}");
     assert_eq!(left(&document, "requests"), Some("0"));

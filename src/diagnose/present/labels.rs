@@ -65,5 +65,6 @@ pub(crate) fn quantity(value: f64, std: Option<f64>, unit: &str) -> String {
         "s" => (1e3, "ms"),
         other => (1.0, other),
     };
-    format!("{} {unit}", with_interval(value * factor, std.map(|std| std * factor)))
+    let size = with_interval(value * factor, std.map(|std| std * factor));
+    format!("{size} {}", unit.replace('*', "·"))
 }

@@ -87,8 +87,9 @@ impl BinnedResidual {
         let bars: String = self.mean.iter().map(|mean| level((mean - low) / (high - low))).collect();
         let [from, to] = extremes(&self.at);
         let (scale, scale_unit) = people(self.against);
+        let space = if scale_unit.is_empty() { "" } else { " " };
         format!(
-            "  {:<10} left over {} to {} {unit} against {} from {} to {} {scale_unit}: {bars}",
+            "  {:<10} left over {} to {} {unit} against {} from {} to {}{space}{scale_unit}: {bars}",
             name(self.equation),
             short(low * factor),
             short(high * factor),

@@ -83,7 +83,7 @@ impl Diagnosis {
     }
 
     fn write_leaks(&self, out: &mut String) {
-        out.push_str("\nleak coefficients, L/min/bar, 95 %       before                  after\n");
+        let _ = writeln!(out, "\n{:<24} {:>24} {:>22}", "leak, L/min/bar, 95 %", "before", "after");
         let rows = |leaks: &LeakEstimates| {
             [
                 leaks.internal_leak_coefficient,

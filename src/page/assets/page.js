@@ -101,9 +101,10 @@
   };
 
   // Names at the lines' ends, moved apart.
-  const names = (chart) => (u) => {
-    if (chart.lines.length < 2 || !isRoomy(u.width)) return;
-    const { left, top, width, height } = u.bbox;
+  const endsOf = (u) => {
+    const { chart } = u;
+    if (chart.lines.length < 2 || !isRoomy(u.width)) return [];
+    const { top, height } = u.bbox;
     const [, to] = u.series[0].idxs || [0, u.data[0].length - 1];
     const ends = [];
     chart.lines.forEach((line, n) => {
@@ -111,19 +112,23 @@
       let i = to;
       while (i > 0 && u.data[3 * n + 2][i] == null) i--;
       const value = u.data[3 * n + 2][i];
-      if (value != null) ends.push({ name: line.name, colour: ink(line), y: u.valToPos(value, "y", true) });
+      if (value != null) ends.push({ name: line.name, ink: line.ink, colour: ink(line), y: u.valToPos(value, "y", true) });
     });
     ends.sort((a, b) => a.y - b.y);
     const gap = 13 * devicePixelRatio;
     const [first, last] = [top + gap / 2, top + height - gap / 2];
     ends.forEach((end, n) => { end.y = Math.max(end.y, n ? ends[n - 1].y + gap : first); });
     for (let n = ends.length - 1; n >= 0; n--) ends[n].y = Math.min(ends[n].y, n + 1 < ends.length ? ends[n + 1].y - gap : last);
+    return ends;
+  };
+  const names = (u) => {
+    const { left, width } = u.bbox;
     const ctx = u.ctx;
     ctx.save();
     ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
     ctx.textBaseline = "middle";
     ctx.textAlign = "left";
-    for (const end of ends) {
+    for (const end of endsOf(u)) {
       ctx.fillStyle = end.colour;
       ctx.fillText(end.name, left + width + 5 * devicePixelRatio, end.y);
     }
@@ -183,14 +188,13 @@
         sync: timed ? { key: "time", scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } } : undefined,
       },
       hooks: {
-        drawClear: [marks(chart)],
-        draw: [names(chart)],
+        drawAxes: [marks(chart)],
+        draw: [names],
         setScale: [(self, key) => key === "x" && follow(self)],
         setCursor: timed ? [show] : [],
+        init: [(self) => Object.assign(self, { timed, chart, shift: timed ? shift : 0, ends: () => endsOf(self) })],
       },
     }, columns(chart), place);
-    u.timed = timed;
-    u.chart = chart;
     plots.push(u);
   };
 
@@ -253,6 +257,14 @@
     const width = u.root.parentElement.clientWidth;
     if (width && width !== u.width) u.setSize({ width, height: height(width) });
   });
+  // A table wider than its place is scrolled by the keyboard too.
+  const reach = () => document.querySelectorAll(".wide").forEach((box) => {
+    const scrolls = box.scrollWidth > box.clientWidth;
+    for (const [name, value] of [["tabindex", "0"], ["role", "group"], ["aria-label", "A table that scrolls sideways"]]) {
+      if (scrolls) box.setAttribute(name, value);
+      else box.removeAttribute(name);
+    }
+  });
 
   document.querySelectorAll(".chart").forEach((place) => draw(place, data.charts[Number(place.dataset.chart)]));
   if (plots.length) {
@@ -264,8 +276,9 @@
     all.addEventListener("click", whole);
     if (!timed().length) { legend.querySelector(".tools").hidden = true; clock.hidden = true; }
   }
-  new ResizeObserver(fit).observe(document.body);
+  new ResizeObserver(() => { fit(); reach(); }).observe(document.body);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   matchMedia("print").addEventListener("change", redraw);
+  root.plots = plots;
   root.dataset.drawn = String(plots.length);
 })();

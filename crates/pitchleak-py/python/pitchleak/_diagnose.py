@@ -263,7 +263,10 @@ class Diagnosis(Raw, Paged, Tabular):
         return columns | {"confusable_with": [", ".join(effect.confusable_with) for effect in self.effects]}
 
     def plot(self, figure: "Figure | None" = None) -> "Figure":
-        """Draws what is left of each balance over time, before and after, one trace after the other (needs matplotlib)."""
+        """Draws what is left of each balance over time, before and after, one trace after the other.
+
+        Needs matplotlib.
+        """
         pyplot = optional("matplotlib.pyplot", "plot")
         present = [name for name, course in self.residuals_before.items() if np.isfinite(course.residual).any()]
         figure = pyplot.figure(figsize=(8, 2.2 * max(len(present), 1))) if figure is None else figure
