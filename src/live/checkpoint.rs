@@ -5,6 +5,7 @@ use super::event::NoticeEvent;
 use super::watch::Watch;
 use crate::Rig;
 use crate::output::{self, OutputError};
+use ciborium::Value;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -203,11 +204,36 @@ fn read(path: &Path) -> Option<Result<Saved, String>> {
     if body.get(2..2 + SCHEMA.len()) != Some(SCHEMA.as_bytes()) {
         return Some(Err(version));
     }
-    Some(match ciborium::from_reader::<Saved, _>(body) {
-        Ok(saved) => Ok(saved),
-        Err(ciborium::de::Error::Semantic(_, why)) => Err(why),
-        Err(_) => Err(version),
-    })
+    Some(saved(body).map_err(|why| why.unwrap_or(version)))
+}
+
+/// What CBOR holds; else what is wrong with it, where it is of this version.
+fn saved(mut body: &[u8]) -> Result<Saved, Option<String>> {
+    let tree: Value = ciborium::from_reader(&mut body).map_err(|_| None)?;
+    if !body.is_empty() {
+        return Err(Some("something follows its end".to_owned()));
+    }
+    if !has_possible_numbers(&tree) {
+        return Err(Some("a number in it is impossible".to_owned()));
+    }
+    let saved: Saved = tree.deserialized().map_err(|ciborium::value::Error::Custom(why)| Some(why))?;
+    if !saved.1.values().all(Cylinder::is_possible) {
+        return Err(Some("its counts contradict each other".to_owned()));
+    }
+    Ok(saved)
+}
+
+/// Beyond any time in s and any flow in L/min.
+const LARGEST: f64 = 1e15;
+
+/// Of the watch itself; estimators look at their own.
+fn has_possible_numbers(tree: &Value) -> bool {
+    match tree {
+        Value::Float(number) => number.abs() <= LARGEST,
+        Value::Array(values) => values.iter().all(has_possible_numbers),
+        Value::Map(entries) => entries.iter().all(|(_, value)| has_possible_numbers(value)),
+        _ => true,
+    }
 }
 
 /// CRC-32 (ISO-HDLC), as of gzip.

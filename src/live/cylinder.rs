@@ -54,6 +54,11 @@ impl Cylinder {
         self.stream.rig()
     }
 
+    /// Whether samples can have led to it; its stream has been looked at as it was read.
+    pub(super) fn is_possible(&self) -> bool {
+        self.history.is_possible()
+    }
+
     /// Takes in a line.
     pub(super) fn take(&mut self, config: &LiveConfig, line: &Line<'_>, events: &mut Vec<Event>) {
         match self.stream.take_line(line.layout, line.number, line.cells) {

@@ -119,6 +119,12 @@ impl Summary {
 }
 
 impl History {
+    /// Whether estimates can have led to it, as far as its counts tell.
+    pub(super) fn is_possible(&self) -> bool {
+        let sums = |sums: &Sums| sums.leaks.iter().all(|(_, leak)| leak.alarms <= sums.estimates);
+        sums(&self.hour) && sums(&self.day) && self.days.len() <= DAYS
+    }
+
     /// Takes in an estimate of the time `at_s`, s since any one moment; gives the spans that ended before it.
     pub(super) fn add(&mut self, at_s: f64, estimate: &EstimateEvent) -> Vec<Summary> {
         let hour = self.hour.add(Span::Hour, at_s, estimate);
@@ -164,7 +170,7 @@ impl Sums {
         let over = self.estimates > 0 && (index - self.index).abs() > 0.5;
         let ended = over.then(|| std::mem::take(self).summary(span));
         self.index = index;
-        self.estimates += 1;
+        self.estimates = self.estimates.saturating_add(1);
         for leak in Leak::ALL {
             let alarm = estimate.faults.contains(&leak);
             self.leaks[leak].add(estimate.leakage[leak], alarm, self.estimates == 1);
@@ -189,7 +195,7 @@ impl LeakSums {
     fn add(&mut self, leakage: LiveLeakage, alarm: bool, first: bool) {
         self.mean_lpm += leakage.mean_lpm;
         self.max_lpm = if first { leakage.mean_lpm } else { self.max_lpm.max(leakage.mean_lpm) };
-        self.alarms += u64::from(alarm);
+        self.alarms = self.alarms.saturating_add(u64::from(alarm));
         self.std_lpm = leakage.std_lpm;
     }
 }

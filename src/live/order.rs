@@ -33,7 +33,7 @@ impl Order {
     /// was set back, unless they may have come before (`resent`).
     pub(super) fn turn(&mut self, t_s: f64, resent: bool, set_back_after_s: f64) -> Turn {
         if self.last_s.is_none_or(|last_s| t_s > last_s) {
-            *self = Self { count: self.count + 1, last_s: Some(t_s), over_again_s: None };
+            *self = Self { count: self.count.saturating_add(1), last_s: Some(t_s), over_again_s: None };
             return Turn::Next;
         }
         if resent {
@@ -48,7 +48,7 @@ impl Order {
         if t_s - from_s < set_back_after_s {
             return Turn::Late;
         }
-        *self = Self { count: self.count + 1, last_s: Some(t_s), over_again_s: None };
+        *self = Self { count: self.count.saturating_add(1), last_s: Some(t_s), over_again_s: None };
         Turn::SetBack
     }
 }

@@ -1,7 +1,7 @@
 //! Files that a run writes: whole or not at all, and never over what it reads.
 //!
 //! A file is written beside its place under a name of its own, synced, and renamed. A run that fails or is killed leaves
-//! the old file; a kill may leave a hidden `.pitchleak-….tmp` too. What is no regular file (a pipe, a device) is written
+//! the old file; a kill may leave a hidden `.pitchleak-….tmp` too, which [`abandon`] removes where there is time for it. What is no regular file (a pipe, a device) is written
 //! to as it is.
 
 mod fault;
@@ -9,15 +9,17 @@ mod inputs;
 mod replacement;
 #[cfg(test)]
 mod tests;
+mod unfinished;
 
 pub use inputs::Inputs;
 pub(crate) use inputs::{Identity, identity};
+pub use unfinished::abandon;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use replacement::{Replacement, create_beside};
+use replacement::Replacement;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Why a file is not written.
@@ -152,10 +154,17 @@ impl Sink {
 }
 
 impl Write for Sink {
+    /// Again where a signal came within it: not every writer above does that.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Replacement(file) => file.write(bytes),
-            Self::Device(file) => file.write(bytes),
+        loop {
+            let written = match self {
+                Self::Replacement(file) => file.write(bytes),
+                Self::Device(file) => file.write(bytes),
+            };
+            match written {
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                done => return done,
+            }
         }
     }
 
@@ -197,7 +206,7 @@ pub fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>, inputs: &Inputs) -
 /// # Errors
 /// [`OutputError::Write`].
 pub fn make_folder(folder: &Path) -> Result<(), OutputError> {
-    let made = fs::create_dir_all(folder).and_then(|()| create_beside(&folder.join("output")));
-    let removed = made.and_then(|(path, _)| fs::remove_file(path));
-    removed.map_err(|source| OutputError::Write { path: folder.to_owned(), source })
+    let made = fs::create_dir_all(folder).and_then(|()| Replacement::of(folder.join("output")));
+    // Not placed, it goes.
+    made.map(drop).map_err(|source| OutputError::Write { path: folder.to_owned(), source })
 }

@@ -1,6 +1,7 @@
 //! A file that takes another's place when it is whole.
 
 use super::fault;
+use super::unfinished::unfinished;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -36,7 +37,10 @@ impl Replacement {
     /// Puts it in the target's place; the name has reached the disk too.
     pub(super) fn place(mut self) -> io::Result<()> {
         fault::strike()?;
+        let mut unfinished = unfinished();
         fs::rename(&self.temporary, &self.target)?;
+        unfinished.remove(&self.temporary);
+        drop(unfinished);
         self.placed = true;
         fault::strike()?;
         sync(folder_of(&self.target))
@@ -57,6 +61,8 @@ impl Write for Replacement {
 impl Drop for Replacement {
     fn drop(&mut self) {
         if !self.placed {
+            let mut unfinished = unfinished();
+            unfinished.remove(&self.temporary);
             // Gone already or not to be removed: nothing is lost by it.
             let _ = fs::remove_file(&self.temporary);
         }
@@ -67,7 +73,7 @@ impl Drop for Replacement {
 const ATTEMPTS: u32 = 100;
 
 /// A new file in the folder of `target`, hidden, under a name that no other run and no other thread has.
-pub(super) fn create_beside(target: &Path) -> io::Result<(PathBuf, File)> {
+fn create_beside(target: &Path) -> io::Result<(PathBuf, File)> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     fault::strike()?;
     let mut taken = None;
@@ -76,8 +82,12 @@ pub(super) fn create_beside(target: &Path) -> io::Result<(PathBuf, File)> {
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let name = format!(".pitchleak-{:x}-{nanoseconds:x}-{count:x}.tmp", std::process::id());
         let path = folder_of(target).join(name);
+        let mut unfinished = unfinished();
         match OpenOptions::new().write(true).create_new(true).open(&path) {
-            Ok(file) => return Ok((path, file)),
+            Ok(file) => {
+                unfinished.insert(path.clone());
+                return Ok((path, file));
+            }
             Err(error) if error.kind() == ErrorKind::AlreadyExists => taken = Some(error),
             Err(error) => return Err(error),
         }

@@ -1,6 +1,6 @@
 use super::fault::{Fault, plan};
 use super::*;
-use std::io::{ErrorKind, Read};
+use std::io::Read;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A folder that goes with the test.
@@ -96,6 +96,24 @@ fn short_and_interrupted_writes_lose_nothing() {
         plan(None);
         done.expect("written");
         assert_eq!(text(&path), "0.1,2\n".repeat(100));
+    }
+}
+
+/// The end of a compressed file was once given up where a signal came within it.
+#[test]
+fn an_interrupted_write_of_a_compressed_file_is_tried_again() {
+    let folder = Folder::new();
+    let path = folder.0.join("out.csv.gz");
+    // More than a buffer when compressed, and less than zlib hands on before the end.
+    let sign =
+        |k: u32| if k % 60 == 59 { '\n' } else { char::from(33 + (k.wrapping_pow(3) % 9973 % 94) as u8) };
+    let content: String = (0..12_000_u32).map(sign).collect();
+    for before in [2, 3, 100, 500] {
+        plan(Some((before, Fault::Hampered)));
+        let done = write_in_lines(&path, &content);
+        plan(None);
+        done.expect("written");
+        assert_eq!(text(&path), content);
     }
 }
 

@@ -191,7 +191,7 @@ impl<R: Read> Elements<R> {
         if size > if small { 4 } else { LONGEST_HEADER } {
             return Err(TraceFault::Damaged("a name or size in the MAT file has no end".to_owned()));
         }
-        let mut bytes = vec![0; padded(size, small) as usize];
+        let mut bytes = vec![0; (size + padding(size, small)) as usize];
         self.bytes.read_exact(&mut bytes).map_err(damaged)?;
         bytes.truncate(size as usize);
         Ok((kind, bytes))
@@ -229,18 +229,23 @@ impl<R: Read> Elements<R> {
         let (kind, size, small) = self.tag()?;
         let width =
             width(kind).ok_or_else(|| TraceFault::Damaged(format!("`{name}` holds data of type {kind}")))?;
-        if u64::from(size) != length * width as u64 {
+        if length.checked_mul(width as u64) != Some(u64::from(size)) {
             return Err(TraceFault::Damaged(format!("`{name}` has {size} bytes for {length} numbers")));
+        }
+        if small && size > 4 {
+            return Err(TraceFault::Damaged(format!(
+                "`{name}` has {size} bytes beside its tag, which has room for 4"
+            )));
         }
         *budget = budget.checked_sub(length).ok_or(TraceFault::Format(
             "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet",
         ))?;
-        let values = self.numbers(kind, width, padded(size, small), size)?;
+        let values = self.numbers(kind, width, size, padding(size, small))?;
         Ok(Some(Variable { name, values: Values::Vector(values) }))
     }
 
     /// Numbers in pieces: memory is taken as they come, whatever the tag promises.
-    fn numbers(&mut self, kind: u32, width: usize, padded: u32, size: u32) -> Result<Vec<f64>, TraceFault> {
+    fn numbers(&mut self, kind: u32, width: usize, size: u32, padding: u32) -> Result<Vec<f64>, TraceFault> {
         let mut values = Vec::new();
         let mut piece = vec![0; 64 * 1024];
         let mut left = size as usize;
@@ -251,8 +256,7 @@ impl<R: Read> Elements<R> {
             values.extend(bytes.chunks_exact(width).map(|number| self.number(kind, number)));
             left -= count;
         }
-        let padding = u64::from(padded - size);
-        io::copy(&mut self.bytes.by_ref().take(padding), &mut io::sink()).map_err(damaged)?;
+        io::copy(&mut self.bytes.by_ref().take(u64::from(padding)), &mut io::sink()).map_err(damaged)?;
         Ok(values)
     }
 
@@ -291,9 +295,9 @@ fn width(kind: u32) -> Option<usize> {
     }
 }
 
-/// Elements end at multiples of eight bytes, those within a tag with the tag.
-fn padded(size: u32, small: bool) -> u32 {
-    if small { 4 } else { size.saturating_add(7) & !7 }
+/// Bytes behind the data: elements end at multiples of eight bytes, those within a tag with the tag.
+fn padding(size: u32, small: bool) -> u32 {
+    if small { 4_u32.saturating_sub(size) } else { size.wrapping_neg() & 7 }
 }
 
 #[cfg(test)]

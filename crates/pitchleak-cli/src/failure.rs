@@ -49,7 +49,7 @@ pub enum Failure {
     #[error("no command `{0}`; pitchleak --help names them")]
     NoCommand(String),
     /// Ctrl-C, or the signal to end.
-    #[error("interrupted: nothing is written")]
+    #[error("interrupted: no file is left half-written")]
     Interrupted,
     /// Standard input.
     #[error("cannot read standard input: {0}")]

@@ -5,10 +5,8 @@ use pitchleak::fleet::{
     FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
 };
 use pitchleak::page::{Page, PageFile};
-use std::io;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Judge the traces of many cylinders on all cores: a row per cylinder and trace
 ///
@@ -49,7 +47,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rigs = FleetRig::from_file(arguments.rig.clone());
     let traces = FleetTrace::find(&arguments.traces, &rigs)?;
     let inputs = FleetTrace::inputs(&traces, &rigs);
-    let stop = stop_at_signal()?;
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let bar = output::bar(traces.len() as u64, "{bar:40} {pos}/{len} traces, {eta} left");
@@ -59,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             bar.suspend(|| output::complain("error", error));
         }
     };
-    let rows = judge_all(&traces, judged, &stop).map_err(|Stopped| Failure::Interrupted)?;
+    let rows = judge_all(&traces, judged, &AtomicBool::new(false)).map_err(|Stopped| Failure::Interrupted)?;
     bar.finish_and_clear();
     if let Some(file) = file {
         file.write(&FleetTable::of(&rows))?;
@@ -77,13 +74,4 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         0 => Ok(Outcome::Done),
         errors => Err(Failure::NotJudged { errors, traces: rows.len() }),
     }
-}
-
-/// Ctrl-C ends the run soon, and leaves nothing half-written behind.
-fn stop_at_signal() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let seen = Arc::clone(&stop);
-    ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed))
-        .map_err(|error| Failure::Output(io::Error::other(error)))?;
-    Ok(stop)
 }

@@ -7,6 +7,7 @@ mod diagnose;
 mod failure;
 mod fleet;
 mod input;
+mod interrupt;
 mod man;
 mod output;
 mod replay;
@@ -16,6 +17,7 @@ mod text_format;
 mod watch;
 
 use clap::{Parser, Subcommand};
+use failure::Failure;
 use std::process::ExitCode;
 
 /// Says how much oil leaks where in a hydraulic pitch cylinder.
@@ -28,7 +30,7 @@ struct Cli {
 
 const EXIT_STATUS: &str = "\
 Exit status: 0 done; 1 a fault was found and --fail-on-fault was given; 2 bad input or usage, or, at the
-end of `fleet`, traces that could not be judged.
+end of `fleet`, traces that could not be judged; 130 Ctrl-C or the signal to end.
 Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
@@ -53,19 +55,7 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
-        Command::Replay(arguments) => replay::run(&arguments),
-        Command::Diagnose(arguments) => diagnose::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
-        Command::Columns(arguments) => columns::run(&arguments),
-        Command::Fleet(arguments) => fleet::run(&arguments),
-        Command::Watch(arguments) => watch::run(&arguments),
-        Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Reproduce(arguments) => reproduce::run(&arguments),
-        Command::Completions(arguments) => completions::run(&arguments),
-        Command::Man(arguments) => man::run(&arguments),
-    };
-    match outcome {
+    match run(&Cli::parse().command) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
         // Whoever read our output has had enough: not an error of ours.
@@ -74,5 +64,24 @@ fn main() -> ExitCode {
             output::complain("error", &failure);
             ExitCode::from(failure.status())
         }
+    }
+}
+
+fn run(command: &Command) -> Result<Outcome, Failure> {
+    // A watch that is to end saves its state first.
+    if !matches!(command, Command::Watch(_)) {
+        interrupt::leave_nothing_half_written()?;
+    }
+    match command {
+        Command::Replay(arguments) => replay::run(arguments),
+        Command::Diagnose(arguments) => diagnose::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
+        Command::Columns(arguments) => columns::run(arguments),
+        Command::Fleet(arguments) => fleet::run(arguments),
+        Command::Watch(arguments) => watch::run(arguments),
+        Command::Simulate(arguments) => simulate::run(arguments),
+        Command::Reproduce(arguments) => reproduce::run(arguments),
+        Command::Completions(arguments) => completions::run(arguments),
+        Command::Man(arguments) => man::run(arguments),
     }
 }

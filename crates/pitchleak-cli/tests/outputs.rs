@@ -78,6 +78,9 @@ fn no_command_writes_over_what_it_reads() {
         "simulate --position 0.1 --load 0 --oil-temp t.csv --out t.csv",
         "simulate --position 0.1 --load 0 --rig truth.json --out truth.csv",
         "simulate --wind t.csv --out link.csv",
+        "fleet other.csv t.csv --out link.csv",
+        "fleet other.csv t.html --report ./t.html",
+        "diagnose other.csv --test t.html --report t.html",
     ] {
         let refused = run(at, arguments);
         let error = String::from_utf8(refused.stderr).unwrap();
@@ -133,33 +136,6 @@ fn on_a_full_disk_the_old_file_stays() {
     }
 }
 
-/// `ci/kill-runs` does this a thousand times.
-#[test]
-fn killed_at_any_moment_it_leaves_the_old_file_or_the_new_one() {
-    let folder = folder();
-    let at = folder.path();
-    for (arguments, name) in WRITING {
-        let path = at.join(name);
-        let started = std::time::Instant::now();
-        assert!(run(at, arguments).status.success(), "{arguments}");
-        let takes = started.elapsed();
-        let new = fs::read(&path).unwrap();
-        for kill in 0..8 {
-            fs::write(&path, "old").unwrap();
-            let mut child = program(at, arguments).stdout(Stdio::null()).spawn().unwrap();
-            std::thread::sleep(takes * kill / 7);
-            child.kill().unwrap();
-            child.wait().unwrap();
-            let found = fs::read(&path).unwrap();
-            assert!(
-                found == b"old" || found == new,
-                "{arguments} killed after {kill}/7: {} bytes",
-                found.len()
-            );
-        }
-    }
-}
-
 #[test]
 fn what_fails_half_way_leaves_the_old_file() {
     let folder = folder();
@@ -202,5 +178,53 @@ fn outputs_that_cannot_be_written_are_found_before_the_work() {
         child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
         assert_eq!(status.and_then(|status| status.code()), Some(2), "{arguments}: {error}");
         assert!(error.contains("cannot write"), "{arguments}: {error}");
+    }
+}
+
+/// As a terminal does it, and as a service manager does it, to every command that takes its time.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_ends_every_command_with_the_old_file_there_and_nothing_beside_it() {
+    let folder = folder();
+    let at = folder.path();
+    for (number, (arguments, name)) in [
+        ("replay - --out out.csv", "out.csv"),
+        ("replay - --report out.html", "out.html"),
+        ("check - --report out.html", "out.html"),
+        ("diagnose - --save-rig out.toml", "out.toml"),
+        ("simulate --wind 13 --duration 100000 --out out.csv", "out.csv"),
+        ("reproduce --report out.html", "out.html"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        fs::write(at.join(name), "old").unwrap();
+        let before = contents(at);
+        // Whoever runs the tests may have them ignored; then the program leaves that so.
+        let mut child = Command::new("env")
+            .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_pitchleak")])
+            .current_dir(at)
+            .args(arguments.split(' '))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Held open: its end would be the command's.
+        let _stdin = child.stdin.take();
+        let began = (0..1000).any(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            contents(at).len() > before.len()
+        });
+        assert!(began, "{arguments} writes nothing");
+        let signal = if number % 2 == 0 { "-INT" } else { "-TERM" };
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let status = child.wait().unwrap();
+        let mut error = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
+        assert_eq!(status.code(), Some(130), "{arguments}: {error}");
+        assert!(error.contains("interrupted"), "{arguments}: {error}");
+        assert!(contents(at) == before, "{arguments}");
+        fs::remove_file(at.join(name)).unwrap();
     }
 }

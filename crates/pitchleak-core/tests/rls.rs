@@ -1,8 +1,8 @@
 //! Laws of the default estimator: units, number types, and that nothing but numbers ever leaves it.
 
 use pitchleak_core::{
-    Cylinder, CylinderError, ExcitationSettings, Fluid, LeakDetector, PerLeak, Real, Rls, RlsError,
-    RlsSettings, Sample, SensorSpread, Sensors, Update,
+    Cylinder, CylinderError, ExcitationSettings, Fluid, LeakDetector, Parameter, PerLeak, Real, Rls,
+    RlsError, RlsSettings, Sample, SensorSpread, Sensors, Update,
 };
 use pitchleak_testkit::Motion;
 use proptest::prelude::*;
@@ -139,6 +139,40 @@ fn a_sudden_leak_is_found_within_a_second() {
     println!("found after {found_after_s:?} s");
     assert!(found_after_s.is_some_and(|t| t <= 1.0));
     assert!(changed_at_s.is_some_and(|t: f64| (60.0..61.0).contains(&t)), "{changed_at_s:?}");
+}
+
+/// A leak that grows has a slope, within four standard deviations, and one that stays has none.
+#[test]
+fn a_leak_that_grows_has_a_slope() {
+    let growth_ps = 2e-13;
+    let grown = (0..).zip(exact(120)).map(|(k, mut sample)| {
+        let t_s = f64::from(k) * 0.01;
+        sample.qa_m3s = sample.qa_m3s.map(|q| q + growth_ps * t_s * sample.pa_pa);
+        sample
+    });
+    let rls: Rls<f64, 4> = estimate(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), grown);
+    let slopes = rls.estimates().leak_slopes_m3spa_ps;
+    println!("{slopes:?}");
+    let off = slopes.external_a.value - growth_ps;
+    assert!(off.abs() < 4.0 * slopes.external_a.std && off.abs() < 0.2 * growth_ps, "{slopes:?}");
+    for still in [slopes.internal, slopes.external_b] {
+        assert!(still.std > 0.0 && still.value.abs() < 4.0 * still.std, "{slopes:?}");
+    }
+}
+
+/// Without pressure and meter in chamber B a leak past the piston and one out of chamber A are the same flow.
+#[test]
+fn leaks_that_make_the_same_flow_trade_off() {
+    let traded = |samples: Vec<Sample<f64>>| {
+        let rls: Rls<f64, 4> =
+            estimate(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), samples.into_iter());
+        rls.excitation(&ExcitationSettings::default()).leaks.map(|leak| leak.traded_with)
+    };
+    assert_eq!(traded(exact(60).collect()), PerLeak { internal: None, external_a: None, external_b: None });
+    let blind = exact(60).map(|sample| Sample { pb_pa: 1e3, qb_m3s: None, ..sample });
+    let blind = traded(blind.collect());
+    assert_eq!(blind.internal, Some(Parameter::ExternalA));
+    assert_eq!(blind.external_a, Some(Parameter::Internal));
 }
 
 fn any_number() -> impl Strategy<Value = f64> {

@@ -150,6 +150,22 @@ fn damage_is_one_line_and_costs_no_memory() {
     assert!(read(huge).unwrap_err().to_string().contains("damaged"));
 }
 
+/// Data beside their tag are four bytes at most: more once took the variables after them away.
+#[test]
+fn more_beside_a_tag_than_it_has_room_for_is_damage() {
+    let mut inside = Writer { bytes: Vec::new(), big_endian: false };
+    inside.variable(CLASS_DOUBLE, "t_s", 2, &[], 8);
+    inside.bytes.truncate(inside.bytes.len() - 8);
+    inside.word(8 << 16 | 2);
+    inside.bytes.extend([0; 8]);
+    let mut bytes = header(false);
+    bytes.extend(14_u32.to_le_bytes());
+    bytes.extend((inside.bytes.len() as u32).to_le_bytes());
+    bytes.extend(inside.bytes);
+    let message = read(bytes).unwrap_err().to_string();
+    assert!(message.contains("`t_s` has 8 bytes beside its tag"), "{message}");
+}
+
 proptest::proptest! {
     #[test]
     fn any_byte_may_be_wrong(at in 0..4000_usize, byte in 0..=255_u8, big_endian: bool, compressed: bool) {

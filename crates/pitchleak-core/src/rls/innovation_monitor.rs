@@ -121,4 +121,14 @@ mod tests {
             assert!((monitor.inflation() / expected - 1.0).abs() < 0.05, "{}", monitor.inflation());
         }
     }
+
+    /// The mean of `count` χ²₁ terms has the variance 2/count: two of its standard deviations beyond 1 are the first that
+    /// tell.
+    #[test]
+    fn chance_is_what_so_few_terms_scatter_by() {
+        for count in [8.0_f64, 50.0, 20_000.0] {
+            let beyond = 1.0 + 2.0 * (2.0 / count).sqrt();
+            assert!((significant_ratio(count * beyond, count) - 1.0).abs() < 1e-12, "{count}");
+        }
+    }
 }

@@ -303,4 +303,39 @@ mod tests {
             assert!((ends[0].1[i] - ends[1].1[i]).abs() < 1e-9);
         }
     }
+
+    /// (M⁻¹ + v e eᵀ) M' = M⁻¹ M, without an inverse: M' + v M'e eᵀM = M, and so with the vector.
+    #[test]
+    fn what_has_moved_is_known_by_its_variance_less() {
+        const WIDTH: usize = 4 + LEAKS;
+        let matrix = |trend: &Trend<f64, 4>, r: usize, c: usize| match (r.checked_sub(4), c.checked_sub(4)) {
+            (None, None) => trend.levels.entry(r, c),
+            (Some(slope), None) => trend.cross[slope][c],
+            (None, Some(slope)) => trend.cross[slope][r],
+            (Some(a), Some(b)) => trend.slopes[a][b],
+        };
+        let vector = |trend: &Trend<f64, 4>, r: usize| match r.checked_sub(4) {
+            None => trend.levels.vector[r],
+            Some(slope) => trend.slope_vector[slope],
+        };
+        let (before, own) = (grown(100.0), 0);
+        // As much as was known of it.
+        let variance = 1.0 / before.levels.entry(own, own);
+        let mut after = before;
+        after.diffuse(own, variance);
+        for r in 0..WIDTH {
+            let moved = variance * matrix(&after, r, own);
+            for c in 0..WIDTH {
+                let again = matrix(&after, r, c) + moved * matrix(&before, own, c);
+                let known = matrix(&before, r, c);
+                let scale = (matrix(&before, r, r) * matrix(&before, c, c)).sqrt();
+                assert!((again - known).abs() < 1e-12 * scale, "{r} {c}: {again} {known}");
+            }
+            let (again, known) = (vector(&after, r) + moved * vector(&before, own), vector(&before, r));
+            assert!(
+                (again - known).abs() < 1e-12 * known.abs().max(vector(&before, own).abs()),
+                "{r}: {again} {known}"
+            );
+        }
+    }
 }

@@ -1,14 +1,12 @@
 //! A trace with any numbers in it: diagnosed to numbers, and the rig that comes of it can be read.
-#![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use super::{Dice, trace_text};
 use pitchleak::Rig;
 use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::trace::TraceReader;
-use pitchleak_fuzz::{Dice, trace_text};
 use std::io::Cursor;
 
-fuzz_target!(|bytes: &[u8]| {
+pub fn enter(bytes: &[u8]) {
     let mut dice = Dice(bytes);
     let text = trace_text(0, 150 + usize::from(dice.byte()));
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -29,4 +27,4 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(!text.contains("NaN"), "{text}");
     let _ = diagnosis.figures();
     Rig::parse(&diagnosis.rig(&rig).to_toml(), "fuzz").expect("reads what it wrote");
-});
+}

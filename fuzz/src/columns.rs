@@ -1,17 +1,26 @@
 //! Any columns in memory, in parts: estimates that are numbers, or a typed error.
-#![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use super::{Dice, assert_numbers};
 use pitchleak::Rig;
 use pitchleak::replay::Stream;
 use pitchleak::trace::{BadRows, TableLayout, TraceReader};
-use pitchleak_fuzz::{Dice, assert_numbers};
 
 const HEADERS: [&str; 12] = [
-    "t_s", "x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s", "force_n", "v_mps", "temp_k", "q_int_m3s", "x_mm", "t_ms",
+    "t_s",
+    "x_m",
+    "pa_pa",
+    "pb_pa",
+    "qa_m3s",
+    "qb_m3s",
+    "force_n",
+    "v_mps",
+    "temp_k",
+    "q_int_m3s",
+    "x_mm",
+    "t_ms",
 ];
 
-fuzz_target!(|bytes: &[u8]| {
+pub fn enter(bytes: &[u8]) {
     let mut dice = Dice(bytes);
     let width = 4 + usize::from(dice.byte() % 9);
     let headers: Vec<String> = HEADERS[..width].iter().map(ToString::to_string).collect();
@@ -26,7 +35,20 @@ fuzz_target!(|bytes: &[u8]| {
             let odd = dice.byte();
             t_s += 0.01;
             for (signal, column) in columns.iter_mut().enumerate() {
-                let usual = [t_s, 0.1 + 1e-4 * row as f64, 5e6, 4e6, 1e-5, -1e-5, 100.0, 0.01, 310.0, 0.0, 100.0, t_s];
+                let usual = [
+                    t_s,
+                    0.1 + 1e-4 * row as f64,
+                    5e6,
+                    4e6,
+                    1e-5,
+                    -1e-5,
+                    100.0,
+                    0.01,
+                    310.0,
+                    0.0,
+                    100.0,
+                    t_s,
+                ];
                 column.push(if usize::from(odd) % 23 == signal { dice.number() } else { usual[signal] });
             }
         }
@@ -39,4 +61,4 @@ fuzz_target!(|bytes: &[u8]| {
             assert_numbers(&report);
         }
     }
-});
+}

@@ -1,16 +1,14 @@
 //! Any effects of any size in a rig: a trace is replayed with them to numbers.
-#![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use super::{Dice, trace_text};
 use pitchleak::Rig;
 use pitchleak::core::Effect;
 use pitchleak::rig::EffectValue;
-use pitchleak_fuzz::{Dice, trace_text};
 use std::sync::LazyLock;
 
 static TRACE: LazyLock<String> = LazyLock::new(|| trace_text(0, 200));
 
-fuzz_target!(|bytes: &[u8]| {
+pub fn enter(bytes: &[u8]) {
     let (mut dice, mut rig) = (Dice(bytes), Rig::paper());
     for _ in 0..dice.byte() % 9 {
         let effect = Effect::ALL[usize::from(dice.byte()) % Effect::ALL.len()];
@@ -19,5 +17,5 @@ fuzz_target!(|bytes: &[u8]| {
     }
     // As a file holds them, within their bounds.
     let rig = Rig::parse(&rig.to_toml(), "fuzz").expect("reads what it wrote");
-    pitchleak_fuzz::replay_bytes(TRACE.as_bytes(), &rig);
-});
+    super::replay_bytes(TRACE.as_bytes(), &rig);
+}

@@ -1,12 +1,10 @@
 //! Any bytes as a saved estimator, and saved ones with bytes changed and the checksum put right: refused, or an
 //! estimator that goes on with numbers.
-#![no_main]
 
-use libfuzzer_sys::fuzz_target;
+use super::{Dice, assert_numbers, trace_text};
 use pitchleak::Rig;
 use pitchleak::replay::Stream;
 use pitchleak::trace::{BadRows, TraceReader};
-use pitchleak_fuzz::{Dice, assert_numbers, trace_text};
 use std::io::Cursor;
 use std::sync::LazyLock;
 
@@ -24,7 +22,7 @@ fn go_on(stream: &mut Stream, from: usize, rows: usize) {
     let _ = stream.extend(reader);
 }
 
-fuzz_target!(|bytes: &[u8]| {
+pub fn enter(bytes: &[u8]) {
     let _ = Stream::restore(bytes);
     let mut forged = SAVED[..SAVED.len() - 4].to_vec();
     let mut dice = Dice(bytes);
@@ -41,4 +39,4 @@ fuzz_target!(|bytes: &[u8]| {
     if let Some(report) = stream.report("fuzz") {
         assert_numbers(&report);
     }
-});
+}

@@ -1,13 +1,12 @@
 //! Any order to the simulation, a line for each part: numbers or a typed error.
-#![no_main]
 
-use libfuzzer_sys::fuzz_target;
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
 use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Noise, Plan};
 use pitchleak::units::{self, Dimension};
 
-fuzz_target!(|text: &str| {
+pub fn enter(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
     let mut lines = text.lines();
     let mut next = || lines.next().unwrap_or_default();
     let leak = |text: &str| text.parse::<LeakCourse>().unwrap_or_else(|_| "0".parse().expect("none"));
@@ -39,4 +38,4 @@ fuzz_target!(|text: &str| {
     assert!(columns.iter().all(|(_, values)| !values.iter().any(|value| value.is_infinite())));
     assert!(columns.iter().find(|(name, _)| *name == "x_mm").is_some());
     serde_json::to_string(&truth).expect("a truth has a JSON form");
-});
+}
