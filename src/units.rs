@@ -8,6 +8,24 @@ pub use pitchleak_core::LPM_PER_M3S;
 /// 1 m³/(s·Pa) in L/min/bar.
 pub const LPM_PER_BAR: f64 = LPM_PER_M3S * 1e5;
 
+/// Factor from the SI unit of an effect's value to the unit that people use, and that unit.
+pub fn effect_unit(si: &str) -> (f64, &str) {
+    match si {
+        "1" => (100.0, "%"),
+        "Pa" => (1e-5, "bar"),
+        "m" => (1e3, "mm"),
+        "m2" => (1e6, "mm²"),
+        "m3" => (1e6, "ml"),
+        "m3/s" => (LPM_PER_M3S, "L/min"),
+        "m3/(s*Pa)" => (LPM_PER_BAR, "L/min/bar"),
+        "m3/(s*Pa*K)" => (LPM_PER_BAR, "L/min/bar/K"),
+        "m3/(s*sqrt(Pa))" => (LPM_PER_M3S * 1e5_f64.sqrt(), "L/min/√bar"),
+        "Pa*s/m3" => (1e-5 / LPM_PER_M3S, "bar/(L/min)"),
+        "s" => (1e3, "ms"),
+        other => (1.0, other),
+    }
+}
+
 /// What a quantity measures; each has its list of accepted units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {

@@ -115,7 +115,7 @@ fn doubt_is_said_and_ends_with_a_status_for_those_who_ask() {
 fn the_readme_shows_what_is_printed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let shown = readme.split("```text output\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let command = ["replay", "data/traces/external_a.csv.gz"];
     assert!(readme.contains(&command.join(" ")));
     assert_eq!(stdout(&pitchleak().current_dir(&root).args(command).output().unwrap()), shown);

@@ -2,7 +2,7 @@
 
 use crate::diagnose::equation::Equation;
 use crate::report::with_interval;
-use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
+use crate::units::{LPM_PER_M3S, effect_unit};
 
 /// Name of an equation in text and figures.
 pub(crate) fn name(equation: Equation) -> &'static str {
@@ -51,20 +51,7 @@ pub(crate) fn people(variable: &str) -> (f64, &'static str) {
 
 /// With its 95 % interval, in people's units.
 pub(crate) fn quantity(value: f64, std: Option<f64>, unit: &str) -> String {
-    let (factor, unit) = match unit {
-        "1" => (100.0, "%"),
-        "Pa" => (1e-5, "bar"),
-        "m" => (1e3, "mm"),
-        "m2" => (1e6, "mm²"),
-        "m3" => (1e6, "ml"),
-        "m3/s" => (LPM_PER_M3S, "L/min"),
-        "m3/(s*Pa)" => (LPM_PER_BAR, "L/min/bar"),
-        "m3/(s*Pa*K)" => (LPM_PER_BAR, "L/min/bar/K"),
-        "m3/(s*sqrt(Pa))" => (LPM_PER_M3S * 1e5_f64.sqrt(), "L/min/√bar"),
-        "Pa*s/m3" => (1e-5 / LPM_PER_M3S, "bar/(L/min)"),
-        "s" => (1e3, "ms"),
-        other => (1.0, other),
-    };
+    let (factor, unit) = effect_unit(unit);
     let size = with_interval(value * factor, std.map(|std| std * factor));
     format!("{size} {}", unit.replace('*', "·"))
 }
