@@ -31,16 +31,20 @@ ROWS = 60_000
 
 
 def columns():
-    """The paper's cylinder with an internal leak of 1.2e-11 m3/(s Pa)."""
-    t = np.arange(ROWS) / 100
+    """The paper's cylinder with an internal leak of 1.2e-11 m3/(s Pa), noise of 0.1 % and meters of the leaks."""
+    t, noise = np.arange(ROWS) / 100, np.random.default_rng(1).normal
+    area_a, area_b, stroke, modulus = 1.26e-3, 0.94e-3, 0.2, 0.8e9
     x, v = 0.1 + 0.05 * np.sin(0.5 * t), 0.025 * np.cos(0.5 * t)
     pa, pb = 5e6 + 1e6 * np.sin(0.3 * t), 4e6 + 1e6 * np.cos(0.3 * t)
     leak = 1.2e-11 * (pa - pb)
-    flows = {"qa_lpm": 1.26e-3 * v + leak, "qb_lpm": -0.94e-3 * v - leak, "q_int_lpm": leak, "q_ext_a_lpm": 0.0 * t}
+    qa = area_a * v + area_a * x / modulus * 0.3e6 * np.cos(0.3 * t) + leak
+    qb = -area_b * v - area_b * (stroke - x) / modulus * 0.3e6 * np.sin(0.3 * t) - leak
+    full_scales = {"x_mm": 200, "pa_bar": 160, "pb_bar": 160, "qa_lpm": 20, "qb_lpm": 20}
+    readings = {"x_mm": 1e3 * x, "pa_bar": pa / 1e5, "pb_bar": pb / 1e5, "qa_lpm": 6e4 * qa, "qb_lpm": 6e4 * qb}
+    readings = {name: exact + noise(0.0, 0.001 * full_scales[name], ROWS) for name, exact in readings.items()}
+    meters = {"q_int_lpm": 6e4 * leak, "q_ext_a_lpm": 0.0 * t, "q_ext_b_lpm": 0.0 * t}
     return polars.DataFrame(
-        {"t_s": t, "x_mm": 1e3 * x, "v_mps": v, "pa_bar": pa / 1e5, "pb_bar": pb / 1e5}
-        | {name: 6e4 * flow for name, flow in flows.items()}
-        | {"q_ext_b_lpm": 0.0, "force_n": pa * 1.26e-3 - pb * 0.94e-3}
+        {"t_s": t, "v_mps": v} | readings | meters | {"force_n": pa * area_a - pb * area_b + noise(0.0, 50.0, ROWS)}
     )
 
 
@@ -108,7 +112,9 @@ def long_traces(folder, count):
     pool, dask = on_a_pool(csv), on_dask(csv)
     show("pl.fleet on a process pool", pool)
     show("pl.fleet on Dask", dask, f": {dask / pool:.2f} times the pool")
-    parquet, _ = farm(emptied(folder), "parquet", count, frame, lambda one, path: one.write_parquet(path))
+    parquet, _ = farm(
+        emptied(folder), "parquet", count, frame, lambda one, path: one.write_parquet(path, compression="snappy")
+    )
     binary, _ = processor_s(["fleet", parquet])
     show(
         "fleet of Parquet, processor time over the cores",

@@ -2,7 +2,7 @@
 
 Run it with
 
-    pip install '.[pandas,plot]' 'dask[distributed]'
+    pip install '.[arrow,plot]' 'dask[distributed]'
     python examples/fleet_on_dask.py [picture.png]
 """
 
@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 
 import matplotlib
+import pyarrow.parquet
 
 matplotlib.use("Agg")
 from dask.distributed import Client, LocalCluster
@@ -23,20 +24,20 @@ DAYS = 6
 
 
 def make_farm(farm: Path) -> None:
-    """A trace of 20 s a day for each blade, in folders as partitioned tables have them."""
+    """A trace of 20 s a day for each blade, in Parquet partitioned by turbine and blade."""
     for (cylinder, lpm), day in itertools.product(LEAK_A_DAY_LPM.items(), range(1, DAYS + 1)):
         turbine, blade = cylinder.split("/")
         folder = farm / f"turbine={turbine}" / f"blade={blade}"
         folder.mkdir(parents=True, exist_ok=True)
-        trace = folder / f"2026-05-{day:02}.csv.gz"
-        pl.simulate(13, leak_internal=f"{lpm * day} L/min", noise="0.3 %", seed=day, duration=20, out=trace)
+        trace = pl.simulate(13, leak_internal=f"{lpm * day} L/min", noise="0.3 %", seed=day, duration=20)
+        pyarrow.parquet.write_table(trace.to_arrow(), folder / f"2026-05-{day:02}.parquet")
         (folder / "rig.toml").write_text(pl.Rig.paper().to_toml().replace("accuracy = 0.01", "accuracy = 0.003"))
 
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         make_farm(Path(folder))
-        traces = f"{folder}/**/*.csv.gz"
+        traces = f"{folder}/**/*.parquet"
         with (
             LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
             Client(cluster) as client,

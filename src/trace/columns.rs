@@ -150,7 +150,10 @@ impl Layout {
             if self.gives(signal) {
                 continue;
             }
-            let headers: Vec<_> = self.columns.iter().map(|column| column.header.as_str()).collect();
+            let mut headers: Vec<_> = self.columns.iter().map(|column| column.header.as_str()).collect();
+            if headers.is_empty() {
+                headers.push("no column");
+            }
             return Err(TraceFault::MissingColumn {
                 signal: words.to_owned(),
                 accepted: accepted(signal, map),

@@ -4,6 +4,7 @@ use super::columns::{Content, Layout, shorten};
 use super::dialect::Dialect;
 use super::error::TraceFault;
 use super::format::{Format, Reading, Stream};
+use super::number::plain_number;
 use super::quality::{BadReason, BadRow, Counted};
 use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_present};
@@ -106,9 +107,10 @@ impl Splitting {
     fn read(&mut self, record: &Record<'_>, row: &mut Row) -> Result<(), Fault> {
         *row = Row { line: record.line, ..Row::empty() };
         match record.text {
-            Text::Plain(text) => {
+            Text::Plain(text, end) => {
                 let (delimiter, decimal) = (self.delimiter, self.decimal);
-                let cells = Plain { text, delimiter, decimal, at: 0, length: 0, ended: false };
+                let cells =
+                    Plain { text, end, delimiter, decimal, at: 0, length: 0, places: 0, ended: false };
                 read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
             Text::Unquoted(text, ends) => {
@@ -218,13 +220,36 @@ pub(super) trait Cells<'a> {
 
 /// A record without quotes.
 struct Plain<'a> {
+    /// It, and what stands behind it.
     text: &'a [u8],
+    /// Where it ends: with `text`, or at a line end.
+    end: usize,
     delimiter: u8,
     decimal: Decimal,
     at: usize,
-    /// Bytes of the cell before.
+    /// Bytes of the cell before, and its decimals.
     length: usize,
+    places: usize,
     ended: bool,
+}
+
+impl<'a> Plain<'a> {
+    #[inline(always)]
+    fn rest(&self) -> &'a [u8] {
+        self.text.get(self.at..self.end).unwrap_or_default()
+    }
+
+    /// Passes over a cell where it is so long.
+    #[inline(always)]
+    fn passes(&mut self, length: usize) -> bool {
+        let end = self.at + length;
+        let ended = end == self.end;
+        let is_cell = ended || self.text.get(end) == Some(&self.delimiter);
+        if is_cell {
+            (self.at, self.length, self.ended) = (end + 1, length, ended);
+        }
+        is_cell
+    }
 }
 
 impl<'a> Cells<'a> for Plain<'a> {
@@ -235,7 +260,7 @@ impl<'a> Cells<'a> for Plain<'a> {
 
     #[inline]
     fn cell(&mut self) -> &'a [u8] {
-        let rest = self.text.get(self.at..).unwrap_or_default();
+        let rest = self.rest();
         let end = memchr::memchr(self.delimiter, rest);
         self.ended = end.is_none();
         let cell = end.map_or(rest, |end| rest.get(..end).unwrap_or_default());
@@ -252,18 +277,21 @@ impl<'a> Cells<'a> for Plain<'a> {
     /// Most cells are a number and no more: its end is the cell's.
     #[inline(always)]
     fn number(&mut self) -> Result<f64, BadReason> {
-        let rest = self.text.get(self.at..).unwrap_or_default();
         if self.decimal == Decimal::Comma {
             return read_number(self.cell(), Decimal::Comma);
         }
-        if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(rest) {
-            let ended = length == rest.len();
-            if value.is_finite() && (ended || rest.get(length) == Some(&self.delimiter)) {
-                self.ended = ended;
-                self.length = length;
-                self.at += length + 1;
-                return Ok(value);
-            }
+        // No number goes on behind a line end.
+        let text = self.text.get(self.at..).unwrap_or_default();
+        if let Some((value, length)) = plain_number(text, &mut self.places)
+            && self.passes(length)
+        {
+            return Ok(value);
+        }
+        if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(self.rest())
+            && value.is_finite()
+            && self.passes(length)
+        {
+            return Ok(value);
         }
         read_number(self.cell(), Decimal::Point)
     }

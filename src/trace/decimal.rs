@@ -71,7 +71,8 @@ impl Marks {
             return;
         }
         self.cells += 1;
-        let count = match (number.matches('.').count(), number.matches(',').count()) {
+        let marks = |mark: u8| number.bytes().filter(|byte| *byte == mark).count();
+        let count = match (marks(b'.'), marks(b',')) {
             (0, 0) if number.len() < 4 => &mut self.small,
             (0, 0) => return,
             (0, 1) if !is_group(number, ',') => &mut self.commas,

@@ -1,5 +1,6 @@
 //! The encoding of a text file: what is not UTF-8 is made so.
 
+use std::borrow::Cow;
 use std::io::{self, Read};
 
 /// How characters are written.
@@ -42,9 +43,9 @@ impl Encoding {
 }
 
 /// The text of a header; what is no UTF-8 is Latin-1, of which UTF-8 knows every character.
-pub(super) fn text(cell: &[u8]) -> String {
+pub(super) fn text(cell: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(cell) {
-        Ok(text) => text.to_owned(),
+        Ok(text) => Cow::Borrowed(text),
         Err(_) => cell.iter().map(|byte| char::from(*byte)).collect(),
     }
 }

@@ -3,6 +3,7 @@
 //! MathWorks, "MAT-File Format", chapter 1 (Level 5).
 
 use super::bind::bind;
+use super::columns::shorten;
 use super::error::TraceFault;
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
 use super::quality::Counted;
@@ -69,16 +70,19 @@ fn with_others(
     others: &[(String, &'static str)],
     short: &[(String, Vec<f64>)],
 ) -> TraceFault {
-    match (fault, others.first(), short.first()) {
-        (TraceFault::MissingColumn { .. }, Some((name, "struct")), _) => TraceFault::Ambiguous {
+    let (other, short) = (others.first(), short.first());
+    let name = other.map(|(name, _)| name).or(short.map(|(name, _)| name));
+    let name = name.map(|name| shorten(name, 40)).unwrap_or_default();
+    match (fault, other, short) {
+        (TraceFault::MissingColumn { .. }, Some((_, "struct")), _) => TraceFault::Ambiguous {
             what: format!("variable `{name}` is a struct, which is not read"),
             settle: format!("save its fields as variables: save('trace.mat', '-struct', '{name}')"),
         },
-        (TraceFault::MissingColumn { .. }, Some((name, kind)), _) => TraceFault::Ambiguous {
+        (TraceFault::MissingColumn { .. }, Some((_, kind)), _) => TraceFault::Ambiguous {
             what: format!("variable `{name}` is a {kind}, which is not read"),
             settle: "save each signal as a numeric vector, e.g. t_s, x_mm, pa_bar, pb_bar".to_owned(),
         },
-        (TraceFault::MissingColumn { signal, accepted, found, .. }, None, Some((name, values))) => {
+        (TraceFault::MissingColumn { signal, accepted, found, .. }, None, Some((_, values))) => {
             let hint = format!("; `{name}` has {} values and not as many as these", values.len());
             TraceFault::MissingColumn { signal, accepted, found, hint }
         }
@@ -142,6 +146,10 @@ fn read(mut stream: Stream) -> Result<(Named<Vec<f64>>, Named<&'static str>), Tr
 
 fn damaged(error: io::Error) -> TraceFault {
     TraceFault::Damaged(format!("the MAT file breaks off ({error})"))
+}
+
+fn damaged_variable(name: &str, what: &str) -> TraceFault {
+    TraceFault::Damaged(format!("`{}` {what}", shorten(name, 40)))
 }
 
 /// Data elements, one after the other.
@@ -228,14 +236,13 @@ impl<R: Read> Elements<R> {
         }
         let (kind, size, small) = self.tag()?;
         let width =
-            width(kind).ok_or_else(|| TraceFault::Damaged(format!("`{name}` holds data of type {kind}")))?;
+            width(kind).ok_or_else(|| damaged_variable(&name, &format!("holds data of type {kind}")))?;
         if length.checked_mul(width as u64) != Some(u64::from(size)) {
-            return Err(TraceFault::Damaged(format!("`{name}` has {size} bytes for {length} numbers")));
+            return Err(damaged_variable(&name, &format!("has {size} bytes for {length} numbers")));
         }
         if small && size > 4 {
-            return Err(TraceFault::Damaged(format!(
-                "`{name}` has {size} bytes beside its tag, which has room for 4"
-            )));
+            let what = format!("has {size} bytes beside its tag, which has room for 4");
+            return Err(damaged_variable(&name, &what));
         }
         *budget = budget.checked_sub(length).ok_or(TraceFault::Format(
             "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet",

@@ -14,6 +14,7 @@ mod inspect;
 mod inspect_text;
 mod line;
 mod mat;
+mod number;
 mod parquet;
 mod proposal;
 mod quality;

@@ -21,8 +21,8 @@ pub(super) struct Record<'a> {
 
 #[derive(Clone, Copy)]
 pub(super) enum Text<'a> {
-    /// As in the file, to be split at each delimiter.
-    Plain(&'a [u8]),
+    /// As in the file, to be split at each delimiter: it, with what stands behind it, and its length.
+    Plain(&'a [u8], usize),
     /// Cells without their quotes, one after the other, and where each ends.
     Unquoted(&'a [u8], &'a [usize]),
 }
@@ -30,7 +30,9 @@ pub(super) enum Text<'a> {
 impl<'a> Record<'a> {
     pub(super) fn cells(&self, delimiter: u8) -> Vec<&'a [u8]> {
         match self.text {
-            Text::Plain(text) => text.split(|byte| *byte == delimiter).collect(),
+            Text::Plain(text, length) => {
+                text.get(..length).unwrap_or_default().split(|byte| *byte == delimiter).collect()
+            }
             Text::Unquoted(text, ends) => {
                 let starts = std::iter::once(&0).chain(ends);
                 starts.zip(ends).map(|(start, end)| text.get(*start..*end).unwrap_or_default()).collect()
@@ -58,18 +60,28 @@ pub(super) struct Records {
     /// Lines ended so far.
     ended: u64,
     finished: Option<Option<io::Error>>,
-    unquoter: Unquoter,
+    delimiter: u8,
+    /// Made for the first quote: most files have none.
+    unquoter: Option<Unquoter>,
 }
 
 impl Records {
     pub(super) fn new(source: Box<dyn Read + Send>) -> Self {
-        let unquoter = Unquoter::new(b',');
-        Self { source, buffer: vec![0; CHUNK], start: 0, filled: 0, ended: 0, finished: None, unquoter }
+        Self {
+            source,
+            buffer: vec![0; CHUNK],
+            start: 0,
+            filled: 0,
+            ended: 0,
+            finished: None,
+            delimiter: b',',
+            unquoter: None,
+        }
     }
 
     /// Splits at `delimiter` from here on.
     pub(super) fn split_at(&mut self, delimiter: u8) {
-        self.unquoter = Unquoter::new(delimiter);
+        (self.delimiter, self.unquoter) = (delimiter, None);
     }
 
     /// The line that the next record starts on, from 1.
@@ -99,12 +111,11 @@ impl Records {
 
     #[inline]
     fn record(&self, line: u64, start: usize, found: &Found) -> Record<'_> {
-        let text = match found.cells {
-            Some(cells) => {
-                let ends = self.unquoter.ends.get(..cells).unwrap_or_default();
-                Text::Unquoted(&self.unquoter.cells, ends)
+        let text = match (found.cells, &self.unquoter) {
+            (Some(cells), Some(unquoter)) => {
+                Text::Unquoted(&unquoter.cells, unquoter.ends.get(..cells).unwrap_or_default())
             }
-            None => Text::Plain(self.buffer.get(start..start + found.text).unwrap_or_default()),
+            _ => Text::Plain(self.buffer.get(start..self.filled).unwrap_or_default(), found.text),
         };
         let unended = self.finished.is_some() && self.buffer.get(start + found.length - 1) != Some(&b'\n');
         Record { line, text, unended }
@@ -131,7 +142,8 @@ impl Records {
                 Some(at) if pending.get(at) == Some(&b'\n') => return Ok(Found::line(pending, at)),
                 Some(_) => {
                     let within = pending.get(..LONGEST_QUOTED).unwrap_or(pending);
-                    if let Some(found) = self.unquoter.read(within, at_end && within.len() == pending.len()) {
+                    let unquoter = self.unquoter.get_or_insert_with(|| Unquoter::new(self.delimiter));
+                    if let Some(found) = unquoter.read(within, at_end && within.len() == pending.len()) {
                         return Ok(found);
                     }
                     // A quote that does not close within reach is stray: its record ends with its line.

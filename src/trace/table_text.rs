@@ -61,44 +61,11 @@ impl TextTable {
     }
 
     fn split(ahead: &[u8], whole: bool, delimiter: Delimiter, rig: &Rig) -> Option<Self> {
-        let rows = rows(ahead, whole, delimiter);
-        let wide = |row: &TextRow| row.cells.len() >= LEAST_CELLS;
-        let may_name = |row: &TextRow| wide(row) && !is_data(&row.cells);
-        let named = rows.iter().take(LONGEST_PREAMBLE).enumerate().filter(|(_, row)| may_name(row));
-        for (index, _) in named {
-            let table = Self::under(&rows, index, delimiter, rig)?;
-            if table.bound.is_ok() {
-                return Some(table);
-            }
-        }
-        let is_data_row = |row: &TextRow| wide(row) && is_data(&row.cells);
-        let first_data = rows.iter().take(LONGEST_PREAMBLE).position(is_data_row);
-        match first_data {
-            Some(0) => {
-                let table = Self::under(&rows, 0, delimiter, rig)?;
-                Some(Self { headless: true, ..table })
-            }
-            Some(data) => {
-                let above = |count: usize| data.checked_sub(count).and_then(|index| rows.get(index));
-                let units = above(1).is_some_and(is_units) && above(2).is_some_and(wide);
-                Self::under(&rows, data - if units { 2 } else { 1 }, delimiter, rig)
-            }
-            None => Self::under(&rows, 0, delimiter, rig),
-        }
-    }
-
-    /// The table whose header is this row.
-    fn under(rows: &[TextRow], header: usize, delimiter: Delimiter, rig: &Rig) -> Option<Self> {
-        let row = rows.get(header)?;
-        let mut headers = row.cells.clone();
-        if let Some(first) = headers.first_mut() {
-            *first = first.trim_start_matches(['#', '%']).trim_start_matches("//").trim().to_owned();
-        }
-        let units = rows.get(header + 1).filter(|row| is_units(row)).cloned();
-        let rows = rows.get(header + 1 + usize::from(units.is_some())..).unwrap_or_default().to_vec();
-        fit_trailing(&mut headers, &rows);
-        let bound = bind(&headers, units.as_ref().map(|row| row.cells.as_slice()), &rows, rig);
-        Some(Self { delimiter, header_line: row.line, headers, units, rows, bound, headless: false })
+        let mut rows = rows(ahead, whole, delimiter);
+        let (head, headless) = Head::among(&rows, rig)?;
+        let Head { line, headers, units, bound, first } = head;
+        let rows = rows.split_off(first);
+        Some(Self { delimiter, header_line: line, headers, units, rows, bound, headless })
     }
 
     /// The last line before the rows.
@@ -109,6 +76,57 @@ impl TextTable {
     /// What stands in a column, empty cells left out.
     pub(super) fn column(&self, index: usize) -> Vec<&str> {
         column(&self.rows, index)
+    }
+}
+
+/// What stands above the rows.
+struct Head {
+    line: u64,
+    headers: Vec<String>,
+    units: Option<TextRow>,
+    bound: Result<Bound, TraceFault>,
+    /// The first row below it.
+    first: usize,
+}
+
+impl Head {
+    /// The header that makes a trace of the rows, or the likeliest one, and whether it is none but holds numbers.
+    fn among(rows: &[TextRow], rig: &Rig) -> Option<(Self, bool)> {
+        let wide = |row: &TextRow| row.cells.len() >= LEAST_CELLS;
+        let may_name = |row: &TextRow| wide(row) && !is_data(&row.cells);
+        let named = rows.iter().take(LONGEST_PREAMBLE).enumerate().filter(|(_, row)| may_name(row));
+        for (index, _) in named {
+            let head = Self::at(rows, index, rig)?;
+            if head.bound.is_ok() {
+                return Some((head, false));
+            }
+        }
+        let is_data_row = |row: &TextRow| wide(row) && is_data(&row.cells);
+        let first_data = rows.iter().take(LONGEST_PREAMBLE).position(is_data_row);
+        let header = match first_data {
+            Some(data) if data > 0 => {
+                let above = |count: usize| data.checked_sub(count).and_then(|index| rows.get(index));
+                let units = above(1).is_some_and(is_units) && above(2).is_some_and(wide);
+                data - if units { 2 } else { 1 }
+            }
+            _ => 0,
+        };
+        Some((Self::at(rows, header, rig)?, first_data == Some(0)))
+    }
+
+    /// The header that this row is.
+    fn at(rows: &[TextRow], header: usize, rig: &Rig) -> Option<Self> {
+        let row = rows.get(header)?;
+        let mut headers = row.cells.clone();
+        if let Some(first) = headers.first_mut() {
+            *first = first.trim_start_matches(['#', '%']).trim_start_matches("//").trim().to_owned();
+        }
+        let units = rows.get(header + 1).filter(|row| is_units(row)).cloned();
+        let first = header + 1 + usize::from(units.is_some());
+        let rows = rows.get(first..).unwrap_or_default();
+        fit_trailing(&mut headers, rows);
+        let bound = bind(&headers, units.as_ref().map(|row| row.cells.as_slice()), rows, rig);
+        Some(Self { line: row.line, headers, units, bound, first })
     }
 }
 

@@ -9,10 +9,13 @@ import shutil
 import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
+import cloudpickle
 import numpy as np
 import pandas as pd
 import polars
 import pyarrow as pa
+import pyarrow.compute as arrow
+import pyarrow.parquet
 import pytest
 from conftest import ROOT, TRACES, read_columns
 
@@ -193,8 +196,9 @@ def test_a_fleet_pickles(found):
     assert pickle.loads(pickle.dumps(found)) == found
 
 
-def test_dask_gives_the_same_rows(farm, found):
-    """On two processes that Dask started, as it does on a cluster."""
+@pytest.fixture(scope="module")
+def dask():
+    """The map of a client of two processes that Dask started, as it does on a cluster."""
     with warnings.catch_warnings():
         # Dask's own, of ports that are taken and clocks that are late.
         warnings.simplefilter("ignore")
@@ -203,20 +207,51 @@ def test_dask_gives_the_same_rows(farm, found):
             distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
             distributed.Client(cluster) as client,
         ):
-            assert pl.fleet(f"{farm}/**/*.csv", map=client.map, progress=False) == found
+            yield client.map
 
 
-def test_polars_groups(found):
+@pytest.fixture(scope="module")
+def blades(found):
+    """Every blade's samples in one table, as a lake has them."""
+    parts = []
+    for row in found.rows:
+        turbine, blade = row.cylinder.split("/")[-2:]
+        named = polars.lit(turbine).alias("turbine"), polars.lit(blade).alias("blade")
+        parts.append(polars.read_csv(row.path).with_columns(*named))
+    return polars.concat(parts, how="diagonal").to_arrow()
+
+
+def verdicts(fleet):
+    return [(row.status, row.faults, row.leaks) for row in fleet.rows]
+
+
+def test_dask_gives_the_same_rows(dask, farm, found):
+    assert pl.fleet(f"{farm}/**/*.csv", map=dask, progress=False) == found
+
+
+def test_dask_judges_parquet_partitioned_by_turbine_and_blade(dask, blades, found, tmp_path):
+    pyarrow.parquet.write_to_dataset(blades, tmp_path, partition_cols=["turbine", "blade"])
+    rig = ROOT / "data" / "traces" / "rig.toml"
+    here = pl.fleet(f"{tmp_path}/**/*.parquet", rig, progress=False)
+    assert [row.cylinder for row in here.rows] == ["T1/B1", "T1/B2", "T2/B1", "T2/B2"]
+    assert verdicts(here) == verdicts(found)
+    assert pl.fleet(f"{tmp_path}/**/*.parquet", rig, map=dask, progress=False) == here
+
+
+def test_polars_groups(blades, found, rig):
     """As docs/fleet.md shows it."""
-    frames = [polars.read_csv(row.path).with_columns(blade=polars.lit(row.cylinder)) for row in found.rows]
-    rig = pl.Rig.load(ROOT / "data" / "traces" / "rig.toml")
+    frame = polars.from_arrow(blades).with_columns(blade=polars.concat_str("turbine", "blade", separator="/"))
 
     def judge(part):
-        return pl.fleet({part["blade"][0]: part.drop("blade")}, rig, map=map, progress=False).to_polars()
+        return pl.fleet({part["blade"][0]: part.drop("turbine", "blade")}, rig, map=map, progress=False).to_polars()
 
-    out = polars.concat(frames, how="diagonal").group_by("blade", maintain_order=True).map_groups(judge)
-    assert out["cylinder"].to_list() == [row.cylinder for row in found.rows]
+    out = frame.group_by("blade", maintain_order=True).map_groups(judge)
+    assert out["cylinder"].to_list() == ["T1/B1", "T1/B2", "T2/B1", "T2/B2"]
     assert out["status"].to_list() == [row.status for row in found.rows]
+    assert out["internal_lpm"].to_list() == found.table["internal_lpm"].tolist()
+    schema = pl.Fleet([]).to_polars().schema
+    lazy = frame.lazy().group_by("blade", maintain_order=True).map_groups(judge, schema=schema).collect()
+    assert lazy.equals(out)
 
 
 def test_the_schema_is_the_same_whatever_is_missing(found):
@@ -224,12 +259,23 @@ def test_the_schema_is_the_same_whatever_is_missing(found):
     assert pl.Fleet([]).to_arrow().schema == found.to_arrow().schema
     assert pl.Fleet([]).to_polars().schema == found.to_polars().schema
 
-    def judge(key, part):  # what Spark's applyInArrow calls
-        (blade,) = (value.as_py() for value in key)
-        return pl.fleet({blade: part.sort_by("t_s")}, map=map, progress=False).to_arrow()
 
-    trace = pa.table(pl.simulate(13, duration=10).columns)
-    shuffled = trace.take(np.random.default_rng(1).permutation(trace.num_rows))
-    row = judge((pa.scalar("B1"),), shuffled)
-    assert row.schema == found.to_arrow().schema
-    assert row["status"].to_pylist() == [pl.replay(trace).verdict.status]
+def test_what_spark_calls(blades, found, rig):
+    """As docs/fleet.md shows it: `applyInArrow` gives the keys as scalars and a group in any order, and pickles `judge`
+    with all that it needs."""
+    schema = pl.Fleet([]).to_arrow().schema
+
+    def judge(key, part):
+        turbine, blade = (value.as_py() for value in key)
+        found = pl.fleet({f"{turbine}/{blade}": part.sort_by("t_s")}, rig, map=map, progress=False)
+        return found.to_arrow()
+
+    there = cloudpickle.loads(cloudpickle.dumps(judge))
+    shuffled = blades.take(np.random.default_rng(1).permutation(blades.num_rows))
+    for row, key in zip(found.rows, [("T1", "B1"), ("T1", "B2"), ("T2", "B1"), ("T2", "B2")], strict=True):
+        group = shuffled.filter((arrow.field("turbine") == key[0]) & (arrow.field("blade") == key[1]))
+        out = there(tuple(pa.scalar(value) for value in key), group)
+        assert out.schema == schema
+        assert out["cylinder"].to_pylist() == ["/".join(key)]
+        assert out["status"].to_pylist() == [row.status]
+        assert out["internal_lpm"].to_pylist() == [row.leaks.internal.mean_lpm]

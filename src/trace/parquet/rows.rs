@@ -3,7 +3,7 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::times::TimeFormat;
 use crate::trace::bind::bind;
-use crate::trace::columns::{Content, Layout, shorten};
+use crate::trace::columns::{Content, Layout, shorten, standard};
 use crate::trace::dialect::time_format;
 use crate::trace::error::TraceFault;
 use crate::trace::format::{Rows, Stream};
@@ -66,7 +66,7 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     };
     let fields = fields(file.as_ref());
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
-    let sample = sample(file.as_ref(), &fields)?;
+    let sample = sample(file.as_ref(), &fields, rig)?;
     let bound = bind(&names, None, &sample, rig)?;
     let mut layout = Layout { counted: Counted::Rows, ..bound.layout };
     let mut read = Vec::new();
@@ -158,8 +158,15 @@ fn kind(column: &ColumnDescriptor) -> Kind {
     }
 }
 
-/// The first rows as text, as those of a file of text are looked at.
-fn sample(file: &dyn FileReader, fields: &[Field]) -> Result<Vec<TextRow>, TraceFault> {
+/// Whether a column's header alone says that it holds numbers, and of which signal.
+fn is_plain(field: &Field, rig: &Rig) -> bool {
+    let is_mapped = || rig.columns.values().any(|column| column.name.trim() == field.name.trim());
+    matches!(standard(field.name.trim()), Some((_, Some(_)))) && !is_mapped()
+}
+
+/// The first rows as text, as those of a file of text are looked at; without the columns whose cells nobody asks, because
+/// a page of each would be read twice.
+fn sample(file: &dyn FileReader, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow>, TraceFault> {
     let mut rows: Vec<TextRow> = Vec::new();
     if file.num_row_groups() == 0 {
         return Ok(rows);
@@ -168,6 +175,7 @@ fn sample(file: &dyn FileReader, fields: &[Field]) -> Result<Vec<TextRow>, Trace
     for (index, field) in fields.iter().enumerate() {
         let cells: Vec<String> = match field.kind {
             Kind::Other => continue,
+            Kind::Number if is_plain(field, rig) => continue,
             Kind::Stamp(_) => vec!["2000-01-01T00:00:00".to_owned()],
             Kind::Text => {
                 let mut reader = group.get_column_reader(field.place).map_err(damaged)?;

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
 from ._page import Paged, same
+from ._picture import axes_for
 from ._pitchleak import Rig
 from ._raw import Raw
 from ._records import record
 from ._report import LABELS
 from ._results import PerLeak, Trace
-from ._tabular import Tabular, optional
+from ._tabular import Tabular
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,7 +126,7 @@ class Check(Raw, Paged, Tabular):
 
         Returns the axes.
         """
-        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 2.5))[1] if ax is None else ax
+        axes = axes_for(ax, 2.5)
         for leak, reach in self.leaks.items():
             if reach.resolution is None:
                 axes.barh(LABELS[leak], 0.0)

@@ -11,11 +11,12 @@ from . import _html, _inputs, _pitchleak
 from ._check import Wiring
 from ._gaps import broken, people_time
 from ._page import Paged
+from ._picture import figure_for, legend_beside
 from ._pitchleak import Rig
 from ._progress import Progress, shown
 from ._raw import Raw
 from ._records import record
-from ._tabular import Tabular, optional
+from ._tabular import Tabular
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -267,10 +268,9 @@ class Diagnosis(Raw, Paged, Tabular):
 
         Needs matplotlib.
         """
-        pyplot = optional("matplotlib.pyplot", "plot")
         present = [name for name, course in self.residuals_before.items() if np.isfinite(course.residual).any()]
-        figure = pyplot.figure(figsize=(8, 2.2 * max(len(present), 1))) if figure is None else figure
-        axes = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0] if present else []
+        figure = figure_for(figure, 2.2 * max(len(present), 1))
+        axes: Any = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0] if present else []
         for ax, name in zip(axes, present, strict=True):
             factor, label = _BALANCES[name]
             for course, when in ((self.residuals_before[name], "before"), (self.residuals_after[name], "after")):
@@ -279,7 +279,7 @@ class Diagnosis(Raw, Paged, Tabular):
                 ax.plot(t / second, residual, linewidth=0.8, label=when)
             ax.set_ylabel(label)
         if present:
-            axes[0].legend(loc="upper right", ncols=2, title=self.verdict.replace("_", " "))
+            legend_beside(axes[0], self.verdict.replace("_", " "))
             axes[-1].set_xlabel(f"time, {unit}")
         return figure
 

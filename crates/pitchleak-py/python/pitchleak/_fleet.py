@@ -12,6 +12,7 @@ import numpy as np
 from . import _html, _inputs, _pitchleak
 from ._page import Paged
 from ._parallel import on_all_cores
+from ._picture import axes_for, legend_beside
 from ._pitchleak import Rig, RigError, Stop, TraceError
 from ._progress import Progress, shown
 from ._records import record
@@ -247,7 +248,7 @@ class Fleet(Paged, Tabular):
         rows = [row for row in self.rows if row.cylinder == cylinder and row.leaks is not None]
         if not rows:
             raise ValueError(f"no trace of `{cylinder}` could be judged")
-        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+        axes = axes_for(ax)
         dated = all(row.begins is not None for row in rows)
         when: Any = np.array([_middle(row) for row in rows]) if dated else np.arange(len(rows))
         for leak, label in LABELS.items():
@@ -267,11 +268,12 @@ class Fleet(Paged, Tabular):
                 axes.plot(ends, line, color=color, linewidth=1)
         axes.set_ylabel("leak flow, L/min")
         axes.set_title(cylinder, fontsize="medium")
-        axes.legend(loc="best", title="leak")
+        legend_beside(axes, "leak")
         if dated:
-            axes.figure.autofmt_xdate()
+            axes.tick_params("x", rotation=30)
         else:
             axes.set_xlabel("trace")
+            axes.xaxis.set_major_locator(optional("matplotlib.ticker", "plot").MaxNLocator(integer=True))
         return axes
 
     def _worst(self) -> str:

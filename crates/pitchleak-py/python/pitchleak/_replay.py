@@ -13,10 +13,11 @@ from ._gaps import broken, people_time
 from ._groups import split
 from ._page import Paged, same
 from ._parallel import on_all_cores
+from ._picture import axes_for, legend_beside
 from ._pitchleak import Rig, Stop
 from ._progress import Progress
 from ._report import LABELS, Report, draw_flows, parse
-from ._tabular import Tabular, optional
+from ._tabular import Tabular
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +78,7 @@ class Replay(Report, Paged, Tabular):
         The flows are the coefficients at the mean pressures of the trace, so that their course shows what
         is learnt and not how the pressures move. Returns the axes.
         """
-        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+        axes = axes_for(ax)
         table = self.table
         second, unit = people_time(table["t_s"])
         prefixes = {"internal": "internal", "external_a": "external_leak_a", "external_b": "external_leak_b"}
@@ -99,7 +100,7 @@ class Replay(Report, Paged, Tabular):
             axes.set_ylim(min(0.0, *flows) - 0.5 * span, max(0.0, *flows) + 0.5 * span)
         axes.set_xlabel(f"time, {unit}")
         axes.set_ylabel("leak flow, L/min")
-        axes.legend(loc="best", title="leak (line: alarm raised)" if self.alarms else "leak")
+        legend_beside(axes, "leak (line:\nalarm raised)" if self.alarms else "leak")
         return axes
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _html
+from ._picture import axes_for, legend_beside
 from ._raw import Raw
 from ._records import record
 from ._results import (
@@ -23,7 +24,6 @@ from ._results import (
     Trend,
     Verdict,
 )
-from ._tabular import optional
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,7 +118,7 @@ def parse(cls: type[R], text_json: str, text: str) -> R:
 
 def draw_flows(leakages: Mapping[str, PerLeak[Leakage]], ax: "Axes | None") -> "Axes":
     """Draws leak flows of cylinders by their names."""
-    axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+    axes = axes_for(ax)
     for shift, (leak, label) in zip((-0.15, 0.0, 0.15), LABELS.items(), strict=True):
         flows = [getattr(leakage, leak) for leakage in leakages.values()]
         mean = np.array([flow.mean_lpm for flow in flows], np.float64)
@@ -128,5 +128,5 @@ def draw_flows(leakages: Mapping[str, PerLeak[Leakage]], ax: "Axes | None") -> "
     axes.set_xticks(range(len(leakages)), list(leakages), rotation=30 if len(leakages) > 4 else 0)
     axes.set_xlim(-0.6, max(len(leakages), 1) - 0.4)
     axes.set_ylabel("leak flow, L/min")
-    axes.legend(loc="best", title="leak, 95 %")
+    legend_beside(axes, "leak, 95 %")
     return axes

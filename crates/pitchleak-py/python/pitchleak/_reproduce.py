@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _html, _inputs, _pitchleak
+from ._picture import axes_for, legend_beside
 from ._progress import Progress, shown
 from ._raw import Raw
 from ._records import record
-from ._tabular import Tabular, optional
+from ._tabular import Tabular
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,7 +73,7 @@ class Reproduction(Raw, Tabular):
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draws the mean coefficient error of every row (needs matplotlib). Returns the axes."""
-        axes = optional("matplotlib.pyplot", "plot").subplots(figsize=(8, 4))[1] if ax is None else ax
+        axes = axes_for(ax)
         for estimator in dict.fromkeys(row.estimator for row in self.rows):
             rows = [row for row in self.rows if row.estimator == estimator and row.identifiable]
             names = [f"{row.wind_mps} m/s\ncase {row.case}\n{row.leak.replace('_', ' ')}" for row in rows]
@@ -81,7 +82,7 @@ class Reproduction(Raw, Tabular):
         axes.set_yscale("log")
         axes.set_ylabel("coefficient error, %")
         axes.tick_params("x", labelsize=6)
-        axes.legend()
+        legend_beside(axes)
         return axes
 
     def __str__(self) -> str:

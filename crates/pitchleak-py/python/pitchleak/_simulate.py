@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from . import _html, _inputs, _pitchleak
 from ._gaps import broken
+from ._picture import figure_for, legend_beside
 from ._pitchleak import Rig
 from ._progress import Progress, shown
 from ._raw import Raw
 from ._records import record
 from ._results import PerLeak
-from ._tabular import Tabular, optional
+from ._tabular import Tabular
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,14 +70,13 @@ class Simulation(Raw, Tabular):
 
     def plot(self, figure: "Figure | None" = None) -> "Figure":
         """Draws position, pressures and flows over time (needs matplotlib)."""
-        pyplot = optional("matplotlib.pyplot", "plot")
-        figure = pyplot.figure(figsize=(8, 6)) if figure is None else figure
+        figure = figure_for(figure, 6.0)
         rows = (("x_mm",), ("pa_bar", "pb_bar"), ("qa_lpm", "qb_lpm"))
         axes = figure.subplots(len(rows), 1, sharex=True)
         for ax, names in zip(axes, rows, strict=True):
             for name in names:
                 ax.plot(*broken(self.columns["t_s"], self.columns[name]), linewidth=0.9, label=name)
-            ax.legend(loc="upper right", ncols=2)
+            legend_beside(ax)
         axes[-1].set_xlabel("time, s")
         return figure
 
