@@ -120,6 +120,20 @@ fn each_fault_is_found_on_its_channel_alone() {
     }
 }
 
+/// Of a long trace pieces are looked at, and each begins a new run: none is counted that was not read.
+#[test]
+fn a_sensor_that_holds_its_readings_is_found_in_long_traces_too() {
+    let mut sound = readings(Some(0.01), 1000.0);
+    sound.truncate(50_000);
+    let held = |at: usize, _, now, before| if at.is_multiple_of(4) { now } else { before };
+    for (name, of) in CHANNELS {
+        let faults = found(&changed(&sound, of, held), &rig(0.01));
+        let right =
+            |fault: &(&str, ChannelFaultKind, f64, f64)| (fault.0, fault.1) == (name, ChannelFaultKind::Held);
+        assert!(faults.len() == 1 && faults.iter().all(right), "{name}: {faults:?}");
+    }
+}
+
 /// Perfect sensors, whatever is declared; a piston at rest; slow sampling; rows lost, gaps, spikes; digits of a file.
 #[test]
 fn sound_channels_are_silent() {

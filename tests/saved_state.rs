@@ -186,3 +186,22 @@ fn parts_that_do_not_fit_each_other_are_refused() {
     let doubled = sealed([&saved[..saved.len() - 4], &[0]].concat());
     assert!(matches!(Stream::restore(&doubled), Err(RestoreError::Content(_))), "something after the end");
 }
+
+/// A channel that repeats more readings than it has.
+#[test]
+fn counts_that_contradict_each_other_are_refused() {
+    let saved = streams()[0].save().unwrap();
+    for name in ["in_long_runs", "repeats"] {
+        let bytes = forged(&saved, |value| {
+            each(value, &mut |value| {
+                for (key, count) in value.as_map_mut().into_iter().flatten() {
+                    if key.as_text() == Some(name) {
+                        *count = 1_000_000.into();
+                    }
+                }
+            });
+        });
+        assert_ne!(bytes, saved, "{name}");
+        assert!(Stream::restore(&bytes).is_err(), "{name}");
+    }
+}

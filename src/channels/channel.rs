@@ -1,6 +1,9 @@
 /// Runs of identical readings up to this long are counted by their length; a longer one may be a sensor that hangs.
 pub(super) const SHORT_RUN: usize = 32;
 
+/// No trace has as many.
+const MOST_READINGS: u64 = 1 << 53;
+
 /// What one channel did, reading by reading.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Channel {
@@ -114,12 +117,30 @@ impl Channel {
         self.last_s = t_s;
     }
 
+    /// Whether readings can have led to it, as far as its counts tell.
+    pub fn is_possible(&self) -> bool {
+        let running = if self.repeats > 0 { u64::from(self.repeats) + 1 } else { 0 };
+        let in_runs = self.in_short_runs_longer_than_one() + running;
+        let extremes = [&self.least, &self.most];
+        in_runs.checked_add(self.in_long_runs).is_some_and(|count| count <= self.readings)
+            && self.readings < MOST_READINGS
+            && extremes
+                .iter()
+                .all(|extreme| extreme.repeats <= extreme.count && extreme.count <= self.readings)
+    }
+
+    fn in_short_runs_longer_than_one(&self) -> u64 {
+        (1..).zip(self.short_runs).map(|(length, count): (u64, u32)| length * u64::from(count)).sum()
+    }
+
     /// Some readings are not looked at: the next one follows from none, whatever it is.
     pub fn skip_to(&mut self, t_s: f64, value: f64) {
         if value.to_bits() != self.last.to_bits() && self.repeats > 0 {
             self.close_run();
         }
         (self.last, self.last_step, self.last_bend, self.last_s) = (value, 0.0, 0.0, t_s);
+        // A run may begin with it.
+        self.readings += 1;
     }
 
     #[inline]
@@ -140,7 +161,7 @@ impl Channel {
         if self.repeats == 0 {
             self.repeats_from_s = self.last_s;
         }
-        self.repeats += 1;
+        self.repeats = self.repeats.saturating_add(1);
     }
 
     #[cold]
@@ -173,12 +194,8 @@ impl Channel {
 
     /// Short runs, single readings among them, and how many those are.
     pub fn short_runs(&self) -> (u64, u64) {
-        let (mut runs, mut readings) = (0, 0);
-        for (length, count) in (1..).zip(self.short_runs) {
-            runs += u64::from(count);
-            readings += length * u64::from(count);
-        }
-        let singles = self.in_short_runs() - readings;
+        let runs: u64 = self.short_runs.iter().copied().map(u64::from).sum();
+        let singles = self.in_short_runs() - self.in_short_runs_longer_than_one();
         (runs + singles, singles)
     }
 

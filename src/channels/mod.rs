@@ -88,6 +88,11 @@ impl Default for ChannelMonitor {
 }
 
 impl ChannelMonitor {
+    /// Whether records can have led to it.
+    pub(crate) fn is_possible(&self) -> bool {
+        self.channels.iter().all(Channel::is_possible)
+    }
+
     /// Takes in one record. Of a long trace one piece in a few is looked at: a fault that lasts is in it.
     #[inline]
     pub fn add(&mut self, record: &Record) {

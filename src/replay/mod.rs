@@ -151,6 +151,7 @@ impl Replay {
             std::mem::discriminant(&fresh.estimator) == std::mem::discriminant(&self.estimator)
                 && fresh.correction.is_some() == self.correction.is_some()
                 && fresh.doubt.count() == self.doubt.count()
+                && self.channels.is_possible()
         })
     }
 
