@@ -8,6 +8,9 @@ pub use pitchleak_core::LPM_PER_M3S;
 /// 1 m³/(s·Pa) in L/min/bar.
 pub const LPM_PER_BAR: f64 = LPM_PER_M3S * 1e5;
 
+/// Seconds of a day.
+pub(crate) const S_PER_DAY: f64 = 86_400.0;
+
 /// Factor from the SI unit of an effect's value to the unit that people use, and that unit.
 pub fn effect_unit(si: &str) -> (f64, &str) {
     match si {
@@ -250,6 +253,14 @@ pub fn readable(value: f64, digits: i32) -> String {
     let text = format!("{value:.places$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// A span of time in the unit that people would take.
+pub(crate) fn duration(time_s: f64) -> String {
+    const UNITS: [(f64, &str); 3] = [(S_PER_DAY, "days"), (3600.0, "h"), (60.0, "min")];
+    let unit = UNITS.into_iter().find(|(unit_s, _)| time_s >= 2.0 * unit_s);
+    let (unit_s, name) = unit.unwrap_or((1.0, "s"));
+    format!("{:.0} {name}", time_s / unit_s)
 }
 
 fn join<'a>(names: impl Iterator<Item = &'a str>) -> String {

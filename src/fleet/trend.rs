@@ -2,13 +2,13 @@
 
 use super::FleetRow;
 use crate::report::{LeakTrend, Status, with_interval};
+use crate::units::S_PER_DAY;
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::HashMap;
 
-const S_PER_DAY: f64 = 86_400.0;
 const H_PER_MONTH: f64 = 24.0 * 30.0;
 
 /// How the leaks of a cylinder change from trace to trace.

@@ -7,6 +7,7 @@ use super::{Card, Head, Page, Section, Tone};
 use crate::envelope::Range;
 use crate::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend};
 use crate::report::{Status, advice, capital, with_interval};
+use crate::units::S_PER_DAY;
 use jiff::Timestamp;
 use maud::{Markup, html};
 use pitchleak_core::Leak;
@@ -18,7 +19,6 @@ const MOST_ROWS: usize = 1000;
 const MOST_NAMED: usize = 8;
 /// Growing leaks that are drawn.
 const MOST_DRAWN: usize = 8;
-const S_PER_DAY: f64 = 86_400.0;
 
 impl Page {
     /// The report of a fleet.

@@ -9,7 +9,7 @@ use crate::report::{
     duration, interval, with_interval,
 };
 use crate::rig::Rig;
-use crate::units::{LPM_PER_BAR, LPM_PER_M3S};
+use crate::units::{LPM_PER_BAR, LPM_PER_M3S, duration};
 use maud::{Markup, html};
 use pitchleak_core::{AlarmState, Estimate, Leak};
 

@@ -12,7 +12,7 @@ mod verdict;
 pub use episode::Episode;
 pub use reason::{Reason, ReasonId};
 pub use spell::Spell;
-pub(crate) use statement::{advice, capital, duration, interval, with_interval};
+pub(crate) use statement::{advice, capital, interval, with_interval};
 pub use text::{Palette, data_line};
 pub(crate) use text::{misfit, rig_line};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};

@@ -1,5 +1,5 @@
-use super::statement::duration;
 use super::{Episode, TraceSummary};
+use crate::units::duration;
 use pitchleak_core::Leak;
 
 /// Episodes of one leak that follow one another closely, told as one: what a day of a leak that comes and goes is in short.

@@ -1,6 +1,7 @@
 //! The verdict as sentences.
 
 use super::{Findings, Leakage, Reason, Status};
+use crate::units::duration;
 use pitchleak_core::{Estimate, Leak};
 
 /// Where to look for a leak.
@@ -143,14 +144,6 @@ fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> 
         oil.unwrap_or_default(),
         reaches.unwrap_or_default()
     ))
-}
-
-/// In the unit that people would take.
-pub(crate) fn duration(time_s: f64) -> String {
-    const UNITS: [(f64, &str); 3] = [(86_400.0, "days"), (3600.0, "h"), (60.0, "min")];
-    let unit = UNITS.into_iter().find(|(unit_s, _)| time_s >= 2.0 * unit_s);
-    let (unit_s, name) = unit.unwrap_or((1.0, "s"));
-    format!("{:.0} {name}", time_s / unit_s)
 }
 
 fn sentence(text: &str) -> String {

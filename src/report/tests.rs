@@ -1,6 +1,7 @@
 use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::rig::Rig;
+use crate::times::{Clock, TimeFormat, Zone};
 use crate::wiring::{Wiring, ZeroCheck};
 
 fn entry(value: f64, std: f64) -> EstimateEntry {
@@ -301,6 +302,37 @@ fn what_happened_earlier_is_in_the_sentence() {
     let verdict = intermittent.verdict();
     assert_eq!((verdict.status, verdict.faults), (Status::Leak, vec![Leak::Internal]));
     assert!(verdict.text.starts_with("Internal leak that comes and goes, 2 times"), "{}", verdict.text);
+}
+
+#[test]
+fn a_long_trace_is_told_from_its_beginning_on_by_its_clock() {
+    let berlin = TimeFormat { zone: Zone::by_name("+01:00"), ..TimeFormat::default() };
+    let mut day =
+        Found { episodes: vec![episode(3600.0, Some(7260.0)), episode(40_000.0, None)], ..found(INTERNAL) };
+    day.trace.duration_s = 50_000.0;
+    day.trace.begins = Clock::new(1_763_676_631_000_000_000, &berlin);
+    let report = day.report();
+    let text = report.to_text(&Palette::PLAIN);
+    assert!(text.contains("leaks through the trace, which begins 2025-11-20 23:10:31 +01\n"), "{text}");
+    assert!(text.contains("internal    21 Nov 00:10 to 21 Nov 01:11 "), "{text}");
+    assert!(text.contains("internal    from 21 Nov 10:17 on "), "{text}");
+    assert!(text.contains("50000.0 s (14 h)"), "{text}");
+    let json: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
+    assert_eq!(json["trace"]["begins"], "2025-11-20T23:10:31+01:00");
+    assert_eq!(json["spells"][0]["times"], 1);
+}
+
+#[test]
+fn a_long_trace_without_a_clock_counts_hours() {
+    let mut day = Found { episodes: vec![episode(3600.0, Some(7260.0))], ..sound() };
+    day.trace.duration_s = 50_000.0;
+    let text = day.report().to_text(&Palette::PLAIN);
+    assert!(text.contains("Earlier: internal leak of 0.50 L/min from 1 h 00 min to 2 h 01 min."), "{text}");
+    let mut quiet = sound();
+    quiet.trace.duration_s = 50_000.0;
+    assert!(
+        quiet.report().to_text(&Palette::PLAIN).contains("leaks through the trace\nno alarm at any time\n")
+    );
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use super::reason::MISFIT;
 use super::sketch::{write_bars, write_courses};
-use super::statement::{duration, interval, with_interval};
+use super::statement::{interval, with_interval};
 use super::{EstimateEntry, ReplayReport, Status, TraceSummary, Verdict};
 use crate::replay::Sketch;
 use crate::rig::Rig;
-use crate::units::LPM_PER_BAR;
+use crate::units::{LPM_PER_BAR, duration};
 use pitchleak_core::AlarmState;
 use std::fmt::Write;
 

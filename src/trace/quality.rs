@@ -1,6 +1,7 @@
 //! What a reader noticed about a trace.
 
 use super::Record;
+use crate::units::duration;
 use pitchleak_core::Sample;
 use std::fmt;
 
@@ -138,10 +139,13 @@ impl TraceQuality {
             warnings.push(format!("the clock was set back ({} times)", self.clock_restarts));
         }
         if self.gaps > 0 {
-            let longest = self.longest_gap_s;
+            let longest = match self.longest_gap_s {
+                short_s if short_s < 120.0 => format!("{short_s:.3} s"),
+                long_s => duration(long_s),
+            };
             warnings.push(match self.gaps {
-                1 => format!("1 gap in time, {longest:.3} s"),
-                gaps => format!("{gaps} gaps in time, the longest {longest:.3} s"),
+                1 => format!("1 gap in time, {longest}"),
+                gaps => format!("{gaps} gaps in time, the longest {longest}"),
             });
         }
         if !self.absent_columns.is_empty() {

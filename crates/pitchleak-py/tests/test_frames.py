@@ -26,8 +26,8 @@ def expected(trace):
 
 
 def same(out, expected):
-    """All but the name by which columns are called and the warnings about those that nobody reads."""
-    drop = ("warnings",)
+    """All but the clock of the time stamps and the warnings about columns that nobody reads."""
+    drop = ("warnings", "begins")
     left, right = out.to_dict(), expected.to_dict()
     return all(
         {key: value for key, value in one["trace"].items() if key not in drop}
@@ -64,9 +64,15 @@ def test_time_may_be_the_index(trace, expected):
 def test_a_datetime_index_is_a_column_of_time_stamps(trace):
     rest = without_time(trace)
     stamped = pl.replay(rest | {"timestamp": stamps(trace).to_numpy()})
-    for zone in (None, "UTC", "Europe/Berlin"):
+    assert stamped.trace.begins == "2026-05-01T00:00:00+00:00"
+    for zone, begins in (
+        (None, stamped.trace.begins),
+        ("UTC", stamped.trace.begins),
+        ("Europe/Berlin", "2026-04-30T22:00:00+00:00"),
+    ):
         index = stamps(trace).tz_localize(zone)
-        assert same(pl.replay(pd.DataFrame(rest, index=index)), stamped)
+        out = pl.replay(pd.DataFrame(rest, index=index))
+        assert same(out, stamped) and out.trace.begins == begins
     night = pd.date_range("2026-10-25 00:59:55", periods=len(trace["t_s"]), freq="10ms", tz="UTC")
     through = pd.DataFrame(rest, index=night.tz_convert("Europe/Berlin"))
     assert pl.replay(through).trace.gaps == 0
