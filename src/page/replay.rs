@@ -6,7 +6,7 @@ use super::machine::{alarms, facts, prose, short, trace};
 use super::{Card, Head, History, Page, Section};
 use crate::report::{
     EstimateEntry, Reason, ReasonId, ReplayReport, Status, TraceSummary, advice, capital, data_line,
-    duration, interval, with_interval,
+    interval, with_interval,
 };
 use crate::rig::Rig;
 use crate::units::{LPM_PER_BAR, LPM_PER_M3S, duration};

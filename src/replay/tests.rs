@@ -60,7 +60,7 @@ fn a_terminal_sees_the_course_of_each_leak_and_its_pause() {
     let report = replay.report(TraceSummary::new("trace", &crate::trace::TraceQuality::default()));
     let palette = crate::report::Palette::PLAIN;
     let shown = report.to_terminal(&palette, &sketch);
-    assert!(shown.contains("\ninternal    █") && shown.contains('●'), "{shown}");
+    assert!(shown.contains("███     ") && shown.contains('●'), "{shown}");
     assert!(!report.to_text(&palette).contains(['█', '●', '┊']));
 }
 
