@@ -315,4 +315,14 @@ mod tests {
             assert_near(found, coefficient * pressure, variance);
         }
     }
+
+    /// Of a sixth of the reading, a fifth of the truth: y = x (1 + γ). Its spread follows the slope of γ/(1 + γ).
+    #[test]
+    fn a_share_of_the_reading_is_one_of_the_truth() {
+        let gain = of_reading(Estimate { value: 1.0_f64 / 6.0, std: 1e-3 });
+        let nearby = of_reading(Estimate { value: 1.0_f64 / 6.0 + 1e-6, std: 1e-3 });
+        assert!((gain.value - 0.2).abs() < 1e-12);
+        let slope = (nearby.value - gain.value) / 1e-6;
+        assert!((gain.std / 1e-3 / slope - 1.0).abs() < 1e-5, "{gain:?} {slope}");
+    }
 }
