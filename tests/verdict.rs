@@ -49,6 +49,27 @@ fn each_mistake_gives_its_reason() {
     }
 }
 
+/// A fifth of the leak passes an orifice: sensors of 0.1 % see that it isn't C P, and by which law it is. Where a meter is
+/// off besides, nothing is sure.
+#[test]
+fn a_leak_through_an_orifice_is_sure_and_its_law_is_named() {
+    let internal = Some(Leak::Internal);
+    [WindCase::Mps13, WindCase::Mps30].par_iter().for_each(|wind| {
+        let truths = truths(*wind, internal);
+        let judged = |faults, seed| {
+            let report = replayed(&truths, &lie(faults), 1e-3, seed).unwrap_or_else(|e| panic!("{e}"));
+            (judge(&report, internal, &truths), report.verdict.text)
+        };
+        for seed in 1..=2 {
+            let (judgement, text) = judged(&[], seed);
+            assert_eq!(judgement, Judgement::Right, "{wind:?}: {text}");
+            assert!(text.contains("as through an orifice, by the root of the pressure"), "{wind:?}: {text}");
+            let (judgement, text) = judged(&["qa gain 20 %"], seed);
+            assert_eq!(judgement, Judgement::InDoubt, "{wind:?}: {text}");
+        }
+    });
+}
+
 /// Right columns, honest sensors: sure, and right.
 #[test]
 fn honest_traces_stay_sure() {

@@ -10,10 +10,34 @@ use crate::report::{
 use crate::rig::EstimatorKind;
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
+use crate::wiring::Orifice;
 use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak};
 
 /// Why an estimate says nothing that is no finite number.
 const NO_NUMBER: &str = "the readings lead to no finite number";
+
+fn leakage_through(orifice: &Orifice) -> PerLeak<Leakage> {
+    orifice
+        .sizes_m3s
+        .zip(orifice.net_m3s)
+        .map(|(size, net_m3s)| Leakage { net_mean_lpm: Some(net_m3s * LPM_PER_M3S), ..Leakage::new(size) })
+}
+
+/// Below zero by so many standard deviations is more than chance.
+const NEGATIVE_SIGMAS: f64 = 3.0;
+
+/// No leak is negative: by what one is, the model errs, and in the other leaks by as much.
+fn with_model_error(flows: PerLeak<Leakage>) -> PerLeak<Leakage> {
+    let is_negative =
+        |flow: &Leakage| flow.std_lpm.is_some_and(|std| flow.mean_lpm + NEGATIVE_SIGMAS * std < 0.0);
+    let negative = flows.iter().map(|(_, flow)| flow).filter(|flow| is_negative(flow));
+    let error_lpm = negative.map(|flow| -flow.mean_lpm).fold(0.0, f64::max);
+    flows.map(|flow| {
+        let own = is_negative(&flow);
+        let std_lpm = flow.std_lpm.map(|std| if own { std } else { std.hypot(error_lpm) });
+        Leakage { std_lpm, ..flow }
+    })
+}
 
 impl Replay {
     /// The report on the trace so far.
@@ -27,9 +51,14 @@ impl Replay {
         let found = self.estimator.estimates();
         let excitation = found.map(|found| found.excitation);
         let estimates = self.estimates(excitation);
-        let leakage = self.leakage(excitation.is_some());
+        let by_orifice = suspicions.orifice.map(|orifice| leakage_through(&orifice));
+        let leakage = by_orifice.unwrap_or_else(|| self.leakage(excitation.is_some()));
         let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
-        let trend = self.trend(found.as_ref(), &leakage, &threshold_lpm);
+        // Where the law is an orifice's, what looks like a change is the pressure's.
+        let stays = by_orifice.is_some();
+        let trend =
+            if stays { PerLeak::default() } else { self.trend(found.as_ref(), &leakage, &threshold_lpm) };
+        let changed_at_s = self.changed_at_s.filter(|_| !stays);
         let episodes = self.episodes.list();
         let misfit = found.map(|_| self.consistency.misfit());
         let findings = Findings {
@@ -46,7 +75,7 @@ impl Replay {
             end_s: self.end_s,
             misfit,
             restarts: self.consistency.restarts(),
-            changed_at_s: self.changed_at_s,
+            changed_at_s,
             channels: &self.channel_faults(),
             suspicions,
         };
@@ -66,7 +95,7 @@ impl Replay {
                 .filter(finite)
                 .map(FlowMeterOffsets::new),
             normalised_innovation: misfit.map(|misfit| [misfit.balance, misfit.odometer]),
-            changed_at_s: self.changed_at_s,
+            changed_at_s,
             alarms: self.alarms.clone(),
             score: self.scoring.scores(),
         }
@@ -104,14 +133,15 @@ impl Replay {
     fn leakage(&self, knows_spread: bool) -> PerLeak<Leakage> {
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
-        sizes.zip(net).map(|(size, net)| {
+        let flows = sizes.zip(net).map(|(size, net)| {
             let leakage = Leakage::new(size);
             Leakage {
                 net_mean_lpm: Some(net.value * LPM_PER_M3S),
                 std_lpm: leakage.std_lpm.filter(|_| knows_spread && is_known(&size)),
                 ..leakage
             }
-        })
+        });
+        with_model_error(flows)
     }
 
     fn estimates(&self, excitation: Option<ExcitationReport<f64>>) -> Estimates {
@@ -199,5 +229,27 @@ fn label(parameter: Parameter) -> &'static str {
         Parameter::GainA => "the gain of flow meter A",
         Parameter::GainB => "the gain of flow meter B",
         Parameter::GainPosition => "the gain of the position sensor",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_below_zero_beyond_chance_makes_the_others_unsure() {
+        let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None };
+        let of = |external_b_lpm| {
+            let flows = PerLeak {
+                internal: lpm(0.4, 0.003),
+                external_a: lpm(0.0, 0.003),
+                external_b: lpm(external_b_lpm, 0.01),
+            };
+            with_model_error(flows).map(|flow| flow.std_lpm)
+        };
+        let surer = of(-0.02);
+        assert_eq!((surer.internal, surer.external_b), (Some(0.003), Some(0.01)));
+        let unsure = of(-0.04);
+        assert_eq!((unsure.internal, unsure.external_b), (Some(0.003_f64.hypot(0.04)), Some(0.01)));
     }
 }

@@ -5,7 +5,10 @@ use crate::channels::ChannelFaultKind;
 use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
 use crate::trace::Record;
-use crate::wiring::{Excerpt, ZeroCheck, explain, sensor_error, unit_by_scatter, zero_check};
+use crate::wiring::{
+    Excerpt, Orifice, ZeroCheck, explain, orifice, sensor_error, unit_by_scatter, zero_check,
+};
+use pitchleak_core::PerLeak;
 
 impl Replay {
     /// What an excerpt of the trace, whose columns were read by `columns`, says against `verdict`.
@@ -23,19 +26,35 @@ impl Replay {
         } else {
             [unit_by_scatter(excerpt, &self.rig), None]
         };
-        let zeros = if verdict.status == Status::Leak { self.zeros(excerpt) } else { None };
+        let orifice = if wiring.is_none() { self.orifice(verdict, excerpt) } else { None };
+        let zeros = match orifice {
+            _ if self.declares_zeros() => None,
+            Some(orifice) => orifice.zeros,
+            None if verdict.status == Status::Leak => self.zeros(excerpt),
+            None => None,
+        };
+        let sensor = sensor.filter(|_| orifice.is_none());
         let [wiring, sensor] =
             [wiring, sensor].map(|found| found.map(|found| found.wiring(columns, &self.rig)));
-        Suspicions { wiring, sensor, zeros }
+        Suspicions { wiring, sensor, zeros, orifice }
     }
 
-    /// Leaks since they changed last against zeros of the meters, unless the rig file declares how far those may be off: the
-    /// estimates then have them already.
-    fn zeros(&self, excerpt: &Excerpt) -> Option<ZeroCheck> {
+    /// Whether the leaks found pass an orifice, where nothing speaks against them but that they are not as C P.
+    fn orifice(&self, verdict: &Verdict, excerpt: &Excerpt) -> Option<Orifice> {
+        let only_by_law = verdict.reasons.iter().all(|reason| reason.id.may_be_orifice());
+        let doubtful = verdict.status == Status::Doubtful && only_by_law && !verdict.faults.is_empty();
+        let leaks = PerLeak::from_fn(|leak| verdict.faults.contains(&leak));
+        doubtful.then(|| orifice(&excerpt.records(), &self.rig, leaks))?
+    }
+
+    /// Whether the rig file says how far the meters' zeros may be off: the estimates then have them already.
+    fn declares_zeros(&self) -> bool {
         let sensors = self.rig.sensors();
-        if sensors.flow_a.bias_std > 0.0 || sensors.flow_b.bias_std > 0.0 {
-            return None;
-        }
+        sensors.flow_a.bias_std > 0.0 || sensors.flow_b.bias_std > 0.0
+    }
+
+    /// Leaks since they changed last against zeros of the meters.
+    fn zeros(&self, excerpt: &Excerpt) -> Option<ZeroCheck> {
         let mut records = excerpt.records();
         let since_s = self.changed_at_s.unwrap_or(f64::NEG_INFINITY);
         records.retain(|record: &Record| record.t_s >= since_s);

@@ -57,6 +57,13 @@ impl ReasonId {
     }
 }
 
+impl ReasonId {
+    /// Whether a leak of another law than C P can be behind it.
+    pub(crate) fn may_be_orifice(self) -> bool {
+        matches!(self, Self::NegativeLeak | Self::KeepsChanging | Self::ModelDoesNotFit)
+    }
+}
+
 impl Serialize for ReasonId {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
@@ -126,7 +133,8 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
         keeps_changing(findings),
         model_does_not_fit(findings),
     ];
-    channels.chain(others.into_iter().flatten()).collect()
+    let open = |reason: &Reason| findings.suspicions.orifice.is_none() || !reason.id.may_be_orifice();
+    channels.chain(others.into_iter().flatten()).filter(open).collect()
 }
 
 /// What the trace says too little of.
@@ -260,15 +268,17 @@ fn may_be_zeros(findings: &Findings<'_>, zeros: &ZeroCheck, leak: Leak) -> bool 
 }
 
 fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {
-    let ended = findings.episodes.iter().filter(|episode| episode.to_s.is_some()).count();
-    let explained = (findings.episodes.len() + ended) as u64;
-    (findings.restarts > RESTARTS + explained).then(|| {
+    let ended: Vec<_> = findings.episodes.iter().filter(|episode| episode.to_s.is_some()).collect();
+    let explained = (findings.episodes.len() + ended.len()) as u64;
+    let more_often = findings.restarts > RESTARTS + explained;
+    // One leak may come and go; two that do so by turns are no leaks.
+    let by_turns = ended.iter().any(|episode| episode.fault != ended[0].fault);
+    let what =
+        if more_often { "more often than a leak came or went" } else { "and leaks came and went by turns" };
+    (more_often || findings.restarts > RESTARTS && by_turns).then(|| {
         Reason::new(
             ReasonId::KeepsChanging,
-            format!(
-                "the estimates began anew {} times, more often than a leak came or went",
-                findings.restarts
-            ),
+            format!("the estimates began anew {} times, {what}", findings.restarts),
             "check for loose contacts, sensors that hang, and changes of the rig during the recording",
         )
     })

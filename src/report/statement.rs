@@ -2,6 +2,7 @@
 
 use super::{Findings, Leakage, Reason, Status};
 use crate::units::duration;
+use crate::wiring::Orifice;
 use pitchleak_core::{Estimate, Leak};
 
 /// Where to look for a leak.
@@ -19,6 +20,7 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
     let mut sentences = Vec::new();
     if status.is_sure() {
         sentences.extend(faults.iter().map(|leak| fault(findings, *leak)));
+        sentences.extend(findings.suspicions.orifice.map(law));
         sentences.extend(excluded(findings));
         sentences.extend(unknown(findings));
     } else {
@@ -59,6 +61,14 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
         ),
         _ => format!("{label} leak of {} L/min: {}.", interval(&findings.leakage[leak]), advice(leak)),
     }
+}
+
+/// By which law they leak, where it is not the model's.
+fn law(Orifice { before, after, .. }: Orifice) -> String {
+    format!(
+        "It leaks as through an orifice, by the root of the pressure (figures are means over the trace): with that law the residual falls from {before:.1} to \
+         {after:.1} times the noise."
+    )
 }
 
 /// Leaks whose upper bound is below the threshold.

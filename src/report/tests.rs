@@ -2,7 +2,7 @@ use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::rig::Rig;
 use crate::times::{Clock, TimeFormat, Zone};
-use crate::wiring::{Wiring, ZeroCheck};
+use crate::wiring::{Orifice, Wiring, ZeroCheck};
 
 fn entry(value: f64, std: f64) -> EstimateEntry {
     EstimateEntry::new(Estimate { value, std }, EstimateEntry::COEFFICIENT_UNIT)
@@ -207,6 +207,38 @@ fn estimates_that_begin_anew_again_and_again_are_a_doubt() {
     let once = Found { restarts: 1, changed_at_s: Some(50.0), ..found(INTERNAL) };
     assert_eq!(once.judged(), (Status::Leak, vec![]));
     assert!(once.verdict().text.contains("The leaks changed at once at 50.00 s"));
+}
+
+#[test]
+fn leaks_that_come_and_go_by_turns_are_a_doubt_where_the_estimates_begin_anew() {
+    let of = |fault, from_s| Episode { fault, ..episode(from_s, Some(from_s + 5.0)) };
+    let by_turns = vec![of(Leak::ExternalA, 20.0), of(Leak::ExternalB, 28.0), of(Leak::ExternalB, 40.0)];
+    let restless =
+        |restarts, episodes| Found { restarts, changed_at_s: Some(50.0), episodes, ..found(INTERNAL) };
+    assert_eq!(restless(5, by_turns.clone()).judged(), (Status::Doubtful, vec!["keeps_changing"]));
+    assert_eq!(restless(2, by_turns).judged().0, Status::Leak);
+    let one = vec![of(Leak::ExternalB, 20.0), of(Leak::ExternalB, 40.0)];
+    assert_eq!(restless(5, one).judged().0, Status::Leak);
+}
+
+#[test]
+fn an_orifice_answers_what_the_law_of_the_leak_leaves_open_and_nothing_else() {
+    let mut leaking =
+        Found { misfit: Some(Misfit { balance: 9.0, ..SOUND }), restarts: 7, ..found(INTERNAL) };
+    leaking.changed_at_s = Some(50.0);
+    assert_eq!(leaking.judged(), (Status::Doubtful, vec!["keeps_changing", "model_does_not_fit"]));
+    let (sizes_m3s, net_m3s) = (PerLeak::default(), PerLeak::default());
+    leaking.suspicions.orifice = Some(Orifice { before: 5.0, after: 1.0, sizes_m3s, net_m3s, zeros: None });
+    assert_eq!(leaking.judged(), (Status::Leak, vec![]));
+    let text = leaking.verdict().text;
+    assert!(
+        text.contains("by the root of the pressure: with that law the residual falls from 5.0 to 1.0"),
+        "{text}"
+    );
+    assert!(text.contains("Figures are those since 50.00 s, where the pressures changed"), "{text}");
+    let value = Estimate { value: 20e9, std: 1e9 };
+    leaking.estimates.bulk_modulus = EstimateEntry::new(value, EstimateEntry::BULK_MODULUS_UNIT);
+    assert_eq!(leaking.judged(), (Status::Doubtful, vec!["bulk_modulus_impossible"]));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::episode::comes_and_goes;
 use super::reason::{Reason, contradictions, gaps};
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
-use crate::wiring::{Wiring, ZeroCheck};
+use crate::wiring::{Orifice, Wiring, ZeroCheck};
 use pitchleak_core::{Estimate, Fluid, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
@@ -121,12 +121,14 @@ pub struct Suspicions {
     pub sensor: Option<Wiring>,
     /// The leaks held against zeros of the meters.
     pub zeros: Option<ZeroCheck>,
+    /// Leaks through an orifice that explain what leaks as C P do not.
+    pub orifice: Option<Orifice>,
 }
 
 impl Suspicions {
     /// Whether there is anything to weigh.
     pub fn any(&self) -> bool {
-        self.wiring.is_some() || self.sensor.is_some() || self.zeros.is_some()
+        self.wiring.is_some() || self.sensor.is_some() || self.zeros.is_some() || self.orifice.is_some()
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::trace::Record;
-use pitchleak_core::Cylinder;
+use pitchleak_core::{Cylinder, Leak, PerLeak, Sample};
 
 /// Shortest block, s, and its fewest steps: as in the estimator.
 const BLOCK_S: f64 = 0.25;
@@ -21,6 +21,8 @@ pub(super) struct Block {
     pub fed: Fed,
     pub a: Chamber,
     pub b: Chamber,
+    /// ∫√P dt of the pressure across each leak, of its sign, √Pa·s.
+    pub roots: PerLeak<f64>,
     /// Δx, m.
     pub travel_m: f64,
     /// ∫dt, s, and Σ dt², s².
@@ -28,6 +30,17 @@ pub(super) struct Block {
     pub time_square_s2: f64,
     /// Time of its end since the middle of all blocks, s.
     pub after_middle_s: f64,
+}
+
+impl Block {
+    /// ∫P dt of the pressure across a leak, Pa·s.
+    pub fn across(&self, leak: Leak) -> f64 {
+        match leak {
+            Leak::Internal => self.a.pressure - self.b.pressure,
+            Leak::ExternalA => self.a.pressure,
+            Leak::ExternalB => self.b.pressure,
+        }
+    }
 }
 
 /// One chamber's integrals.
@@ -47,6 +60,7 @@ pub(super) struct Chamber {
 struct Sum {
     a: Chamber,
     b: Chamber,
+    roots: PerLeak<f64>,
     travel_m: f64,
     time_s: f64,
     time_square_s2: f64,
@@ -100,6 +114,14 @@ impl Sum {
         let (qa, qb) = (sum(l.qa_m3s, n.qa_m3s), sum(l.qb_m3s, n.qb_m3s));
         add(&mut self.a, cylinder.volume_a_m3(x), [l.pa_pa, n.pa_pa], qa);
         add(&mut self.b, cylinder.volume_b_m3(x), [l.pb_pa, n.pb_pa], qb);
+        let mean = |p: fn(&Sample<f64>) -> f64| 0.5 * (p(l) + p(n));
+        let across = PerLeak {
+            internal: mean(|s| s.pa_pa - s.pb_pa),
+            external_a: mean(|s| s.pa_pa),
+            external_b: mean(|s| s.pb_pa),
+        };
+        let roots = across.map(|p| dt * p.abs().sqrt().copysign(p));
+        self.roots = self.roots.zip(roots).map(|(sum, root)| sum + root);
         self.travel_m += n.x_m - l.x_m;
         self.time_s += dt;
         self.time_square_s2 += dt * dt;
@@ -115,7 +137,7 @@ impl Sum {
             (false, true) => Fed::OnlyB,
             (false, false) => return None,
         };
-        let Self { a, b, travel_m, time_s, time_square_s2, .. } = self;
-        Some(Block { follows, fed, a, b, travel_m, time_s, time_square_s2, after_middle_s })
+        let Self { a, b, roots, travel_m, time_s, time_square_s2, .. } = self;
+        Some(Block { follows, fed, a, b, roots, travel_m, time_s, time_square_s2, after_middle_s })
     }
 }

@@ -2,114 +2,11 @@
 //! the whole piece, with the declared noise. Nothing restarts, so nothing is forgiven.
 
 use super::blocks::{Block, Chamber, Fed, blocks};
+use super::priors::{LEAKS, OFFSETS, ORIFICES, PARAMETERS, Priors, Vector};
 use crate::rig::Rig;
 use crate::trace::Record;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use pitchleak_core::{Cylinder, Estimate, Leak, Parameter, PerLeak, Sensors};
-
-/// The estimator's nine in their order (1/β less its prior mean; the three leaks; the meters' offsets; the gains of meters
-/// and position sensor); the drifts of the meters' zeros; the slopes of the three leaks.
-const PARAMETERS: usize = 14;
-type Vector = SVector<f64, PARAMETERS>;
-
-/// Prior standard deviations of the parameters, SI.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Priors(Vector);
-
-/// A sensor that nobody declared wrong may be off by so much, 1 σ: of full scale, of the reading.
-const UNDECLARED_SHARE: f64 = 0.05;
-/// A meter's zero that nobody declared wrong may be off by this share of full scale, 1 σ, and drift as far through a trace.
-const UNDECLARED_ZERO_SHARE: f64 = 0.01;
-/// A gain that is off by far, 1 σ, and a zero, share of full scale.
-const WILD_GAIN: f64 = 0.2;
-const WILD_ZERO_SHARE: f64 = 0.1;
-/// Where these parameters stand: of leaks in their order, of meters A and B.
-const LEAKS: usize = 1;
-const OFFSETS: usize = 4;
-const DRIFTS: usize = 9;
-const SLOPES: usize = 11;
-/// A leak of the meter's whole range at this share of the pressure sensor's is the widest looked for, 1 σ.
-const LEAK_AT_SHARE: f64 = 0.1;
-
-impl Priors {
-    /// What the rig file declares.
-    pub fn declared(rig: &Rig) -> Self {
-        let (fluid, sensors) = (&rig.fluid, rig.sensors());
-        let flow = rig.instruments.flow_a.full_scale.max(rig.instruments.flow_b.full_scale);
-        let leak = flow / (LEAK_AT_SHARE * rig.instruments.pressure.full_scale);
-        let compressibility = fluid.bulk_modulus_std_pa / (fluid.bulk_modulus_pa * fluid.bulk_modulus_pa);
-        Self(Vector::from([
-            compressibility,
-            leak,
-            leak,
-            leak,
-            sensors.flow_a.bias_std,
-            sensors.flow_b.bias_std,
-            sensors.flow_a.gain_std,
-            sensors.flow_b.gain_std,
-            sensors.position.gain_std,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ]))
-    }
-
-    /// The same rig with meters whose zeros are off and drift, as undeclared ones are now and then.
-    pub fn with_zeros_off(mut self, rig: &Rig, duration_s: f64) -> Self {
-        let Self(spread) = &mut self;
-        let full_scales = [rig.instruments.flow_a.full_scale, rig.instruments.flow_b.full_scale];
-        for (meter, full_scale) in full_scales.into_iter().enumerate() {
-            let usual = UNDECLARED_ZERO_SHARE * full_scale;
-            spread[OFFSETS + meter] = spread[OFFSETS + meter].max(usual);
-            spread[DRIFTS + meter] = usual / duration_s.max(1.0);
-        }
-        self
-    }
-
-    /// The same rig with leaks that change by anything from end to end.
-    pub fn with_changing_leaks(mut self, duration_s: f64) -> Self {
-        for leak in 0..3 {
-            self.0[SLOPES + leak] = self.0[LEAKS + leak] / duration_s.max(1.0);
-        }
-        self
-    }
-
-    /// The same rig without this leak.
-    pub fn without(mut self, leak: Leak) -> Self {
-        self.0[LEAKS + leak as usize] = 0.0;
-        self.0[SLOPES + leak as usize] = 0.0;
-        self
-    }
-
-    /// The same rig with one sensor whose gain or zero may be off by far.
-    pub fn with_error(mut self, error: Parameter, rig: &Rig) -> Self {
-        self.0[error as usize] = match error {
-            Parameter::OffsetA => WILD_ZERO_SHARE * rig.instruments.flow_a.full_scale,
-            Parameter::OffsetB => WILD_ZERO_SHARE * rig.instruments.flow_b.full_scale,
-            _ => WILD_GAIN,
-        };
-        self
-    }
-
-    /// The same rig with sensors that may be off as undeclared ones are now and then.
-    pub fn with_sensor_errors(rig: &Rig) -> Self {
-        let Self(mut spread) = Self::declared(rig);
-        let sheets = &rig.instruments;
-        let usual = [
-            UNDECLARED_SHARE * sheets.flow_a.full_scale,
-            UNDECLARED_SHARE * sheets.flow_b.full_scale,
-            UNDECLARED_SHARE,
-            UNDECLARED_SHARE,
-            UNDECLARED_SHARE,
-        ];
-        for (spread, usual) in spread.iter_mut().skip(OFFSETS).zip(usual) {
-            *spread = spread.max(usual);
-        }
-        Self(spread)
-    }
-}
 
 /// What a fit leaves.
 #[derive(Clone, Copy, Debug)]
@@ -120,9 +17,9 @@ pub(super) struct Fit {
     pub rows: [usize; 2],
     /// χ² of the parameters against their priors.
     penalty: f64,
-    /// In prior standard deviations.
+    /// In prior standard deviations, and their covariance.
     parameters: Vector,
-    std: Vector,
+    covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
     /// Units of the parameters, SI.
     units: Vector,
     compressibility_per_pa: f64,
@@ -158,10 +55,14 @@ impl Fit {
         [1, 2, 3].map(|at: usize| (self.parameters[at] * spread[at]).max(0.0))
     }
 
+    fn std(&self, at: usize) -> f64 {
+        self.covariance[(at, at)].sqrt()
+    }
+
     /// A parameter in SI; its spread grows with the misfit.
     fn estimate(&self, at: usize) -> Estimate<f64> {
         let inflation = self.worst().max(1.0).sqrt();
-        Estimate { value: self.parameters[at], std: inflation * self.std[at] }.scaled(self.units[at])
+        Estimate { value: self.parameters[at], std: inflation * self.std(at) }.scaled(self.units[at])
     }
 
     /// A parameter of the estimator's, SI; of the compressibility what it is off its prior mean.
@@ -208,8 +109,27 @@ impl Fit {
     /// How far the most negative leak lies below zero, in standard deviations that grow with the misfit.
     pub fn negative_leak_sigmas(&self) -> f64 {
         let inflation = self.worst().max(1.0).sqrt();
-        let below = [1, 2, 3].map(|at: usize| -self.parameters[at] / (self.std[at] * inflation));
+        let below = [1, 2, 3].map(|at: usize| -self.parameters[at] / (self.std(at) * inflation));
         below.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Mean flow of a leak over the blocks, m³/s, of its size or of its sign, by both laws; its spread grows with the misfit.
+    pub fn flow_m3s(&self, blocks: &[Block], leak: Leak, of: fn(f64) -> f64) -> Estimate<f64> {
+        let [plain, orifice] = [LEAKS, ORIFICES].map(|at| at + leak as usize);
+        let time_s = blocks.iter().map(|block| block.time_s).sum::<f64>().max(f64::MIN_POSITIVE);
+        let mut weights = Vector::zeros();
+        for block in blocks {
+            weights[plain] += of(block.across(leak)) * self.units[plain] / time_s;
+            weights[orifice] += of(block.roots[leak]) * self.units[orifice] / time_s;
+        }
+        let variance = self.worst().max(1.0) * weights.dot(&(self.covariance * weights));
+        Estimate { value: weights.dot(&self.parameters), std: variance.max(0.0).sqrt() }
+    }
+
+    /// How far a leak's coefficient by an orifice's law lies above zero, in such standard deviations.
+    pub fn orifice_sigmas(&self, leak: Leak) -> f64 {
+        let Estimate { value, std } = self.estimate(ORIFICES + leak as usize);
+        if std > 0.0 { value / std } else { 0.0 }
     }
 
     /// Whether the rig can be so: bulk modulus and sensor errors within their priors, no leak negative.
@@ -301,7 +221,6 @@ impl System {
         }
         let cholesky = sums.matrix.cholesky()?;
         let parameters = cholesky.solve(&sums.vector);
-        let variances = cholesky.inverse().diagonal();
         let ratio = |rows: &Vec<Row>| {
             let squares = rows.iter().map(|row| (row.left - row.columns.dot(&parameters)).powi(2));
             (!rows.is_empty()).then(|| squares.sum::<f64>() / rows.len() as f64)
@@ -313,7 +232,7 @@ impl System {
             units: self.priors,
             compressibility_per_pa: self.compressibility_per_pa + parameters[0] * self.priors[0],
             parameters,
-            std: variances.map(f64::sqrt),
+            covariance: cholesky.inverse(),
         })
     }
 
@@ -360,7 +279,7 @@ impl System {
         let compression = of.a * a.compression + of.b * b.compression;
         let travel = of.position * block.travel_m;
         let (flow_a, flow_b) = (of.a * a.flow_m3, of.b * b.flow_m3);
-        let internal = (of.a - of.b) * (a.pressure - b.pressure);
+        let internal = (of.a - of.b) * block.across(Leak::Internal);
         let (at_a, at_b) = (of.a * a.pressure, of.b * b.pressure);
         let columns = Vector::from([
             compression,
@@ -377,6 +296,9 @@ impl System {
             internal * block.after_middle_s,
             at_a * block.after_middle_s,
             at_b * block.after_middle_s,
+            (of.a - of.b) * block.roots.internal,
+            of.a * block.roots.external_a,
+            of.b * block.roots.external_b,
         ]);
         Row {
             left: flow_a + flow_b - travel - self.compressibility_per_pa * compression,

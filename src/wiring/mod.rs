@@ -10,6 +10,8 @@ mod explanation;
 mod fit;
 mod mistake;
 mod noise;
+mod orifice;
+mod priors;
 mod readings;
 mod sensor_error;
 mod signs;
@@ -18,6 +20,7 @@ mod zeros;
 pub use excerpt::Excerpt;
 pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
+pub use orifice::{Orifice, orifice};
 pub use readings::Readings;
 pub use sensor_error::sensor_error;
 pub use zeros::{ZeroCheck, zero_check};
@@ -26,8 +29,9 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
 use blocks::{Block, blocks};
-use fit::{Fit, Priors};
+use fit::Fit;
 use noise::{ScatterRatios, Verdict};
+use priors::Priors;
 use rayon::prelude::*;
 
 /// Mean square residual, over the declared noise, from which the declared wiring is in doubt …

@@ -2,8 +2,9 @@
 
 use super::blocks::blocks;
 use super::explanation::{Evidence, Explanation};
-use super::fit::{Fit, Priors};
+use super::fit::Fit;
 use super::mistake::Mistake;
+use super::priors::Priors;
 use super::readings::Readings;
 use super::{APART, LEAST_DROP};
 use crate::rig::Rig;
@@ -12,7 +13,7 @@ use crate::units::LPM_PER_M3S;
 use pitchleak_core::Parameter;
 
 /// What may be off, one at a time.
-const ERRORS: [Parameter; 5] =
+pub(super) const ERRORS: [Parameter; 5] =
     [Parameter::GainA, Parameter::GainB, Parameter::GainPosition, Parameter::OffsetA, Parameter::OffsetB];
 /// An error of fewer standard deviations is none.
 const SURE_SIGMAS: f64 = 5.0;

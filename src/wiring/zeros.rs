@@ -1,7 +1,8 @@
 //! A meter whose zero is off against a leak: both let oil go missing, the one always, the other with the pressure.
 
 use super::blocks::blocks;
-use super::fit::{Fit, Priors};
+use super::fit::Fit;
+use super::priors::Priors;
 use crate::rig::Rig;
 use crate::trace::Record;
 use pitchleak_core::{Estimate, PerLeak};
@@ -27,9 +28,13 @@ pub struct ZeroCheck {
 /// Holds leaks against zeros, by generalised least squares over all the records; both may change through them. `None`
 /// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
-    let ends = [records.first()?, records.last()?].map(|record| record.t_s);
-    let duration_s = ends[1] - ends[0];
-    let leaks = Priors::declared(rig).with_changing_leaks(duration_s);
+    let duration_s = duration_s(records)?;
+    held_against_zeros(records, rig, Priors::declared(rig).with_changing_leaks(duration_s))
+}
+
+/// The same of `leaks`.
+pub(super) fn held_against_zeros(records: &[Record], rig: &Rig, leaks: Priors) -> Option<ZeroCheck> {
+    let duration_s = duration_s(records)?;
     let zeros = leaks.with_zeros_off(rig, duration_s);
     let blocks = blocks(records, &rig.cylinder);
     let declared = Fit::of(&blocks, rig, &leaks)?;
@@ -45,4 +50,8 @@ pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
         offsets_without_m3s: without.map(|fit| fit.offsets_m3s()),
         leaks_m3spa: free.leak_coefficients(),
     })
+}
+
+pub(super) fn duration_s(records: &[Record]) -> Option<f64> {
+    Some(records.last()?.t_s - records.first()?.t_s)
 }
