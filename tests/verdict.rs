@@ -41,7 +41,7 @@ fn each_mistake_gives_its_reason() {
         ("model_does_not_fit", WindCase::Mps13, internal, &["qb gain 20 %"]),
     ];
     for (id, wind, leaking, faults) in cases {
-        let report =
+        let (report, _) =
             replayed(&truths(wind, leaking), &lie(faults), 3e-3, 1).unwrap_or_else(|e| panic!("{e}"));
         let ids: Vec<_> = report.verdict.reasons.iter().map(|reason| reason.id.name()).collect();
         assert!(ids.contains(&id), "{faults:?}: {id} is not among {ids:?}: {}", report.verdict.text);
@@ -57,8 +57,9 @@ fn a_leak_through_an_orifice_is_sure_and_its_law_is_named() {
     [WindCase::Mps13, WindCase::Mps30].par_iter().for_each(|wind| {
         let truths = truths(*wind, internal);
         let judged = |faults, seed| {
-            let report = replayed(&truths, &lie(faults), 1e-3, seed).unwrap_or_else(|e| panic!("{e}"));
-            (judge(&report, internal, &truths), report.verdict.text)
+            let (report, shown) =
+                replayed(&truths, &lie(faults), 1e-3, seed).unwrap_or_else(|e| panic!("{e}"));
+            (judge(&report, internal, shown), report.verdict.text)
         };
         for seed in 1..=2 {
             let (judgement, text) = judged(&[], seed);
@@ -79,9 +80,9 @@ fn honest_traces_stay_sure() {
     cylinders.par_iter().for_each(|(wind, leaking)| {
         let truths = truths(*wind, *leaking);
         for accuracy in [3e-3, 1e-2] {
-            let report = replayed(&truths, &honest, accuracy, 2).unwrap_or_else(|e| panic!("{e}"));
+            let (report, shown) = replayed(&truths, &honest, accuracy, 2).unwrap_or_else(|e| panic!("{e}"));
             let name = format!("{} at {} m/s, {accuracy}", leak_name(*leaking), wind.mean_mps());
-            let judged = judge(&report, *leaking, &truths);
+            let judged = judge(&report, *leaking, shown);
             assert_eq!(judged, Judgement::Right, "{name}: {:?}", report.verdict);
             let status = if leaking.is_some() { Status::Leak } else { Status::Sound };
             assert_eq!((report.verdict.status, report.verdict.reasons.len()), (status, 0), "{name}");

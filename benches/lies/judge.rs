@@ -47,8 +47,10 @@ fn is_size(report: &ReplayReport, leak: Leak, truths: &[Truth]) -> bool {
 
 /// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
 pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> (Judgement, bool) {
-    let Ok(report) = replayed(truths, lie, accuracy, seed) else { return (Judgement::InDoubt, false) };
-    (judge(&report, leaking, truths), names(&report, lie))
+    let Ok((report, shown)) = replayed(truths, lie, accuracy, seed) else {
+        return (Judgement::InDoubt, false);
+    };
+    (judge(&report, leaking, shown), names(&report, lie))
 }
 
 /// Whether the report says what the lie is.
@@ -57,27 +59,35 @@ fn names(report: &ReplayReport, lie: &Lie) -> bool {
     report.verdict.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
 }
 
-/// The report on it.
-pub fn replayed(truths: &[Truth], lie: &Lie, accuracy: f64, seed: u64) -> Result<ReplayReport, ReplayError> {
+/// The report on it, and the truth as far as it was recorded.
+pub fn replayed<'a>(
+    truths: &'a [Truth],
+    lie: &Lie,
+    accuracy: f64,
+    seed: u64,
+) -> Result<(ReplayReport, &'a [Truth]), ReplayError> {
     let rig = rig(accuracy);
-    let text = recorded(truths, lie, rig.sensors(), seed);
+    let (text, shown) = recorded(truths, lie, rig.sensors(), seed);
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig)?;
-    replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
+    let report = replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?;
+    Ok((report, shown))
 }
 
-/// The trace as CSV, as users have it.
-fn recorded(truths: &[Truth], lie: &Lie, noise: Sensors<f64>, seed: u64) -> Vec<u8> {
+/// The trace as CSV, as users have it, and the truth up to its last row.
+fn recorded<'a>(truths: &'a [Truth], lie: &Lie, noise: Sensors<f64>, seed: u64) -> (Vec<u8>, &'a [Truth]) {
     let rig = rig(1e-2);
     let faults: Vec<SensorFault> = lie.faults.iter().map(|text| text.parse().expect("a fault")).collect();
     let mut faults = SensorFaults::new(&faults, &rig.instruments, rig.cylinder.stroke_m, seed);
     let mut sensing = Sensing::new(noise, Biases::default(), seed);
     let mut writer = TraceWriter::new(Vec::new(), TraceLayout::default()).expect("memory takes it");
+    let mut shown_rows = 0;
     for (index, truth) in truths.iter().enumerate() {
         let sample: Sample<f64> = sensing.read(&truth.sample);
         let shown = faults.show(&Reading::at(truth, sample)).filter(|_| index % lie.every == 0);
         if let Some(shown) = shown {
+            shown_rows = index + 1;
             writer.row(&Row::new(truth, shown)).expect("memory takes it");
         }
     }
-    writer.into_inner()
+    (writer.into_inner(), truths.get(..shown_rows).unwrap_or_default())
 }
