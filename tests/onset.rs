@@ -7,6 +7,7 @@ use pitchleak::reproduce::{Run, SAMPLE_RATE_HZ, rig};
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use rayon::prelude::*;
 use std::thread;
 
 const ONSET_S: f64 = 60.0;
@@ -55,7 +56,8 @@ fn a_sudden_leak_is_named_alone_and_soon() {
         WindCase::ALL.into_iter().flat_map(move |wind| Leak::ALL.map(|leak| (wind, leak, size_lpm, within_s)))
     };
     let large = [(WindCase::Mps13, Leak::ExternalB, 1.0, 4.5)];
-    for (wind, leak, size_lpm, within_s) in each(0.2, 7.0).chain(each(0.5, 4.5)).chain(large) {
+    let cases: Vec<_> = each(0.2, 7.0).chain(each(0.5, 4.5)).chain(large).collect();
+    cases.into_par_iter().for_each(|(wind, leak, size_lpm, within_s)| {
         let truths = opening(wind, leak, size_lpm);
         for seed in 0..5 {
             watch(&truths, seed, |t_s, active| {
@@ -66,7 +68,7 @@ fn a_sudden_leak_is_named_alone_and_soon() {
                 }
             });
         }
-    }
+    });
 }
 
 #[test]

@@ -231,11 +231,8 @@ fn an_orifice_answers_what_the_law_of_the_leak_leaves_open_and_nothing_else() {
     leaking.suspicions.orifice = Some(Orifice { before: 5.0, after: 1.0, sizes_m3s, net_m3s, zeros: None });
     assert_eq!(leaking.judged(), (Status::Leak, vec![]));
     let text = leaking.verdict().text;
-    assert!(
-        text.contains("by the root of the pressure: with that law the residual falls from 5.0 to 1.0"),
-        "{text}"
-    );
-    assert!(text.contains("Figures are those since 50.00 s, where the pressures changed"), "{text}");
+    assert!(text.contains("It leaks as through an orifice, by the root of the pressure"), "{text}");
+    assert!(text.contains("with that law the residual falls from 5.0 to 1.0 times the noise."), "{text}");
     let value = Estimate { value: 20e9, std: 1e9 };
     leaking.estimates.bulk_modulus = EstimateEntry::new(value, EstimateEntry::BULK_MODULUS_UNIT);
     assert_eq!(leaking.judged(), (Status::Doubtful, vec!["bulk_modulus_impossible"]));
