@@ -26,7 +26,7 @@ done <<END
 paper-law 61
 paper 113
 rls 700
-rls-offsets 1290
-rls-gains 2520
+rls-offsets 1040
+rls-gains 1960
 END
 exit $failed

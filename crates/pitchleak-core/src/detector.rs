@@ -119,7 +119,7 @@ impl<T: Real> Channel<T> {
             self.evidence_time_s = T::zero();
             return None;
         }
-        self.evidence_time_s += dt_s.max(T::zero());
+        self.evidence_time_s += dt_s.at_least(T::zero());
         if self.evidence_time_s < settings.hold_time_s {
             return None;
         }

@@ -231,6 +231,43 @@ fn an_update_tells_innovation_and_watched_time() {
     assert!((59.0..=60.0).contains(&watched_s), "{watched_s}");
 }
 
+/// Every second block begins a renewal, and it ends with the sixth sample that follows and is taken in, however few samples
+/// a block has: before the next block does.
+#[test]
+fn a_renewal_ends_before_the_next_block() {
+    for (dt_s, block_time_s) in
+        [(0.005, 0.25), (0.01, 0.25), (0.05, 0.25), (0.1, 0.25), (0.4, 0.25), (0.01, 0.01)]
+    {
+        let settings = RlsSettings { block_time_s, ..RlsSettings::default() };
+        let mut rls =
+            Rls::<f64, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), settings).unwrap();
+        let (mut blocks, mut since, mut renewed) = (0, 0, 0);
+        // At rest, so that any step will do; gaps and nonsense may come at any moment.
+        let flow = Some(1e-12 * 5e6);
+        let rest =
+            Sample { x_m: 0.1, pa_pa: 5e6, pb_pa: 5e6, qa_m3s: flow, qb_m3s: Some(0.0), force_n: None };
+        for k in 0..4000 {
+            let sample = if k % 13 == 4 { Sample { pa_pa: f64::NAN, ..rest } } else { rest };
+            let update = rls.update(if k % 17 == 5 { 60.0 } else { dt_s }, &sample);
+            match update {
+                Update::Balanced { .. } => {
+                    blocks += 1;
+                    since = 0;
+                }
+                Update::Accepted => since += 1,
+                Update::Renewed { changed, .. } => {
+                    assert_eq!((since, blocks % 2, changed), (5, 0, false), "{dt_s} s, sample {k}");
+                    since += 1;
+                    renewed += 1;
+                }
+                Update::Started | Update::Rejected => {}
+            }
+            assert!(blocks == 2 * renewed || blocks == 2 * renewed + 1 || since < 6, "{dt_s} s, sample {k}");
+        }
+        assert!(renewed > 20, "{renewed} with {dt_s} s");
+    }
+}
+
 #[test]
 fn an_estimator_refuses_what_cannot_be() {
     let settings = RlsSettings::default();

@@ -14,6 +14,16 @@ pub trait Real:
     fn lit(value: f64) -> Self;
     /// The value as `f64` (exact).
     fn as_f64(self) -> f64;
+    /// The larger of both; `least` where this is no number. [`Float::max`] is a call on a microcontroller.
+    #[inline(always)]
+    fn at_least(self, least: Self) -> Self {
+        if self > least { self } else { least }
+    }
+    /// The smaller of both; `most` where this is no number.
+    #[inline(always)]
+    fn at_most(self, most: Self) -> Self {
+        if self < most { self } else { most }
+    }
     /// e to the power of `self`.
     fn libm_exp(self) -> Self;
     /// Natural logarithm.
@@ -32,8 +42,6 @@ pub trait Real:
     fn libm_acos(self) -> Self;
     /// Hyperbolic tangent.
     fn libm_tanh(self) -> Self;
-    /// √(self² + other²) without overflow.
-    fn libm_hypot(self, other: Self) -> Self;
 }
 
 /// Nobody else may add a [`Real`]: the last bit of each result depends on it.
@@ -44,7 +52,7 @@ mod sealed {
 }
 
 macro_rules! real {
-    ($type:ty, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident, $hypot:ident) => {
+    ($type:ty, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident) => {
         impl Real for $type {
             #[inline(always)]
             fn lit(value: f64) -> Self {
@@ -81,12 +89,9 @@ macro_rules! real {
             fn libm_tanh(self) -> Self {
                 libm::$tanh(self)
             }
-            fn libm_hypot(self, other: Self) -> Self {
-                libm::$hypot(self, other)
-            }
         }
     };
 }
 
-real!(f32, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf, hypotf);
-real!(f64, exp, log, log1p, pow, sin, cos, tan, acos, tanh, hypot);
+real!(f32, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf);
+real!(f64, exp, log, log1p, pow, sin, cos, tan, acos, tanh);

@@ -38,7 +38,7 @@ impl<T: Real> Integrals<T> {
     pub fn step(cylinder: &Cylinder<T>, dt_s: T, last: &Sample<T>, now: &Sample<T>) -> Self {
         let half = T::lit(0.5);
         let half_dt = half * dt_s;
-        let x = (half * (last.x_m + now.x_m)).max(T::zero()).min(cylinder.stroke_m);
+        let x = (half * (last.x_m + now.x_m)).at_least(T::zero()).at_most(cylinder.stroke_m);
         let flow = |a: Option<T>, b: Option<T>| half_dt * (a.unwrap_or(T::zero()) + b.unwrap_or(T::zero()));
         Self {
             a: ChamberIntegral {

@@ -58,19 +58,6 @@ impl<T: Real, const N: usize> BlockSums<T, N> {
         self.count += T::one();
     }
 
-    /// Σ (y − fᵀθ)²/S at `theta`.
-    pub fn chi_square(&self, theta: &[T; N]) -> T {
-        let mut chi = self.square;
-        for i in 0..N {
-            chi -= T::lit(2.0) * theta[i] * self.vector[i];
-            for j in 0..=i {
-                let twice = if i == j { T::one() } else { T::lit(2.0) };
-                chi += twice * theta[i] * theta[j] * self.matrix[i][j];
-            }
-        }
-        chi.max(T::zero())
-    }
-
     /// Mean age of what each leak's column tells of, s.
     fn ages_s(&self) -> [T; LEAKS] {
         let mut ages = [T::zero(); LEAKS];
@@ -108,21 +95,41 @@ pub(super) struct Balance<T, const N: usize> {
 /// A row f tells of each leak as it was some time ago: with slopes s it reads fᵀ(θ − age ∘ s), so its information of
 /// levels and slopes together is that of the row (f, −age ∘ f).
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
 pub(super) struct Block<T, const N: usize> {
     /// Its length, s.
     pub time_s: T,
-    /// Σ f fᵀ, both triangles.
+    /// Σ f fᵀ, lower triangle; at [`of_slopes`] Σ age² f fᵀ for the leaks.
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     pub matrix: [[T; N]; N],
     /// Σ f y.
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub vector: [T; N],
     /// Σ age f fᵀ for the leaks.
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     pub aged: [[T; N]; LEAKS],
     /// Σ age f y for the leaks.
     pub aged_vector: [T; LEAKS],
-    /// Σ age² f fᵀ for the leaks.
-    pub aged_square: [[T; LEAKS]; LEAKS],
+    /// Σ y².
+    square: T,
+    /// Number of rows.
+    count: T,
     /// What sensor noise in column 0 adds to Σ f₀² on average.
     pub column_noise: T,
+}
+
+/// Place, above the diagonal of a matrix whose lower triangle is the parameters', of the symmetric matrix of the leaks'
+/// slopes; `i` >= `j`.
+#[inline]
+pub(super) const fn of_slopes(i: usize, j: usize) -> (usize, usize) {
+    (j, i + 1)
 }
 
 impl<T: Real, const N: usize> Block<T, N> {
@@ -140,34 +147,36 @@ impl<T: Real, const N: usize> Block<T, N> {
     }
 
     fn odometer(time_s: T, sums: &BlockSums<T, N>, column_noise: T) -> Self {
-        let mut matrix = sums.matrix;
-        for i in 0..N {
-            for j in i + 1..N {
-                matrix[i][j] = matrix[j][i];
-            }
-        }
         let middle_s = T::lit(0.5) * time_s;
         let age_s = sums.ages_s().map(|age| age + middle_s);
-        let mut aged = [[T::zero(); N]; LEAKS];
-        let mut aged_vector = [T::zero(); LEAKS];
-        let mut aged_square = [[T::zero(); LEAKS]; LEAKS];
+        let mut block = Self {
+            time_s,
+            matrix: sums.matrix,
+            vector: sums.vector,
+            aged: [[T::zero(); N]; LEAKS],
+            aged_vector: [T::zero(); LEAKS],
+            square: sums.square,
+            count: sums.count,
+            column_noise,
+        };
         for i in 0..LEAKS {
             let own = leak_column(i);
             for j in 0..N {
-                aged[i][j] = age_s[i] * matrix[own][j];
+                block.aged[i][j] = age_s[i] * symmetric(&sums.matrix, own, j);
             }
-            for j in 0..LEAKS {
-                aged_square[i][j] = age_s[i] * age_s[j] * matrix[own][leak_column(j)];
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                block.matrix[row][column] = age_s[j] * block.aged[i][leak_column(j)];
             }
-            aged_vector[i] = age_s[i] * sums.vector[own];
+            block.aged_vector[i] = age_s[i] * sums.vector[own];
         }
-        Self { time_s, matrix, vector: sums.vector, aged, aged_vector, aged_square, column_noise }
+        block
     }
 
     /// Adds a row of unit variance that is `age_s` old.
     fn add(&mut self, f: &[T; N], y: T, age_s: T) {
         for i in 0..N {
-            for j in 0..N {
+            for j in 0..=i {
                 self.matrix[i][j] += f[i] * f[j];
             }
             self.vector[i] += f[i] * y;
@@ -177,10 +186,32 @@ impl<T: Real, const N: usize> Block<T, N> {
             for j in 0..N {
                 self.aged[i][j] += aged * f[j];
             }
-            for j in 0..LEAKS {
-                self.aged_square[i][j] += aged * age_s * f[leak_column(j)];
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                self.matrix[row][column] += aged * age_s * f[leak_column(j)];
             }
             self.aged_vector[i] += aged * y;
         }
+        self.square += y * y;
+        self.count += T::one();
     }
+
+    /// Σ (y − fᵀθ)² at `theta`, and the number of rows.
+    pub fn chi_square(&self, theta: &[T; N]) -> (T, T) {
+        let mut chi = self.square;
+        for i in 0..N {
+            let mut told = T::lit(2.0) * self.vector[i] - theta[i] * self.matrix[i][i];
+            for j in 0..i {
+                told -= T::lit(2.0) * theta[j] * self.matrix[i][j];
+            }
+            chi -= theta[i] * told;
+        }
+        (chi, self.count)
+    }
+}
+
+/// Entry of a symmetric matrix kept in the lower triangle.
+#[inline]
+pub(super) fn symmetric<T: Copy, const N: usize>(matrix: &[[T; N]; N], i: usize, j: usize) -> T {
+    if i >= j { matrix[i][j] } else { matrix[j][i] }
 }

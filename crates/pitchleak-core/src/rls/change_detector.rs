@@ -69,8 +69,8 @@ impl<T: Real, const N: usize> ChangeDetector<T, N> {
             innovation -= balance.columns[leak_column(leak)] * *slope * self.since_s;
         }
         let ratio = innovation * innovation / (variance * inflation);
-        let step = ratio.min(T::lit(CUSUM_STEP)) - T::lit(CUSUM_DRIFT);
-        self.cusum = (self.cusum + step).max(T::zero());
+        let step = ratio.at_most(T::lit(CUSUM_STEP)) - T::lit(CUSUM_DRIFT);
+        self.cusum = (self.cusum + step).at_least(T::zero());
         self.cusum > T::lit(CUSUM_BOUND)
     }
 }

@@ -106,7 +106,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Leak coefficients, those below zero as none, m³/(s·Pa).
     pub(super) fn possible_leaks_m3spa(&self) -> PerLeak<T> {
-        self.leak_coefficients().map(|coefficient| coefficient.value.max(T::zero()))
+        let one = |leak: Parameter| {
+            (self.solution.mean[leak as usize] * self.scale[leak as usize]).at_least(T::zero())
+        };
+        PerLeak {
+            internal: one(Parameter::Internal),
+            external_a: one(Parameter::ExternalA),
+            external_b: one(Parameter::ExternalB),
+        }
     }
 
     fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
@@ -172,7 +179,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let [share_a, share_b] = pressures;
         let hidden = share_a * share_a * aa + share_a * share_b * (ab + ba) + share_b * share_b * bb;
         let bias_pa = self.zeros.now().pressure.bias_std;
-        let variance = found.max(T::zero()) + bias_pa * bias_pa * hidden.max(T::zero());
+        let variance = found.at_least(T::zero()) + bias_pa * bias_pa * hidden.at_least(T::zero());
         Estimate { value: per_a * mean_a + per_b * mean_b, std: variance.sqrt() }
     }
 
@@ -201,7 +208,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let together = scale * (per_a * a + per_b * b);
         let (own, through) = (coefficient.std * pressure, coefficient.value * bias.std);
         let variance = own * own + through * through - T::lit(2.0) * coefficient.value * pressure * together;
-        Estimate { value: coefficient.value * pressure, std: variance.max(T::zero()).sqrt() }
+        Estimate { value: coefficient.value * pressure, std: variance.at_least(T::zero()).sqrt() }
     }
 
     /// Means of |P_L|, P_A, P_B over the memory as read, Pa.

@@ -1,7 +1,7 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::block::Block;
+use super::block::{Block, of_slopes};
 use super::information::Posterior;
 use super::parameter::LEAKS;
 use super::trend::Elimination;
@@ -18,11 +18,22 @@ use crate::Real;
 ///
 /// (Kalman's likelihood by the matrix inversion lemma; Bar-Shalom, Li, Kirubarajan 2001, §5.2 and §11.6). The square is
 /// taken relative to a reference θ common to all, so that nothing cancels in f32.
-pub(super) struct Evidence<'a, T, const N: usize> {
-    block: &'a Block<T, N>,
-    reference: &'a [T; N],
-    /// Hᵀ(y − H θ) at the reference, of levels and slopes.
-    score: ([T; N], [T; LEAKS]),
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub(super) struct Evidence<T, const N: usize> {
+    pub block: Block<T, N>,
+    /// Hᵀ(y − H θ) at the reference, of levels …
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
+    score: [T; N],
+    /// … and slopes.
+    slope_score: [T; LEAKS],
 }
 
 /// What a hypothesis said before a block.
@@ -37,60 +48,77 @@ pub(super) struct Foretold<T, const N: usize> {
 /// What it says after the block.
 pub(super) struct Learnt<'a, T, const N: usize> {
     pub levels: &'a Posterior<T, N>,
-    pub slopes: &'a Elimination<T, N>,
+    /// None for leaks that stay.
+    pub slopes: Option<&'a Elimination<T, N>>,
     /// Prior units per s where a slope is one.
     pub rate_ps: T,
 }
 
-impl<'a, T: Real, const N: usize> Evidence<'a, T, N> {
-    pub fn new(block: &'a Block<T, N>, mean_0: T, reference: &'a [T; N]) -> Self {
-        let mut levels = block.vector;
-        levels[0] += block.column_noise * mean_0;
-        let slopes = block.aged_vector.map(|value| -value);
-        let told = Self { block, reference, score: (levels, slopes) };
-        let score = told.residual(reference, &[T::zero(); LEAKS]);
-        Self { score, ..told }
+impl<T: Real, const N: usize> Evidence<T, N> {
+    pub fn new(block: Block<T, N>, mean_0: T, reference: &[T; N]) -> Self {
+        let mut score = block.vector;
+        score[0] += block.column_noise * mean_0;
+        let slope_score = block.aged_vector.map(|value| -value);
+        let mut told = Self { block, score, slope_score };
+        (told.score, told.slope_score) = told.residual(reference, &[T::zero(); LEAKS]);
+        told
     }
 
     /// The score that is left when levels and slopes are larger by this.
     fn residual(&self, levels: &[T; N], slopes_ps: &[T; LEAKS]) -> ([T; N], [T; LEAKS]) {
-        let block = self.block;
-        let (mut of_levels, mut of_slopes) = self.score;
+        let block = &self.block;
+        let (mut of_levels, mut slopes) = (self.score, self.slope_score);
         of_levels[0] += block.column_noise * levels[0];
         for i in 0..N {
-            for j in 0..N {
-                of_levels[i] -= block.matrix[i][j] * levels[j];
+            for j in 0..i {
+                let entry = block.matrix[i][j];
+                of_levels[i] -= entry * levels[j];
+                of_levels[j] -= entry * levels[i];
             }
+            of_levels[i] -= block.matrix[i][i] * levels[i];
         }
         for i in 0..LEAKS {
             for j in 0..N {
                 of_levels[j] += block.aged[i][j] * slopes_ps[i];
-                of_slopes[i] += block.aged[i][j] * levels[j];
+                slopes[i] += block.aged[i][j] * levels[j];
             }
-            for j in 0..LEAKS {
-                of_slopes[i] -= block.aged_square[i][j] * slopes_ps[j];
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                let entry = block.matrix[row][column];
+                slopes[i] -= entry * slopes_ps[j];
+                if j < i {
+                    slopes[j] -= entry * slopes_ps[i];
+                }
             }
         }
-        (of_levels, of_slopes)
+        (of_levels, slopes)
     }
 
     /// ln of the block's probability as above, and ln of how much the determinant of the hypothesis' information
     /// has grown.
-    pub fn log_likelihood(&self, before: &Foretold<T, N>, after: &Learnt<'_, T, N>) -> (T, T) {
+    pub fn log_likelihood(
+        &self,
+        reference: &[T; N],
+        before: &Foretold<T, N>,
+        after: &Learnt<'_, T, N>,
+    ) -> (T, T) {
         let mut apart = before.levels;
         for i in 0..N {
-            apart[i] -= self.reference[i];
+            apart[i] -= reference[i];
         }
-        let (levels, slopes) = self.residual(&apart, &before.slopes_ps);
+        let (levels, mut slopes) = self.residual(&apart, &before.slopes_ps);
         let mut square = T::zero();
         for i in 0..N {
-            square += apart[i] * (self.score.0[i] + levels[i]);
+            square += apart[i] * (self.score[i] + levels[i]);
         }
         for i in 0..LEAKS {
-            square += before.slopes_ps[i] * (self.score.1[i] + slopes[i]);
+            square += before.slopes_ps[i] * (self.slope_score[i] + slopes[i]);
+            slopes[i] *= after.rate_ps;
         }
-        let slopes = slopes.map(|slope| slope * after.rate_ps);
-        let learnt = after.slopes.variance(after.levels, &levels, &slopes);
+        let learnt = match after.slopes {
+            Some(eliminated) => eliminated.variance(after.levels, &levels, &slopes),
+            None => after.levels.variance(&levels),
+        };
         // Noise in column 0 makes its entry of b larger by chance.
         let by_noise = self.block.column_noise * after.levels.variance_0();
         let growth = log_growth(before, after);
@@ -105,8 +133,8 @@ fn log_growth<T: Real, const N: usize>(before: &Foretold<T, N>, after: &Learnt<'
         after.iter().zip(before).fold(T::one(), |product, (after, before)| product * (*after / *before))
     };
     let levels = ratio(after.levels.pivots(), &before.pivots.0);
-    let slopes = ratio(&after.slopes.pivots, &before.pivots.1);
-    (levels * slopes).min(T::max_value()).libm_ln()
+    let slopes = after.slopes.map_or(T::one(), |slopes| ratio(&slopes.pivots, &before.pivots.1));
+    (levels * slopes).at_most(T::max_value()).libm_ln()
 }
 
 #[cfg(test)]
@@ -202,28 +230,33 @@ mod tests {
             let rows = rows(index);
             let block = block(&rows);
             let reference = [0.1, -0.2, 0.3, 0.05];
-            let evidence = Evidence::new(&block, 0.0, &reference);
+            let evidence = Evidence::new(block, 0.0, &reference);
 
-            let none = Elimination::no_slopes();
             let levels = constant.solve(&PRIOR);
-            let pivots = (*levels.pivots(), none.pivots);
+            let pivots = (*levels.pivots(), [1.0; 3]);
             let before = Foretold { levels: levels.mean, slopes_ps: [0.0; 3], pivots };
             constant.add(&block);
             let after = constant.solve(&PRIOR);
-            let (stays, _) =
-                evidence.log_likelihood(&before, &Learnt { levels: &after, slopes: &none, rate_ps: 0.0 });
+            let (stays, _) = evidence.log_likelihood(
+                &reference,
+                &before,
+                &Learnt { levels: &after, slopes: None, rate_ps: 0.0 },
+            );
 
             trend.advance(block.time_s);
-            let (information, slopes) = trend.eliminate_slopes();
-            let levels = information.solve(&PRIOR);
+            let slopes = trend.eliminate_slopes();
+            let levels = slopes.levels.solve(&PRIOR);
             let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
             let pivots = (*levels.pivots(), slopes.pivots);
             let before = Foretold { levels: levels.mean, slopes_ps, pivots };
             trend.add(&block);
-            let (information, slopes) = trend.eliminate_slopes();
-            let after = information.solve(&PRIOR);
-            let (changes, _) =
-                evidence.log_likelihood(&before, &Learnt { levels: &after, slopes: &slopes, rate_ps });
+            let slopes = trend.eliminate_slopes();
+            let after = slopes.levels.solve(&PRIOR);
+            let (changes, _) = evidence.log_likelihood(
+                &reference,
+                &before,
+                &Learnt { levels: &after, slopes: Some(&slopes), rate_ps },
+            );
 
             let (log_steady, mean, cov) = dense(&rows, 0.0, &steady.0, &steady.1);
             steady = (mean, cov);

@@ -2,7 +2,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::Parameter;
-use super::block::Block;
+use super::block::{Block, symmetric};
 use crate::Real;
 
 /// Normal equations of a linear regression with a unit prior, and what noise in column 0 does to them.
@@ -20,7 +20,7 @@ use crate::Real;
     ))
 )]
 pub(super) struct Information<T, const N: usize> {
-    /// Σ w f fᵀ, lower triangle.
+    /// Σ w f fᵀ, lower triangle; a [`Trend`](super::trend::Trend) keeps its slopes' above the diagonal.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     pub matrix: [[T; N]; N],
     /// Σ w f y.
@@ -143,7 +143,7 @@ impl<T: Real, const N: usize> Information<T, N> {
     /// Entry of the symmetric matrix.
     #[inline]
     pub fn entry(&self, i: usize, j: usize) -> T {
-        if i >= j { self.matrix[i][j] } else { self.matrix[j][i] }
+        symmetric(&self.matrix, i, j)
     }
 
     /// Posterior mean, and what its covariance follows from: the factors of A = M + prior.
@@ -183,10 +183,10 @@ impl<T: Real, const N: usize> Information<T, N> {
                 upper[i][j] = u;
             }
             if i == 0 {
-                taken = self.column_noise.min(pivot - T::one()).max(T::zero());
+                taken = self.column_noise.at_most(pivot - T::one()).at_least(T::zero());
                 pivot -= taken;
             }
-            pivots[i] = pivot.max(floor * diagonal);
+            pivots[i] = pivot.at_least(floor * diagonal);
             inverse_pivot[i] = T::one() / pivots[i];
         }
         Factors { upper, pivots, inverse_pivot, taken }
@@ -215,12 +215,6 @@ pub(super) struct Posterior<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Posterior<T, N> {
-    pub fn zero() -> Self {
-        let zero = [T::zero(); N];
-        let factors = Factors { upper: [zero; N], pivots: zero, inverse_pivot: zero, taken: T::zero() };
-        Self { mean: zero, factors }
-    }
-
     /// Pivots of A: their product is its determinant.
     pub fn pivots(&self) -> &[T; N] {
         &self.factors.pivots
@@ -242,11 +236,23 @@ impl<T: Real, const N: usize> Posterior<T, N> {
         variance
     }
 
-    /// The mean with the whole covariance A⁻¹.
-    pub fn solution(&self) -> Solution<T, N> {
+    /// The covariance A⁻¹, lower triangle.
+    #[inline]
+    pub fn covariance(&self) -> [[T; N]; N] {
         let mut covariance = self.factors.inverse();
         for i in 0..N {
-            covariance[i][i] = covariance[i][i].max(T::min_positive_value());
+            covariance[i][i] = covariance[i][i].at_least(T::min_positive_value());
+        }
+        covariance
+    }
+
+    /// The mean with the whole covariance A⁻¹.
+    pub fn solution(&self) -> Solution<T, N> {
+        let mut covariance = self.covariance();
+        for i in 0..N {
+            for j in 0..i {
+                covariance[j][i] = covariance[i][j];
+            }
         }
         Solution { mean: self.mean, covariance }
     }
@@ -295,15 +301,27 @@ impl<T: Real, const N: usize> Factors<T, N> {
         }
     }
 
-    /// A⁻¹, column by column.
+    /// A⁻¹ = Wᵀ D⁻¹ W with W = U⁻¹, lower triangle.
+    #[inline]
     fn inverse(&self) -> [[T; N]; N] {
+        let mut w = [[T::zero(); N]; N];
+        for j in 0..N {
+            w[j][j] = T::one();
+            for i in (0..j).rev() {
+                let mut sum = self.upper[i][j];
+                for k in i + 1..j {
+                    sum += self.upper[i][k] * w[k][j];
+                }
+                w[i][j] = -sum;
+            }
+        }
         let mut inverse = [[T::zero(); N]; N];
-        for column in 0..N {
-            let mut x = [T::zero(); N];
-            x[column] = T::one();
-            self.substitute(&mut x);
-            for i in 0..N {
-                inverse[i][column] = x[i];
+        for k in 0..N {
+            for i in k..N {
+                let weighed = self.inverse_pivot[k] * w[k][i];
+                for j in k..i + 1 {
+                    inverse[i][j] += weighed * w[k][j];
+                }
             }
         }
         inverse

@@ -42,33 +42,36 @@ impl<T: Real> InnovationMonitor<T> {
     /// calculation of errors by the method of least squares").
     pub fn inflation(&self) -> T {
         let balance = significant_ratio(self.balance_sum, self.balance_count);
-        balance.max(significant_ratio(self.odometer_sum, self.odometer_count)).max(T::one())
+        balance.at_least(significant_ratio(self.odometer_sum, self.odometer_count)).at_least(T::one())
     }
 }
 
 /// Mean of χ²₁ terms over what such a mean may be by chance (its variance is 2/count).
 fn significant_ratio<T: Real>(sum: T, count: T) -> T {
-    if count > T::zero() { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
+    // Where it is not even the mean that is expected, nothing is significant: a root is dear on a microcontroller.
+    if sum > count { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
 }
 
-/// Variance of a sensor's white noise from second differences of the signal, which cancel its slope:
+/// Variance of both pressure sensors' white noise from second differences of the signal, which cancel its slope:
 /// E (p₂ − 2 p₁ + p₀)² = 6 σ² (von Neumann et al. 1941 use first differences).
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct NoiseMeter<T> {
-    last_rise: Option<T>,
-    sum: T,
+    last_rise: Option<[T; 2]>,
+    sum: [T; 2],
     count: T,
 }
 
 impl<T: Real> NoiseMeter<T> {
     #[inline]
-    pub fn add(&mut self, before: T, now: T) {
-        let rise = now - before;
+    pub fn add(&mut self, before: [T; 2], now: [T; 2]) {
+        let rise = [now[0] - before[0], now[1] - before[1]];
         if let Some(last) = self.last_rise.replace(rise) {
-            let second = rise - last;
             let keep = T::lit(0.999);
-            self.sum = keep * self.sum + second * second;
+            for i in 0..2 {
+                let second = rise[i] - last[i];
+                self.sum[i] = keep * self.sum[i] + second * second;
+            }
             self.count = keep * self.count + T::one();
         }
     }
@@ -78,9 +81,10 @@ impl<T: Real> NoiseMeter<T> {
         self.last_rise = None;
     }
 
-    /// Standard deviation, Pa.
-    pub fn std_pa(&self) -> T {
-        if self.count > T::zero() { (self.sum / (T::lit(6.0) * self.count)).sqrt() } else { T::zero() }
+    /// Variances, Pa².
+    pub fn variance_pa2(&self) -> [T; 2] {
+        let variance = |sum: T| sum / (T::lit(6.0) * self.count);
+        if self.count > T::zero() { self.sum.map(variance) } else { [T::zero(); 2] }
     }
 }
 
@@ -101,10 +105,10 @@ mod tests {
             // A few times the meter's memory of a thousand samples.
             for (k, unit) in noise.by_ref().take(3000) {
                 let now = slope_pa * k as f64 + std_pa * unit;
-                meter.add(before, now);
+                meter.add([before, 0.0], [now, 0.0]);
                 before = now;
             }
-            *reading = meter.std_pa() / std_pa;
+            *reading = meter.variance_pa2()[0].sqrt() / std_pa;
         }
         let mean = readings.iter().sum::<f64>() / readings.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean} of the noise");

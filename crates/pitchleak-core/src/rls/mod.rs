@@ -24,6 +24,7 @@ mod excitation;
 mod information;
 mod innovation_monitor;
 mod ma1_whitener;
+mod mixture;
 mod model_bank;
 mod noise;
 mod offset_prior;
@@ -46,13 +47,13 @@ pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
 use information::{Information, Prior, Solution};
 use innovation_monitor::{InnovationMonitor, NoiseMeter};
 use ma1_whitener::Ma1Whitener;
-use model_bank::{ModelBank, Outlook};
+use model_bank::{ModelBank, Outlook, STEPS};
 use noise::NoiseStd;
 use offset_prior::OffsetPrior;
 use parameter::LEAKS;
 pub use parameter::Parameter;
 use position_filter::PositionFilter;
-use pressure_means::PressureMeans;
+use pressure_means::{PressureMeans, Watched};
 use prior::{offset_units, prior_spread};
 pub use update::{Innovation, Update};
 use weights::Weights;
@@ -61,13 +62,21 @@ use zeros::Zeros;
 /// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
 const AVERAGING_S: f64 = 60.0;
 
+/// Least number of steps of a block, however slowly samples come: a renewal ends before the next block does.
+const LEAST_STEPS: f64 = 8.0;
+const _: () = assert!((STEPS as f64) < LEAST_STEPS);
+/// Share of its usual length that a block has after a sudden change: what it tells is then known as soon as the usual block
+/// would end, at the usual 25 samples a block.
+const FIRST_SHARE: f64 = 0.75;
+
 /// How [`Rls`] remembers and averages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RlsSettings<T> {
     /// Longest memory, s; infinite to remember everything. How much of it counts is learnt from the data.
     pub forgetting_time_s: T,
-    /// Length of the balance's blocks, s: the estimates are renewed after every second block.
+    /// Length of the balance's blocks, s: the estimates are renewed after every second block, by the sixth sample that
+    /// follows it. A block has eight samples at least.
     pub block_time_s: T,
     /// A step longer than this, s, is a gap: nothing is integrated over it.
     pub max_step_s: T,
@@ -110,8 +119,6 @@ pub struct Rls<T, const N: usize> {
     zeros: Zeros<T>,
     last: Option<Sample<T>>,
     both: Weights<T>,
-    only_a: Weights<T>,
-    only_b: Weights<T>,
     position_filter: Option<PositionFilter<T, N>>,
     /// What the position filter has told since the estimates were renewed.
     sums: BlockSums<T, N>,
@@ -121,11 +128,12 @@ pub struct Rls<T, const N: usize> {
     unlearnt_s: T,
     /// Blocks of the balance since then; after a sudden change the first one counts at once.
     unlearnt: usize,
-    block: Integrals<T>,
+    block: Watched<T>,
+    /// How long it will be, s.
+    block_time_s: T,
     /// The part of the block in which both flows were measured.
     fed: Integrals<T>,
-    pressure_noise_a: NoiseMeter<T>,
-    pressure_noise_b: NoiseMeter<T>,
+    pressure_noise: NoiseMeter<T>,
     /// The balance equation's moving-average noise filter: last whitened block.
     memory: Option<Ma1Whitener<T, N>>,
     /// Variance of the sensor noise in the compressibility's column, over the rows' own, summed over the block.
@@ -171,17 +179,15 @@ impl<T: Real, const N: usize> Rls<T, N> {
             zeros,
             last: None,
             both: Weights::both(&cylinder, &noise, &no_leak),
-            only_a: Weights::only_a(&cylinder, &noise, &no_leak),
-            only_b: Weights::only_b(&cylinder, &noise, &no_leak),
             position_filter: None,
             sums: BlockSums::new(),
             balances: [None; BALANCES],
             unlearnt_s: T::zero(),
             unlearnt: 0,
-            block: Integrals::default(),
+            block: Watched::default(),
+            block_time_s: settings.block_time_s,
             fed: Integrals::default(),
-            pressure_noise_a: NoiseMeter::default(),
-            pressure_noise_b: NoiseMeter::default(),
+            pressure_noise: NoiseMeter::default(),
             memory: None,
             column_noise: T::zero(),
             bank: ModelBank::new(settings.forgetting_time_s),
@@ -208,34 +214,35 @@ impl<T: Real, const N: usize> Rls<T, N> {
             return self.restart(sample);
         }
         let step = Integrals::step(&self.cylinder, dt_s, &last, sample);
-        self.pressure_noise_a.add(last.pa_pa, sample.pa_pa);
-        self.pressure_noise_b.add(last.pb_pa, sample.pb_pa);
+        self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
         self.block.add(&step);
         self.advance(&step, &last, sample);
-        let full = self.block.time >= self.settings.block_time_s && self.block.steps >= T::lit(8.0);
-        if full { self.close_block() } else { Update::Accepted }
+        let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
+        if full {
+            self.close_block()
+        } else if self.bank.is_renewing() {
+            self.go_on()
+        } else {
+            Update::Accepted
+        }
     }
 
     /// PositionFilter step, by whichever flows both ends of the step have.
     #[inline]
     fn advance(&mut self, step: &Integrals<T>, last: &Sample<T>, now: &Sample<T>) {
         let sensor_variance = self.noise.position_m * self.noise.position_m;
-        let odometer =
-            self.position_filter.get_or_insert(PositionFilter::anchored(last.x_m, sensor_variance));
         let fed_a = last.qa_m3s.is_some() && now.qa_m3s.is_some();
         let fed_b = last.qb_m3s.is_some() && now.qb_m3s.is_some();
-        let weights = match (fed_a, fed_b) {
-            (true, true) => {
-                self.fed.add(step);
-                &self.both
-            }
-            (true, false) => &self.only_a,
-            (false, true) => &self.only_b,
-            (false, false) => {
-                odometer.anchor(now.x_m, sensor_variance);
-                return;
-            }
-        };
+        if fed_a && fed_b {
+            self.fed.add(step);
+        }
+        let weights = if fed_a && fed_b { self.both } else { self.weights_of_one(fed_a) };
+        let odometer =
+            self.position_filter.get_or_insert(PositionFilter::anchored(last.x_m, sensor_variance));
+        if !fed_a && !fed_b {
+            odometer.anchor(now.x_m, sensor_variance);
+            return;
+        }
         let mut equation =
             combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
         let gain = Parameter::GainPosition as usize;
@@ -255,7 +262,15 @@ impl<T: Real, const N: usize> Rls<T, N> {
         );
     }
 
-    /// Closes a block of the balance; every second one the estimates are renewed.
+    /// Weights where only one flow is measured, that of chamber A or B.
+    #[cold]
+    fn weights_of_one(&self, a: bool) -> Weights<T> {
+        let only = if a { Weights::only_a } else { Weights::only_b };
+        only(&self.cylinder, &self.noise, &self.possible_leaks_m3spa())
+    }
+
+    /// Closes a block of the balance; after every second one the renewal of the estimates begins.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn close_block(&mut self) -> Update<T> {
         self.compensate_odometer();
         let balance = self.whitened_balance();
@@ -263,12 +278,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
             self.memory = None;
         }
         let innovation = balance.as_ref().map(|equation| self.watch_balance(equation));
-        let time_s = self.block.time;
+        let time_s = self.block.time_s;
         let keep = T::one() / (T::one() + time_s / T::lit(AVERAGING_S));
         self.pressures.add_block(&self.block, keep);
         self.innovations.forget(keep);
-        let changed = balance.as_ref().is_some_and(|equation| self.has_changed(equation));
-        self.block = Integrals::default();
+        let inflation = self.innovations.inflation();
+        let changed = balance.as_ref().is_some_and(|equation| self.has_changed(equation, inflation));
+        self.block = Watched::default();
+        self.block_time_s = self.settings.block_time_s;
         self.fed = Integrals::default();
         if changed {
             let elapsed_s = self.unlearnt_s + time_s;
@@ -276,21 +293,15 @@ impl<T: Real, const N: usize> Rls<T, N> {
             return Update::Renewed { elapsed_s, changed, innovation };
         }
         self.take_balance(balance, time_s);
-        if self.unlearnt < BALANCES {
-            return Update::Balanced { innovation };
+        if self.unlearnt >= BALANCES {
+            self.learn(inflation);
         }
-        let elapsed_s = self.unlearnt_s;
-        let changed = self.learn();
-        if changed {
-            self.begin_anew();
-        }
-        Update::Renewed { elapsed_s, changed, innovation }
+        Update::Balanced { innovation }
     }
 
-    fn has_changed(&mut self, balance: &Equation<T, N>) -> bool {
+    fn has_changed(&mut self, balance: &Equation<T, N>, inflation: T) -> bool {
         let slopes_ps = self.slopes_ps.map(|(mean, _)| mean);
-        let inflation = self.innovations.inflation();
-        self.change.update(balance, self.block.time, &self.solution, &slopes_ps, inflation)
+        self.change.update(balance, self.block.time_s, &self.solution, &slopes_ps, inflation)
     }
 
     /// Puts a balance to those that will be learnt from together.
@@ -305,21 +316,35 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.unlearnt_s += time_s;
     }
 
-    /// What the blocks since the last time tell of the parameters. Says whether the leaks have jumped.
-    fn learn(&mut self) -> bool {
+    /// Begins to learn what the blocks since the last time tell of the parameters.
+    fn learn(&mut self, inflation: T) {
         let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
-        let mean_0 = self.compressibility / self.scale[Parameter::Compressibility as usize];
         let drifted = self.drifted();
-        let prior = Prior { mean_0, offsets: &self.offsets.information };
-        let inflation = self.innovations.inflation();
-        self.bank.drift_zeros(&drifted);
-        let Outlook { now, slopes_ps, jumped } = self.bank.update(&block, &prior, inflation, &self.solution);
+        let prior = prior(self.compressibility, &self.scale, &self.offsets);
+        self.bank.begin(block, drifted, inflation, &prior, &self.solution);
+        self.empty_sums();
+    }
+
+    /// Goes on to learn, a sample's share of it.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn go_on(&mut self) -> Update<T> {
+        let prior = prior(self.compressibility, &self.scale, &self.offsets);
+        let Some(outlook) = self.bank.go_on(&prior, &self.solution) else { return Update::Accepted };
+        let Outlook { now, slopes_ps, jumped, time_s, chi_square: (mut chi_square, mut count) } = outlook;
         self.solution = now;
         self.slopes_ps = slopes_ps;
-        self.innovations.odometer(self.sums.chi_square(&self.solution.mean), self.sums.count);
+        for Balance { equation, .. } in self.balances.iter().flatten() {
+            let left = equation.remainder(&self.solution.mean);
+            chi_square -= left * left;
+            count -= T::one();
+        }
+        self.innovations.odometer(chi_square.at_least(T::zero()), count);
+        self.balances = [None; BALANCES];
         self.reweigh();
-        self.empty_block(0);
-        jumped
+        if jumped {
+            self.begin_anew();
+        }
+        Update::Renewed { elapsed_s: time_s, changed: jumped, innovation: None }
     }
 
     /// By how much zeros may have drifted since the estimates were renewed, variances in prior units.
@@ -331,13 +356,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.zeros.advance(self.unlearnt_s, &self.cylinder, &leaks)
     }
 
-    /// Nothing is to be learnt from; `blocks` count as if they had been there.
-    fn empty_block(&mut self, blocks: usize) {
+    /// Of the odometer and the blocks' time nothing is to be learnt from.
+    fn empty_sums(&mut self) {
         self.sums = BlockSums::new();
-        self.balances = [None; BALANCES];
         self.column_noise = T::zero();
         self.unlearnt_s = T::zero();
-        self.unlearnt = blocks;
+        self.unlearnt = 0;
         if let Some(odometer) = &mut self.position_filter {
             odometer.weight_sum = T::zero();
         }
@@ -345,8 +369,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// The leak has changed at once: what was learnt before it counts for nothing, and neither the odometer
     /// nor the block just closed may carry the old leak on. The next block is learnt from at once.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn begin_anew(&mut self) {
-        self.bank = ModelBank::new(self.settings.forgetting_time_s);
+        self.bank.forget_all();
         let prior = Prior { mean_0: T::zero(), offsets: &self.offsets.information };
         self.solution = Information::new().solve(&prior).solution();
         self.slopes_ps = [(T::zero(), T::zero()); LEAKS];
@@ -358,7 +383,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if let (Some(odometer), Some(last)) = (&mut self.position_filter, &self.last) {
             odometer.anchor(last.x_m, variance);
         }
-        self.empty_block(BALANCES - 1);
+        self.empty_sums();
+        self.balances = [None; BALANCES];
+        self.unlearnt = BALANCES - 1;
+        self.block_time_s = T::lit(FIRST_SHARE) * self.settings.block_time_s;
     }
 
     /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
@@ -368,10 +396,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
         let mut equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
-        let stored =
-            self.stored_oil_variance(weight_a, weight_b, self.noise.pressure_pa, self.noise.pressure_pa)
-                * self.compressibility
-                * self.compressibility;
+        let stored = self.stored_oil_variance(
+            weight_a,
+            weight_b,
+            [self.noise.pressure_pa * self.noise.pressure_pa; 2],
+        ) * self.compressibility
+            * self.compressibility;
         let mut variance = self.both.balance_variance * self.fed.time_square + stored;
         if let Some(memory) = &self.memory {
             let share = memory.share();
@@ -399,12 +429,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if let Some(memory) = self.memory {
             let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
             let noise = T::lit(2.0)
-                * self.stored_oil_variance(
-                    weight_a,
-                    weight_b,
-                    self.pressure_noise_a.std_pa(),
-                    self.pressure_noise_b.std_pa(),
-                );
+                * self.stored_oil_variance(weight_a, weight_b, self.pressure_noise.variance_pa2());
             self.compensate(noise / memory.variance);
         }
         Innovation { value, variance }
@@ -417,8 +442,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let noise = self.stored_oil_variance(
             self.both.odometer_a,
             self.both.odometer_b,
-            self.pressure_noise_a.std_pa(),
-            self.pressure_noise_b.std_pa(),
+            self.pressure_noise.variance_pa2(),
         );
         self.compensate(noise * odometer.weight_sum);
     }
@@ -430,12 +454,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.column_noise += variance * scale * scale;
     }
 
-    /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given spread.
-    fn stored_oil_variance(&self, weight_a: T, weight_b: T, std_a_pa: T, std_b_pa: T) -> T {
-        let x = self.last.map_or(T::zero(), |s| s.x_m).max(T::zero()).min(self.cylinder.stroke_m);
-        let a = weight_a * self.cylinder.volume_a_m3(x) * std_a_pa;
-        let b = weight_b * self.cylinder.volume_b_m3(x) * std_b_pa;
-        a * a + b * b
+    /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given variances.
+    fn stored_oil_variance(&self, weight_a: T, weight_b: T, [a_pa2, b_pa2]: [T; 2]) -> T {
+        let x = self.last.map_or(T::zero(), |s| s.x_m).at_least(T::zero()).at_most(self.cylinder.stroke_m);
+        let a = weight_a * self.cylinder.volume_a_m3(x);
+        let b = weight_b * self.cylinder.volume_b_m3(x);
+        a * a * a_pa2 + b * b * b_pa2
     }
 
     /// The leaks found decide how much pressure noise the equations carry, and how much of the pressures'
@@ -443,8 +467,6 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn reweigh(&mut self) {
         let leaks = self.possible_leaks_m3spa();
         self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
-        self.only_a = Weights::only_a(&self.cylinder, &self.noise, &leaks);
-        self.only_b = Weights::only_b(&self.cylinder, &self.noise, &leaks);
         if N > Parameter::OffsetB as usize {
             self.offsets = OffsetPrior::new(
                 &self.cylinder,
@@ -463,8 +485,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             None => self.position_filter = Some(PositionFilter::anchored(sample.x_m, variance)),
         }
         self.memory = None;
-        self.pressure_noise_a.interrupt();
-        self.pressure_noise_b.interrupt();
+        self.pressure_noise.interrupt();
         Update::Started
     }
 
@@ -480,4 +501,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
             && flow_ok(sample.qa_m3s)
             && flow_ok(sample.qb_m3s)
     }
+}
+
+/// What is known beforehand of an estimator's parameters.
+fn prior<'a, T: Real, const N: usize>(
+    compressibility: T,
+    scale: &[T; N],
+    offsets: &'a OffsetPrior<T>,
+) -> Prior<'a, T> {
+    let mean_0 = compressibility / scale[Parameter::Compressibility as usize];
+    Prior { mean_0, offsets: &offsets.information }
 }

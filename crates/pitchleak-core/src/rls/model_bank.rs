@@ -4,8 +4,9 @@
 use super::block::Block;
 use super::evidence::{Evidence, Foretold, Learnt};
 use super::information::{Information, Posterior, Prior, Solution};
+use super::mixture::Mixture;
 use super::parameter::{LEAKS, Parameter, leak_column};
-use super::trend::{Elimination, Trend};
+use super::trend::Trend;
 use crate::Real;
 
 /// Hypotheses in which the leaks change.
@@ -15,6 +16,8 @@ const TRENDS: usize = 5;
 const MEMORIES_S: [f64; TRENDS] = [3600.0, 480.0, 90.0, 18.0, 4.0];
 /// All hypotheses: leaks that stay, and the trends.
 const HYPOTHESES: usize = TRENDS + 1;
+/// Calls of [`ModelBank::go_on`] that finish a renewal: one for each trend, and one to conclude.
+pub(super) const STEPS: usize = TRENDS + 1;
 /// Least ln of a weight beside the best one's. It bounds how long the past of a hypothesis counts for it: from
 /// here it needs seven nats of new evidence to be believed.
 const LEAST: f64 = -8.5;
@@ -40,6 +43,10 @@ const RECENT_S: f64 = 20.0;
 /// model averaging).
 ///
 /// What is told is the mixture: its mean, and the covariance about it, which holds what the hypotheses disagree on.
+///
+/// A renewal is spread over several samples, so that none of them takes much longer than the others: [`begin`](Self::begin)
+/// takes in what has been seen and hears the hypothesis that nothing changes, each [`go_on`](Self::go_on) one
+/// trend, and the last one concludes.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -59,105 +66,187 @@ pub(super) struct ModelBank<T, const N: usize> {
     log_weights: [T; HYPOTHESES],
     /// The evidence of the last [`RECENT_S`]; the best has zero.
     recent: [T; HYPOTHESES],
-    /// What is known since the block before, if it looked as though the leaks had jumped.
-    suspected: Option<Information<T, N>>,
+    pending: Pending<T, N>,
+}
+
+/// What waits for more.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+enum Pending<T, const N: usize> {
+    Nothing,
+    /// It looks as though the leaks had jumped; this is what is known since. The next block tells.
+    Jump(Information<T, N>),
+    Renewal(Renewal<T, N>),
+}
+
+/// A renewal, half done.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+struct Renewal<T, const N: usize> {
+    evidence: Evidence<T, N>,
+    /// Variances by which the offsets of chambers A and B have moved.
+    drifted: [T; 2],
+    /// How much larger than declared the noise is.
+    inflation: T,
+    /// Hypotheses that were heard.
+    heard: u8,
+    /// ln of the block's probability by each.
+    gained: [T; HYPOTHESES],
+    /// The same by the jump that was suspected before.
+    by_jump: Option<T>,
+    /// The block tells more than was known before.
+    news: bool,
+    /// Slopes of the leaks, mean and variance, prior units per s, by the trend that foretold the recent data best before.
+    slopes_ps: [(T, T); LEAKS],
+    mixture: Mixture<T, N>,
 }
 
 /// What the bank knows after a block.
 pub(super) struct Outlook<T, const N: usize> {
     /// All parameters as they are now.
     pub now: Solution<T, N>,
-    /// Slopes of the leaks, mean and variance, prior units per s; by the trend that foretold the recent data best.
+    /// Slopes of the leaks, mean and variance, prior units per s; by the trend that foretold best what came before the block.
     pub slopes_ps: [(T, T); LEAKS],
     /// Whether the leaks have changed at once: no hypothesis foretells them.
     pub jumped: bool,
+    /// Length of the block, s.
+    pub time_s: T,
+    /// Σ (y − fᵀθ)² of the block by `now`, and its number of rows.
+    pub chi_square: (T, T),
 }
 
 impl<T: Real, const N: usize> ModelBank<T, N> {
     /// Knows nothing, and will remember for `memory_s` at most.
     pub fn new(memory_s: T) -> Self {
-        let mut log_weights = [T::lit(UNUSUAL); HYPOTHESES];
-        log_weights[0] = T::zero();
         Self {
             constant: Information::new(),
             memory_s,
-            trends: MEMORIES_S.map(|memory| Trend::new(T::lit(memory).min(memory_s))),
-            log_weights,
+            trends: MEMORIES_S.map(|memory| Trend::new(T::lit(memory).at_most(memory_s))),
+            log_weights: unheard(),
             recent: [T::zero(); HYPOTHESES],
-            suspected: None,
+            pending: Pending::Nothing,
         }
     }
 
-    /// The offsets of chambers A and B have moved by something of these variances.
-    pub fn drift_zeros(&mut self, variances: &[T; 2]) {
-        for (offset, variance) in [Parameter::OffsetA, Parameter::OffsetB].into_iter().zip(variances) {
-            if *variance > T::zero() && (offset as usize) < N {
-                self.constant.diffuse(offset as usize, *variance);
-                for trend in &mut self.trends {
-                    trend.diffuse(offset as usize, *variance);
-                }
-            }
+    /// Knows nothing again.
+    pub fn forget_all(&mut self) {
+        self.constant = Information::new();
+        for trend in &mut self.trends {
+            *trend = Trend::new(trend.memory_s);
         }
+        self.log_weights = unheard();
+        self.recent = [T::zero(); HYPOTHESES];
+        self.pending = Pending::Nothing;
     }
 
-    /// Takes in a block. `inflation` says how much larger than declared the noise is; `reference` are parameters
-    /// near the truth: those `known` before.
-    pub fn update(
+    /// Begins to take in a block, after which zeros have moved by something of the variances `drifted`; `inflation` says how
+    /// much larger than declared the noise is, `known` is what was known before.
+    #[cfg_attr(target_os = "none", inline(never))] // its stack is none of the other samples'
+    pub fn begin(
         &mut self,
-        block: &Block<T, N>,
-        prior: &Prior<'_, T>,
+        block: Block<T, N>,
+        drifted: [T; 2],
         inflation: T,
+        prior: &Prior<'_, T>,
         known: &Solution<T, N>,
-    ) -> Outlook<T, N> {
+    ) {
         let evidence = Evidence::new(block, prior.mean_0, &known.mean);
-        let mut found = [Posterior::zero(); HYPOTHESES];
-        let mut gained = [T::zero(); HYPOTHESES];
-        let growth;
-        self.constant.forget(T::one() / (T::one() + block.time_s / self.memory_s));
-        (found[0], gained[0], growth) = update_levels(&mut self.constant, block, prior, &evidence);
-        for k in 0..TRENDS {
-            (found[k + 1], gained[k + 1]) = update_trend(&mut self.trends[k], block, prior, &evidence);
+        let by_jump = match &mut self.pending {
+            Pending::Jump(information) => {
+                Some(Levels::learn(information, prior, &evidence, known).gain / inflation)
+            }
+            _ => None,
+        };
+        for (offset, variance) in moved::<T, N>(&drifted) {
+            self.constant.diffuse(offset, variance);
         }
-        let gained = gained.map(|gain| gain / inflation);
-        let mut jumped = false;
-        let mut suspicion = None;
-        // Before there is something to foretell with, all hypotheses say the same, up to rounding.
-        if growth < T::lit(NEWS) {
-            jumped = self.confirm_jump(block, prior, &evidence, &gained, inflation);
-            suspicion = self.suspect_jump(block, prior, &evidence, &gained, inflation, known);
-            self.weigh(&gained, block.time_s);
+        self.constant.forget(T::one() / (T::one() + evidence.block.time_s / self.memory_s));
+        let learnt = Levels::learn(&mut self.constant, prior, &evidence, known);
+        self.pending = Pending::Renewal(Renewal {
+            evidence,
+            drifted,
+            inflation,
+            heard: 0,
+            gained: [T::zero(); HYPOTHESES],
+            by_jump,
+            // Before there is something to foretell with, all hypotheses say the same, up to rounding.
+            news: learnt.growth >= T::lit(NEWS),
+            slopes_ps: [(T::zero(), T::zero()); LEAKS],
+            mixture: Mixture::new(),
+        });
+        if let Pending::Renewal(renewal) = &mut self.pending {
+            renewal.hear(&self.log_weights, learnt.gain, &learnt.posterior);
         }
-        let now = suspicion.unwrap_or_else(|| self.mixture(&found));
-        let outlook = Outlook { now, slopes_ps: self.slopes_ps(&found), jumped };
-        self.replace_refuted();
-        outlook
     }
 
-    /// Whether a suspected jump foretold this block better than any hypothesis: after a wild reading it does not.
-    fn confirm_jump(
-        &mut self,
-        block: &Block<T, N>,
-        prior: &Prior<'_, T>,
-        evidence: &Evidence<'_, T, N>,
-        gained: &[T; HYPOTHESES],
-        inflation: T,
-    ) -> bool {
-        let Some(mut suspected) = self.suspected.take() else { return false };
-        let (_, gain, _) = update_levels(&mut suspected, block, prior, evidence);
-        gained.iter().all(|other| gain / inflation > *other)
+    /// Whether a renewal is half done.
+    #[inline]
+    pub fn is_renewing(&self) -> bool {
+        matches!(self.pending, Pending::Renewal(_))
+    }
+
+    /// Goes on with a renewal; gives what is known at its end. `prior` and `known` are those that it began with.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) -> Option<Outlook<T, N>> {
+        let best = self.best_trend();
+        let Pending::Renewal(renewal) = &mut self.pending else { return None };
+        let Some(trend) = self.trends.get_mut(usize::from(renewal.heard).wrapping_sub(1)) else {
+            return self.conclude(prior, known);
+        };
+        for (offset, variance) in moved::<T, N>(&renewal.drifted) {
+            trend.diffuse(offset, variance);
+        }
+        renewal.hear_trend(trend, best, &self.log_weights, prior, known);
+        None
+    }
+
+    /// Weighs the hypotheses, all of which were heard.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn conclude(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) -> Option<Outlook<T, N>> {
+        let Pending::Renewal(renewal) = &self.pending else { return None };
+        let Renewal { gained, by_jump, news, slopes_ps, .. } = *renewal;
+        let time_s = renewal.evidence.block.time_s;
+        let suspected = if news { None } else { self.suspect_jump(renewal, prior, known) };
+        let now = match &suspected {
+            Some((_, solution)) => *solution,
+            None => renewal.mixture.solution(),
+        };
+        let chi_square = renewal.evidence.block.chi_square(&now.mean);
+        self.pending = match suspected {
+            Some((information, _)) => Pending::Jump(information),
+            None => Pending::Nothing,
+        };
+        if !news {
+            self.weigh(&gained, time_s);
+        }
+        self.replace_refuted();
+        // After a wild reading the jump that was suspected does not foretell best.
+        let jumped = !news && by_jump.is_some_and(|gain| gained.iter().all(|other| gain > *other));
+        Some(Outlook { now, slopes_ps, jumped, time_s, chi_square })
     }
 
     /// Holds against the hypotheses that the leaks jumped to anything usual just before this block, all else as
     /// known. Where that is much more likely it is what is known until the next block.
     fn suspect_jump(
-        &mut self,
-        block: &Block<T, N>,
+        &self,
+        renewal: &Renewal<T, N>,
         prior: &Prior<'_, T>,
-        evidence: &Evidence<'_, T, N>,
-        gained: &[T; HYPOTHESES],
-        inflation: T,
         known: &Solution<T, N>,
-    ) -> Option<Solution<T, N>> {
+    ) -> Option<(Information<T, N>, Solution<T, N>)> {
         let mut variance = [T::zero(); N];
         for i in 0..N {
             variance[i] = known.covariance[i][i];
@@ -166,37 +255,24 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             variance[leak_column(i)] += T::lit(USUAL_JUMP * USUAL_JUMP);
         }
         let mut information = Information::of(&known.mean, &variance, prior);
-        let (posterior, gain, _) = update_levels(&mut information, block, prior, evidence);
+        let learnt = Levels::learn(&mut information, prior, &renewal.evidence, known);
         let mut foretold = T::neg_infinity();
         for k in 0..HYPOTHESES {
-            foretold = foretold.max(self.log_weights[k] + gained[k]);
+            foretold = (self.log_weights[k] + renewal.gained[k]).at_least(foretold);
         }
-        if gain / inflation - foretold < T::lit(JUMPED) {
-            return None;
-        }
-        self.suspected = Some(information);
-        Some(posterior.solution())
+        let suspected = learnt.gain / renewal.inflation - foretold >= T::lit(JUMPED);
+        suspected.then(|| (information, learnt.posterior.solution()))
     }
 
-    /// Slopes by the trend that foretold the recent data best.
-    fn slopes_ps(&self, found: &[Posterior<T, N>; HYPOTHESES]) -> [(T, T); LEAKS] {
+    /// The trend that foretold the recent data best.
+    fn best_trend(&self) -> usize {
         let mut best = 1;
         for k in 2..HYPOTHESES {
             if self.recent[k] > self.recent[best] {
                 best = k;
             }
         }
-        let mut slopes = [(T::zero(), T::zero()); LEAKS];
-        let trend = best.checked_sub(1).and_then(|k| self.trends.get(k));
-        let (Some(trend), Some(levels)) = (trend, found.get(best)) else { return slopes };
-        let (_, elimination) = trend.eliminate_slopes();
-        let mean = elimination.slopes(&levels.mean);
-        for i in 0..LEAKS {
-            let mut one = [T::zero(); LEAKS];
-            one[i] = trend.rate_ps();
-            slopes[i] = (trend.rate_ps() * mean[i], elimination.variance(levels, &[T::zero(); N], &one));
-        }
-        slopes
+        best
     }
 
     fn weigh(&mut self, gained: &[T; HYPOTHESES], time_s: T) {
@@ -207,49 +283,7 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         }
         below_the_best(&mut self.log_weights);
         below_the_best(&mut self.recent);
-        self.log_weights = self.log_weights.map(|weight| weight.max(T::lit(LEAST)));
-    }
-
-    fn mixture(&self, found: &[Posterior<T, N>; HYPOTHESES]) -> Solution<T, N> {
-        let weights = self.weights();
-        let mut mixture = Solution::zero();
-        for (weight, posterior) in weights.iter().zip(found) {
-            for i in 0..N {
-                mixture.mean[i] += *weight * posterior.mean[i];
-            }
-        }
-        for (weight, posterior) in weights.iter().zip(found) {
-            if *weight <= T::zero() {
-                continue;
-            }
-            let Solution { mean: mut apart, covariance } = posterior.solution();
-            for i in 0..N {
-                apart[i] -= mixture.mean[i];
-                for j in 0..=i {
-                    mixture.covariance[i][j] += *weight * (covariance[i][j] + apart[i] * apart[j]);
-                }
-            }
-        }
-        for i in 0..N {
-            for j in 0..i {
-                mixture.covariance[j][i] = mixture.covariance[i][j];
-            }
-        }
-        mixture
-    }
-
-    /// Weights that sum to one; none for a hypothesis at the floor.
-    fn weights(&self) -> [T; HYPOTHESES] {
-        let least = T::lit(LEAST).libm_exp();
-        let mut weights = [T::zero(); HYPOTHESES];
-        let mut whole = T::zero();
-        for k in 0..HYPOTHESES {
-            if self.log_weights[k] > T::lit(LEAST) {
-                weights[k] = self.log_weights[k].libm_exp() - least;
-                whole += weights[k];
-            }
-        }
-        weights.map(|weight| weight / whole)
+        self.log_weights = self.log_weights.map(|weight| weight.at_least(T::lit(LEAST)));
     }
 
     /// A hypothesis that recent data refute goes on from what the best one knows. Only one whose own past would
@@ -262,25 +296,27 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             }
         }
         // The best is never refuted: its recent evidence is zero.
-        if best == 0 {
-            for k in 0..TRENDS {
-                if self.is_refuted(k + 1) && self.trends[k].memory_s > T::lit(RECENT_S) {
-                    self.trends[k] = Trend::from_levels(self.trends[k].memory_s, self.constant);
-                    self.restart(k + 1);
-                }
+        for k in 0..HYPOTHESES {
+            if k != best && self.is_refuted(k) {
+                self.replace(k, best);
             }
         }
-        let Some(source) = best.checked_sub(1).and_then(|k| self.trends.get(k)).copied() else { return };
-        if self.is_refuted(0) {
-            self.constant = source.eliminate_slopes().0;
-            self.restart(0);
-        }
-        for k in 0..TRENDS {
-            if k + 1 < best && self.is_refuted(k + 1) {
-                self.trends[k] = Trend::from_trend(self.trends[k].memory_s, &source);
-                self.restart(k + 1);
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn replace(&mut self, refuted: usize, best: usize) {
+        let source = best.checked_sub(1).and_then(|k| self.trends.get(k)).copied();
+        match (refuted.checked_sub(1).and_then(|k| self.trends.get_mut(k)), source) {
+            (Some(trend), None) if trend.memory_s > T::lit(RECENT_S) => {
+                *trend = Trend::from_levels(trend.memory_s, self.constant);
             }
+            (Some(trend), Some(source)) if refuted < best => {
+                *trend = Trend::from_trend(trend.memory_s, &source);
+            }
+            (None, Some(source)) => self.constant = source.eliminate_slopes().levels,
+            _ => return,
         }
+        self.restart(refuted);
     }
 
     fn is_refuted(&self, hypothesis: usize) -> bool {
@@ -296,49 +332,94 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
     }
 }
 
-/// Takes a block into leaks that stay; gives what is known then, ln of the block's probability and the growth of the
-/// determinant.
-#[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
-fn update_levels<T: Real, const N: usize>(
-    information: &mut Information<T, N>,
-    block: &Block<T, N>,
-    prior: &Prior<'_, T>,
-    evidence: &Evidence<'_, T, N>,
-) -> (Posterior<T, N>, T, T) {
-    let slopes = Elimination::no_slopes();
-    let levels = information.solve(prior);
-    let pivots = (*levels.pivots(), slopes.pivots);
-    let before = Foretold { levels: levels.mean, slopes_ps: [T::zero(); LEAKS], pivots };
-    information.add(block);
-    let levels = information.solve(prior);
-    let after = Learnt { levels: &levels, slopes: &slopes, rate_ps: T::zero() };
-    let (gain, growth) = evidence.log_likelihood(&before, &after);
-    (levels, gain, growth)
+impl<T: Real, const N: usize> Renewal<T, N> {
+    /// Takes the block into a trend, and hears it; `best` is the one whose slopes are told.
+    fn hear_trend(
+        &mut self,
+        trend: &mut Trend<T, N>,
+        best: usize,
+        log_weights: &[T; HYPOTHESES],
+        prior: &Prior<'_, T>,
+        known: &Solution<T, N>,
+    ) {
+        let rate_ps = trend.rate_ps();
+        trend.advance(self.evidence.block.time_s);
+        let slopes = trend.eliminate_slopes();
+        let levels = slopes.levels.solve(prior);
+        let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
+        let before = Foretold { slopes_ps, pivots: (*levels.pivots(), slopes.pivots), levels: levels.mean };
+        trend.add(&self.evidence.block);
+        let slopes = trend.eliminate_slopes();
+        let levels = slopes.levels.solve(prior);
+        let after = Learnt { levels: &levels, slopes: Some(&slopes), rate_ps };
+        let (gain, _) = self.evidence.log_likelihood(&known.mean, &before, &after);
+        if usize::from(self.heard) == best {
+            self.slopes_ps = slopes.slopes_ps(&levels, rate_ps);
+        }
+        self.hear(log_weights, gain, &levels);
+    }
+
+    /// Hears the next hypothesis: ln of the block's probability by it, and what it knows since. It weighs by what it was
+    /// believed before, and not at all where that was the least.
+    fn hear(&mut self, log_weights: &[T; HYPOTHESES], gain: T, found: &Posterior<T, N>) {
+        let gained = if self.news { T::zero() } else { gain / self.inflation };
+        let own = usize::from(self.heard);
+        if let (Some(own), Some(before)) = (self.gained.get_mut(own), log_weights.get(own)) {
+            *own = gained;
+            if *before > T::lit(LEAST) {
+                let share = T::one() - (T::lit(LEAST) - *before).libm_exp();
+                self.mixture.add(share, *before + gained, found);
+            }
+        }
+        self.heard += 1;
+    }
 }
 
-#[cfg_attr(target_os = "none", inline(never))]
-fn update_trend<T: Real, const N: usize>(
-    trend: &mut Trend<T, N>,
-    block: &Block<T, N>,
-    prior: &Prior<'_, T>,
-    evidence: &Evidence<'_, T, N>,
-) -> (Posterior<T, N>, T) {
-    let rate_ps = trend.rate_ps();
-    trend.advance(block.time_s);
-    let (information, slopes) = trend.eliminate_slopes();
-    let levels = information.solve(prior);
-    let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
-    let before = Foretold { slopes_ps, pivots: (*levels.pivots(), slopes.pivots), levels: levels.mean };
-    trend.add(block);
-    let (information, slopes) = trend.eliminate_slopes();
-    let levels = information.solve(prior);
-    let (gain, _) = evidence.log_likelihood(&before, &Learnt { levels: &levels, slopes: &slopes, rate_ps });
-    (levels, gain)
+/// ln of the weights before any data.
+fn unheard<T: Real>() -> [T; HYPOTHESES] {
+    let mut log_weights = [T::lit(UNUSUAL); HYPOTHESES];
+    log_weights[0] = T::zero();
+    log_weights
+}
+
+/// Offsets that have moved, and the variances by which.
+fn moved<T: Real, const N: usize>(variances: &[T; 2]) -> impl Iterator<Item = (usize, T)> {
+    let offsets = [Parameter::OffsetA as usize, Parameter::OffsetB as usize];
+    offsets.into_iter().zip(*variances).filter(|(offset, variance)| *offset < N && *variance > T::zero())
+}
+
+/// What leaks that stay tell after a block.
+struct Levels<T, const N: usize> {
+    posterior: Posterior<T, N>,
+    /// ln of the block's probability.
+    gain: T,
+    /// ln of the growth of the determinant.
+    growth: T,
+}
+
+impl<T: Real, const N: usize> Levels<T, N> {
+    /// Takes the block into `information`.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    fn learn(
+        information: &mut Information<T, N>,
+        prior: &Prior<'_, T>,
+        evidence: &Evidence<T, N>,
+        known: &Solution<T, N>,
+    ) -> Self {
+        let none = [T::zero(); LEAKS];
+        let levels = information.solve(prior);
+        let before = Foretold { levels: levels.mean, slopes_ps: none, pivots: (*levels.pivots(), none) };
+        information.add(&evidence.block);
+        let posterior = information.solve(prior);
+        let after = Learnt { levels: &posterior, slopes: None, rate_ps: T::zero() };
+        let (gain, growth) = evidence.log_likelihood(&known.mean, &before, &after);
+        Self { posterior, gain, growth }
+    }
 }
 
 /// Each number less the largest.
 fn below_the_best<T: Real, const K: usize>(values: &mut [T; K]) {
-    let best = values.iter().fold(T::neg_infinity(), |best, value| best.max(*value));
+    let best = values.iter().fold(T::neg_infinity(), |best, value| value.at_least(best));
     for value in values {
         *value -= best;
     }

@@ -29,7 +29,7 @@ impl<T: Real> OffsetPrior<T> {
         leaks: &PerLeak<T>,
     ) -> Self {
         let floor = T::lit(1e-9) * cylinder.area_a_m2 * cylinder.stroke_m;
-        let square = |bias: T, unit: T| (bias.max(floor) / unit) * (bias.max(floor) / unit);
+        let square = |bias: T, unit: T| (bias.at_least(floor) / unit) * (bias.at_least(floor) / unit);
         let (d_a, d_b) = (square(zeros.flow_a.bias_std, unit_a), square(zeros.flow_b.bias_std, unit_b));
         let (to_a, to_b) = (zeros.pressure.bias_std / unit_a, zeros.pressure.bias_std / unit_b);
         let c = leaks.internal;
@@ -47,8 +47,8 @@ impl<T: Real> OffsetPrior<T> {
         let pressure_per_offset = product(&transposed, &information).map(|row| row.map(|value| -value));
         let explained = product(&pressure_per_offset, &j);
         let pressure_spread = [
-            [(T::one() + explained[0][0]).max(T::zero()), explained[0][1]],
-            [explained[1][0], (T::one() + explained[1][1]).max(T::zero())],
+            [(T::one() + explained[0][0]).at_least(T::zero()), explained[0][1]],
+            [explained[1][0], (T::one() + explained[1][1]).at_least(T::zero())],
         ];
         Self { information, pressure_per_offset, pressure_spread }
     }

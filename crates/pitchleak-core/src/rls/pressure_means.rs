@@ -1,6 +1,29 @@
 use super::balance::Integrals;
 use crate::{LeakPressures, PerLeak, Real};
 
+/// A block of the balance: how long it is by now, and its pressures.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Watched<T> {
+    pub time_s: T,
+    /// Number of steps.
+    pub steps: T,
+    /// ∫ P_A dt, Pa·s.
+    a: T,
+    /// ∫ P_B dt, Pa·s.
+    b: T,
+}
+
+impl<T: Real> Watched<T> {
+    #[inline]
+    pub fn add(&mut self, step: &Integrals<T>) {
+        self.time_s += step.time;
+        self.steps += step.steps;
+        self.a += step.a.pressure;
+        self.b += step.b.pressure;
+    }
+}
+
 /// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
 /// block's mean, so that sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
@@ -14,14 +37,14 @@ pub(super) struct PressureMeans<T> {
 }
 
 impl<T: Real> PressureMeans<T> {
-    pub fn add_block(&mut self, block: &Integrals<T>, keep: T) {
+    pub fn add_block(&mut self, block: &Watched<T>, keep: T) {
         self.forget(keep);
-        self.time += block.time;
-        let load = block.a.pressure - block.b.pressure;
+        self.time += block.time_s;
+        let load = block.a - block.b;
         self.load += load.abs();
-        self.load_sign += if load < T::zero() { -block.time } else { block.time };
-        self.a += block.a.pressure;
-        self.b += block.b.pressure;
+        self.load_sign += if load < T::zero() { -block.time_s } else { block.time_s };
+        self.a += block.a;
+        self.b += block.b;
     }
 
     pub fn forget(&mut self, keep: T) {
@@ -48,12 +71,10 @@ impl<T: Real> PressureMeans<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::balance::ChamberIntegral;
     use super::*;
 
-    fn block(time: f64, pa_pa: f64, pb_pa: f64) -> Integrals<f64> {
-        let chamber = |pa: f64| ChamberIntegral { pressure: pa * time, ..ChamberIntegral::default() };
-        Integrals { a: chamber(pa_pa), b: chamber(pb_pa), time, ..Integrals::default() }
+    fn block(time_s: f64, pa_pa: f64, pb_pa: f64) -> Watched<f64> {
+        Watched { time_s, steps: 25.0, a: pa_pa * time_s, b: pb_pa * time_s }
     }
 
     /// What is weighed by time and forgetting is the mean: Σ w P / Σ w.

@@ -38,7 +38,9 @@ pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, zeros: &Zeros<T>) ->
     let volume = cylinder.area_a_m2 * cylinder.stroke_m;
     let through_leak = volume * T::lit(5e-8) * zeros.pressure.bias_std;
     [zeros.flow_a, zeros.flow_b].map(|meter| {
-        meter.bias_std.libm_hypot(meter.drift_std_ph).libm_hypot(through_leak).max(T::lit(1e-9) * volume)
+        let (bias, drift) = (meter.bias_std, meter.drift_std_ph);
+        let together = bias * bias + drift * drift + through_leak * through_leak;
+        together.sqrt().max(T::lit(1e-9) * volume)
     })
 }
 

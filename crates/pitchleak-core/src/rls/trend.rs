@@ -1,7 +1,7 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::block::Block;
+use super::block::{Block, of_slopes};
 use super::information::{Information, Posterior};
 use super::parameter::{LEAKS, leak_column};
 use crate::Real;
@@ -26,28 +26,30 @@ const USUAL_CHANGE: f64 = 0.1 / 240.0;
 )]
 pub(super) struct Trend<T, const N: usize> {
     pub memory_s: T,
-    /// Information of all parameters as they are now.
+    /// Information of all parameters as they are now; between slopes at [`of_slopes`].
     levels: Information<T, N>,
     /// Information between slopes and parameters.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     cross: [[T; N]; LEAKS],
-    /// Information between slopes, both triangles.
-    slopes: [[T; LEAKS]; LEAKS],
     slope_vector: [T; LEAKS],
 }
 
-/// The slopes eliminated from a trend's normal equations by Cholesky S = R Rᵀ: given the levels θ they are
-/// s = R⁻ᵀ (h − H θ), with covariance S⁻¹ about that.
+/// The slopes eliminated from a trend's normal equations by S = L D Lᵀ: given the levels θ they are
+/// s = L⁻ᵀ D⁻¹ (h − H θ), with covariance S⁻¹ about that.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Elimination<T, const N: usize> {
-    /// R below the diagonal, and 1/R on it.
-    root: [[T; LEAKS]; LEAKS],
-    /// H = R⁻¹ C.
+    /// Information of the levels with the slopes eliminated (Schur complement).
+    pub levels: Information<T, N>,
+    /// L below the diagonal, which is one.
+    lower: [[T; LEAKS]; LEAKS],
+    /// H = L⁻¹ C.
     half: [[T; N]; LEAKS],
-    /// h = R⁻¹ ξ.
+    /// h = L⁻¹ ξ.
     half_vector: [T; LEAKS],
-    /// Diagonal of R².
+    /// D.
     pub pivots: [T; LEAKS],
+    /// 1/D.
+    inverse_pivot: [T; LEAKS],
 }
 
 impl<T: Real, const N: usize> Trend<T, N> {
@@ -56,26 +58,33 @@ impl<T: Real, const N: usize> Trend<T, N> {
     }
 
     /// Levels known, nothing of the slopes.
-    pub fn from_levels(memory_s: T, levels: Information<T, N>) -> Self {
-        Self {
-            memory_s,
-            levels,
-            cross: [[T::zero(); N]; LEAKS],
-            slopes: [[T::zero(); LEAKS]; LEAKS],
-            slope_vector: [T::zero(); LEAKS],
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn from_levels(memory_s: T, mut levels: Information<T, N>) -> Self {
+        for i in 0..LEAKS {
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                levels.matrix[row][column] = T::zero();
+            }
         }
+        Self { memory_s, levels, cross: [[T::zero(); N]; LEAKS], slope_vector: [T::zero(); LEAKS] }
     }
 
     /// What another trend knows, with this memory.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn from_trend(memory_s: T, other: &Self) -> Self {
         let unit = other.memory_s / memory_s;
-        Self {
-            memory_s,
-            levels: other.levels,
-            cross: other.cross.map(|row| row.map(|c| c * unit)),
-            slopes: other.slopes.map(|row| row.map(|s| s * unit * unit)),
-            slope_vector: other.slope_vector.map(|v| v * unit),
+        let mut trend = Self { memory_s, ..*other };
+        for i in 0..LEAKS {
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                trend.levels.matrix[row][column] *= unit * unit;
+            }
+            for j in 0..N {
+                trend.cross[i][j] *= unit;
+            }
+            trend.slope_vector[i] *= unit;
         }
+        trend
     }
 
     /// Change of a level per s, prior units, where a slope is one.
@@ -88,36 +97,40 @@ impl<T: Real, const N: usize> Trend<T, N> {
         let keep = T::one() / (T::one() + elapsed_s / self.memory_s);
         self.levels.forget(keep);
         let moved = elapsed_s * self.rate_ps();
-        let before = self.cross;
         for i in 0..LEAKS {
             let own = leak_column(i);
-            for j in 0..N {
-                self.cross[i][j] = keep * before[i][j] - moved * self.levels.entry(own, j);
-            }
-            for j in 0..LEAKS {
+            for j in 0..=i {
                 let other = leak_column(j);
-                self.slopes[i][j] = keep * (self.slopes[i][j] - moved * (before[i][other] + before[j][own]))
-                    + moved * moved * self.levels.entry(own, other);
+                let (row, column) = of_slopes(i, j);
+                let slopes =
+                    self.levels.matrix[row][column] - moved * (self.cross[i][other] + self.cross[j][own]);
+                self.levels.matrix[row][column] =
+                    keep * slopes + moved * moved * self.levels.entry(own, other);
             }
             self.slope_vector[i] = keep * self.slope_vector[i] - moved * self.levels.vector[own];
+        }
+        for i in 0..LEAKS {
+            for j in 0..N {
+                self.cross[i][j] = keep * self.cross[i][j] - moved * self.levels.entry(leak_column(i), j);
+            }
         }
     }
 
     /// Parameter `own`, which has no slope, has moved by something of this variance: as
     /// [`Information::diffuse`], of levels and slopes together.
     pub fn diffuse(&mut self, own: usize, variance: T) {
-        let levels = &self.levels;
-        let share = variance / (T::one() + variance * levels.matrix[own][own]);
+        let share = variance / (T::one() + variance * self.levels.matrix[own][own]);
         let column = self.cross.map(|row| row[own]);
         for i in 0..LEAKS {
             let through = share * column[i];
             for j in 0..N {
-                self.cross[i][j] -= through * levels.entry(own, j);
+                self.cross[i][j] -= through * self.levels.entry(own, j);
             }
-            for j in 0..LEAKS {
-                self.slopes[i][j] -= through * column[j];
+            for j in 0..=i {
+                let (row, place) = of_slopes(i, j);
+                self.levels.matrix[row][place] -= through * column[j];
             }
-            self.slope_vector[i] -= through * levels.vector[own];
+            self.slope_vector[i] -= through * self.levels.vector[own];
         }
         self.levels.diffuse(own, variance);
     }
@@ -129,80 +142,85 @@ impl<T: Real, const N: usize> Trend<T, N> {
             for j in 0..N {
                 self.cross[i][j] -= rate * block.aged[i][j];
             }
-            for j in 0..LEAKS {
-                self.slopes[i][j] += rate * rate * block.aged_square[i][j];
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                self.levels.matrix[row][column] += rate * rate * block.matrix[row][column];
             }
             self.slope_vector[i] -= rate * block.aged_vector[i];
         }
     }
 
-    /// The levels' information with the slopes eliminated (Schur complement), and how the slopes follow.
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
-    pub fn eliminate_slopes(&self) -> (Information<T, N>, Elimination<T, N>) {
-        let (root, pivots) = self.slope_root();
-        let mut half = self.cross;
-        let mut half_vector = self.slope_vector;
-        for i in 0..LEAKS {
-            for k in 0..i {
-                let factor = root[i][k];
-                for j in 0..N {
-                    let above = half[k][j];
-                    half[i][j] -= factor * above;
-                }
-                let known = half_vector[k];
-                half_vector[i] -= factor * known;
-            }
-            for j in 0..N {
-                half[i][j] *= root[i][i];
-            }
-            half_vector[i] *= root[i][i];
-        }
-        let mut levels = self.levels;
-        for i in 0..N {
-            for k in 0..LEAKS {
-                let factor = half[k][i];
-                for j in 0..=i {
-                    levels.matrix[i][j] -= factor * half[k][j];
-                }
-                levels.vector[i] -= factor * half_vector[k];
-            }
-        }
-        (levels, Elimination { root, half, half_vector, pivots })
-    }
-
-    /// R of S + 1 = R Rᵀ with 1/R on its diagonal, and the diagonal of R².
-    fn slope_root(&self) -> ([[T; LEAKS]; LEAKS], [T; LEAKS]) {
-        let mut root = [[T::zero(); LEAKS]; LEAKS];
-        let mut pivots = [T::zero(); LEAKS];
-        for i in 0..LEAKS {
-            for j in 0..i {
-                let mut sum = self.slopes[i][j];
-                for k in 0..j {
-                    sum -= root[i][k] * root[j][k];
-                }
-                root[i][j] = sum * root[j][j];
-            }
-            let mut pivot = self.slopes[i][i] + T::one();
-            let floor = T::lit(8.0) * T::epsilon() * pivot;
-            for k in 0..i {
-                pivot -= root[i][k] * root[i][k];
-            }
-            // Rounding (in f32) may not take from the prior.
-            pivots[i] = pivot.max(T::lit(0.5)).max(floor);
-            root[i][i] = T::one() / pivots[i].sqrt();
-        }
-        (root, pivots)
+    pub fn eliminate_slopes(&self) -> Elimination<T, N> {
+        let mut eliminated = Elimination::nothing();
+        eliminated.levels = self.levels;
+        eliminated.half = self.cross;
+        eliminated.half_vector = self.slope_vector;
+        eliminated.factor();
+        eliminated.eliminate();
+        eliminated
     }
 }
 
 impl<T: Real, const N: usize> Elimination<T, N> {
-    /// Leaks that do not change.
-    pub fn no_slopes() -> Self {
+    fn nothing() -> Self {
+        let zero = [T::zero(); LEAKS];
         Self {
-            root: [[T::zero(); LEAKS]; LEAKS],
+            levels: Information::new(),
+            lower: [zero; LEAKS],
             half: [[T::zero(); N]; LEAKS],
-            half_vector: [T::zero(); LEAKS],
-            pivots: [T::one(); LEAKS],
+            half_vector: zero,
+            pivots: zero,
+            inverse_pivot: zero,
+        }
+    }
+
+    /// L and D of S + 1 = L D Lᵀ; S at [`of_slopes`].
+    fn factor(&mut self) {
+        for i in 0..LEAKS {
+            for j in 0..i {
+                let (row, column) = of_slopes(i, j);
+                let mut sum = self.levels.matrix[row][column];
+                for k in 0..j {
+                    // L D stands here until its row is done.
+                    sum -= self.lower[i][k] * self.lower[j][k];
+                }
+                self.lower[i][j] = sum;
+            }
+            let (row, column) = of_slopes(i, i);
+            let diagonal = self.levels.matrix[row][column] + T::one();
+            let mut pivot = diagonal;
+            for j in 0..i {
+                let own = self.lower[i][j] * self.inverse_pivot[j];
+                pivot -= own * self.lower[i][j];
+                self.lower[i][j] = own;
+            }
+            // Rounding (in f32) may not take from the prior.
+            let floor = T::lit(8.0) * T::epsilon() * diagonal;
+            self.pivots[i] = pivot.at_least(T::lit(0.5)).at_least(floor);
+            self.inverse_pivot[i] = T::one() / self.pivots[i];
+        }
+    }
+
+    /// H and h from C and ξ, and what they leave of the levels' information.
+    fn eliminate(&mut self) {
+        for i in 0..LEAKS {
+            for k in 0..i {
+                let factor = self.lower[i][k];
+                for j in 0..N {
+                    let above = self.half[k][j];
+                    self.half[i][j] -= factor * above;
+                }
+                let above = self.half_vector[k];
+                self.half_vector[i] -= factor * above;
+            }
+            for j in 0..N {
+                let factor = self.half[i][j] * self.inverse_pivot[i];
+                for k in 0..j + 1 {
+                    self.levels.matrix[j][k] -= factor * self.half[i][k];
+                }
+                self.levels.vector[j] -= factor * self.half_vector[i];
+            }
         }
     }
 
@@ -213,14 +231,27 @@ impl<T: Real, const N: usize> Elimination<T, N> {
             for j in 0..N {
                 slopes[i] -= self.half[i][j] * levels[j];
             }
+            slopes[i] *= self.inverse_pivot[i];
         }
         for back in 0..LEAKS {
             let i = LEAKS - 1 - back;
             for k in i + 1..LEAKS {
                 let known = slopes[k];
-                slopes[i] -= self.root[k][i] * known;
+                slopes[i] -= self.lower[k][i] * known;
             }
-            slopes[i] *= self.root[i][i];
+        }
+        slopes
+    }
+
+    /// Mean and variance of each slope, per s; `rate_ps` is that of a slope of one.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn slopes_ps(&self, levels: &Posterior<T, N>, rate_ps: T) -> [(T, T); LEAKS] {
+        let mean = self.slopes(&levels.mean);
+        let mut slopes = [(T::zero(), T::zero()); LEAKS];
+        for i in 0..LEAKS {
+            let mut one = [T::zero(); LEAKS];
+            one[i] = rate_ps;
+            slopes[i] = (rate_ps * mean[i], self.variance(levels, &[T::zero(); N], &one));
         }
         slopes
     }
@@ -233,12 +264,12 @@ impl<T: Real, const N: usize> Elimination<T, N> {
         for i in 0..LEAKS {
             for k in 0..i {
                 let known = through[k];
-                through[i] -= self.root[i][k] * known;
+                through[i] -= self.lower[i][k] * known;
             }
-            through[i] *= self.root[i][i];
-            variance += through[i] * through[i];
+            let factor = through[i] * self.inverse_pivot[i];
+            variance += factor * through[i];
             for j in 0..N {
-                whole[j] -= self.half[i][j] * through[i];
+                whole[j] -= self.half[i][j] * factor;
             }
         }
         variance + levels.variance(&whole)
@@ -277,8 +308,8 @@ mod tests {
     fn finds_levels_and_slopes_of_leaks_that_grow() {
         for memory_s in [10.0, 100.0, 3600.0] {
             let trend = grown(memory_s);
-            let (levels, slopes) = trend.eliminate_slopes();
-            let now = levels.solve(&PRIOR);
+            let slopes = trend.eliminate_slopes();
+            let now = slopes.levels.solve(&PRIOR);
             let found = slopes.slopes(&now.mean);
             for i in 0..LEAKS {
                 let start = [1e-3, 2e-3, 5e-4][i];
@@ -294,8 +325,8 @@ mod tests {
         let long = grown(100.0);
         let other = Trend::from_trend(7.0, &long);
         let ends = [long, other].map(|trend| {
-            let (levels, slopes) = trend.eliminate_slopes();
-            let now = levels.solve(&PRIOR);
+            let slopes = trend.eliminate_slopes();
+            let now = slopes.levels.solve(&PRIOR);
             (now.mean, slopes.slopes(&now.mean).map(|slope| slope * trend.rate_ps()))
         });
         for i in 0..LEAKS {
@@ -312,7 +343,10 @@ mod tests {
             (None, None) => trend.levels.entry(r, c),
             (Some(slope), None) => trend.cross[slope][c],
             (None, Some(slope)) => trend.cross[slope][r],
-            (Some(a), Some(b)) => trend.slopes[a][b],
+            (Some(a), Some(b)) => {
+                let (row, column) = of_slopes(a.max(b), a.min(b));
+                trend.levels.matrix[row][column]
+            }
         };
         let vector = |trend: &Trend<f64, 4>, r: usize| match r.checked_sub(4) {
             None => trend.levels.vector[r],

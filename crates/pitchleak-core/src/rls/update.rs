@@ -5,20 +5,22 @@ pub enum Update<T> {
     Started,
     /// The sample was taken in.
     Accepted,
-    /// The sample completed a block of the balance; the estimates will be new after the next.
+    /// The sample completed a block of the balance. After every second one the estimates are renewed, a part with each
+    /// sample that follows, so that none takes much longer than another.
     Balanced {
-        /// As that of [`Renewed`](Self::Renewed).
+        /// What the flow balance of the block had that the estimates before it did not foretell; none where a
+        /// chamber had no flow to balance.
         innovation: Option<Innovation<T>>,
     },
-    /// The sample completed a block: the estimates are new.
+    /// The estimates are new.
     Renewed {
         /// Time that was watched since the estimates were last new, s: without gaps, for
         /// [`LeakDetector::update`](crate::LeakDetector::update).
         elapsed_s: T,
         /// The leak has changed at once: what was learnt before counts for nothing any more.
         changed: bool,
-        /// What the flow balance of the block had that the estimates before it did not foretell; none where a
-        /// chamber had no flow to balance.
+        /// That of a block which the sample completed, as in [`Balanced`](Self::Balanced): only where it shows that the
+        /// leak has changed.
         innovation: Option<Innovation<T>>,
     },
     /// Not a number, or beyond what a cylinder can do: the sample was left out.

@@ -61,9 +61,11 @@ impl<T: Real> Zeros<T> {
 
     /// The same with biases as wide as drift has made them by now.
     pub fn now(&self) -> Self {
-        let root = self.share().sqrt();
-        let wider =
-            |zero: Zero<T>| Zero { bias_std: zero.bias_std.libm_hypot(root * zero.drift_std_ph), ..zero };
+        let share = self.share();
+        let wider = |zero: Zero<T>| {
+            let (bias, drift) = (zero.bias_std, zero.drift_std_ph);
+            Zero { bias_std: (bias * bias + share * drift * drift).sqrt(), ..zero }
+        };
         Self {
             flow_a: wider(self.flow_a),
             flow_b: wider(self.flow_b),
