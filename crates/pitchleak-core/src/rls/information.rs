@@ -126,6 +126,10 @@ impl<T: Real, const N: usize> Information<T, N> {
 
     /// Parameter `own` has moved by something of this variance: M − M e (1/q + eᵀM e)⁻¹ eᵀM, by the matrix inversion lemma.
     pub fn diffuse(&mut self, own: usize, variance: T) {
+        // Known to every caller, but not to a compiler that keeps this apart.
+        if own >= N {
+            return;
+        }
         let mut column = [T::zero(); N];
         for i in 0..N {
             column[i] = self.entry(own, i);
