@@ -1,6 +1,6 @@
 use crate::Real;
 
-/// How [`Rls`] remembers and averages.
+/// How [`Rls`](super::Rls) remembers and averages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RlsSettings<T> {
