@@ -2,6 +2,7 @@ use super::Replay;
 use super::state::{self, RestoreError};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
+use crate::times::{Clock, TimeFormat};
 use crate::trace::{
     BadRows, LineLayout, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader, read_line,
 };
@@ -136,6 +137,7 @@ impl Stream {
     /// The report as it stands; `name` is the trace's. None before the first part.
     pub fn report(&self, name: &str) -> Option<ReplayReport> {
         let quality = self.validator.as_ref()?.quality();
-        Some(self.replay.report(TraceSummary::new(name, quality)))
+        let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
+        Some(self.replay.report(TraceSummary { begins, ..TraceSummary::new(name, quality) }))
     }
 }
