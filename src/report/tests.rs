@@ -226,6 +226,8 @@ fn an_orifice_answers_what_the_law_of_the_leak_leaves_open_and_nothing_else() {
     let mut leaking =
         Found { misfit: Some(Misfit { balance: 9.0, ..SOUND }), restarts: 7, ..found(INTERNAL) };
     leaking.changed_at_s = Some(50.0);
+    leaking.episodes = vec![Episode { fault: Leak::ExternalA, ..episode(2.0, Some(39.0)) }];
+    leaking.restarts = 9;
     assert_eq!(leaking.judged(), (Status::Doubtful, vec!["keeps_changing", "model_does_not_fit"]));
     let (sizes_m3s, net_m3s) = (PerLeak::default(), PerLeak::default());
     leaking.suspicions.orifice = Some(Orifice { before: 5.0, after: 1.0, sizes_m3s, net_m3s, zeros: None });
@@ -233,6 +235,7 @@ fn an_orifice_answers_what_the_law_of_the_leak_leaves_open_and_nothing_else() {
     let text = leaking.verdict().text;
     assert!(text.contains("It leaks as through an orifice, by the root of the pressure"), "{text}");
     assert!(text.contains("with that law the residual falls from 5.0 to 1.0 times the noise."), "{text}");
+    assert!(!text.contains("Earlier"), "{text}");
     let value = Estimate { value: 20e9, std: 1e9 };
     leaking.estimates.bulk_modulus = EstimateEntry::new(value, EstimateEntry::BULK_MODULUS_UNIT);
     assert_eq!(leaking.judged(), (Status::Doubtful, vec!["bulk_modulus_impossible"]));
