@@ -1,6 +1,7 @@
 //! What each leak was in an hour and in a day, and how it changes over weeks: in bounded memory.
 
 use super::event::{EstimateEvent, LiveLeakage, SummaryEvent};
+use crate::units::S_PER_DAY;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +24,7 @@ impl Span {
     fn seconds(self) -> f64 {
         match self {
             Self::Hour => 3600.0,
-            Self::Day => 86_400.0,
+            Self::Day => S_PER_DAY,
         }
     }
 

@@ -23,18 +23,12 @@ fn leakage_through(orifice: &Orifice) -> PerLeak<Leakage> {
         .map(|(size, net_m3s)| Leakage { net_mean_lpm: Some(net_m3s * LPM_PER_M3S), ..Leakage::new(size) })
 }
 
-/// Below zero by so many standard deviations is more than chance.
-const NEGATIVE_SIGMAS: f64 = 3.0;
-
 /// No leak is negative: by what one is, the model errs, and in the other leaks by as much.
 fn with_model_error(flows: PerLeak<Leakage>) -> PerLeak<Leakage> {
-    let is_negative =
-        |flow: &Leakage| flow.std_lpm.is_some_and(|std| flow.mean_lpm + NEGATIVE_SIGMAS * std < 0.0);
-    let negative = flows.iter().map(|(_, flow)| flow).filter(|flow| is_negative(flow));
+    let negative = flows.iter().map(|(_, flow)| flow).filter(|flow| flow.is_negative());
     let error_lpm = negative.map(|flow| -flow.mean_lpm).fold(0.0, f64::max);
     flows.map(|flow| {
-        let own = is_negative(&flow);
-        let std_lpm = flow.std_lpm.map(|std| if own { std } else { std.hypot(error_lpm) });
+        let std_lpm = flow.std_lpm.map(|std| if flow.is_negative() { std } else { std.hypot(error_lpm) });
         Leakage { std_lpm, ..flow }
     })
 }

@@ -6,7 +6,7 @@ use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
 use crate::trace::Record;
 use crate::wiring::{
-    Excerpt, Orifice, ZeroCheck, explain, orifice, sensor_error, unit_by_scatter, zero_check,
+    Excerpt, Explanation, Orifice, ZeroCheck, explain, orifice, sensor_error, unit_by_scatter, zero_check,
 };
 use pitchleak_core::PerLeak;
 
@@ -17,34 +17,33 @@ impl Replay {
         if self.channel_faults().iter().any(|fault| fault.kind != ChannelFaultKind::Coarse) {
             return Suspicions::default();
         }
-        let doubtful = verdict.status == Status::Doubtful;
-        let [wiring, sensor] = if doubtful {
-            let records = excerpt.records();
-            let wiring = explain(&records, &self.rig);
-            let sensor = if wiring.is_none() { sensor_error(&records, &self.rig) } else { None };
-            [wiring, sensor]
-        } else {
-            [unit_by_scatter(excerpt, &self.rig), None]
-        };
-        let orifice = if wiring.is_none() { self.orifice(verdict, excerpt) } else { None };
-        let zeros = match orifice {
-            _ if self.declares_zeros() => None,
-            Some(orifice) => orifice.zeros,
-            None if verdict.status == Status::Leak => self.zeros(excerpt),
-            None => None,
-        };
-        let sensor = sensor.filter(|_| orifice.is_none());
-        let [wiring, sensor] =
-            [wiring, sensor].map(|found| found.map(|found| found.wiring(columns, &self.rig)));
-        Suspicions { wiring, sensor, zeros, orifice }
+        let zeros_count = !self.declares_zeros();
+        let named = |found: Option<Explanation>| found.map(|found| found.wiring(columns, &self.rig));
+        if verdict.status != Status::Doubtful {
+            let may_be_zeros = zeros_count && verdict.status == Status::Leak;
+            return Suspicions {
+                wiring: named(unit_by_scatter(excerpt, &self.rig)),
+                zeros: if may_be_zeros { self.zeros(excerpt) } else { None },
+                ..Suspicions::default()
+            };
+        }
+        let records = excerpt.records();
+        let wiring = named(explain(&records, &self.rig));
+        if wiring.is_some() {
+            return Suspicions { wiring, ..Suspicions::default() };
+        }
+        if let Some(orifice) = self.orifice(verdict, &records) {
+            let zeros = orifice.zeros.filter(|_| zeros_count);
+            return Suspicions { zeros, orifice: Some(orifice), ..Suspicions::default() };
+        }
+        Suspicions { sensor: named(sensor_error(&records, &self.rig)), ..Suspicions::default() }
     }
 
     /// Whether the leaks found pass an orifice, where nothing speaks against them but that they are not as C P.
-    fn orifice(&self, verdict: &Verdict, excerpt: &Excerpt) -> Option<Orifice> {
+    fn orifice(&self, verdict: &Verdict, records: &[Record]) -> Option<Orifice> {
         let only_by_law = verdict.reasons.iter().all(|reason| reason.id.may_be_orifice());
-        let doubtful = verdict.status == Status::Doubtful && only_by_law && !verdict.faults.is_empty();
         let leaks = PerLeak::from_fn(|leak| verdict.faults.contains(&leak));
-        doubtful.then(|| orifice(&excerpt.records(), &self.rig, leaks))?
+        (only_by_law && !verdict.faults.is_empty()).then(|| orifice(records, &self.rig, leaks))?
     }
 
     /// Whether the rig file says how far the meters' zeros may be off: the estimates then have them already.

@@ -124,13 +124,13 @@ impl TraceSummary {
     /// its clock shows, or how long after the start.
     pub fn time(&self, t_s: f64, decimals: usize) -> String {
         match &self.begins {
-            _ if self.duration_s < LONG_S => format!("{t_s:.decimals$} s"),
+            _ if !self.is_long() => format!("{t_s:.decimals$} s"),
             Some(clock) => clock.text(t_s, self.duration_s),
             None => after_start(t_s, self.duration_s),
         }
     }
 
-    /// Whether its times are those of a clock.
+    /// Whether seconds are no unit for its times.
     pub(crate) fn is_long(&self) -> bool {
         self.duration_s >= LONG_S
     }
@@ -234,7 +234,15 @@ impl Leakage {
         let lpm = flow_m3s.scaled(LPM_PER_M3S);
         Self { mean_lpm: lpm.value, net_mean_lpm: None, std_lpm: Some(lpm.std) }
     }
+
+    /// Whether it is below zero by more than chance, which no leak is.
+    pub(crate) fn is_negative(&self) -> bool {
+        self.std_lpm.is_some_and(|std| self.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)
+    }
 }
+
+/// Below zero by so many standard deviations is more than chance.
+const NEGATIVE_SIGMAS: f64 = 3.0;
 
 /// Offsets of the flow meters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

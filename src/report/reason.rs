@@ -55,9 +55,7 @@ impl ReasonId {
             Self::NoUncertainty => "no_uncertainty",
         }
     }
-}
 
-impl ReasonId {
     /// Whether a leak of another law than C P can be behind it.
     pub(crate) fn may_be_orifice(self) -> bool {
         matches!(self, Self::NegativeLeak | Self::KeepsChanging | Self::ModelDoesNotFit)
@@ -103,7 +101,6 @@ const BULK_MODULUS_SIGMAS: f64 = 3.0;
 /// C P leaves a little in the others.
 const NEGATIVE_SHARE: f64 = 0.5;
 const NEGATIVE_SHARE_OF_LARGEST: f64 = 0.13;
-const NEGATIVE_SIGMAS: f64 = 3.0;
 
 /// χ² by which a leak has to explain the trace better than zeros that are off: one of 2 % of full scale costs 4.
 const LEAK_OVER_ZEROS: f64 = 4.0;
@@ -221,8 +218,7 @@ fn negative_leak(findings: &Findings<'_>) -> Option<Reason> {
         let leakage = &findings.leakage[*leak];
         let matters =
             (NEGATIVE_SHARE * findings.threshold_lpm[*leak]).max(NEGATIVE_SHARE_OF_LARGEST * largest);
-        leakage.mean_lpm < -matters
-            && leakage.std_lpm.is_some_and(|std| leakage.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)
+        leakage.mean_lpm < -matters && leakage.is_negative()
     };
     let negative: Vec<_> = Leak::ALL.into_iter().filter(is_negative).collect();
     let first = *negative.first()?;

@@ -62,6 +62,6 @@ pub fn orifice(records: &[Record], rig: &Rig, leaks: PerLeak<bool>) -> Option<Or
         after: fit.worst().sqrt(),
         sizes_m3s: PerLeak::from_fn(|leak| size(&fit, leak)),
         net_m3s: PerLeak::from_fn(|leak| fit.flow_m3s(&blocks, leak, |pressure| pressure).value),
-        zeros: held_against_zeros(records, rig, through),
+        zeros: held_against_zeros(&blocks, rig, &through, duration_s),
     })
 }

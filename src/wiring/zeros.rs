@@ -1,6 +1,6 @@
 //! A meter whose zero is off against a leak: both let oil go missing, the one always, the other with the pressure.
 
-use super::blocks::blocks;
+use super::blocks::{Block, blocks};
 use super::fit::Fit;
 use super::priors::Priors;
 use crate::rig::Rig;
@@ -29,17 +29,21 @@ pub struct ZeroCheck {
 /// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     let duration_s = duration_s(records)?;
-    held_against_zeros(records, rig, Priors::declared(rig).with_changing_leaks(duration_s))
+    let leaks = Priors::declared(rig).with_changing_leaks(duration_s);
+    held_against_zeros(&blocks(records, &rig.cylinder), rig, &leaks, duration_s)
 }
 
-/// The same of `leaks`.
-pub(super) fn held_against_zeros(records: &[Record], rig: &Rig, leaks: Priors) -> Option<ZeroCheck> {
-    let duration_s = duration_s(records)?;
+/// The same of `leaks` in blocks that span so long.
+pub(super) fn held_against_zeros(
+    blocks: &[Block],
+    rig: &Rig,
+    leaks: &Priors,
+    duration_s: f64,
+) -> Option<ZeroCheck> {
     let zeros = leaks.with_zeros_off(rig, duration_s);
-    let blocks = blocks(records, &rig.cylinder);
-    let declared = Fit::of(&blocks, rig, &leaks)?;
-    let free = Fit::of(&blocks, rig, &zeros)?;
-    let without = PerLeak::from_fn(|leak| Fit::of(&blocks, rig, &zeros.without(leak)).unwrap_or(free));
+    let declared = Fit::of(blocks, rig, leaks)?;
+    let free = Fit::of(blocks, rig, &zeros)?;
+    let without = PerLeak::from_fn(|leak| Fit::of(blocks, rig, &zeros.without(leak)).unwrap_or(free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
     let beyond = |other: &Fit| (other.chi_square() - declared.chi_square()) / inflation;
