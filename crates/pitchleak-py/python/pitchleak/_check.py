@@ -113,7 +113,7 @@ class Check(Raw, Paged, Tabular):
 
     def _read(self) -> Sequence[str]:
         source, rig, _ = self._again
-        return [rig.name, *([source] if isinstance(source, str) else [])]
+        return _inputs.files(rig, source)
 
     @property
     def table(self) -> Mapping[str, Any]:

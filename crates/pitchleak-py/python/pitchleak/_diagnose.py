@@ -348,7 +348,7 @@ def diagnose(
         for residuals in (before, after)
     ]
     filled = {"raw": raw, "rig": found_rig, "residuals_before": courses[0], "residuals_after": courses[1]}
-    files = (rig.name, *(source for source in (*fitted, *judged) if isinstance(source, str)))
+    files = tuple(_inputs.files(rig, *fitted, *judged))
     for name, value in {**filled, "_text": text, "_page": page, "_files": files}.items():
         object.__setattr__(result, name, value)
     return result

@@ -39,6 +39,11 @@ def is_path(data: Any) -> bool:
     return isinstance(data, (str, os.PathLike))
 
 
+def files(rig: Rig, *sources: Source) -> list[str]:
+    """The files among what a result rests on."""
+    return [rig.name, *(source for source in sources if isinstance(source, str))]
+
+
 def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
     """A path as it is; columns as a table that borrows them."""
     if is_path(data):

@@ -41,7 +41,7 @@ class _Again:
         return _pitchleak.replay_page(self.source, self.rig, self.estimator, self.strict)
 
     def files(self) -> list[str]:
-        return [self.rig.name, *([self.source] if isinstance(self.source, str) else [])]
+        return _inputs.files(self.rig, self.source)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
