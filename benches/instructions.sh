@@ -25,8 +25,8 @@ while read -r estimator limit; do
 done <<END
 paper-law 61
 paper 113
-rls 700
-rls-offsets 1040
+rls 640
+rls-offsets 940
 rls-gains 1960
 END
 exit $failed

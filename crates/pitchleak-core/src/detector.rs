@@ -130,6 +130,7 @@ impl<T: Real> Channel<T> {
 }
 
 /// Half width of the confidence sequence around an estimate of spread `std`, same unit.
+#[cfg_attr(target_os = "none", inline(never))]
 fn confidence_half_width<T: Real>(std: T, threshold: T, alpha: T) -> T {
     let r = (threshold / std).powi(2);
     let bound = (T::one() + r.recip()) * (r.libm_ln_1p() - T::lit(2.0) * alpha.libm_ln());

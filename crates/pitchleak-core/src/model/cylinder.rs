@@ -61,10 +61,12 @@ impl core::fmt::Display for CylinderError {
 
 impl core::error::Error for CylinderError {}
 
+#[cfg_attr(target_os = "none", inline(never))]
 fn positive<T: Real>(value: T) -> bool {
     value.is_finite() && value > T::zero()
 }
 
+#[cfg_attr(target_os = "none", inline(never))]
 fn not_negative<T: Real>(value: T) -> bool {
     value.is_finite() && value >= T::zero()
 }

@@ -45,6 +45,7 @@ impl<T: Real> SensorSpread<T> {
 
 impl<T: Real> SensorSpread<T> {
     /// Whether every spread is a number and none is negative.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each sensor
     pub fn is_physical(&self) -> bool {
         let Self { noise_std, bias_std, gain_std, drift_std_ph } = *self;
         [noise_std, bias_std, gain_std, drift_std_ph].iter().all(|std| std.is_finite() && *std >= T::zero())

@@ -62,12 +62,15 @@ macro_rules! real {
             fn as_f64(self) -> f64 {
                 f64::from(self)
             }
+            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
             fn libm_exp(self) -> Self {
                 libm::$exp(self)
             }
+            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
             fn libm_ln(self) -> Self {
                 libm::$ln(self)
             }
+            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
             fn libm_ln_1p(self) -> Self {
                 libm::$ln_1p(self)
             }

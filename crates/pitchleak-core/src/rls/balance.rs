@@ -18,6 +18,47 @@ pub(super) struct ChamberIntegral<T> {
     pub pressure: T,
 }
 
+/// What the flow meters say of a step.
+pub(super) struct Fed<T> {
+    pub chambers: FedChambers,
+    /// Sum of chamber A's flow at both ends, m³/s.
+    a_m3s: T,
+    /// The same of chamber B.
+    b_m3s: T,
+}
+
+/// Chambers whose flow was measured at both ends of a step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum FedChambers {
+    Both,
+    OnlyA,
+    OnlyB,
+    Neither,
+}
+
+impl<T: Real> Fed<T> {
+    #[inline]
+    pub fn over(last: &Sample<T>, now: &Sample<T>) -> Self {
+        match (last.qa_m3s, now.qa_m3s, last.qb_m3s, now.qb_m3s) {
+            (Some(a), Some(a_now), Some(b), Some(b_now)) => {
+                Self { chambers: FedChambers::Both, a_m3s: a + a_now, b_m3s: b + b_now }
+            }
+            _ => Self::not_both(last, now),
+        }
+    }
+
+    #[cold]
+    fn not_both(last: &Sample<T>, now: &Sample<T>) -> Self {
+        let none = T::zero();
+        let (chambers, a_m3s, b_m3s) = match (last.qa_m3s, now.qa_m3s, last.qb_m3s, now.qb_m3s) {
+            (Some(a), Some(a_now), ..) => (FedChambers::OnlyA, a + a_now, none),
+            (.., Some(b), Some(b_now)) => (FedChambers::OnlyB, none, b + b_now),
+            _ => (FedChambers::Neither, none, none),
+        };
+        Self { chambers, a_m3s, b_m3s }
+    }
+}
+
 /// Both chambers over the same time.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -33,21 +74,20 @@ pub(super) struct Integrals<T> {
 }
 
 impl<T: Real> Integrals<T> {
-    /// Integrals over the step from `last` to `now`; a resting flow counts as zero here.
+    /// Integrals over the step from `last` to `now`; a chamber that is not fed counts as one without flow.
     #[inline]
-    pub fn step(cylinder: &Cylinder<T>, dt_s: T, last: &Sample<T>, now: &Sample<T>) -> Self {
+    pub fn step(cylinder: &Cylinder<T>, dt_s: T, last: &Sample<T>, now: &Sample<T>, fed: &Fed<T>) -> Self {
         let half = T::lit(0.5);
         let half_dt = half * dt_s;
         let x = (half * (last.x_m + now.x_m)).at_least(T::zero()).at_most(cylinder.stroke_m);
-        let flow = |a: Option<T>, b: Option<T>| half_dt * (a.unwrap_or(T::zero()) + b.unwrap_or(T::zero()));
         Self {
             a: ChamberIntegral {
-                flow: flow(last.qa_m3s, now.qa_m3s),
+                flow: half_dt * fed.a_m3s,
                 compression: cylinder.volume_a_m3(x) * (now.pa_pa - last.pa_pa),
                 pressure: half_dt * (last.pa_pa + now.pa_pa),
             },
             b: ChamberIntegral {
-                flow: flow(last.qb_m3s, now.qb_m3s),
+                flow: half_dt * fed.b_m3s,
                 compression: cylinder.volume_b_m3(x) * (now.pb_pa - last.pb_pa),
                 pressure: half_dt * (last.pb_pa + now.pb_pa),
             },

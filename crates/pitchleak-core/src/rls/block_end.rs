@@ -3,10 +3,10 @@
 use super::balance::{Equation, Integrals, combine};
 use super::block::{BALANCES, Balance, Block, BlockSums};
 use super::change_detector::ChangeDetector;
-use super::information::{Information, Prior};
+use super::evidence::Evidence;
+use super::information::Solution;
 use super::innovation_monitor::InnovationMonitor;
 use super::ma1_whitener::Ma1Whitener;
-use super::model_bank::Outlook;
 use super::parameter::{LEAKS, Parameter};
 use super::pressure_means::Watched;
 use super::update::{Innovation, Update};
@@ -32,7 +32,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.pressures.add_block(&self.block, keep);
         self.innovations.forget(keep);
         let inflation = self.innovations.inflation();
-        let changed = balance.as_ref().is_some_and(|equation| self.has_changed(equation, inflation));
+        let watched = balance.as_ref().zip(innovation);
+        let changed =
+            watched.is_some_and(|(equation, by_known)| self.has_changed(equation, by_known, inflation));
         self.block = Watched::default();
         self.block_time_s = self.settings.block_time_s;
         self.fed = Integrals::default();
@@ -48,9 +50,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
         Update::Balanced { innovation }
     }
 
-    fn has_changed(&mut self, balance: &Equation<T, N>, inflation: T) -> bool {
+    fn has_changed(&mut self, balance: &Equation<T, N>, by_known: Innovation<T>, inflation: T) -> bool {
         let slopes_ps = self.slopes_ps.map(|(mean, _)| mean);
-        self.change.update(balance, self.block.time_s, &self.solution, &slopes_ps, inflation)
+        self.change.update(balance, self.block.time_s, &self.solution, by_known, &slopes_ps, inflation)
     }
 
     /// Puts a balance to those that will be learnt from together.
@@ -70,7 +72,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
         let drifted = self.drifted();
         let prior = prior(self.compressibility, &self.scale, &self.offsets);
-        self.bank.begin(block, drifted, inflation, &prior, &self.solution);
+        let evidence = Evidence::new(block, prior.mean_0, &self.solution.mean);
+        self.bank.begin(evidence, drifted, inflation, &prior, &self.solution);
         self.empty_sums();
     }
 
@@ -78,10 +81,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     pub(super) fn go_on(&mut self) -> Update<T> {
         let prior = prior(self.compressibility, &self.scale, &self.offsets);
-        let Some(outlook) = self.bank.go_on(&prior, &self.solution) else { return Update::Accepted };
-        let Outlook { now, slopes_ps, jumped, time_s, chi_square: (mut chi_square, mut count) } = outlook;
-        self.solution = now;
-        self.slopes_ps = slopes_ps;
+        let Some(outlook) = self.bank.go_on(&prior, &mut self.solution) else { return Update::Accepted };
+        self.slopes_ps = outlook.slopes_ps;
+        let (mut chi_square, mut count) = outlook.chi_square;
         for Balance { equation, .. } in self.balances.iter().flatten() {
             let left = equation.remainder(&self.solution.mean);
             chi_square -= left * left;
@@ -90,10 +92,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.innovations.odometer(chi_square.at_least(T::zero()), count);
         self.balances = [None; BALANCES];
         self.reweigh();
-        if jumped {
+        if outlook.jumped {
             self.begin_anew();
         }
-        Update::Renewed { elapsed_s: time_s, changed: jumped, innovation: None }
+        Update::Renewed { elapsed_s: outlook.time_s, changed: outlook.jumped, innovation: None }
     }
 
     /// By how much zeros may have drifted since the estimates were renewed, variances in prior units.
@@ -121,16 +123,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn begin_anew(&mut self) {
         self.bank.forget_all();
-        let prior = Prior { mean_0: T::zero(), offsets: &self.offsets.information };
-        self.solution = Information::new().solve(&prior).solution();
+        self.solution = Solution::of_prior(&self.offsets.information);
         self.slopes_ps = [(T::zero(), T::zero()); LEAKS];
         self.change = ChangeDetector::new(&self.solution);
         self.innovations = InnovationMonitor::default();
         self.pressures.forget(T::lit(1e-8));
         self.memory = None;
-        let variance = self.noise.position_m * self.noise.position_m;
-        if let (Some(odometer), Some(last)) = (&mut self.position_filter, &self.last) {
-            odometer.anchor(last.x_m, variance);
+        if let Some(last) = self.last {
+            self.anchor(last.x_m);
         }
         self.empty_sums();
         self.balances = [None; BALANCES];
@@ -172,8 +172,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     fn watch_balance(&mut self, equation: &Equation<T, N>) -> Innovation<T> {
-        let (value, variance) = self.solution.predict(equation.left, &equation.columns);
-        self.innovations.balance(value, variance);
+        let innovation = self.solution.predict(equation);
+        self.innovations.balance(&innovation);
         // Both ends of the block are noisy readings of the pressure.
         if let Some(memory) = self.memory {
             let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
@@ -181,7 +181,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
                 * self.stored_oil_variance(weight_a, weight_b, self.pressure_noise.variance_pa2());
             self.compensate(noise / memory.variance);
         }
-        Innovation { value, variance }
+        innovation
     }
 
     /// Pressure noise in the odometer's compressibility column: the last reading's only, as the
@@ -204,6 +204,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given variances.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     fn stored_oil_variance(&self, weight_a: T, weight_b: T, [a_pa2, b_pa2]: [T; 2]) -> T {
         let x = self.last.map_or(T::zero(), |s| s.x_m).at_least(T::zero()).at_most(self.cylinder.stroke_m);
         let a = weight_a * self.cylinder.volume_a_m3(x);

@@ -1,6 +1,7 @@
 use super::balance::Equation;
 use super::information::Solution;
 use super::parameter::{LEAKS, leak_column};
+use super::update::Innovation;
 use crate::Real;
 
 /// Page's test on ν²/S, which is χ²₁ as long as nothing changes: drift, largest step and bound. A false
@@ -30,6 +31,7 @@ const SUDDEN_S: f64 = 3.0;
     ))
 )]
 pub(super) struct ChangeDetector<T, const N: usize> {
+    /// Of use only while `cusum` is above zero.
     forecast: Solution<T, N>,
     slopes_ps: [T; LEAKS],
     cusum: T,
@@ -41,36 +43,39 @@ impl<T: Real, const N: usize> ChangeDetector<T, N> {
         Self { forecast: *forecast, slopes_ps: [T::zero(); LEAKS], cusum: T::zero(), since_s: T::zero() }
     }
 
-    fn from(known: &Solution<T, N>, slopes_ps: &[T; LEAKS]) -> Self {
-        Self { slopes_ps: *slopes_ps, ..Self::new(known) }
-    }
-
     /// Holds a whitened balance over `time_s` against the forecast; `known` and `slopes_ps` (prior units, per s) are
-    /// what is known before it, `inflation` how much larger than declared the noise is. Says whether the leak
-    /// has changed.
+    /// what is known before it, `by_known` the balance's innovation by that, and `inflation` how much larger than
+    /// declared the noise is. Says whether the leak has changed.
     pub fn update(
         &mut self,
         balance: &Equation<T, N>,
         time_s: T,
         known: &Solution<T, N>,
+        by_known: Innovation<T>,
         slopes_ps: &[T; LEAKS],
         inflation: T,
     ) -> bool {
-        if self.cusum <= T::zero() || self.since_s > T::lit(SUDDEN_S) {
-            *self = Self { cusum: T::zero(), ..Self::from(known, slopes_ps) };
+        let mut by_forecast = None;
+        if self.cusum > T::zero() && self.since_s <= T::lit(SUDDEN_S) {
+            by_forecast = Some(self.forecast.predict(balance)).filter(|by| by.variance <= T::lit(VAGUE));
+        } else {
+            self.cusum = T::zero();
+        }
+        if by_forecast.is_none() {
+            self.slopes_ps = *slopes_ps;
+            self.since_s = T::zero();
         }
         self.since_s += time_s;
-        let (mut innovation, mut variance) = self.forecast.predict(balance.left, &balance.columns);
-        if variance > T::lit(VAGUE) {
-            *self = Self { cusum: self.cusum, since_s: time_s, ..Self::from(known, slopes_ps) };
-            (innovation, variance) = self.forecast.predict(balance.left, &balance.columns);
-        }
+        let Innovation { value: mut innovation, variance } = by_forecast.unwrap_or(by_known);
         for (leak, slope) in self.slopes_ps.iter().enumerate() {
             innovation -= balance.columns[leak_column(leak)] * *slope * self.since_s;
         }
         let ratio = innovation * innovation / (variance * inflation);
         let step = ratio.at_most(T::lit(CUSUM_STEP)) - T::lit(CUSUM_DRIFT);
         self.cusum = (self.cusum + step).at_least(T::zero());
+        if by_forecast.is_none() && self.cusum > T::zero() {
+            self.forecast = *known;
+        }
         self.cusum > T::lit(CUSUM_BOUND)
     }
 }
@@ -84,7 +89,7 @@ mod tests {
 
     fn hold(detector: &mut ChangeDetector<f64, 4>, innovation: f64, known: &Solution<f64, 4>) -> bool {
         let balance = Equation { left: innovation, columns: [0.0, 0.0, 1.0, 0.0] };
-        detector.update(&balance, BLOCK_S, known, &[0.0; LEAKS], 1.0)
+        detector.update(&balance, BLOCK_S, known, known.predict(&balance), &[0.0; LEAKS], 1.0)
     }
 
     /// A leak that opens shows within a few blocks; in the eight million that a false change takes at the least
@@ -136,7 +141,7 @@ mod tests {
             // The first one surprises, the rest grow by their slope.
             let value = if block == 0 { 5.0 } else { 2.0 * BLOCK_S * f64::from(block + 1) };
             let balance = Equation { left: value, columns: [0.0, 0.0, 1.0, 0.0] };
-            detector.update(&balance, BLOCK_S, &known, &[0.0, 2.0, 0.0], 1.0)
+            detector.update(&balance, BLOCK_S, &known, known.predict(&balance), &[0.0, 2.0, 0.0], 1.0)
         });
         assert!(!foretold, "what the slope foretells");
     }

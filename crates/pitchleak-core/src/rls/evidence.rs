@@ -2,7 +2,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block::{Block, of_slopes};
-use super::information::Posterior;
+use super::information::{Posterior, Solution};
 use super::parameter::LEAKS;
 use super::trend::Elimination;
 use crate::Real;
@@ -36,13 +36,23 @@ pub(super) struct Evidence<T, const N: usize> {
     slope_score: [T; LEAKS],
 }
 
+/// Hᵀ(y − H θ) of levels and slopes.
+struct Score<T, const N: usize> {
+    levels: [T; N],
+    slopes: [T; LEAKS],
+    /// |y − H θ|² at the reference, less that at θ.
+    square: T,
+}
+
 /// What a hypothesis said before a block.
-pub(super) struct Foretold<T, const N: usize> {
-    pub levels: [T; N],
+pub(super) struct Foretold<'a, T, const N: usize> {
+    pub levels: &'a [T; N],
     /// Slopes of the leaks, prior units per s.
     pub slopes_ps: [T; LEAKS],
-    /// Pivots of its information, levels and slopes.
-    pub pivots: ([T; N], [T; LEAKS]),
+    /// Pivots of its information: of the levels …
+    pub pivots: &'a [T; N],
+    /// … and of the slopes.
+    pub slope_pivots: &'a [T; LEAKS],
 }
 
 /// What it says after the block.
@@ -60,12 +70,15 @@ impl<T: Real, const N: usize> Evidence<T, N> {
         score[0] += block.column_noise * mean_0;
         let slope_score = block.aged_vector.map(|value| -value);
         let mut told = Self { block, score, slope_score };
-        (told.score, told.slope_score) = told.residual(reference, &[T::zero(); LEAKS]);
+        let left = told.residual(reference, &[T::zero(); LEAKS]);
+        told.score = left.levels;
+        told.slope_score = left.slopes;
         told
     }
 
     /// The score that is left when levels and slopes are larger by this.
-    fn residual(&self, levels: &[T; N], slopes_ps: &[T; LEAKS]) -> ([T; N], [T; LEAKS]) {
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    fn residual(&self, levels: &[T; N], slopes_ps: &[T; LEAKS]) -> Score<T, N> {
         let block = &self.block;
         let (mut of_levels, mut slopes) = (self.score, self.slope_score);
         of_levels[0] += block.column_noise * levels[0];
@@ -91,7 +104,29 @@ impl<T: Real, const N: usize> Evidence<T, N> {
                 }
             }
         }
-        (of_levels, slopes)
+        let mut square = T::zero();
+        for i in 0..N {
+            square += levels[i] * (self.score[i] + of_levels[i]);
+        }
+        for i in 0..LEAKS {
+            square += slopes_ps[i] * (self.slope_score[i] + slopes[i]);
+        }
+        Score { levels: of_levels, slopes, square }
+    }
+
+    /// [`log_likelihood`](Self::log_likelihood) of leaks that stay, which said `levels` of those `pivots` before the block.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    pub fn of_levels(
+        &self,
+        reference: &Solution<T, N>,
+        levels: &[T; N],
+        pivots: &[T; N],
+        after: &Posterior<T, N>,
+    ) -> (T, T) {
+        let none = [T::zero(); LEAKS];
+        let before = Foretold { levels, slopes_ps: none, pivots, slope_pivots: &none };
+        let after = Learnt { levels: after, slopes: None, rate_ps: T::zero() };
+        self.log_likelihood(&reference.mean, &before, &after)
     }
 
     /// ln of the block's probability as above, and ln of how much the determinant of the hypothesis' information
@@ -99,41 +134,36 @@ impl<T: Real, const N: usize> Evidence<T, N> {
     pub fn log_likelihood(
         &self,
         reference: &[T; N],
-        before: &Foretold<T, N>,
+        before: &Foretold<'_, T, N>,
         after: &Learnt<'_, T, N>,
     ) -> (T, T) {
-        let mut apart = before.levels;
+        let mut apart = [T::zero(); N];
         for i in 0..N {
-            apart[i] -= reference[i];
+            apart[i] = before.levels[i] - reference[i];
         }
-        let (levels, mut slopes) = self.residual(&apart, &before.slopes_ps);
-        let mut square = T::zero();
-        for i in 0..N {
-            square += apart[i] * (self.score[i] + levels[i]);
-        }
-        for i in 0..LEAKS {
-            square += before.slopes_ps[i] * (self.slope_score[i] + slopes[i]);
-            slopes[i] *= after.rate_ps;
+        let mut left = self.residual(&apart, &before.slopes_ps);
+        for slope in &mut left.slopes {
+            *slope *= after.rate_ps;
         }
         let learnt = match after.slopes {
-            Some(eliminated) => eliminated.variance(after.levels, &levels, &slopes),
-            None => after.levels.variance(&levels),
+            Some(eliminated) => eliminated.variance(after.levels, &left.levels, &left.slopes),
+            None => after.levels.variance(&left.levels),
         };
         // Noise in column 0 makes its entry of b larger by chance.
         let by_noise = self.block.column_noise * after.levels.variance_0();
         let growth = log_growth(before, after);
-        (T::lit(0.5) * (square + learnt - by_noise - growth), growth)
+        (T::lit(0.5) * (left.square + learnt - by_noise - growth), growth)
     }
 }
 
 /// ln of how much the determinant of the information has grown; the pivots one by one, as their product may be
 /// beyond f32.
-fn log_growth<T: Real, const N: usize>(before: &Foretold<T, N>, after: &Learnt<'_, T, N>) -> T {
+fn log_growth<T: Real, const N: usize>(before: &Foretold<'_, T, N>, after: &Learnt<'_, T, N>) -> T {
     let ratio = |after: &[T], before: &[T]| {
         after.iter().zip(before).fold(T::one(), |product, (after, before)| product * (*after / *before))
     };
-    let levels = ratio(after.levels.pivots(), &before.pivots.0);
-    let slopes = after.slopes.map_or(T::one(), |slopes| ratio(&slopes.pivots, &before.pivots.1));
+    let levels = ratio(after.levels.pivots(), before.pivots);
+    let slopes = after.slopes.map_or(T::one(), |slopes| ratio(&slopes.pivots, before.slope_pivots));
     (levels * slopes).at_most(T::max_value()).libm_ln()
 }
 
@@ -233,8 +263,12 @@ mod tests {
             let evidence = Evidence::new(block, 0.0, &reference);
 
             let levels = constant.solve(&PRIOR);
-            let pivots = (*levels.pivots(), [1.0; 3]);
-            let before = Foretold { levels: levels.mean, slopes_ps: [0.0; 3], pivots };
+            let before = Foretold {
+                levels: &levels.mean,
+                slopes_ps: [0.0; 3],
+                pivots: levels.pivots(),
+                slope_pivots: &[1.0; 3],
+            };
             constant.add(&block);
             let after = constant.solve(&PRIOR);
             let (stays, _) = evidence.log_likelihood(
@@ -246,9 +280,12 @@ mod tests {
             trend.advance(block.time_s);
             let slopes = trend.eliminate_slopes();
             let levels = slopes.levels.solve(&PRIOR);
-            let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
-            let pivots = (*levels.pivots(), slopes.pivots);
-            let before = Foretold { levels: levels.mean, slopes_ps, pivots };
+            let before = Foretold {
+                levels: &levels.mean,
+                slopes_ps: slopes.slopes(&levels.mean).map(|slope| slope * rate_ps),
+                pivots: levels.pivots(),
+                slope_pivots: &slopes.pivots,
+            };
             trend.add(&block);
             let slopes = trend.eliminate_slopes();
             let after = slopes.levels.solve(&PRIOR);

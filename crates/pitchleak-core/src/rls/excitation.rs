@@ -34,7 +34,7 @@ impl<T: Real> Default for ExcitationSettings<T> {
 impl<T: Real> ExcitationSettings<T> {
     /// Whether a leak's flow, m³/s, is known well enough to call it identified.
     pub fn resolves(&self, flow_m3s: &Estimate<T>) -> bool {
-        flow_m3s.half_width95() <= self.resolution_m3s.max(self.resolution_share * flow_m3s.value.abs())
+        flow_m3s.half_width95() <= self.resolution_m3s.at_least(self.resolution_share * flow_m3s.value.abs())
     }
 
     /// Whether the bulk modulus, or its inverse, is identified: its spread beside its prior's.
@@ -76,7 +76,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             traded_with: self.traded_with(parameter),
         };
         let pinned = self.leak_coefficients().zip(self.mean_pressures_pa()).map(|(leak, pressure)| {
-            settings.resolves(&leak.scaled(pressure.max(settings.least_pressure_pa)))
+            settings.resolves(&leak.scaled(pressure.at_least(settings.least_pressure_pa)))
         });
         let learnt = settings.learns(self.compressibility().std, self.compressibility_prior_std());
         ExcitationReport {
@@ -90,7 +90,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     fn variance_reduction(&self, parameter: Parameter) -> T {
-        (T::one() - self.covariance(parameter, parameter)).max(T::zero())
+        (T::one() - self.covariance(parameter, parameter)).at_least(T::zero())
     }
 
     fn traded_with(&self, parameter: Parameter) -> Option<Parameter> {

@@ -2,7 +2,9 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::Parameter;
+use super::balance::Equation;
 use super::block::{Block, symmetric};
+use super::update::Innovation;
 use crate::Real;
 
 /// Normal equations of a linear regression with a unit prior, and what noise in column 0 does to them.
@@ -27,7 +29,7 @@ pub(super) struct Information<T, const N: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub vector: [T; N],
     /// What sensor noise in column 0 adds to the normal equation of that column on average.
-    column_noise: T,
+    pub column_noise: T,
 }
 
 /// What is known before any sample.
@@ -61,6 +63,24 @@ impl<T: Real, const N: usize> Solution<T, N> {
         Self { mean: [T::zero(); N], covariance: [[T::zero(); N]; N] }
     }
 
+    /// Of a covariance's lower triangle.
+    #[inline]
+    pub fn of(mean: [T; N], mut covariance: [[T; N]; N]) -> Self {
+        for i in 0..N {
+            covariance[i][i] = covariance[i][i].at_least(T::min_positive_value());
+            for j in 0..i {
+                covariance[j][i] = covariance[i][j];
+            }
+        }
+        Self { mean, covariance }
+    }
+
+    /// What is known before any sample.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn of_prior(offsets: &[[T; 2]; 2]) -> Self {
+        Information::new().solve(&Prior { mean_0: T::zero(), offsets }).solution()
+    }
+
     /// Variance of aᵀθ.
     fn variance(&self, a: &[T; N]) -> T {
         let mut variance = T::zero();
@@ -74,13 +94,13 @@ impl<T: Real, const N: usize> Solution<T, N> {
         variance
     }
 
-    /// Innovation y − fᵀθ̂ of an observation with unit noise, and its variance 1 + fᵀP f.
-    pub fn predict(&self, y: T, f: &[T; N]) -> (T, T) {
-        let mut innovation = y;
-        for i in 0..N {
-            innovation -= f[i] * self.mean[i];
+    /// Innovation y − fᵀθ̂ of an equation with unit noise, and its variance 1 + fᵀP f.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    pub fn predict(&self, equation: &Equation<T, N>) -> Innovation<T> {
+        Innovation {
+            value: equation.remainder(&self.mean),
+            variance: T::one() + self.variance(&equation.columns),
         }
-        (innovation, T::one() + self.variance(f))
     }
 }
 
@@ -89,16 +109,17 @@ impl<T: Real, const N: usize> Information<T, N> {
         Self { matrix: [[T::zero(); N]; N], vector: [T::zero(); N], column_noise: T::zero() }
     }
 
-    /// Independent parameters of this mean and variance, prior included.
-    pub fn of(mean: &[T; N], variance: &[T; N], prior: &Prior<'_, T>) -> Self {
+    /// Independent parameters of this mean and each its own information, prior included.
+    pub fn of(mean: &[T; N], known: &[T; N], prior: &Prior<'_, T>) -> Self {
         let mut information = Self::new();
         for i in 0..N {
             for j in 0..=i {
-                information.matrix[i][j] = -prior_entry(prior.offsets, i, j);
+                if let Some(prior) = prior_entry(prior.offsets, i, j) {
+                    information.matrix[i][j] -= prior;
+                }
             }
-            let known = T::one() / variance[i];
-            information.matrix[i][i] += known;
-            information.vector[i] = known * mean[i];
+            information.matrix[i][i] += known[i];
+            information.vector[i] = known[i] * mean[i];
         }
         information
     }
@@ -114,6 +135,7 @@ impl<T: Real, const N: usize> Information<T, N> {
         self.column_noise *= keep;
     }
 
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn add(&mut self, block: &Block<T, N>) {
         for i in 0..N {
             for j in 0..=i {
@@ -159,6 +181,13 @@ impl<T: Real, const N: usize> Information<T, N> {
         Posterior { mean: factors.solve(self.vector, prior.mean_0), factors }
     }
 
+    /// Entry of A = M + prior, `i` >= `j`.
+    #[inline]
+    fn with_prior(&self, offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
+        let entry = self.matrix[i][j];
+        prior_entry(offsets, i, j).map_or(entry, |prior| entry + prior)
+    }
+
     /// U D Uᵀ of A = M + prior, last parameter first (Bierman 1977, Factorization Methods for Discrete
     /// Sequential Estimation, §III.4), so that the last pivot is what is known of parameter 0 beyond all
     /// others. The column noise is taken from it, but never more than leaves the prior standing.
@@ -172,13 +201,13 @@ impl<T: Real, const N: usize> Information<T, N> {
         for back in 0..N {
             let i = N - 1 - back;
             for j in (i + 1..N).rev() {
-                let mut sum = self.matrix[j][i] + prior_entry(offsets, j, i);
+                let mut sum = self.with_prior(offsets, j, i);
                 for k in j + 1..N {
                     sum -= upper[i][k] * upper[j][k];
                 }
                 upper[i][j] = sum;
             }
-            let diagonal = self.matrix[i][i] + prior_entry(offsets, i, i);
+            let diagonal = self.with_prior(offsets, i, i);
             let mut pivot = diagonal;
             for j in i + 1..N {
                 // upper[i][j] holds U D here; turn it to U as it is used.
@@ -197,17 +226,17 @@ impl<T: Real, const N: usize> Information<T, N> {
     }
 }
 
-/// Entry of the prior information, `i` >= `j`.
+/// Entry of the prior information, `i` >= `j`; none is zero.
 #[inline]
-fn prior_entry<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> T {
+fn prior_entry<T: Real>(offsets: &[[T; 2]; 2], i: usize, j: usize) -> Option<T> {
     const A: usize = Parameter::OffsetA as usize;
     const B: usize = Parameter::OffsetB as usize;
     match (i, j) {
-        (A, A) => offsets[0][0],
-        (B, B) => offsets[1][1],
-        (B, A) => offsets[1][0],
-        _ if i == j => T::one(),
-        _ => T::zero(),
+        (A, A) => Some(offsets[0][0]),
+        (B, B) => Some(offsets[1][1]),
+        (B, A) => Some(offsets[1][0]),
+        _ if i == j => Some(T::one()),
+        _ => None,
     }
 }
 
@@ -243,22 +272,13 @@ impl<T: Real, const N: usize> Posterior<T, N> {
     /// The covariance A⁻¹, lower triangle.
     #[inline]
     pub fn covariance(&self) -> [[T; N]; N] {
-        let mut covariance = self.factors.inverse();
-        for i in 0..N {
-            covariance[i][i] = covariance[i][i].at_least(T::min_positive_value());
-        }
-        covariance
+        self.factors.inverse()
     }
 
     /// The mean with the whole covariance A⁻¹.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn solution(&self) -> Solution<T, N> {
-        let mut covariance = self.covariance();
-        for i in 0..N {
-            for j in 0..i {
-                covariance[j][i] = covariance[i][j];
-            }
-        }
-        Solution { mean: self.mean, covariance }
+        Solution::of(self.mean, self.covariance())
     }
 }
 
@@ -320,7 +340,13 @@ impl<T: Real, const N: usize> Factors<T, N> {
             }
         }
         let mut inverse = [[T::zero(); N]; N];
-        for k in 0..N {
+        for i in 0..N {
+            let weighed = self.inverse_pivot[0] * w[0][i];
+            for j in 0..i + 1 {
+                inverse[i][j] = weighed * w[0][j];
+            }
+        }
+        for k in 1..N {
             for i in k..N {
                 let weighed = self.inverse_pivot[k] * w[k][i];
                 for j in k..i + 1 {
@@ -334,7 +360,6 @@ impl<T: Real, const N: usize> Factors<T, N> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::balance::Equation;
     use super::super::block::{Balance, BlockSums};
     use super::*;
 

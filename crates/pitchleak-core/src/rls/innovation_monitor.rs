@@ -1,3 +1,4 @@
+use super::update::Innovation;
 use crate::Real;
 
 /// Watches the innovations: are they as large as the declared noise says?
@@ -11,9 +12,9 @@ pub(super) struct InnovationMonitor<T> {
 }
 
 impl<T: Real> InnovationMonitor<T> {
-    /// Takes one balance innovation of variance `variance`, both over the declared noise's variance.
-    pub fn balance(&mut self, innovation: T, variance: T) {
-        let ratio = innovation * innovation / variance;
+    /// Takes one innovation of the balance.
+    pub fn balance(&mut self, innovation: &Innovation<T>) {
+        let ratio = innovation.value * innovation.value / innovation.variance;
         self.balance_sum += ratio;
         self.balance_count += T::one();
     }
@@ -40,6 +41,7 @@ impl<T: Real> InnovationMonitor<T> {
     /// Factor on the variances: where the residuals are larger than declared by more than two standard
     /// deviations of their own scatter, the intervals grow with them; they never shrink (Birge 1932, "The
     /// calculation of errors by the method of least squares").
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn inflation(&self) -> T {
         let balance = significant_ratio(self.balance_sum, self.balance_count);
         balance.at_least(significant_ratio(self.odometer_sum, self.odometer_count)).at_least(T::one())
@@ -48,8 +50,10 @@ impl<T: Real> InnovationMonitor<T> {
 
 /// Mean of χ²₁ terms over what such a mean may be by chance (its variance is 2/count).
 fn significant_ratio<T: Real>(sum: T, count: T) -> T {
-    // Where it is not even the mean that is expected, nothing is significant: a root is dear on a microcontroller.
-    if sum > count { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
+    // Short of two standard deviations it is below one, which tells nothing: a root is dear on a microcontroller.
+    let beyond = sum - count;
+    let may_be = beyond > T::zero() && beyond * beyond > T::lit(7.0) * count;
+    if may_be { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
 }
 
 /// Variance of both pressure sensors' white noise from second differences of the signal, which cancel its slope:
@@ -66,14 +70,17 @@ impl<T: Real> NoiseMeter<T> {
     #[inline]
     pub fn add(&mut self, before: [T; 2], now: [T; 2]) {
         let rise = [now[0] - before[0], now[1] - before[1]];
-        if let Some(last) = self.last_rise.replace(rise) {
-            let keep = T::lit(0.999);
-            for i in 0..2 {
-                let second = rise[i] - last[i];
-                self.sum[i] = keep * self.sum[i] + second * second;
-            }
-            self.count = keep * self.count + T::one();
+        let Some(last) = &mut self.last_rise else {
+            self.last_rise = Some(rise);
+            return;
+        };
+        let keep = T::lit(0.999);
+        for i in 0..2 {
+            let second = rise[i] - last[i];
+            self.sum[i] = keep * self.sum[i] + second * second;
         }
+        self.count = keep * self.count + T::one();
+        *last = rise;
     }
 
     /// A gap: the next difference starts anew.
@@ -120,7 +127,7 @@ mod tests {
         for (scale, expected) in [(1.0, 1.0), (2.0, 4.0)] {
             let mut monitor = InnovationMonitor::default();
             for unit in white_noise(2).take(20_000) {
-                monitor.balance(scale * unit, 1.0);
+                monitor.balance(&Innovation { value: scale * unit, variance: 1.0 });
             }
             assert!((monitor.inflation() / expected - 1.0).abs() < 0.05, "{}", monitor.inflation());
         }

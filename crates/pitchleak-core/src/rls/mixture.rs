@@ -65,13 +65,7 @@ impl<T: Real, const N: usize> Mixture<T, N> {
     }
 
     pub fn solution(&self) -> Solution<T, N> {
-        let mut solution = self.known;
-        for i in 0..N {
-            for j in 0..i {
-                solution.covariance[j][i] = solution.covariance[i][j];
-            }
-        }
-        solution
+        Solution::of(self.known.mean, self.known.covariance)
     }
 }
 

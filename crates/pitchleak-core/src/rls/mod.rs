@@ -40,13 +40,13 @@ mod weights;
 mod zeros;
 
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
-use balance::{Integrals, combine};
+use balance::{Fed, FedChambers, Integrals, combine};
 use block::{BALANCES, Balance, BlockSums};
 use change_detector::ChangeDetector;
 pub use error::RlsError;
 pub use estimates::Estimates;
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
-use information::{Information, Prior, Solution};
+use information::{Prior, Solution};
 use innovation_monitor::{InnovationMonitor, NoiseMeter};
 use ma1_whitener::Ma1Whitener;
 use model_bank::{ModelBank, STEPS};
@@ -98,6 +98,7 @@ pub struct Rls<T, const N: usize> {
     scale: [T; N],
     offsets: OffsetPrior<T>,
     zeros: Zeros<T>,
+    /// Without the force, which tells nothing of leaks.
     last: Option<Sample<T>>,
     both: Weights<T>,
     position_filter: Option<PositionFilter<T, N>>,
@@ -148,8 +149,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let no_leak = PerLeak::default();
         let zeros = Zeros::of(sensors);
         let offsets = OffsetPrior::new(&cylinder, &zeros, offset_units(&cylinder, &zeros), &no_leak);
-        let solution =
-            Information::new().solve(&Prior { mean_0: T::zero(), offsets: &offsets.information }).solution();
+        let solution = Solution::of_prior(&offsets.information);
         Ok(Self {
             cylinder,
             noise,
@@ -187,17 +187,18 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if !self.plausible(sample) {
             return Update::Rejected;
         }
-        let Some(last) = self.last.replace(*sample) else {
+        let Some(last) = self.last.replace(Sample { force_n: None, ..*sample }) else {
             return self.restart(sample);
         };
         let integrable = dt_s > T::zero() && dt_s <= self.settings.max_step_s;
         if !integrable {
             return self.restart(sample);
         }
-        let step = Integrals::step(&self.cylinder, dt_s, &last, sample);
+        let fed = Fed::over(&last, sample);
+        let step = Integrals::step(&self.cylinder, dt_s, &last, sample, &fed);
         self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
         self.block.add(&step);
-        self.advance(&step, &last, sample);
+        self.advance(&step, fed.chambers, sample.x_m);
         let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
         if full {
             self.close_block()
@@ -208,22 +209,23 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    /// PositionFilter step, by whichever flows both ends of the step have.
+    /// PositionFilter step to the reading `x_m`, by whichever flows both ends of the step have.
     #[inline]
-    fn advance(&mut self, step: &Integrals<T>, last: &Sample<T>, now: &Sample<T>) {
+    fn advance(&mut self, step: &Integrals<T>, fed: FedChambers, x_m: T) {
+        let of_one;
+        let weights = match fed {
+            FedChambers::Both => {
+                self.fed.add(step);
+                &self.both
+            }
+            FedChambers::Neither => return self.anchor(x_m),
+            one => {
+                of_one = self.weights_of_one(one == FedChambers::OnlyA);
+                &of_one
+            }
+        };
+        let Some(odometer) = &mut self.position_filter else { return };
         let sensor_variance = self.noise.position_m * self.noise.position_m;
-        let fed_a = last.qa_m3s.is_some() && now.qa_m3s.is_some();
-        let fed_b = last.qb_m3s.is_some() && now.qb_m3s.is_some();
-        if fed_a && fed_b {
-            self.fed.add(step);
-        }
-        let weights = if fed_a && fed_b { self.both } else { self.weights_of_one(fed_a) };
-        let odometer =
-            self.position_filter.get_or_insert(PositionFilter::anchored(last.x_m, sensor_variance));
-        if !fed_a && !fed_b {
-            odometer.anchor(now.x_m, sensor_variance);
-            return;
-        }
         let mut equation =
             combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
         let gain = Parameter::GainPosition as usize;
@@ -237,7 +239,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             equation.left,
             &equation.columns,
             variance,
-            now.x_m,
+            x_m,
             sensor_variance,
             &mut self.sums,
         );
@@ -265,13 +267,19 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
-        self.last = Some(*sample);
+    /// The piston is where the sensor reads `x_m`; whatever was known of that counts for nothing.
+    #[cold]
+    fn anchor(&mut self, x_m: T) {
         let variance = self.noise.position_m * self.noise.position_m;
         match &mut self.position_filter {
-            Some(odometer) => odometer.anchor(sample.x_m, variance),
-            None => self.position_filter = Some(PositionFilter::anchored(sample.x_m, variance)),
+            Some(odometer) => odometer.anchor(x_m, variance),
+            None => self.position_filter = Some(PositionFilter::anchored(x_m, variance)),
         }
+    }
+
+    #[cold]
+    fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
+        self.anchor(sample.x_m);
         self.memory = None;
         self.pressure_noise.interrupt();
         Update::Started

@@ -1,7 +1,6 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::block::Block;
 use super::evidence::{Evidence, Foretold, Learnt};
 use super::information::{Information, Posterior, Prior, Solution};
 use super::mixture::Mixture;
@@ -116,16 +115,14 @@ struct Renewal<T, const N: usize> {
 }
 
 /// What the bank knows after a block.
-pub(super) struct Outlook<T, const N: usize> {
-    /// All parameters as they are now.
-    pub now: Solution<T, N>,
+pub(super) struct Outlook<T> {
     /// Slopes of the leaks, mean and variance, prior units per s; by the trend that foretold best what came before the block.
     pub slopes_ps: [(T, T); LEAKS],
     /// Whether the leaks have changed at once: no hypothesis foretells them.
     pub jumped: bool,
     /// Length of the block, s.
     pub time_s: T,
-    /// Σ (y − fᵀθ)² of the block by `now`, and its number of rows.
+    /// Σ (y − fᵀθ)² of the block by what is known now, and its number of rows.
     pub chi_square: (T, T),
 }
 
@@ -158,16 +155,18 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
     #[cfg_attr(target_os = "none", inline(never))] // its stack is none of the other samples'
     pub fn begin(
         &mut self,
-        block: Block<T, N>,
+        evidence: Evidence<T, N>,
         drifted: [T; 2],
         inflation: T,
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
     ) {
-        let evidence = Evidence::new(block, prior.mean_0, &known.mean);
         let by_jump = match &mut self.pending {
             Pending::Jump(information) => {
-                Some(Levels::learn(information, prior, &evidence, known).gain / inflation)
+                let before = information.solve(prior);
+                information.add(&evidence.block);
+                let after = information.solve(prior);
+                Some(evidence.of_levels(known, &before.mean, before.pivots(), &after).0 / inflation)
             }
             _ => None,
         };
@@ -175,7 +174,10 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             self.constant.diffuse(offset, variance);
         }
         self.constant.forget(T::one() / (T::one() + evidence.block.time_s / self.memory_s));
-        let learnt = Levels::learn(&mut self.constant, prior, &evidence, known);
+        let before = self.constant.solve(prior);
+        self.constant.add(&evidence.block);
+        let after = self.constant.solve(prior);
+        let (gain, growth) = evidence.of_levels(known, &before.mean, before.pivots(), &after);
         self.pending = Pending::Renewal(Renewal {
             evidence,
             drifted,
@@ -184,12 +186,12 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             gained: [T::zero(); HYPOTHESES],
             by_jump,
             // Before there is something to foretell with, all hypotheses say the same, up to rounding.
-            news: learnt.growth >= T::lit(NEWS),
+            news: growth >= T::lit(NEWS),
             slopes_ps: [(T::zero(), T::zero()); LEAKS],
             mixture: Mixture::new(),
         });
         if let Pending::Renewal(renewal) = &mut self.pending {
-            renewal.hear(&self.log_weights, learnt.gain, &learnt.posterior);
+            renewal.hear(&self.log_weights, gain, &after);
         }
     }
 
@@ -199,44 +201,45 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         matches!(self.pending, Pending::Renewal(_))
     }
 
-    /// Goes on with a renewal; gives what is known at its end. `prior` and `known` are those that it began with.
+    /// Goes on with a renewal, which began with this `prior` and what was `known`: at its end, what is known.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) -> Option<Outlook<T, N>> {
-        let best = self.best_trend();
+    pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
         let Pending::Renewal(renewal) = &mut self.pending else { return None };
-        let Some(trend) = self.trends.get_mut(usize::from(renewal.heard).wrapping_sub(1)) else {
+        let heard = usize::from(renewal.heard);
+        let Some(trend) = self.trends.get_mut(heard.wrapping_sub(1)) else {
             return self.conclude(prior, known);
         };
+        let is_best = is_best_trend(&self.recent, heard);
         for (offset, variance) in moved::<T, N>(&renewal.drifted) {
             trend.diffuse(offset, variance);
         }
-        renewal.hear_trend(trend, best, &self.log_weights, prior, known);
+        renewal.hear_trend(trend, is_best, &self.log_weights, prior, known);
         None
     }
 
     /// Weighs the hypotheses, all of which were heard.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn conclude(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) -> Option<Outlook<T, N>> {
+    fn conclude(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
         let Pending::Renewal(renewal) = &self.pending else { return None };
         let Renewal { gained, by_jump, news, slopes_ps, .. } = *renewal;
         let time_s = renewal.evidence.block.time_s;
         let suspected = if news { None } else { self.suspect_jump(renewal, prior, known) };
-        let now = match &suspected {
+        *known = match &suspected {
             Some((_, solution)) => *solution,
             None => renewal.mixture.solution(),
         };
-        let chi_square = renewal.evidence.block.chi_square(&now.mean);
-        self.pending = match suspected {
-            Some((information, _)) => Pending::Jump(information),
-            None => Pending::Nothing,
-        };
+        let chi_square = renewal.evidence.block.chi_square(&known.mean);
+        self.pending = Pending::Nothing;
+        if let Some((information, _)) = suspected {
+            self.pending = Pending::Jump(information);
+        }
         if !news {
             self.weigh(&gained, time_s);
         }
         self.replace_refuted();
         // After a wild reading the jump that was suspected does not foretell best.
         let jumped = !news && by_jump.is_some_and(|gain| gained.iter().all(|other| gain > *other));
-        Some(Outlook { now, slopes_ps, jumped, time_s, chi_square })
+        Some(Outlook { slopes_ps, jumped, time_s, chi_square })
     }
 
     /// Holds against the hypotheses that the leaks jumped to anything usual just before this block, all else as
@@ -254,25 +257,17 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         for i in 0..LEAKS {
             variance[leak_column(i)] += T::lit(USUAL_JUMP * USUAL_JUMP);
         }
-        let mut information = Information::of(&known.mean, &variance, prior);
-        let learnt = Levels::learn(&mut information, prior, &renewal.evidence, known);
+        let pivots = variance.map(|variance| T::one() / variance);
+        let mut information = Information::of(&known.mean, &pivots, prior);
+        information.add(&renewal.evidence.block);
+        let after = information.solve(prior);
+        let (gain, _) = renewal.evidence.of_levels(known, &known.mean, &pivots, &after);
         let mut foretold = T::neg_infinity();
         for k in 0..HYPOTHESES {
             foretold = (self.log_weights[k] + renewal.gained[k]).at_least(foretold);
         }
-        let suspected = learnt.gain / renewal.inflation - foretold >= T::lit(JUMPED);
-        suspected.then(|| (information, learnt.posterior.solution()))
-    }
-
-    /// The trend that foretold the recent data best.
-    fn best_trend(&self) -> usize {
-        let mut best = 1;
-        for k in 2..HYPOTHESES {
-            if self.recent[k] > self.recent[best] {
-                best = k;
-            }
-        }
-        best
+        let suspected = gain / renewal.inflation - foretold >= T::lit(JUMPED);
+        suspected.then(|| (information, after.solution()))
     }
 
     fn weigh(&mut self, gained: &[T; HYPOTHESES], time_s: T) {
@@ -333,11 +328,11 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
 }
 
 impl<T: Real, const N: usize> Renewal<T, N> {
-    /// Takes the block into a trend, and hears it; `best` is the one whose slopes are told.
+    /// Takes the block into a trend, and hears it; where it `is_best` its slopes are told.
     fn hear_trend(
         &mut self,
         trend: &mut Trend<T, N>,
-        best: usize,
+        is_best: bool,
         log_weights: &[T; HYPOTHESES],
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
@@ -346,14 +341,18 @@ impl<T: Real, const N: usize> Renewal<T, N> {
         trend.advance(self.evidence.block.time_s);
         let slopes = trend.eliminate_slopes();
         let levels = slopes.levels.solve(prior);
-        let slopes_ps = slopes.slopes(&levels.mean).map(|slope| slope * rate_ps);
-        let before = Foretold { slopes_ps, pivots: (*levels.pivots(), slopes.pivots), levels: levels.mean };
+        let before = Foretold {
+            levels: &levels.mean,
+            slopes_ps: slopes.slopes(&levels.mean).map(|slope| slope * rate_ps),
+            pivots: levels.pivots(),
+            slope_pivots: &slopes.pivots,
+        };
         trend.add(&self.evidence.block);
         let slopes = trend.eliminate_slopes();
         let levels = slopes.levels.solve(prior);
         let after = Learnt { levels: &levels, slopes: Some(&slopes), rate_ps };
         let (gain, _) = self.evidence.log_likelihood(&known.mean, &before, &after);
-        if usize::from(self.heard) == best {
+        if is_best {
             self.slopes_ps = slopes.slopes_ps(&levels, rate_ps);
         }
         self.hear(log_weights, gain, &levels);
@@ -375,6 +374,13 @@ impl<T: Real, const N: usize> Renewal<T, N> {
     }
 }
 
+/// Whether a trend foretold the recent data best, the first of those that did so alike.
+fn is_best_trend<T: Real>(recent: &[T; HYPOTHESES], hypothesis: usize) -> bool {
+    let Some(own) = recent.get(hypothesis) else { return false };
+    let mut others = recent.iter().enumerate().skip(1);
+    others.all(|(other, evidence)| evidence < own || (evidence <= own && other >= hypothesis))
+}
+
 /// ln of the weights before any data.
 fn unheard<T: Real>() -> [T; HYPOTHESES] {
     let mut log_weights = [T::lit(UNUSUAL); HYPOTHESES];
@@ -385,36 +391,12 @@ fn unheard<T: Real>() -> [T; HYPOTHESES] {
 /// Offsets that have moved, and the variances by which.
 fn moved<T: Real, const N: usize>(variances: &[T; 2]) -> impl Iterator<Item = (usize, T)> {
     let offsets = [Parameter::OffsetA as usize, Parameter::OffsetB as usize];
-    offsets.into_iter().zip(*variances).filter(|(offset, variance)| *offset < N && *variance > T::zero())
-}
-
-/// What leaks that stay tell after a block.
-struct Levels<T, const N: usize> {
-    posterior: Posterior<T, N>,
-    /// ln of the block's probability.
-    gain: T,
-    /// ln of the growth of the determinant.
-    growth: T,
-}
-
-impl<T: Real, const N: usize> Levels<T, N> {
-    /// Takes the block into `information`.
-    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
-    fn learn(
-        information: &mut Information<T, N>,
-        prior: &Prior<'_, T>,
-        evidence: &Evidence<T, N>,
-        known: &Solution<T, N>,
-    ) -> Self {
-        let none = [T::zero(); LEAKS];
-        let levels = information.solve(prior);
-        let before = Foretold { levels: levels.mean, slopes_ps: none, pivots: (*levels.pivots(), none) };
-        information.add(&evidence.block);
-        let posterior = information.solve(prior);
-        let after = Learnt { levels: &posterior, slopes: None, rate_ps: T::zero() };
-        let (gain, growth) = evidence.log_likelihood(&known.mean, &before, &after);
-        Self { posterior, gain, growth }
-    }
+    let there = if N > Parameter::OffsetB as usize { offsets.len() } else { 0 };
+    offsets
+        .into_iter()
+        .zip(*variances)
+        .take(there)
+        .filter(|(offset, variance)| *offset < N && *variance > T::zero())
 }
 
 /// Each number less the largest.

@@ -16,10 +16,10 @@ impl<T: Real> NoiseStd<T> {
         let millionth = T::lit(1e-6);
         let flow_floor = millionth * cylinder.area_a_m2 * cylinder.stroke_m;
         Self {
-            flow_a_m3s: sensors.flow_a.noise_std.max(flow_floor),
-            flow_b_m3s: sensors.flow_b.noise_std.max(flow_floor),
-            pressure_pa: sensors.pressure.noise_std.max(T::one()),
-            position_m: sensors.position.noise_std.max(millionth * cylinder.stroke_m),
+            flow_a_m3s: sensors.flow_a.noise_std.at_least(flow_floor),
+            flow_b_m3s: sensors.flow_b.noise_std.at_least(flow_floor),
+            pressure_pa: sensors.pressure.noise_std.at_least(T::one()),
+            position_m: sensors.position.noise_std.at_least(millionth * cylinder.stroke_m),
         }
     }
 

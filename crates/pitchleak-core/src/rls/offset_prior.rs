@@ -22,6 +22,7 @@ pub(super) struct OffsetPrior<T> {
 
 impl<T: Real> OffsetPrior<T> {
     /// Of `zeros` as far off as they may be by now; `units` of the offsets, m³/s.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn new(
         cylinder: &Cylinder<T>,
         zeros: &Zeros<T>,

@@ -12,7 +12,7 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
 ) -> [T; N] {
     let tiny = T::lit(1e-9);
     let leak = cylinder.area_a_m2 * cylinder.stroke_m * T::lit(8e3) / fluid.bulk_modulus_pa;
-    let relative = (fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa).max(T::lit(1e-6));
+    let relative = (fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa).at_least(T::lit(1e-6));
     let [offset_a, offset_b] = offset_units(cylinder, &Zeros::of(sensors));
     let all = [
         relative / fluid.bulk_modulus_pa,
@@ -21,9 +21,9 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
         leak,
         offset_a,
         offset_b,
-        sensors.flow_a.gain_std.max(tiny),
-        sensors.flow_b.gain_std.max(tiny),
-        sensors.position.gain_std.max(tiny),
+        sensors.flow_a.gain_std.at_least(tiny),
+        sensors.flow_b.gain_std.at_least(tiny),
+        sensors.position.gain_std.at_least(tiny),
     ];
     let mut spread = [T::zero(); N];
     for (s, value) in spread.iter_mut().zip(all) {
@@ -34,13 +34,14 @@ pub(super) fn prior_spread<T: Real, const N: usize>(
 
 /// Units of the offsets of chambers A and B, m³/s: the meter's bias and what it drifts in an hour, and what the pressures' bias drives
 /// through a leak that empties the cylinder in 20 s at 1 MPa.
+#[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
 pub(super) fn offset_units<T: Real>(cylinder: &Cylinder<T>, zeros: &Zeros<T>) -> [T; 2] {
     let volume = cylinder.area_a_m2 * cylinder.stroke_m;
     let through_leak = volume * T::lit(5e-8) * zeros.pressure.bias_std;
     [zeros.flow_a, zeros.flow_b].map(|meter| {
         let (bias, drift) = (meter.bias_std, meter.drift_std_ph);
         let together = bias * bias + drift * drift + through_leak * through_leak;
-        together.sqrt().max(T::lit(1e-9) * volume)
+        together.sqrt().at_least(T::lit(1e-9) * volume)
     })
 }
 

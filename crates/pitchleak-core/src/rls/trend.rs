@@ -40,8 +40,8 @@ pub(super) struct Trend<T, const N: usize> {
 pub(super) struct Elimination<T, const N: usize> {
     /// Information of the levels with the slopes eliminated (Schur complement).
     pub levels: Information<T, N>,
-    /// L below the diagonal, which is one.
-    lower: [[T; LEAKS]; LEAKS],
+    /// L at [`below`] the diagonal, which is one.
+    lower: [T; LEAKS],
     /// H = L⁻¹ C.
     half: [[T; N]; LEAKS],
     /// h = L⁻¹ ξ.
@@ -53,6 +53,7 @@ pub(super) struct Elimination<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Trend<T, N> {
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn new(memory_s: T) -> Self {
         Self::from_levels(memory_s, Information::new())
     }
@@ -152,76 +153,89 @@ impl<T: Real, const N: usize> Trend<T, N> {
 
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn eliminate_slopes(&self) -> Elimination<T, N> {
-        let mut eliminated = Elimination::nothing();
-        eliminated.levels = self.levels;
-        eliminated.half = self.cross;
-        eliminated.half_vector = self.slope_vector;
-        eliminated.factor();
-        eliminated.eliminate();
+        let zero = [T::zero(); LEAKS];
+        let mut eliminated = Elimination {
+            levels: Information::new(),
+            lower: zero,
+            half: [[T::zero(); N]; LEAKS],
+            half_vector: zero,
+            pivots: zero,
+            inverse_pivot: zero,
+        };
+        eliminated.factor(&self.levels.matrix);
+        eliminated.halve(&self.cross, &self.slope_vector);
+        eliminated.leave(&self.levels);
         eliminated
     }
 }
 
 impl<T: Real, const N: usize> Elimination<T, N> {
-    fn nothing() -> Self {
-        let zero = [T::zero(); LEAKS];
-        Self {
-            levels: Information::new(),
-            lower: [zero; LEAKS],
-            half: [[T::zero(); N]; LEAKS],
-            half_vector: zero,
-            pivots: zero,
-            inverse_pivot: zero,
-        }
-    }
-
-    /// L and D of S + 1 = L D Lᵀ; S at [`of_slopes`].
-    fn factor(&mut self) {
+    /// L and D of S + 1 = L D Lᵀ; S at [`of_slopes`] of `matrix`.
+    fn factor(&mut self, matrix: &[[T; N]; N]) {
         for i in 0..LEAKS {
             for j in 0..i {
                 let (row, column) = of_slopes(i, j);
-                let mut sum = self.levels.matrix[row][column];
+                let mut sum = matrix[row][column];
                 for k in 0..j {
                     // L D stands here until its row is done.
-                    sum -= self.lower[i][k] * self.lower[j][k];
+                    sum -= self.lower[below(i, k)] * self.lower[below(j, k)];
                 }
-                self.lower[i][j] = sum;
+                self.lower[below(i, j)] = sum;
             }
             let (row, column) = of_slopes(i, i);
-            let diagonal = self.levels.matrix[row][column] + T::one();
+            let diagonal = matrix[row][column] + T::one();
             let mut pivot = diagonal;
             for j in 0..i {
-                let own = self.lower[i][j] * self.inverse_pivot[j];
-                pivot -= own * self.lower[i][j];
-                self.lower[i][j] = own;
+                let own = self.lower[below(i, j)] * self.inverse_pivot[j];
+                pivot -= own * self.lower[below(i, j)];
+                self.lower[below(i, j)] = own;
             }
             // Rounding (in f32) may not take from the prior.
-            let floor = T::lit(8.0) * T::epsilon() * diagonal;
-            self.pivots[i] = pivot.at_least(T::lit(0.5)).at_least(floor);
+            let floor = T::lit(0.5) + T::lit(8.0) * T::epsilon() * diagonal;
+            self.pivots[i] = pivot.at_least(floor);
             self.inverse_pivot[i] = T::one() / self.pivots[i];
         }
     }
 
-    /// H and h from C and ξ, and what they leave of the levels' information.
-    fn eliminate(&mut self) {
+    /// H and h from C and ξ.
+    fn halve(&mut self, cross: &[[T; N]; LEAKS], slope_vector: &[T; LEAKS]) {
         for i in 0..LEAKS {
-            for k in 0..i {
-                let factor = self.lower[i][k];
-                for j in 0..N {
-                    let above = self.half[k][j];
-                    self.half[i][j] -= factor * above;
-                }
-                let above = self.half_vector[k];
-                self.half_vector[i] -= factor * above;
-            }
             for j in 0..N {
-                let factor = self.half[i][j] * self.inverse_pivot[i];
-                for k in 0..j + 1 {
-                    self.levels.matrix[j][k] -= factor * self.half[i][k];
+                let mut entry = cross[i][j];
+                for k in 0..i {
+                    entry -= self.lower[below(i, k)] * self.half[k][j];
                 }
-                self.levels.vector[j] -= factor * self.half_vector[i];
+                self.half[i][j] = entry;
             }
+            let mut entry = slope_vector[i];
+            for k in 0..i {
+                entry -= self.lower[below(i, k)] * self.half_vector[k];
+            }
+            self.half_vector[i] = entry;
         }
+    }
+
+    /// What is left of the levels' information. Entry by entry: registers are few on a microcontroller.
+    fn leave(&mut self, levels: &Information<T, N>) {
+        for j in 0..N {
+            let mut factor = [T::zero(); LEAKS];
+            for i in 0..LEAKS {
+                factor[i] = self.half[i][j] * self.inverse_pivot[i];
+            }
+            for k in 0..j + 1 {
+                let mut entry = levels.matrix[j][k];
+                for i in 0..LEAKS {
+                    entry -= factor[i] * self.half[i][k];
+                }
+                self.levels.matrix[j][k] = entry;
+            }
+            let mut entry = levels.vector[j];
+            for i in 0..LEAKS {
+                entry -= factor[i] * self.half_vector[i];
+            }
+            self.levels.vector[j] = entry;
+        }
+        self.levels.column_noise = levels.column_noise;
     }
 
     /// Mean slopes that go with the levels.
@@ -237,7 +251,7 @@ impl<T: Real, const N: usize> Elimination<T, N> {
             let i = LEAKS - 1 - back;
             for k in i + 1..LEAKS {
                 let known = slopes[k];
-                slopes[i] -= self.lower[k][i] * known;
+                slopes[i] -= self.lower[below(k, i)] * known;
             }
         }
         slopes
@@ -264,7 +278,7 @@ impl<T: Real, const N: usize> Elimination<T, N> {
         for i in 0..LEAKS {
             for k in 0..i {
                 let known = through[k];
-                through[i] -= self.lower[i][k] * known;
+                through[i] -= self.lower[below(i, k)] * known;
             }
             let factor = through[i] * self.inverse_pivot[i];
             variance += factor * through[i];
@@ -274,6 +288,12 @@ impl<T: Real, const N: usize> Elimination<T, N> {
         }
         variance + levels.variance(&whole)
     }
+}
+
+/// Place of what stands in row `i` and column `j` < `i`, row by row.
+#[inline]
+const fn below(i: usize, j: usize) -> usize {
+    i + j - 1
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ pub(super) struct Weights<T> {
 impl<T: Real> Weights<T> {
     /// Weights where both flows are measured. The error of chamber A is n_QA − (C_ip + C_epA) n_PA
     /// + C_ip n_PB, that of B likewise, so the leaks themselves decide how much pressure noise counts.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn both(cylinder: &Cylinder<T>, noise: &NoiseStd<T>, leaks: &PerLeak<T>) -> Self {
         let pressure = noise.pressure_pa * noise.pressure_pa;
         let (c, a, b) = (leaks.internal, leaks.external_a, leaks.external_b);
