@@ -1,10 +1,11 @@
-//! What an operator would believe after the replay, and whether it is so.
+//! What an operator would believe at a door of the program, and whether it is so.
 
 use crate::lie::Lie;
 use crate::plant::{Leaking, rig};
-use pitchleak::core::{Leak, Sample, Sensors};
+use pitchleak::core::{Leak, PerLeak, Sample, Sensors};
+use pitchleak::live::{EstimateEvent, Event, LineFormat, LiveConfig, LiveLeakage, Watch};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::report::ReplayReport;
+use pitchleak::report::{Reason, ReplayReport, Status};
 use pitchleak::simulate::{
     Biases, Reading, Row, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
 };
@@ -22,13 +23,92 @@ pub enum Judgement {
     ConfidentlyWrong,
 }
 
+/// Where samples come in and a verdict comes out.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Door {
+    /// `pitchleak replay`, of the whole file.
+    Replay,
+    /// `pitchleak watch` and the gateway, line by line: what they say last.
+    Watch,
+}
+
+impl Door {
+    pub const ALL: [Self; 2] = [Self::Replay, Self::Watch];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Replay => "replay",
+            Self::Watch => "watch",
+        }
+    }
+
+    /// What it says of a trace; none where it refuses it.
+    fn said(self, trace: Vec<u8>, accuracy: f64) -> Option<Said> {
+        match self {
+            Self::Replay => replayed(trace, accuracy).ok().map(Said::from),
+            Self::Watch => watched(&trace, accuracy).map(Said::from),
+        }
+    }
+}
+
+/// What a door says.
+pub struct Said {
+    status: Status,
+    faults: Vec<Leak>,
+    leakage: PerLeak<LiveLeakage>,
+    changed_at_s: Option<f64>,
+    reasons: Vec<Reason>,
+}
+
+impl From<ReplayReport> for Said {
+    fn from(report: ReplayReport) -> Self {
+        Self {
+            status: report.verdict.status,
+            faults: report.verdict.faults,
+            leakage: report.leakage.map(LiveLeakage::from),
+            changed_at_s: report.changed_at_s,
+            reasons: report.verdict.reasons,
+        }
+    }
+}
+
+impl From<EstimateEvent> for Said {
+    fn from(last: EstimateEvent) -> Self {
+        let EstimateEvent { status, faults, leakage, changed_at_s, reasons, .. } = last;
+        Self { status, faults, leakage, changed_at_s, reasons }
+    }
+}
+
+fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayError> {
+    let rig = rig(accuracy);
+    let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace)), &rig)?;
+    replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
+}
+
+/// The last estimate.
+fn watched(trace: &[u8], accuracy: f64) -> Option<EstimateEvent> {
+    let (mut last, mut events) = (None, Vec::new());
+    let mut watch = Watch::new(LiveConfig::of(rig(accuracy)), Some(LineFormat::Csv));
+    for line in trace.split(|byte| *byte == b'\n') {
+        watch.take(line, &mut events);
+        last = last_estimate(&mut events).or(last);
+    }
+    watch.finish(&mut events);
+    last_estimate(&mut events).or(last)
+}
+
+fn last_estimate(events: &mut Vec<Event>) -> Option<EstimateEvent> {
+    let estimate = |event| if let Event::Estimate(estimate) = event { Some(*estimate) } else { None };
+    events.drain(..).filter_map(estimate).last()
+}
+
 /// A stated figure may be off by this much, or by its own 3 σ, L/min.
 const FIGURE_LPM: f64 = 0.1;
 
-pub fn judge(report: &ReplayReport, leaking: Leaking, truths: &[Truth]) -> Judgement {
-    let right_place = report.verdict.faults.iter().copied().eq(leaking);
-    let right_size = report.verdict.faults.iter().all(|leak| is_size(report, *leak, truths));
-    match (report.verdict.status.is_sure(), right_place && right_size) {
+pub fn judge(said: &Said, leaking: Leaking, truths: &[Truth]) -> Judgement {
+    let right_place = said.faults.iter().copied().eq(leaking);
+    let right_size = said.faults.iter().all(|leak| is_size(said, *leak, truths));
+    match (said.status.is_sure(), right_place && right_size) {
         (false, _) => Judgement::InDoubt,
         (true, true) => Judgement::Right,
         (true, false) => Judgement::ConfidentlyWrong,
@@ -36,41 +116,28 @@ pub fn judge(report: &ReplayReport, leaking: Leaking, truths: &[Truth]) -> Judge
 }
 
 /// Whether the mean flow of a leak is the one stated.
-fn is_size(report: &ReplayReport, leak: Leak, truths: &[Truth]) -> bool {
-    let since_s = report.changed_at_s.unwrap_or(0.0);
+fn is_size(said: &Said, leak: Leak, truths: &[Truth]) -> bool {
+    let since_s = said.changed_at_s.unwrap_or(0.0);
     let flows = truths.iter().filter(|truth| truth.t_s >= since_s).map(|truth| truth.leaks_m3s[leak].abs());
     let (sum, count) = flows.fold((0.0, 0.0), |(sum, count), flow| (sum + flow, count + 1.0));
-    let stated = report.leakage[leak];
+    let stated = said.leakage[leak];
     let off_lpm = (stated.mean_lpm - LPM_PER_M3S * sum / f64::max(count, 1.0)).abs();
     off_lpm <= FIGURE_LPM.max(3.0 * stated.std_lpm.unwrap_or(0.0))
 }
 
-/// The judgement of a replay of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
-pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> (Judgement, bool) {
-    let Ok((report, shown)) = replayed(truths, lie, accuracy, seed) else {
-        return (Judgement::InDoubt, false);
-    };
-    (judge(&report, leaking, shown), names(&report, lie))
+/// The judgement at each door of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
+pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> [(Judgement, bool); 2] {
+    let (trace, shown) = recorded(truths, lie, rig(accuracy).sensors(), seed);
+    Door::ALL.map(|door| match door.said(trace.clone(), accuracy) {
+        None => (Judgement::InDoubt, false),
+        Some(said) => (judge(&said, leaking, shown), names(&said, lie)),
+    })
 }
 
-/// Whether the report says what the lie is.
-fn names(report: &ReplayReport, lie: &Lie) -> bool {
+/// Whether it is said what the lie is.
+fn names(said: &Said, lie: &Lie) -> bool {
     let Some([id, words]) = lie.named else { return false };
-    report.verdict.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
-}
-
-/// The report on it, and the truth as far as it was recorded.
-pub fn replayed<'a>(
-    truths: &'a [Truth],
-    lie: &Lie,
-    accuracy: f64,
-    seed: u64,
-) -> Result<(ReplayReport, &'a [Truth]), ReplayError> {
-    let rig = rig(accuracy);
-    let (text, shown) = recorded(truths, lie, rig.sensors(), seed);
-    let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig)?;
-    let report = replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?;
-    Ok((report, shown))
+    said.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
 }
 
 /// The trace as CSV, as users have it, and the truth up to its last row.

@@ -1,4 +1,4 @@
-//! The bench of lies: what `replay` makes of traces whose sensors, wires or recorder lie, of a cylinder that does
+//! The bench of lies: what `replay` and `watch` make of traces whose sensors, wires or recorder lie, of a cylinder that does
 //! what the estimator's model leaves out.
 //!
 //! `cargo bench --bench lies` prints the tables of `docs/bench-of-lies.md`. After `--`: seeds per row, and a file for

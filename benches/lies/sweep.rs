@@ -1,6 +1,6 @@
 //! All lies on all cylinders.
 
-use crate::judge::{Judgement, ask};
+use crate::judge::{Door, Judgement, ask};
 use crate::lie::{LIES, Lie};
 use crate::plant::{LEAKING, Leaking, truths};
 use pitchleak::wind::WindCase;
@@ -9,6 +9,7 @@ use rayon::prelude::*;
 /// One row of the bench, over its seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
+    pub door: Door,
     pub lie: &'static Lie,
     pub leaking: Leaking,
     pub accuracy: f64,
@@ -26,28 +27,32 @@ impl Outcome {
     }
 }
 
-/// Every lie × leak × accuracy × wind, `seeds` times each; the order and the seeds don't depend on the cores.
+/// Every lie × leak × accuracy × wind at each door, `seeds` times each; the order and the seeds don't depend on the cores.
 pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome> {
     let cylinders: Vec<_> = winds.iter().flat_map(|wind| LEAKING.map(|leaking| (*wind, leaking))).collect();
     let of_cylinder = |(wind, leaking): &(WindCase, Leaking)| {
         let truths = truths(*wind, *leaking);
         let cases: Vec<_> = accuracies.iter().flat_map(|a| LIES.iter().map(move |lie| (*a, lie))).collect();
-        let outcome = |(accuracy, lie): &(f64, &'static Lie)| {
-            let judgements: Vec<_> =
+        let outcomes = |(accuracy, lie): &(f64, &'static Lie)| {
+            let asked: Vec<_> =
                 (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
-            let count = |which| judgements.iter().filter(|(judgement, _)| *judgement == which).count();
-            Outcome {
-                lie,
-                leaking: *leaking,
-                accuracy: *accuracy,
-                wind: *wind,
-                right: count(Judgement::Right),
-                in_doubt: count(Judgement::InDoubt),
-                confidently_wrong: count(Judgement::ConfidentlyWrong),
-                named: judgements.iter().filter(|(_, named)| *named).count(),
-            }
+            Door::ALL.map(|door| {
+                let judgements = || asked.iter().map(|doors| doors[door as usize]);
+                let count = |which| judgements().filter(|(judgement, _)| *judgement == which).count();
+                Outcome {
+                    door,
+                    lie,
+                    leaking: *leaking,
+                    accuracy: *accuracy,
+                    wind: *wind,
+                    right: count(Judgement::Right),
+                    in_doubt: count(Judgement::InDoubt),
+                    confidently_wrong: count(Judgement::ConfidentlyWrong),
+                    named: judgements().filter(|(_, named)| *named).count(),
+                }
+            })
         };
-        cases.par_iter().map(outcome).collect::<Vec<_>>()
+        cases.par_iter().flat_map_iter(outcomes).collect::<Vec<_>>()
     };
     cylinders.par_iter().map(of_cylinder).collect::<Vec<_>>().concat()
 }

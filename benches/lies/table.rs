@@ -1,17 +1,18 @@
 //! The tables of `docs/bench-of-lies.md`, and the snapshot's form.
 
+use crate::judge::Door;
 use crate::lie::{Family, LIES};
 use crate::plant::leak_name;
 use crate::sweep::Outcome;
 use std::fmt::Write;
 
-pub const HEADER: &str = "family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named\n";
+pub const HEADER: &str = "door,family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named\n";
 
 /// What a row of the bench is about, as the first cells of its line.
 pub fn key(outcome: &Outcome) -> String {
-    let Outcome { lie, leaking, accuracy, wind, .. } = outcome;
-    let (family, leak) = (lie.family.name(), leak_name(*leaking));
-    format!("{family},{},{leak},{accuracy},{}", lie.name, wind.mean_mps())
+    let Outcome { door, lie, leaking, accuracy, wind, .. } = outcome;
+    let (door, family, leak) = (door.name(), lie.family.name(), leak_name(*leaking));
+    format!("{door},{family},{},{leak},{accuracy},{}", lie.name, wind.mean_mps())
 }
 
 /// Every row.
@@ -40,23 +41,32 @@ fn line(out: &mut String, name: &str, [runs, right, doubt, wrong, named]: [usize
     let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {named} | {wrong} |");
 }
 
-/// The tables for people.
+/// The tables for people, door by door.
 pub fn summary(outcomes: &[Outcome]) -> String {
+    let of_door = |door: Door| {
+        let own: Vec<Outcome> = outcomes.iter().filter(|one| one.door == door).copied().collect();
+        tables(door, &own)
+    };
+    Door::ALL.map(of_door).join("\n")
+}
+
+fn tables(door: Door, outcomes: &[Outcome]) -> String {
     let mut out = String::new();
     let head = |out: &mut String, title: &str, what: &str| {
         let _ = write!(
             out,
-            "## {title}\n\n| {what} | runs | right | in doubt | of these named | confidently wrong |\n|---|---|---|---|---|---|\n"
+            "## `{}`: {title}\n\n| {what} | runs | right | in doubt | of these named | confidently wrong |\n|---|---|---|---|---|---|\n",
+            door.name()
         );
     };
-    head(&mut out, "By family", "family");
+    head(&mut out, "by family", "family");
     for family in Family::ALL {
         line(&mut out, family.name(), sums(outcomes, |one| one.lie.family == family));
     }
     out.push('\n');
     for (title, what, families) in [
-        ("Right and sure is asked", "accuracy, wind", &[Family::Honest, Family::Harmless][..]),
-        ("Right or in doubt is asked", "accuracy, wind", &[Family::Offset, Family::Mistake][..]),
+        ("right and sure is asked", "accuracy, wind", &[Family::Honest, Family::Harmless][..]),
+        ("right or in doubt is asked", "accuracy, wind", &[Family::Offset, Family::Mistake][..]),
     ] {
         head(&mut out, title, what);
         let mut conditions: Vec<_> = outcomes.iter().map(|one| (one.accuracy, one.wind)).collect();
@@ -69,7 +79,7 @@ pub fn summary(outcomes: &[Outcome]) -> String {
         }
         out.push('\n');
     }
-    head(&mut out, "By lie", "lie");
+    head(&mut out, "by lie", "lie");
     for lie in LIES {
         let name = format!("{} ({})", lie.name, lie.family.name());
         line(&mut out, &name, sums(outcomes, |one| one.lie.name == lie.name));

@@ -141,7 +141,9 @@ impl Cylinder {
             status: report.verdict.status,
             faults: report.verdict.faults,
             leakage: report.leakage.map(LiveLeakage::from),
+            changed_at_s: report.changed_at_s,
             trend: report.trend,
+            reasons: report.verdict.reasons,
             time_ns: self.time_ns(t_s),
         })
     }

@@ -1,7 +1,7 @@
 //! What goes out.
 
 use super::history::{LeakSummary, Span};
-use crate::report::{LeakTrend, Leakage, Status};
+use crate::report::{LeakTrend, Leakage, Reason, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -38,14 +38,20 @@ pub struct EstimateEvent {
     pub cylinder: String,
     /// Time of the sample, s; since the first one where lines have time stamps.
     pub t_s: f64,
-    /// What a replay's verdict on the samples so far would be, before it weighs wiring and zeros over a whole trace.
+    /// What a replay's verdict on the samples so far would be.
     pub status: Status,
     /// Leaks whose alarm stands, and those that come and go.
     pub faults: Vec<Leak>,
-    /// Mean leak flows since the start, or since the leak changed.
+    /// Mean leak flows since the start, or since `changed_at_s`.
     pub leakage: PerLeak<LiveLeakage>,
+    /// When the leak last changed at once, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changed_at_s: Option<f64>,
     /// How fast each leak changes; none where the data don't tell.
     pub trend: PerLeak<Option<LeakTrend>>,
+    /// Why the status is doubtful or not sure, and what to check, first things first; none where it is sure.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
     /// Time of the sample, ns since 1970, where lines have time stamps.
     #[serde(skip)]
     pub time_ns: Option<i64>,

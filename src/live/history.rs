@@ -214,7 +214,9 @@ mod tests {
             status: Status::Leak,
             faults: vec![Leak::Internal],
             leakage: PerLeak { internal: leakage, external_a: leakage, external_b: leakage },
+            changed_at_s: None,
             trend: PerLeak::default(),
+            reasons: Vec::new(),
             time_ns: None,
         }
     }
