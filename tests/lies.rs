@@ -73,6 +73,9 @@ fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
         assert!(wrong.len() <= slack, "{door:?}, {family:?}: newly confidently wrong: {wrong:#?}");
         // To doubt a trace whose meters lie is no loss.
         let must_be_sure = matches!(family, Family::Honest | Family::Harmless);
-        assert!(!must_be_sure || lost <= slack, "{door:?}, {family:?}: {lost} of {runs} right and sure ones are lost");
+        assert!(
+            !must_be_sure || lost <= slack,
+            "{door:?}, {family:?}: {lost} of {runs} right and sure ones are lost"
+        );
     }
 }

@@ -10,16 +10,23 @@ mod lie;
 #[path = "../benches/lies/plant.rs"]
 mod plant;
 
-use judge::{Judgement, judge, replayed};
+use judge::{Judgement, Said, judge, recorded};
 use lie::{Family, Lie};
 use pitchleak::core::Leak;
-use pitchleak::report::Status;
+use pitchleak::report::{ReplayReport, Status};
+use pitchleak::simulate::Truth;
 use pitchleak::wind::WindCase;
 use plant::{LEAKING, leak_name, truths};
 use rayon::prelude::*;
 
 fn lie(faults: &'static [&'static str]) -> Lie {
     Lie { family: Family::Mistake, name: "", faults, every: 1, named: None }
+}
+
+/// The report on what sensors show of it, and the truth as far as it was recorded.
+fn replayed<'a>(truths: &'a [Truth], lie: &Lie, accuracy: f64, seed: u64) -> (ReplayReport, &'a [Truth]) {
+    let (trace, shown) = recorded(truths, lie, accuracy, seed);
+    (judge::replayed(trace, accuracy).unwrap_or_else(|e| panic!("{e}")), shown)
 }
 
 /// The kinds of reasons that a minute of wind can give; the others are tested beside the code.
@@ -41,8 +48,7 @@ fn each_mistake_gives_its_reason() {
         ("model_does_not_fit", WindCase::Mps13, internal, &["qb gain 20 %"]),
     ];
     for (id, wind, leaking, faults) in cases {
-        let (report, _) =
-            replayed(&truths(wind, leaking), &lie(faults), 3e-3, 1).unwrap_or_else(|e| panic!("{e}"));
+        let (report, _) = replayed(&truths(wind, leaking), &lie(faults), 3e-3, 1);
         let ids: Vec<_> = report.verdict.reasons.iter().map(|reason| reason.id.name()).collect();
         assert!(ids.contains(&id), "{faults:?}: {id} is not among {ids:?}: {}", report.verdict.text);
         assert!(!report.verdict.status.is_sure() && !report.verdict.text.is_empty());
@@ -57,9 +63,9 @@ fn a_leak_through_an_orifice_is_sure_and_its_law_is_named() {
     [WindCase::Mps13, WindCase::Mps30].par_iter().for_each(|wind| {
         let truths = truths(*wind, internal);
         let judged = |faults, seed| {
-            let (report, shown) =
-                replayed(&truths, &lie(faults), 1e-3, seed).unwrap_or_else(|e| panic!("{e}"));
-            (judge(&report, internal, shown), report.verdict.text)
+            let (report, shown) = replayed(&truths, &lie(faults), 1e-3, seed);
+            let text = report.verdict.text.clone();
+            (judge(&report.into(), internal, shown), text)
         };
         for seed in 1..=2 {
             let (judgement, text) = judged(&[], seed);
@@ -80,9 +86,9 @@ fn honest_traces_stay_sure() {
     cylinders.par_iter().for_each(|(wind, leaking)| {
         let truths = truths(*wind, *leaking);
         for accuracy in [3e-3, 1e-2] {
-            let (report, shown) = replayed(&truths, &honest, accuracy, 2).unwrap_or_else(|e| panic!("{e}"));
+            let (report, shown) = replayed(&truths, &honest, accuracy, 2);
             let name = format!("{} at {} m/s, {accuracy}", leak_name(*leaking), wind.mean_mps());
-            let judged = judge(&report, *leaking, shown);
+            let judged = judge(&Said::from(report.clone()), *leaking, shown);
             assert_eq!(judged, Judgement::Right, "{name}: {:?}", report.verdict);
             let status = if leaking.is_some() { Status::Leak } else { Status::Sound };
             assert_eq!((report.verdict.status, report.verdict.reasons.len()), (status, 0), "{name}");

@@ -2,7 +2,7 @@
 
 use crate::lie::Lie;
 use crate::plant::{Leaking, rig};
-use pitchleak::core::{Leak, PerLeak, Sample, Sensors};
+use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::live::{EstimateEvent, Event, LineFormat, LiveConfig, LiveLeakage, Watch};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{Reason, ReplayReport, Status};
@@ -79,7 +79,7 @@ impl From<EstimateEvent> for Said {
     }
 }
 
-fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayError> {
+pub fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayError> {
     let rig = rig(accuracy);
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace)), &rig)?;
     replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
@@ -99,7 +99,7 @@ fn watched(trace: &[u8], accuracy: f64) -> Option<EstimateEvent> {
 
 fn last_estimate(events: &mut Vec<Event>) -> Option<EstimateEvent> {
     let estimate = |event| if let Event::Estimate(estimate) = event { Some(*estimate) } else { None };
-    events.drain(..).filter_map(estimate).last()
+    events.drain(..).rev().find_map(estimate)
 }
 
 /// A stated figure may be off by this much, or by its own 3 σ, L/min.
@@ -126,8 +126,14 @@ fn is_size(said: &Said, leak: Leak, truths: &[Truth]) -> bool {
 }
 
 /// The judgement at each door of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
-pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> [(Judgement, bool); 2] {
-    let (trace, shown) = recorded(truths, lie, rig(accuracy).sensors(), seed);
+pub fn ask(
+    truths: &[Truth],
+    leaking: Leaking,
+    lie: &Lie,
+    accuracy: f64,
+    seed: u64,
+) -> [(Judgement, bool); 2] {
+    let (trace, shown) = recorded(truths, lie, accuracy, seed);
     Door::ALL.map(|door| match door.said(trace.clone(), accuracy) {
         None => (Judgement::InDoubt, false),
         Some(said) => (judge(&said, leaking, shown), names(&said, lie)),
@@ -141,7 +147,8 @@ fn names(said: &Said, lie: &Lie) -> bool {
 }
 
 /// The trace as CSV, as users have it, and the truth up to its last row.
-fn recorded<'a>(truths: &'a [Truth], lie: &Lie, noise: Sensors<f64>, seed: u64) -> (Vec<u8>, &'a [Truth]) {
+pub fn recorded<'a>(truths: &'a [Truth], lie: &Lie, accuracy: f64, seed: u64) -> (Vec<u8>, &'a [Truth]) {
+    let noise = rig(accuracy).sensors();
     let rig = rig(1e-2);
     let faults: Vec<SensorFault> = lie.faults.iter().map(|text| text.parse().expect("a fault")).collect();
     let mut faults = SensorFaults::new(&faults, &rig.instruments, rig.cylinder.stroke_m, seed);

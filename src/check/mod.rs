@@ -11,7 +11,7 @@ use crate::replay::{Replay, ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceReader};
-use crate::wiring::{Excerpt, Wiring, explain, sensor_error, unit_by_scatter};
+use crate::wiring::{Excerpt, Recorded, Wiring, explain, sensor_error, unit_by_scatter};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -104,7 +104,7 @@ pub fn check<E: From<ReplayError>>(
         channels: monitor.faults(&rig),
         wiring: explain(&records, &rig)
             .or_else(|| unit_by_scatter(&excerpt, &rig))
-            .or_else(|| sensor_error(&records, &rig))
+            .or_else(|| sensor_error(&Recorded::new(&records, &rig)?))
             .map(|found| found.wiring(&columns, &rig)),
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),

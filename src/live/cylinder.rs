@@ -149,7 +149,7 @@ impl Cylinder {
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        let Some(ReplayReport { leakage, alarms, .. }) = self.stream.report(name) else { return };
+        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report(name) else { return };
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
             let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));
@@ -161,6 +161,7 @@ impl Cylinder {
                 t_s: alarm.time_s,
                 fault: alarm.fault,
                 state: alarm.state,
+                status: verdict.status,
                 leakage: leakage[alarm.fault].into(),
                 time_ns,
             }));

@@ -86,6 +86,8 @@ pub struct AlarmEvent {
     pub fault: Leak,
     /// What happened.
     pub state: AlarmState,
+    /// Of all estimates at that time: an alarm beside `doubtful` is one to check.
+    pub status: Status,
     /// The leak as known by then.
     #[serde(flatten)]
     pub leakage: LiveLeakage,
@@ -154,6 +156,9 @@ impl Event {
         let _ = match self {
             Self::Estimate(event) => {
                 let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
+                if let Some(reason) = event.reasons.first() {
+                    let _ = write!(values, ",reason=\"{}\"", reason.id.name());
+                }
                 for leak in Leak::ALL {
                     let LiveLeakage { mean_lpm, std_lpm } = event.leakage[leak];
                     let _ = write!(values, ",{}_mean_lpm={mean_lpm}", leak.id());
@@ -171,7 +176,12 @@ impl Event {
                 line = tagged(&line, "fault", event.fault.id());
                 let raised = event.state == AlarmState::Raised;
                 let (id, mean) = (quoted(&event.id), event.leakage.mean_lpm);
-                write!(line, " id=\"{id}\",t_s={},raised={raised},mean_lpm={mean}", event.t_s)
+                let status = event.status.id();
+                write!(
+                    line,
+                    " id=\"{id}\",t_s={},raised={raised},status=\"{status}\",mean_lpm={mean}",
+                    event.t_s
+                )
             }
             Self::Notice(event) => {
                 line = tagged(&line, "kind", &event.kind);

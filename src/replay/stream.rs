@@ -6,6 +6,7 @@ use crate::times::{Clock, TimeFormat};
 use crate::trace::{
     BadRows, LineLayout, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader, read_line,
 };
+use crate::wiring::Running;
 use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
@@ -13,6 +14,7 @@ use pitchleak_core::RlsError;
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Stream {
     replay: Replay,
+    evidence: Running,
     validator: Option<RowValidator>,
     bad_rows: BadRows,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
@@ -69,7 +71,13 @@ impl Stream {
     /// # Errors
     /// As [`Replay::new`].
     pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, RlsError> {
-        Ok(Self { replay: Replay::new(rig)?, validator: None, bad_rows, epoch_ns: None })
+        Ok(Self {
+            replay: Replay::new(rig)?,
+            evidence: Running::default(),
+            validator: None,
+            bad_rows,
+            epoch_ns: None,
+        })
     }
 
     /// What becomes of bad rows.
@@ -91,13 +99,28 @@ impl Stream {
         let mut renewals = 0;
         let ended = loop {
             match reader.next_record(&mut record) {
-                Ok(true) => renewals += u64::from(self.replay.push(&record)),
+                Ok(true) => renewals += u64::from(self.push(&record)),
                 Ok(false) | Err(TraceError { fault: TraceFault::NoRows { .. }, .. }) => break Ok(renewals),
                 Err(error) => break Err(error),
             }
         };
         self.validator = Some(reader.into_validator());
         ended
+    }
+
+    /// Takes in one record; says whether the estimates are new.
+    fn push(&mut self, record: &Record) -> bool {
+        let restarts = self.replay.consistency.restarts();
+        let renewed = self.replay.push(record);
+        if self.replay.consistency.restarts() != restarts {
+            self.evidence.restart();
+        }
+        if !self.replay.spikes.left_out() {
+            let replay = &self.replay;
+            self.evidence
+                .add(record, &replay.rig, || replay.leak_coefficients().map(|leak| leak.value.max(0.0)));
+        }
+        renewed
     }
 
     /// Takes in one line of a live feed, the `line`th: its cells, as `layout` names them.
@@ -114,7 +137,7 @@ impl Stream {
         let validator = self.validator.get_or_insert_with(|| layout.validator(rig, bad_rows));
         let mut record = Record::default();
         Ok(match read_line(layout, line, cells, &mut self.epoch_ns, validator, &mut record)? {
-            None => Taken::Good { renewed: self.replay.push(&record) },
+            None => Taken::Good { renewed: self.push(&record) },
             Some(bad) => Taken::Bad(bad),
         })
     }
@@ -138,6 +161,9 @@ impl Stream {
     pub fn report(&self, name: &str) -> Option<ReplayReport> {
         let quality = self.validator.as_ref()?.quality();
         let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
-        Some(self.replay.report(TraceSummary { begins, ..TraceSummary::new(name, quality) }))
+        let summary = TraceSummary { begins, ..TraceSummary::new(name, quality) };
+        let report = self.replay.report(summary.clone());
+        let suspicions = self.replay.suspicions_so_far(&report.verdict, &self.evidence);
+        Some(if suspicions.any() { self.replay.report_with(summary, &suspicions) } else { report })
     }
 }

@@ -1,4 +1,4 @@
-//! Once the trace has been read: does something else than leaks explain it?
+//! Does something else than leaks explain what was read?
 
 use super::Replay;
 use crate::channels::ChannelFaultKind;
@@ -6,24 +6,22 @@ use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
 use crate::trace::Record;
 use crate::wiring::{
-    Excerpt, Explanation, Orifice, ZeroCheck, explain, orifice, sensor_error, unit_by_scatter, zero_check,
+    Excerpt, Explanation, Orifice, Recorded, Running, Wiring, ZeroCheck, changing_leaks_or_zeros, explain,
+    orifice, sensor_error, unit_by_scatter,
 };
 use pitchleak_core::PerLeak;
 
 impl Replay {
-    /// What an excerpt of the trace, whose columns were read by `columns`, says against `verdict`.
+    /// What an excerpt of the whole trace, whose columns were read by `columns`, says against `verdict`.
     pub(super) fn suspicions(&self, verdict: &Verdict, excerpt: &Excerpt, columns: &ColumnMap) -> Suspicions {
-        // Where a channel is broken, no wiring explains the trace.
-        if self.channel_faults().iter().any(|fault| fault.kind != ChannelFaultKind::Coarse) {
+        if self.has_broken_channel() {
             return Suspicions::default();
         }
-        let zeros_count = !self.declares_zeros();
-        let named = |found: Option<Explanation>| found.map(|found| found.wiring(columns, &self.rig));
+        let named = |found: Option<Explanation>| self.named(found, columns);
         if verdict.status != Status::Doubtful {
-            let may_be_zeros = zeros_count && verdict.status == Status::Leak;
             return Suspicions {
                 wiring: named(unit_by_scatter(excerpt, &self.rig)),
-                zeros: if may_be_zeros { self.zeros(excerpt) } else { None },
+                zeros: if self.may_be_zeros(verdict) { self.zeros(excerpt) } else { None },
                 ..Suspicions::default()
             };
         }
@@ -32,18 +30,51 @@ impl Replay {
         if wiring.is_some() {
             return Suspicions { wiring, ..Suspicions::default() };
         }
-        if let Some(orifice) = self.orifice(verdict, &records) {
-            let zeros = orifice.zeros.filter(|_| zeros_count);
+        let Some(whole) = Recorded::new(&records, &self.rig) else { return Suspicions::default() };
+        if let Some(orifice) = self.orifice(verdict, &whole) {
+            let zeros = orifice.zeros.filter(|_| !self.declares_zeros());
             return Suspicions { zeros, orifice: Some(orifice), ..Suspicions::default() };
         }
-        Suspicions { sensor: named(sensor_error(&records, &self.rig)), ..Suspicions::default() }
+        Suspicions { sensor: named(sensor_error(&whole)), ..Suspicions::default() }
+    }
+
+    /// What a stream's evidence so far says. To look for mistakes of wiring takes the samples themselves, and as long as
+    /// those are not excluded, no other law of a leak is believed: that is for a replay of the stored trace.
+    pub(super) fn suspicions_so_far(&self, verdict: &Verdict, evidence: &Running) -> Suspicions {
+        if self.has_broken_channel() {
+            return Suspicions::default();
+        }
+        let named = |found: Option<Explanation>| self.named(found, &self.rig.columns);
+        let lately = evidence.stretch(&self.rig);
+        if verdict.status == Status::Doubtful {
+            return Suspicions { sensor: named(sensor_error(&lately)), ..Suspicions::default() };
+        }
+        Suspicions {
+            wiring: named(evidence.unit_by_scatter(&self.rig)),
+            zeros: if self.may_be_zeros(verdict) { changing_leaks_or_zeros(&lately) } else { None },
+            ..Suspicions::default()
+        }
+    }
+
+    /// No wiring explains what such a channel reads.
+    fn has_broken_channel(&self) -> bool {
+        self.channel_faults().iter().any(|fault| fault.kind != ChannelFaultKind::Coarse)
+    }
+
+    fn named(&self, found: Option<Explanation>, columns: &ColumnMap) -> Option<Wiring> {
+        found.map(|found| found.wiring(columns, &self.rig))
     }
 
     /// Whether the leaks found pass an orifice, where nothing speaks against them but that they are not as C P.
-    fn orifice(&self, verdict: &Verdict, records: &[Record]) -> Option<Orifice> {
+    fn orifice(&self, verdict: &Verdict, whole: &Recorded<'_>) -> Option<Orifice> {
         let only_by_law = verdict.reasons.iter().all(|reason| reason.id.may_be_orifice());
         let leaks = PerLeak::from_fn(|leak| verdict.faults.contains(&leak));
-        (only_by_law && !verdict.faults.is_empty()).then(|| orifice(records, &self.rig, leaks))?
+        (only_by_law && !verdict.faults.is_empty()).then(|| orifice(whole, leaks))?
+    }
+
+    /// Whether a leak is claimed that zeros of the meters may be.
+    fn may_be_zeros(&self, verdict: &Verdict) -> bool {
+        verdict.status == Status::Leak && !self.declares_zeros()
     }
 
     /// Whether the rig file says how far the meters' zeros may be off: the estimates then have them already.
@@ -57,6 +88,6 @@ impl Replay {
         let mut records = excerpt.records();
         let since_s = self.changed_at_s.unwrap_or(f64::NEG_INFINITY);
         records.retain(|record: &Record| record.t_s >= since_s);
-        zero_check(&records, &self.rig)
+        changing_leaks_or_zeros(&Recorded::new(&records, &self.rig)?)
     }
 }

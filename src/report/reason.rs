@@ -1,10 +1,10 @@
 //! Why a verdict is doubtful or not sure, each with what to check.
 
-use super::Findings;
 use super::statement::{interval, join, with_interval};
+use super::{Findings, Misfit};
 use crate::channels::ChannelFaultKind;
 use crate::units::LPM_PER_M3S;
-use crate::wiring::{Wiring, ZeroCheck};
+use crate::wiring::{SingleZero, Wiring, ZeroCheck};
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
@@ -29,6 +29,8 @@ pub enum ReasonId {
     KeepsChanging,
     /// The residuals are larger than the declared noise can make them.
     ModelDoesNotFit,
+    /// Several leaks at once explain the trace only nearly.
+    SeveralLeaks,
     /// The trace does not pin a leak down.
     NotIdentifiable,
     /// A leak's interval reaches beyond its threshold, and yet not for sure.
@@ -50,6 +52,7 @@ impl ReasonId {
             Self::OffsetOrLeak => "offset_or_leak",
             Self::KeepsChanging => "keeps_changing",
             Self::ModelDoesNotFit => "model_does_not_fit",
+            Self::SeveralLeaks => "several_leaks",
             Self::NotIdentifiable => "not_identifiable",
             Self::Undecided => "undecided",
             Self::NoUncertainty => "no_uncertainty",
@@ -109,6 +112,8 @@ const LEAK_OVER_ZEROS: f64 = 4.0;
 /// otherwise.
 const ZEROS_AT_MOST: f64 = 0.023;
 const ZERO_AT_MOST: f64 = 0.02;
+/// χ² by which one steady zero beside all leaks has to explain the trace better to count: five standard deviations.
+const ZERO_BEYOND_CHANCE: f64 = 25.0;
 
 /// What contradicts the model or the sensors, the likeliest cause first.
 pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
@@ -126,9 +131,10 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
         mostly_bad_rows(findings),
         bulk_modulus_impossible(findings),
         negative_leak(findings),
-        offset_or_leak(findings),
+        offset_or_leak(findings).or_else(|| offset_in_leak(findings)),
         keeps_changing(findings),
         model_does_not_fit(findings),
+        several_leaks(findings),
     ];
     let open = |reason: &Reason| findings.suspicions.orifice.is_none() || !reason.id.may_be_orifice();
     channels.chain(others.into_iter().flatten()).filter(open).collect()
@@ -250,8 +256,38 @@ fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
             leak.label(),
             zeros.for_leak[leak]
         ),
-        "read the meters with their valves shut, or record while the pressures change; how far zeros may be off belongs in \
-         the rig file (`bias`)",
+        ZEROS_TELL,
+    ))
+}
+
+const ZEROS_TELL: &str = "read the meters with their valves shut, or record while the pressures change; how far zeros may be \
+                          off belongs in the rig file (`bias`)";
+
+/// A leak that is there, but whose size has a meter's zero in it.
+fn offset_in_leak(findings: &Findings<'_>) -> Option<Reason> {
+    let zeros = findings.suspicions.zeros?;
+    let single = ["qa", "qb"].into_iter().zip(zeros.single).filter_map(|(name, zero)| Some((name, zero?)));
+    let changed = |zero: &SingleZero| {
+        let shift_lpm = zero.shift_m3s.map(|shift| shift * LPM_PER_M3S);
+        let matters = |leak: &Leak| shift_lpm[*leak].abs() >= findings.threshold_lpm[*leak];
+        let leak = Leak::ALL.into_iter().find(|leak| findings.active[*leak] && matters(leak))?;
+        Some((leak, shift_lpm[leak]))
+    };
+    let likely = single.filter(|(_, zero)| zero.drop >= ZERO_BEYOND_CHANCE);
+    let likely = likely.filter_map(|(name, zero)| Some((name, zero, changed(&zero)?)));
+    let (name, zero, (leak, shift_lpm)) = likely.max_by(|(_, a, _), (_, b, _)| a.drop.total_cmp(&b.drop))?;
+    let offset = zero.offset_m3s.scaled(LPM_PER_M3S);
+    Some(Reason::new(
+        ReasonId::OffsetOrLeak,
+        format!(
+            "a zero of {name} that is off by {} L/min explains this trace better (χ² {:+.0}); the {} leak is then {:.2} L/min {}",
+            with_interval(offset.value, Some(offset.std)),
+            -zero.drop,
+            leak.label(),
+            shift_lpm.abs(),
+            if shift_lpm < 0.0 { "smaller" } else { "larger" }
+        ),
+        ZEROS_TELL,
     ))
 }
 
@@ -280,9 +316,34 @@ fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {
     })
 }
 
+const SENSORS_TELL: &str = "check whether the sensors are as good as declared and wired as declared (`pitchleak check`); `pitchleak \
+                            diagnose` looks for an effect that the model lacks";
+
+/// What chance makes of the balance's misfit at the most.
+fn chance(misfit: &Misfit) -> f64 {
+    1.0 + CHANCE_SIGMAS * (2.0 / misfit.balances.max(1) as f64).sqrt()
+}
+
+/// Several leaks at once are rarer than a wrong sensor: they have to explain the trace to the noise.
+fn several_leaks(findings: &Findings<'_>) -> Option<Reason> {
+    let (misfit, faults) = (findings.misfit?, findings.faults());
+    let beyond = misfit.balance > chance(&misfit) && misfit.balance <= MISFIT;
+    (faults.len() > 1 && beyond).then(|| {
+        Reason::new(
+            ReasonId::SeveralLeaks,
+            format!(
+                "{} leaks at once leave residuals {:.1} times the noise of [sensors], more than chance",
+                join(&faults, "and"),
+                misfit.balance.sqrt()
+            ),
+            SENSORS_TELL,
+        )
+    })
+}
+
 fn model_does_not_fit(findings: &Findings<'_>) -> Option<Reason> {
     let misfit = findings.misfit?;
-    let chance = 1.0 + CHANCE_SIGMAS * (2.0 / misfit.balances.max(1) as f64).sqrt();
+    let chance = chance(&misfit);
     let balance = misfit.balance > chance.max(MISFIT) || misfit.worst_window > WORST_MISFIT;
     let odometer = misfit.worst_odometer > ODOMETER_MISFIT;
     (balance || odometer).then(|| {
@@ -294,8 +355,7 @@ fn model_does_not_fit(findings: &Findings<'_>) -> Option<Reason> {
                 "model and declared noise do not explain this trace: its residuals are {at_least}{times:.1} times the \
                  noise of [sensors]"
             ),
-            "check whether the sensors are as good as declared and wired as declared (`pitchleak check`); `pitchleak \
-             diagnose` looks for an effect that the model lacks",
+            SENSORS_TELL,
         )
     })
 }

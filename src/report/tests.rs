@@ -2,7 +2,7 @@ use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::rig::Rig;
 use crate::times::{Clock, TimeFormat, Zone};
-use crate::wiring::{Orifice, Wiring, ZeroCheck};
+use crate::wiring::{Orifice, SingleZero, Wiring, ZeroCheck};
 
 fn entry(value: f64, std: f64) -> EstimateEntry {
     EstimateEntry::new(Estimate { value, std }, EstimateEntry::COEFFICIENT_UNIT)
@@ -289,6 +289,7 @@ fn a_leak_that_a_zero_explains_as_well_is_in_doubt() {
         offsets_m3s: [none; 2],
         offsets_without_m3s: PerLeak::from_fn(|_| [off, none]),
         leaks_m3spa: PerLeak::default(),
+        single: [None; 2],
     };
     let held = |for_leak| Found {
         suspicions: Suspicions { zeros: Some(zeros(for_leak)), ..Suspicions::default() },
@@ -310,6 +311,7 @@ fn a_leak_larger_than_zeros_stands_and_hides_none() {
         offsets_m3s: [none; 2],
         offsets_without_m3s: PerLeak::from_fn(|_| [far, none]),
         leaks_m3spa: PerLeak::default(),
+        single: [None; 2],
     };
     let mut large = found(INTERNAL);
     large.suspicions.zeros = Some(zeros);
@@ -318,6 +320,52 @@ fn a_leak_larger_than_zeros_stands_and_hides_none() {
     large.leakage.external_a.mean_lpm = 0.2;
     assert_eq!(large.judged(), (Status::Doubtful, vec!["offset_or_leak"]));
     assert!(large.verdict().text.contains("as the external A leak does"));
+}
+
+/// The leak is beyond doubt, how large it is isn't.
+#[test]
+fn a_zero_that_is_surely_off_and_changes_a_leak_by_its_threshold_is_a_doubt() {
+    let none = Estimate { value: 0.0, std: 1e-8 };
+    let judged = |drop, shift_lpm: f64| {
+        let single = SingleZero {
+            drop,
+            offset_m3s: Estimate { value: 0.2 / LPM_PER_M3S, std: 1e-8 },
+            shift_m3s: PerLeak { internal: shift_lpm / LPM_PER_M3S, ..PerLeak::default() },
+        };
+        let zeros = ZeroCheck {
+            for_leak: PerLeak { internal: 1e3, ..PerLeak::default() },
+            for_zeros: drop,
+            offsets_m3s: [none; 2],
+            offsets_without_m3s: PerLeak::from_fn(|_| [none; 2]),
+            leaks_m3spa: PerLeak::default(),
+            // That of the other meter, which explains a little more, changes no leak.
+            single: [
+                Some(single),
+                Some(SingleZero { drop: drop + 1.0, shift_m3s: PerLeak::default(), ..single }),
+            ],
+        };
+        let found = Found {
+            suspicions: Suspicions { zeros: Some(zeros), ..Suspicions::default() },
+            ..found(INTERNAL)
+        };
+        (found.judged(), found.verdict().text)
+    };
+    assert_eq!(judged(40.0, -0.05).0, (Status::Leak, vec![]));
+    assert_eq!(judged(20.0, -0.2).0, (Status::Leak, vec![]));
+    let (doubted, text) = judged(40.0, -0.2);
+    assert_eq!(doubted, (Status::Doubtful, vec!["offset_or_leak"]));
+    assert!(text.contains("A zero of qa that is off by 0.2000 ± 0.0012 L/min"), "{text}");
+    assert!(text.contains("the internal leak is then 0.20 L/min smaller"), "{text}");
+}
+
+/// What one leak may leave beyond the noise, several may not.
+#[test]
+fn several_leaks_at_once_have_to_explain_the_trace_to_the_noise() {
+    let mut found = found(INTERNAL);
+    found.misfit = Some(Misfit { balance: 2.0, ..SOUND });
+    assert_eq!(found.judged().0, Status::Leak);
+    found.active.external_b = true;
+    assert_eq!(found.judged(), (Status::Doubtful, vec!["several_leaks"]));
 }
 
 fn episode(from_s: f64, to_s: Option<f64>) -> Episode {

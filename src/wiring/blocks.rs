@@ -1,5 +1,6 @@
 use crate::trace::Record;
 use pitchleak_core::{Cylinder, Leak, PerLeak, Sample};
+use serde::{Deserialize, Serialize};
 
 /// Shortest block, s, and its fewest steps: as in the estimator.
 const BLOCK_S: f64 = 0.25;
@@ -28,8 +29,8 @@ pub(super) struct Block {
     /// ∫dt, s, and Σ dt², s².
     pub time_s: f64,
     pub time_square_s2: f64,
-    /// Time of its end since the middle of all blocks, s.
-    pub after_middle_s: f64,
+    /// Time of its end, s.
+    pub end_s: f64,
 }
 
 impl Block {
@@ -44,7 +45,7 @@ impl Block {
 }
 
 /// One chamber's integrals.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Chamber {
     /// ∫Q dt, m³.
     pub flow_m3: f64,
@@ -56,7 +57,7 @@ pub(super) struct Chamber {
     pub volume_m3: f64,
 }
 
-#[derive(Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Sum {
     a: Chamber,
     b: Chamber,
@@ -69,40 +70,41 @@ struct Sum {
     fed_b: u32,
 }
 
-/// The records' blocks; a rest that a gap cuts off is lost, as is a block without any flow all through.
-pub(super) fn blocks(records: &[Record], cylinder: &Cylinder<f64>) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    let (mut sum, mut follows) = (Sum::default(), false);
-    for pair in records.windows(2) {
-        let [last, now] = pair else { continue };
-        if now.step_s() <= 0.0 {
-            (sum, follows) = (Sum::default(), false);
-            continue;
-        }
-        sum.add(last, now, cylinder);
-        if sum.time_s >= BLOCK_S && sum.steps >= BLOCK_STEPS {
-            match std::mem::take(&mut sum).block(follows, now.t_s) {
-                Some(block) => {
-                    follows = true;
-                    blocks.push(block);
-                }
-                None => follows = false,
-            }
-        }
-    }
-    centre_time(&mut blocks);
-    blocks
+/// Gathers records to blocks; a rest that a gap cuts off is lost, as is a block without any flow all through.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Gatherer {
+    last: Option<Sample<f64>>,
+    sum: Sum,
+    follows: bool,
 }
 
-fn centre_time(blocks: &mut [Block]) {
-    let ends = [blocks.first(), blocks.last()].map(|block| block.map_or(0.0, |block| block.after_middle_s));
-    let middle_s = 0.5 * (ends[0] + ends[1]);
-    blocks.iter_mut().for_each(|block| block.after_middle_s -= middle_s);
+impl Gatherer {
+    /// Takes in the next record; gives the block that it ends.
+    pub fn add(&mut self, now: &Record, cylinder: &Cylinder<f64>) -> Option<Block> {
+        let last = self.last.replace(now.sample)?;
+        if now.step_s() <= 0.0 {
+            (self.sum, self.follows) = (Sum::default(), false);
+            return None;
+        }
+        self.sum.add(&last, now, cylinder);
+        if self.sum.time_s < BLOCK_S || self.sum.steps < BLOCK_STEPS {
+            return None;
+        }
+        let block = std::mem::take(&mut self.sum).block(self.follows, now.t_s);
+        self.follows = block.is_some();
+        block
+    }
+}
+
+/// The records' blocks.
+pub(super) fn blocks(records: &[Record], cylinder: &Cylinder<f64>) -> Vec<Block> {
+    let mut gatherer = Gatherer::default();
+    records.iter().filter_map(|record| gatherer.add(record, cylinder)).collect()
 }
 
 impl Sum {
-    fn add(&mut self, last: &Record, now: &Record, cylinder: &Cylinder<f64>) {
-        let (dt, l, n) = (now.step_s(), &last.sample, &now.sample);
+    fn add(&mut self, l: &Sample<f64>, now: &Record, cylinder: &Cylinder<f64>) {
+        let (dt, n) = (now.step_s(), &now.sample);
         let x = (0.5 * (l.x_m + n.x_m)).clamp(0.0, cylinder.stroke_m);
         let add = |chamber: &mut Chamber, volume: f64, [p0, p1]: [f64; 2], flows: Option<f64>| {
             chamber.flow_m3 += 0.5 * dt * flows.unwrap_or(0.0);
@@ -130,7 +132,7 @@ impl Sum {
         self.fed_b += u32::from(qb.is_some());
     }
 
-    fn block(self, follows: bool, after_middle_s: f64) -> Option<Block> {
+    fn block(self, follows: bool, end_s: f64) -> Option<Block> {
         let fed = match (self.fed_a == self.steps, self.fed_b == self.steps) {
             (true, true) => Fed::Both,
             (true, false) => Fed::OnlyA,
@@ -138,6 +140,6 @@ impl Sum {
             (false, false) => return None,
         };
         let Self { a, b, roots, travel_m, time_s, time_square_s2, .. } = self;
-        Some(Block { follows, fed, a, b, roots, travel_m, time_s, time_square_s2, after_middle_s })
+        Some(Block { follows, fed, a, b, roots, travel_m, time_s, time_square_s2, end_s })
     }
 }

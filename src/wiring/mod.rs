@@ -5,6 +5,8 @@
 
 mod blocks;
 mod candidates;
+mod continuity;
+mod equations;
 mod excerpt;
 mod explanation;
 mod fit;
@@ -13,22 +15,28 @@ mod noise;
 mod orifice;
 mod priors;
 mod readings;
+mod running;
+mod running_median;
 mod sensor_error;
 mod signs;
 mod zeros;
 
+pub(crate) use continuity::Recorded;
 pub use excerpt::Excerpt;
 pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
-pub use orifice::{Orifice, orifice};
+pub use orifice::Orifice;
+pub(crate) use orifice::orifice;
 pub use readings::Readings;
-pub use sensor_error::sensor_error;
-pub use zeros::{ZeroCheck, zero_check};
+pub use running::Running;
+pub(crate) use sensor_error::sensor_error;
+pub(crate) use zeros::changing_leaks_or_zeros;
+pub use zeros::{SingleZero, ZeroCheck, zero_check};
 
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
-use blocks::{Block, blocks};
+use continuity::Continuity;
 use fit::Fit;
 use noise::{ScatterRatios, Verdict};
 use priors::Priors;
@@ -76,10 +84,10 @@ struct Scored {
 /// does, or nothing explains them, or too much. Use an [`Excerpt`] of a long trace.
 pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
     let priors = Priors::declared(rig);
-    let blocks = blocks(records, &rig.cylinder);
-    let declared = Fit::of(&blocks, rig, &priors)?;
+    let stretch = Recorded::new(records, rig)?;
+    let declared = stretch.fit(&priors)?;
     let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
-    if !contradicted || sensor_errors_explain(&blocks, rig) {
+    if !contradicted || sensor_errors_explain(&stretch) {
         return None;
     }
     if let Some((readings, turned)) = signs::lost(records, rig) {
@@ -95,7 +103,7 @@ pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
         if lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig) {
             return None;
         }
-        let fit = Fit::new(&mended, rig, &priors)?;
+        let fit = Recorded::new(&mended, rig)?.fit(&priors)?;
         let scatter = ratios.verdict(mistake);
         let wanted = scatter != Verdict::Against && flows_overshoot(mistake, &declared);
         (wanted && explains(&fit, &declared)).then_some(Scored { mistake, fit, scatter })
@@ -116,7 +124,10 @@ pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
 /// don't tell. Only where the channels that are not mistaken scatter as declared, and those that are by just the
 /// factor between two units.
 pub fn unit_by_scatter(excerpt: &Excerpt, rig: &Rig) -> Option<Explanation> {
-    let ratios = ScatterRatios::of(&excerpt.first_records(SCATTER_ROWS), rig);
+    unit_betrayed(&ScatterRatios::of(&excerpt.first_records(SCATTER_ROWS), rig))
+}
+
+fn unit_betrayed(ratios: &ScatterRatios) -> Option<Explanation> {
     let found =
         candidates::flow_units().into_iter().find_map(|mistake| Some((mistake, ratios.betrays(mistake)?)))?;
     let (mistake, ratio) = found;
@@ -126,13 +137,14 @@ pub fn unit_by_scatter(excerpt: &Excerpt, rig: &Rig) -> Option<Explanation> {
 /// Mean squares of the normalised residual of the flow balance and of the position against the flows, over all the
 /// records; none of an equation without rows, or of too few records.
 pub fn misfit(records: &[Record], rig: &Rig) -> [Option<f64>; 2] {
-    Fit::new(records, rig, &Priors::declared(rig)).map_or([None; 2], |fit| fit.ratios)
+    let fit = Recorded::new(records, rig).and_then(|stretch| stretch.fit(&Priors::declared(rig)));
+    fit.map_or([None; 2], |fit| fit.ratios)
 }
 
 /// Offsets and gains of a few percent are commoner than mistakes of wiring: where they explain as much, they do.
-fn sensor_errors_explain(blocks: &[Block], rig: &Rig) -> bool {
-    Fit::of(blocks, rig, &Priors::with_sensor_errors(rig))
-        .is_some_and(|fit| is_near(&fit) && fit.is_possible())
+fn sensor_errors_explain(stretch: &impl Continuity) -> bool {
+    let fit = stretch.fit(&Priors::with_sensor_errors(stretch.rig()));
+    fit.is_some_and(|fit| is_near(&fit) && fit.is_possible())
 }
 
 fn is_near(fit: &Fit) -> bool {

@@ -1,8 +1,11 @@
+use super::SCATTER_ROWS;
 use super::mistake::Mistake;
 use super::readings::Readings;
+use super::running_median::RunningMedian;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
+use serde::{Deserialize, Serialize};
 
 /// One reading of a record.
 type Reading = fn(&Record) -> Option<f64>;
@@ -32,18 +35,27 @@ const CHANNELS: usize = 5;
 /// The scatter of each sensor's readings over the declared noise.
 pub(super) struct ScatterRatios(Vec<(Signal, f64)>);
 
+/// The channels.
+const READINGS: [(Signal, Reading); CHANNELS] = [
+    (Signal::Position, |r| Some(r.sample.x_m)),
+    (Signal::PressureA, |r| Some(r.sample.pa_pa)),
+    (Signal::PressureB, |r| Some(r.sample.pb_pa)),
+    (Signal::FlowA, |r| r.sample.qa_m3s),
+    (Signal::FlowB, |r| r.sample.qb_m3s),
+];
+
 impl ScatterRatios {
     pub fn of(records: &[Record], rig: &Rig) -> Self {
+        Self::new(READINGS.map(|(_, reading)| scatter(records, reading)), rig)
+    }
+
+    /// Of the standard deviations of the channels' white noise, where they are known.
+    fn new(scatter: [Option<f64>; CHANNELS], rig: &Rig) -> Self {
         let sensors = rig.sensors();
-        let channels: [(Signal, f64, Reading); CHANNELS] = [
-            (Signal::Position, sensors.position.noise_std, |r| Some(r.sample.x_m)),
-            (Signal::PressureA, sensors.pressure.noise_std, |r| Some(r.sample.pa_pa)),
-            (Signal::PressureB, sensors.pressure.noise_std, |r| Some(r.sample.pb_pa)),
-            (Signal::FlowA, sensors.flow_a.noise_std, |r| r.sample.qa_m3s),
-            (Signal::FlowB, sensors.flow_b.noise_std, |r| r.sample.qb_m3s),
-        ];
-        let ratios = channels.into_iter().filter_map(|(signal, declared, reading)| {
-            Some((signal, scatter(records, reading)? / declared)).filter(|(_, ratio)| ratio.is_finite())
+        let declared = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
+        let channels = READINGS.iter().zip(scatter).zip(declared);
+        let ratios = channels.filter_map(|(((signal, _), scatter), declared)| {
+            Some((*signal, scatter? / declared.noise_std)).filter(|(_, ratio)| ratio.is_finite())
         });
         Self(ratios.collect())
     }
@@ -78,12 +90,19 @@ impl ScatterRatios {
     }
 }
 
-/// Standard deviation of white noise: third differences cancel a motion's slope and curvature, their median cancels
-/// jolts; E Δ³² = 20 σ², and the median of a normal number's size is 0.6745.
+/// What the median size of third differences is of white noise of standard deviation 1: they cancel a motion's slope and
+/// curvature, their median cancels jolts; E Δ³² = 20 σ², and the median of a normal number's size is 0.6745.
+const MEDIAN_SIZE: f64 = 0.6745 * 4.472_135_954_999_58;
+
+fn third_difference([a, b, c, d]: [f64; 4]) -> f64 {
+    d - 3.0 * c + 3.0 * b - a
+}
+
+/// Standard deviation of white noise.
 fn scatter(records: &[Record], reading: Reading) -> Option<f64> {
     let third = |w: &[Record]| {
         let [a, b, c, d] = w else { return None };
-        Some((reading(d)? - 3.0 * reading(c)? + 3.0 * reading(b)? - reading(a)?).abs())
+        Some(third_difference([reading(a)?, reading(b)?, reading(c)?, reading(d)?]).abs())
     };
     let mut sizes: Vec<f64> = records.windows(4).filter_map(third).collect();
     let middle = sizes.len() / 2;
@@ -91,5 +110,50 @@ fn scatter(records: &[Record], reading: Reading) -> Option<f64> {
         return None;
     }
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*median / (0.6745 * 20f64.sqrt()))
+    Some(*median / MEDIAN_SIZE)
+}
+
+/// The same of a stream, half a minute at a time, in constant memory.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct RunningScatter {
+    channels: [RunningChannel; CHANNELS],
+    rows: usize,
+    /// Of the half minute before.
+    before: Option<[Option<f64>; CHANNELS]>,
+}
+
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct RunningChannel {
+    last: [Option<f64>; 3],
+    third_differences: RunningMedian,
+}
+
+impl RunningScatter {
+    pub fn add(&mut self, record: &Record) {
+        for ((_, reading), channel) in READINGS.iter().zip(&mut self.channels) {
+            channel.add(reading(record));
+        }
+        self.rows = self.rows.saturating_add(1);
+        if self.rows >= SCATTER_ROWS {
+            *self = Self { before: Some(self.scatter()), ..Self::default() };
+        }
+    }
+
+    fn scatter(&self) -> [Option<f64>; CHANNELS] {
+        self.channels.map(|channel| Some(channel.third_differences.value()? / MEDIAN_SIZE))
+    }
+
+    pub fn ratios(&self, rig: &Rig) -> ScatterRatios {
+        ScatterRatios::new(self.before.unwrap_or_else(|| self.scatter()), rig)
+    }
+}
+
+impl RunningChannel {
+    fn add(&mut self, reading: Option<f64>) {
+        let [a, b, c] = self.last;
+        if let (Some(a), Some(b), Some(c), Some(d)) = (a, b, c, reading) {
+            self.third_differences.add(third_difference([a, b, c, d]).abs());
+        }
+        self.last = [b, c, reading];
+    }
 }

@@ -1,13 +1,11 @@
 //! A leak through an orifice, Q = C √P, against the model's C P: cracks and loose fittings leak so.
 
-use super::blocks::blocks;
+use super::continuity::Continuity;
 use super::fit::Fit;
 use super::priors::Priors;
 use super::sensor_error::ERRORS;
-use super::zeros::{ZeroCheck, duration_s, held_against_zeros};
+use super::zeros::{ZeroCheck, held_against_zeros};
 use super::{APART, LEAST_DROP, is_near};
-use crate::rig::Rig;
-use crate::trace::Record;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// A coefficient further below zero is no orifice's, standard deviations.
@@ -30,25 +28,23 @@ pub struct Orifice {
     pub zeros: Option<ZeroCheck>,
 }
 
-/// Whether `leaks` of which a part passes an orifice explain the records where leaks as C P do not, and no gain or
-/// zero of a sensor does as well that would leave another leak; `None` where they don't. Use an
-/// [`Excerpt`](super::Excerpt) of a long trace.
-pub fn orifice(records: &[Record], rig: &Rig, leaks: PerLeak<bool>) -> Option<Orifice> {
-    let duration_s = duration_s(records)?;
-    let blocks = blocks(records, &rig.cylinder);
+/// Whether `leaks` of which a part passes an orifice explain the stretch where leaks as C P do not, and no gain or
+/// zero of a sensor does as well that would leave another leak; `None` where they don't.
+pub(crate) fn orifice(stretch: &impl Continuity, leaks: PerLeak<bool>) -> Option<Orifice> {
+    let rig = stretch.rig();
     let plain = Priors::declared(rig);
     let leaking: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| leaks[*leak]).collect();
     let through = leaking.iter().fold(plain, |all, leak| all.with_orifice(*leak, rig));
-    let declared = Fit::of(&blocks, rig, &plain)?;
-    let fit = Fit::of(&blocks, rig, &through)?;
+    let declared = stretch.fit(&plain)?;
+    let fit = stretch.fit(&through)?;
     let backwards = Leak::ALL.into_iter().any(|leak| fit.orifice_sigmas(leak) < -NEGATIVE_SIGMAS);
     let drop = declared.chi_square() - fit.chi_square();
     if drop < LEAST_DROP || !is_near(&fit) || !fit.is_possible() || backwards {
         return None;
     }
     let rivals = ERRORS.map(|error| plain.with_error(error, rig)).into_iter();
-    let rivals = rivals.chain([plain.with_zeros_off(rig, duration_s)]);
-    let size = |fit: &Fit, leak: Leak| fit.flow_m3s(&blocks, leak, f64::abs);
+    let rivals = rivals.chain([plain.with_zeros_off(rig, stretch.duration_s())]);
+    let size = |fit: &Fit, leak: Leak| fit.flow_m3s(leak, stretch.driven(leak).sizes);
     let agrees = |rival: &Fit| {
         leaking.iter().all(|leak| {
             let apart_m3s = size(rival, *leak).value - size(&fit, *leak).value;
@@ -56,12 +52,12 @@ pub fn orifice(records: &[Record], rig: &Rig, leaks: PerLeak<bool>) -> Option<Or
         })
     };
     let is_beaten = |rival: &Fit| rival.chi_square() > fit.chi_square() + APART || agrees(rival);
-    let is_best = rivals.filter_map(|rival| Fit::of(&blocks, rig, &rival)).all(|rival| is_beaten(&rival));
+    let is_best = rivals.filter_map(|rival| stretch.fit(&rival)).all(|rival| is_beaten(&rival));
     is_best.then(|| Orifice {
         before: declared.worst().sqrt(),
         after: fit.worst().sqrt(),
         sizes_m3s: PerLeak::from_fn(|leak| size(&fit, leak)),
-        net_m3s: PerLeak::from_fn(|leak| fit.flow_m3s(&blocks, leak, |pressure| pressure).value),
-        zeros: held_against_zeros(&blocks, rig, &through, duration_s),
+        net_m3s: PerLeak::from_fn(|leak| fit.flow_m3s(leak, stretch.driven(leak).net).value),
+        zeros: held_against_zeros(stretch, &through),
     })
 }

@@ -11,7 +11,7 @@ pub(super) type Vector = SVector<f64, PARAMETERS>;
 
 /// Prior standard deviations of the parameters, SI.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Priors(pub(super) Vector);
+pub(crate) struct Priors(pub(super) Vector);
 
 /// A sensor that nobody declared wrong may be off by so much, 1 σ: of full scale, of the reading.
 const UNDECLARED_SHARE: f64 = 0.05;
@@ -25,6 +25,14 @@ pub(super) const LEAKS: usize = 1;
 pub(super) const OFFSETS: usize = 4;
 const DRIFTS: usize = 9;
 const SLOPES: usize = 11;
+/// Each mean over time, and its slope.
+pub(super) const SLOPE_OF: [(usize, usize); 5] = [
+    (OFFSETS, DRIFTS),
+    (OFFSETS + 1, DRIFTS + 1),
+    (LEAKS, SLOPES),
+    (LEAKS + 1, SLOPES + 1),
+    (LEAKS + 2, SLOPES + 2),
+];
 pub(super) const ORIFICES: usize = 14;
 /// A leak of the meter's whole range at this share of the pressure sensor's is the widest looked for, 1 σ.
 const LEAK_AT_SHARE: f64 = 0.1;
@@ -66,6 +74,15 @@ impl Priors {
             spread[OFFSETS + meter] = spread[OFFSETS + meter].max(usual);
             spread[DRIFTS + meter] = usual / duration_s.max(1.0);
         }
+        self
+    }
+
+    /// The same rig with one meter whose zero is off and steady, as an undeclared one is now and then.
+    pub fn with_zero_off(mut self, zero: Parameter, rig: &Rig) -> Self {
+        let meter =
+            if zero == Parameter::OffsetA { &rig.instruments.flow_a } else { &rig.instruments.flow_b };
+        let spread = &mut self.0[zero as usize];
+        *spread = spread.max(UNDECLARED_ZERO_SHARE * meter.full_scale);
         self
     }
 

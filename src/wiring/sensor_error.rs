@@ -1,14 +1,12 @@
 //! One sensor whose gain or zero is off by more than anybody declared.
 
-use super::blocks::blocks;
+use super::continuity::Continuity;
 use super::explanation::{Evidence, Explanation};
 use super::fit::Fit;
 use super::mistake::Mistake;
 use super::priors::Priors;
 use super::readings::Readings;
 use super::{APART, LEAST_DROP};
-use crate::rig::Rig;
-use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::Parameter;
 
@@ -25,14 +23,13 @@ const NEAR: [(f64, f64); 2] = [(2.0, 2.0), (4.0, 10.0)];
 /// … unless they make a leak negative by so many standard deviations.
 const NEGATIVE_SIGMAS: f64 = 5.0;
 
-/// The sensor whose gain or zero, off by more than the rig file says, explains the records where the declared sensors do
-/// not; `None` where those do, or no single error explains them. Use an [`Excerpt`](super::Excerpt) of a long trace.
-pub fn sensor_error(records: &[Record], rig: &Rig) -> Option<Explanation> {
-    let blocks = blocks(records, &rig.cylinder);
-    let priors = Priors::declared(rig);
-    let declared = Fit::of(&blocks, rig, &priors)?;
+/// The sensor whose gain or zero, off by more than the rig file says, explains the stretch where the declared sensors do
+/// not; `None` where those do, or no single error explains it.
+pub(crate) fn sensor_error(stretch: &impl Continuity) -> Option<Explanation> {
+    let priors = Priors::declared(stretch.rig());
+    let declared = stretch.fit(&priors)?;
     let score = |error: Parameter| {
-        let fit = Fit::of(&blocks, rig, &priors.with_error(error, rig))?;
+        let fit = stretch.fit(&priors.with_error(error, stretch.rig()))?;
         explains(&fit, &declared, error).then_some((error, fit))
     };
     let mut found: Vec<_> = ERRORS.into_iter().filter_map(score).collect();

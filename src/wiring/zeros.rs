@@ -1,11 +1,11 @@
 //! A meter whose zero is off against a leak: both let oil go missing, the one always, the other with the pressure.
 
-use super::blocks::{Block, blocks};
+use super::continuity::{Continuity, Recorded};
 use super::fit::Fit;
 use super::priors::Priors;
 use crate::rig::Rig;
 use crate::trace::Record;
-use pitchleak_core::{Estimate, PerLeak};
+use pitchleak_core::{Estimate, Leak, Parameter, PerLeak};
 
 /// Leaks against zeros of the flow meters that are off, and drift, undeclared. A zero is off by 1 % of full scale (1 σ):
 /// what takes several times as much is rather a leak.
@@ -23,27 +23,38 @@ pub struct ZeroCheck {
     pub offsets_without_m3s: PerLeak<[Estimate<f64>; 2]>,
     /// Leak coefficients beside free zeros, m³/(s·Pa), in the middle of the records; their spread grows with the misfit.
     pub leaks_m3spa: PerLeak<Estimate<f64>>,
+    /// The zero of each meter alone, off and steady.
+    pub single: [Option<SingleZero>; 2],
+}
+
+/// One meter's zero that is off, and steady, beside all leaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SingleZero {
+    /// By how much χ² falls.
+    pub drop: f64,
+    /// How far it is off, m³/s.
+    pub offset_m3s: Estimate<f64>,
+    /// By how much the leaks' mean flows then change, m³/s.
+    pub shift_m3s: PerLeak<f64>,
 }
 
 /// Holds leaks against zeros, by generalised least squares over all the records; both may change through them. `None`
 /// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
-    let duration_s = duration_s(records)?;
-    let leaks = Priors::declared(rig).with_changing_leaks(duration_s);
-    held_against_zeros(&blocks(records, &rig.cylinder), rig, &leaks, duration_s)
+    changing_leaks_or_zeros(&Recorded::new(records, rig)?)
 }
 
-/// The same of `leaks` in blocks that span so long.
-pub(super) fn held_against_zeros(
-    blocks: &[Block],
-    rig: &Rig,
-    leaks: &Priors,
-    duration_s: f64,
-) -> Option<ZeroCheck> {
-    let zeros = leaks.with_zeros_off(rig, duration_s);
-    let declared = Fit::of(blocks, rig, leaks)?;
-    let free = Fit::of(blocks, rig, &zeros)?;
-    let without = PerLeak::from_fn(|leak| Fit::of(blocks, rig, &zeros.without(leak)).unwrap_or(free));
+/// The same of any stretch.
+pub(crate) fn changing_leaks_or_zeros(stretch: &impl Continuity) -> Option<ZeroCheck> {
+    held_against_zeros(stretch, &Priors::declared(stretch.rig()).with_changing_leaks(stretch.duration_s()))
+}
+
+/// The same of `leaks`.
+pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<ZeroCheck> {
+    let zeros = leaks.with_zeros_off(stretch.rig(), stretch.duration_s());
+    let declared = stretch.fit(leaks)?;
+    let free = stretch.fit(&zeros)?;
+    let without = PerLeak::from_fn(|leak| stretch.fit(&zeros.without(leak)).unwrap_or(free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
     let beyond = |other: &Fit| (other.chi_square() - declared.chi_square()) / inflation;
@@ -53,9 +64,22 @@ pub(super) fn held_against_zeros(
         offsets_m3s: free.offsets_m3s(),
         offsets_without_m3s: without.map(|fit| fit.offsets_m3s()),
         leaks_m3spa: free.leak_coefficients(),
+        single: [Parameter::OffsetA, Parameter::OffsetB]
+            .map(|zero| single_zero(stretch, leaks, &declared, zero)),
     })
 }
 
-pub(super) fn duration_s(records: &[Record]) -> Option<f64> {
-    Some(records.last()?.t_s - records.first()?.t_s)
+fn single_zero(
+    stretch: &impl Continuity,
+    leaks: &Priors,
+    declared: &Fit,
+    zero: Parameter,
+) -> Option<SingleZero> {
+    let fit = stretch.fit(&leaks.with_zero_off(zero, stretch.rig()))?;
+    let flow_m3s = |fit: &Fit, leak: Leak| fit.flow_m3s(leak, stretch.driven(leak).sizes).value;
+    Some(SingleZero {
+        drop: (declared.chi_square() - fit.chi_square()) / fit.worst().max(1.0),
+        offset_m3s: fit.parameter(zero),
+        shift_m3s: PerLeak::from_fn(|leak| flow_m3s(&fit, leak) - flow_m3s(declared, leak)),
+    })
 }

@@ -1,0 +1,68 @@
+use super::blocks::{Block, blocks};
+use super::equations::{Driven, Equations, Noise};
+use super::fit::Fit;
+use super::priors::Priors;
+use crate::rig::Rig;
+use crate::trace::Record;
+use pitchleak_core::{Leak, PerLeak};
+
+/// What both continuity equations say of a stretch of samples.
+pub(crate) trait Continuity {
+    /// Fits the model with these priors; `None` where the samples are too few.
+    fn fit(&self, priors: &Priors) -> Option<Fit>;
+
+    /// The rig.
+    fn rig(&self) -> &Rig;
+
+    /// From its first sample to its last, s.
+    fn duration_s(&self) -> f64;
+
+    /// What drove a leak's flow, on average.
+    fn driven(&self, leak: Leak) -> Driven;
+}
+
+/// A stretch of which all blocks are at hand.
+pub(crate) struct Recorded<'a> {
+    blocks: Vec<Block>,
+    rig: &'a Rig,
+    duration_s: f64,
+    /// With the noise of the sensors alone.
+    equations: Equations,
+}
+
+/// Pressure noise through the leaks, which halves a residual at the most, can't explain this one.
+const HOPELESS: f64 = 20.0;
+
+impl<'a> Recorded<'a> {
+    /// Of these records, if there are any. Use an [`Excerpt`](super::Excerpt) of a long trace.
+    pub(crate) fn new(records: &[Record], rig: &'a Rig) -> Option<Self> {
+        let duration_s = records.last()?.t_s - records.first()?.t_s;
+        let blocks = blocks(records, &rig.cylinder);
+        let equations = Equations::of(&blocks, &Noise::new(rig, PerLeak::default()));
+        Some(Self { blocks, rig, duration_s, equations })
+    }
+}
+
+impl Continuity for Recorded<'_> {
+    fn fit(&self, priors: &Priors) -> Option<Fit> {
+        let found = Fit::of(&[&self.equations], self.rig, priors)?;
+        if found.worst() > HOPELESS {
+            return Some(found);
+        }
+        // Pressure noise reaches the equations through the leaks, which only a fit tells.
+        let equations = Equations::of(&self.blocks, &Noise::new(self.rig, found.leaks()));
+        Fit::of(&[&equations], self.rig, priors)
+    }
+
+    fn rig(&self) -> &Rig {
+        self.rig
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn driven(&self, leak: Leak) -> Driven {
+        Driven::of(&[&self.equations], leak)
+    }
+}
