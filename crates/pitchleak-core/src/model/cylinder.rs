@@ -67,7 +67,7 @@ fn positive<T: Real>(value: T) -> bool {
 }
 
 #[cfg_attr(target_os = "none", inline(never))]
-fn not_negative<T: Real>(value: T) -> bool {
+pub(super) fn not_negative<T: Real>(value: T) -> bool {
     value.is_finite() && value >= T::zero()
 }
 

@@ -1,3 +1,4 @@
+use super::cylinder::not_negative;
 use crate::{LPM_PER_M3S, Real};
 
 /// How far one sensor's reading may be off, 1 σ each, in the sensor's SI unit.
@@ -48,7 +49,7 @@ impl<T: Real> SensorSpread<T> {
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each sensor
     pub fn is_physical(&self) -> bool {
         let Self { noise_std, bias_std, gain_std, drift_std_ph } = *self;
-        [noise_std, bias_std, gain_std, drift_std_ph].iter().all(|std| std.is_finite() && *std >= T::zero())
+        [noise_std, bias_std, gain_std, drift_std_ph].iter().all(|std| not_negative(*std))
     }
 }
 
