@@ -22,6 +22,8 @@ pub fn effect_unit(si: &str) -> (f64, &str) {
         "m3/s" => (LPM_PER_M3S, "L/min"),
         "m3/(s*Pa)" => (LPM_PER_BAR, "L/min/bar"),
         "m3/(s*Pa*K)" => (LPM_PER_BAR, "L/min/bar/K"),
+        "m3/(s*Pa*s)" => (3600.0 * LPM_PER_BAR, "L/min/bar/h"),
+        "m3/s2" => (3600.0 * LPM_PER_M3S, "L/min/h"),
         "m3/(s*sqrt(Pa))" => (LPM_PER_M3S * 1e5_f64.sqrt(), "L/min/√bar"),
         "Pa*s/m3" => (1e-5 / LPM_PER_M3S, "bar/(L/min)"),
         "s" => (1e3, "ms"),

@@ -7,6 +7,9 @@ mod cases;
 #[allow(dead_code, reason = "the bench asks more of it")]
 #[path = "../benches/confidence/plant.rs"]
 mod plant;
+#[allow(dead_code, reason = "the bench asks more of it")]
+#[path = "../benches/confidence/questions.rs"]
+mod questions;
 #[allow(dead_code, reason = "the bench prints more of it")]
 #[path = "../benches/confidence/tally.rs"]
 mod tally;
@@ -29,7 +32,7 @@ fn lines(answers: &[(Case, Diagnosis)]) -> String {
 
 #[test]
 fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
-    let answers = asked(cases::sound(1), 2, 9);
+    let answers = asked(questions::sound(1), 2, 9);
     let sound = answers.iter().filter(|(_, answer)| answer.verdict == Verdict::NoMissingEffect).count();
     let named = answers.iter().any(|(_, answer)| !answer.effects.is_empty());
     assert!(!named && sound + 1 >= answers.len(), "{sound} of {}:\n{}", answers.len(), lines(&answers));
@@ -37,7 +40,7 @@ fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
 
 #[test]
 fn two_effects_are_both_named_and_their_values_hold() {
-    let answers = asked(cases::two(24), 0, 2);
+    let answers = asked(questions::two(24), 0, 2);
     let is_explained = |(case, answer): &&(Case, Diagnosis)| {
         answer.verdict == Verdict::Explained && tally::all_named(case, answer)
     };
@@ -54,7 +57,7 @@ fn two_effects_are_both_named_and_their_values_hold() {
 
 #[test]
 fn an_effect_that_no_table_has_is_never_surely_explained_by_another() {
-    for (case, answer) in asked(cases::outside(26), 0, 2) {
+    for (case, answer) in asked(questions::outside(26), 0, 2) {
         let surely = answer.effects.iter().any(|effect| effect.confident);
         assert!(!(surely && answer.verdict == Verdict::Explained), "{}", tally::line(&case, &answer));
     }

@@ -121,8 +121,14 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
     Some(truths)
 }
 
+/// A worn spot where the piston often is, and a valve that opens at a load pressure it sometimes has.
 fn constants() -> EffectConstants<f64> {
-    EffectConstants { spot_position_m: 0.09, spot_width_m: 0.015, ..EffectConstants::default() }
+    EffectConstants {
+        spot_position_m: 0.09,
+        spot_width_m: 0.015,
+        cracking_pa: 1e6,
+        ..EffectConstants::default()
+    }
 }
 
 pub fn seen(truths: &[Truth], sensors: Sensors<f64>, seed: u64) -> Series {

@@ -2,10 +2,11 @@
 //! table has, by a plant of its own.
 //!
 //! `cargo bench --bench confidence` prints the figures of `docs/closing-the-loop.md`. After `--`: a kind (`sound`, `long`, `two`,
-//! `outside`), a number that thins the cases out, `seeds=7000` for rigs drawn anew, and `each` for a line per case.
+//! `further`, `outside`), a number that thins the cases out, `seeds=7000` for rigs drawn anew, and `each` for a line per case.
 
 mod cases;
 mod plant;
+mod questions;
 mod tally;
 
 use cases::Case;
@@ -13,15 +14,16 @@ use cases::Case;
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let stride = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(1_usize).max(1);
-    let kinds = ["sound", "long", "two", "outside"];
+    let kinds = ["sound", "long", "two", "further", "outside"];
     let wanted = |kind: &str| {
         !arguments.iter().any(|a| kinds.contains(&a.as_str())) || arguments.iter().any(|a| a == kind)
     };
-    let all: [(&str, Vec<Case>); 4] = [
-        ("sound", cases::sound(stride)),
-        ("long", cases::long(24 / stride)),
-        ("two", cases::two(96 / stride)),
-        ("outside", cases::outside(208 / stride)),
+    let all: [(&str, Vec<Case>); 5] = [
+        ("sound", questions::sound(stride)),
+        ("long", questions::long(20 / stride)),
+        ("two", questions::two(96 / stride)),
+        ("further", questions::further(48 / stride)),
+        ("outside", questions::outside(208 / stride)),
     ];
     let further = arguments.iter().find_map(|a| a.strip_prefix("seeds=")?.parse().ok()).unwrap_or(0_u64);
     let each = arguments.iter().any(|a| a == "each");

@@ -10,6 +10,7 @@ const ATMOSPHERE_PA: f64 = 101_325.0;
 const SPOOL_HZ: f64 = 40.0;
 const SPOOL_DAMPING: f64 = 0.8;
 const UNDERLAP: f64 = 5e-3;
+const OIL_KGPM3: f64 = 870.0;
 /// Time before the first sample, s.
 const WARM_UP_S: f64 = 3.0;
 
@@ -56,6 +57,10 @@ pub struct Physics {
     pub cubic: f64,
     /// Friction that is larger outwards.
     pub lopsided: f64,
+    /// The oil's bulk modulus grows by this share per Pa.
+    pub stiffening: f64,
+    /// Volume of the hose from the valve, its meter and its pressure sensor to chamber A, m³; it has inertia.
+    pub hose: f64,
 }
 
 /// One instant.
@@ -126,6 +131,9 @@ struct State {
     pb: f64,
     spool: f64,
     spool_v: f64,
+    /// At the valve's end of the hose, and what flows out of its other end.
+    hose_p: f64,
+    hose_q: f64,
 }
 
 impl State {
@@ -137,6 +145,8 @@ impl State {
             pb: self.pb + h * rate.pb,
             spool: self.spool + h * rate.spool,
             spool_v: self.spool_v + h * rate.spool_v,
+            hose_p: self.hose_p + h * rate.hose_p,
+            hose_q: self.hose_q + h * rate.hose_q,
         }
     }
 }
@@ -152,17 +162,38 @@ fn gas(p: f64) -> f64 {
 }
 
 impl Plant {
+    fn pressure_at_valve_a(&self, at: &State) -> f64 {
+        if self.ailment.hose > 0.0 { at.hose_p } else { at.pa }
+    }
+
+    /// Rates of pressure at the valve's end of the hose and of the flow through it.
+    fn hose(&self, at: &State, valve_flow: f64) -> (f64, f64) {
+        let volume = self.ailment.hose;
+        if volume <= 0.0 {
+            return (0.0, 0.0);
+        }
+        // Bore of a tenth of the piston's area.
+        let bore = 0.1 * self.area_a;
+        let inertia = OIL_KGPM3 * volume / (bore * bore);
+        let resistance = 2e5 / self.valve;
+        let flow = (at.hose_p - at.pa - resistance * at.hose_q) / inertia;
+        ((valve_flow - at.hose_q) * self.bulk / volume, flow)
+    }
+
     fn flows(&self, at: &State) -> (f64, f64) {
         let k = self.valve / (SUPPLY_PA / 2.0).sqrt();
         let (out, back) = ((UNDERLAP + at.spool).max(0.0), (UNDERLAP - at.spool).max(0.0));
-        let qa = k * (out * root(SUPPLY_PA - at.pa) - back * root(at.pa));
+        let pa = self.pressure_at_valve_a(at);
+        let qa = k * (out * root(SUPPLY_PA - pa) - back * root(pa));
         let qb = k * 0.75 * (back * root(SUPPLY_PA - at.pb) - out * root(at.pb));
         (qa, qb)
     }
 
     fn rate(&self, t: f64, at: &State, wanted: f64, load: f64) -> State {
         let own = &self.ailment;
-        let (qa, qb) = self.flows(at);
+        let (valve_flow, qb) = self.flows(at);
+        let (hose_p, hose_q) = self.hose(at, valve_flow);
+        let qa = if own.hose > 0.0 { at.hose_q } else { valve_flow };
         let pl = at.pa - at.pb;
         let past = self.internal * pl
             + own.turbulent * root(pl)
@@ -172,8 +203,9 @@ impl Plant {
             + own.one_way * if at.v > 0.0 { pl } else { 0.0 }
             + own.growing * t * pl;
         let (va, vb) = (self.area_a * at.x.max(1e-4), self.area_b * (self.stroke - at.x).max(1e-4));
-        let ca = (va + own.dead_a) / self.bulk + (own.air * va + own.gas_a) * gas(at.pa);
-        let cb = (vb + own.dead_b) / self.bulk + own.air * vb * gas(at.pb);
+        let bulk = |p: f64| self.bulk * (1.0 + own.stiffening * p);
+        let ca = (va + own.dead_a) / bulk(at.pa) + (own.air * va + own.gas_a) * gas(at.pa);
+        let cb = (vb + own.dead_b) / bulk(at.pb) + own.air * vb * gas(at.pb);
         let dry = (at.v / 2e-3).tanh();
         let friction = own.viscous * at.v
             + own.coulomb * dry
@@ -187,6 +219,8 @@ impl Plant {
             pb: (qb + self.area_b * at.v + past - self.external_b * at.pb) / cb,
             spool: at.spool_v,
             spool_v: omega * omega * (wanted - at.spool) - 2.0 * SPOOL_DAMPING * omega * at.spool_v,
+            hose_p,
+            hose_q,
         }
     }
 
@@ -196,7 +230,7 @@ impl Plant {
         let motion = Lines::draw(&mut random, 9, 0.04, 0.9);
         let wind = Lines::draw(&mut random, 12, 0.04, 1.4);
         let h = 1.0 / RATE_HZ;
-        let mut at = State { x: self.stroke / 2.0, pa: 5e6, pb: 4e6, ..State::default() };
+        let mut at = State { x: self.stroke / 2.0, pa: 5e6, pb: 4e6, hose_p: 5e6, ..State::default() };
         // The clock of the reference, which stands while the piston rests.
         let mut clock = 0.0;
         let steps = ((seconds + WARM_UP_S) * RATE_HZ).round() as u64;
@@ -214,7 +248,8 @@ impl Plant {
             let wanted = (10.0 * (aim - at.x) / self.stroke).clamp(-1.0, 1.0);
             if k as f64 >= WARM_UP_S * RATE_HZ {
                 let (qa, qb) = self.flows(&at);
-                show(&Instant { t, x: at.x, pa: at.pa, pb: at.pb, qa, qb, force: load });
+                let pa = self.pressure_at_valve_a(&at);
+                show(&Instant { t, x: at.x, pa, pb: at.pb, qa, qb, force: load });
             }
             let k1 = self.rate(t, &at, wanted, load);
             let k2 = self.rate(t, &at.plus(h / 2.0, k1), wanted, load);

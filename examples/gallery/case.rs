@@ -54,8 +54,14 @@ pub fn follows_temperature(effect: Effect) -> bool {
     effect.spec().constants.contains(&EffectConstant::ReferenceTemp)
 }
 
+/// A worn spot where the piston often is, and a valve that opens at a load pressure it sometimes has.
 fn constants() -> EffectConstants<f64> {
-    EffectConstants { spot_position_m: 0.09, spot_width_m: 0.015, ..EffectConstants::default() }
+    EffectConstants {
+        spot_position_m: 0.09,
+        spot_width_m: 0.015,
+        cracking_pa: 1e6,
+        ..EffectConstants::default()
+    }
 }
 
 impl Wind {
@@ -121,11 +127,12 @@ impl Wind {
     }
 }
 
-/// The candidate that a case is made of: the effect, with a worn spot where the case has it.
+/// The candidate that a case is made of: the effect, with a worn spot where the case has it and a valve that opens as the case's.
 fn is(candidate: &Candidate, effect: Effect) -> bool {
+    let is_placed =
+        |own: &EffectConstant| matches!(own, EffectConstant::SpotPosition | EffectConstant::CrackingPressure);
     candidate.effect == effect
-        && (!effect.spec().constants.contains(&EffectConstant::SpotPosition)
-            || candidate.constants == constants())
+        && (!effect.spec().constants.iter().any(is_placed) || candidate.constants == constants())
 }
 
 impl Case {

@@ -44,6 +44,7 @@ use std::collections::BTreeMap;
 /// Fits all of `train` as traces of one rig and judges on `test`, or, where that is empty, on blocks
 /// of `train` that each fit leaves out.
 pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress: Progress<'_>) -> Diagnosis {
+    let faults = data::channel_faults(train, declared);
     let (test, _) = data::thinned(test, declared);
     let (train, declared) = data::thinned(train, declared);
     let checks = data::check_sensors(&train, &declared);
@@ -59,7 +60,8 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let judgement = assess::judge(&selection, excited, &checks);
+    let failures = assess::failures(&checks, &faults);
+    let judgement = assess::judge(&selection, excited, &failures);
     let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
@@ -67,7 +69,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let interactions = search::interactions(fit, effects);
     Diagnosis {
         samples: Samples::of(&train),
-        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &checks)).collect(),
+        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &failures)).collect(),
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },

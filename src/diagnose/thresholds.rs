@@ -124,6 +124,8 @@ pub(crate) const MOST_EFFECTS: usize = 6;
 pub(crate) const MOST_STEPS: usize = 10;
 /// Swaps that one addition may set off. Chosen against cycles.
 pub(crate) const MOST_SWAPS: usize = 4;
+/// So many effects may be two in disguise. Derived: a rival for one of them, and a single one for the two others.
+pub(crate) const FEWEST_TO_SIMPLIFY: usize = 3;
 /// While the residual is larger than the noise, an effect must mend this share of it to be named.
 /// Chosen: below that it is too small to be told from what the wrong equations make of it.
 pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;

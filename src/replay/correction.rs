@@ -96,6 +96,7 @@ impl Correction {
             dqb_m3s2: self.rates.qb.update(dt_s, qb).slope(),
             force_n: sample.force_n.unwrap_or(0.0),
             temp_k: record.temperature_k.unwrap_or(USUAL_TEMPERATURE_K),
+            t_s: self.time_s,
         }
     }
 }

@@ -217,6 +217,7 @@ impl Scenario {
             rig.emulator.set_leaks(now)?;
             rig.leaks_m3spa = now;
         }
+        rig.emulator.set_time(t_s);
         match &self.oil_temperature {
             Some(oil) => Ok(rig.emulator.set_temperature(oil.at(t_s))?),
             None => Ok(()),

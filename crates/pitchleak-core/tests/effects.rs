@@ -26,6 +26,7 @@ fn signals() -> impl Strategy<Value = Signals<f64>> {
             dqb_m3s2: dqb,
             force_n: force,
             temp_k: 320.0,
+            t_s: 100.0,
         },
     )
 }
@@ -116,7 +117,8 @@ fn a_set_refuses_what_cannot_be() {
     assert_eq!(set.iter().count(), 8);
 }
 
-/// A term that moves with a measured left side of the chambers' equations carries its noise, and says so.
+/// A term that grows with a measured left side of the chambers' equations carries its noise, and says so. What only turns with it,
+/// as a direction does, carries none once it is turned.
 #[test]
 fn what_carries_the_noise_of_the_left_side_is_in_proportion_to_it() {
     use pitchleak_core::effects::LeftSide;
@@ -135,10 +137,11 @@ fn what_carries_the_noise_of_the_left_side_is_in_proportion_to_it() {
                 let none = effect.unit_term(&rest, &model, &constants);
                 [own.chamber_a_m3s - none.chamber_a_m3s, own.chamber_b_m3s - none.chamber_b_m3s]
             };
-            let size = flows(one)[0].abs() + flows(one)[1].abs();
+            let (one, two) = (flows(one), flows(two));
+            let size = (two[0] - one[0]).abs() + (two[1] - one[1]).abs();
             let carries = effect.spec().carries == Some(*side);
             assert_eq!(size > 1e-9, carries, "{effect} {side:?} {size}");
-            for (one, two) in flows(one).into_iter().zip(flows(two)) {
+            for (one, two) in one.into_iter().zip(two).filter(|_| carries) {
                 assert!((two - 2.0 * one).abs() < 1e-9 * size + 1e-12, "{effect} {side:?}");
             }
         }
@@ -196,11 +199,14 @@ fn every_constant_that_matters_is_listed() {
         x_m: 0.09,
         v_mps: 5e-4,
         a_mps2: 0.1,
-        pa_pa: 4e6,
-        pb_pa: 1e6,
+        pa_pa: 13e6,
+        pb_pa: 6e6,
+        qa_m3s: 6e-7,
+        qb_m3s: -5e-7,
         dpa_pas: 1e6,
         dpb_pas: -2e6,
         temp_k: 330.0,
+        t_s: 100.0,
         ..Signals::default()
     };
     for effect in Effect::ALL.iter().copied() {
@@ -251,5 +257,46 @@ fn dry_friction_turns_at_its_slip_speed() {
         let at = Signals { v_mps: share * constants.slip_speed_mps, ..Signals::default() };
         let force_n = Effect::CoulombFriction.unit_term(&at, &model, &constants).force_n;
         assert!((force_n - expected).abs() < 1e-6, "{force_n}");
+    }
+}
+
+/// Nothing leaks below the cracking pressure, and what is beyond drives the leak above it, either way.
+#[test]
+fn a_leak_above_a_cracking_pressure_grows_with_what_is_beyond() {
+    let (model, constants) =
+        (Model::<f64>::paper(), EffectConstants { cracking_pa: 5e6, ..Default::default() });
+    for (pressure, beyond) in [(4.9e6, 0.0), (-4.9e6, 0.0), (5e6, 0.0), (6.5e6, 1.5e6), (-6.5e6, -1.5e6)] {
+        let at = Signals { pa_pa: pressure, pb_pa: 0.0, ..Signals::default() };
+        let past = Effect::InternalLeakCracking.unit_term(&at, &model, &constants);
+        assert_eq!((past.chamber_a_m3s, past.chamber_b_m3s), (beyond, -beyond));
+    }
+}
+
+/// What grows with time does so from the trace's beginning on.
+#[test]
+fn what_grows_is_nothing_at_the_beginning_and_twice_as_large_after_twice_the_time() {
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    let at = |t_s: f64| Signals { pa_pa: 4e6, pb_pa: 1e6, t_s, ..Signals::default() };
+    let leak = |t_s| Effect::InternalLeakGrowth.unit_term(&at(t_s), &model, &constants).chamber_a_m3s;
+    let drift = |t_s| Effect::FlowMeterDriftA.read(1e-7, &at(t_s)).qa_m3s;
+    assert_eq!((leak(0.0), drift(0.0)), (0.0, 0.0));
+    assert!((leak(60.0) - 60.0 * 3e6).abs() < 1e-6 && (leak(120.0) - 2.0 * leak(60.0)).abs() < 1e-6);
+    assert!((drift(60.0) - 6e-6).abs() < 1e-18 && (drift(120.0) - 1.2e-5).abs() < 1e-18);
+}
+
+/// A seal that is tighter one way leaks more the other way.
+#[test]
+fn a_leak_that_depends_on_direction_turns_with_the_flows() {
+    let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
+    for (way, speed) in [(1.0, 0.05), (-1.0, -0.05), (0.0, 0.0)] {
+        let at = Signals {
+            pa_pa: 4e6,
+            pb_pa: 1e6,
+            qa_m3s: speed * model.cylinder.area_a_m2,
+            qb_m3s: -speed * model.cylinder.area_b_m2,
+            ..Signals::default()
+        };
+        let leak = Effect::InternalLeakDirection.unit_term(&at, &model, &constants).chamber_a_m3s;
+        assert!((leak - way * 3e6).abs() < 1.0, "{leak}");
     }
 }

@@ -1,6 +1,7 @@
 //! Whether what is left can be the sensors' noise, and if not, where it shows.
 
 use super::residual::whitened_residual;
+use crate::channels::ChannelFault;
 use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::Fit;
@@ -34,20 +35,24 @@ pub(crate) fn complaints(fit: &Fit<'_>) -> Vec<String> {
             found.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
         }
     }
-    let strongest = search::nameless_chi2_drop(fit).sqrt();
-    if strongest > statistics::bonferroni_sigma(LEAST_P, Nameless::ALL.len()) {
+    if let Some((product, chi2_drop)) = beyond_chance(fit) {
+        let (sigma, words) = (chi2_drop.sqrt(), product.words());
         found.push(format!(
-            "what is left follows a product of signals that no known effect makes ({strongest:.1} sigma)"
+            "what is left follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
         ));
     }
     found
 }
 
-/// What a product of signals that no known effect makes would mend, where that is beyond chance.
-pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
-    let strongest = search::nameless_chi2_drop(fit);
+/// The product of signals that no known effect makes which what is left follows beyond chance.
+fn beyond_chance(fit: &Fit<'_>) -> Option<(Nameless, f64)> {
     let by_chance = statistics::bonferroni_sigma(LEAST_P, Nameless::ALL.len()).powi(2);
-    if strongest > by_chance { strongest } else { 0.0 }
+    search::strongest_nameless(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
+}
+
+/// What such a product would mend.
+pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
+    beyond_chance(fit).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
 /// Variables on which what is left depends, in whatever shape: its means in bins of equal count against each, by χ².
@@ -78,8 +83,14 @@ fn binned_p(white: &[f64], values: &[f64]) -> Option<f64> {
     Some(statistics::chi2_p(bins.map(of_bin).sum(), freedom))
 }
 
+/// What is wrong with the sensors themselves, in sentences: no model of the machine can mend it.
+pub(crate) fn failures(checks: &[SensorCheck], faults: &[ChannelFault]) -> Vec<String> {
+    let told = |fault: &ChannelFault| format!("{}: {}", fault.text, fault.suggestion);
+    ripples(checks).into_iter().chain(faults.iter().map(told)).collect()
+}
+
 /// A signal whose noise is no noise. Where several have the same, the machine does it: it is motion, and the balances hold.
-pub(crate) fn ripples(checks: &[SensorCheck]) -> Vec<String> {
+fn ripples(checks: &[SensorCheck]) -> Vec<String> {
     let sentence = |check: &SensorCheck| {
         let ratio = check.found.std / check.declared_std;
         format!("{}: fast, regular noise {ratio:.1} times the declared one (a ripple)", check.name)

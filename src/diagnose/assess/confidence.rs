@@ -2,7 +2,6 @@
 //! beside it, and against what physics allows.
 
 use super::adequacy;
-use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::search::{self, Selected, Selection};
@@ -12,12 +11,12 @@ use pitchleak_core::Effect;
 use pitchleak_core::effects::EffectKind;
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
-pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
-    own_doubts(selection, one, checks).or_else(|| doubtful_company(selection, one, checks))
+pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
+    own_doubts(selection, one, failures).or_else(|| doubtful_company(selection, one, failures))
 }
 
 /// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
-fn doubtful_company(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
+fn doubtful_company(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
     let fit = &selection.fit;
     let (acts, ratio) = (acts_in(fit, one.term), fit.noise_ratio());
     let is_doubtful = |other: &&Selected| {
@@ -25,14 +24,14 @@ fn doubtful_company(selection: &Selection<'_>, one: &Selected, checks: &[SensorC
         let is_shared = |equation: Equation| acts[equation] && also[equation] && ratio[equation] > 1.0;
         other.term != one.term
             && Equation::ALL.into_iter().any(is_shared)
-            && own_doubts(selection, other, checks).is_some()
+            && own_doubts(selection, other, failures).is_some()
     };
     let other = selection.effects.iter().find(is_doubtful)?;
     let id = fit.problem.terms[other.term].effect()?.spec().id;
     Some(format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"))
 }
 
-fn own_doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck]) -> Option<String> {
+fn own_doubts(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
     let fit = &selection.fit;
     let reasons: Vec<String> = [
         rivals(one),
@@ -41,7 +40,7 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck])
         lopsided(selection, one),
         bounds(fit, one),
         leaks(fit, one),
-        ripple(checks),
+        sensors(failures),
     ]
     .into_iter()
     .flatten()
@@ -49,10 +48,9 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, checks: &[SensorCheck])
     (!reasons.is_empty()).then(|| reasons.join("; "))
 }
 
-/// A sensor's noise is none.
-fn ripple(checks: &[SensorCheck]) -> Option<String> {
-    (!adequacy::ripples(checks).is_empty())
-        .then(|| "a sensor's fast noise is regular, which no noise is".to_owned())
+/// A sensor fails by itself.
+fn sensors(failures: &[String]) -> Option<String> {
+    (!failures.is_empty()).then(|| "a sensor fails by itself, which may pass for an effect".to_owned())
 }
 
 /// In which equations an effect shows.
@@ -73,7 +71,14 @@ fn remainder(fit: &Fit<'_>, one: &Selected) -> Option<String> {
     if one.beaten_by_nameless {
         return Some("a product of signals without a name fits better".to_owned());
     }
-    let acts = acts_in(fit, one.term);
+    if one.is_like_nameless {
+        return Some("a product of signals without a name fits as well".to_owned());
+    }
+    let mut acts = acts_in(fit, one.term);
+    if acts.force {
+        // Forces feel a speed that comes from the flows: where those do not balance, it may be wrong.
+        acts = PerEquation::from_fn(|_| true);
+    }
     let excess = |equation: Equation| {
         let count = fit.innovations(equation).len() as f64;
         if acts[equation] { count * (1.0 - fit.noise_ratio()[equation].powi(-2)) } else { 0.0 }

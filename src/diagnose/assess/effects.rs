@@ -1,20 +1,15 @@
 //! What is said of each effect.
 
 use super::confidence;
-use crate::diagnose::data::SensorCheck;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Calibration, FoundEffect};
 use crate::diagnose::search::{Selected, Selection};
 use pitchleak_core::{Effect, Estimate};
 
 /// An effect of the answer.
-pub(crate) fn found(
-    selection: &Selection<'_>,
-    one: &Selected,
-    checks: &[SensorCheck],
-) -> Option<FoundEffect> {
+pub(crate) fn found(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<FoundEffect> {
     let fit = &selection.fit;
-    let doubt = confidence::doubts(selection, one, checks);
+    let doubt = confidence::doubts(selection, one, failures);
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
     let std = confidence::std_with_oil(fit, one.term).unwrap_or(std);

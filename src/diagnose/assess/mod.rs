@@ -11,6 +11,7 @@ mod model_fit;
 mod residual;
 mod verdict;
 
+pub(crate) use adequacy::failures;
 pub(crate) use effects::{calibration, found};
 pub(crate) use excitation::{detection_limits, is_excited};
 pub(crate) use held_out::HeldOut;

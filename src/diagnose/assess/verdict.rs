@@ -1,9 +1,8 @@
 //! The answer in a word, and the sentences that speak for it.
 
-use super::adequacy::{complaints, ripples};
+use super::adequacy::complaints;
 use super::confidence::ratio_note;
 use super::leaks::negative_leaks;
-use crate::diagnose::data::SensorCheck;
 use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
 use crate::diagnose::search::Selection;
 use crate::diagnose::thresholds::MOST_ROUNDS;
@@ -15,11 +14,11 @@ pub(crate) struct Judgement {
     pub(crate) complaints: Vec<String>,
 }
 
-/// Judges the model with the effects.
-pub(crate) fn judge(selection: &Selection<'_>, excited: bool, checks: &[SensorCheck]) -> Judgement {
+/// Judges the model with the effects, beside what is wrong with the sensors.
+pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: &[String]) -> Judgement {
     let Selection { fit, effects } = selection;
     let mut complaints = complaints(fit);
-    complaints.extend(ripples(checks));
+    complaints.extend_from_slice(failures);
     if effects.iter().any(|one| one.beaten_by_nameless) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
     }

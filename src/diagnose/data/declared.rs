@@ -40,6 +40,12 @@ impl Declared {
         Self { cylinder, fluid, instruments, sensors, effects }
     }
 
+    /// The rig file's part in it.
+    pub(super) fn rig(&self) -> Rig {
+        let Self { cylinder, fluid, instruments, .. } = *self;
+        Rig { cylinder, fluid, instruments, ..Rig::paper() }
+    }
+
     /// With the noise of means over `count` samples.
     fn averaged(mut self, count: usize) -> Self {
         let root = (count as f64).sqrt();

@@ -1,5 +1,6 @@
 //! The traces and what is declared of them.
 
+mod channels;
 mod declared;
 mod files;
 mod motion;
@@ -9,6 +10,7 @@ mod traces;
 mod unresolved;
 mod wiring;
 
+pub(crate) use channels::channel_faults;
 pub use declared::Declared;
 pub(crate) use declared::thinned;
 pub use files::{FittedAndJudged, Roles, SameFile};

@@ -1,5 +1,6 @@
 //! A trace as columns, cut into stretches without a gap.
 
+use crate::channels::ChannelMonitor;
 use crate::rig::ColumnMap;
 use crate::trace::{Record, TraceError, TraceReader};
 use pitchleak_core::Sample;
@@ -32,6 +33,8 @@ pub struct Series {
     pub merged: usize,
     /// Samples of the recording that are not held here.
     pub left_out: u64,
+    /// What each channel shows by itself, of all samples that were recorded.
+    pub channels: ChannelMonitor,
 }
 
 /// A pause that cannot be mistaken for a step, s.
@@ -48,6 +51,7 @@ impl Series {
         self.qb_m3s.push(sample.qb_m3s.unwrap_or(f64::NAN));
         self.force_n.push(sample.force_n.unwrap_or(f64::NAN));
         self.temp_k.push(temp_k.unwrap_or(f64::NAN));
+        self.channels.add(&Record { t_s, sample: *sample, ..Record::default() });
     }
 
     /// Reads a whole trace.
@@ -116,7 +120,8 @@ impl Series {
     /// A series without samples of the same trace.
     pub(super) fn like(&self) -> Self {
         let (name, columns) = (self.name.clone(), self.columns.clone());
-        Self { name, columns, merged: self.merged, left_out: self.left_out, ..Self::default() }
+        let channels = self.channels.clone();
+        Self { name, columns, merged: self.merged, left_out: self.left_out, channels, ..Self::default() }
     }
 
     /// Adds all samples of `more`.

@@ -52,6 +52,7 @@ impl Traces {
             each()?;
             t_s += Series::step_to(&record);
             own.left_out += 1;
+            own.channels.add(&Record { t_s, ..record });
             in_piece += 1;
             if self.begun.is_multiple_of(self.stride) {
                 piece.push(t_s, &record.sample, record.temperature_k);

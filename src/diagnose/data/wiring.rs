@@ -3,7 +3,6 @@
 
 use super::declared::Declared;
 use super::series::Series;
-use crate::Rig;
 use crate::wiring::{Excerpt, Mistake, Wiring, explain};
 
 /// A mistake that explains the traces.
@@ -19,12 +18,7 @@ pub(crate) fn miswired(traces: &[Series], declared: &Declared) -> Option<Miswire
     if declared.effects.iter().next().is_some() {
         return None;
     }
-    let rig = Rig {
-        cylinder: declared.cylinder,
-        fluid: declared.fluid,
-        instruments: declared.instruments,
-        ..Rig::paper()
-    };
+    let rig = declared.rig();
     let mut excerpt = Excerpt::default();
     traces.iter().flat_map(Series::records).for_each(|record| excerpt.add(&record));
     let found = explain(&excerpt.records(), &rig)?;

@@ -58,7 +58,7 @@ pub(crate) struct Fit<'a> {
 impl<'a> Fit<'a> {
     /// Best fit of the declared model.
     pub(crate) fn declared(problem: &'a Problem<'a>, progress: Progress<'_>) -> Self {
-        let constants = vec![problem.usual_constants; problem.terms.len()];
+        let constants = (0..problem.terms.len()).map(|term| problem.usual(term)).collect();
         let structure = Structure { active: problem.declared_terms(), constants };
         Self::settled(problem, structure, problem.start.clone(), PerEquation::default(), progress)
     }

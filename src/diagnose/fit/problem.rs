@@ -2,10 +2,10 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective};
-use crate::diagnose::thresholds::LEAST_LAG_SHARE;
+use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
-use pitchleak_core::{Model, PerLeak, Sensors};
+use pitchleak_core::{Effect, Model, PerLeak, Sensors};
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -18,8 +18,10 @@ pub(crate) struct Problem<'a> {
     pub(crate) priors: Vec<Option<Prior>>,
     /// No shorter lag is named.
     least_lag_s: f64,
-    /// The constants that every effect starts from.
+    /// The constants that effects start from …
     pub(crate) usual_constants: EffectConstants<f64>,
+    /// … but for these: a valve opens half of the time, and a direction turns at once.
+    usual_own: [(Effect, EffectConstant, f64); 2],
     /// The declared model, from which the fit sets out.
     pub(super) start: Linearisation,
 }
@@ -35,6 +37,7 @@ impl<'a> Problem<'a> {
             terms,
             least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
             usual_constants: friction_constants(traces, declared),
+            usual_own: [cracking_pressure(traces), turning_speed(declared)],
             start: Linearisation::declared(declared),
         }
     }
@@ -48,6 +51,21 @@ impl<'a> Problem<'a> {
     /// The place of a term.
     pub(crate) fn place(&self, term: Term) -> Option<usize> {
         self.terms.iter().position(|one| *one == term)
+    }
+
+    /// The constants that a term starts from.
+    pub(crate) fn usual(&self, term: usize) -> EffectConstants<f64> {
+        let is_own =
+            |(effect, ..): &&(Effect, EffectConstant, f64)| self.terms[term] == Term::Effect(*effect);
+        let own = self.usual_own.iter().find(is_own);
+        own.map_or(self.usual_constants, |(_, parameter, value)| {
+            self.usual_constants.with(*parameter, *value)
+        })
+    }
+
+    /// Whether some term starts from these.
+    pub(crate) fn is_usual(&self, constants: EffectConstants<f64>) -> bool {
+        (0..self.terms.len()).any(|term| self.usual(term) == constants)
     }
 
     /// The priors as increments from a linearisation.
@@ -85,6 +103,24 @@ fn friction_constants(traces: &[Series], declared: &Declared) -> EffectConstants
         stribeck_speed_mps: within(EffectConstant::StribeckSpeed, usual / 2.0),
         ..EffectConstants::default()
     }
+}
+
+/// The mean load pressure.
+fn cracking_pressure(traces: &[Series]) -> (Effect, EffectConstant, f64) {
+    let loads = traces.iter().flat_map(|series| series.pa_pa.iter().zip(&series.pb_pa));
+    let (sum, count) = loads.fold((0.0, 0.0), |(sum, count), (pa, pb)| (sum + (pa - pb).abs(), count + 1.0));
+    let spec = EffectConstant::CrackingPressure.spec();
+    let mean_pa = if count > 0.0 { (sum / count).clamp(spec.lower, spec.upper) } else { spec.upper };
+    (Effect::InternalLeakCracking, EffectConstant::CrackingPressure, mean_pa)
+}
+
+/// The speed below which the meters' noise hides the direction of motion.
+fn turning_speed(declared: &Declared) -> (Effect, EffectConstant, f64) {
+    let (sensors, cylinder) = (&declared.sensors, &declared.cylinder);
+    let swept_m3s = sensors.flow_a.noise_std.hypot(sensors.flow_b.noise_std);
+    let speed_mps = LEAST_SURE_SIGMA * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
+    let spec = EffectConstant::SlipSpeed.spec();
+    (Effect::InternalLeakDirection, EffectConstant::SlipSpeed, speed_mps.clamp(spec.lower, spec.upper))
 }
 
 fn prior(term: Term, declared: &Declared) -> Option<Prior> {

@@ -3,7 +3,7 @@
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE};
-use crate::diagnose::weak_form::Term;
+use crate::diagnose::weak_form::{Nameless, Term};
 use pitchleak_core::effects::EffectConstants;
 
 /// Places of the terms that could be named.
@@ -18,15 +18,23 @@ pub(crate) fn open(fit: &Fit<'_>) -> Vec<usize> {
 pub(super) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
     let problem = fit.problem;
     let count = problem.terms.iter().filter(|term| term.effect().is_some()).count();
-    let trials = if constants == problem.usual_constants { 1 } else { CONSTANTS_TRIALS };
+    let trials = if problem.is_usual(constants) { 1 } else { CONSTANTS_TRIALS };
     statistics::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
 }
 
-/// Largest fall of the sum of squares by a product of signals that has no name.
-pub(crate) fn nameless_chi2_drop(fit: &Fit<'_>) -> f64 {
-    let terms = &fit.problem.terms;
-    let nameless = (0..terms.len()).filter(|i| matches!(terms[*i], Term::Nameless(_)));
-    nameless.filter_map(|i| fit.score(&fit.free, i)).map(|score| score.chi2_drop).fold(0.0, f64::max)
+/// The product of signals without a name that would bring most to a model, and by how much the sum of squares would fall.
+pub(crate) fn strongest_nameless(fit: &Fit<'_>, model: &Solution) -> Option<(Nameless, f64)> {
+    let terms = fit.problem.terms.iter().enumerate();
+    let scored = terms.filter_map(|(place, term)| {
+        let Term::Nameless(product) = term else { return None };
+        Some((*product, fit.score(model, place)?.chi2_drop))
+    });
+    scored.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// By how much it would fall.
+pub(super) fn nameless_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
+    strongest_nameless(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
 /// A whitened column of a term with constants that are not its present ones.

@@ -6,6 +6,7 @@ use crate::diagnose::thresholds::{
     FIRST_STEP, LAST_STEP, LEAST_CLIMB, MOST_CLIMBS, SEARCH_STARTS, WORTH_SEARCHING,
 };
 use crate::diagnose::weak_form::Row;
+use pitchleak_core::Effect;
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 
 /// A constant and the values of it that these traces can tell apart.
@@ -25,7 +26,7 @@ impl Range {
 /// The constants of an effect that are fitted: not those that only fix a reference.
 fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     let Some(effect) = fit.problem.terms[term].effect() else { return vec![] };
-    effect.constants().iter().filter_map(|parameter| range(fit, *parameter)).collect()
+    effect.constants().iter().filter_map(|parameter| range(fit, effect, *parameter)).collect()
 }
 
 /// Whether an effect has such constants.
@@ -33,7 +34,7 @@ pub(super) fn are_fitted(fit: &Fit<'_>, term: usize) -> bool {
     !free(fit, term).is_empty()
 }
 
-fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
+fn range(fit: &Fit<'_>, effect: Effect, parameter: EffectConstant) -> Option<Range> {
     let rows = &fit.rows().rows;
     let span = |value: &dyn Fn(&Row) -> f64| {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
@@ -50,8 +51,15 @@ fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
             (0.02 * high, 0.7 * high)
         }
         EffectConstant::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
+        EffectConstant::CrackingPressure => {
+            let (low, high) = span(&|row| (row.mean.pa_pa - row.mean.pb_pa).abs());
+            // What always or never opens can't be told from other leaks, or at all.
+            (low + 0.05 * (high - low), high - 0.05 * (high - low))
+        }
         // Slow to fast.
         EffectConstant::PolytropicExponent => (1.0, 1.4),
+        // A seal's lip turns at once.
+        EffectConstant::SlipSpeed if effect == Effect::InternalLeakDirection => return None,
         EffectConstant::SlipSpeed => {
             let (_, high) = span(&|row| row.mean.v_mps.abs());
             (fit.problem.usual_constants.slip_speed_mps, 0.3 * high)
@@ -65,7 +73,7 @@ fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
 
 /// The constants with which the search for a candidate's begins: the present ones and a few places of each range.
 fn starts(fit: &Fit<'_>, term: usize) -> Vec<EffectConstants<f64>> {
-    let (ranges, usual) = (free(fit, term), fit.problem.usual_constants);
+    let (ranges, usual) = (free(fit, term), fit.problem.usual(term));
     let middle = ranges
         .iter()
         .fold(fit.constants(term), |constants, other| constants.with(other.parameter, other.at(0.3)));

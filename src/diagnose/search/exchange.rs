@@ -6,7 +6,8 @@ use super::selection::{self, Selected, Selection};
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{CONFUSABLE_CHI2, MOST_SWAPS};
+use crate::diagnose::thresholds::{CONFUSABLE_CHI2, FEWEST_TO_SIMPLIFY, MOST_SWAPS};
+use crate::diagnose::weak_form::Term;
 
 /// Exchanges named effects for rivals that do better in their place, until none does.
 pub(super) fn exchange_all(all: &mut Selection<'_>, progress: Progress<'_>) {
@@ -80,6 +81,41 @@ fn mergeable(
         let best = candidates.rough_trials(&without).into_iter().next()?;
         (lost - best.score.chi2_drop <= spare).then_some(((a, b), best))
     })
+}
+
+/// Takes fewer effects where they do as well: a rival in the place of one may let two others give way to a single one. In each place
+/// the right effect can look no better than a wrong one as long as the others are wrong too.
+pub(super) fn simplify(all: &mut Selection<'_>, progress: Progress<'_>) {
+    for at in 0..all.effects.len() {
+        if all.effects.len() < FEWEST_TO_SIMPLIFY {
+            return;
+        }
+        let one = all.effects[at].clone();
+        let places =
+            one.confusable_with.iter().filter_map(|rival| all.fit.problem.place(Term::Effect(*rival)));
+        let simpler = places.filter(|place| !all.fit.active().contains(place)).find_map(|rival| {
+            let new = [(rival, all.fit.constants(rival))];
+            let mut trial =
+                Selection { fit: all.fit.changed(&[one.term], &new, progress), effects: all.effects.clone() };
+            trial.effects[at].term = rival;
+            if !merge_two(&mut trial, progress) {
+                return None;
+            }
+            trial.drop_needless(progress);
+            does_as_well(&trial.fit, &all.fit).then_some(trial)
+        });
+        if let Some(simpler) = simpler {
+            *all = simpler;
+            return all.find_confusable();
+        }
+    }
+}
+
+/// Whether a fit with fewer effects leaves no more than one of these would have to mend to be named.
+fn does_as_well(simpler: &Fit<'_>, than: &Fit<'_>) -> bool {
+    let spare = critical_sigma(than, than.problem.usual_constants).powi(2);
+    let is_as_complete = than.is_incomplete() || !simpler.is_incomplete();
+    is_as_complete && simpler.free.chi2 <= than.free.chi2 + spare * than.dispersion(than.free.chi2)
 }
 
 fn replace(fit: &Fit<'_>, one: &mut Selected, best: &Trial) {

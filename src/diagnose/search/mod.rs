@@ -9,7 +9,7 @@ mod select;
 mod selection;
 mod trials;
 
-pub(crate) use candidates::{nameless_chi2_drop, open};
+pub(crate) use candidates::{open, strongest_nameless};
 pub use collinearity::{Candidate, Collinearity};
 pub(crate) use interaction::interactions;
 pub(crate) use selection::{Selected, Selection, loss};
@@ -40,6 +40,7 @@ pub(crate) fn search<'a>(
     }
     all.drop_doubtful(progress);
     all.find_confusable();
+    exchange::simplify(&mut all, progress);
     all
 }
 

@@ -25,7 +25,8 @@ impl Selection<'_> {
             p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
             mended_percent: None,
             confusable_with: vec![],
-            beaten_by_nameless: nameless_chi2_drop(fit) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
+            is_like_nameless: false,
+            beaten_by_nameless: nameless_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
         });
         self.fit = with(fit, &[], &trial, progress);
         true
@@ -68,6 +69,7 @@ impl Selection<'_> {
             let lost = without.chi2 - fit.free.chi2;
             let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
             let rivals = candidates.trials(&without).into_iter().filter(is_close);
+            one.is_like_nameless = lost - nameless_chi2_drop(fit, &without) < CONFUSABLE_CHI2 * dispersion;
             one.confusable_with =
                 rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
         }

@@ -16,6 +16,8 @@ pub(crate) struct Selected {
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
+    /// A product of signals without a name fits nearly as well in its place.
+    pub(crate) is_like_nameless: bool,
     /// A product of signals without a name would have fitted better.
     pub(crate) beaten_by_nameless: bool,
 }
@@ -24,7 +26,14 @@ pub(crate) struct Selected {
 impl Selected {
     /// An effect of which nothing is known but its place.
     pub(crate) fn unjudged(term: usize) -> Self {
-        Self { term, p_value: 1.0, mended_percent: None, confusable_with: vec![], beaten_by_nameless: false }
+        Self {
+            term,
+            p_value: 1.0,
+            mended_percent: None,
+            confusable_with: vec![],
+            is_like_nameless: false,
+            beaten_by_nameless: false,
+        }
     }
 }
 
@@ -64,7 +73,7 @@ pub(crate) fn loss(fit: &Fit<'_>, terms: &[usize]) -> f64 {
 pub(super) fn with<'a>(fit: &Fit<'a>, old: &[usize], trial: &Trial, progress: Progress<'_>) -> Fit<'a> {
     let term = trial.score.term;
     let with = fit.changed(old, &[(term, trial.constants)], progress);
-    let is_usual = trial.constants == fit.problem.usual_constants;
+    let is_usual = trial.constants == fit.problem.usual(term);
     if is_usual { with } else { with_better_constants(&with, term, progress).unwrap_or(with) }
 }
 
@@ -80,7 +89,7 @@ fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>)
     let starts = constants::first_scores(&mut candidates, &vacated.free, term);
     let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop))?;
     let (best, found) = constants::best_score(&mut candidates, &vacated.free, first);
-    let is_usual = fit.constants(term) == fit.problem.usual_constants;
+    let is_usual = fit.constants(term) == fit.problem.usual(term);
     let needed = if is_usual { CONFUSABLE_CHI2 } else { LEAST_CLIMB };
     let is_better = best.chi2_drop > present + needed * vacated.dispersion(fit.free.chi2);
     is_better.then(|| vacated.with(term, found, progress))

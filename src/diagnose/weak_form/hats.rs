@@ -248,6 +248,7 @@ fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
         dqb_m3s2: rate(&series.qb_m3s),
         force_n: middle(&series.force_n),
         temp_k: middle(&series.temp_k),
+        t_s: series.t_s[at] - dt / 2.0,
     };
     Means {
         reading,

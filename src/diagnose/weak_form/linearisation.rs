@@ -25,7 +25,8 @@ pub(crate) fn as_felt(seen: &Signals<f64>, felt: &Signals<f64>) -> Signals<f64> 
 /// Whether two instants agree in all that physical effects depend on.
 fn is_same(one: &Signals<f64>, other: &Signals<f64>) -> bool {
     let motion = |m: &Signals<f64>| [m.x_m, m.v_mps, m.a_mps2, m.temp_k].map(f64::to_bits);
-    let oil = |m: &Signals<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas].map(f64::to_bits);
+    let oil =
+        |m: &Signals<f64>| [m.pa_pa, m.pb_pa, m.dpa_pas, m.dpb_pas, m.qa_m3s, m.qb_m3s].map(f64::to_bits);
     motion(one) == motion(other) && oil(one) == oil(other)
 }
 

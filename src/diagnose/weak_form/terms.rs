@@ -41,10 +41,12 @@ pub(crate) enum Nameless {
     BentMeterB,
     /// Force in proportion to ẋ |ẋ|.
     SquareFriction,
+    /// Storage in proportion to the pressure: V P Ṗ.
+    StiffeningOil,
 }
 
 impl Nameless {
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::SpeedLeak,
         Self::DirectionLeak,
         Self::SquareLeak,
@@ -52,9 +54,24 @@ impl Nameless {
         Self::BentMeterA,
         Self::BentMeterB,
         Self::SquareFriction,
+        Self::StiffeningOil,
     ];
 
-    fn unit_term(self, at: &Signals<f64>) -> Terms<f64> {
+    /// For people.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::SpeedLeak => "a leak past the piston that grows with speed times load pressure",
+            Self::DirectionLeak => "a leak past the piston that turns with speed times load pressure",
+            Self::SquareLeak => "a leak past the piston that grows with the square of the load pressure",
+            Self::SpoolLeak => "a leak past the piston that follows the valve's opening",
+            Self::BentMeterA => "a meter A whose scale differs between both ways",
+            Self::BentMeterB => "a meter B whose scale differs between both ways",
+            Self::SquareFriction => "a friction that grows with the square of the speed",
+            Self::StiffeningOil => "an oil that stiffens as the pressure rises",
+        }
+    }
+
+    fn unit_term(self, at: &Signals<f64>, model: &Model<f64>) -> Terms<f64> {
         let load = at.pa_pa - at.pb_pa;
         let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
         let force = |force_n: f64| Terms { force_n, ..Terms::default() };
@@ -66,6 +83,11 @@ impl Nameless {
             Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
             Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
             Self::SquareFriction => force(at.v_mps * at.v_mps.abs()),
+            Self::StiffeningOil => Terms {
+                chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.pa_pa * at.dpa_pas,
+                chamber_b_m3s: model.cylinder.volume_b_m3(at.x_m) * at.pb_pa * at.dpb_pas,
+                force_n: 0.0,
+            },
         }
     }
 }
@@ -87,6 +109,7 @@ const PROBE: Signals<f64> = Signals {
     dqb_m3s2: -1.4e-4,
     force_n: 2e3,
     temp_k: 300.0,
+    t_s: 10.0,
 };
 
 /// The four constants of the declared model.
@@ -117,7 +140,7 @@ impl Term {
             Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
             Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
             Self::Effect(effect) => effect.unit_term(at, model, constants),
-            Self::Nameless(product) => product.unit_term(at),
+            Self::Nameless(product) => product.unit_term(at, model),
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
@@ -153,10 +176,13 @@ impl Term {
     pub(crate) fn noisy_in(self) -> &'static [(Channel, usize)] {
         const SPEED: &[(Channel, usize)] = &[(Channel::Position, 1)];
         const STORAGE: &[(Channel, usize)] = &[(Channel::PressureA, 1), (Channel::PressureB, 1)];
+        const FLOWS: &[(Channel, usize)] = &[(Channel::FlowA, 0), (Channel::FlowB, 0)];
         const FORCE: &[(Channel, usize)] = &[(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
         let effect = match self {
-            Self::InverseBulk => return STORAGE,
+            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => return STORAGE,
             Self::Nameless(Nameless::DirectionLeak) => return SPEED,
+            // The direction turns with what both meters read.
+            Self::Effect(Effect::InternalLeakDirection) => return FLOWS,
             Self::Effect(effect) => effect,
             _ => return &[],
         };

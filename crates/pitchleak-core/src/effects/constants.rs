@@ -9,7 +9,7 @@ pub struct EffectConstants<T> {
     pub precharge_pa: T,
     /// Gas: polytropic exponent, 1 (slow) to 1.4 (fast).
     pub polytropic_exponent: T,
-    /// Friction: speed within which its direction turns, m/s.
+    /// Friction, and leaks with a direction: speed within which it turns, m/s.
     pub slip_speed_mps: T,
     /// Stribeck friction: speed at which it has fallen to 1/e, m/s.
     pub stribeck_speed_mps: T,
@@ -19,6 +19,8 @@ pub struct EffectConstants<T> {
     pub spot_width_m: T,
     /// Temperature at which the declared leak holds, K.
     pub reference_temp_k: T,
+    /// Relief valve or seal that opens under pressure: gauge pressure from which it leaks, Pa.
+    pub cracking_pa: T,
 }
 
 /// One constant of a [`EffectConstants`], by name: what a fit may vary.
@@ -40,6 +42,8 @@ pub enum EffectConstant {
     SpotWidth,
     /// [`EffectConstants::reference_temp_k`]
     ReferenceTemp,
+    /// [`EffectConstants::cracking_pa`]
+    CrackingPressure,
 }
 
 /// Name, unit and physical bounds of a [`EffectConstant`].
@@ -57,7 +61,7 @@ pub struct EffectConstantSpec {
 
 impl EffectConstant {
     /// Every constant.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Precharge,
         Self::PolytropicExponent,
         Self::SlipSpeed,
@@ -65,6 +69,7 @@ impl EffectConstant {
         Self::SpotPosition,
         Self::SpotWidth,
         Self::ReferenceTemp,
+        Self::CrackingPressure,
     ];
 
     /// Name, unit and bounds.
@@ -77,6 +82,7 @@ impl EffectConstant {
             Self::SpotPosition => ("spot_position", "m", 0.0, 10.0),
             Self::SpotWidth => ("spot_width", "m", 1e-4, 10.0),
             Self::ReferenceTemp => ("reference_temp", "K", 200.0, 500.0),
+            Self::CrackingPressure => ("cracking_pressure", "Pa", 0.0, 1e8),
         };
         EffectConstantSpec { id, unit, lower, upper }
     }
@@ -92,6 +98,7 @@ impl<T: Real> Default for EffectConstants<T> {
             spot_position_m: T::lit(0.1),
             spot_width_m: T::lit(0.02),
             reference_temp_k: T::lit(313.15),
+            cracking_pa: T::lit(5e6),
         }
     }
 }
@@ -127,6 +134,7 @@ impl<T: Real> EffectConstants<T> {
             EffectConstant::SpotPosition => &mut self.spot_position_m,
             EffectConstant::SpotWidth => &mut self.spot_width_m,
             EffectConstant::ReferenceTemp => &mut self.reference_temp_k,
+            EffectConstant::CrackingPressure => &mut self.cracking_pa,
         }
     }
 }

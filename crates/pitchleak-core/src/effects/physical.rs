@@ -1,6 +1,7 @@
 //! Terms of physical effects on the right of eq. (1)–(2).
 
 use super::EffectConstants;
+use super::sensor::known;
 use crate::{ATMOSPHERE_PA, Cylinder, LEAST_ABSOLUTE_PA, Real, Signals, Terms};
 
 pub(super) fn chamber_a<T: Real>(flow_m3s: T) -> Terms<T> {
@@ -54,6 +55,23 @@ fn gas_compressibility<T: Real>(pressure_pa: T, from_pa: T, constants: &EffectCo
     let absolute = (pressure_pa + T::lit(ATMOSPHERE_PA)).max(T::lit(LEAST_ABSOLUTE_PA));
     let exponent = T::one() / constants.polytropic_exponent;
     exponent * (from_pa.max(T::zero()) / absolute).libm_powf(exponent) / absolute
+}
+
+/// Pressure beyond that at which a valve or seal opens, either way; none within.
+pub(super) fn beyond_cracking<T: Real>(pressure_pa: T, constants: &EffectConstants<T>) -> T {
+    let within = pressure_pa.max(-constants.cracking_pa).min(constants.cracking_pa);
+    pressure_pa - within
+}
+
+/// A smooth direction of motion as both meters show it, which are quieter than a position's rate.
+pub(super) fn flow_direction<T: Real>(
+    at: &Signals<T>,
+    cylinder: &Cylinder<T>,
+    constants: &EffectConstants<T>,
+) -> T {
+    let swept_m3s = known(at.qa_m3s) - known(at.qb_m3s);
+    let turning_m3s = constants.slip_speed_mps * (cylinder.area_a_m2 + cylinder.area_b_m2);
+    (swept_m3s / turning_m3s).libm_tanh()
 }
 
 /// How much of a worn spot the piston stands on, 0 to 1.

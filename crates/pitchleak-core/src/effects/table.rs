@@ -13,7 +13,8 @@
 
 use super::entry::effects;
 use super::physical::{
-    accumulator, bell, chamber_a, chamber_b, direction, entrained_air, force, past_piston, stribeck,
+    accumulator, bell, beyond_cracking, chamber_a, chamber_b, direction, entrained_air, flow_direction,
+    force, past_piston, stribeck,
 };
 use super::sensor::{known, scale, shift};
 use crate::signed_root;
@@ -36,14 +37,20 @@ effects! {
         "Holds at a quarter and at the whole of the load pressure: a laminar leak falls to a quarter, a turbulent one to a half, an offset not at all."
     ExternalLeakATurbulent "external_leak_a_turbulent" ["m3/(s*sqrt(Pa))"] ExternalLeakA 0.0 .. 1e-6, 6e-9;
         term |at, _, _| chamber_a(signed_root(at.pa_pa));
-        "Oil leaves chamber A through an orifice-like opening (a cracked fitting, a valve off its seat)."
+        "Oil leaves chamber A through an orifice-like opening (a cracked fitting, a valve off its seat, a relief valve that opens too early)."
         "Inspect fittings, drain and relief valves on side A."
-        "Holds at a quarter and at the whole of the pressure A: a laminar leak falls to a quarter, a turbulent one to a half, an offset not at all."
+        "Holds at a quarter and at the whole of the pressure A: a laminar leak falls to a quarter, a turbulent one to a half, an offset not at all, and a relief valve shuts."
     ExternalLeakBTurbulent "external_leak_b_turbulent" ["m3/(s*sqrt(Pa))"] ExternalLeakB 0.0 .. 1e-6, 6e-9;
         term |at, _, _| chamber_b(signed_root(at.pb_pa));
-        "Oil leaves chamber B through an orifice-like opening (a cracked fitting, a valve off its seat)."
+        "Oil leaves chamber B through an orifice-like opening (a cracked fitting, a valve off its seat, a relief valve that opens too early)."
         "Inspect fittings, drain and relief valves on side B."
-        "Holds at a quarter and at the whole of the pressure B: a laminar leak falls to a quarter, a turbulent one to a half, an offset not at all."
+        "Holds at a quarter and at the whole of the pressure B: a laminar leak falls to a quarter, a turbulent one to a half, an offset not at all, and a relief valve shuts."
+    InternalLeakCracking "internal_leak_cracking" ["m3/(s*Pa)"] InternalLeak 0.0 .. 1e-9, 2e-11;
+        term |at, _, constants| past_piston(beyond_cracking(at.pa_pa - at.pb_pa, constants));
+        constants [CrackingPressure];
+        "Oil passes the piston, or a valve beside it, only above a certain pressure difference (a cross-port relief valve set low or with dirt on its seat, a seal that lifts)."
+        "Test the cross-port relief valve at the pressure named, then the piston seal."
+        "Holds at rising load: below the cracking pressure only the laminar leak is there, above it the leak grows with what is beyond."
     EntrainedAir "entrained_air" ["1"] Storage 0.0 .. 0.2, 1e-2;
         term |at, model, constants| entrained_air(at, &model.cylinder, constants);
         constants [PolytropicExponent];
@@ -74,6 +81,16 @@ effects! {
         "Flow meter B does not read zero at rest; it passes for a leak that does not depend on pressure."
         "Zero flow meter B with the valves shut."
         "A minute with the valves shut and line B vented: what flow meter B still reads is its offset."
+    FlowMeterDriftA "flow_meter_drift_a" ["m3/s2"] Sensor -1e-5 .. 1e-5, 5e-8;
+        reads |at, one, none| shift(Signals { qa_m3s: at.t_s, dqa_m3s2: one, ..none });
+        "The zero of flow meter A moves while the trace runs (an amplifier that warms up); it passes for a leak that grows."
+        "Let flow meter A warm up, zero it, and take a trace again."
+        "A minute with the valves shut and line A vented before and after the trace: by what flow meter A differs."
+    FlowMeterDriftB "flow_meter_drift_b" ["m3/s2"] Sensor -1e-5 .. 1e-5, 5e-8;
+        reads |at, one, none| shift(Signals { qb_m3s: at.t_s, dqb_m3s2: one, ..none });
+        "The zero of flow meter B moves while the trace runs (an amplifier that warms up); it passes for a leak that grows."
+        "Let flow meter B warm up, zero it, and take a trace again."
+        "A minute with the valves shut and line B vented before and after the trace: by what flow meter B differs."
     FlowMeterGainA "flow_meter_gain_a" ["1"] Sensor -0.5 .. 0.5, 2e-2;
         reads |_, one, none| scale(Signals { qa_m3s: one, dqa_m3s2: one, ..none });
         prior flow_a.gain_std; carries FlowA;
@@ -168,6 +185,17 @@ effects! {
         "Warm oil is thinner, so the laminar leak past the piston grows with temperature."
         "Compare leak estimates at equal oil temperature, or let the model carry the slope."
         "The same hold with cold and with warm oil."
+    InternalLeakGrowth "internal_leak_growth" ["m3/(s*Pa*s)"] InternalLeak -1e-11 .. 1e-11, 1e-13;
+        term |at, _, _| past_piston(at.t_s * (at.pa_pa - at.pb_pa));
+        "The leak past the piston grows while the trace runs: a seal gives way, or the oil warms and no column says so."
+        "Compare the leak over the next traces, record the oil's temperature, and inspect the seal if that stays."
+        "The same hold at the beginning and at the end, and the meters' zeros before and after."
+    InternalLeakDirection "internal_leak_direction" ["m3/(s*Pa)"] InternalLeak -1e-9 .. 1e-9, 5e-12;
+        term |at, model, constants| past_piston(flow_direction(at, &model.cylinder, constants) * (at.pa_pa - at.pb_pa));
+        constants [SlipSpeed];
+        "The piston seal is tighter one way than the other (a lip seal in one direction, a check valve in the piston): positive, the leak is larger while extending."
+        "Check that the seal is mounted the right way round and its lip is whole."
+        "Strokes both ways at constant speed and load: the leak differs by twice the value named."
     ViscousFriction "viscous_friction" ["N*s/m"] Force 0.0 .. 1e6, 1.5e3;
         term |at, _, _| force(at.v_mps);
         "Seals and guides resist in proportion to speed."
@@ -204,7 +232,7 @@ effects! {
         "Holds without pressure change at several positions: the force of a spring follows the position."
     AddedMass "added_mass" ["kg"] Storage -1e4 .. 1e4, 1e1;
         term |at, _, _| force(at.a_mps2);
-        "More (or less) mass moves with the piston than declared, such as oil in long lines."
+        "More (or less) mass moves with the piston than declared, such as the oil of a long hose between a pressure sensor and its port."
         "Declare the moving mass as fitted."
         "Fast reversals without load: force in step with acceleration."
     ForceGain "force_gain" ["1"] Sensor -0.5 .. 0.5, 5e-2;

@@ -184,6 +184,13 @@ impl<T: Real> Emulator<T> {
         Ok(())
     }
 
+    /// Says what time it is, s: some effects of the pitching cylinder grow with it. What is not a number is passed over.
+    pub fn set_time(&mut self, time_s: T) {
+        if time_s.is_finite() {
+            self.params.pitch.plant.time_s = time_s;
+        }
+    }
+
     /// Changes the effects that act on the pitching cylinder.
     pub fn set_effects(&mut self, effects: EffectSet<T>) {
         self.params.pitch.plant.effects = effects;

@@ -35,6 +35,8 @@ pub struct Signals<T> {
     pub force_n: T,
     /// Oil temperature, K.
     pub temp_k: T,
+    /// Time since the trace or the run began, s.
+    pub t_s: T,
 }
 
 /// One number for each equation of the cylinder.
@@ -135,6 +137,7 @@ impl<T: Real> Signals<T> {
             dqb_m3s2: f(self.dqb_m3s2, other.dqb_m3s2),
             force_n: f(self.force_n, other.force_n),
             temp_k: f(self.temp_k, other.temp_k),
+            t_s: f(self.t_s, other.t_s),
         }
     }
 }

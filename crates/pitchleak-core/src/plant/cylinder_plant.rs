@@ -22,6 +22,8 @@ pub struct CylinderPlant<T> {
     pub vapour_pressure_pa: T,
     /// Oil temperature, K.
     pub temp_k: T,
+    /// Time since the run began, s, with which some effects grow.
+    pub time_s: T,
     /// Effects beyond the model, friction among them; sensor effects do not act here.
     pub effects: EffectSet<T>,
 }
@@ -75,6 +77,7 @@ impl<T: Real> CylinderPlant<T> {
             end_stop: EndStop::for_cylinder(&model.cylinder),
             vapour_pressure_pa: T::lit(-1e5),
             temp_k: T::lit(313.15),
+            time_s: T::zero(),
             effects: EffectSet::default(),
         };
         plant.check().map(|()| plant)
@@ -148,6 +151,7 @@ impl<T: Real> CylinderPlant<T> {
             qb_m3s: drive.qb_m3s,
             force_n: drive.force_n,
             temp_k: self.temp_k,
+            t_s: self.time_s,
             ..Signals::default()
         };
         let effects = self.effects.terms(&signals, &self.model, |kind| kind != EffectKind::Storage);

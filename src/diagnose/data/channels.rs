@@ -1,0 +1,65 @@
+//! Channels that fail by themselves: beside one that is clipped, stuck or coarse no effect is to be believed.
+
+use super::declared::Declared;
+use super::series::Series;
+use crate::channels::{ChannelFault, ChannelFaultKind};
+use crate::signal::Signal;
+
+/// The faults that the channels of these traces show, each kind once per channel.
+pub(crate) fn channel_faults(traces: &[Series], declared: &Declared) -> Vec<ChannelFault> {
+    let rig = declared.rig();
+    let mut found: Vec<ChannelFault> = Vec::new();
+    for series in traces {
+        for fault in series.channels.faults(&rig) {
+            let is_known = found.iter().any(|one| (one.channel, one.kind) == (fault.channel, fault.kind));
+            if !is_known && !is_no_flow(series, &fault) {
+                found.push(fault);
+            }
+        }
+    }
+    found
+}
+
+/// A flow that is never less than exactly nothing, or never more, piles up there whenever the piston stands: that is no end of a range.
+fn is_no_flow(series: &Series, fault: &ChannelFault) -> bool {
+    let flow = [(Signal::FlowA, &series.qa_m3s), (Signal::FlowB, &series.qb_m3s)];
+    let own = flow.into_iter().find(|(signal, _)| signal.name() == fault.channel);
+    own.filter(|_| fault.kind == ChannelFaultKind::Clipped).is_some_and(|(_, values)| {
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        least == 0.0 || most == 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{declared, sound};
+    use pitchleak_core::Sample;
+
+    /// The sound rig's trace with another reading of flow A.
+    fn with_flow_a(read: impl Fn(f64) -> f64) -> Vec<ChannelFault> {
+        let (full, mut series) = (sound(30), Series::default());
+        for at in 0..full.len() {
+            let sample = Sample {
+                x_m: full.x_m[at],
+                pa_pa: full.pa_pa[at],
+                pb_pa: full.pb_pa[at],
+                qa_m3s: Some(read(full.qa_m3s[at])),
+                qb_m3s: Some(full.qb_m3s[at]),
+                force_n: None,
+            };
+            series.push(full.t_s[at], &sample, None);
+        }
+        channel_faults(&[series], &declared())
+    }
+
+    #[test]
+    fn a_coarse_meter_fails_by_itself_and_a_sound_one_or_one_without_flow_does_not() {
+        let quantum = 30.0 * declared().sensors.flow_a.noise_std;
+        let coarse = with_flow_a(|q| (q / quantum).round() * quantum);
+        assert!(coarse.iter().any(|fault| fault.channel == Signal::FlowA.name()), "{coarse:?}");
+        assert_eq!(with_flow_a(|q| q), []);
+        assert_eq!(with_flow_a(|q| q.max(0.0)), []);
+    }
+}
