@@ -190,6 +190,8 @@ fn end_stops_hold_full_pressure() {
 /// In simulation an effect is exactly what the diagnosis will look for.
 #[test]
 fn residual_of_the_plain_model_is_the_effects_term() {
+    // Such that each effect acts in the state below.
+    let constants = EffectConstants { cracking_pa: 1e6, ..EffectConstants::default() };
     for effect in Effect::ALL.iter().copied() {
         let spec = effect.spec();
         if spec.kind == EffectKind::Sensor {
@@ -197,12 +199,12 @@ fn residual_of_the_plain_model_is_the_effects_term() {
         }
         let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 0.0 };
         let mut plant = CylinderPlant::new(Model::<f64> { leaks_m3spa: leaks, ..Model::paper() }).unwrap();
-        plant.temp_k = 323.0;
-        plant.effects.set(effect, spec.default_size, EffectConstants::default()).unwrap();
+        (plant.temp_k, plant.time_s) = (323.0, 20.0);
+        plant.effects.set(effect, spec.default_size, constants).unwrap();
         let state = plant.state_at(0.09, 0.02, 4e6, 2e6);
         let signals = plant.rates(&state, &Drive { qa_m3s: 5e-5, qb_m3s: -1e-5, force_n: 2e3 }).signals;
         let residual = plant.model.residual(&signals);
-        let term = effect.unit_term(&signals, &plant.model, &EffectConstants::default());
+        let term = effect.unit_term(&signals, &plant.model, &constants);
         let expected = term.zip(term, |unit, _| unit * spec.default_size);
         let scale = [1e-4, 1e-4, 5e3];
         let pairs = [
