@@ -50,7 +50,8 @@ impl<T: Real> InnovationMonitor<T> {
 
 /// Mean of χ²₁ terms over what such a mean may be by chance (its variance is 2/count).
 fn significant_ratio<T: Real>(sum: T, count: T) -> T {
-    // Short of two standard deviations it is below one, which tells nothing: a root is dear on a microcontroller.
+    // Short of two standard deviations, (sum − count)² = 8 count, it is below one, which tells nothing: a root is dear on a
+    // microcontroller. 7, so that rounding at the edge changes nothing.
     let beyond = sum - count;
     let may_be = beyond > T::zero() && beyond * beyond > T::lit(7.0) * count;
     if may_be { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
