@@ -40,20 +40,19 @@ impl<T: Real> State<T> {
 
     /// Force of the load cylinder against extension, N.
     pub fn load_force_n(&self, params: &EmulatorParams<T>) -> T {
-        let load = self.load(params);
-        let (pa_pa, pb_pa) = params.load.plant.pressures_pa(&load);
-        let cylinder = &params.load.plant.model.cylinder;
-        pa_pa * cylinder.area_a_m2 - pb_pa * cylinder.area_b_m2
+        push_n(&params.load, params.load.plant.pressures_pa(&self.load(params)))
     }
 
     /// Rates of the pitching and the load cylinder, and the flow drawn from the supply, m³/s.
     pub fn rates(&self, params: &EmulatorParams<T>) -> (CylinderRates<T>, CylinderRates<T>, T) {
         let [pitch_spool, load_spool] = self.spools;
         let load_state = self.load(params);
-        let load_flows = self.flows(&params.load, &load_state, load_spool);
-        let pitch_flows = self.flows(&params.pitch, &self.pitch, pitch_spool);
-        let load = rates(&params.load, &load_state, &load_flows, T::zero());
-        let pitch = rates(&params.pitch, &self.pitch, &pitch_flows, self.load_force_n(params));
+        let load_pa = params.load.plant.pressures_pa(&load_state);
+        let pitch_pa = params.pitch.plant.pressures_pa(&self.pitch);
+        let load_flows = self.flows(&params.load, load_pa, load_spool);
+        let pitch_flows = self.flows(&params.pitch, pitch_pa, pitch_spool);
+        let load = rates(&params.load, &load_state, load_pa, &load_flows, T::zero());
+        let pitch = rates(&params.pitch, &self.pitch, pitch_pa, &pitch_flows, push_n(&params.load, load_pa));
         (pitch, load, pitch_flows.supply_m3s + load_flows.supply_m3s)
     }
 
@@ -157,8 +156,7 @@ impl<T: Real> State<T> {
         CylinderState { x_m: stroke - self.pitch.x_m, v_mps: -self.pitch.v_mps, oil_a_m3, oil_b_m3 }
     }
 
-    fn flows(&self, axis: &Axis<T>, cylinder: &CylinderState<T>, spool: T) -> ValveFlows<T> {
-        let (pa_pa, pb_pa) = axis.plant.pressures_pa(cylinder);
+    fn flows(&self, axis: &Axis<T>, (pa_pa, pb_pa): (T, T), spool: T) -> ValveFlows<T> {
         axis.valve.flows(spool, self.supply_pa, pa_pa, pb_pa)
     }
 }
@@ -166,11 +164,18 @@ impl<T: Real> State<T> {
 fn rates<T: Real>(
     axis: &Axis<T>,
     cylinder: &CylinderState<T>,
+    pressures_pa: (T, T),
     flows: &ValveFlows<T>,
     force_n: T,
 ) -> CylinderRates<T> {
     let drive = Drive { qa_m3s: flows.a_m3s, qb_m3s: flows.b_m3s, force_n };
-    axis.plant.rates(cylinder, &axis.plant.bounded(drive))
+    axis.plant.rates_under(cylinder, pressures_pa, &axis.plant.bounded(drive))
+}
+
+/// Force of a cylinder's pressures in the direction of its extension, N.
+fn push_n<T: Real>(axis: &Axis<T>, (pa_pa, pb_pa): (T, T)) -> T {
+    let cylinder = &axis.plant.model.cylinder;
+    pa_pa * cylinder.area_a_m2 - pb_pa * cylinder.area_b_m2
 }
 
 #[cfg(test)]

@@ -138,10 +138,19 @@ impl<T: Real> CylinderPlant<T> {
 
     /// The right side of the differential equation.
     pub fn rates(&self, state: &CylinderState<T>, drive: &Drive<T>) -> CylinderRates<T> {
+        self.rates_under(state, self.pressures_pa(state), drive)
+    }
+
+    /// [`rates`](Self::rates) where the pressures P_A, P_B of the state are known already.
+    pub(crate) fn rates_under(
+        &self,
+        state: &CylinderState<T>,
+        (pa_pa, pb_pa): (T, T),
+        drive: &Drive<T>,
+    ) -> CylinderRates<T> {
         let cylinder = &self.model.cylinder;
         let chamber = self.chamber();
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
-        let (pa_pa, pb_pa) = self.pressures_pa(state);
         let mut signals = Signals {
             x_m: self.end_stop.guarded_m(state.x_m, cylinder.stroke_m),
             v_mps: state.v_mps,

@@ -79,10 +79,11 @@ impl<T: Real> ValvePlant<T> {
 
     /// The cylinder's rates, and the flow drawn from the supply, m³/s.
     pub fn rates(&self, state: &ValvePlantState<T>, load_n: T) -> (CylinderRates<T>, T) {
-        let (pa_pa, pb_pa) = self.cylinder.pressures_pa(&state.cylinder);
-        let flows = self.valve.flows(state.spool, state.supply_pa, pa_pa, pb_pa);
+        let pressures_pa = self.cylinder.pressures_pa(&state.cylinder);
+        let flows = self.valve.flows(state.spool, state.supply_pa, pressures_pa.0, pressures_pa.1);
         let drive = Drive { qa_m3s: flows.a_m3s, qb_m3s: flows.b_m3s, force_n: load_n };
-        (self.cylinder.rates(&state.cylinder, &self.cylinder.bounded(drive)), flows.supply_m3s)
+        let drive = self.cylinder.bounded(drive);
+        (self.cylinder.rates_under(&state.cylinder, pressures_pa, &drive), flows.supply_m3s)
     }
 
     /// Leak flows of a state, m³/s.
