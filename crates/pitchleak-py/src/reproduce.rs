@@ -1,13 +1,13 @@
 use crate::errors::{output_error, value_error};
-use crate::replay::Report;
 use crate::threads::detached;
 use pitchleak::output::make_folder;
+use pitchleak::page::Page;
 use pitchleak::reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
 /// Reruns the paper's experiment; writes its figures and tables into a directory where one is given. `progress` is
-/// called with the pieces done and their number, stage by stage.
+/// called with the pieces done and their number, stage by stage. Gives the report's JSON, its text, and the page.
 #[pyfunction]
 #[pyo3(signature = (seeds, out, progress = None))]
 pub fn reproduce(
@@ -15,7 +15,7 @@ pub fn reproduce(
     seeds: u64,
     out: Option<PathBuf>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Report> {
+) -> PyResult<(String, String, String)> {
     if let Some(directory) = &out {
         make_folder(directory).map_err(|error| output_error(py, &error))?;
     }
@@ -23,11 +23,13 @@ pub fn reproduce(
         engine_reproduce(seeds, |Progress { done, count, .. }| caller.at(done as f64, count as f64))
     })?;
     let done = done.map_err(value_error)?;
-    if let Some(directory) = out {
-        py.detach(|| done.write(&directory)).map_err(|error| match error {
-            ReproduceError::Output(error) => output_error(py, &error),
-            error => value_error(error),
-        })?;
-    }
-    Ok((done.report.to_json().map_err(value_error)?, done.report.to_text()))
+    let page = py.detach(|| {
+        out.map(|directory| done.write(&directory)).transpose()?;
+        Page::of_reproduction(&done)
+    });
+    let page = page.map_err(|error| match error {
+        ReproduceError::Output(error) => output_error(py, &error),
+        error => value_error(error),
+    })?;
+    Ok((done.report.to_json().map_err(value_error)?, done.report.to_text(), page.to_html()))
 }

@@ -118,7 +118,9 @@ def test_reproduce_is_the_programs(program, tmp_path):
     told = []
     table = pl.reproduce(1, out=tmp_path, progress=lambda done, whole: told.append((done, whole)))
     assert told and all(0 < done <= whole for done, whole in told)
-    assert table.raw == json.loads(program("reproduce", "--seeds", 1, "--json"))
+    page = tmp_path / "page.html"
+    assert table.raw == json.loads(program("reproduce", "--seeds", 1, "--json", "--report", page))
+    assert table.to_html() == page.read_text() == pickle.loads(pickle.dumps(table)).to_html()
     assert list(tmp_path.glob("*.svg"))
     assert len(table.to_pandas()) == len(table.rows) == 32
     assert table.plot().get_yscale() == "log" and "<table>" in table._repr_html_()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _html, _inputs, _pitchleak
+from ._page import Paged
 from ._picture import axes_for, legend_beside
 from ._progress import Progress, shown
 from ._raw import Raw
@@ -52,7 +53,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Reproduction(Raw, Tabular):
+class Reproduction(Paged, Raw, Tabular):
     """The paper's table, its law and ours on the same readings. As a table: the rows."""
 
     seeds: int
@@ -64,6 +65,7 @@ class Reproduction(Raw, Tabular):
     raw: dict[str, Any] = field(init=False, default_factory=dict)
     """Every field of ``pitchleak reproduce --json``."""
     _text: str = field(init=False, default="")
+    _page: str = field(init=False, default="")
 
     @property
     def table(self) -> Mapping[str, Any]:
@@ -84,6 +86,9 @@ class Reproduction(Raw, Tabular):
         axes.tick_params("x", labelsize=6)
         legend_beside(axes)
         return axes
+
+    def to_html(self) -> str:
+        return self._page
 
     def __str__(self) -> str:
         return self._text.rstrip()
@@ -115,9 +120,10 @@ def reproduce(seeds: int = 56, *, out: _inputs.Path | None = None, progress: Pro
     if seeds < 1:
         raise ValueError("seeds: at least 1")
     with shown(progress, "") as at:
-        report, text = _pitchleak.reproduce(seeds, None if out is None else os.fspath(out), at)
+        report, text, page = _pitchleak.reproduce(seeds, None if out is None else os.fspath(out), at)
     raw = json.loads(report)
     result = record(Reproduction, raw)
     object.__setattr__(result, "raw", raw)
     object.__setattr__(result, "_text", text)
+    object.__setattr__(result, "_page", page)
     return result
