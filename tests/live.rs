@@ -3,9 +3,13 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
+use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::live::{Batch, BatchFormat, Checkpoint, EstimateEvent, Event, LiveConfig, Snapshot, Watch};
-use pitchleak::replay::{ReplayError, replay};
-use pitchleak::trace::TraceReader;
+use pitchleak::replay::{ReplayError, Stream, replay};
+use pitchleak::report::{Status, Verdict};
+use pitchleak::trace::{BadRows, TraceReader};
+use pitchleak_testkit::trace_text::{file, row};
+use pitchleak_testkit::{Motion, noisy, seeded};
 use std::io::Read;
 use std::path::PathBuf;
 
@@ -241,5 +245,58 @@ fn set_alarms(value: &mut ciborium::Value) {
             Some("alarms") => *value = 1_000_000.into(),
             _ => set_alarms(value),
         }
+    }
+}
+
+/// A cylinder in motion for three quarters of an hour, read 25 times a second by sensors of 0.3 %; `lie` changes readings.
+fn long_trace(rig: &Rig, lie: impl Fn(f64, &mut Sample<f64>)) -> Vec<String> {
+    let motion = Motion::wind_like(PerLeak { internal: 1e-11, external_a: 0.0, external_b: 0.0 });
+    let (sensors, mut random) = (rig.sensors(), seeded(7));
+    let read = |k: u32| {
+        let t_s = f64::from(k) * 0.04;
+        let mut sample = noisy(&motion.sample(t_s), &sensors, &mut random);
+        lie(t_s, &mut sample);
+        row(t_s, motion.position_m.slope(t_s), &sample)
+    };
+    (0..45 * 60 * 25).map(read).collect()
+}
+
+fn reader<'a>(rows: &[String], rig: &Rig) -> TraceReader<'a> {
+    TraceReader::from_stream("t", Box::new(std::io::Cursor::new(file(rows).into_bytes())), rig).unwrap()
+}
+
+/// What misfitted, or hung, for a while is told as long as the stream runs, and counts for ten to twenty minutes; a file's
+/// verdict is on the whole of it.
+#[test]
+fn what_was_wrong_once_does_not_keep_a_stream_in_doubt_for_ever() {
+    let mut rig = Rig::paper();
+    rig.instruments = rig.instruments.with_accuracy(3e-3);
+    let wrong = |t_s: f64| (60.0..90.0).contains(&t_s);
+    let hangs = |t_s: f64, sample: &mut Sample<f64>| {
+        if wrong(t_s) {
+            sample.qa_m3s = Some(5e-5);
+        }
+    };
+    let scatters = |t_s: f64, sample: &mut Sample<f64>| {
+        let by_m3s = if wrong(t_s) { 4e-5 * (40.0 * t_s).sin() } else { 0.0 };
+        sample.qa_m3s = sample.qa_m3s.map(|flow| flow + by_m3s);
+    };
+    for (rows, said) in [
+        (long_trace(&rig, hangs), "Earlier: qa reads 3 L/min from 60.00 s to 89.96 s"),
+        (
+            long_trace(&rig, scatters),
+            "Earlier: model and declared noise did not explain the readings between",
+        ),
+    ] {
+        let mut stream = Stream::new(&rig, BadRows::Skip).unwrap();
+        let (begun, rest) = rows.split_at(5 * 60 * 25);
+        stream.extend(reader(begun, &rig)).unwrap();
+        assert_eq!(stream.report("t").unwrap().verdict.status, Status::Doubtful, "{said}");
+        stream.extend(reader(rest, &rig)).unwrap();
+        let Verdict { status, faults, text, .. } = stream.report("t").unwrap().verdict;
+        assert_eq!((status, faults), (Status::Leak, vec![Leak::Internal]), "{text}");
+        assert!(text.contains(said), "{text}");
+        let whole = replay(&mut reader(&rows, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap();
+        assert_eq!(whole.verdict.status, Status::Doubtful, "{said}");
     }
 }

@@ -23,8 +23,10 @@ pub(super) struct Channel {
     repeats: u32,
     repeats_from_s: f64,
     last_s: f64,
-    /// The longest run of all.
+    /// The longest run of all, …
     pub longest: Run,
+    /// … of the stretch that goes on, and of the one before it.
+    lately: [Run; 2],
     /// Runs of length 2, 3, … [`SHORT_RUN`] at their length less 1; the first place is not used.
     short_runs: [u32; SHORT_RUN],
     /// Longer runs, and the readings in them.
@@ -69,6 +71,7 @@ impl Default for Channel {
             repeats_from_s: 0.0,
             last_s: 0.0,
             longest: Run::default(),
+            lately: [Run::default(); 2],
             short_runs: [0; SHORT_RUN],
             long_runs: 0,
             in_long_runs: 0,
@@ -174,9 +177,26 @@ impl Channel {
         let count = u64::from(repeats) + 1;
         self.in_long_runs += count;
         self.long_runs += 1;
-        if count > self.longest.count {
-            self.longest = Run { value: self.last, count, from_s: self.repeats_from_s, to_s: self.last_s };
+        let run = Run { value: self.last, count, from_s: self.repeats_from_s, to_s: self.last_s };
+        let [now, _] = &mut self.lately;
+        for longest in [&mut self.longest, now] {
+            if count > longest.count {
+                *longest = run;
+            }
         }
+    }
+
+    /// Another stretch begins: the one before the last is forgotten.
+    pub fn next_stretch(&mut self) {
+        let [now, _] = self.lately;
+        self.lately = [Run::default(), now];
+    }
+
+    /// With no run but those that ended in the last two stretches, or go on.
+    pub fn lately(mut self) -> Self {
+        let [now, before] = self.lately;
+        self.longest = if now.count > before.count { now } else { before };
+        self
     }
 
     /// As if the trace ended here: the run that goes on counts.

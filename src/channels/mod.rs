@@ -140,4 +140,14 @@ impl ChannelMonitor {
     pub fn faults(&self, rig: &Rig) -> Vec<ChannelFault> {
         faults::find(self, rig)
     }
+
+    /// A stream's next stretch begins.
+    pub(crate) fn next_stretch(&mut self) {
+        self.channels.iter_mut().for_each(Channel::next_stretch);
+    }
+
+    /// As if channels had been stuck in the last two stretches alone.
+    pub(crate) fn lately(&self) -> Self {
+        Self { channels: self.channels.map(Channel::lately), ..*self }
+    }
 }

@@ -2,6 +2,7 @@
 
 mod consistency;
 mod correction;
+mod draft;
 mod effect_uncertainty;
 mod episodes;
 mod estimate_file;
@@ -24,7 +25,7 @@ pub use state::RestoreError;
 pub use stream::Stream;
 
 use crate::channels::ChannelMonitor;
-use crate::report::{Alarm, ReplayReport, TraceSummary};
+use crate::report::{Alarm, ReplayReport, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceReader};
 use crate::units::LPM_PER_M3S;
@@ -196,10 +197,8 @@ impl Replay {
                 if changed {
                     self.pressures = TracePressures::default();
                     self.changed_at_s = Some(record.t_s);
-                    self.consistency.restarted();
-                } else if let Some([_, odometer]) = self.estimator.normalised_innovation() {
-                    self.consistency.odometer(odometer);
                 }
+                self.weigh_renewal(record.t_s, changed);
                 self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
                 self.detect(record.t_s, elapsed_s);
             }
@@ -214,6 +213,18 @@ impl Replay {
         if let Some(innovation) = innovation {
             self.consistency.balance(innovation);
             self.innovation = Some(innovation.value / innovation.variance.sqrt());
+        }
+    }
+
+    /// Weighs whether they explain the travel, or the estimates began anew.
+    fn weigh_renewal(&mut self, t_s: f64, changed: bool) {
+        if self.consistency.is_next_stretch(t_s) {
+            self.channels.next_stretch();
+        }
+        if changed {
+            self.consistency.restarted();
+        } else if let Some([_, odometer]) = self.estimator.normalised_innovation() {
+            self.consistency.odometer(odometer);
         }
     }
 
@@ -345,9 +356,9 @@ pub fn replay<E: From<ReplayError>>(
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
-    let report = replay.report(summary.clone());
-    let suspicions = replay.suspicions(&report.verdict, &excerpt, &reader.columns(&rig.columns));
-    Ok(if suspicions.any() { replay.report_with(summary, &suspicions) } else { report })
+    let (weighed, columns) = (replay.whole_trace(), reader.columns(&rig.columns));
+    let suspect = |verdict: &Verdict| replay.suspicions(verdict, &weighed, &excerpt, &columns);
+    Ok(replay.report_with(summary, &weighed, suspect))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use super::Replay;
 use super::state::{self, RestoreError};
-use crate::report::{ReplayReport, TraceSummary};
+use crate::report::{ReplayReport, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::times::{Clock, TimeFormat};
 use crate::trace::{
@@ -157,13 +157,14 @@ impl Stream {
         &self.replay
     }
 
-    /// The report as it stands; `name` is the trace's. None before the first part.
+    /// The report as it stands, its verdict held against the last ten to twenty minutes; `name` is the trace's. None before the
+    /// first part.
     pub fn report(&self, name: &str) -> Option<ReplayReport> {
         let quality = self.validator.as_ref()?.quality();
         let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
         let summary = TraceSummary { begins, ..TraceSummary::new(name, quality) };
-        let report = self.replay.report(summary.clone());
-        let suspicions = self.replay.suspicions_so_far(&report.verdict, &self.evidence);
-        Some(if suspicions.any() { self.replay.report_with(summary, &suspicions) } else { report })
+        let weighed = self.replay.last_stretch();
+        let suspect = |verdict: &Verdict| self.replay.suspicions_so_far(verdict, &weighed, &self.evidence);
+        Some(self.replay.report_with(summary, &weighed, suspect))
     }
 }

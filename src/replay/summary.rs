@@ -1,27 +1,19 @@
 //! From a finished replay to its report.
 
 use super::Replay;
+use super::draft::{Draft, Weighed};
 use super::known::is_known;
-use crate::channels::ChannelFault;
+use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::report::{
-    EstimateEntry, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell,
-    Suspicions, TraceSummary, Verdict,
+    EstimateEntry, Estimates, LeakTrend, Leakage, ReplayReport, Suspicions, TraceSummary, Verdict,
 };
 use crate::rig::EstimatorKind;
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
-use crate::wiring::Orifice;
 use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak};
 
 /// Why an estimate says nothing that is no finite number.
 const NO_NUMBER: &str = "the readings lead to no finite number";
-
-fn leakage_through(orifice: &Orifice) -> PerLeak<Leakage> {
-    orifice
-        .sizes_m3s
-        .zip(orifice.net_m3s)
-        .map(|(size, net_m3s)| Leakage { net_mean_lpm: Some(net_m3s * LPM_PER_M3S), ..Leakage::new(size) })
-}
 
 /// No leak is negative: by what one is, the model errs, and in the other leaks by as much.
 fn with_model_error(flows: PerLeak<Leakage>) -> PerLeak<Leakage> {
@@ -36,67 +28,33 @@ fn with_model_error(flows: PerLeak<Leakage>) -> PerLeak<Leakage> {
 impl Replay {
     /// The report on the trace so far.
     pub fn report(&self, trace: TraceSummary) -> ReplayReport {
-        self.report_with(trace, &Suspicions::default())
+        self.report_with(trace, &self.whole_trace(), |_| Suspicions::default())
     }
 
-    /// The same, where something else than leaks may explain the trace.
-    pub(super) fn report_with(&self, mut trace: TraceSummary, suspicions: &Suspicions) -> ReplayReport {
-        trace.warnings.extend(self.spikes.warning());
-        let found = self.estimator.estimates();
-        let excitation = found.map(|found| found.excitation);
-        let estimates = self.estimates(excitation);
-        let by_orifice = suspicions.orifice.map(|orifice| leakage_through(&orifice));
-        let leakage = by_orifice.unwrap_or_else(|| self.leakage(excitation.is_some()));
-        let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
-        // Where the law is an orifice's, what looks like a change is the pressure's.
-        let stays = by_orifice.is_some();
-        let trend =
-            if stays { PerLeak::default() } else { self.trend(found.as_ref(), &leakage, &threshold_lpm) };
-        let changed_at_s = self.changed_at_s.filter(|_| !stays);
-        let episodes = self.episodes.list();
-        let misfit = found.map(|_| self.consistency.misfit());
-        let findings = Findings {
-            active: self.detector.active(),
-            leakage: &leakage,
-            estimates: &estimates,
-            trends: &trend,
-            episodes: &episodes,
-            threshold_lpm,
-            meters_lpm: [self.rig.instruments.flow_a, self.rig.instruments.flow_b]
-                .map(|meter| meter.full_scale * LPM_PER_M3S),
-            fluid: self.rig.fluid,
-            trace: &trace,
-            end_s: self.end_s,
-            misfit,
-            restarts: self.consistency.restarts(),
-            changed_at_s,
-            channels: &self.channel_faults(),
-            suspicions,
-        };
-        ReplayReport {
-            schema: ReplayReport::SCHEMA,
-            rig: self.rig.name.clone(),
-            estimator: self.rig.estimator.kind,
-            verdict: Verdict::of(&findings),
-            trend,
-            spells: Spell::of(&episodes, trace.duration_s, self.end_s),
-            episodes,
-            trace,
-            estimates,
-            leakage,
-            flow_meter_offsets: found
-                .and_then(|found| found.flow_offsets_m3s)
-                .filter(finite)
-                .map(FlowMeterOffsets::new),
-            normalised_innovation: misfit.map(|misfit| [misfit.balance, misfit.odometer]),
-            changed_at_s,
-            alarms: self.alarms.clone(),
-            score: self.scoring.scores(),
+    /// The same with a verdict held against `weighed`; `suspect` says what else than leaks may explain the trace where the
+    /// figures alone give this verdict.
+    pub(super) fn report_with(
+        &self,
+        trace: TraceSummary,
+        weighed: &Weighed,
+        suspect: impl FnOnce(&Verdict) -> Suspicions,
+    ) -> ReplayReport {
+        let draft = Draft::new(self, weighed, trace);
+        let verdict = draft.verdict(&Suspicions::default());
+        let suspicions = suspect(&verdict);
+        if !suspicions.any() {
+            return draft.report(verdict);
         }
+        let draft = match &suspicions.orifice {
+            Some(orifice) => draft.through(orifice),
+            None => draft,
+        };
+        let verdict = draft.verdict(&suspicions);
+        draft.report(verdict)
     }
 
     /// How the leak flows change at the pressures of [`leakage`](Self::leakage).
-    fn trend(
+    pub(super) fn trend(
         &self,
         found: Option<&pitchleak_core::Estimates<f64>>,
         leakage: &PerLeak<Leakage>,
@@ -115,16 +73,16 @@ impl Replay {
     }
 
     /// Faults of the channels that are read: of the estimators only the paper's law reads the force.
-    pub(super) fn channel_faults(&self) -> Vec<ChannelFault> {
+    pub(super) fn channel_faults(&self, channels: &ChannelMonitor) -> Vec<ChannelFault> {
         let reads_force = self.rig.estimator.kind == EstimatorKind::Paper;
-        let mut faults = self.channels.faults(&self.rig);
+        let mut faults = channels.faults(&self.rig);
         faults.retain(|fault| reads_force || fault.channel != Signal::Force.name());
         faults
     }
 
     /// Flows at the mean pressures of the trace, or since the leak changed, eq. (15); the internal one at the mean size of P_L, whatever
     /// its sign.
-    fn leakage(&self, knows_spread: bool) -> PerLeak<Leakage> {
+    pub(super) fn leakage(&self, knows_spread: bool) -> PerLeak<Leakage> {
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
         let flows = sizes.zip(net).map(|(size, net)| {
@@ -138,7 +96,7 @@ impl Replay {
         with_model_error(flows)
     }
 
-    fn estimates(&self, excitation: Option<ExcitationReport<f64>>) -> Estimates {
+    pub(super) fn estimates(&self, excitation: Option<ExcitationReport<f64>>) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
         let entries = self.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
             let unit = EstimateEntry::COEFFICIENT_UNIT;
@@ -192,10 +150,6 @@ impl Replay {
             )
         })
     }
-}
-
-fn finite(offsets: &[Estimate<f64>; 2]) -> bool {
-    offsets.iter().all(|offset| offset.value.is_finite() && offset.std.is_finite())
 }
 
 /// The entry, marked where the trace does not identify the parameter.

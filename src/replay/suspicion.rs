@@ -1,6 +1,7 @@
 //! Does something else than leaks explain what was read?
 
 use super::Replay;
+use super::draft::Weighed;
 use crate::channels::ChannelFaultKind;
 use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
@@ -11,10 +12,23 @@ use crate::wiring::{
 };
 use pitchleak_core::PerLeak;
 
+impl Weighed {
+    /// No wiring explains what such a channel reads.
+    fn has_broken_channel(&self) -> bool {
+        self.channels.iter().any(|fault| fault.kind != ChannelFaultKind::Coarse)
+    }
+}
+
 impl Replay {
     /// What an excerpt of the whole trace, whose columns were read by `columns`, says against `verdict`.
-    pub(super) fn suspicions(&self, verdict: &Verdict, excerpt: &Excerpt, columns: &ColumnMap) -> Suspicions {
-        if self.has_broken_channel() {
+    pub(super) fn suspicions(
+        &self,
+        verdict: &Verdict,
+        weighed: &Weighed,
+        excerpt: &Excerpt,
+        columns: &ColumnMap,
+    ) -> Suspicions {
+        if weighed.has_broken_channel() {
             return Suspicions::default();
         }
         let named = |found: Option<Explanation>| self.named(found, columns);
@@ -40,8 +54,13 @@ impl Replay {
 
     /// What a stream's evidence so far says. To look for mistakes of wiring takes the samples themselves, and as long as
     /// those are not excluded, no other law of a leak is believed: that is for a replay of the stored trace.
-    pub(super) fn suspicions_so_far(&self, verdict: &Verdict, evidence: &Running) -> Suspicions {
-        if self.has_broken_channel() {
+    pub(super) fn suspicions_so_far(
+        &self,
+        verdict: &Verdict,
+        weighed: &Weighed,
+        evidence: &Running,
+    ) -> Suspicions {
+        if weighed.has_broken_channel() {
             return Suspicions::default();
         }
         let named = |found: Option<Explanation>| self.named(found, &self.rig.columns);
@@ -54,11 +73,6 @@ impl Replay {
             zeros: if self.may_be_zeros(verdict) { changing_leaks_or_zeros(&lately) } else { None },
             ..Suspicions::default()
         }
-    }
-
-    /// No wiring explains what such a channel reads.
-    fn has_broken_channel(&self) -> bool {
-        self.channel_faults().iter().any(|fault| fault.kind != ChannelFaultKind::Coarse)
     }
 
     fn named(&self, found: Option<Explanation>, columns: &ColumnMap) -> Option<Wiring> {

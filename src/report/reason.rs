@@ -300,17 +300,20 @@ fn may_be_zeros(findings: &Findings<'_>, zeros: &ZeroCheck, leak: Leak) -> bool 
 }
 
 fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {
-    let ended: Vec<_> = findings.episodes.iter().filter(|episode| episode.to_s.is_some()).collect();
-    let explained = (findings.episodes.len() + ended.len()) as u64;
-    let more_often = findings.restarts > RESTARTS + explained;
+    let Misfit { restarts, since_s, .. } = findings.misfit?;
+    let begun = findings.episodes.iter().filter(|episode| episode.from_s >= since_s).count();
+    let ended: Vec<_> =
+        findings.episodes.iter().filter(|episode| episode.to_s.is_some_and(|to_s| to_s >= since_s)).collect();
+    let explained = (begun + ended.len()) as u64;
+    let more_often = restarts > RESTARTS + explained;
     // One leak may come and go; two that do so by turns are no leaks.
     let by_turns = ended.iter().any(|episode| episode.fault != ended[0].fault);
     let what =
         if more_often { "more often than a leak came or went" } else { "and leaks came and went by turns" };
-    (more_often || findings.restarts > RESTARTS && by_turns).then(|| {
+    (more_often || restarts > RESTARTS && by_turns).then(|| {
         Reason::new(
             ReasonId::KeepsChanging,
-            format!("the estimates began anew {} times, {what}", findings.restarts),
+            format!("the estimates began anew {restarts} times, {what}"),
             "check for loose contacts, sensors that hang, and changes of the rig during the recording",
         )
     })
@@ -319,15 +322,23 @@ fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {
 const SENSORS_TELL: &str = "check whether the sensors are as good as declared and wired as declared (`pitchleak check`); `pitchleak \
                             diagnose` looks for an effect that the model lacks";
 
-/// What chance makes of the balance's misfit at the most.
-fn chance(misfit: &Misfit) -> f64 {
-    1.0 + CHANCE_SIGMAS * (2.0 / misfit.balances.max(1) as f64).sqrt()
+impl Misfit {
+    /// What chance makes of the balance's at the most.
+    fn chance(&self) -> f64 {
+        1.0 + CHANCE_SIGMAS * (2.0 / self.balances.max(1) as f64).sqrt()
+    }
+
+    /// Whether model and declared noise do not explain it.
+    pub(crate) fn contradicts(&self) -> bool {
+        let balance = self.balance > self.chance().max(MISFIT) || self.worst_window > WORST_MISFIT;
+        balance || self.worst_odometer > ODOMETER_MISFIT
+    }
 }
 
 /// Several leaks at once are rarer than a wrong sensor: they have to explain the trace to the noise.
 fn several_leaks(findings: &Findings<'_>) -> Option<Reason> {
     let (misfit, faults) = (findings.misfit?, findings.faults());
-    let beyond = misfit.balance > chance(&misfit) && misfit.balance <= MISFIT;
+    let beyond = misfit.balance > misfit.chance() && misfit.balance <= MISFIT;
     (faults.len() > 1 && beyond).then(|| {
         Reason::new(
             ReasonId::SeveralLeaks,
@@ -343,10 +354,7 @@ fn several_leaks(findings: &Findings<'_>) -> Option<Reason> {
 
 fn model_does_not_fit(findings: &Findings<'_>) -> Option<Reason> {
     let misfit = findings.misfit?;
-    let chance = chance(&misfit);
-    let balance = misfit.balance > chance.max(MISFIT) || misfit.worst_window > WORST_MISFIT;
-    let odometer = misfit.worst_odometer > ODOMETER_MISFIT;
-    (balance || odometer).then(|| {
+    misfit.contradicts().then(|| {
         let times = misfit.worst_window.max(misfit.balance).max(misfit.worst_odometer).sqrt();
         let at_least = if times > 3.5 { "at least " } else { "" };
         Reason::new(

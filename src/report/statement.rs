@@ -127,7 +127,17 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
             }
         }
     });
-    ended.collect::<Vec<_>>().into_iter().chain(changed)
+    ended.collect::<Vec<_>>().into_iter().chain(no_longer_weighed(findings)).chain(changed)
+}
+
+/// What contradicted model or sensors before the last stretch of a stream.
+fn no_longer_weighed(findings: &Findings<'_>) -> impl Iterator<Item = String> {
+    let unexplained = findings.misfit.and_then(|misfit| misfit.unexplained_s).map(|span_s| {
+        let [from, to] = span_s.map(|t_s| findings.trace.time(t_s, 0));
+        format!("Earlier: model and declared noise did not explain the readings between {from} and {to}.")
+    });
+    let channels = findings.earlier_channels.iter().map(|fault| format!("Earlier: {}.", fault.text));
+    channels.chain(unexplained)
 }
 
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {

@@ -8,8 +8,16 @@ fn entry(value: f64, std: f64) -> EstimateEntry {
     EstimateEntry::new(Estimate { value, std }, EstimateEntry::COEFFICIENT_UNIT)
 }
 
-const SOUND: Misfit =
-    Misfit { balance: 1.0, balances: 240, worst_window: 1.2, odometer: 1.0, worst_odometer: 1.1 };
+const SOUND: Misfit = Misfit {
+    balance: 1.0,
+    balances: 240,
+    worst_window: 1.2,
+    odometer: 1.0,
+    worst_odometer: 1.1,
+    restarts: 0,
+    since_s: f64::NEG_INFINITY,
+    unexplained_s: None,
+};
 
 /// What a test changes of a minute's findings.
 struct Found {
@@ -23,6 +31,7 @@ struct Found {
     restarts: u64,
     changed_at_s: Option<f64>,
     channels: Vec<ChannelFault>,
+    earlier_channels: Vec<ChannelFault>,
     suspicions: Suspicions,
 }
 
@@ -39,10 +48,11 @@ impl Found {
             fluid: Rig::paper().fluid,
             trace: &self.trace,
             end_s: 60.0,
-            misfit: self.misfit,
+            misfit: self.misfit.map(|misfit| Misfit { restarts: self.restarts, ..misfit }),
             restarts: self.restarts,
             changed_at_s: self.changed_at_s,
             channels: &self.channels,
+            earlier_channels: &self.earlier_channels,
             suspicions: &self.suspicions,
         })
     }
@@ -109,6 +119,7 @@ fn found(active: PerLeak<bool>) -> Found {
         restarts: 0,
         changed_at_s: None,
         channels: Vec::new(),
+        earlier_channels: Vec::new(),
         suspicions: Suspicions::default(),
     }
 }

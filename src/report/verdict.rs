@@ -62,7 +62,8 @@ pub struct Verdict {
     pub reasons: Vec<Reason>,
 }
 
-/// How far model and declared noise are from explaining a trace, over the whole of it: means of ν²/S, about 1 where they do.
+/// How far model and declared noise are from explaining a trace, or the last stretch of a stream: means of ν²/S, about 1
+/// where they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// Of the flow balance.
@@ -75,6 +76,12 @@ pub struct Misfit {
     pub odometer: f64,
     /// Its largest mean over a minute or what there is.
     pub worst_odometer: f64,
+    /// How often the estimates began anew.
+    pub restarts: u64,
+    /// Since when, s; −∞ over the whole trace.
+    pub since_s: f64,
+    /// Before that, the last ten minutes or so that they did not explain, s.
+    pub unexplained_s: Option<[f64; 2]>,
 }
 
 /// All that a verdict rests on.
@@ -102,12 +109,14 @@ pub struct Findings<'a> {
     pub end_s: f64,
     /// None from an estimator that knows no noise.
     pub misfit: Option<Misfit>,
-    /// How often the estimates began anew, and when last.
+    /// How often the estimates began anew since the trace began, and when last.
     pub restarts: u64,
     /// See [`restarts`](Self::restarts).
     pub changed_at_s: Option<f64>,
-    /// Faults of the channels that the estimator reads.
+    /// Faults of the channels that the estimator reads, …
     pub channels: &'a [ChannelFault],
+    /// … and those of before [`Misfit::since_s`].
+    pub earlier_channels: &'a [ChannelFault],
     /// What else may explain the trace.
     pub suspicions: &'a Suspicions,
 }

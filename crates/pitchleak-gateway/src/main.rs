@@ -12,7 +12,6 @@ mod mqtt;
 mod notify;
 mod outbox;
 mod pace;
-mod probe;
 mod run;
 mod saver;
 mod service;

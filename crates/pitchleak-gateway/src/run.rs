@@ -16,7 +16,6 @@ use pitchleak::live::{Checkpoint, Watch};
 use std::fs::{File, TryLockError};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -106,12 +105,11 @@ fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
             service.take(Input::Saved(saved));
         }
     }
-    let connected = service.metrics.connected.load(Relaxed);
     let Service { broker, base, jobs, .. } = service;
     // The network thread and the saver no longer wait for us.
     drop((jobs, inputs));
     broker.publish(status(&base, "offline"));
-    broker.close(if connected { GOODBYE } else { Duration::ZERO });
+    broker.close(GOODBYE);
 }
 
 /// Two services with one state would spoil it.

@@ -1,0 +1,135 @@
+//! A report in the making: its figures once, its verdict as soon as it is known what speaks against them.
+
+use super::Replay;
+use crate::channels::ChannelFault;
+use crate::report::{
+    Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, Misfit, ReplayReport, Spell,
+    Suspicions, TraceSummary, Verdict,
+};
+use crate::units::LPM_PER_M3S;
+use crate::wiring::Orifice;
+use pitchleak_core::PerLeak;
+
+/// What a verdict is held against.
+pub(super) struct Weighed {
+    misfit: Misfit,
+    /// Faults of channels that count, and earlier ones that are only told.
+    pub channels: Vec<ChannelFault>,
+    earlier_channels: Vec<ChannelFault>,
+}
+
+impl Replay {
+    /// A file's verdict: all that was read.
+    pub(super) fn whole_trace(&self) -> Weighed {
+        Weighed {
+            misfit: self.consistency.whole(),
+            channels: self.channel_faults(&self.channels),
+            earlier_channels: Vec::new(),
+        }
+    }
+
+    /// A stream's: its last stretch. It may run for months, and what once misfitted is mended or forgotten.
+    pub(super) fn last_stretch(&self) -> Weighed {
+        let channels = self.channel_faults(&self.channels.lately());
+        let mut earlier_channels = self.channel_faults(&self.channels);
+        earlier_channels.retain(|one| channels.iter().all(|fault| fault.channel != one.channel));
+        Weighed { misfit: self.consistency.lately(), channels, earlier_channels }
+    }
+}
+
+/// All of a report but its verdict.
+pub(super) struct Draft<'a> {
+    replay: &'a Replay,
+    weighed: &'a Weighed,
+    trace: TraceSummary,
+    found: Option<pitchleak_core::Estimates<f64>>,
+    estimates: Estimates,
+    leakage: PerLeak<Leakage>,
+    threshold_lpm: PerLeak<f64>,
+    trend: PerLeak<Option<LeakTrend>>,
+    changed_at_s: Option<f64>,
+    episodes: Vec<Episode>,
+}
+
+impl<'a> Draft<'a> {
+    pub fn new(replay: &'a Replay, weighed: &'a Weighed, mut trace: TraceSummary) -> Self {
+        trace.warnings.extend(replay.spikes.warning());
+        let found = replay.estimator.estimates();
+        let excitation = found.as_ref().map(|found| found.excitation);
+        let leakage = replay.leakage(excitation.is_some());
+        let threshold_lpm = replay.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        Self {
+            estimates: replay.estimates(excitation),
+            trend: replay.trend(found.as_ref(), &leakage, &threshold_lpm),
+            changed_at_s: replay.changed_at_s,
+            episodes: replay.episodes.list(),
+            replay,
+            weighed,
+            trace,
+            found,
+            leakage,
+            threshold_lpm,
+        }
+    }
+
+    /// The same where leaks pass an orifice: what looks like a change is then the pressure's.
+    pub fn through(self, orifice: &Orifice) -> Self {
+        Self { leakage: leakage_through(orifice), trend: PerLeak::default(), changed_at_s: None, ..self }
+    }
+
+    pub fn verdict(&self, suspicions: &Suspicions) -> Verdict {
+        let Replay { rig, detector, consistency, end_s, .. } = self.replay;
+        Verdict::of(&Findings {
+            active: detector.active(),
+            leakage: &self.leakage,
+            estimates: &self.estimates,
+            trends: &self.trend,
+            episodes: &self.episodes,
+            threshold_lpm: self.threshold_lpm,
+            meters_lpm: [rig.instruments.flow_a, rig.instruments.flow_b]
+                .map(|meter| meter.full_scale * LPM_PER_M3S),
+            fluid: rig.fluid,
+            trace: &self.trace,
+            end_s: *end_s,
+            misfit: self.found.as_ref().map(|_| self.weighed.misfit),
+            restarts: consistency.restarts(),
+            changed_at_s: self.changed_at_s,
+            channels: &self.weighed.channels,
+            earlier_channels: &self.weighed.earlier_channels,
+            suspicions,
+        })
+    }
+
+    pub fn report(self, verdict: Verdict) -> ReplayReport {
+        let replay = self.replay;
+        let whole = self.found.as_ref().map(|_| replay.consistency.whole());
+        ReplayReport {
+            schema: ReplayReport::SCHEMA,
+            rig: replay.rig.name.clone(),
+            estimator: replay.rig.estimator.kind,
+            verdict,
+            trend: self.trend,
+            spells: Spell::of(&self.episodes, self.trace.duration_s, replay.end_s),
+            episodes: self.episodes,
+            trace: self.trace,
+            estimates: self.estimates,
+            leakage: self.leakage,
+            flow_meter_offsets: self
+                .found
+                .and_then(|found| found.flow_offsets_m3s)
+                .filter(|offsets| offsets.iter().all(|one| one.value.is_finite() && one.std.is_finite()))
+                .map(FlowMeterOffsets::new),
+            normalised_innovation: whole.map(|misfit| [misfit.balance, misfit.odometer]),
+            changed_at_s: self.changed_at_s,
+            alarms: replay.alarms.clone(),
+            score: replay.scoring.scores(),
+        }
+    }
+}
+
+fn leakage_through(orifice: &Orifice) -> PerLeak<Leakage> {
+    orifice
+        .sizes_m3s
+        .zip(orifice.net_m3s)
+        .map(|(size, net_m3s)| Leakage { net_mean_lpm: Some(net_m3s * LPM_PER_M3S), ..Leakage::new(size) })
+}
