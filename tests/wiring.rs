@@ -8,7 +8,9 @@ use pitchleak::core::{Effect, EffectSet, PerLeak};
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::{Record, TraceReader};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
-use pitchleak::wiring::{Excerpt, Exchange, Mistake, Readings, explain, misfit, zero_check};
+use pitchleak::wiring::{
+    Excerpt, Exchange, Explanation, Mistake, Readings, Recorded, explain, misfit, zero_check,
+};
 use pitchleak_testkit::hopsan;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -51,6 +53,10 @@ fn records(truths: &[Truth], rig: &Rig, seed: u64) -> Vec<Record> {
         Record { t_s: truth.t_s, dt_s, sample: sensing.read(&truth.sample), ..Record::default() }
     };
     truths.iter().map(record).collect()
+}
+
+fn explained(records: &[Record], rig: &Rig) -> Option<Explanation> {
+    explain(&Recorded::new(records, rig)?)
 }
 
 /// Forty kinds, by their names in the snapshot.
@@ -117,7 +123,7 @@ fn the_right_mistake_is_named_and_no_other() {
             let tally = table.entry(name.clone()).or_default();
             let worst = misfit(&wrong, &rig).into_iter().flatten().fold(0.0, f64::max);
             tally.evidence += u32::from(worst >= 2.0);
-            let found = explain(&wrong, &rig);
+            let found = explained(&wrong, &rig);
             if let Some(found) = &found {
                 let right = found.mistakes.iter().any(|one| same(*one, mistake));
                 tally.named += u32::from(right);
@@ -165,9 +171,9 @@ fn recorded_traces_are_not_accused() {
             excerpt.add(&record);
         }
         let records = excerpt.records();
-        assert_eq!(explain(&records, &rig), None, "{path}: {:?}", misfit(&records, &rig));
+        assert_eq!(explained(&records, &rig), None, "{path}: {:?}", misfit(&records, &rig));
         let swapped = Mistake::Exchanged(Exchange::Flows).make(&records, &rig);
-        let found = explain(&swapped, &rig).map(|found| found.mistakes);
+        let found = explained(&swapped, &rig).map(|found| found.mistakes);
         println!(
             "{path}: {:.2?}, exchanged {:.0?} {found:?}",
             misfit(&records, &rig),
@@ -244,7 +250,7 @@ fn right_columns_are_never_accused() {
                         truths.iter().zip(&records).map(|(t, r)| Record { sample: t.sample, ..*r }).collect();
                     [("noisy", records), ("clean", noise_free)].into_iter().filter_map(
                         move |(name, records)| {
-                            let found = explain(&records, &rig)?;
+                            let found = explained(&records, &rig)?;
                             Some(format!(
                                 "{wind:?} {leak} {effects:?} {accuracy} {name}: {found:?} from {:?}",
                                 misfit(&records, &rig)

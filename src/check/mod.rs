@@ -98,14 +98,15 @@ pub fn check<E: From<ReplayError>>(
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;
     let records = excerpt.records();
+    let whole = Recorded::new(&records, &rig);
+    let found = whole.as_ref().and_then(explain);
+    let found = found.or_else(|| unit_by_scatter(&excerpt, &rig));
+    let found = found.or_else(|| sensor_error(whole.as_ref()?));
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
-        wiring: explain(&records, &rig)
-            .or_else(|| unit_by_scatter(&excerpt, &rig))
-            .or_else(|| sensor_error(&Recorded::new(&records, &rig)?))
-            .map(|found| found.wiring(&columns, &rig)),
+        wiring: found.map(|found| found.wiring(&columns, &rig)),
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,

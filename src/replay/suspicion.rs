@@ -40,11 +40,11 @@ impl Replay {
             };
         }
         let records = excerpt.records();
-        let wiring = named(explain(&records, &self.rig));
+        let Some(whole) = Recorded::new(&records, &self.rig) else { return Suspicions::default() };
+        let wiring = named(explain(&whole));
         if wiring.is_some() {
             return Suspicions { wiring, ..Suspicions::default() };
         }
-        let Some(whole) = Recorded::new(&records, &self.rig) else { return Suspicions::default() };
         if let Some(orifice) = self.orifice(verdict, &whole) {
             let zeros = orifice.zeros.filter(|_| !self.declares_zeros());
             return Suspicions { zeros, orifice: Some(orifice), ..Suspicions::default() };

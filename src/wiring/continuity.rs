@@ -21,8 +21,9 @@ pub(crate) trait Continuity {
     fn driven(&self, leak: Leak) -> Driven;
 }
 
-/// A stretch of which all blocks are at hand.
-pub(crate) struct Recorded<'a> {
+/// A stretch of which all records are at hand.
+pub struct Recorded<'a> {
+    pub(super) records: &'a [Record],
     blocks: Vec<Block>,
     rig: &'a Rig,
     duration_s: f64,
@@ -35,11 +36,11 @@ const HOPELESS: f64 = 20.0;
 
 impl<'a> Recorded<'a> {
     /// Of these records, if there are any. Use an [`Excerpt`](super::Excerpt) of a long trace.
-    pub(crate) fn new(records: &[Record], rig: &'a Rig) -> Option<Self> {
+    pub fn new(records: &'a [Record], rig: &'a Rig) -> Option<Self> {
         let duration_s = records.last()?.t_s - records.first()?.t_s;
         let blocks = blocks(records, &rig.cylinder);
         let equations = Equations::of(&blocks, &Noise::new(rig, PerLeak::default()));
-        Some(Self { blocks, rig, duration_s, equations })
+        Some(Self { records, blocks, rig, duration_s, equations })
     }
 }
 

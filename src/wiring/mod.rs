@@ -21,7 +21,7 @@ mod sensor_error;
 mod signs;
 mod zeros;
 
-pub(crate) use continuity::Recorded;
+pub use continuity::Recorded;
 pub use excerpt::Excerpt;
 pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
@@ -81,13 +81,13 @@ struct Scored {
 }
 
 /// The mistake of wiring, sign or unit that explains the records where the declared wiring does not; `None` where that
-/// does, or nothing explains them, or too much. Use an [`Excerpt`] of a long trace.
-pub fn explain(records: &[Record], rig: &Rig) -> Option<Explanation> {
+/// does, or nothing explains them, or too much.
+pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
+    let (records, rig) = (stretch.records, stretch.rig());
     let priors = Priors::declared(rig);
-    let stretch = Recorded::new(records, rig)?;
     let declared = stretch.fit(&priors)?;
     let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
-    if !contradicted || sensor_errors_explain(&stretch) {
+    if !contradicted || sensor_errors_explain(stretch) {
         return None;
     }
     if let Some((readings, turned)) = signs::lost(records, rig) {

@@ -3,7 +3,7 @@
 
 use super::declared::Declared;
 use super::series::Series;
-use crate::wiring::{Excerpt, Mistake, Wiring, explain};
+use crate::wiring::{Excerpt, Mistake, Recorded, Wiring, explain};
 
 /// A mistake that explains the traces.
 pub(crate) struct Miswired {
@@ -21,7 +21,8 @@ pub(crate) fn miswired(traces: &[Series], declared: &Declared) -> Option<Miswire
     let rig = declared.rig();
     let mut excerpt = Excerpt::default();
     traces.iter().flat_map(Series::records).for_each(|record| excerpt.add(&record));
-    let found = explain(&excerpt.records(), &rig)?;
+    let records = excerpt.records();
+    let found = explain(&Recorded::new(&records, &rig)?)?;
     let is_like_an_effect = |one: &Mistake| matches!(one, Mistake::Late(..) | Mistake::Absolute(_));
     let columns = traces.first().map(|series| series.columns.clone()).unwrap_or_default();
     Some(Miswired {
