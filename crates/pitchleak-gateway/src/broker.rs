@@ -1,5 +1,6 @@
 //! What the service needs of a message broker, whichever program or crate stands behind it.
 
+use crate::probe::Limits;
 use std::time::{Duration, Instant};
 
 /// A way to a broker. Nothing here waits.
@@ -35,7 +36,7 @@ pub enum Keeping {
 /// What comes in.
 #[derive(Debug)]
 pub enum Inbound {
-    /// Connected; says whether the broker knew the session.
+    /// Connected, and samples can come; says whether the broker knew the session.
     Up { session_kept: bool },
     /// No connection, and why.
     Down(String),
@@ -43,6 +44,8 @@ pub enum Inbound {
     Delivery(Delivery),
     /// The broker has a message of ours.
     Confirmed(u64),
+    /// What the broker keeps and sends; or why that is not known.
+    Limits(Result<Limits, String>),
 }
 
 /// A message for us.

@@ -36,6 +36,8 @@ pub struct BrokerConfig {
     pub keep_alive_s: u16,
     /// Deliveries that the broker leaves unacknowledged at most before it waits.
     pub in_flight: usize,
+    /// Messages that the broker shall keep while the gateway is away, which is found out at the start; 0: it is not.
+    pub queued: usize,
 }
 
 #[derive(Debug)]
@@ -93,6 +95,7 @@ struct BrokerDocument {
     password_file: Option<PathBuf>,
     keep_alive_s: Option<u16>,
     in_flight: Option<u16>,
+    queued: Option<u32>,
 }
 
 #[derive(Default, Deserialize)]
@@ -109,6 +112,8 @@ struct Http {
 
 /// Mosquitto's own limit, unless its configuration says otherwise.
 const IN_FLIGHT: u16 = 20;
+/// As many messages are sent to find out whether the broker keeps them.
+const MOST_QUEUED: u32 = 100_000;
 
 impl Config {
     /// Reads the file at `path`, and those that it names; paths in it are from its folder.
@@ -173,14 +178,19 @@ impl BrokerDocument {
         if client_id.is_empty() || self.host.is_empty() || self.in_flight == Some(0) {
             return Err(bad("broker: host and client_id must not be empty, nor in_flight 0"));
         }
+        let queued = self.queued.unwrap_or(0);
+        if queued > MOST_QUEUED {
+            return Err(bad(&format!("broker.queued = {queued}: at most {MOST_QUEUED} is allowed")));
+        }
         Ok(BrokerConfig {
             host: self.host,
             port: self.port.unwrap_or(if tls.is_some() { 8883 } else { 1883 }),
             client_id,
             tls,
             login,
-            keep_alive_s: self.keep_alive_s.unwrap_or(30).max(5),
+            keep_alive_s: self.keep_alive_s.unwrap_or(30).max(1),
             in_flight: self.in_flight.unwrap_or(IN_FLIGHT).into(),
+            queued: queued as usize,
         })
     }
 }

@@ -12,6 +12,7 @@ mod mqtt;
 mod notify;
 mod outbox;
 mod pace;
+mod probe;
 mod run;
 mod saver;
 mod service;

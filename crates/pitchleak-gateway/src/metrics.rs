@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 const LATENCIES_S: [f64; 10] = [0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.5, 2.0];
 /// A service that did not turn around for so long hangs.
 const HANGS: Duration = Duration::from_secs(10);
+/// Checkpoints that fail one after the other before the service is not well.
+const FAILURES: u32 = 3;
 
 /// Counters and what there is of each.
 pub struct Metrics {
@@ -22,13 +24,17 @@ pub struct Metrics {
     pub cylinders: AtomicU64,
     pub unacknowledged: AtomicU64,
     pub unsent_alarms: AtomicU64,
+    pub broker_keeps: AtomicU64,
+    pub broker_sends: AtomicU64,
     pub checkpoints: AtomicU64,
-    pub checkpoint_failures: AtomicU64,
+    checkpoint_failures: AtomicU64,
     pub checkpoint_bytes: AtomicU64,
     pub checkpoint_us: AtomicU64,
     latencies: [AtomicU64; LATENCIES_S.len() + 1],
     latency_us: AtomicU64,
     left_out: Mutex<BTreeMap<String, u64>>,
+    /// Checkpoints in a row that could not be written.
+    failures_in_a_row: AtomicU64,
     /// ms since the begin.
     turned: AtomicU64,
     saved: AtomicU64,
@@ -47,6 +53,8 @@ impl Metrics {
             cylinders: zero(),
             unacknowledged: zero(),
             unsent_alarms: zero(),
+            broker_keeps: zero(),
+            broker_sends: zero(),
             checkpoints: zero(),
             checkpoint_failures: zero(),
             checkpoint_bytes: zero(),
@@ -54,6 +62,7 @@ impl Metrics {
             latencies: Default::default(),
             latency_us: zero(),
             left_out: Mutex::default(),
+            failures_in_a_row: zero(),
             turned: zero(),
             saved: zero(),
         }
@@ -74,6 +83,13 @@ impl Metrics {
         self.checkpoint_bytes.store(bytes as u64, Ordering::Relaxed);
         self.checkpoint_us.store(took.as_micros().try_into().unwrap_or(u64::MAX), Ordering::Relaxed);
         self.saved.store(self.now_ms(), Ordering::Relaxed);
+        self.failures_in_a_row.store(0, Ordering::Relaxed);
+    }
+
+    /// The disk took none.
+    pub fn not_saved(&self) {
+        self.checkpoint_failures.fetch_add(1, Ordering::Relaxed);
+        self.failures_in_a_row.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Time from a message to what follows from it.
@@ -104,7 +120,9 @@ impl Metrics {
             return Some("no connection to the broker".to_owned());
         }
         let without = since(&self.saved);
-        (without > 3 * every + HANGS).then(|| format!("no checkpoint for {} s", without.as_secs()))
+        let failed = self.failures_in_a_row.load(Ordering::Relaxed) >= u64::from(FAILURES);
+        (failed || without > FAILURES * every + HANGS)
+            .then(|| format!("no checkpoint for {} s", without.as_secs()))
     }
 
     /// In Prometheus' text format.
@@ -121,6 +139,18 @@ impl Metrics {
             ("alarms_total", "counter", "alarms raised and cleared", of(&self.alarms)),
             ("unacknowledged", "gauge", "messages that wait for a checkpoint", of(&self.unacknowledged)),
             ("unsent_alarms", "gauge", "alarms that the broker does not have yet", of(&self.unsent_alarms)),
+            (
+                "broker_keeps",
+                "gauge",
+                "messages that the broker keeps while nobody takes them, at least; 0: not known",
+                of(&self.broker_keeps),
+            ),
+            (
+                "broker_sends",
+                "gauge",
+                "messages that the broker sends before it waits, at least; 0: not known",
+                of(&self.broker_sends),
+            ),
             ("checkpoints_total", "counter", "checkpoints written", of(&self.checkpoints)),
             (
                 "checkpoint_failures_total",
@@ -195,6 +225,19 @@ mod tests {
         let every = Duration::from_secs(10);
         assert!(metrics.trouble(every).is_some());
         metrics.connected.store(true, Ordering::Relaxed);
+        assert_eq!(metrics.trouble(every), None);
+    }
+
+    #[test]
+    fn nor_is_one_whose_disk_takes_no_checkpoint() {
+        let metrics = Metrics::new();
+        let every = Duration::from_secs(10);
+        metrics.connected.store(true, Ordering::Relaxed);
+        (0..2).for_each(|_| metrics.not_saved());
+        assert_eq!(metrics.trouble(every), None);
+        metrics.not_saved();
+        assert!(metrics.trouble(every).is_some_and(|trouble| trouble.contains("no checkpoint")));
+        metrics.saved(1000, Duration::ZERO);
         assert_eq!(metrics.trouble(every), None);
     }
 }

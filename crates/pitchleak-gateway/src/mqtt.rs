@@ -5,6 +5,8 @@ use crate::config::{BrokerConfig, Tls};
 use crate::failure::Failure;
 use crate::input::Input;
 use crate::outbox::{Next, Outbox};
+use crate::probe::Probe;
+use crate::topics;
 use rumqttc::{
     AckMode, AsyncClient, ConnectionError, Event, EventLoop, LastWill, ManualAck, MqttOptions, Packet,
     PubAck, Publish, PublishOptions, QoS, SubscribeFilter, SubscribeReasonCode, TlsConfiguration, Transport,
@@ -41,7 +43,9 @@ impl Mqtt {
         gone: Message,
         inbox: SyncSender<Input>,
     ) -> Result<Self, Failure> {
-        let options = options(config, gone)?;
+        let reach = reach(config)?;
+        let probe = (config.queued > 0).then(|| probe(config, reach.clone()));
+        let options = options(config, gone, reach);
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
@@ -58,7 +62,7 @@ impl Mqtt {
                 let shared = Arc::new(Shared::default());
                 tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
                 tokio::spawn(send(client, its_outbox, Arc::clone(&shared), inbox.clone()));
-                listen(connection, &shared, &inbox).await;
+                listen(connection, &shared, &inbox, probe).await;
             });
             let _ = end.send(());
         };
@@ -83,14 +87,27 @@ impl Broker for Mqtt {
     }
 }
 
-fn options(config: &BrokerConfig, gone: Message) -> Result<MqttOptions, Failure> {
-    let mut options = MqttOptions::new(&config.client_id, (config.host.as_str(), config.port));
-    options
+/// Of the connection that lasts.
+fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> MqttOptions {
+    reach
         .set_keep_alive(config.keep_alive_s)
         .set_clean_session(false)
         .set_ack_mode(AckMode::Manual)
         .set_max_packet_size(LARGEST_PACKET, LARGEST_PAYLOAD)
         .set_last_will(LastWill::new(gone.topic, gone.payload, QoS::AtLeastOnce, true));
+    reach
+}
+
+/// Beside it; nobody listens to its topic.
+fn probe(config: &BrokerConfig, mut reach: MqttOptions) -> Probe {
+    reach.set_client_id(format!("{}-probe", config.client_id)).set_clean_session(true);
+    let topic = topics::of_cylinder("pitchleak-probe", &config.client_id, "");
+    Probe { options: reach, topic, messages: config.queued }
+}
+
+/// The way to the broker.
+fn reach(config: &BrokerConfig) -> Result<MqttOptions, Failure> {
+    let mut options = MqttOptions::new(&config.client_id, (config.host.as_str(), config.port));
     if let Some(login) = &config.login {
         options.set_credentials(&login.user, login.password.clone());
     }
@@ -116,14 +133,22 @@ struct Shared {
 }
 
 /// Polls the connection, and does nothing else.
-async fn listen(mut connection: EventLoop, shared: &Shared, inbox: &SyncSender<Input>) {
-    let mut pause = FIRST_PAUSE;
+async fn listen(
+    mut connection: EventLoop,
+    shared: &Shared,
+    inbox: &SyncSender<Input>,
+    mut probe: Option<Probe>,
+) {
+    let (mut pause, mut session_kept) = (FIRST_PAUSE, false);
     loop {
         let inbound = match connection.poll().await {
             Ok(Event::Incoming(Packet::ConnAck(ack))) => {
-                pause = FIRST_PAUSE;
+                (pause, session_kept) = (FIRST_PAUSE, ack.session_present);
                 shared.up.notify_one();
-                Inbound::Up { session_kept: ack.session_present }
+                if let Some(probe) = probe.take() {
+                    tokio::spawn(find_limits(probe, inbox.clone()));
+                }
+                continue;
             }
             Ok(Event::Incoming(Packet::Publish(publish))) => {
                 Inbound::Delivery(delivery(&publish, shared.connection.load(Ordering::Relaxed)))
@@ -133,6 +158,7 @@ async fn listen(mut connection: EventLoop, shared: &Shared, inbox: &SyncSender<I
             {
                 Inbound::Down("the broker refuses a subscription".to_owned())
             }
+            Ok(Event::Incoming(Packet::SubAck(_))) => Inbound::Up { session_kept },
             Ok(_) => continue,
             Err(ConnectionError::RequestsDone) => return,
             Err(error) => {
@@ -156,6 +182,10 @@ fn delivery(publish: &Publish, connection: u64) -> Delivery {
         ticket: (publish.qos == QoS::AtLeastOnce).then_some(Ticket { connection, id: publish.pkid }),
         received: Instant::now(),
     }
+}
+
+async fn find_limits(probe: Probe, inbox: SyncSender<Input>) {
+    hand_over(&inbox, Inbound::Limits(probe.limits().await)).await;
 }
 
 /// Gives the service what came; while it is behind, the thread goes on with other things.

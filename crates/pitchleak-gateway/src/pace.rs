@@ -10,6 +10,8 @@ const SILENCE: Duration = Duration::from_millis(300);
 const AT_ONCE: Duration = Duration::from_millis(150);
 /// So often in a row it stopped at the same number.
 const STALLS: u32 = 3;
+/// At most, until a disk that took no checkpoint is tried again: a broker that waits makes it no emptier.
+const TRY_AGAIN: Duration = Duration::from_secs(10);
 
 pub struct Pace {
     every: Duration,
@@ -18,6 +20,8 @@ pub struct Pace {
     asked: Instant,
     delivered: Instant,
     stall: Stall,
+    /// The last checkpoint could not be written.
+    failed: bool,
 }
 
 /// Where the broker fell silent.
@@ -41,7 +45,7 @@ pub enum Due {
 
 impl Pace {
     pub fn new(every: Duration, in_flight: usize, now: Instant) -> Self {
-        Self { every, in_flight, asked: now, delivered: now, stall: Stall::default() }
+        Self { every, in_flight, asked: now, delivered: now, stall: Stall::default(), failed: false }
     }
 
     pub fn delivered(&mut self, now: Instant) {
@@ -51,8 +55,21 @@ impl Pace {
         }
     }
 
-    /// The broker has its acknowledgements.
+    /// The broker waits after so many deliveries; says whether that is sooner than was thought.
+    pub fn learn(&mut self, in_flight: usize) -> bool {
+        let sooner = in_flight < self.in_flight;
+        self.in_flight = self.in_flight.min(in_flight.max(1));
+        sooner
+    }
+
+    /// The disk took no checkpoint.
+    pub fn failed(&mut self) {
+        self.failed = true;
+    }
+
+    /// It took one, and the broker has its acknowledgements.
     pub fn acknowledged(&mut self, now: Instant) {
+        self.failed = false;
         if self.stall.released.is_some() {
             self.stall.released = Some(now);
         }
@@ -60,8 +77,12 @@ impl Pace {
 
     /// Whether a checkpoint is due while so many deliveries wait to be acknowledged; if so, it is taken to be written.
     pub fn due(&mut self, now: Instant, unacknowledged: usize) -> Due {
+        let since_asked = now.duration_since(self.asked);
+        if self.failed && since_asked < self.every.min(TRY_AGAIN) {
+            return Due::NotYet;
+        }
         let silent = now.duration_since(self.delivered) >= SILENCE;
-        let due = if unacknowledged >= self.in_flight || now.duration_since(self.asked) >= self.every {
+        let due = if unacknowledged >= self.in_flight || since_asked >= self.every || self.failed {
             self.stall.released = None;
             Due::Now
         } else if silent && unacknowledged >= LEAST_IN_FLIGHT {
@@ -116,6 +137,27 @@ mod tests {
     #[test]
     fn a_feed_that_comes_in_bursts_is_none() {
         assert_eq!(four_rounds(Duration::from_millis(600)), [Due::Now; 4]);
+    }
+
+    #[test]
+    fn a_full_disk_is_tried_once_in_a_while_however_much_waits() {
+        let begin = Instant::now();
+        let at = |ms| begin + Duration::from_millis(ms);
+        let mut pace = Pace::new(Duration::from_secs(10), 20, begin);
+        let mut fails = |ms| {
+            let due = pace.due(at(ms), 500) != Due::NotYet;
+            if due {
+                pace.failed();
+            }
+            due
+        };
+        assert_eq!((0..60_000).step_by(100).filter(|ms| fails(*ms)).count(), 6);
+        let mut pace = Pace::new(Duration::from_secs(3600), 20, begin);
+        pace.failed();
+        assert_eq!(pace.due(at(9_900), 0), Due::NotYet);
+        assert_eq!(pace.due(at(10_000), 0), Due::Now);
+        pace.acknowledged(at(10_100));
+        assert_eq!(pace.due(at(10_200), 20), Due::Now);
     }
 
     #[test]

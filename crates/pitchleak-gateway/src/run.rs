@@ -16,6 +16,7 @@ use pitchleak::live::{Checkpoint, Watch};
 use std::fs::{File, TryLockError};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -105,11 +106,12 @@ fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
             service.take(Input::Saved(saved));
         }
     }
+    let connected = service.metrics.connected.load(Relaxed);
     let Service { broker, base, jobs, .. } = service;
     // The network thread and the saver no longer wait for us.
     drop((jobs, inputs));
     broker.publish(status(&base, "offline"));
-    broker.close(GOODBYE);
+    broker.close(if connected { GOODBYE } else { Duration::ZERO });
 }
 
 /// Two services with one state would spoil it.

@@ -5,8 +5,9 @@ use pitchleak::core::Leak;
 use pitchleak::live::SummaryEvent;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
+use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
 /// Files kept, a file a day.
@@ -37,9 +38,10 @@ impl Summaries {
             rows(files.entry(day).or_default(), &from, summary);
         }
         for (day, rows) in &files {
-            let mut file =
-                OpenOptions::new().create(true).append(true).open(self.folder.join(format!("{day}.csv")))?;
-            let length = file.metadata()?.len();
+            let path = self.folder.join(format!("{day}.csv"));
+            let mut file = OpenOptions::new().create(true).read(true).append(true).open(path)?;
+            let length = whole_rows(&file)?;
+            file.set_len(length)?;
             if length + (rows.len() as u64) > LARGEST_FILE {
                 continue;
             }
@@ -60,6 +62,20 @@ impl Summaries {
         let beyond = names.len().saturating_sub(FILES);
         names.iter().take(beyond).try_for_each(|name| fs::remove_file(self.folder.join(name)))
     }
+}
+
+/// Length up to the end of the last whole row: a disk that is full or without power takes a part of one.
+fn whole_rows(file: &File) -> io::Result<u64> {
+    let mut length = file.metadata()?.len();
+    let mut last = [0];
+    while length > 0 {
+        file.read_exact_at(&mut last, length - 1)?;
+        if last == *b"\n" {
+            break;
+        }
+        length -= 1;
+    }
+    Ok(length)
 }
 
 /// Name of its day, and of its begin.
@@ -104,23 +120,43 @@ mod tests {
     use pitchleak::core::PerLeak;
     use pitchleak::live::Span;
 
+    fn of_hour(hour: u32) -> SummaryEvent {
+        let from_s = 1.7e9 + 3600.0 * f64::from(hour);
+        SummaryEvent {
+            cylinder: "T7/B2".to_owned(),
+            span: Span::Hour,
+            from_s,
+            estimates: 3600,
+            leakage: PerLeak::default(),
+            time_ns: Some((from_s * 1e9) as i64),
+        }
+    }
+
+    #[test]
+    fn a_row_of_which_the_disk_took_a_part_is_written_anew() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let summaries = Summaries::new(folder.path().join("summaries")).expect("a folder");
+        summaries.append(&[of_hour(0)]).expect("room");
+        let file = summaries.folder.join("2023-11-14.csv");
+        let whole = fs::read_to_string(&file).expect("a file");
+        summaries.append(&[of_hour(1)]).expect("room");
+        let both = fs::read_to_string(&file).expect("a file");
+        for torn in [&both[..whole.len() + 30], &both[..HEADER.len() - 5], ""] {
+            fs::write(&file, torn).expect("room");
+            let hours =
+                if torn.len() > HEADER.len() { vec![of_hour(1)] } else { vec![of_hour(0), of_hour(1)] };
+            summaries.append(&hours).expect("room");
+            assert_eq!(fs::read_to_string(&file).expect("a file"), both);
+        }
+    }
+
     #[test]
     fn ninety_days_are_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let summaries = Summaries::new(folder.path().join("summaries")).expect("a folder");
         for day in 0..100_u32 {
-            let hours = (24 * day..24 * (day + 1)).map(|hour| {
-                let from_s = 1.7e9 + 3600.0 * f64::from(hour);
-                SummaryEvent {
-                    cylinder: "T7/B2".to_owned(),
-                    span: Span::Hour,
-                    from_s,
-                    estimates: 3600,
-                    leakage: PerLeak::default(),
-                    time_ns: Some((from_s * 1e9) as i64),
-                }
-            });
-            summaries.append(&hours.collect::<Vec<_>>()).expect("room");
+            let hours: Vec<_> = (24 * day..24 * (day + 1)).map(of_hour).collect();
+            summaries.append(&hours).expect("room");
         }
         let mut files: Vec<_> = fs::read_dir(&summaries.folder)
             .expect("a folder")

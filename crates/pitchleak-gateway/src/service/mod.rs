@@ -6,6 +6,7 @@ use crate::input::Input;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::pace::{Due, Pace};
+use crate::probe::Limits;
 use crate::saver::{Job, Saved};
 use crate::topics;
 use pitchleak::live::{Batch, Event, OutputFormat, Snapshot, SummaryEvent, Watch};
@@ -71,6 +72,7 @@ impl<B: Broker> Service<B> {
             Input::Broker(Inbound::Confirmed(number)) => {
                 self.waiting.alarms.remove(&number);
             }
+            Input::Broker(Inbound::Limits(limits)) => self.limits(limits),
             Input::Saved(saved) => self.saved(saved),
             Input::Stop => return false,
         }
@@ -89,6 +91,40 @@ impl<B: Broker> Service<B> {
         self.log.say(Level::Warning, "no_broker", why);
         // They will come again.
         self.waiting.tickets.clear();
+    }
+
+    fn limits(&mut self, limits: Result<Limits, String>) {
+        let Limits { given, kept, in_flight } = match limits {
+            Ok(limits) => limits,
+            Err(why) => {
+                self.log.say(Level::Warning, "broker_limits", &format!("cannot be found out: {why}"));
+                return;
+            }
+        };
+        self.metrics.broker_keeps.store(kept as u64, Relaxed);
+        self.metrics.broker_sends.store(in_flight as u64, Relaxed);
+        if kept < given {
+            let text = format!(
+                "the broker keeps {kept} messages while nobody takes them, and not {given} (broker.queued): what is beyond is \
+                 lost: raise its limit (Mosquitto: max_queued_messages)"
+            );
+            self.log.say(Level::Warning, "broker_limits", &text);
+        } else {
+            let text =
+                format!("the broker keeps {kept} messages or more, and sends {in_flight} before it waits");
+            self.log.say(Level::Info, "broker_limits", &text);
+        }
+        if in_flight < given && self.pace.learn(in_flight) {
+            self.broker_waits_after(in_flight);
+        }
+    }
+
+    fn broker_waits_after(&self, count: usize) {
+        let text = format!(
+            "the broker waits after {count} unacknowledged messages, so that each so many cost a checkpoint: raise its \
+             limit (Mosquitto: max_inflight_messages) and broker.in_flight"
+        );
+        self.log.say(Level::Warning, "in_flight", &text);
     }
 
     fn deliver(&mut self, delivery: &Delivery) {
@@ -138,13 +174,7 @@ impl<B: Broker> Service<B> {
         match self.pace.due(now, self.waiting.tickets.len()) {
             Due::NotYet => return,
             Due::Now => {}
-            Due::NowThatBrokerWaits(count) => {
-                let text = format!(
-                    "the broker waits after {count} unacknowledged messages, so that each costs a checkpoint: raise its \
-                     limit (Mosquitto: max_inflight_messages) and broker.in_flight"
-                );
-                self.log.say(Level::Warning, "in_flight", &text);
-            }
+            Due::NowThatBrokerWaits(count) => self.broker_waits_after(count),
         }
         self.save();
     }
@@ -177,7 +207,8 @@ impl<B: Broker> Service<B> {
                 self.pace.acknowledged(Instant::now());
             }
             Err(why) => {
-                self.metrics.checkpoint_failures.fetch_add(1, Relaxed);
+                self.metrics.not_saved();
+                self.pace.failed();
                 self.log.say(Level::Warning, "checkpoint", &why);
                 // In the order in which they came.
                 let later = std::mem::replace(&mut self.waiting.tickets, saved.tickets);

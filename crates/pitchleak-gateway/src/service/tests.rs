@@ -139,6 +139,25 @@ fn what_is_of_no_use_is_acknowledged_too_or_it_would_come_for_ever() {
 }
 
 #[test]
+fn what_the_broker_keeps_and_sends_is_told_and_kept_to() {
+    let (mut service, _, queue) = service();
+    service.take(Input::Broker(Inbound::Limits(Ok(Limits { given: 500, kept: 200, in_flight: 12 }))));
+    assert!(service.metrics.text().contains("\npitchleak_broker_keeps 200\n"));
+    (0..11).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
+    service.tick(Instant::now());
+    assert!(queue.try_recv().is_err());
+    service.take(delivery("pitch/B1/samples", Ok("[]"), 11));
+    service.tick(Instant::now());
+    assert!(queue.try_recv().is_ok());
+    // A broker that sends all that it keeps may send more.
+    let (mut service, _, queue) = self::service();
+    service.take(Input::Broker(Inbound::Limits(Ok(Limits { given: 5, kept: 5, in_flight: 5 }))));
+    (0..5).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
+    service.tick(Instant::now());
+    assert!(queue.try_recv().is_err());
+}
+
+#[test]
 fn a_broker_that_waits_gets_its_checkpoint_at_once() {
     let (mut service, _, queue) = service();
     service.tick(Instant::now());

@@ -4,34 +4,40 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
 /// The program, its configuration and its state.
 pub struct Gateway {
     child: Option<Child>,
+    listener: Option<JoinHandle<()>>,
     folder: tempfile::TempDir,
-    /// What it said on standard error, of all its runs.
+    /// What it said on standard error since it was started.
     pub said: Arc<Mutex<String>>,
 }
 
-pub const PROGRAM: &str = env!("CARGO_BIN_EXE_pitchleak-gateway");
+const PROGRAM: &str = env!("CARGO_BIN_EXE_pitchleak-gateway");
 
 impl Gateway {
     /// Not started yet. `change` makes the configuration another.
     pub fn new(broker: &Mosquitto, change: impl FnOnce(String) -> String) -> Self {
+        Self::at(broker.tls_port, change)
+    }
+
+    /// With whatever broker is there.
+    pub fn at(port: u16, change: impl FnOnce(String) -> String) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("password"), "correct\n").unwrap();
         let text = format!(
             "state = \"state\"\ncheckpoint_s = 0.2\n\
-             [broker]\nhost = \"localhost\"\nport = {}\nca_file = \"{}/authority.pem\"\nuser = \"tester\"\npassword_file = \"password\"\n\
+             [broker]\nhost = \"localhost\"\nport = {port}\nca_file = \"{}/authority.pem\"\nuser = \"tester\"\npassword_file = \"password\"\n\
              [[samples]]\ntopic = \"pitch/+/+/samples\"\nformat = \"json\"\n\
              [http]\nlisten = \"127.0.0.1:0\"\n\
              [watch]\nrig = \"{}/traces/rig.toml\"\nmost_cylinders = 50\n",
-            broker.tls_port,
             certificates().display(),
             data().display()
         );
         std::fs::write(folder.path().join("gateway.toml"), change(text)).unwrap();
-        Self { child: None, folder, said: Arc::default() }
+        Self { child: None, listener: None, folder, said: Arc::default() }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -39,16 +45,27 @@ impl Gateway {
     }
 
     pub fn start(&mut self) {
-        let mut child =
-            Command::new(PROGRAM).arg(self.path("gateway.toml")).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = self.command().stderr(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let said = Arc::clone(&self.said);
-        std::thread::spawn(move || {
+        said.lock().unwrap().clear();
+        self.listener = Some(std::thread::spawn(move || {
             for line in lines.map_while(Result::ok) {
                 said.lock().unwrap().push_str(&format!("{line}\n"));
             }
-        });
+        }));
         self.child = Some(child);
+    }
+
+    /// As another says what it wants of it.
+    pub fn start_as(&mut self, change: impl FnOnce(&mut Command) -> &mut Command) {
+        self.child = Some(change(&mut self.command()).spawn().unwrap());
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new(PROGRAM);
+        command.arg(self.path("gateway.toml"));
+        command
     }
 
     /// Waits until it says so.
@@ -65,14 +82,16 @@ impl Gateway {
         let mut child = self.child.take().unwrap();
         child.kill().unwrap();
         child.wait().unwrap();
-        self.said.lock().unwrap().clear();
+        self.listener.take().map(JoinHandle::join);
     }
 
     /// By SIGTERM; its exit status.
     pub fn end(&mut self) -> Option<i32> {
         let mut child = self.child.take().unwrap();
         Command::new("kill").arg(child.id().to_string()).status().unwrap();
-        child.wait().unwrap().code()
+        let status = child.wait().unwrap();
+        self.listener.take().map(JoinHandle::join);
+        status.code()
     }
 
     /// What it answers to a request.

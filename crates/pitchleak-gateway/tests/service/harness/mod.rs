@@ -1,10 +1,12 @@
 //! A real broker, a gateway, a sender and a listener, all on loopback and gone with the test.
 
 mod client;
+mod expected;
 mod gateway;
 mod mosquitto;
 
 pub use client::{Listener, Sender};
+pub use expected::{ids, names, state, undisturbed};
 pub use gateway::Gateway;
 pub use mosquitto::Mosquitto;
 
@@ -12,6 +14,8 @@ use flate2::read::GzDecoder;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+pub const TRACE: &str = "traces/both.csv.gz";
 
 pub fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data")

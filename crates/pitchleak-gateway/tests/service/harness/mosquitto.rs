@@ -54,6 +54,17 @@ impl Mosquitto {
         Command::new("kill").arg(self.child.id().to_string()).status().unwrap();
         self.child.wait().unwrap();
         std::thread::sleep(std::time::Duration::from_millis(300));
+        self.revive();
+    }
+
+    /// By `kill -9`.
+    pub fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// Starts it again.
+    pub fn revive(&mut self) {
         self.child = spawn(self.folder.path(), self.port);
     }
 }

@@ -1,0 +1,9 @@
+//! The program with a real broker: TLS and password, killed at any moment, fed with what it cannot use, on a full disk.
+
+#![allow(clippy::unwrap_used)]
+
+mod broker;
+mod disk;
+mod harness;
+mod refused;
+mod systemd;
