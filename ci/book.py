@@ -4,11 +4,12 @@
 
 The chapters are those of docs/SUMMARY.md; the gallery of effects gets a page for each entry of the table of effects.
 A file of the repository that a chapter links to comes along. Exit status 1 if a link, an anchor or a file is missing,
-if a page would ask the network for anything, or if a browser complains of one.
+if a page would ask the network for anything, if a browser complains of one, or if axe-core finds a serious barrier.
 """
 
 import html
 import html.parser
+import importlib.util
 import os
 import re
 import shutil
@@ -25,6 +26,12 @@ SOURCE = BOOK / "src"
 LINK = re.compile(r"(\]\()(?!\w+:|#)([^)#\s]+)")
 EQUATION = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
 GALLERY = "- [Gallery of effects](gallery.md)\n"
+AUDIT = """
+addEventListener("load", () => axe.run(document, { preload: false, resultTypes: ["violations"] }).then((found) => {
+  for (const { help, impact, nodes } of found.violations)
+    if (impact === "serious" || impact === "critical") console.error(`${document.title}: ${help}: ${nodes[0].html}`);
+}));
+"""
 
 
 def place(path: Path) -> Path:
@@ -118,17 +125,37 @@ def faults(pages: dict[Path, Page]) -> list[str]:
     return found
 
 
+def audited(pages: dict[Path, Page]) -> list[Path]:
+    """Copies, beside them, of the chapters and of one effect's page, which say what axe-core finds serious."""
+    package = importlib.util.find_spec("axe_playwright_python")
+    if not package or not package.submodule_search_locations:
+        print("not looked through by axe-core: axe-playwright-python is not installed")
+        return []
+    axe = Path(package.submodule_search_locations[0], "axe.min.js").as_uri()
+    script = f'<script src="{axe}"></script><script>{AUDIT}</script></body>'
+    effects = [path for path in pages if path.parent.name == "gallery"]
+    copies = []
+    for path in pages.keys() - effects[1:]:
+        copies.append(path.with_name(f"audited-{path.name}"))
+        copies[-1].write_text(path.read_text().replace("</body>", script))
+    return copies
+
+
 def complaints(pages: dict[Path, Page]) -> list[str]:
-    """What a browser without a network says of the pages: equations that it can't draw, files that lack."""
+    """What a browser without a network says of the pages: equations that it can't draw, files that lack, barriers."""
     if not shutil.which("chromium"):
         print("not opened in a browser: chromium is not installed")
         return []
+    copies = audited(pages)
     with tempfile.TemporaryDirectory() as made:
         frames = Path(made) / "frames.html"
-        frames.write_text("".join(f'<iframe src="{path.as_uri()}"></iframe>' for path in pages))
+        frames.write_text("".join(f'<iframe src="{path.as_uri()}"></iframe>' for path in [*pages, *copies]))
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"]
+        options += ["--virtual-time-budget=60000"]
         alone = ["--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={made}/profile", frames.as_uri()]
         seen = subprocess.run(["chromium", *options, *alone], capture_output=True, text=True, timeout=300)
+    for path in copies:
+        path.unlink()
     return [line for line in seen.stderr.splitlines() if "CONSOLE" in line]
 
 
