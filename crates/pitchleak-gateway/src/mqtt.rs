@@ -26,6 +26,9 @@ const REQUESTS: usize = 64;
 /// Between attempts to connect.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 const LONGEST_PAUSE: Duration = Duration::from_secs(15);
+/// Attempts to find out the broker's limits, and between them.
+const PROBES: u32 = 5;
+const BETWEEN_PROBES: Duration = Duration::from_secs(60);
 /// Between attempts to hand something to a queue that is full.
 const BEAT: Duration = Duration::from_millis(1);
 
@@ -184,8 +187,17 @@ fn delivery(publish: &Publish, connection: u64) -> Delivery {
     }
 }
 
+/// Also where the broker goes away meanwhile.
 async fn find_limits(probe: Probe, inbox: SyncSender<Input>) {
-    hand_over(&inbox, Inbound::Limits(probe.limits().await)).await;
+    for _ in 0..PROBES {
+        let limits = probe.limits().await;
+        let found = limits.is_ok();
+        hand_over(&inbox, Inbound::Limits(limits)).await;
+        if found {
+            return;
+        }
+        tokio::time::sleep(BETWEEN_PROBES).await;
+    }
 }
 
 /// Gives the service what came; while it is behind, the thread goes on with other things.

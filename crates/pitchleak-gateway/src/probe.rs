@@ -39,7 +39,10 @@ impl Probe {
     pub async fn limits(&self) -> Result<Limits, String> {
         let limits = tokio::time::timeout(PATIENCE, self.give_and_count()).await;
         let limits = limits.map_err(|_| format!("nothing known after {} s", PATIENCE.as_secs()))?;
-        limits.map_err(|error| error.to_string())
+        match limits {
+            Ok(limits) if limits.kept == 0 => Err(format!("nothing comes back from topic `{}`", self.topic)),
+            limits => limits.map_err(|error| error.to_string()),
+        }
     }
 
     async fn give_and_count(&self) -> Result<Limits, ConnectionError> {
