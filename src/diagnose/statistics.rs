@@ -6,22 +6,28 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 /// Probability that white noise of variance one shows correlations this large: Box and Pierce (1970),
 /// but with the known variance in the denominator, so that a remainder far below the noise passes. Where the
 /// numbers happen to be larger than that, their own: products of 300 numbers that are by chance 10 % too large
-/// would pass for colour ten times as often as the law says.
+/// would pass for colour ten times as often as the law says. What is not a number is left out.
 pub(crate) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64> {
-    let n = innovations.len();
+    let n = known(innovations).count();
     if n < 4 * PORTMANTEAU_LAGS {
         return None;
     }
-    let power = innovations.iter().map(|v| v * v).sum::<f64>() / n as f64;
+    let power = known(innovations).map(|v| v * v).sum::<f64>() / n as f64;
     let variance = power.max(dispersion);
+    let add = |(sum, count): (f64, f64), more: f64| (sum + more, count + 1.0);
     let sum: f64 = (1..=PORTMANTEAU_LAGS)
         .map(|lag| {
-            let later = &innovations[lag..];
-            let product: f64 = innovations.iter().zip(later).map(|(a, b)| a * b).sum();
-            product * product / later.len() as f64 / (variance * variance)
+            let pairs = innovations.iter().zip(&innovations[lag..]).map(|(a, b)| a * b);
+            let (product, count) = pairs.filter(|product| product.is_finite()).fold((0.0, 0.0), add);
+            if count > 0.0 { product * product / count / (variance * variance) } else { 0.0 }
         })
         .sum();
     Some(chi2_p(sum, PORTMANTEAU_LAGS as f64))
+}
+
+/// The numbers that are known.
+pub(crate) fn known(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    values.iter().copied().filter(|value| value.is_finite())
 }
 
 /// Upper tail of the chi-squared distribution.
@@ -45,6 +51,19 @@ mod tests {
         assert!(portmanteau_p(&wave, 1.0).is_some_and(|p| p < 1e-9));
         let tiny: Vec<f64> = wave.iter().map(|v| 1e-3 * v).collect();
         assert!(portmanteau_p(&tiny, 1.0).is_some_and(|p| p > 0.99));
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_left_out() {
+        let mut normal = crate::simulate::Normal::stream(4, 0);
+        let mut numbers: Vec<f64> = (0..2000).map(|_| normal.draw()).collect();
+        let full = portmanteau_p(&numbers, 1.0).expect("enough");
+        numbers.iter_mut().step_by(50).for_each(|number| *number = f64::NAN);
+        assert!(full > 0.01 && portmanteau_p(&numbers, 1.0).is_some_and(|p| p > 0.01));
+        let wave: Vec<f64> =
+            numbers.iter().zip(0_i32..).map(|(v, i)| v + 0.5 * (0.05 * f64::from(i)).sin()).collect();
+        assert!(portmanteau_p(&wave, 1.0).is_some_and(|p| p < 1e-6));
+        assert_eq!(portmanteau_p(&[f64::NAN; 500], 1.0), None);
     }
 
     #[test]

@@ -100,6 +100,8 @@ pub(crate) const SETTLED_NOISE: f64 = 0.02;
 pub(crate) const MOST_ROUNDS: usize = 8;
 /// Halvings of the interval that holds the equation error. Derived: to 2⁻¹⁶ of it.
 pub(crate) const BISECTIONS: usize = 16;
+/// Halvings of the share of fast signals that is noise. Derived: to 2⁻⁶ of it.
+pub(crate) const SHARE_BISECTIONS: usize = 6;
 /// A term held at a value has this share of its own standard deviation as prior. Derived: it moves by 1e-8 of it.
 pub(crate) const HELD: f64 = 1e-4;
 /// Added to the diagonal of the scaled normal equations, so that collinear columns can be solved. Derived: as a prior

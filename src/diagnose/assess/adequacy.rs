@@ -25,7 +25,7 @@ pub(crate) fn complaints(fit: &Fit<'_>) -> Vec<String> {
         let name = name(equation);
         if *ratio > 1.0 {
             found.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
-        } else if statistics::portmanteau_p(&fit.innovations(equation), 1.0).is_some_and(|p| p < LEAST_P) {
+        } else if fit.whiteness_p(equation).is_some_and(|p| p < LEAST_P) {
             found.push(format!("what is left in {name} is as small as noise but not white"));
         }
     }

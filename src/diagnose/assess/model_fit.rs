@@ -7,14 +7,15 @@ use crate::diagnose::data::Series;
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{ModelFit, Quality};
-use crate::diagnose::statistics;
 
 /// How well a model fits: on `test`, or, where that is empty, on blocks that the fit left out.
 pub(crate) fn model_fit(fit: &Fit<'_>, test: &[Series]) -> ModelFit {
     let held_out = HeldOut::of(fit, test);
-    let whiteness_p = |equation| statistics::portmanteau_p(&fit.innovations(equation), 1.0);
     ModelFit {
-        quality: Quality { rmse: held_out.rmse(), whiteness_p: PerEquation::from_fn(whiteness_p) },
+        quality: Quality {
+            rmse: held_out.rmse(),
+            whiteness_p: PerEquation::from_fn(|equation| fit.whiteness_p(equation)),
+        },
         leaks: leaks(fit),
         noise_ratio: fit.noise_ratio(),
         residuals: PerEquation::from_fn(|equation| whitened_residual(fit, equation)),

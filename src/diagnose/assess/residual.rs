@@ -52,7 +52,7 @@ pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<Equ
     Some(EquationResidual {
         count: white.len(),
         noise_ratio: fit.noise_ratio()[equation],
-        whiteness_p: statistics::portmanteau_p(&white, 1.0),
+        whiteness_p: fit.whiteness_p(equation),
         normality_p: (white.len() >= FEWEST).then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
         skewness,
         excess_kurtosis,

@@ -11,6 +11,7 @@ use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTL
 use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
+use std::sync::OnceLock;
 
 /// Called at every round of a fit.
 pub type Progress<'a> = &'a dyn Fn();
@@ -53,6 +54,8 @@ pub(crate) struct Fit<'a> {
     assumed_error: PerEquation<f64>,
     /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
     pub(super) equation_error: PerEquation<f64>,
+    /// Filled when it is asked for.
+    pub(super) whiteness_p: PerEquation<OnceLock<Option<f64>>>,
 }
 
 impl<'a> Fit<'a> {
@@ -152,6 +155,7 @@ impl<'a> Fit<'a> {
             held_compressibility,
             assumed_error,
             equation_error,
+            whiteness_p: PerEquation::default(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod equation_error;
 mod gauss_newton;
+mod own_noise;
 mod predict;
 mod problem;
 mod regression;

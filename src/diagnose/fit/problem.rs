@@ -10,6 +10,8 @@ use pitchleak_core::{Effect, Model, PerLeak, Sensors};
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
     pub(crate) traces: &'a [Series],
+    /// As the data sheets have them.
+    pub(super) declared: Sensors<f64>,
     /// With the noise that the sensors really carry.
     pub(crate) sensors: Sensors<f64>,
     /// The same without ripples, which average away within a block: what columns share with the residual.
@@ -31,6 +33,7 @@ impl<'a> Problem<'a> {
         let terms = all_terms();
         Self {
             traces,
+            declared: declared.sensors,
             sensors: effective(&declared.sensors, checks, |_| true),
             white: effective(&declared.sensors, checks, |check| !check.is_ripple()),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),

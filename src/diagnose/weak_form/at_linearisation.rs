@@ -5,7 +5,7 @@ use super::hats::{ActiveTerm, Integrand};
 use super::linearisation::Linearisation;
 use super::noise_model::NoiseModel;
 use super::rows::Rows;
-use super::sensitivity::Sensitivity;
+use super::sensitivity::{Channel, Sensitivity};
 use super::shared_noise::{SharedNoise, Slopes};
 use super::terms::Term;
 use super::whitening::Whitening;
@@ -82,8 +82,29 @@ impl<'a> WeakForm<'a> {
 
     /// The noise of these rows, had the equations this error.
     pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
-        let Self { noise_at: at, rows, sensors, sensitivities, .. } = self;
+        self.noise_with(&self.sensitivities, equation_error)
+    }
+
+    /// The same with other sensitivities.
+    pub(crate) fn noise_with<'b>(
+        &'b self,
+        sensitivities: &'b [PerEquation<Sensitivity>],
+        equation_error: PerEquation<f64>,
+    ) -> NoiseModel<'b> {
+        let Self { noise_at: at, rows, sensors, .. } = self;
         NoiseModel { at, sensors, equation_error, rows, sensitivities }
+    }
+
+    /// The sensitivities, had the sensors their `declared` noise and a share of what they show beyond it.
+    pub(crate) fn at_share(&self, declared: &Sensors<f64>, share: f64) -> Vec<PerEquation<Sensitivity>> {
+        let times = Channel::ALL.map(|channel| {
+            let variance = |sensors| channel.noise_std(sensors, &self.noise_at).powi(2);
+            let quiet = variance(declared) / variance(self.sensors);
+            if quiet.is_finite() { (share + (1.0 - share) * quiet).sqrt() } else { 1.0 }
+        });
+        let of_row =
+            |row: &PerEquation<Sensitivity>| PerEquation::from_fn(|equation| row[equation].at_noise(&times));
+        self.sensitivities.iter().map(of_row).collect()
     }
 
     /// How the sensors' noise enters each of the rows.

@@ -115,6 +115,21 @@ impl Sensitivity {
         Self { loudness: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
     }
 
+    /// Whether samples don't see all that moves here.
+    pub(crate) fn is_loud(&self) -> bool {
+        self.loudness.iter().any(|times| *times > 1.0)
+    }
+
+    /// The same where each channel has so many times the noise of its sensor; where it is loud, as it was.
+    #[must_use]
+    pub(super) fn at_noise(mut self, times: &[f64; Channel::ALL.len()]) -> Self {
+        if !self.is_loud() {
+            let channels = self.gains.iter_mut().zip(times);
+            channels.for_each(|(gains, times)| *gains = gains.map(|gain| gain * times));
+        }
+        self
+    }
+
     /// Of all three equations at a row.
     pub(crate) fn of(at: &Linearisation, sensors: &Sensors<f64>, row: &Row) -> PerEquation<Self> {
         let mut all = PerEquation::<Self>::default();
