@@ -60,8 +60,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let failures = assess::failures(&checks, &faults);
-    let judgement = assess::judge(&selection, excited, &failures);
+    let judgement = assess::judge(&selection, excited, assess::failures(&checks, &faults));
     let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
@@ -69,7 +68,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let interactions = search::interactions(fit, effects);
     Diagnosis {
         samples: Samples::of(&train),
-        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &failures)).collect(),
+        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &judgement)).collect(),
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },

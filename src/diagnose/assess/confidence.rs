@@ -2,6 +2,7 @@
 //! beside it, and against what physics allows.
 
 use super::adequacy;
+use super::verdict::Judgement;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::search::{self, Selected, Selection};
@@ -11,12 +12,12 @@ use pitchleak_core::Effect;
 use pitchleak_core::effects::EffectKind;
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
-pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
-    own_doubts(selection, one, failures).or_else(|| doubtful_company(selection, one, failures))
+pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+    own_doubts(selection, one, judgement).or_else(|| doubtful_company(selection, one, judgement))
 }
 
 /// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
-fn doubtful_company(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
+fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
     let (acts, ratio) = (acts_in(fit, one.term), fit.noise_ratio());
     let is_doubtful = |other: &&Selected| {
@@ -24,23 +25,23 @@ fn doubtful_company(selection: &Selection<'_>, one: &Selected, failures: &[Strin
         let is_shared = |equation: Equation| acts[equation] && also[equation] && ratio[equation] > 1.0;
         other.term != one.term
             && Equation::ALL.into_iter().any(is_shared)
-            && own_doubts(selection, other, failures).is_some()
+            && own_doubts(selection, other, judgement).is_some()
     };
     let other = selection.effects.iter().find(is_doubtful)?;
     let id = fit.problem.terms[other.term].effect()?.spec().id;
     Some(format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"))
 }
 
-fn own_doubts(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<String> {
+fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
     let reasons: Vec<String> = [
         rivals(one),
         remainder(fit, one),
-        company(selection, one),
+        company(selection, one, judgement),
         lopsided(selection, one),
         bounds(fit, one),
         leaks(fit, one),
-        sensors(failures),
+        sensors(&judgement.failures),
     ]
     .into_iter()
     .flatten()
@@ -92,8 +93,9 @@ fn remainder(fit: &Fit<'_>, one: &Selected) -> Option<String> {
     })
 }
 
-/// It is as small as the error that another named effect, of the same equation, may have in its law.
-fn company(selection: &Selection<'_>, one: &Selected) -> Option<String> {
+/// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that
+/// no effect explains, that error is of unknown size: only the strongest effect of an equation is believed.
+fn company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
     let acts = acts_in(fit, one.term);
     let shares_equation = |other: &&Selected| {
@@ -102,13 +104,16 @@ fn company(selection: &Selection<'_>, one: &Selected) -> Option<String> {
     };
     let own = search::loss(fit, &[one.term]);
     let others = selection.effects.iter().filter(|other| other.term != one.term);
-    let large = others
-        .filter(shares_equation)
-        .max_by(|a, b| search::loss(fit, &[a.term]).total_cmp(&search::loss(fit, &[b.term])))?;
+    let of_others = others.filter(shares_equation).map(|other| (other, search::loss(fit, &[other.term])));
+    let (large, mended) = of_others.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let id = fit.problem.terms[large.term].effect()?.spec().id;
-    (own < LEAST_SHARE_BESIDE * search::loss(fit, &[large.term])).then(|| {
-        format!("it is so small beside {id} that a small error in the law of that would pass for it")
-    })
+    if own < LEAST_SHARE_BESIDE * mended {
+        return Some(format!(
+            "it is so small beside {id} that a small error in the law of that would pass for it"
+        ));
+    }
+    (own < mended && !judgement.complaints.is_empty())
+        .then(|| format!("something else is there, too, and it mends less than {id}: an error in the law of that may pass for it"))
 }
 
 /// Dry friction that is larger one way is, as long as the piston moves, dry friction and an offset of the load.

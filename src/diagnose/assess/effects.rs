@@ -1,15 +1,16 @@
 //! What is said of each effect.
 
 use super::confidence;
+use super::verdict::Judgement;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Calibration, FoundEffect};
 use crate::diagnose::search::{Selected, Selection};
 use pitchleak_core::{Effect, Estimate};
 
 /// An effect of the answer.
-pub(crate) fn found(selection: &Selection<'_>, one: &Selected, failures: &[String]) -> Option<FoundEffect> {
+pub(crate) fn found(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<FoundEffect> {
     let fit = &selection.fit;
-    let doubt = confidence::doubts(selection, one, failures);
+    let doubt = confidence::doubts(selection, one, judgement);
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
     let std = confidence::std_with_oil(fit, one.term).unwrap_or(std);

@@ -12,13 +12,15 @@ pub(crate) struct Judgement {
     pub(crate) verdict: Verdict,
     /// What speaks against the model with the effects.
     pub(crate) complaints: Vec<String>,
+    /// The complaints among them of sensors that fail by themselves.
+    pub(crate) failures: Vec<String>,
 }
 
 /// Judges the model with the effects, beside what is wrong with the sensors.
-pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: &[String]) -> Judgement {
+pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: Vec<String>) -> Judgement {
     let Selection { fit, effects } = selection;
     let mut complaints = complaints(fit);
-    complaints.extend_from_slice(failures);
+    complaints.extend_from_slice(&failures);
     if effects.iter().any(|one| one.beaten_by_nameless) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
     }
@@ -29,7 +31,7 @@ pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: &[String
         (true, false, true) => Verdict::Explained,
         (true, false, false) => Verdict::PartlyExplained,
     };
-    Judgement { verdict, complaints }
+    Judgement { verdict, complaints, failures }
 }
 
 /// All sentences for people: `after` is none where no effect was named.
