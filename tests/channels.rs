@@ -120,6 +120,27 @@ fn each_fault_is_found_on_its_channel_alone() {
     }
 }
 
+/// A standing piston's pressure follows its load; where that stands still, too, a coarse sensor may read one value.
+#[test]
+fn a_pressure_that_stands_still_under_a_changing_load_is_dead() {
+    let (rig, motion) = (rig(0.003), Motion::wind_like(LEAKS));
+    let at_rest = |load: f64| {
+        let mut random = seeded(2);
+        let record = |k: u32| {
+            let t_s = 0.01 * f64::from(k);
+            let pb_pa = 4e6 + load * (motion.pressure_b_pa.value(t_s) - 4e6);
+            let sample =
+                Sample { x_m: 0.1, pb_pa, qa_m3s: Some(0.0), qb_m3s: Some(0.0), ..motion.sample(0.0) };
+            let sample = Sample { pa_pa: 5e6, ..noisy(&sample, &sensors_of(0.003), &mut random) };
+            Record { t_s, dt_s: if k == 0 { 0.0 } else { 0.01 }, sample, ..Record::default() }
+        };
+        found(&(0..6000).map(record).collect::<Vec<_>>(), &rig)
+    };
+    let dead: Vec<_> = at_rest(1.0).iter().map(|(channel, kind, ..)| (*channel, *kind)).collect();
+    assert_eq!(dead, [("pa", ChannelFaultKind::Dead)]);
+    assert_eq!(at_rest(0.0), []);
+}
+
 /// Of a long trace pieces are looked at, and each begins a new run: none is counted that was not read.
 #[test]
 fn a_sensor_that_holds_its_readings_is_found_in_long_traces_too() {

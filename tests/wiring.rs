@@ -182,6 +182,33 @@ fn recorded_traces_are_not_accused() {
     }
 }
 
+/// In calm wind the piston hardly moves, and the flows don't tell. A force column whose own sign or unit is wrong, or that
+/// is none, accuses nobody.
+#[test]
+fn the_load_force_tells_exchanged_pressures_at_rest() {
+    let rig = rig(0.01);
+    let chambers = Mistake::Exchanged(Exchange::Chambers);
+    let with_force = |records: &[Record], change: &dyn Fn(f64) -> Option<f64>| {
+        let change = |record: &Record| {
+            let mut record = *record;
+            record.sample.force_n = record.sample.force_n.and_then(change);
+            record
+        };
+        explained(&records.iter().map(change).collect::<Vec<_>>(), &rig).map(|found| found.mistakes)
+    };
+    for (_, internal, external) in LEAKS {
+        let right = records(&truths(WindCase::Mps5, internal, external, EffectSet::default()), &rig, 11);
+        let swapped = chambers.make(&right, &rig);
+        let told = with_force(&swapped, &Some).unwrap();
+        assert!(told.contains(&chambers) && told.len() <= 2, "{told:?}");
+        assert_eq!(with_force(&swapped, &|_| None), None);
+        for factor in [1.0, -1.0, 1e3, 0.1, 0.0] {
+            assert_eq!(with_force(&right, &|force| Some(factor * force)), None, "{factor}");
+        }
+        assert_eq!(with_force(&swapped, &|_| Some(0.0)), None);
+    }
+}
+
 /// What is made and mended is what it was.
 #[test]
 fn mending_undoes_making() {

@@ -140,26 +140,34 @@ fn gravest(one: &Judged, all: &[Judged], monitor: &ChannelMonitor) -> Option<Cha
     // Force and pressure may change on a standing piston: only travel and flow are motion.
     let kinematic =
         |other: &&Judged| matches!(other.signal, Signal::Position | Signal::FlowA | Signal::FlowB);
-    let motion = others().filter(kinematic).any(Judged::moves);
+    let moves = others().filter(kinematic).any(Judged::moves);
+    let load = others().any(|other| !kinematic(&other) && other.moves());
     let whole = (monitor.first_s, monitor.last_s);
-    dead(one, witnesses, motion, whole)
+    dead(one, witnesses, Activity { moves, load }, whole)
         .or_else(|| held(one, seldom_repeated, whole))
         .or_else(|| clipped(one))
         .or_else(|| stuck(one))
         .or_else(|| coarse(one, whole))
 }
 
+/// What the other channels show that the cylinder does: it moves, its load changes.
+struct Activity {
+    moves: bool,
+    load: bool,
+}
+
 /// Constant though the cylinder moves: where other channels show that this trace has noise, or at exactly zero. An
 /// unused force column of zeros harms nobody.
-fn dead(one: &Judged, witnesses: usize, motion: bool, whole: (f64, f64)) -> Option<ChannelFault> {
+fn dead(one: &Judged, witnesses: usize, activity: Activity, whole: (f64, f64)) -> Option<ChannelFault> {
     let Run { value, count, .. } = one.channel.longest;
     let constant = count as f64 >= DEAD_SHARE * one.channel.readings as f64;
     let zero = value == 0.0;
     let force = one.signal == Signal::Force;
     // Only a meter's resolution could make it rest, and nothing rests as long as others scatter.
     let flow = matches!(one.signal, Signal::FlowA | Signal::FlowB);
-    let moves = motion || (flow && witnesses >= 2);
-    if !constant || !moves || (force && zero) || !(zero || witnesses >= 2) {
+    let pressure = matches!(one.signal, Signal::PressureA | Signal::PressureB);
+    let alive = activity.moves || (witnesses >= 2 && (flow || (pressure && activity.load)));
+    if !constant || !alive || (force && zero) || !(zero || witnesses >= 2) {
         return None;
     }
     let exactly = if zero { "exactly " } else { "" };
@@ -167,7 +175,13 @@ fn dead(one: &Judged, witnesses: usize, motion: bool, whole: (f64, f64)) -> Opti
         "{} reads {exactly}{} all the time although {}",
         one.signal.name(),
         one.reading(value),
-        if motion { "the cylinder moves" } else { "other channels scatter" }
+        if activity.moves {
+            "the cylinder moves"
+        } else if pressure {
+            "the load changes"
+        } else {
+            "other channels scatter"
+        }
     );
     Some(one.fault(ChannelFaultKind::Dead, whole, text))
 }

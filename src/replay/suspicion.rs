@@ -7,8 +7,8 @@ use crate::report::{Status, Suspicions, Verdict};
 use crate::rig::ColumnMap;
 use crate::trace::Record;
 use crate::wiring::{
-    Excerpt, Explanation, Orifice, Recorded, Running, Wiring, ZeroCheck, changing_leaks_or_zeros, explain,
-    orifice, sensor_error, unit_by_scatter,
+    Excerpt, Explanation, Orifice, Recorded, Running, Wiring, ZeroCheck, changing_leaks_or_zeros,
+    exchanged_by_force, exchanged_so_far, explain, orifice, sensor_error, unit_by_scatter,
 };
 use pitchleak_core::PerLeak;
 
@@ -34,7 +34,7 @@ impl Replay {
         let named = |found: Option<Explanation>| self.named(found, columns);
         if verdict.status != Status::Doubtful {
             return Suspicions {
-                wiring: named(unit_by_scatter(excerpt, &self.rig)),
+                wiring: named(unit_by_scatter(excerpt, &self.rig).or_else(|| self.exchanged(excerpt))),
                 zeros: if self.may_be_zeros(verdict) { self.zeros(excerpt) } else { None },
                 ..Suspicions::default()
             };
@@ -66,13 +66,20 @@ impl Replay {
         let named = |found: Option<Explanation>| self.named(found, &self.rig.columns);
         let lately = evidence.stretch(&self.rig);
         if verdict.status == Status::Doubtful {
-            return Suspicions { sensor: named(sensor_error(&lately)), ..Suspicions::default() };
+            let wiring = named(exchanged_so_far(&lately));
+            let sensor = if wiring.is_some() { None } else { named(sensor_error(&lately)) };
+            return Suspicions { wiring, sensor, ..Suspicions::default() };
         }
+        let wiring = evidence.unit_by_scatter(&self.rig).or_else(|| exchanged_so_far(&lately));
         Suspicions {
-            wiring: named(evidence.unit_by_scatter(&self.rig)),
+            wiring: named(wiring),
             zeros: if self.may_be_zeros(verdict) { changing_leaks_or_zeros(&lately) } else { None },
             ..Suspicions::default()
         }
+    }
+
+    fn exchanged(&self, excerpt: &Excerpt) -> Option<Explanation> {
+        exchanged_by_force(&Recorded::new(&excerpt.records(), &self.rig)?)
     }
 
     fn named(&self, found: Option<Explanation>, columns: &ColumnMap) -> Option<Wiring> {

@@ -24,6 +24,8 @@ pub(super) struct Block {
     pub b: Chamber,
     /// ∫√P dt of the pressure across each leak, of its sign, √Pa·s.
     pub roots: PerLeak<f64>,
+    /// ∫F dt, N·s, where the load force was measured all through.
+    pub force: Option<f64>,
     /// Δx, m.
     pub travel_m: f64,
     /// ∫dt, s, and Σ dt², s².
@@ -62,6 +64,8 @@ struct Sum {
     a: Chamber,
     b: Chamber,
     roots: PerLeak<f64>,
+    force: f64,
+    forces: u32,
     travel_m: f64,
     time_s: f64,
     time_square_s2: f64,
@@ -124,6 +128,10 @@ impl Sum {
         };
         let roots = across.map(|p| dt * p.abs().sqrt().copysign(p));
         self.roots = self.roots.zip(roots).map(|(sum, root)| sum + root);
+        if let Some(force) = sum(l.force_n, n.force_n) {
+            self.force += 0.5 * dt * force;
+            self.forces += 1;
+        }
         self.travel_m += n.x_m - l.x_m;
         self.time_s += dt;
         self.time_square_s2 += dt * dt;
@@ -140,6 +148,7 @@ impl Sum {
             (false, false) => return None,
         };
         let Self { a, b, roots, travel_m, time_s, time_square_s2, .. } = self;
-        Some(Block { follows, fed, a, b, roots, travel_m, time_s, time_square_s2, end_s })
+        let force = (self.forces == self.steps).then_some(self.force);
+        Some(Block { follows, fed, a, b, roots, force, travel_m, time_s, time_square_s2, end_s })
     }
 }

@@ -1,12 +1,13 @@
 use super::blocks::{Block, blocks};
 use super::equations::{Driven, Equations, Noise};
 use super::fit::Fit;
+use super::force::ForceBalance;
 use super::priors::Priors;
 use crate::rig::Rig;
 use crate::trace::Record;
 use pitchleak_core::{Leak, PerLeak};
 
-/// What both continuity equations say of a stretch of samples.
+/// What both continuity equations say of a stretch of samples, and the force balance.
 pub(crate) trait Continuity {
     /// Fits the model with these priors; `None` where the samples are too few.
     fn fit(&self, priors: &Priors) -> Option<Fit>;
@@ -19,6 +20,9 @@ pub(crate) trait Continuity {
 
     /// What drove a leak's flow, on average.
     fn driven(&self, leak: Leak) -> Driven;
+
+    /// The force balance, where the load force was measured.
+    fn force_balance(&self) -> Option<ForceBalance>;
 }
 
 /// A stretch of which all records are at hand.
@@ -65,5 +69,9 @@ impl Continuity for Recorded<'_> {
 
     fn driven(&self, leak: Leak) -> Driven {
         Driven::of(&[&self.equations], leak)
+    }
+
+    fn force_balance(&self) -> Option<ForceBalance> {
+        ForceBalance::of(&self.equations.force, self.rig)
     }
 }

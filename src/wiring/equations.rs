@@ -2,6 +2,7 @@
 //! priors, in constant memory however many blocks there are.
 
 use super::blocks::{Block, Chamber, Fed};
+use super::force::ForceSums;
 use super::priors::{PARAMETERS, SLOPE_OF, Vector};
 use crate::rig::Rig;
 use nalgebra::SMatrix;
@@ -223,6 +224,7 @@ pub(super) struct Equations {
     /// Of the flow balance, and of the position against the flows.
     series: [Series; 2],
     driven: PerLeak<Driven>,
+    pub force: ForceSums,
     time_s: f64,
     blocks: u32,
     /// Ends of the first and of the last block.
@@ -243,6 +245,7 @@ impl Equations {
         self.span_s = Some([begin_s, block.end_s]);
         self.time_s += block.time_s;
         self.blocks = self.blocks.saturating_add(1);
+        self.force.add(block);
         self.driven = PerLeak::from_fn(|leak| self.driven[leak].with(block.across(leak), block.roots[leak]));
         let [balance, travel] = &mut self.series;
         let after_begin_s = block.end_s - begin_s;

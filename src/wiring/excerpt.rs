@@ -17,7 +17,7 @@ pub struct Excerpt {
 
 const AFTER_GAP: f64 = -1.0;
 
-/// What the equations need of a record, in a third of its memory; NaN is a flow that is missing.
+/// What the equations need of a record, in a third of its memory; NaN is a flow or a force that is missing.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     t_s: f64,
@@ -26,26 +26,28 @@ struct Kept {
     x_m: f64,
     pressures_pa: [f64; 2],
     flows_m3s: [f64; 2],
+    force_n: f64,
 }
 
 impl Kept {
     fn of(record: &Record, step_s: f64) -> Self {
         let s = &record.sample;
-        let missing = |flow: Option<f64>| flow.unwrap_or(f64::NAN);
+        let missing = |reading: Option<f64>| reading.unwrap_or(f64::NAN);
         Self {
             t_s: record.t_s,
             step_s,
             x_m: s.x_m,
             pressures_pa: [s.pa_pa, s.pb_pa],
             flows_m3s: [missing(s.qa_m3s), missing(s.qb_m3s)],
+            force_n: missing(s.force_n),
         }
     }
 
     fn record(&self) -> Record {
         let ([pa_pa, pb_pa], [qa, qb]) = (self.pressures_pa, self.flows_m3s);
-        let measured = |flow: f64| Some(flow).filter(|flow| !flow.is_nan());
-        let sample =
-            Sample { x_m: self.x_m, pa_pa, pb_pa, qa_m3s: measured(qa), qb_m3s: measured(qb), force_n: None };
+        let measured = |reading: f64| Some(reading).filter(|reading| !reading.is_nan());
+        let (qa_m3s, qb_m3s, force_n) = (measured(qa), measured(qb), measured(self.force_n));
+        let sample = Sample { x_m: self.x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n };
         let after_gap = self.step_s < 0.0;
         Record { t_s: self.t_s, dt_s: self.step_s.max(0.0), after_gap, sample, ..Record::default() }
     }

@@ -27,6 +27,13 @@ pub enum Evidence {
         /// … and with the mistake mended.
         after: f64,
     },
+    /// What the force balance leaves, root mean square, N.
+    Force {
+        /// With the pressures as they are read …
+        before: f64,
+        /// … and exchanged.
+        after: f64,
+    },
     /// How large the scatter of the readings is as they stand, in that declared; the other channels scatter as declared.
     Scatter(f64),
     /// So many readings are positive and as large as the negative flow that the piston's motion gives.
@@ -38,8 +45,8 @@ pub enum Evidence {
 pub struct Wiring {
     /// The mistake and its evidence, in one sentence.
     pub suggestion: String,
-    /// Size of the residual in standard deviations of the declared noise, as the wiring is declared; none where the
-    /// scatter alone speaks.
+    /// Size of the residual in standard deviations of the declared noise, as the wiring is declared; none where
+    /// something else speaks.
     pub residual_before: Option<f64>,
     /// The same with the mistake mended.
     pub residual_after: Option<f64>,
@@ -64,6 +71,9 @@ impl Explanation {
                     format!("with {first} no leak is negative, which it is as the columns are declared")
                 };
                 (text, Some((before, after)))
+            }
+            Evidence::Force { before, after } => {
+                (format!("with {first} the forces balance to {after:.0} N and not to {before:.0} N"), None)
             }
             Evidence::Scatter(ratio) => (
                 format!("with {first} they scatter as declared, and {ratio:.2} times that as they stand"),

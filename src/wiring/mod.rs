@@ -10,6 +10,7 @@ mod equations;
 mod excerpt;
 mod explanation;
 mod fit;
+mod force;
 mod mistake;
 mod noise;
 mod orifice;
@@ -69,6 +70,9 @@ const ENOUGH_ROWS: usize = 40;
 /// Share of the readings that must be possible on the rig.
 const POSSIBLE_SHARE: f64 = 0.99;
 
+const EXCHANGED_PRESSURES: [Mistake; 2] =
+    [Mistake::Exchanged(Exchange::Pressures), Mistake::Exchanged(Exchange::Chambers)];
+
 /// Rows that show a sensor's scatter to a percent or two.
 const SCATTER_ROWS: usize = 3000;
 
@@ -80,11 +84,35 @@ struct Scored {
     scatter: Verdict,
 }
 
+/// The exchange of pressures that the force balance tells, alone or with that of the flows, whatever the flows say; two where
+/// those don't tell which.
+pub(crate) fn exchanged_by_force(stretch: &Recorded<'_>) -> Option<Explanation> {
+    let [before, after] = stretch.force_balance()?.holds_exchanged()?;
+    let (records, rig) = (stretch.records, stretch.rig());
+    let score = |mistake: Mistake| {
+        let fit = Recorded::new(&mistake.mend(records, rig), rig)?.fit(&Priors::declared(rig))?;
+        Some(Scored { mistake, fit, scatter: Verdict::Silent })
+    };
+    let found: Vec<Scored> = EXCHANGED_PRESSURES.into_iter().filter_map(score).collect();
+    let rows = found.first()?.fit.row_count();
+    let mistakes = best(found, rows).iter().map(|one| one.mistake).collect();
+    Some(Explanation { mistakes, evidence: Evidence::Force { before, after } })
+}
+
+/// The same of a stream, which keeps no records to exchange the flows in.
+pub(crate) fn exchanged_so_far(stretch: &impl Continuity) -> Option<Explanation> {
+    let [before, after] = stretch.force_balance()?.holds_exchanged()?;
+    Some(Explanation { mistakes: EXCHANGED_PRESSURES.into(), evidence: Evidence::Force { before, after } })
+}
+
 /// The mistake of wiring, sign or unit that explains the records where the declared wiring does not; `None` where that
 /// does, or nothing explains them, or too much.
 pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
     let (records, rig) = (stretch.records, stretch.rig());
     let priors = Priors::declared(rig);
+    if let Some(exchanged) = exchanged_by_force(stretch) {
+        return Some(exchanged);
+    }
     let declared = stretch.fit(&priors)?;
     let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
     if !contradicted || sensor_errors_explain(stretch) {
@@ -95,7 +123,10 @@ pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
         return Some(Explanation { mistakes: readings.into_iter().map(Mistake::Size).collect(), evidence });
     }
     let ratios = ScatterRatios::of(records, rig);
-    let candidates = candidates::candidates();
+    let mut candidates = candidates::candidates();
+    if stretch.force_balance().is_some_and(|balance| balance.holds()) {
+        candidates.retain(|mistake| !EXCHANGED_PRESSURES.contains(mistake));
+    }
     let score = |mistake: Mistake| {
         let mended = mistake.mend(records, rig);
         let lossy = matches!(mistake, Mistake::Size(_))

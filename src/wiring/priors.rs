@@ -16,7 +16,7 @@ pub(crate) struct Priors(pub(super) Vector);
 /// A sensor that nobody declared wrong may be off by so much, 1 σ: of full scale, of the reading.
 const UNDECLARED_SHARE: f64 = 0.05;
 /// A meter's zero that nobody declared wrong may be off by this share of full scale, 1 σ, and drift as far through a trace.
-const UNDECLARED_ZERO_SHARE: f64 = 0.01;
+pub(super) const UNDECLARED_ZERO_SHARE: f64 = 0.01;
 /// A gain that is off by far, 1 σ, and a zero, share of full scale.
 const WILD_GAIN: f64 = 0.2;
 const WILD_ZERO_SHARE: f64 = 0.1;

@@ -6,6 +6,7 @@ use super::continuity::Continuity;
 use super::equations::{Driven, Equations, Noise};
 use super::explanation::Explanation;
 use super::fit::Fit;
+use super::force::{ForceBalance, ForceSums};
 use super::noise::RunningScatter;
 use super::priors::Priors;
 use super::unit_betrayed;
@@ -91,6 +92,10 @@ impl Continuity for RunningStretch<'_> {
 
     fn driven(&self, leak: Leak) -> Driven {
         Driven::of(&self.parts, leak)
+    }
+
+    fn force_balance(&self) -> Option<ForceBalance> {
+        ForceBalance::of(&ForceSums::of(self.parts.iter().map(|part| &part.force)), self.rig)
     }
 }
 
