@@ -12,10 +12,10 @@ mod plant;
 
 use judge::{Judgement, Said, judge, recorded};
 use lie::{Family, Lie};
-use pitchleak::core::Leak;
+use pitchleak::core::{EffectSet, Leak, PerLeak};
 use pitchleak::report::{ReplayReport, Status};
-use pitchleak::simulate::Truth;
-use pitchleak::wind::WindCase;
+use pitchleak::simulate::{Scenario, Truth};
+use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use plant::{LEAKING, leak_name, truths};
 use rayon::prelude::*;
 
@@ -75,6 +75,36 @@ fn a_leak_through_an_orifice_is_sure_and_its_law_is_named() {
             assert_eq!(judgement, Judgement::InDoubt, "{wind:?}: {text}");
         }
     });
+}
+
+/// A leak that grows and then stays goes in no straight line: no zero of a meter makes that up.
+#[test]
+fn a_leak_that_grew_and_stays_is_a_leak_and_no_zero() {
+    let truths = grown(WindCase::Mps5, "0 -> 0.6 L/min @ 30 s..120 s", 240.0);
+    let (report, shown) = replayed(&truths, &lie(&[]), 1e-2, 1);
+    assert_eq!(report.verdict.status, Status::Leak, "{}", report.verdict.text);
+    let last = shown.last().expect("has rows");
+    let truth = last.leaks_m3s.external_a / last.signals.pa_pa;
+    let found = report.estimates.external_leak_a_coefficient.value;
+    assert!((found / truth - 1.0).abs() < 0.02, "{found} of {truth} m³/(s·Pa)");
+}
+
+/// What happened where the external leak of A took this course.
+fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
+    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
+    let leaks = PerLeak { external_a: course.parse().expect("a course"), ..PerLeak::default() };
+    let scenario = Scenario {
+        rig: plant::rig(1e-2),
+        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
+        leaks,
+        oil_temperature: None,
+        effects: EffectSet::default(),
+        start_s: 0.0,
+        warm_up_s: 10.0,
+        duration_s,
+        sample_rate_hz: 100.0,
+    };
+    scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs")
 }
 
 /// Right columns, honest sensors: sure, and right.

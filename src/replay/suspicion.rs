@@ -8,7 +8,7 @@ use crate::rig::ColumnMap;
 use crate::trace::Record;
 use crate::wiring::{
     Excerpt, Explanation, Orifice, Recorded, Running, Wiring, ZeroCheck, changing_leaks_or_zeros,
-    exchanged_by_force, exchanged_so_far, explain, orifice, sensor_error, unit_by_scatter,
+    exchanged_by_force, exchanged_so_far, explain, orifice, sensor_error, unit_by_scatter, zero_check_lately,
 };
 use pitchleak_core::PerLeak;
 
@@ -109,6 +109,6 @@ impl Replay {
         let mut records = excerpt.records();
         let since_s = self.changed_at_s.unwrap_or(f64::NEG_INFINITY);
         records.retain(|record: &Record| record.t_s >= since_s);
-        changing_leaks_or_zeros(&Recorded::new(&records, &self.rig)?)
+        zero_check_lately(&records, &self.rig)
     }
 }

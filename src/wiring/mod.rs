@@ -31,8 +31,8 @@ pub(crate) use orifice::orifice;
 pub use readings::Readings;
 pub use running::Running;
 pub(crate) use sensor_error::sensor_error;
-pub(crate) use zeros::changing_leaks_or_zeros;
 pub use zeros::{SingleZero, ZeroCheck, zero_check};
+pub(crate) use zeros::{changing_leaks_or_zeros, zero_check_lately};
 
 use crate::rig::Rig;
 use crate::signal::Signal;

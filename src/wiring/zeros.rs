@@ -27,6 +27,9 @@ pub struct ZeroCheck {
     pub single: [Option<SingleZero>; 2],
 }
 
+/// What a bend gives a fit to choose (leaks, their slopes and the oil once more) is worth less in χ² by chance.
+const BEYOND_CHANCE: f64 = 25.0;
+
 /// One meter's zero that is off, and steady, beside all leaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SingleZero {
@@ -42,6 +45,36 @@ pub struct SingleZero {
 /// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     changing_leaks_or_zeros(&Recorded::new(records, rig)?)
+}
+
+/// The same of the last of the records: a leak that grows and then stays goes in no straight line, and a steady zero would
+/// seem to explain the bend. As long as leaks that change their course explain the records better than zeros do, the later
+/// half is looked at.
+pub(crate) fn zero_check_lately(mut records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
+    while do_leaks_bend(records, rig).unwrap_or(false) {
+        records = records.split_at(records.len() / 2).1;
+    }
+    zero_check(records, rig)
+}
+
+/// Whether leaks that go straight in each half, quarter or eighth of the records explain them better than zeros do with
+/// leaks that go straight throughout. `None` where the records are too few.
+fn do_leaks_bend(records: &[Record], rig: &Rig) -> Option<bool> {
+    let whole = Recorded::new(records, rig)?;
+    let duration_s = whole.duration_s();
+    let straight = |duration_s: f64| Priors::declared(rig).with_changing_leaks(duration_s);
+    let zeros = whole.fit(&straight(duration_s).with_zeros_off(rig, duration_s))?.chi_square();
+    let bent = |parts: usize| {
+        let chi_square = |part: &[Record]| {
+            let part = Recorded::new(part, rig)?;
+            Some(part.fit(&straight(part.duration_s()))?.chi_square())
+        };
+        records.chunks(records.len().div_ceil(parts)).map(chi_square).sum::<Option<f64>>()
+    };
+    let better = |parts: u32| {
+        bent(parts as usize).is_some_and(|left| zeros - left > BEYOND_CHANCE * f64::from(parts - 1))
+    };
+    Some([2, 4, 8].into_iter().any(better))
 }
 
 /// The same of any stretch.
