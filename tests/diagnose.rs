@@ -6,7 +6,8 @@ use pitchleak::core::{Effect, EffectSet, PerLeak, Sample, Signals};
 use pitchleak::curve::Curve;
 use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
-use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing};
+use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
+use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use std::f64::consts::TAU;
 
 const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 1e-12 };
@@ -97,6 +98,52 @@ fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
     assert_eq!(again.verdict, Verdict::NoMissingEffect, "{:?}", again.notes);
     let leak = again.after.leaks.internal_leak_coefficient;
     assert!((leak.value - LEAKS.internal).abs() < 4.0 * leak.std);
+}
+
+/// A meter that was mended between the traces that are fitted and the one that judges.
+#[test]
+fn an_effect_that_other_samples_do_not_have_is_not_believed() {
+    let mended = trace(None);
+    let off = trace(Some((Effect::FlowMeterGainA, 0.03)));
+    let answer = diagnose(&[off], &[mended], &Declared::of(&rig()), &|| ());
+    let found = answer.effects.first().expect("is found");
+    assert_eq!(
+        (found.id, answer.verdict),
+        ("flow_meter_gain_a", Verdict::PartlyExplained),
+        "{:?}",
+        answer.notes
+    );
+    assert_eq!(found.doubt.as_deref(), Some("the error on held-out samples did not fall where it acts"));
+}
+
+/// Sensors ten times as good as declared, a meter of which reads 3 % too much: what the declared noise would do to the fit
+/// is not taken off where it isn't there.
+#[test]
+fn sensors_better_than_declared_mislead_nobody() {
+    let history = History::of(&Wind::BuiltIn(WindCase::Mps13)).expect("is built in");
+    let declared = Rig::paper();
+    let mut effects = EffectSet::default();
+    effects.set(Effect::FlowMeterGainA, 0.03, EffectConstants::default()).expect("is within bounds");
+    let scenario = Scenario {
+        rig: declared.clone(),
+        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
+        leaks: PerLeak::default(),
+        oil_temperature: None,
+        effects,
+        start_s: 0.0,
+        warm_up_s: 10.0,
+        duration_s: 180.0,
+        sample_rate_hz: 100.0,
+    };
+    let mut sensing = Sensing::new(rig().sensors(), Biases::default(), 1);
+    let mut series = Series::default();
+    let push = |truth: &Truth| series.push(truth.t_s, &sensing.read(&truth.sample), None);
+    scenario.run(PerLeak::default(), push).expect("the plant runs");
+    let answer = ask(series, &declared);
+    let names: Vec<_> = answer.effects.iter().map(|one| one.id).collect();
+    assert_eq!((names.as_slice(), answer.verdict), (&["flow_meter_gain_a"][..], Verdict::Explained));
+    let gain = answer.effects.first().expect("is found");
+    assert!((gain.value - 0.03).abs() < 4.0 * gain.std && gain.std < 0.005, "{gain:?}");
 }
 
 /// A volume is measured only over the bulk modulus, so both are saved.

@@ -60,7 +60,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let judgement = assess::judge(&selection, excited, assess::failures(&checks, &faults));
+    let judgement = assess::judge(&selection, excited, assess::failures(&checks, &faults), [&before, &after]);
     let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);

@@ -1,6 +1,7 @@
 """A trace in parts is the trace."""
 
 import pickle
+import re
 import threading
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_a_file_that_is_no_state_is_refused(rig, tmp_path):
     est = pl.Estimator(rig)
     est.update(0.0, 0.1, 5e6, 4e6)
     saved = est.saved()
-    for bad in (b"", b"hello", saved[:100], saved[:-1], saved + b"\0", saved.replace(b"state/5", b"state/9")):
+    for bad in (b"", b"hello", saved[:100], saved[:-1], saved + b"\0", re.sub(rb"state/\d+", b"state/0", saved)):
         with pytest.raises(ValueError, match="saved"):
             pl.Estimator.from_bytes(bad)
     with pytest.raises(ValueError, match="another rig"):

@@ -41,12 +41,20 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
         lopsided(selection, one),
         bounds(fit, one),
         leaks(fit, one),
+        held_out(fit, one, judgement),
         sensors(&judgement.failures),
     ]
     .into_iter()
     .flatten()
     .collect();
     (!reasons.is_empty()).then(|| reasons.join("; "))
+}
+
+/// Wherever it acts, samples that were not fitted are met no better with all the effects than without any.
+fn held_out(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+    let acts = acts_in(fit, one.term);
+    let is_met_better = Equation::ALL.into_iter().any(|equation| acts[equation] && judgement.fell[equation]);
+    (!is_met_better).then(|| "the error on held-out samples did not fall where it acts".to_owned())
 }
 
 /// A sensor fails by itself.

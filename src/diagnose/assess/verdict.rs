@@ -3,6 +3,7 @@
 use super::adequacy::complaints;
 use super::confidence::ratio_note;
 use super::leaks::negative_leaks;
+use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
 use crate::diagnose::search::Selection;
 use crate::diagnose::thresholds::MOST_ROUNDS;
@@ -14,15 +15,28 @@ pub(crate) struct Judgement {
     pub(crate) complaints: Vec<String>,
     /// The complaints among them of sensors that fail by themselves.
     pub(crate) failures: Vec<String>,
+    /// Where the effects together made the error on held-out samples smaller.
+    pub(crate) fell: PerEquation<bool>,
 }
 
-/// Judges the model with the effects, beside what is wrong with the sensors.
-pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: Vec<String>) -> Judgement {
+/// Judges the model with the effects by its errors on held-out samples, `before` without them and `after`, and by what is
+/// left, beside what is wrong with the sensors.
+pub(crate) fn judge(
+    selection: &Selection<'_>,
+    excited: bool,
+    failures: Vec<String>,
+    [before, after]: [&ModelFit; 2],
+) -> Judgement {
     let Selection { fit, effects } = selection;
     let mut complaints = complaints(fit);
     complaints.extend_from_slice(&failures);
     if effects.iter().any(|one| one.beaten_by_nameless) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
+    }
+    let [before, after] = [before, after].map(|model| &model.quality.rmse);
+    let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);
+    if !effects.is_empty() && Equation::ALL.into_iter().all(|equation| !fell[equation]) {
+        complaints.push("samples that were not fitted are met no better than without the effects".to_owned());
     }
     let verdict = match (excited, effects.is_empty(), complaints.is_empty()) {
         (false, ..) => Verdict::InsufficientExcitation,
@@ -31,7 +45,7 @@ pub(crate) fn judge(selection: &Selection<'_>, excited: bool, failures: Vec<Stri
         (true, false, true) => Verdict::Explained,
         (true, false, false) => Verdict::PartlyExplained,
     };
-    Judgement { verdict, complaints, failures }
+    Judgement { verdict, complaints, failures, fell }
 }
 
 /// All sentences for people: `after` is none where no effect was named.

@@ -15,7 +15,7 @@ pub use declared::Declared;
 pub(crate) use declared::thinned;
 pub use files::{FittedAndJudged, Roles, SameFile};
 pub(crate) use motion::Motion;
-pub(crate) use sensor_noise::{SensorCheck, check_sensors, effective};
+pub(crate) use sensor_noise::{SensorCheck, check_sensors, effective, white};
 pub use series::Series;
 pub use traces::Traces;
 pub(crate) use unresolved::Unresolved;

@@ -21,6 +21,12 @@ impl SensorCheck {
         self.found.std > (1.0 + NOISIER_SIGMA * self.found.scatter) * self.declared_std
     }
 
+    /// Whether it is white and less than declared: more can't hide, as motion only adds to it. None at all is a coarse reading.
+    fn is_quieter(&self) -> bool {
+        let is_white = self.found.std > 0.0 && self.found.colour < RIPPLE_COLOUR;
+        is_white && self.found.std < (1.0 - NOISIER_SIGMA * self.found.scatter) * self.declared_std
+    }
+
     pub(crate) fn is_ripple(&self) -> bool {
         self.found.std > RIPPLE * self.declared_std && self.found.colour > RIPPLE_COLOUR
     }
@@ -53,19 +59,25 @@ pub(crate) fn check_sensors(traces: &[Series], declared: &Declared) -> Vec<Senso
     signals.map(check).into()
 }
 
-/// The declared noise, or what the traces really carry where that is more and `counts`.
-pub(crate) fn effective(
+/// The declared noise, or what the traces really carry where that is more.
+pub(crate) fn effective(declared: &Sensors<f64>, checks: &[SensorCheck]) -> Sensors<f64> {
+    largest(declared, checks, |check| if check.is_noisier() { check.found.std } else { check.declared_std })
+}
+
+/// The noise that changes from sample to sample: what the traces carry, more or less than declared. A ripple averages away.
+pub(crate) fn white(declared: &Sensors<f64>, checks: &[SensorCheck]) -> Sensors<f64> {
+    largest(declared, checks, |check| {
+        let differs = check.is_quieter() || check.is_noisier() && !check.is_ripple();
+        if differs { check.found.std } else { check.declared_std }
+    })
+}
+
+/// The sensors with the largest noise of the signals that they read.
+fn largest(
     declared: &Sensors<f64>,
     checks: &[SensorCheck],
-    counts: impl Fn(&SensorCheck) -> bool,
+    noise_std: impl Fn(&SensorCheck) -> f64,
 ) -> Sensors<f64> {
-    let found = |name: &str| {
-        checks
-            .iter()
-            .filter(|c| c.name.starts_with(name) && c.is_noisier() && counts(c))
-            .map(|c| c.found.std)
-            .fold(0.0, f64::max)
-    };
     let mut sensors = *declared;
     for (spread, name) in [
         (&mut sensors.position, "position"),
@@ -74,7 +86,8 @@ pub(crate) fn effective(
         (&mut sensors.flow_b, "flow b"),
         (&mut sensors.force, "force"),
     ] {
-        spread.noise_std = spread.noise_std.max(found(name));
+        let own = checks.iter().filter(|check| check.name.starts_with(name)).map(&noise_std);
+        spread.noise_std = own.reduce(f64::max).unwrap_or(spread.noise_std);
     }
     sensors
 }

@@ -1,7 +1,7 @@
 //! What a diagnosis fits, and all that stays the same while it tries one effect after the other.
 
 use super::regression::Prior;
-use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective};
+use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
 use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
@@ -14,7 +14,7 @@ pub(crate) struct Problem<'a> {
     pub(super) declared: Sensors<f64>,
     /// With the noise that the sensors really carry.
     pub(crate) sensors: Sensors<f64>,
-    /// The same without ripples, which average away within a block: what columns share with the residual.
+    /// The noise that columns share with the residual: as found, without ripples, which average away within a block.
     pub(super) white: Sensors<f64>,
     pub(crate) terms: Vec<Term>,
     pub(crate) priors: Vec<Option<Prior>>,
@@ -34,8 +34,8 @@ impl<'a> Problem<'a> {
         Self {
             traces,
             declared: declared.sensors,
-            sensors: effective(&declared.sensors, checks, |_| true),
-            white: effective(&declared.sensors, checks, |check| !check.is_ripple()),
+            sensors: effective(&declared.sensors, checks),
+            white: white(&declared.sensors, checks),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,
             least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
