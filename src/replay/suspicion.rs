@@ -32,14 +32,14 @@ impl Replay {
             return Suspicions::default();
         }
         let named = |found: Option<Explanation>| self.named(found, columns);
+        let records = excerpt.records();
         if verdict.status != Status::Doubtful {
             return Suspicions {
-                wiring: named(unit_by_scatter(excerpt, &self.rig).or_else(|| self.exchanged(excerpt))),
-                zeros: if self.may_be_zeros(verdict) { self.zeros(excerpt) } else { None },
+                wiring: named(unit_by_scatter(excerpt, &self.rig).or_else(|| self.exchanged(&records))),
+                zeros: if self.may_be_zeros(verdict) { self.zeros(records) } else { None },
                 ..Suspicions::default()
             };
         }
-        let records = excerpt.records();
         let Some(whole) = Recorded::new(&records, &self.rig) else { return Suspicions::default() };
         let wiring = named(explain(&whole));
         if wiring.is_some() {
@@ -78,8 +78,8 @@ impl Replay {
         }
     }
 
-    fn exchanged(&self, excerpt: &Excerpt) -> Option<Explanation> {
-        exchanged_by_force(&Recorded::new(&excerpt.records(), &self.rig)?)
+    fn exchanged(&self, records: &[Record]) -> Option<Explanation> {
+        exchanged_by_force(&Recorded::new(records, &self.rig)?)
     }
 
     fn named(&self, found: Option<Explanation>, columns: &ColumnMap) -> Option<Wiring> {
@@ -105,8 +105,7 @@ impl Replay {
     }
 
     /// Leaks since they changed last against zeros of the meters.
-    fn zeros(&self, excerpt: &Excerpt) -> Option<ZeroCheck> {
-        let mut records = excerpt.records();
+    fn zeros(&self, mut records: Vec<Record>) -> Option<ZeroCheck> {
         let since_s = self.changed_at_s.unwrap_or(f64::NEG_INFINITY);
         records.retain(|record: &Record| record.t_s >= since_s);
         zero_check_lately(&records, &self.rig)

@@ -27,9 +27,6 @@ pub struct ZeroCheck {
     pub single: [Option<SingleZero>; 2],
 }
 
-/// What a bend gives a fit to choose (leaks, their slopes and the oil once more) is worth less in χ² by chance.
-const BEYOND_CHANCE: f64 = 25.0;
-
 /// One meter's zero that is off, and steady, beside all leaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SingleZero {
@@ -41,6 +38,9 @@ pub struct SingleZero {
     pub shift_m3s: PerLeak<f64>,
 }
 
+/// What a bend gives a fit to choose (leaks, their slopes and the oil once more) is worth less in χ² by chance.
+const BEYOND_CHANCE: f64 = 25.0;
+
 /// Holds leaks against zeros, by generalised least squares over all the records; both may change through them. `None`
 /// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
@@ -50,18 +50,18 @@ pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
 /// The same of the last of the records: a leak that grows and then stays goes in no straight line, and a steady zero would
 /// seem to explain the bend. As long as leaks that change their course explain the records better than zeros do, the later
 /// half is looked at.
-pub(crate) fn zero_check_lately(mut records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
-    while do_leaks_bend(records, rig).unwrap_or(false) {
-        records = records.split_at(records.len() / 2).1;
+pub(crate) fn zero_check_lately(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
+    let mut stretch = Recorded::new(records, rig)?;
+    while do_leaks_bend(&stretch).unwrap_or(false) {
+        stretch = Recorded::new(stretch.records.split_at(stretch.records.len() / 2).1, rig)?;
     }
-    zero_check(records, rig)
+    changing_leaks_or_zeros(&stretch)
 }
 
 /// Whether leaks that go straight in each half, quarter or eighth of the records explain them better than zeros do with
 /// leaks that go straight throughout. `None` where the records are too few.
-fn do_leaks_bend(records: &[Record], rig: &Rig) -> Option<bool> {
-    let whole = Recorded::new(records, rig)?;
-    let duration_s = whole.duration_s();
+fn do_leaks_bend(whole: &Recorded<'_>) -> Option<bool> {
+    let (records, rig, duration_s) = (whole.records, whole.rig(), whole.duration_s());
     let straight = |duration_s: f64| Priors::declared(rig).with_changing_leaks(duration_s);
     let zeros = whole.fit(&straight(duration_s).with_zeros_off(rig, duration_s))?.chi_square();
     let bent = |parts: usize| {
