@@ -90,6 +90,20 @@ impl Scorer {
         reference_m3s: f64,
         pressure_pa: f64,
     ) {
+        let kept = &mut Kept::default();
+        self.update_beside(t_s, leak_flow_m3s, coefficient, reference_m3s, pressure_pa, kept);
+    }
+
+    /// The same beside other leaks, with what they share.
+    pub(crate) fn update_beside(
+        &mut self,
+        t_s: f64,
+        leak_flow_m3s: f64,
+        coefficient: f64,
+        reference_m3s: f64,
+        pressure_pa: f64,
+        kept: &mut Kept,
+    ) {
         let finite = [t_s, leak_flow_m3s, coefficient, reference_m3s, pressure_pa];
         if !finite.into_iter().all(f64::is_finite) {
             return;
@@ -98,10 +112,10 @@ impl Scorer {
         self.first_s.get_or_insert(t_s);
         self.last_s = t_s;
         self.reference.add(reference_m3s.abs());
-        self.measured.add(dt_s, reference_m3s, pressure_pa);
+        self.measured.add(kept.after(dt_s), reference_m3s, pressure_pa);
+        let Some(measured) = self.measured.value() else { return };
         let size_m3s = self.reference.value().max(reference_m3s.abs());
-        let measured = self.measured.value().filter(|measured| size_m3s > 0.0 && !self.is_mended(*measured));
-        if let Some(measured) = measured {
+        if size_m3s > 0.0 && !self.is_mended(measured) {
             let leakage = (leak_flow_m3s - reference_m3s).abs() / size_m3s;
             self.add(t_s, leakage, (coefficient / measured - 1.0).abs());
         }
@@ -136,6 +150,29 @@ impl Scorer {
     }
 }
 
+/// The share of the samples before that still counts after a step: worked out once for all leaks of a record.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Kept {
+    dt_s: f64,
+    share: f64,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Self { dt_s: 0.0, share: 1.0 }
+    }
+}
+
+impl Kept {
+    #[inline]
+    fn after(&mut self, dt_s: f64) -> f64 {
+        if dt_s.to_bits() != self.dt_s.to_bits() {
+            *self = Self { dt_s, share: 1.0 / (1.0 + dt_s.max(0.0) / COEFFICIENT_MEMORY_S) };
+        }
+        self.share
+    }
+}
+
 /// C_m of eq. (16) from a reference flow and the pressure that drives it: P near zero says nothing about
 /// it, so samples count by P².
 #[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -145,14 +182,17 @@ struct MeasuredCoefficient {
 }
 
 impl MeasuredCoefficient {
-    fn add(&mut self, dt_s: f64, reference_m3s: f64, pressure_pa: f64) {
-        let keep = 1.0 / (1.0 + dt_s.max(0.0) / COEFFICIENT_MEMORY_S);
-        self.flow_pressure = keep * self.flow_pressure + reference_m3s * pressure_pa;
-        self.pressure_square = keep * self.pressure_square + pressure_pa * pressure_pa;
+    /// Takes in a sample; `kept` is the share of those before it that still counts.
+    fn add(&mut self, kept: f64, reference_m3s: f64, pressure_pa: f64) {
+        self.flow_pressure = kept * self.flow_pressure + reference_m3s * pressure_pa;
+        self.pressure_square = kept * self.pressure_square + pressure_pa * pressure_pa;
     }
 
     /// m³/(s·Pa); none where nothing has leaked.
     fn value(&self) -> Option<f64> {
+        if self.flow_pressure == 0.0 {
+            return None;
+        }
         let value = self.flow_pressure / self.pressure_square;
         (value.is_finite() && value != 0.0).then_some(value)
     }

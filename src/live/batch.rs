@@ -30,32 +30,29 @@ pub struct Batch<'a> {
     pub resent: bool,
 }
 
-/// Hands each sample of a message on, or why it is none; an error where the whole message is of no use.
-pub(super) fn parse(
-    batch: &Batch<'_>,
-    mut each: impl FnMut(Result<Fields<'_>, String>),
-) -> Result<(), String> {
+/// The samples of a message, or why one is none; an error where the whole message is of no use.
+pub(super) fn parse<'a>(batch: &Batch<'a>) -> Result<Vec<Result<Fields<'a>, String>>, String> {
     let payload = std::str::from_utf8(batch.payload).map_err(|_| "not UTF-8".to_owned())?;
-    match batch.format {
-        BatchFormat::Json if payload.trim_start().starts_with('[') => {
-            let samples: Vec<&RawValue> =
-                serde_json::from_str(payload).map_err(|error| format!("not a JSON array: {error}"))?;
-            samples.iter().for_each(|sample| each(ndjson::parse(sample.get())));
-        }
-        BatchFormat::Json => lines(payload).for_each(|line| each(ndjson::parse(line))),
+    Ok(match batch.format {
+        BatchFormat::Json if payload.trim_start().starts_with('[') => array(payload)?,
+        BatchFormat::Json => lines(payload).map(ndjson::parse).collect(),
         BatchFormat::Csv => {
             let mut csv = Csv::default();
-            for line in lines(payload) {
-                match csv.parse(line) {
-                    Ok(None) => {}
-                    Ok(Some(fields)) => each(Ok(fields)),
-                    Err(why) => each(Err(why)),
-                }
-            }
+            let row = |line| csv.parse(line).map(|row| row.map(Fields::into_owned)).transpose();
+            lines(payload).filter_map(row).collect()
         }
-        BatchFormat::Neuron => each(neuron::parse(payload)),
+        BatchFormat::Neuron => vec![neuron::parse(payload)],
+    })
+}
+
+/// All at once where each is a sample, else one by one.
+fn array(payload: &str) -> Result<Vec<Result<Fields<'_>, String>>, String> {
+    if let Ok(samples) = serde_json::from_str::<Vec<Fields<'_>>>(payload) {
+        return Ok(samples.into_iter().map(Ok).collect());
     }
-    Ok(())
+    let samples: Vec<&RawValue> =
+        serde_json::from_str(payload).map_err(|error| format!("not a JSON array: {error}"))?;
+    Ok(samples.into_iter().map(|sample| ndjson::parse(sample.get())).collect())
 }
 
 fn lines(payload: &str) -> impl Iterator<Item = &str> {
@@ -67,15 +64,10 @@ mod tests {
     use super::*;
 
     fn cells(format: BatchFormat, payload: &str) -> Vec<Result<String, ()>> {
-        let mut found = Vec::new();
         let batch = Batch { cylinder: "", format, payload: payload.as_bytes(), resent: false };
-        let keep = |fields: Result<Fields<'_>, _>| {
-            found.push(fields.map(|fields| fields.cells.join(" ")).map_err(|_| ()))
-        };
-        if parse(&batch, keep).is_err() {
-            found.push(Err(()));
-        }
-        found
+        let joined =
+            |fields: Result<Fields<'_>, _>| fields.map(|fields| fields.cells.join(" ")).map_err(|_| ());
+        parse(&batch).map_or_else(|_| vec![Err(())], |samples| samples.into_iter().map(joined).collect())
     }
 
     #[test]

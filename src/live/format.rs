@@ -43,17 +43,30 @@ pub(super) struct Fields<'a> {
 /// Name of the cell that holds the cylinder.
 pub(super) const CYLINDER: &str = "cylinder";
 
+/// Cells of a line at the most, as a rule: all signals and a name.
+const ROOM: usize = 16;
+
 impl<'a> Fields<'a> {
-    /// With a name for the cylinder where the line names none.
-    pub(super) fn into_owned(self, cylinder: &str) -> Fields<'static> {
+    /// None yet.
+    pub(super) fn with_room() -> Self {
+        let (names, cells) = (Vec::with_capacity(ROOM), Vec::with_capacity(ROOM));
+        Self { cylinder: Cow::Borrowed(""), names, cells }
+    }
+
+    /// That nothing else has to outlive.
+    pub(super) fn into_owned(self) -> Fields<'static> {
         let owned =
             |cells: Vec<Cow<'_, str>>| cells.into_iter().map(|cell| cell.into_owned().into()).collect();
-        let named = Some(self.cylinder.into_owned()).filter(|name| !name.is_empty());
         Fields {
-            cylinder: named.unwrap_or_else(|| cylinder.to_owned()).into(),
+            cylinder: self.cylinder.into_owned().into(),
             names: owned(self.names),
             cells: owned(self.cells),
         }
+    }
+
+    /// Name of its cylinder: its own, else this.
+    pub(super) fn cylinder_or<'b>(&'b self, other: &'b str) -> &'b str {
+        if self.cylinder.is_empty() { other } else { &self.cylinder }
     }
 
     pub(super) fn push(&mut self, name: Cow<'a, str>, cell: Cow<'a, str>) {

@@ -64,20 +64,23 @@ impl Watch {
     /// Takes in a message, its samples in the order of their times and each once; what there is to say goes to `events`. No
     /// message is an error: what is of no use is counted.
     pub fn take_batch(&mut self, batch: &Batch<'_>, events: &mut Vec<Event>) {
+        let samples = batch::parse(batch).unwrap_or_else(|why| vec![Err(why)]);
         let mut refusals: Vec<Refusal> = Vec::new();
-        let mut samples = Vec::new();
-        let parsed = batch::parse(batch, |fields| match fields {
-            Ok(fields) => samples.push((f64::INFINITY, fields.into_owned(batch.cylinder))),
-            Err(why) => refusals.push(("unreadable", why)),
-        });
-        refusals.extend(parsed.err().map(|why| ("unreadable", why)));
-        for (t_s, fields) in &mut samples {
-            *t_s = self.time_s(fields).unwrap_or(f64::INFINITY);
+        let mut in_turn = Vec::with_capacity(samples.len());
+        for sample in samples {
+            match sample {
+                Ok(fields) => {
+                    let t_s = self.time_s(&fields, fields.cylinder_or(batch.cylinder));
+                    in_turn.push((t_s.unwrap_or(f64::INFINITY), fields));
+                }
+                Err(why) => refusals.push(("unreadable", why)),
+            }
         }
-        samples.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        for (_, fields) in &samples {
+        in_turn.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        for (_, fields) in &in_turn {
             self.lines += 1;
-            refusals.extend(self.take_fields(fields, events, |cylinder, config, line, events| {
+            let name = fields.cylinder_or(batch.cylinder);
+            refusals.extend(self.take_fields(fields, name, events, |cylinder, config, line, events| {
                 cylinder.take_in_turn(config, batch.resent, line, events);
             }));
         }
@@ -113,7 +116,7 @@ impl Watch {
             Err(why) => Err(("unreadable", why)),
             Ok(None) => Ok(()),
             Ok(Some(fields)) => {
-                let refused = self.take_fields(&fields, events, Cylinder::take);
+                let refused = self.take_fields(&fields, &fields.cylinder, events, Cylinder::take);
                 refused.map_or(Ok(()), Err)
             }
         };
@@ -121,41 +124,41 @@ impl Watch {
         taken
     }
 
-    /// Gives a sample to its cylinder; says why, where there is none for it.
+    /// Gives a sample to the cylinder of this name; says why, where there is none for it.
     fn take_fields(
         &mut self,
         fields: &Fields<'_>,
+        name: &str,
         events: &mut Vec<Event>,
         take: impl FnOnce(&mut Cylinder, &LiveConfig, &Line<'_>, &mut Vec<Event>),
     ) -> Option<Refusal> {
-        let name = fields.cylinder.as_ref();
-        let layout = match rig_of(&self.config, &self.cylinders, name) {
-            Ok(rig) => self.layouts.find(&fields.names, rig),
-            Err(refusal) => return Some(refusal),
-        };
-        let layout = match layout {
-            Ok(layout) => layout,
-            Err(why) => {
-                let Some(cylinder) = self.cylinders.get_mut(name) else { return Some(("columns", why)) };
-                cylinder.notice(name, "columns", format!("line {}: {why}", self.lines), events);
-                return None;
+        if let Some(cylinder) = self.cylinders.get_mut(name) {
+            match self.layouts.find(&fields.names, cylinder.rig()) {
+                Ok(layout) => {
+                    let line = Line { name, layout, number: self.lines, cells: &cells(fields) };
+                    take(cylinder, &self.config, &line, events);
+                }
+                Err(why) => cylinder.notice(name, "columns", format!("line {}: {why}", self.lines), events),
             }
-        };
-        if !self.cylinders.contains_key(name) {
-            match Cylinder::new(self.config.rig_of(name)?) {
-                Ok(cylinder) => self.cylinders.insert(name.to_owned(), cylinder),
-                Err(error) => return Some(("unknown_cylinder", error.to_string())),
-            };
+            return None;
         }
-        let cylinder = self.cylinders.get_mut(name)?;
-        let cells = cells(fields);
-        take(cylinder, &self.config, &Line { name, layout, number: self.lines, cells: &cells }, events);
-        None
+        let begun = self.begin(fields, name);
+        begun.map_or_else(Some, |()| self.take_fields(fields, name, events, take))
     }
 
-    /// Time of a sample, s since 1970, or as its sender counts.
-    fn time_s(&mut self, fields: &Fields<'_>) -> Option<f64> {
-        let rig = rig_of(&self.config, &self.cylinders, &fields.cylinder).ok()?;
+    /// A cylinder of which nothing came yet.
+    #[cold]
+    fn begin(&mut self, fields: &Fields<'_>, name: &str) -> Result<(), Refusal> {
+        let rig = rig_of(&self.config, &self.cylinders, name)?;
+        self.layouts.find(&fields.names, rig).map_err(|why| ("columns", why))?;
+        let cylinder = Cylinder::new(rig).map_err(|error| ("unknown_cylinder", error.to_string()))?;
+        self.cylinders.insert(name.to_owned(), cylinder);
+        Ok(())
+    }
+
+    /// Time of a sample of the cylinder of this name, s since 1970, or as its sender counts.
+    fn time_s(&mut self, fields: &Fields<'_>, name: &str) -> Option<f64> {
+        let rig = rig_of(&self.config, &self.cylinders, name).ok()?;
         self.layouts.find(&fields.names, rig).ok()?.time_s(Some(0), &cells(fields))
     }
 }

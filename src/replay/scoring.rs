@@ -1,5 +1,5 @@
 use super::leak_pressures_pa;
-use crate::score::{LeakScore, Scorer};
+use crate::score::{Kept, LeakScore, Scorer};
 use crate::trace::Record;
 use pitchleak_core::{Butterworth, Estimate, PerLeak};
 
@@ -42,9 +42,10 @@ impl Scoring {
         let Some(PerLeak { internal, external_a, external_b }) = &mut self.channels else { return };
         let p = leak_pressures_pa(record, self.pressure_biases_pa);
         let (c, q) = (self.coefficients, reference);
-        internal.add(record.t_s, c.internal, q.internal, p.internal);
-        external_a.add(record.t_s, c.external_a, q.external_a, p.external_a);
-        external_b.add(record.t_s, c.external_b, q.external_b, p.external_b);
+        let (t_s, mut kept) = (record.t_s, Kept::default());
+        internal.add(t_s, c.internal, q.internal, p.internal, &mut kept);
+        external_a.add(t_s, c.external_a, q.external_a, p.external_a, &mut kept);
+        external_b.add(t_s, c.external_b, q.external_b, p.external_b, &mut kept);
     }
 
     /// The scores, where there is a reference.
@@ -64,11 +65,20 @@ impl Channel {
         }))
     }
 
-    fn add(&mut self, t_s: f64, coefficient: f64, reference_m3s: Option<f64>, pressure_pa: f64) {
+    #[inline]
+    fn add(
+        &mut self,
+        t_s: f64,
+        coefficient: f64,
+        reference_m3s: Option<f64>,
+        pressure_pa: f64,
+        kept: &mut Kept,
+    ) {
         let pressure = self.pressure.update(pressure_pa);
         if let Some(reference) = reference_m3s {
             let reference = self.reference.update(reference);
-            self.scorer.update(t_s, coefficient * pressure, coefficient, reference, pressure);
+            let leak_m3s = coefficient * pressure;
+            self.scorer.update_beside(t_s, leak_m3s, coefficient, reference, pressure, kept);
         }
     }
 }

@@ -19,9 +19,35 @@ struct Range {
     most: f64,
 }
 
+/// Signals that have a range: all but the timestamp.
+const RANGES: usize = Signal::ALL.len() - 1;
+
 /// The possible range of every reading that has one.
 #[derive(Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Ranges([Range; 12]);
+#[serde(from = "[Range; RANGES]", into = "[Range; RANGES]")]
+pub(super) struct Ranges {
+    listed: [Range; RANGES],
+    /// The same in the order of a row's cells, which are compared with all of them at once.
+    bounds: [[f64; Signal::ALL.len()]; 2],
+}
+
+impl From<[Range; RANGES]> for Ranges {
+    fn from(listed: [Range; RANGES]) -> Self {
+        let [mut least, mut most] =
+            [f64::NEG_INFINITY, f64::INFINITY].map(|bound| [bound; Signal::ALL.len()]);
+        for range in &listed {
+            least[range.signal as usize] = range.least;
+            most[range.signal as usize] = range.most;
+        }
+        Self { listed, bounds: [least, most] }
+    }
+}
+
+impl From<Ranges> for [Range; RANGES] {
+    fn from(ranges: Ranges) -> Self {
+        ranges.listed
+    }
+}
 
 impl Ranges {
     pub(super) fn of(rig: &Rig) -> Self {
@@ -39,7 +65,7 @@ impl Ranges {
             least: -OVERRANGE * full_scale,
             most: OVERRANGE * full_scale,
         };
-        Self([
+        Self::from([
             position,
             pressure(Signal::PressureA),
             pressure(Signal::PressureB),
@@ -61,7 +87,18 @@ impl Ranges {
     /// The first reading that is not possible; a missing one is.
     #[inline]
     pub(super) fn broken_by(&self, row: &Row) -> Option<Signal> {
-        let broken = self.0.iter().find(|range| {
+        let [least, most] = &self.bounds;
+        let mut broken = false;
+        for ((value, least), most) in row.cells.iter().zip(least).zip(most) {
+            // A missing reading, NaN, is neither.
+            broken |= (value < least) | (value > most);
+        }
+        if broken { self.first_broken_by(row) } else { None }
+    }
+
+    #[cold]
+    fn first_broken_by(&self, row: &Row) -> Option<Signal> {
+        let broken = self.listed.iter().find(|range| {
             let value = row.get(range.signal);
             value < range.least || value > range.most
         });
@@ -70,7 +107,7 @@ impl Ranges {
 
     /// In the unit of the column, which is SI where it is none.
     pub(super) fn describe(&self, signal: Signal, value: f64, unit: Option<Unit>) -> String {
-        let range = self.0.iter().find(|range| range.signal == signal);
+        let range = self.listed.iter().find(|range| range.signal == signal);
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
         let source = match signal {
             Signal::Position => "the stroke",

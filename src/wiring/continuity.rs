@@ -1,5 +1,5 @@
 use super::blocks::{Block, blocks};
-use super::equations::{Driven, Equations, Noise};
+use super::equations::{BothSums, Driven, Equations, Noise};
 use super::fit::Fit;
 use super::force::ForceBalance;
 use super::priors::Priors;
@@ -33,6 +33,8 @@ pub struct Recorded<'a> {
     duration_s: f64,
     /// With the noise of the sensors alone.
     equations: Equations,
+    /// Of them; none of too few records for a block.
+    sums: Option<BothSums>,
 }
 
 /// Pressure noise through the leaks, which halves a residual at the most, can't explain this one.
@@ -44,19 +46,20 @@ impl<'a> Recorded<'a> {
         let duration_s = records.last()?.t_s - records.first()?.t_s;
         let blocks = blocks(records, &rig.cylinder);
         let equations = Equations::of(&blocks, &Noise::new(rig, PerLeak::default()));
-        Some(Self { records, blocks, rig, duration_s, equations })
+        let sums = BothSums::of(&[&equations]);
+        Some(Self { records, blocks, rig, duration_s, equations, sums })
     }
 }
 
 impl Continuity for Recorded<'_> {
     fn fit(&self, priors: &Priors) -> Option<Fit> {
-        let found = Fit::of(&[&self.equations], self.rig, priors)?;
+        let found = Fit::of(self.sums.as_ref()?, self.rig, priors)?;
         if found.worst() > HOPELESS {
             return Some(found);
         }
         // Pressure noise reaches the equations through the leaks, which only a fit tells.
         let equations = Equations::of(&self.blocks, &Noise::new(self.rig, found.leaks()));
-        Fit::of(&[&equations], self.rig, priors)
+        Fit::of(&BothSums::of(&[&equations])?, self.rig, priors)
     }
 
     fn rig(&self) -> &Rig {

@@ -265,6 +265,7 @@ impl Equations {
 }
 
 /// As [`Series`], of several stretches together.
+#[derive(Clone)]
 pub(super) struct Sums {
     pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
     pub vector: Vector,
@@ -274,17 +275,26 @@ pub(super) struct Sums {
 
 impl Sums {
     /// Of this one of both equations in all stretches, with slopes about the moment `middle_s`.
-    pub fn of(parts: &[&Equations], which: usize, middle_s: f64) -> Self {
+    fn of(parts: &[&Equations], which: usize, middle_s: f64) -> Self {
         let mut all = Self { matrix: SMatrix::zeros(), vector: Vector::zeros(), square: 0.0, rows: 0 };
         for part in parts {
             let (Some(series), Some([begin_s, _])) = (part.series.get(which), part.span_s) else { continue };
-            let matrix = SMatrix::from_fn(|i, j| series.matrix[i.max(j)][i.min(j)]);
-            let mut later = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
-            for at in SLOPE_OF {
-                later[at] = begin_s - middle_s;
+            let mut matrix = SMatrix::from_fn(|i, j| series.matrix[i.max(j)][i.min(j)]);
+            let mut vector = Vector::from(series.vector);
+            let later_s = begin_s - middle_s;
+            for (mean, slope) in SLOPE_OF {
+                for at in 0..PARAMETERS {
+                    matrix[(slope, at)] += later_s * matrix[(mean, at)];
+                }
+                vector[slope] += later_s * vector[mean];
             }
-            all.matrix += later.transpose() * matrix * later;
-            all.vector += later.transpose() * Vector::from(series.vector);
+            for (mean, slope) in SLOPE_OF {
+                for at in 0..PARAMETERS {
+                    matrix[(at, slope)] += later_s * matrix[(at, mean)];
+                }
+            }
+            all.matrix += matrix;
+            all.vector += vector;
             all.square += series.square;
             all.rows += series.rows as usize;
         }
@@ -292,7 +302,7 @@ impl Sums {
     }
 
     /// For parameters in these units.
-    pub fn scaled(mut self, units: &Vector) -> Self {
+    fn scaled(mut self, units: &Vector) -> Self {
         self.matrix.component_mul_assign(&(units * units.transpose()));
         self.vector.component_mul_assign(units);
         self
@@ -302,5 +312,23 @@ impl Sums {
     pub fn left(&self, parameters: &Vector) -> f64 {
         let explained = 2.0 * self.vector.dot(parameters) - parameters.dot(&(self.matrix * parameters));
         (self.square - explained).max(0.0)
+    }
+}
+
+/// Both equations over some stretches: whatever the priors.
+#[derive(Clone)]
+pub(super) struct BothSums([Sums; 2]);
+
+impl BothSums {
+    /// With slopes about the middle of the stretches; none where there are no blocks.
+    pub fn of(parts: &[&Equations]) -> Option<Self> {
+        let spans = || parts.iter().filter_map(|part| part.span_s());
+        let middle_s = 0.5 * (spans().next()?[0] + spans().next_back()?[1]);
+        Some(Self([0, 1].map(|which| Sums::of(parts, which, middle_s))))
+    }
+
+    /// Flow balance and position against the flows, for parameters in these units.
+    pub fn scaled(&self, units: &Vector) -> [Sums; 2] {
+        self.0.clone().map(|sums| sums.scaled(units))
     }
 }

@@ -1,7 +1,7 @@
 //! How well the plain model explains a piece of a trace: generalised least squares on both continuity equations over
 //! the whole piece, with the declared noise. Nothing restarts, so nothing is forgiven.
 
-use super::equations::{Equations, Sums};
+use super::equations::{BothSums, Sums};
 use super::priors::{LEAKS, OFFSETS, ORIFICES, PARAMETERS, Priors, Vector};
 use crate::rig::Rig;
 use nalgebra::SMatrix;
@@ -32,13 +32,9 @@ const NEGATIVE_SIGMAS: f64 = 6.0;
 const LEAST_ROWS: usize = 30;
 
 impl Fit {
-    /// Of the equations of these stretches together; `None` where their rows are too few.
-    pub(super) fn of(parts: &[&Equations], rig: &Rig, Priors(priors): &Priors) -> Option<Self> {
-        let spans = || parts.iter().filter_map(|part| part.span_s());
-        let middle_s = 0.5 * (spans().next()?[0] + spans().next_back()?[1]);
-        let series =
-            [Sums::of(parts, 0, middle_s), Sums::of(parts, 1, middle_s)].map(|sums| sums.scaled(priors));
-        let [balance, travel] = &series;
+    /// By these sums; `None` where their rows are too few.
+    pub(super) fn of(sums: &BothSums, rig: &Rig, Priors(priors): &Priors) -> Option<Self> {
+        let [balance, travel] = &sums.scaled(priors);
         if balance.rows + travel.rows < LEAST_ROWS {
             return None;
         }

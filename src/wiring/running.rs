@@ -3,7 +3,7 @@
 
 use super::blocks::Gatherer;
 use super::continuity::Continuity;
-use super::equations::{Driven, Equations, Noise};
+use super::equations::{BothSums, Driven, Equations, Noise};
 use super::explanation::Explanation;
 use super::fit::Fit;
 use super::force::{ForceBalance, ForceSums};
@@ -14,6 +14,7 @@ use crate::rig::Rig;
 use crate::trace::Record;
 use pitchleak_core::{Leak, PerLeak};
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// What a stream keeps.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -65,7 +66,7 @@ impl Running {
             |[_, end_s]: [f64; 2], [begin_s, _]: [f64; 2]| (0.0..MOST_APART_S).contains(&(begin_s - end_s));
         let spans = self.before.span_s().zip(self.now.span_s());
         let before = spans.is_some_and(|(before, now)| follows(before, now)).then_some(&self.before);
-        RunningStretch { parts: before.into_iter().chain([&self.now]).collect(), rig }
+        RunningStretch { parts: before.into_iter().chain([&self.now]).collect(), rig, sums: OnceLock::new() }
     }
 }
 
@@ -73,11 +74,14 @@ impl Running {
 pub(crate) struct RunningStretch<'a> {
     parts: Vec<&'a Equations>,
     rig: &'a Rig,
+    /// Of the parts, for the first fit and all others.
+    sums: OnceLock<Option<BothSums>>,
 }
 
 impl Continuity for RunningStretch<'_> {
     fn fit(&self, priors: &Priors) -> Option<Fit> {
-        Fit::of(&self.parts, self.rig, priors)
+        let sums = self.sums.get_or_init(|| BothSums::of(&self.parts));
+        Fit::of(sums.as_ref()?, self.rig, priors)
     }
 
     fn rig(&self) -> &Rig {

@@ -9,6 +9,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// A tenth of the processor, while the thread of the samples wants all of it.
+#[cfg(target_os = "linux")]
+const NICER: i32 = 10;
+
 /// What is to be written, and the deliveries that may be acknowledged then.
 pub struct Job {
     pub snapshot: Snapshot,
@@ -34,10 +38,22 @@ pub fn start(
     inbox: SyncSender<Input>,
 ) -> Result<(SyncSender<Job>, JoinHandle<()>), Failure> {
     let (jobs, queue) = sync_channel(1);
-    let run = move || work(&checkpoint, &summaries, &queue, &inbox);
+    let run = move || {
+        give_way();
+        work(&checkpoint, &summaries, &queue, &inbox);
+    };
     let spawned = std::thread::Builder::new().name("saver".to_owned()).spawn(run);
     let thread = spawned.map_err(|source| Failure::System { what: "start the saver", source })?;
     Ok((jobs, thread))
+}
+
+/// Where samples come meanwhile on the same core, they go first. On Linux a priority is the thread's own.
+fn give_way() {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::process::{getpriority_process, setpriority_process};
+        let _ = getpriority_process(None).and_then(|nice| setpriority_process(None, nice + NICER));
+    }
 }
 
 fn work(checkpoint: &Checkpoint, summaries: &Summaries, queue: &Receiver<Job>, inbox: &SyncSender<Input>) {

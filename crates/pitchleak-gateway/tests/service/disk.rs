@@ -89,3 +89,22 @@ fn on_a_full_disk_it_goes_on_acknowledges_nothing_and_recovers() {
     wait_until("the state is that of the undisturbed run", || state(&gateway.state()) == expected);
     assert_eq!(gateway.end(), Some(0));
 }
+
+/// Its thread has a lower priority than that of the samples, which may have to share a core with it.
+#[test]
+fn checkpoints_give_way_to_samples() {
+    let Some(broker) = Mosquitto::start("") else { return };
+    let mut gateway = Gateway::new(&broker, |text| text);
+    gateway.start();
+    gateway.wait_for("connected");
+    let tasks = std::fs::read_dir(format!("/proc/{}/task", gateway.id())).unwrap();
+    let stats = tasks.map(|task| std::fs::read_to_string(task.unwrap().path().join("stat")).unwrap());
+    // After the name in brackets, the 17th field is the niceness (proc(5)).
+    let niceness = |stat: &str| stat.rsplit(')').next()?.split(' ').nth(17)?.parse::<i32>().ok();
+    let (savers, others): (Vec<_>, Vec<_>) = stats.partition(|stat| stat.contains("(saver)"));
+    assert_eq!(savers.len(), 1);
+    let others: Vec<_> = others.iter().map(|stat| niceness(stat).unwrap()).collect();
+    let saver = niceness(&savers[0]).unwrap();
+    assert!(others.iter().all(|other| saver == (other + 10).min(19)), "{saver} {others:?}");
+    assert_eq!(gateway.end(), Some(0));
+}
