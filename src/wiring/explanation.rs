@@ -124,6 +124,7 @@ impl Mistake {
             Self::Zero(readings, by_m3s) => {
                 format!("{} L/min added to {}", number(-by_m3s * LPM_PER_M3S), readings.text())
             }
+            Self::Zeros(by_m3s) => Self::zero_of_each(by_m3s).map(|zero| zero.text()).join(" and "),
             Self::Late(readings, by_s) => format!("{} moved {:.0} ms earlier", readings.text(), 1e3 * by_s),
         }
     }
@@ -155,6 +156,9 @@ impl Mistake {
                 .collect(),
             Self::Absolute(readings) => each(readings, &|column| linear(column, 1.0, -ATMOSPHERE_PA)),
             Self::Zero(readings, by_m3s) => each(readings, &|column| linear(column, 1.0, -by_m3s)),
+            Self::Zeros(by_m3s) => {
+                Self::zero_of_each(by_m3s).iter().flat_map(|zero| zero.mending(columns, rig)).collect()
+            }
             Self::Size(_) | Self::Late(..) => Vec::new(),
         }
     }

@@ -31,6 +31,8 @@ pub enum Mistake {
     Absolute(Readings),
     /// Flow readings are this much too large, m³/s.
     Zero(Readings, f64),
+    /// Readings of meters A and B are this much too large, m³/s.
+    Zeros([f64; 2]),
     /// Readings come late by this time, s.
     Late(Readings, f64),
 }
@@ -42,6 +44,9 @@ impl Mistake {
             Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value * factor)),
             Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value + ATMOSPHERE_PA)),
             Self::Zero(readings, by_m3s) => each(records, |r| readings.map(r, |value| value + by_m3s)),
+            Self::Zeros(by_m3s) => Self::zero_of_each(by_m3s)
+                .iter()
+                .fold(records.to_vec(), |records, mistake| mistake.make(&records, rig)),
             Self::Size(readings) => each(records, |r| readings.map(r, f64::abs)),
             Self::Late(readings, by_s) => shifted(records, readings, -by_s),
             Self::Exchanged(_) | Self::Sign(_) | Self::OtherEnd => self.mend(records, rig),
@@ -59,8 +64,14 @@ impl Mistake {
             Self::Scaled(readings, factor) => each(records, |r| readings.map(r, |value| value / factor)),
             Self::Absolute(readings) => each(records, |r| readings.map(r, |value| value - ATMOSPHERE_PA)),
             Self::Zero(readings, by_m3s) => each(records, |r| readings.map(r, |value| value - by_m3s)),
+            Self::Zeros(by_m3s) => Self::Zeros(by_m3s.map(|zero| -zero)).make(records, rig),
             Self::Late(readings, by_s) => shifted(records, readings, by_s),
         }
+    }
+
+    /// The mistakes of one meter each that [`Self::Zeros`] is.
+    pub(super) fn zero_of_each([a_m3s, b_m3s]: [f64; 2]) -> [Self; 2] {
+        [Self::Zero(Readings::FlowA, a_m3s), Self::Zero(Readings::FlowB, b_m3s)]
     }
 
     /// The same kind of mistake on the same readings, of whatever size: what a trace that tells them apart by a hair

@@ -1,4 +1,4 @@
-//! One sensor whose gain or zero is off by more than anybody declared.
+//! A sensor whose gain or zero is off by more than anybody declared, or both meters' zeros.
 
 use super::continuity::Continuity;
 use super::explanation::{Evidence, Explanation};
@@ -8,7 +8,7 @@ use super::priors::Priors;
 use super::readings::Readings;
 use super::{APART, LEAST_DROP};
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::Parameter;
+use pitchleak_core::{Leak, Parameter};
 
 /// What may be off, one at a time.
 pub(super) const ERRORS: [Parameter; 5] =
@@ -24,49 +24,71 @@ const NEAR: [(f64, f64); 2] = [(2.0, 2.0), (4.0, 10.0)];
 const NEGATIVE_SIGMAS: f64 = 5.0;
 
 /// The sensor whose gain or zero, off by more than the rig file says, explains the stretch where the declared sensors do
-/// not; `None` where those do, or no single error explains it.
+/// not; `None` where those do, or neither one error nor both meters' zeros explain it.
 pub(crate) fn sensor_error(stretch: &impl Continuity) -> Option<Explanation> {
     let priors = Priors::declared(stretch.rig());
     let declared = stretch.fit(&priors)?;
-    let score = |error: Parameter| {
-        let fit = stretch.fit(&priors.with_error(error, stretch.rig()))?;
-        explains(&fit, &declared, error).then_some((error, fit))
+    let score = |errors: &[Parameter]| {
+        let off = errors.iter().fold(priors, |priors, error| priors.with_error(*error, stretch.rig()));
+        let mut fits = fewer_leaks(off, errors).into_iter().filter_map(|priors| stretch.fit(&priors));
+        let fit = fits.find(|fit| explains(fit, &declared, errors))?;
+        Some((mistake(errors, &fit), fit))
     };
-    let mut found: Vec<_> = ERRORS.into_iter().filter_map(score).collect();
+    let singles = ERRORS.iter().filter_map(|error| score(&[*error]));
+    let mut found: Vec<_> = singles.chain(score(&[Parameter::OffsetA, Parameter::OffsetB])).collect();
     found.sort_by(|(_, a), (_, b)| a.chi_square().total_cmp(&b.chi_square()));
     let (_, best) = *found.first()?;
     let most = best.chi_square() + APART * best.worst().max(1.0);
     found.retain(|(_, fit)| fit.chi_square() <= most);
     Some(Explanation {
-        mistakes: found.iter().map(|(error, fit)| mistake(*error, fit.parameter(*error).value)).collect(),
+        mistakes: found.iter().map(|(mistake, _)| *mistake).collect(),
         evidence: Evidence::Residual { before: declared.worst().sqrt(), after: best.worst().sqrt() },
     })
 }
 
-fn explains(fit: &Fit, declared: &Fit, error: Parameter) -> bool {
-    let found = fit.parameter(error);
+/// All leaks; beside zeros also none, and each alone: where P_A + P_B hardly changes, as with a symmetric valve, two leaks
+/// at once, one of them negative, look like a zero, so that it stays unsure beside all three.
+fn fewer_leaks(all: Priors, errors: &[Parameter]) -> Vec<Priors> {
+    let mut suppositions = vec![all];
+    if errors.iter().all(|error| matches!(error, Parameter::OffsetA | Parameter::OffsetB)) {
+        let without = |leaks: &[Leak]| leaks.iter().fold(all, |priors, leak| priors.without(*leak));
+        suppositions.push(without(&Leak::ALL));
+        suppositions.extend(Leak::ALL.map(|only| {
+            let others: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| *leak != only).collect();
+            without(&others)
+        }));
+    }
+    suppositions
+}
+
+fn explains(fit: &Fit, declared: &Fit, errors: &[Parameter]) -> bool {
     let drop = declared.chi_square() - fit.chi_square();
     let left = fit.worst().max(1.0);
     let near = NEAR.iter().any(|(most, contrast)| left <= *most && declared.worst() >= contrast * left);
     let mended = left <= NEAR[0].0 && declared.negative_leak_sigmas() >= NEGATIVE_SIGMAS;
-    let is_zero = matches!(error, Parameter::OffsetA | Parameter::OffsetB);
-    found.value.abs() >= SURE_SIGMAS * found.std
-        && (is_zero || found.value.abs() <= MOST_GAIN)
+    errors.iter().all(|error| is_sure(fit, *error))
         && drop >= LEAST_DROP * left
         && (near || mended)
         && fit.is_possible()
 }
 
+fn is_sure(fit: &Fit, error: Parameter) -> bool {
+    let found = fit.parameter(error);
+    let is_zero = matches!(error, Parameter::OffsetA | Parameter::OffsetB);
+    found.value.abs() >= SURE_SIGMAS * found.std && (is_zero || found.value.abs() <= MOST_GAIN)
+}
+
 /// As a mistake of the readings; a gain g stands for readings 1/(1 − g) times too large.
-fn mistake(error: Parameter, value: f64) -> Mistake {
+fn mistake(errors: &[Parameter], fit: &Fit) -> Mistake {
     let thousandths = |value: f64| (value * 1e3).round() / 1e3;
-    let factor = thousandths(1.0 / (1.0 - value));
-    let zero_m3s = thousandths(value * LPM_PER_M3S) / LPM_PER_M3S;
-    match error {
-        Parameter::GainA => Mistake::Scaled(Readings::FlowA, factor),
-        Parameter::GainB => Mistake::Scaled(Readings::FlowB, factor),
-        Parameter::OffsetA => Mistake::Zero(Readings::FlowA, zero_m3s),
-        Parameter::OffsetB => Mistake::Zero(Readings::FlowB, zero_m3s),
-        _ => Mistake::Scaled(Readings::Position, factor),
+    let factor = |gain: Parameter| thousandths(1.0 / (1.0 - fit.parameter(gain).value));
+    let zero_m3s = |zero: Parameter| thousandths(fit.parameter(zero).value * LPM_PER_M3S) / LPM_PER_M3S;
+    match errors {
+        [Parameter::GainA] => Mistake::Scaled(Readings::FlowA, factor(Parameter::GainA)),
+        [Parameter::GainB] => Mistake::Scaled(Readings::FlowB, factor(Parameter::GainB)),
+        [Parameter::OffsetA] => Mistake::Zero(Readings::FlowA, zero_m3s(Parameter::OffsetA)),
+        [Parameter::OffsetB] => Mistake::Zero(Readings::FlowB, zero_m3s(Parameter::OffsetB)),
+        [Parameter::GainPosition] => Mistake::Scaled(Readings::Position, factor(Parameter::GainPosition)),
+        _ => Mistake::Zeros([Parameter::OffsetA, Parameter::OffsetB].map(zero_m3s)),
     }
 }
