@@ -62,3 +62,31 @@ fn an_effect_that_no_table_has_is_never_surely_explained_by_another() {
         assert!(!(surely && answer.verdict == Verdict::Explained), "{}", tally::line(&case, &answer));
     }
 }
+
+/// Stops of a heavy piston between two samples at 20 Hz: what is left of the forces there was noise to the fit, then friction.
+#[test]
+fn a_stop_that_samples_do_not_see_is_neither_noise_nor_friction() {
+    let large = |seed| Case {
+        size: 5.0,
+        rate_hz: 20.0,
+        rest: plant::Rest::Half,
+        seconds: 600.0,
+        pressure_full_scale: 40e6,
+        ..Case::sound("stops", seed)
+    };
+    for (case, answer) in asked([9509, 200_509].map(large).into(), 0, 1) {
+        assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{}", tally::line(&case, &answer));
+    }
+}
+
+/// A meter that reads the position a little leaves less than noise, in a colour: no name beside it is sure.
+#[test]
+fn beside_what_is_small_but_no_noise_a_weak_effect_is_doubtful() {
+    let mut cases: Vec<Case> = questions::outside(9).split_off(8);
+    cases.iter_mut().for_each(|case| case.seed += 11_000);
+    for (case, answer) in asked(cases, 0, 1) {
+        assert_eq!(case.name, "cross-talk");
+        assert!(!answer.effects.is_empty(), "{}", tally::line(&case, &answer));
+        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", tally::line(&case, &answer));
+    }
+}

@@ -52,6 +52,8 @@ pub struct Case {
     pub rate_hz: f64,
     pub seconds: f64,
     pub accuracy: f64,
+    /// Noise that the sensors really have, in that of their data sheets.
+    pub noise_share: f64,
     pub pressure_full_scale: f64,
     pub rest: Rest,
     pub physics: Physics,
@@ -70,6 +72,7 @@ impl Case {
             rate_hz: 100.0,
             seconds: 60.0,
             accuracy: 1e-3,
+            noise_share: 1.0,
             pressure_full_scale: 16e6,
             rest: Rest::Never,
             physics: Physics::default(),
@@ -116,7 +119,7 @@ impl Case {
         let (plant, sensors, own) = (self.plant(), self.rig().sensors(), self.reading);
         let mut noisy = |value: f64, std: f64| {
             let unit: f64 = StandardNormal.sample(&mut random);
-            value + std * unit
+            value + self.noise_share * std * unit
         };
         let every = (10_000.0 / self.rate_hz).round() as u64;
         let (mut late, mut position, mut pressure) = (None::<Instant>, Play(plant.stroke / 2.0), Play(5e6));

@@ -35,10 +35,11 @@ pub fn deviations(case: &Case, answer: &Diagnosis) -> Vec<f64> {
 /// One case and what was said of it.
 pub fn line(case: &Case, answer: &Diagnosis) -> String {
     let mut out = format!(
-        "{:22} size {} {:3} Hz {} {:?} {} s FS {:.0e} seed {}: {:?}",
+        "{:22} size {} {:3} Hz {} of {} {:?} {} s FS {:.0e} seed {}: {:?}",
         case.name,
         case.size,
         case.rate_hz,
+        case.noise_share,
         case.accuracy,
         case.rest,
         case.seconds,

@@ -3,11 +3,16 @@
 use super::thresholds::PORTMANTEAU_LAGS;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// Probability that white noise of variance one shows correlations this large: Box and Pierce (1970),
+/// The chance of a [`portmanteau_chi2`] as large as this among white numbers.
+pub(crate) fn colour_p(chi2: f64) -> f64 {
+    chi2_p(chi2, PORTMANTEAU_LAGS as f64)
+}
+
+/// Sum of squared correlations at so many lags, in their variance among white numbers of variance one: Box and Pierce (1970),
 /// but with the known variance in the denominator, so that a remainder far below the noise passes. Where the
 /// numbers happen to be larger than that, their own: products of 300 numbers that are by chance 10 % too large
 /// would pass for colour ten times as often as the law says. What is not a number is left out.
-pub(crate) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64> {
+pub(crate) fn portmanteau_chi2(innovations: &[f64], dispersion: f64) -> Option<f64> {
     let n = known(innovations).count();
     if n < 4 * PORTMANTEAU_LAGS {
         return None;
@@ -22,7 +27,7 @@ pub(crate) fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64>
             if count > 0.0 { product * product / count / (variance * variance) } else { 0.0 }
         })
         .sum();
-    Some(chi2_p(sum, PORTMANTEAU_LAGS as f64))
+    Some(sum)
 }
 
 /// The numbers that are known.
@@ -44,6 +49,10 @@ pub(crate) fn bonferroni_sigma(rate: f64, count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn portmanteau_p(innovations: &[f64], dispersion: f64) -> Option<f64> {
+        portmanteau_chi2(innovations, dispersion).map(colour_p)
+    }
 
     #[test]
     fn a_slow_wave_is_not_white_and_a_tiny_one_is_below_the_noise() {

@@ -3,10 +3,10 @@
 use super::residual::whitened_residual;
 use crate::channels::ChannelFault;
 use crate::diagnose::data::SensorCheck;
-use crate::diagnose::equation::Equation;
+use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::EquationResidual;
-use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, RESIDUAL_TESTS, SHAPE_BINS};
+use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, RESIDUAL_TESTS, SHAPE_BINS};
 use crate::diagnose::weak_form::Nameless;
 use crate::diagnose::{search, statistics};
 
@@ -18,30 +18,68 @@ fn name(equation: Equation) -> &'static str {
     }
 }
 
-/// Reasons to believe that more than noise is left; none when the model is complete.
-pub(crate) fn complaints(fit: &Fit<'_>) -> Vec<String> {
-    let mut found = Vec::new();
-    for (equation, ratio) in fit.noise_ratio().iter() {
-        let name = name(equation);
-        if *ratio > 1.0 {
-            found.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
-        } else if fit.whiteness_p(equation).is_some_and(|p| p < LEAST_P) {
-            found.push(format!("what is left in {name} is as small as noise but not white"));
+/// What is left of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
+/// all that is left.
+struct Leftover {
+    /// Size in that of the sensors' noise.
+    noise_ratio: f64,
+    by_size: f64,
+    by_colour: f64,
+    /// By each variable that it goes with.
+    by_variable: Vec<(&'static str, f64)>,
+}
+
+impl Leftover {
+    fn of(fit: &Fit<'_>, equation: Equation) -> Self {
+        let noise_ratio = fit.noise_ratio()[equation];
+        let count = fit.innovations(equation).len() as f64;
+        let is_coloured = |chi2: &f64| statistics::colour_p(*chi2) < LEAST_P;
+        let colour = fit.colour(equation).filter(is_coloured);
+        Self {
+            noise_ratio,
+            by_size: count * (1.0 - noise_ratio.max(1.0).powi(-2)),
+            by_colour: colour.map_or(0.0, |chi2| chi2 - PORTMANTEAU_LAGS as f64),
+            by_variable: dependences(fit, equation).collect(),
         }
     }
-    for equation in Equation::ALL {
-        let names: Vec<_> = dependences(fit, equation).collect();
-        if !names.is_empty() {
-            found.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
+
+    /// They see the same from three sides: the largest counts.
+    fn most(&self) -> f64 {
+        self.by_variable.iter().map(|(_, chi2)| *chi2).fold(self.by_size.max(self.by_colour), f64::max)
+    }
+}
+
+/// What speaks against a model.
+pub(crate) struct Inadequacy {
+    /// In sentences; none when the model is complete.
+    pub(crate) complaints: Vec<String>,
+    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    pub(crate) left: PerEquation<f64>,
+}
+
+/// Reasons to believe that more than noise is left.
+pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
+    let left = PerEquation::from_fn(|equation| Leftover::of(fit, equation));
+    let mut complaints = Vec::new();
+    for (equation, left) in left.iter() {
+        let (name, ratio) = (name(equation), left.noise_ratio);
+        if ratio > 1.0 {
+            complaints.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
+        } else if left.by_colour > 0.0 {
+            complaints.push(format!("what is left in {name} is as small as noise but not white"));
         }
+    }
+    for (equation, left) in left.iter().filter(|(_, left)| !left.by_variable.is_empty()) {
+        let names: Vec<_> = left.by_variable.iter().map(|(name, _)| *name).collect();
+        complaints.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
     }
     if let Some((product, chi2_drop)) = beyond_chance(fit) {
         let (sigma, words) = (chi2_drop.sqrt(), product.words());
-        found.push(format!(
+        complaints.push(format!(
             "what is left follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
         ));
     }
-    found
+    Inadequacy { complaints, left: PerEquation::from_fn(|equation| left[equation].most()) }
 }
 
 /// The product of signals that no known effect makes which what is left follows beyond chance.
@@ -55,21 +93,23 @@ pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
     beyond_chance(fit).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
-/// Variables on which what is left depends, in whatever shape: its means in bins of equal count against each, by χ².
-fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = &'static str> {
+/// Variables on which what is left depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
+/// against each.
+fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = (&'static str, f64)> {
     let residual = whitened_residual(fit, equation);
     residual.into_iter().flat_map(|residual| {
         let EquationResidual { white, variables, .. } = residual;
         let depends = move |(name, values): (&'static str, Vec<f64>)| {
-            let p = binned_p(&white, &values)?;
-            (p < LEAST_P / RESIDUAL_TESTS as f64).then_some(name)
+            let (chi2, freedom) = binned_chi2(&white, &values)?;
+            let is_by_chance = statistics::chi2_p(chi2, freedom) >= LEAST_P / RESIDUAL_TESTS as f64;
+            (!is_by_chance).then_some((name, chi2 - freedom))
         };
         variables.into_iter().filter_map(depends)
     })
 }
 
-/// Chance of means this large in bins of equal count; none where there are too few.
-fn binned_p(white: &[f64], values: &[f64]) -> Option<f64> {
+/// Sum of squared means in bins of equal count, in their variance, and the number of bins; none where there are too few.
+fn binned_chi2(white: &[f64], values: &[f64]) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> =
         values.iter().zip(white).filter(|(value, _)| value.is_finite()).map(|(v, w)| (*v, *w)).collect();
     let varies = pairs.iter().any(|pair| pair.0.to_bits() != pairs[0].0.to_bits());
@@ -80,7 +120,7 @@ fn binned_p(white: &[f64], values: &[f64]) -> Option<f64> {
     let bins = pairs.chunks(pairs.len().div_ceil(SHAPE_BINS));
     let of_bin = |bin: &[(f64, f64)]| bin.iter().map(|pair| pair.1).sum::<f64>().powi(2) / bin.len() as f64;
     let freedom = bins.len() as f64;
-    Some(statistics::chi2_p(bins.map(of_bin).sum(), freedom))
+    Some((bins.map(of_bin).sum(), freedom))
 }
 
 /// What is wrong with the sensors themselves, in sentences: no model of the machine can mend it.

@@ -19,10 +19,11 @@ pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judg
 /// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
 fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
-    let (acts, ratio) = (acts_in(fit, one.term), fit.noise_ratio());
+    let acts = acts_in(fit, one.term);
     let is_doubtful = |other: &&Selected| {
         let also = acts_in(fit, other.term);
-        let is_shared = |equation: Equation| acts[equation] && also[equation] && ratio[equation] > 1.0;
+        let is_shared =
+            |equation: Equation| acts[equation] && also[equation] && judgement.left[equation] > 0.0;
         other.term != one.term
             && Equation::ALL.into_iter().any(is_shared)
             && own_doubts(selection, other, judgement).is_some()
@@ -36,7 +37,7 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
     let fit = &selection.fit;
     let reasons: Vec<String> = [
         rivals(one),
-        remainder(fit, one),
+        remainder(fit, one, judgement),
         company(selection, one, judgement),
         lopsided(selection, one),
         bounds(fit, one),
@@ -76,7 +77,7 @@ fn rivals(one: &Selected) -> Option<String> {
 }
 
 /// What is left where it acts is not small beside what it mends.
-fn remainder(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     if one.beaten_by_nameless {
         return Some("a product of signals without a name fits better".to_owned());
     }
@@ -88,11 +89,8 @@ fn remainder(fit: &Fit<'_>, one: &Selected) -> Option<String> {
         // Forces feel a speed that comes from the flows: where those do not balance, it may be wrong.
         acts = PerEquation::from_fn(|_| true);
     }
-    let excess = |equation: Equation| {
-        let count = fit.innovations(equation).len() as f64;
-        if acts[equation] { count * (1.0 - fit.noise_ratio()[equation].powi(-2)) } else { 0.0 }
-    };
-    let left: f64 = Equation::ALL.into_iter().map(excess).sum::<f64>() + adequacy::nameless_excess(fit);
+    let there = |equation: Equation| if acts[equation] { judgement.left[equation] } else { 0.0 };
+    let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>() + adequacy::nameless_excess(fit);
     let mended = search::loss(fit, &[one.term]);
     (left > UNMENDED_SHARE * (mended + left)).then(|| {
         "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \

@@ -1,6 +1,6 @@
 //! The answer in a word, and the sentences that speak for it.
 
-use super::adequacy::complaints;
+use super::adequacy::{Inadequacy, inadequacy};
 use super::confidence::ratio_note;
 use super::leaks::negative_leaks;
 use crate::diagnose::equation::{Equation, PerEquation};
@@ -15,6 +15,8 @@ pub(crate) struct Judgement {
     pub(crate) complaints: Vec<String>,
     /// The complaints among them of sensors that fail by themselves.
     pub(crate) failures: Vec<String>,
+    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    pub(crate) left: PerEquation<f64>,
     /// Where the effects together made the error on held-out samples smaller.
     pub(crate) fell: PerEquation<bool>,
 }
@@ -28,7 +30,7 @@ pub(crate) fn judge(
     [before, after]: [&ModelFit; 2],
 ) -> Judgement {
     let Selection { fit, effects } = selection;
-    let mut complaints = complaints(fit);
+    let Inadequacy { mut complaints, left } = inadequacy(fit);
     complaints.extend_from_slice(&failures);
     if effects.iter().any(|one| one.beaten_by_nameless) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
@@ -45,7 +47,7 @@ pub(crate) fn judge(
         (true, false, true) => Verdict::Explained,
         (true, false, false) => Verdict::PartlyExplained,
     };
-    Judgement { verdict, complaints, failures, fell }
+    Judgement { verdict, complaints, failures, left, fell }
 }
 
 /// All sentences for people: `after` is none where no effect was named.

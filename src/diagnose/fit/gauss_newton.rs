@@ -55,7 +55,7 @@ pub(crate) struct Fit<'a> {
     /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
     pub(super) equation_error: PerEquation<f64>,
     /// Filled when it is asked for.
-    pub(super) whiteness_p: PerEquation<OnceLock<Option<f64>>>,
+    pub(super) colour: PerEquation<OnceLock<Option<f64>>>,
 }
 
 impl<'a> Fit<'a> {
@@ -155,7 +155,7 @@ impl<'a> Fit<'a> {
             held_compressibility,
             assumed_error,
             equation_error,
-            whiteness_p: PerEquation::default(),
+            colour: PerEquation::default(),
         }
     }
 

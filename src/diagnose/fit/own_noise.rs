@@ -13,8 +13,13 @@ impl Fit<'_> {
     /// Probability that white noise shows correlations as large as what is left of an equation, whitened at its own noise, where
     /// the samples are fast enough to see the motion.
     pub(crate) fn whiteness_p(&self, equation: Equation) -> Option<f64> {
-        let of = |equation| statistics::portmanteau_p(&self.whitened_at_own_noise(equation), 1.0);
-        *self.whiteness_p[equation].get_or_init(|| of(equation))
+        self.colour(equation).map(statistics::colour_p)
+    }
+
+    /// The sum of squared correlations that tells so.
+    pub(crate) fn colour(&self, equation: Equation) -> Option<f64> {
+        let of = |equation| statistics::portmanteau_chi2(&self.whitened_at_own_noise(equation), 1.0);
+        *self.colour[equation].get_or_init(|| of(equation))
     }
 
     /// Where less is left than the noise should bring, by the share of it beyond the declared noise that brings as much (bisection).
@@ -78,7 +83,8 @@ mod tests {
         meters.for_each(|check| check.found.std = 4.0 * check.declared_std);
         let problem = Problem::new(traces, &declared, &checks);
         let fit = Fit::declared(&problem, &|| ());
-        let as_fitted = statistics::portmanteau_p(&fit.innovations(Equation::ChamberA), 1.0);
+        let as_fitted =
+            statistics::portmanteau_chi2(&fit.innovations(Equation::ChamberA), 1.0).map(statistics::colour_p);
         [as_fitted, fit.whiteness_p(Equation::ChamberA)].map(|p| p.expect("enough rows"))
     }
 

@@ -60,9 +60,9 @@ impl<'a> WeakForm<'a> {
     ) -> Self {
         let motions = motions(traces, sensors, &at);
         let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
-        let rows = rows.at_places(columns.places, columns.terms.len());
+        let mut rows = rows.at_places(columns.places, columns.terms.len());
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
-        add_unresolved(&mut sensitivities, &rows, traces, sensors);
+        add_unresolved(&mut sensitivities, &mut rows, traces, sensors);
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
@@ -144,14 +144,15 @@ pub(crate) fn residual_rows(
 /// More noise where a trace moves faster than its samples tell.
 fn add_unresolved(
     sensitivities: &mut [PerEquation<Sensitivity>],
-    rows: &Rows,
+    rows: &mut Rows,
     traces: &[Series],
     sensors: &Sensors<f64>,
 ) {
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
-    for (own, row) in sensitivities.iter_mut().zip(&rows.rows) {
+    for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let times = unresolved[row.trace()].loudness(row.samples_in(&traces[row.trace()].t_s));
         *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
+        row.is_jolted = own.force.is_speed_loud();
     }
 }
 

@@ -27,6 +27,8 @@ pub(crate) struct Row {
     pub(crate) mean: Signals<f64>,
     /// Share of the hat during which the direction of motion is unknown.
     pub(crate) stuck: f64,
+    /// Whether the speed jumps between samples: neither pressures nor load show the impulse that it takes.
+    pub(crate) is_jolted: bool,
 }
 
 impl Row {
@@ -156,7 +158,15 @@ impl Rows {
         let block_s = hat.time_s;
         let mean = hat.signals.zip(Signals::default(), |sum, _| sum / block_s);
         let row = self.rows.len();
-        self.rows.push(Row { stretch, t_s, block_s, samples, mean, stuck: hat.unsure_s / block_s });
+        self.rows.push(Row {
+            stretch,
+            t_s,
+            block_s,
+            samples,
+            mean,
+            stuck: hat.unsure_s / block_s,
+            is_jolted: false,
+        });
         for equation in Equation::ALL {
             if hat.missing_s[equation] > SLIVER * block_s {
                 continue;
@@ -176,9 +186,10 @@ impl Rows {
         (own.stretch == later.stretch).then_some(later)
     }
 
-    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown.
+    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where the speed jumps.
     pub(crate) fn counts(&self, entry: &Entry) -> bool {
-        entry.equation != Equation::Force || self.rows[entry.row].stuck <= SLIVER
+        let row = &self.rows[entry.row];
+        entry.equation != Equation::Force || row.stuck <= SLIVER && !row.is_jolted
     }
 }
 

@@ -115,6 +115,11 @@ impl Sensitivity {
         Self { loudness: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
     }
 
+    /// Whether samples don't see all of the speed that forces feel.
+    pub(super) fn is_speed_loud(&self) -> bool {
+        self.loudness[Channel::FeltSpeed as usize] > 1.0
+    }
+
     /// Whether samples don't see all that moves here.
     pub(crate) fn is_loud(&self) -> bool {
         self.loudness.iter().any(|times| *times > 1.0)
