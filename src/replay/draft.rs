@@ -92,7 +92,7 @@ impl<'a> Draft<'a> {
             trace: &self.trace,
             end_s: *end_s,
             misfit: self.found.as_ref().map(|_| self.weighed.misfit),
-            restarts: consistency.restarts(),
+            restarts_in_all: consistency.restarts(),
             changed_at_s: self.changed_at_s,
             channels: &self.weighed.channels,
             earlier_channels: &self.weighed.earlier_channels,

@@ -49,7 +49,7 @@ impl Found {
             trace: &self.trace,
             end_s: 60.0,
             misfit: self.misfit.map(|misfit| Misfit { restarts: self.restarts, ..misfit }),
-            restarts: self.restarts,
+            restarts_in_all: self.restarts,
             changed_at_s: self.changed_at_s,
             channels: &self.channels,
             earlier_channels: &self.earlier_channels,

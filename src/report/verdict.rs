@@ -110,8 +110,8 @@ pub struct Findings<'a> {
     /// None from an estimator that knows no noise.
     pub misfit: Option<Misfit>,
     /// How often the estimates began anew since the trace began, and when last.
-    pub restarts: u64,
-    /// See [`restarts`](Self::restarts).
+    pub restarts_in_all: u64,
+    /// See [`restarts_in_all`](Self::restarts_in_all).
     pub changed_at_s: Option<f64>,
     /// Faults of the channels that the estimator reads, …
     pub channels: &'a [ChannelFault],

@@ -52,48 +52,63 @@ pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
 /// half is looked at.
 pub(crate) fn zero_check_lately(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     let mut stretch = Recorded::new(records, rig)?;
-    while do_leaks_bend(&stretch).unwrap_or(false) {
+    loop {
+        let leaks = straight(&stretch);
+        let free = with_free_zeros(&stretch, &leaks)?;
+        if !do_leaks_bend(&stretch, &free) {
+            return against_zeros(&stretch, &leaks, &free);
+        }
         stretch = Recorded::new(stretch.records.split_at(stretch.records.len() / 2).1, rig)?;
     }
-    changing_leaks_or_zeros(&stretch)
+}
+
+/// Leaks that go straight through a stretch.
+fn straight(stretch: &impl Continuity) -> Priors {
+    Priors::declared(stretch.rig()).with_changing_leaks(stretch.duration_s())
+}
+
+fn with_free_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<Fit> {
+    stretch.fit(&leaks.with_zeros_off(stretch.rig(), stretch.duration_s()))
 }
 
 /// Whether leaks that go straight in each half, quarter or eighth of the records explain them better than zeros do with
-/// leaks that go straight throughout. `None` where the records are too few.
-fn do_leaks_bend(whole: &Recorded<'_>) -> Option<bool> {
-    let (records, rig, duration_s) = (whole.records, whole.rig(), whole.duration_s());
-    let straight = |duration_s: f64| Priors::declared(rig).with_changing_leaks(duration_s);
-    let zeros = whole.fit(&straight(duration_s).with_zeros_off(rig, duration_s))?.chi_square();
+/// leaks that go straight throughout, whose fit this is.
+fn do_leaks_bend(whole: &Recorded<'_>, zeros: &Fit) -> bool {
+    let (records, rig, zeros) = (whole.records, whole.rig(), zeros.chi_square());
     let bent = |parts: usize| {
         let chi_square = |part: &[Record]| {
             let part = Recorded::new(part, rig)?;
-            Some(part.fit(&straight(part.duration_s()))?.chi_square())
+            Some(part.fit(&straight(&part))?.chi_square())
         };
         records.chunks(records.len().div_ceil(parts)).map(chi_square).sum::<Option<f64>>()
     };
     let better = |parts: u32| {
         bent(parts as usize).is_some_and(|left| zeros - left > BEYOND_CHANCE * f64::from(parts - 1))
     };
-    Some([2, 4, 8].into_iter().any(better))
+    [2, 4, 8].into_iter().any(better)
 }
 
 /// The same of any stretch.
 pub(crate) fn changing_leaks_or_zeros(stretch: &impl Continuity) -> Option<ZeroCheck> {
-    held_against_zeros(stretch, &Priors::declared(stretch.rig()).with_changing_leaks(stretch.duration_s()))
+    held_against_zeros(stretch, &straight(stretch))
 }
 
 /// The same of `leaks`.
 pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<ZeroCheck> {
+    against_zeros(stretch, leaks, &with_free_zeros(stretch, leaks)?)
+}
+
+/// The same where the fit with free zeros is at hand.
+fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: &Fit) -> Option<ZeroCheck> {
     let zeros = leaks.with_zeros_off(stretch.rig(), stretch.duration_s());
     let declared = stretch.fit(leaks)?;
-    let free = stretch.fit(&zeros)?;
-    let without = PerLeak::from_fn(|leak| stretch.fit(&zeros.without(leak)).unwrap_or(free));
+    let without = PerLeak::from_fn(|leak| stretch.fit(&zeros.without(leak)).unwrap_or(*free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
     let beyond = |other: &Fit| (other.chi_square() - declared.chi_square()) / inflation;
     Some(ZeroCheck {
         for_leak: without.map(|fit| beyond(&fit)),
-        for_zeros: -beyond(&free),
+        for_zeros: -beyond(free),
         offsets_m3s: free.offsets_m3s(),
         offsets_without_m3s: without.map(|fit| fit.offsets_m3s()),
         leaks_m3spa: free.leak_coefficients(),
