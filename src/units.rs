@@ -244,6 +244,25 @@ impl Dimension {
         };
         self.units().iter().find(|unit| unit.text == text).copied()
     }
+
+    /// The unit that people read a difference of two values in: 5 K more are not 5 °C.
+    pub(crate) fn difference_for_people(self) -> Option<Unit> {
+        self.for_people().filter(|unit| unit.offset.abs() <= 0.0)
+    }
+
+    /// A difference in SI, rounded to [`FEW_DIGITS`] in the unit that people read it in.
+    pub(crate) fn rounded_difference(self, value: f64) -> f64 {
+        let unit = self.difference_for_people();
+        unit.map_or(value, |unit| unit.to_si(rounded(unit.from_si(value), FEW_DIGITS)))
+    }
+}
+
+/// More digits than anybody knows of a sensor, and fewer than arithmetic leaves.
+pub(crate) const FEW_DIGITS: usize = 9;
+
+/// The number of so many significant digits that is next to `value`.
+pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
 /// A number for people: so many significant digits at the most, and no trailing zeros.

@@ -122,6 +122,22 @@ proptest! {
         prop_assert_eq!(Rig::parse(&rig.to_toml(), Rig::PAPER_NAME).unwrap(), rig);
     }
 
+    /// In whatever unit it is written.
+    #[test]
+    fn an_offset_that_is_written_is_the_one_that_is_read(signal in 0..Signal::ALL.len(), offset in any::<f64>(), few in -99999..99999i32) {
+        let signal = Signal::ALL[signal];
+        let Some(dimension) = signal.dimension() else { return Ok(()) };
+        prop_assume!(!offset.is_nan());
+        let unit = dimension.units().iter().find(|unit| unit.suffix.is_some()).copied();
+        for offset in [offset, f64::from(few) / 60e6, f64::from(few) * 1e2] {
+            let mut rig = Rig::paper();
+            let expected = bound::OFFSET.nearest(offset);
+            rig.columns.insert(signal, ForeignColumn { offset, ..ForeignColumn::new("c", unit) });
+            let again = Rig::parse(&rig.to_toml(), "rig.toml").map_err(|error| TestCaseError::fail(error.to_string()))?;
+            prop_assert_eq!(again.columns[&signal].offset.abs().to_bits(), expected.abs().to_bits(), "{}", rig.to_toml());
+        }
+    }
+
     /// Whatever a fit came to.
     #[test]
     fn every_rig_that_is_written_can_be_read(

@@ -2,7 +2,7 @@ use super::bound::{self, Bound};
 use super::effects;
 use super::{CsvSettings, ForeignColumn, Instrument, Rig};
 use crate::signal::Signal;
-use crate::units::Dimension;
+use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;
 use std::fmt::Write;
 
@@ -14,6 +14,17 @@ fn quantity(value: f64, dimension: Dimension) -> String {
 /// The same, within what the reader takes.
 fn within(value: f64, dimension: Dimension, bound: Bound) -> String {
     quantity(bound.nearest(value), dimension)
+}
+
+/// As [`within`], in the unit that people read it in where few digits say the same number there.
+fn for_people(value: f64, dimension: Dimension, bound: Bound) -> String {
+    let si = bound.nearest(value);
+    let text = dimension.difference_for_people().and_then(|unit| {
+        let text = format!("{} {}", rounded(unit.from_si(si), FEW_DIGITS), unit.text);
+        let read = units::parse(&text, dimension).ok()?;
+        (read.to_bits() == si.to_bits()).then(|| toml_text(&text))
+    });
+    text.unwrap_or_else(|| quantity(si, dimension))
 }
 
 fn toml_text(text: &str) -> String {
@@ -172,7 +183,7 @@ impl ForeignColumn {
             let _ = write!(out, ", scale = {scale:?}");
         }
         if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
-            let _ = write!(out, ", offset = {}", within(self.offset, dimension, bound::OFFSET));
+            let _ = write!(out, ", offset = {}", for_people(self.offset, dimension, bound::OFFSET));
         }
         if let Some(format) = &self.format {
             let _ = write!(out, ", format = {}", toml_text(&format.to_string()));
