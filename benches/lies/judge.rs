@@ -42,10 +42,10 @@ impl Door {
         }
     }
 
-    /// What it says of a trace; none where it refuses it.
-    fn said(self, trace: Vec<u8>, accuracy: f64) -> Option<Said> {
+    /// What it says of a trace; the words alone where it refuses it.
+    fn said(self, trace: Vec<u8>, accuracy: f64) -> Result<Said, String> {
         match self {
-            Self::Replay => replayed(trace, accuracy).ok().map(Said::from),
+            Self::Replay => replayed(trace, accuracy).map(Said::from).map_err(|error| error.to_string()),
             Self::Watch => watched(&trace, accuracy).map(Said::from),
         }
     }
@@ -85,21 +85,27 @@ pub fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayErr
     replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
 }
 
-/// The last estimate.
-fn watched(trace: &[u8], accuracy: f64) -> Option<EstimateEvent> {
-    let (mut last, mut events) = (None, Vec::new());
+/// The last estimate, or the last notice where there is none.
+fn watched(trace: &[u8], accuracy: f64) -> Result<EstimateEvent, String> {
+    let (mut last, mut events) = (Err(String::new()), Vec::new());
     let mut watch = Watch::new(LiveConfig::of(rig(accuracy)), Some(LineFormat::Csv));
     for line in trace.split(|byte| *byte == b'\n') {
         watch.take(line, &mut events);
-        last = last_estimate(&mut events).or(last);
+        last = last_said(last, &mut events);
     }
     watch.finish(&mut events);
-    last_estimate(&mut events).or(last)
+    last_said(last, &mut events)
 }
 
-fn last_estimate(events: &mut Vec<Event>) -> Option<EstimateEvent> {
-    let estimate = |event| if let Event::Estimate(estimate) = event { Some(*estimate) } else { None };
-    events.drain(..).rev().find_map(estimate)
+fn last_said(
+    before: Result<EstimateEvent, String>,
+    events: &mut Vec<Event>,
+) -> Result<EstimateEvent, String> {
+    events.drain(..).fold(before, |last, event| match (event, last) {
+        (Event::Estimate(estimate), _) => Ok(*estimate),
+        (Event::Notice(notice), Err(_)) => Err(notice.text),
+        (_, last) => last,
+    })
 }
 
 /// A stated figure may be off by this much, or by its own 3 σ, L/min.
@@ -135,8 +141,8 @@ pub fn ask(
 ) -> [(Judgement, bool); 2] {
     let (trace, shown) = recorded(truths, lie, accuracy, seed);
     Door::ALL.map(|door| match door.said(trace.clone(), accuracy) {
-        None => (Judgement::InDoubt, false),
-        Some(said) => (judge(&said, leaking, shown), names(&said, lie)),
+        Err(words) => (Judgement::InDoubt, has_words(&words, lie)),
+        Ok(said) => (judge(&said, leaking, shown), names(&said, lie)),
     })
 }
 
@@ -144,6 +150,11 @@ pub fn ask(
 fn names(said: &Said, lie: &Lie) -> bool {
     let Some([id, words]) = lie.named else { return false };
     said.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
+}
+
+/// The same of a trace that is refused.
+fn has_words(said: &str, lie: &Lie) -> bool {
+    lie.named.is_some_and(|[_, words]| said.contains(words))
 }
 
 /// The trace as CSV, as users have it, and the truth up to its last row.

@@ -1,7 +1,7 @@
 //! One cylinder's estimator, and what it has to say.
 
 use super::config::LiveConfig;
-use super::event::{AlarmEvent, EstimateEvent, Event, LiveLeakage};
+use super::event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent};
 use super::history::History;
 use super::notices::Notices;
 use super::order::{Order, Turn};
@@ -36,6 +36,9 @@ pub(super) struct Line<'a> {
     pub number: u64,
     pub cells: &'a [&'a [u8]],
 }
+
+/// Kind of notice of [`BadReason::OutOfRange`](crate::trace::BadReason::OutOfRange).
+const OUT_OF_RANGE: &str = "out_of_range";
 
 impl Cylinder {
     pub(super) fn new(rig: &Rig) -> Result<Self, RlsError> {
@@ -107,8 +110,8 @@ impl Cylinder {
 
     /// Counts a line that was left out.
     pub(super) fn notice(&mut self, name: &str, kind: &str, text: String, events: &mut Vec<Event>) {
-        let notice = self.notices.add(name, self.stream.time_s(), kind, text);
-        events.extend(notice.map(Event::Notice));
+        let notice = self.notices.add(name, self.times_s(), kind, text);
+        events.extend(notice.map(|notice| Event::Notice(self.explained(notice))));
     }
 
     /// At the end of the input: what has not been said.
@@ -116,7 +119,22 @@ impl Cylinder {
         if self.stream.time_s() != self.told_s {
             events.extend(self.estimate(name).map(|told| Event::Estimate(Box::new(told))));
         }
-        events.extend(self.notices.rest(name, self.stream.time_s()).into_iter().map(Event::Notice));
+        let rest = self.notices.rest(name, self.times_s());
+        events.extend(rest.into_iter().map(|notice| Event::Notice(self.explained(notice))));
+    }
+
+    /// Of the last line, and of the last good one.
+    fn times_s(&self) -> [Option<f64>; 2] {
+        [self.stream.seen_s(), self.stream.time_s()]
+    }
+
+    /// With the unit that would bring within range what lines are left out for.
+    fn explained(&self, notice: NoticeEvent) -> NoticeEvent {
+        if notice.kind != OUT_OF_RANGE {
+            return notice;
+        }
+        let mistake = self.stream.refused_for().map(|wiring| format!("; {}", wiring.sentence()));
+        NoticeEvent { text: notice.text + &mistake.unwrap_or_default(), ..notice }
     }
 
     fn tell_estimate_if_due(&mut self, name: &str, interval_s: f64, events: &mut Vec<Event>) {

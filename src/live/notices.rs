@@ -18,16 +18,17 @@ struct Kind {
 }
 
 impl Notices {
-    /// Counts a line that was left out; says so at once where nothing was said for a minute.
+    /// Counts a line that was left out; says so at once where nothing was said for a minute. `seen_s` is the time of the last
+    /// line, `t_s` of the last good one.
     pub(super) fn add(
         &mut self,
         cylinder: &str,
-        t_s: Option<f64>,
+        [seen_s, t_s]: [Option<f64>; 2],
         kind: &str,
         text: String,
     ) -> Option<NoticeEvent> {
         let Some(entry) = self.0.get_mut(kind) else {
-            self.0.insert(kind.to_owned(), Kind { told_s: t_s, count: 0, text: String::new() });
+            self.0.insert(kind.to_owned(), Kind { told_s: seen_s, count: 0, text: String::new() });
             return Some(NoticeEvent {
                 cylinder: cylinder.to_owned(),
                 t_s,
@@ -40,13 +41,13 @@ impl Notices {
             entry.text = text;
         }
         entry.count += 1;
-        entry.due(t_s).then(|| entry.tell(cylinder, t_s, kind))
+        entry.due(seen_s).then(|| entry.tell(cylinder, [seen_s, t_s], kind))
     }
 
     /// What was counted and not said.
-    pub(super) fn rest(&mut self, cylinder: &str, t_s: Option<f64>) -> Vec<NoticeEvent> {
+    pub(super) fn rest(&mut self, cylinder: &str, times_s: [Option<f64>; 2]) -> Vec<NoticeEvent> {
         let counted = self.0.iter_mut().filter(|(_, entry)| entry.count > 0);
-        counted.map(|(kind, entry)| entry.tell(cylinder, t_s, kind)).collect()
+        counted.map(|(kind, entry)| entry.tell(cylinder, times_s, kind)).collect()
     }
 }
 
@@ -60,8 +61,8 @@ impl Kind {
         }
     }
 
-    fn tell(&mut self, cylinder: &str, t_s: Option<f64>, kind: &str) -> NoticeEvent {
-        self.told_s = t_s;
+    fn tell(&mut self, cylinder: &str, [seen_s, t_s]: [Option<f64>; 2], kind: &str) -> NoticeEvent {
+        self.told_s = seen_s;
         let (count, text) = (std::mem::take(&mut self.count), std::mem::take(&mut self.text));
         NoticeEvent { cylinder: cylinder.to_owned(), t_s, kind: kind.to_owned(), count, text }
     }
@@ -75,11 +76,11 @@ mod tests {
     fn a_flood_is_one_notice_a_minute() {
         let mut notices = Notices::default();
         let told: Vec<_> = (0..13_000)
-            .filter_map(|k| notices.add("a", Some(f64::from(k) * 0.01), "missing", format!("line {k}")))
+            .filter_map(|k| notices.add("a", [Some(f64::from(k) * 0.01); 2], "missing", format!("line {k}")))
             .collect();
         assert_eq!(told.iter().map(|notice| notice.count).collect::<Vec<_>>(), [1, 6000, 6000]);
         assert_eq!(told[1].text, "line 1");
-        assert_eq!(notices.rest("a", Some(130.0)).first().map(|notice| notice.count), Some(999));
-        assert!(notices.rest("a", Some(130.0)).is_empty());
+        assert_eq!(notices.rest("a", [Some(130.0); 2]).first().map(|notice| notice.count), Some(999));
+        assert!(notices.rest("a", [Some(130.0); 2]).is_empty());
     }
 }

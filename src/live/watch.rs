@@ -92,7 +92,7 @@ impl Watch {
     /// Counts input that was not even a line.
     pub fn notice(&mut self, kind: &str, text: String, events: &mut Vec<Event>) {
         let text = format!("line {}: {text}", self.lines);
-        events.extend(self.notices.add("", None, kind, text).map(Event::Notice));
+        events.extend(self.notices.add("", [None; 2], kind, text).map(Event::Notice));
     }
 
     /// At the end of the input: the last estimates, and what was counted and not said.
@@ -106,7 +106,7 @@ impl Watch {
     /// Says what was counted and not said of lines that belong to no cylinder: they have no time, by which the next notice
     /// could be due.
     pub fn tell_counted(&mut self, events: &mut Vec<Event>) {
-        events.extend(self.notices.rest("", None).into_iter().map(Event::Notice));
+        events.extend(self.notices.rest("", [None; 2]).into_iter().map(Event::Notice));
     }
 
     fn take_line(&mut self, line: &[u8], events: &mut Vec<Event>) -> Result<(), Refusal> {

@@ -25,11 +25,11 @@ pub use state::RestoreError;
 pub use stream::Stream;
 
 use crate::channels::ChannelMonitor;
-use crate::report::{Alarm, ReplayReport, TraceSummary, Verdict};
+use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};
 use crate::rig::Rig;
-use crate::trace::{Record, TraceError, TraceReader};
+use crate::trace::{Record, TraceError, TraceFault, TraceReader};
 use crate::units::LPM_PER_M3S;
-use crate::wiring::Excerpt;
+use crate::wiring::{Excerpt, Refused};
 use consistency::Consistency;
 use correction::Correction;
 use effect_uncertainty::EffectUncertainty;
@@ -347,7 +347,9 @@ pub fn replay<E: From<ReplayError>>(
     let mut replay = Replay::new(rig).map_err(ReplayError::from)?;
     let mut excerpt = Excerpt::default();
     let mut record = Record::default();
-    while reader.next_record(&mut record).map_err(ReplayError::from)? {
+    let columns = reader.columns(&rig.columns);
+    let mut refused = None;
+    while next_record(reader, &mut record, &mut refused, || Refused::new(rig, &columns))? {
         let renewed = replay.push(&record);
         if !replay.spikes.left_out() {
             excerpt.add(&record);
@@ -356,9 +358,35 @@ pub fn replay<E: From<ReplayError>>(
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
-    let (weighed, columns) = (replay.whole_trace(), reader.columns(&rig.columns));
-    let suspect = |verdict: &Verdict| replay.suspicions(verdict, &weighed, &excerpt, &columns);
+    let weighed = replay.whole_trace();
+    let refused = refused.filter(|_| reader.quality().is_mostly_bad());
+    let suspect = |verdict: &Verdict| match refused.as_ref().and_then(Refused::wiring) {
+        Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
+        None => replay.suspicions(verdict, &weighed, &excerpt, &columns),
+    };
     Ok(replay.report_with(summary, &weighed, suspect))
+}
+
+/// The next good record; rows out of range go to `refused`, and the good ones after the first of them.
+#[inline]
+fn next_record(
+    reader: &mut TraceReader<'_>,
+    record: &mut Record,
+    refused: &mut Option<Refused>,
+    none: impl Fn() -> Refused,
+) -> Result<bool, ReplayError> {
+    let taken = reader.next_record_or(record, |row| refused.get_or_insert_with(&none).add_refused(row));
+    let is_good = match taken {
+        Err(TraceError { trace, fault: TraceFault::NoRows { skipped, first, .. } }) => {
+            let mistake = refused.as_ref().and_then(Refused::wiring).map(|wiring| wiring.sentence().into());
+            return Err(TraceError { trace, fault: TraceFault::NoRows { skipped, first, mistake } }.into());
+        }
+        taken => taken?,
+    };
+    if let Some(refused) = refused.as_mut().filter(|_| is_good) {
+        refused.add(record);
+    }
+    Ok(is_good)
 }
 
 #[cfg(test)]

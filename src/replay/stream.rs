@@ -1,12 +1,13 @@
 use super::Replay;
 use super::state::{self, RestoreError};
-use crate::report::{ReplayReport, TraceSummary, Verdict};
-use crate::rig::Rig;
+use crate::report::{ReplayReport, Suspicions, TraceSummary, Verdict};
+use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
 use crate::trace::{
-    BadRows, LineLayout, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader, read_line,
+    BadRows, LineLayout, LineRead, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader,
+    read_line,
 };
-use crate::wiring::Running;
+use crate::wiring::{Refused, Running, Wiring};
 use pitchleak_core::RlsError;
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
@@ -17,6 +18,9 @@ pub struct Stream {
     evidence: Running,
     validator: Option<RowValidator>,
     bad_rows: BadRows,
+    /// While rows are refused as out of range.
+    #[serde(default)]
+    refused: Option<Box<Refused>>,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
     pub epoch_ns: Option<i64>,
 }
@@ -76,6 +80,7 @@ impl Stream {
             evidence: Running::default(),
             validator: None,
             bad_rows,
+            refused: None,
             epoch_ns: None,
         })
     }
@@ -97,8 +102,9 @@ impl Stream {
         };
         let mut record = Record::default();
         let mut renewals = 0;
+        let columns = reader.columns(&self.rig().columns);
         let ended = loop {
-            match reader.next_record(&mut record) {
+            match reader.next_record_or(&mut record, |row| self.refuse(row, |_| columns.clone())) {
                 Ok(true) => renewals += u64::from(self.push(&record)),
                 Ok(false) | Err(TraceError { fault: TraceFault::NoRows { .. }, .. }) => break Ok(renewals),
                 Err(error) => break Err(error),
@@ -112,6 +118,12 @@ impl Stream {
     fn push(&mut self, record: &Record) -> bool {
         let restarts = self.replay.consistency.restarts();
         let renewed = self.replay.push(record);
+        if self.refused.as_ref().is_some_and(|refused| refused.is_over(record.t_s)) {
+            self.refused = None;
+        }
+        if let Some(refused) = &mut self.refused {
+            refused.add(record);
+        }
         if self.replay.consistency.restarts() != restarts {
             self.evidence.restart();
         }
@@ -137,9 +149,31 @@ impl Stream {
         let validator = self.validator.get_or_insert_with(|| layout.validator(rig, bad_rows));
         let mut record = Record::default();
         Ok(match read_line(layout, line, cells, &mut self.epoch_ns, validator, &mut record)? {
-            None => Taken::Good { renewed: self.push(&record) },
-            Some(bad) => Taken::Bad(bad),
+            LineRead::Good => Taken::Good { renewed: self.push(&record) },
+            LineRead::Bad(bad, row) => {
+                row.iter().for_each(|row| self.refuse(row, |map| layout.columns(map)));
+                Taken::Bad(bad)
+            }
         })
+    }
+
+    /// Keeps what a row that was refused as out of range says of its unit.
+    #[cold]
+    fn refuse(&mut self, row: &Record, columns: impl Fn(&ColumnMap) -> ColumnMap) {
+        let rig = self.replay.rig();
+        let none = || Box::new(Refused::new(rig, &columns(&rig.columns)));
+        self.refused.get_or_insert_with(none).add_refused(row);
+    }
+
+    /// The unit, or the slipped decimal point, that brings within range what rows are refused for.
+    pub fn refused_for(&self) -> Option<Wiring> {
+        self.refused.as_ref()?.wiring()
+    }
+
+    /// Time of the last row, also of one out of range, s.
+    pub(crate) fn seen_s(&self) -> Option<f64> {
+        let refused_s = self.refused.as_ref().and_then(|refused| refused.last_s());
+        [self.time_s(), refused_s].into_iter().flatten().reduce(f64::max)
     }
 
     /// Time of the last good row, s; none before the first.
@@ -164,7 +198,11 @@ impl Stream {
         let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
         let summary = TraceSummary { begins, ..TraceSummary::new(name, quality) };
         let weighed = self.replay.last_stretch();
-        let suspect = |verdict: &Verdict| self.replay.suspicions_so_far(verdict, &weighed, &self.evidence);
+        let refused = self.refused_for().filter(|_| quality.is_mostly_bad());
+        let suspect = |verdict: &Verdict| match refused {
+            Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
+            None => self.replay.suspicions_so_far(verdict, &weighed, &self.evidence),
+        };
         Some(self.replay.report_with(summary, &weighed, suspect))
     }
 }

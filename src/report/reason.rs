@@ -4,7 +4,7 @@ use super::statement::{interval, join, with_interval};
 use super::{Findings, Misfit};
 use crate::channels::ChannelFaultKind;
 use crate::units::LPM_PER_M3S;
-use crate::wiring::{SingleZero, Wiring, ZeroCheck};
+use crate::wiring::{HOW_WIRED, SingleZero, Wiring, ZeroCheck};
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
@@ -122,11 +122,7 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
         .iter()
         .map(|fault| Reason::new(ReasonId::Channel(fault.kind), fault.text.clone(), fault.suggestion));
     let others = [
-        named(
-            ReasonId::Wiring,
-            findings.suspicions.wiring.as_ref(),
-            "how the columns are wired and recorded",
-        ),
+        named(ReasonId::Wiring, findings.suspicions.wiring.as_ref(), HOW_WIRED),
         named(ReasonId::SensorError, findings.suspicions.sensor.as_ref(), "the sensor against another one"),
         mostly_bad_rows(findings),
         bulk_modulus_impossible(findings),
@@ -172,15 +168,7 @@ fn undecided(findings: &Findings<'_>, leak: Leak) -> Reason {
 /// What explains the trace, with the lines that mend it.
 fn named(id: ReasonId, found: Option<&Wiring>, check: &str) -> Option<Reason> {
     let found = found?;
-    let suggestion = if found.columns.is_empty() {
-        format!("check {check}, and record anew")
-    } else {
-        format!(
-            "check {check}; where that is so, mend it in the rig file: [columns] {}",
-            found.columns.join("; ")
-        )
-    };
-    Some(Reason::new(id, found.suggestion.clone(), suggestion))
+    Some(Reason::new(id, found.suggestion.clone(), found.remedy(check)))
 }
 
 /// What remains may not stand for the cylinder.

@@ -94,12 +94,14 @@ pub enum TraceFault {
     #[error("line {0} is longer than a megabyte: not a trace of numbers")]
     TooLong(u64),
     /// Not one good row.
-    #[error("no usable row{}", describe_waste(*.skipped, .first.as_ref()))]
+    #[error("no usable row{}{}", describe_waste(*.skipped, .first.as_ref()), describe_mistake(.mistake.as_deref()))]
     NoRows {
         /// Rows skipped as bad.
         skipped: u64,
         /// The first of them.
         first: Option<BadRow>,
+        /// What would bring them within range, where it is known, and the lines that mend it.
+        mistake: Option<Box<str>>,
     },
     /// A bad row, where those are fatal.
     #[error("{0}")]
@@ -107,6 +109,10 @@ pub enum TraceFault {
     /// A compressed stream that ends early, where that is fatal.
     #[error("{0}")]
     CutOff(String),
+}
+
+fn describe_mistake(mistake: Option<&str>) -> String {
+    mistake.map_or_else(String::new, |mistake| format!("; {mistake}"))
 }
 
 fn describe_waste(skipped: u64, first: Option<&BadRow>) -> String {

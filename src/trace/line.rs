@@ -8,7 +8,7 @@ use super::row::Row;
 use super::row_validator::RowValidator;
 use super::stamp::Epoch;
 use super::{BadRows, Record};
-use crate::rig::Rig;
+use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 
 /// What the cells of a line hold, by their names, which are those of a trace's columns.
@@ -41,6 +41,11 @@ impl LineLayout {
         time_s.ok().filter(|time_s| time_s.is_finite())
     }
 
+    /// The column of each signal, as a rig file's `[columns]` would name it; `map` is the one it was made with.
+    pub(crate) fn columns(&self, map: &ColumnMap) -> ColumnMap {
+        self.0.column_map(map)
+    }
+
     /// A validator for lines like these.
     pub(crate) fn validator(&self, rig: &Rig, bad_rows: BadRows) -> RowValidator {
         let mut validator = RowValidator::new(rig, &self.0);
@@ -61,6 +66,13 @@ pub enum Taken {
     Bad(BadRow),
 }
 
+/// What was read of a line.
+pub(crate) enum LineRead {
+    Good,
+    /// With the row as it was read, where a sensor's reading in it is out of range.
+    Bad(BadRow, Option<Box<Record>>),
+}
+
 /// Reads the cells of a line into `record`; a bad row is an error only where those are fatal.
 pub(crate) fn read(
     layout: &LineLayout,
@@ -69,7 +81,7 @@ pub(crate) fn read(
     epoch_ns: &mut Option<i64>,
     validator: &mut RowValidator,
     record: &mut Record,
-) -> Result<Option<BadRow>, TraceFault> {
+) -> Result<LineRead, TraceFault> {
     let LineLayout(layout) = layout;
     let mut row = Row { line, ..Row::empty() };
     let mut epoch = Epoch::since(*epoch_ns, layout.time.clone());
@@ -79,10 +91,9 @@ pub(crate) fn read(
         Ok(()) => validator.check(&row, layout, record),
         Err(fault) => Some(describe(layout, line, cells, &fault)),
     };
-    if let Some(bad) = &bad {
-        validator.skip(bad.clone())?;
-    }
-    Ok(bad)
+    let Some(bad) = bad else { return Ok(LineRead::Good) };
+    validator.skip(bad.clone())?;
+    Ok(LineRead::Bad(bad, validator.take_refused().map(Box::new)))
 }
 
 /// Cells that were split before.

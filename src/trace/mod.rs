@@ -29,8 +29,8 @@ mod table_text;
 
 pub use error::{TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
-pub(crate) use line::read as read_line;
 pub use line::{LineLayout, Taken};
+pub(crate) use line::{LineRead, read as read_line};
 pub use quality::{BadReason, BadRow, Counted, TraceQuality};
 pub use row_validator::RowValidator;
 pub use stamp::seconds_between;
@@ -236,6 +236,20 @@ impl<'a> TraceReader<'a> {
     // Once per sample: a call and its result through memory are a tenth of the sample's time.
     #[inline(always)]
     pub fn next_record(&mut self, record: &mut Record) -> Result<bool, TraceError> {
+        self.next_record_or(record, |_| {})
+    }
+
+    /// As [`next_record`](Self::next_record); `refused` sees the rows on the way that are whole, but have a reading that is out
+    /// of its sensor's range.
+    ///
+    /// # Errors
+    /// As [`next_record`](Self::next_record).
+    #[inline(always)]
+    pub(crate) fn next_record_or(
+        &mut self,
+        record: &mut Record,
+        mut refused: impl FnMut(&Record),
+    ) -> Result<bool, TraceError> {
         while !self.done {
             let taken = match self.rows.next_row(&mut self.row).map_err(|fault| self.error(fault))? {
                 Next::Row => self.validator.take(&self.row, self.rows.layout(), record),
@@ -251,7 +265,7 @@ impl<'a> TraceReader<'a> {
             };
             match taken {
                 Ok(true) => return Ok(true),
-                Ok(false) => {}
+                Ok(false) => self.validator.take_refused().iter().for_each(&mut refused),
                 Err(fault) => {
                     self.done = true;
                     return Err(self.error(fault));

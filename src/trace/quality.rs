@@ -128,6 +128,11 @@ impl TraceQuality {
         (self.regular_steps > 0).then(|| self.regular_steps as f64 / self.regular_time_s)
     }
 
+    /// Whether more rows are bad than good.
+    pub fn is_mostly_bad(&self) -> bool {
+        self.skipped > self.rows
+    }
+
     /// One line each on what a reader of results should know.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();

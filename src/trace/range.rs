@@ -13,7 +13,7 @@ const SLACK: f64 = 0.05;
 const OVERRANGE: f64 = 2.0;
 
 #[derive(Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Range {
+pub(super) struct Range {
     signal: Signal,
     least: f64,
     most: f64,
@@ -46,6 +46,14 @@ impl From<[Range; RANGES]> for Ranges {
 impl From<Ranges> for [Range; RANGES] {
     fn from(ranges: Ranges) -> Self {
         ranges.listed
+    }
+}
+
+impl Range {
+    /// Whether it is that of a sensor of the cylinder.
+    pub(super) fn is_sensor(signal: Signal) -> bool {
+        use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
+        matches!(signal, Position | PressureA | PressureB | FlowA | FlowB | Force)
     }
 }
 

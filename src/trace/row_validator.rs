@@ -2,7 +2,7 @@ use super::clock::{Clock, Step};
 use super::columns::{Layout, shorten};
 use super::error::TraceFault;
 use super::quality::{BadReason, BadRow, TraceQuality};
-use super::range::Ranges;
+use super::range::{Range, Ranges};
 use super::row::Row;
 use super::{BadRows, Record};
 use crate::rig::Rig;
@@ -18,6 +18,9 @@ pub struct RowValidator {
     clock: Clock,
     bad_rows: BadRows,
     quality: TraceQuality,
+    /// The last row, if it was refused as out of range.
+    #[serde(skip)]
+    refused: Option<Record>,
 }
 
 impl RowValidator {
@@ -28,7 +31,13 @@ impl RowValidator {
             reading: layout.reading.clone(),
             ..TraceQuality::default()
         };
-        Self { ranges: Ranges::of(rig), clock: Clock::default(), bad_rows: BadRows::Skip, quality }
+        Self {
+            ranges: Ranges::of(rig),
+            clock: Clock::default(),
+            bad_rows: BadRows::Skip,
+            quality,
+            refused: None,
+        }
     }
 
     /// Whether it holds rows against what `rig` may read.
@@ -39,6 +48,12 @@ impl RowValidator {
     /// What was noticed so far.
     pub fn quality(&self) -> &TraceQuality {
         &self.quality
+    }
+
+    /// The last row as it was read, where a sensor's reading in it was out of range; once.
+    #[cold]
+    pub(super) fn take_refused(&mut self) -> Option<Record> {
+        self.refused.take()
     }
 
     /// Time of the last good row, s.
@@ -73,6 +88,7 @@ impl RowValidator {
     #[inline]
     pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
+            self.refused = Range::is_sensor(signal).then(|| readings(row));
             let detail = self.ranges.describe(signal, row.get(signal), layout.unit_of(signal));
             return Some(bad_cell(row, layout, signal, BadReason::OutOfRange, detail));
         }
@@ -124,11 +140,11 @@ impl RowValidator {
         if self.quality.rows > 0 {
             return Ok(());
         }
-        if let Some(why) = &self.quality.cut_off {
+        if let Some(why) = self.quality.cut_off.as_ref().filter(|_| self.quality.skipped == 0) {
             return Err(TraceFault::CutOff(why.clone()));
         }
         let first = self.quality.first_bad.first().cloned();
-        Err(TraceFault::NoRows { skipped: self.quality.skipped, first })
+        Err(TraceFault::NoRows { skipped: self.quality.skipped, first, mistake: None })
     }
 }
 

@@ -4,7 +4,7 @@ use super::mistake::{Exchange, Mistake};
 use super::readings::Readings;
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
-use crate::units::{LPM_PER_M3S, Unit};
+use crate::units::{Dimension, FEW_DIGITS, LPM_PER_M3S, Unit, readable, rounded};
 use pitchleak_core::ATMOSPHERE_PA;
 use serde::Serialize;
 
@@ -34,6 +34,17 @@ pub enum Evidence {
         /// … and exchanged.
         after: f64,
     },
+    /// What the reader refused as out of range.
+    Range {
+        /// Rows refused, …
+        refused: u64,
+        /// … of so many.
+        rows: u64,
+        /// Least and largest reading once the mistake is mended, SI.
+        extremes: [f64; 2],
+        /// The forces without the load force and with it, root mean square, N, where they tell.
+        force: Option<[f64; 2]>,
+    },
     /// How large the scatter of the readings is as they stand, in that declared; the other channels scatter as declared.
     Scatter(f64),
     /// So many readings are positive and as large as the negative flow that the piston's motion gives.
@@ -56,10 +67,35 @@ pub struct Wiring {
     pub alternatives: Vec<String>,
 }
 
+impl Wiring {
+    /// What to do about it.
+    pub fn remedy(&self, check: &str) -> String {
+        if self.columns.is_empty() {
+            return format!("check {check}, and record anew");
+        }
+        format!(
+            "check {check}; where that is so, mend it in the rig file: [columns] {}",
+            self.columns.join("; ")
+        )
+    }
+
+    /// It in one sentence, without a full stop.
+    pub(crate) fn sentence(&self) -> String {
+        format!("{}; {}", self.suggestion, self.remedy(HOW_WIRED))
+    }
+}
+
+/// What to check of a mistake of wiring.
+pub(crate) const HOW_WIRED: &str = "how the columns are wired and recorded";
+
 impl Explanation {
     /// In words; `columns` are those that the trace was read by.
     pub fn wiring(&self, columns: &ColumnMap, rig: &Rig) -> Wiring {
-        let names: Vec<String> = self.mistakes.iter().map(|mistake| mistake.text()).collect();
+        let name = |mistake: &Mistake| match self.evidence {
+            Evidence::Range { .. } => mistake.text() + &mistake.unit_text(columns),
+            _ => mistake.text(),
+        };
+        let names: Vec<String> = self.mistakes.iter().map(name).collect();
         let first = names.first().cloned().unwrap_or_default();
         let alternatives = names.get(1..).unwrap_or_default().to_vec();
         let (mut suggestion, residuals) = match self.evidence {
@@ -74,6 +110,9 @@ impl Explanation {
             }
             Evidence::Force { before, after } => {
                 (format!("with {first} the forces balance to {after:.0} N and not to {before:.0} N"), None)
+            }
+            Evidence::Range { refused, rows, extremes, force } => {
+                (self.within_range(columns, refused, rows, extremes, force), None)
             }
             Evidence::Scatter(ratio) => (
                 format!("with {first} they scatter as declared, and {ratio:.2} times that as they stand"),
@@ -96,6 +135,33 @@ impl Explanation {
             columns: self.mistakes.first().map_or_else(Vec::new, |mistake| mistake.mending(columns, rig)),
             alternatives,
         }
+    }
+}
+
+impl Explanation {
+    fn within_range(
+        &self,
+        columns: &ColumnMap,
+        refused: u64,
+        rows: u64,
+        extremes: [f64; 2],
+        force: Option<[f64; 2]>,
+    ) -> String {
+        let Some(Mistake::Scaled(readings, _)) = self.mistakes.first() else { return String::new() };
+        let first = self.mistakes.first().map(|mistake| mistake.text() + &mistake.unit_text(columns));
+        let unit =
+            readings.signals().first().and_then(|signal| signal.dimension()).and_then(Dimension::for_people);
+        let [least, most] = extremes.map(|value| unit.map_or(value, |unit| unit.from_si(value)));
+        let forces = force.map_or_else(String::new, |[before, after]| {
+            format!(", and balance the load force to {after:.0} N of {before:.0} N")
+        });
+        format!(
+            "with {} they are {} to {} {}, which the rig allows{forces}; as they stand {refused} of {rows} rows are out of range",
+            first.unwrap_or_default(),
+            readable(least, 3),
+            readable(most, 3),
+            unit.map_or("", |unit| unit.text)
+        )
     }
 }
 
@@ -129,11 +195,22 @@ impl Mistake {
         }
     }
 
+    /// The unit that a scaled column then has, as ` (psi)`; empty where it is none that has a name.
+    fn unit_text(self, columns: &ColumnMap) -> String {
+        let Self::Scaled(readings, factor) = self else { return String::new() };
+        let unit = readings.signals().first().and_then(|signal| {
+            let now = columns.get(signal)?.unit?;
+            let mended = in_unit(columns.get(signal)?.clone(), *signal, 1.0 / factor).unit?;
+            (mended.text != now.text).then_some(mended.text)
+        });
+        unit.map_or_else(String::new, |unit| format!(" ({unit})"))
+    }
+
     /// The lines of `[columns]` that mend it; none where a column cannot say it.
     pub fn mending(self, columns: &ColumnMap, rig: &Rig) -> Vec<String> {
         let line = |signal: Signal, from: Signal, change: &dyn Fn(ForeignColumn) -> ForeignColumn| {
-            let column = columns.get(&from)?.clone();
-            Some(format!("{} = {}", signal.name(), change(column).to_toml(signal)))
+            let column = without_arithmetic(change(columns.get(&from)?.clone()), signal);
+            Some(format!("{} = {}", signal.name(), column.to_toml(signal)))
         };
         let each = |readings: Readings, change: &dyn Fn(ForeignColumn) -> ForeignColumn| {
             readings.signals().iter().filter_map(|signal| line(*signal, *signal, change)).collect()
@@ -188,8 +265,17 @@ fn in_unit(column: ForeignColumn, signal: Signal, factor: f64) -> ForeignColumn 
     let unit = signal.dimension().and_then(|dimension| dimension.units().iter().find(fits).copied());
     match unit {
         Some(unit) => ForeignColumn { unit: Some(unit), ..column },
-        None => linear(column, factor, 0.0),
+        None => linear(column, rounded(factor, GAIN_DIGITS), 0.0),
     }
+}
+
+/// A gain is known to a thousandth.
+const GAIN_DIGITS: usize = 4;
+
+/// The column without the digits that arithmetic leaves in its numbers.
+fn without_arithmetic(column: ForeignColumn, signal: Signal) -> ForeignColumn {
+    let offset = signal.dimension().map_or(column.offset, |of| of.rounded_difference(column.offset));
+    ForeignColumn { scale: rounded(column.scale, FEW_DIGITS), offset, ..column }
 }
 
 /// Five significant digits at the most.
@@ -197,4 +283,58 @@ fn number(value: f64) -> String {
     let digits = (4 - value.abs().log10().floor() as i32).clamp(0, 8) as usize;
     let text = format!("{value:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn columns(unit: &str, scale: f64, offset: f64) -> ColumnMap {
+        let unit = crate::units::unit(unit, Dimension::Flow).unwrap();
+        let column = ForeignColumn { scale, offset, ..ForeignColumn::new("Q1", Some(unit)) };
+        ColumnMap::from([(Signal::FlowA, column)])
+    }
+
+    /// The line, and the rig file's column that it makes.
+    fn mended(mistake: Mistake, columns: &ColumnMap) -> (String, ForeignColumn) {
+        let mut rig = Rig::paper();
+        rig.columns = columns.clone();
+        let line = mistake.mending(columns, &rig).remove(0);
+        rig.columns.clear();
+        let text = format!("{}[columns]\n{line}\n", rig.to_toml());
+        let rig = Rig::parse(&text, "rig.toml").unwrap();
+        (line, rig.columns[&Signal::FlowA].clone())
+    }
+
+    #[test]
+    fn a_zero_is_written_as_it_is_known_and_in_the_unit_that_people_read() {
+        let (line, _) = mended(Mistake::Zero(Readings::FlowA, -0.39 / 60e3), &columns("L/min", 1.0, 0.0));
+        assert_eq!(line, "qa = { name = \"Q1\", unit = \"L/min\", offset = \"0.39 L/min\" }");
+        let (line, _) = mended(Mistake::Scaled(Readings::FlowA, 1.2), &columns("L/min", 1.0, 0.0));
+        assert_eq!(line, "qa = { name = \"Q1\", unit = \"L/min\", scale = 0.8333 }");
+    }
+
+    proptest! {
+        /// Whatever the column's own scale and offset are.
+        #[test]
+        fn what_mends_a_zero_or_a_gain_has_few_digits_and_loads(
+            zero_mlpm in -2000..2000i32,
+            factor in 601..1666i32,
+            offset_mlpm in -2000..2000i32,
+            scale in 1..1000i32,
+        ) {
+            let (zero, offset) = (f64::from(zero_mlpm) / 60e6, f64::from(offset_mlpm) / 60e6);
+            let (factor, scale) = (f64::from(factor) / 1e3, f64::from(scale) / 1e2);
+            let columns = columns("L/s", scale, offset);
+            let (line, column) = mended(Mistake::Zero(Readings::FlowA, zero), &columns);
+            let left = offset - zero;
+            prop_assert!((column.offset - left).abs() <= 1e-15, "{} {}", line, left);
+            prop_assert!(line.len() <= 80, "{}", line);
+            let (line, column) = mended(Mistake::Scaled(Readings::FlowA, factor), &columns);
+            prop_assert!((column.scale * factor / scale - 1.0).abs() < 1e-4, "{}", line);
+            prop_assert!(line.len() <= 80, "{}", line);
+        }
+    }
 }

@@ -58,6 +58,21 @@ impl ForceSums {
         })
     }
 
+    /// The balance with P_A and P_B divided by `factors`; `None` of too few blocks, or without a load force that changes.
+    pub fn scaled(&self, rig: &Rig, [by_a, by_b]: [f64; 2]) -> Option<Scaled> {
+        let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
+        let ([[load, of_a, of_b], ..], weights) = (self.left(), [area_a_m2 / by_a, -area_b_m2 / by_b]);
+        let Left { as_read, without, zeros: [zero, _], .. } = Left::of(self, weights, zero_std_n(rig));
+        let slope = (weights[0] * of_a + weights[1] * of_b) / load;
+        (self.blocks >= LEAST_BLOCKS && load > 0.0).then(|| Scaled {
+            as_read,
+            without,
+            slope,
+            zero,
+            blocks: f64::from(self.blocks),
+        })
+    }
+
     /// Means of F, P_A and P_B.
     fn means(&self) -> [f64; TERMS - FREE] {
         let [[_, _, _, _, means @ ..], ..] = self.products;
@@ -78,6 +93,43 @@ impl ForceSums {
             }
         }
         std::array::from_fn(|i| std::array::from_fn(|j| products[FREE + i][FREE + j]))
+    }
+}
+
+/// The balance with pressures that are divided by factors.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scaled {
+    as_read: f64,
+    without: f64,
+    /// By how much the load force would have to be larger.
+    slope: f64,
+    /// How far the sensors' zeros are off, standard deviations.
+    zero: f64,
+    blocks: f64,
+}
+
+/// Gains of pressure and force sensors that are off, and noise of the force, leave the slope within this of 1.
+const SLOPE: std::ops::RangeInclusive<f64> = 0.85..=1.18;
+
+impl Scaled {
+    /// Whether the load force, as it is read, explains these pressures.
+    pub fn balances(&self) -> bool {
+        let ratio = self.without / self.as_read.max(f64::MIN_POSITIVE);
+        ratio >= CONTRAST && self.deviance_of(ratio) >= LEAST_DROP && SLOPE.contains(&self.slope)
+    }
+
+    /// Less twice the log-likelihood, where the noise is what is left.
+    pub fn deviance(&self) -> f64 {
+        self.deviance_of(self.as_read.max(f64::MIN_POSITIVE)) + self.zero * self.zero
+    }
+
+    fn deviance_of(&self, square: f64) -> f64 {
+        self.blocks * square.ln()
+    }
+
+    /// Root mean square without the force and with it, N.
+    pub fn left_n(&self) -> [f64; 2] {
+        [self.without, self.as_read].map(|square| (square / self.blocks).sqrt())
     }
 }
 
@@ -121,6 +173,13 @@ impl Left {
     }
 }
 
+/// By how far the sensors' zeros may be off together, 1 σ, N.
+fn zero_std_n(rig: &Rig) -> f64 {
+    let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
+    let pressures_n = rig.instruments.pressure.full_scale * area_a_m2.hypot(area_b_m2);
+    UNDECLARED_ZERO_SHARE * pressures_n.hypot(rig.instruments.force.full_scale)
+}
+
 /// What the force balance says of the pressures.
 pub(crate) struct ForceBalance {
     declared: Left,
@@ -133,10 +192,7 @@ impl ForceBalance {
     pub(super) fn of(sums: &ForceSums, rig: &Rig) -> Option<Self> {
         let ([[load, ..], ..], blocks) = (sums.left(), sums.blocks);
         let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
-        let full_scale_pa = rig.instruments.pressure.full_scale;
-        let pressures_n = full_scale_pa * area_a_m2.hypot(area_b_m2);
-        let zero_std = UNDECLARED_ZERO_SHARE * pressures_n.hypot(rig.instruments.force.full_scale);
-        let of = |weights| Left::of(sums, weights, zero_std);
+        let of = |weights| Left::of(sums, weights, zero_std_n(rig));
         (blocks >= LEAST_BLOCKS && load > 0.0).then(|| Self {
             declared: of([area_a_m2, -area_b_m2]),
             exchanged: of([-area_b_m2, area_a_m2]),

@@ -16,6 +16,7 @@ mod noise;
 mod orifice;
 mod priors;
 mod readings;
+mod refused;
 mod running;
 mod running_median;
 mod sensor_error;
@@ -24,11 +25,13 @@ mod zeros;
 
 pub use continuity::Recorded;
 pub use excerpt::Excerpt;
+pub(crate) use explanation::HOW_WIRED;
 pub use explanation::{Evidence, Explanation, Wiring};
 pub use mistake::{Exchange, Mistake};
 pub use orifice::Orifice;
 pub(crate) use orifice::orifice;
 pub use readings::Readings;
+pub use refused::Refused;
 pub use running::Running;
 pub(crate) use sensor_error::sensor_error;
 pub use zeros::{SingleZero, ZeroCheck, zero_check};
@@ -39,6 +42,7 @@ use crate::signal::Signal;
 use crate::trace::Record;
 use continuity::Continuity;
 use fit::Fit;
+use force::ForceBalance;
 use noise::{ScatterRatios, Verdict};
 use priors::Priors;
 use rayon::prelude::*;
@@ -87,7 +91,11 @@ struct Scored {
 /// The exchange of pressures that the force balance tells, alone or with that of the flows, whatever the flows say; two where
 /// those don't tell which.
 pub(crate) fn exchanged_by_force(stretch: &Recorded<'_>) -> Option<Explanation> {
-    let [before, after] = stretch.force_balance()?.holds_exchanged()?;
+    exchanged_by(&stretch.force_balance()?, stretch)
+}
+
+fn exchanged_by(balance: &ForceBalance, stretch: &Recorded<'_>) -> Option<Explanation> {
+    let [before, after] = balance.holds_exchanged()?;
     let (records, rig) = (stretch.records, stretch.rig());
     let score = |mistake: Mistake| {
         let fit = Recorded::new(&mistake.mend(records, rig), rig)?.fit(&Priors::declared(rig))?;
@@ -110,7 +118,8 @@ pub(crate) fn exchanged_so_far(stretch: &impl Continuity) -> Option<Explanation>
 pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
     let (records, rig) = (stretch.records, stretch.rig());
     let priors = Priors::declared(rig);
-    if let Some(exchanged) = exchanged_by_force(stretch) {
+    let balance = stretch.force_balance();
+    if let Some(exchanged) = balance.as_ref().and_then(|balance| exchanged_by(balance, stretch)) {
         return Some(exchanged);
     }
     let declared = stretch.fit(&priors)?;
@@ -124,7 +133,7 @@ pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
     }
     let ratios = ScatterRatios::of(records, rig);
     let mut candidates = candidates::candidates();
-    if stretch.force_balance().is_some_and(|balance| balance.holds()) {
+    if balance.is_some_and(|balance| balance.holds()) {
         candidates.retain(|mistake| !EXCHANGED_PRESSURES.contains(mistake));
     }
     let score = |mistake: Mistake| {
