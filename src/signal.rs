@@ -95,4 +95,10 @@ impl Signal {
     pub fn is_required(self) -> bool {
         matches!(self, Self::Time | Self::Timestamp | Self::Position | Self::PressureA | Self::PressureB)
     }
+
+    /// Whether a sensor of the cylinder reads it.
+    pub(crate) fn is_sensor(self) -> bool {
+        use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
+        matches!(self, Position | PressureA | PressureB | FlowA | FlowB | Force)
+    }
 }

@@ -32,6 +32,7 @@ pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, Taken};
 pub(crate) use line::{LineRead, read as read_line};
 pub use quality::{BadReason, BadRow, Counted, TraceQuality};
+pub(crate) use range::OVERRANGE;
 pub use row_validator::RowValidator;
 pub use stamp::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};

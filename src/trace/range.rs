@@ -10,10 +10,10 @@ const VACUUM_PA: f64 = -101_325.0;
 /// Noise and offset may carry a sound reading this share of full scale past what is possible.
 const SLACK: f64 = 0.05;
 /// No sensor reads more than this many times its full scale.
-const OVERRANGE: f64 = 2.0;
+pub(crate) const OVERRANGE: f64 = 2.0;
 
 #[derive(Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Range {
+struct Range {
     signal: Signal,
     least: f64,
     most: f64,
@@ -46,14 +46,6 @@ impl From<[Range; RANGES]> for Ranges {
 impl From<Ranges> for [Range; RANGES] {
     fn from(ranges: Ranges) -> Self {
         ranges.listed
-    }
-}
-
-impl Range {
-    /// Whether it is that of a sensor of the cylinder.
-    pub(super) fn is_sensor(signal: Signal) -> bool {
-        use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
-        matches!(signal, Position | PressureA | PressureB | FlowA | FlowB | Force)
     }
 }
 

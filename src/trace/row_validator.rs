@@ -2,7 +2,7 @@ use super::clock::{Clock, Step};
 use super::columns::{Layout, shorten};
 use super::error::TraceFault;
 use super::quality::{BadReason, BadRow, TraceQuality};
-use super::range::{Range, Ranges};
+use super::range::Ranges;
 use super::row::Row;
 use super::{BadRows, Record};
 use crate::rig::Rig;
@@ -88,7 +88,7 @@ impl RowValidator {
     #[inline]
     pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
-            self.refused = Range::is_sensor(signal).then(|| readings(row));
+            self.refused = signal.is_sensor().then(|| readings(row));
             let detail = self.ranges.describe(signal, row.get(signal), layout.unit_of(signal));
             return Some(bad_cell(row, layout, signal, BadReason::OutOfRange, detail));
         }

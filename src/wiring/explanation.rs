@@ -112,7 +112,7 @@ impl Explanation {
                 (format!("with {first} the forces balance to {after:.0} N and not to {before:.0} N"), None)
             }
             Evidence::Range { refused, rows, extremes, force } => {
-                (self.within_range(columns, refused, rows, extremes, force), None)
+                (self.within_range(&first, refused, rows, extremes, force), None)
             }
             Evidence::Scatter(ratio) => (
                 format!("with {first} they scatter as declared, and {ratio:.2} times that as they stand"),
@@ -136,19 +136,17 @@ impl Explanation {
             alternatives,
         }
     }
-}
 
-impl Explanation {
+    /// `first` is what mends it.
     fn within_range(
         &self,
-        columns: &ColumnMap,
+        first: &str,
         refused: u64,
         rows: u64,
         extremes: [f64; 2],
         force: Option<[f64; 2]>,
     ) -> String {
         let Some(Mistake::Scaled(readings, _)) = self.mistakes.first() else { return String::new() };
-        let first = self.mistakes.first().map(|mistake| mistake.text() + &mistake.unit_text(columns));
         let unit =
             readings.signals().first().and_then(|signal| signal.dimension()).and_then(Dimension::for_people);
         let [least, most] = extremes.map(|value| unit.map_or(value, |unit| unit.from_si(value)));
@@ -156,8 +154,7 @@ impl Explanation {
             format!(", and balance the load force to {after:.0} N of {before:.0} N")
         });
         format!(
-            "with {} they are {} to {} {}, which the rig allows{forces}; as they stand {refused} of {rows} rows are out of range",
-            first.unwrap_or_default(),
+            "with {first} they are {} to {} {}, which the rig allows{forces}; as they stand {refused} of {rows} rows are out of range",
             readable(least, 3),
             readable(most, 3),
             unit.map_or("", |unit| unit.text)

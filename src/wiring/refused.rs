@@ -10,7 +10,7 @@ use super::readings::Readings;
 use super::{APART, MOST_ALIKE, POSSIBLE_SHARE};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
-use crate::trace::Record;
+use crate::trace::{OVERRANGE, Record};
 use crate::units::Dimension;
 use pitchleak_core::Sample;
 use serde::{Deserialize, Serialize};
@@ -19,9 +19,7 @@ use serde::{Deserialize, Serialize};
 const LEAST_ROWS: u64 = 100;
 /// Mended readings reach this share of full scale at the least and at the most.
 const SHARE_OF_FULL_SCALE: std::ops::RangeInclusive<f64> = 0.005..=1.3;
-/// Beyond twice its full scale no sensor reads: as the reader has it …
-const OVERRANGE: f64 = 2.0;
-/// … and what is beyond so many times that is no sensor's reading in any unit.
+/// What is beyond so many times full scale is no sensor's reading in any unit.
 const ABSURD: f64 = 1e7;
 /// A longer step is a pause, s.
 const LONGEST_STEP_S: f64 = 1.0;

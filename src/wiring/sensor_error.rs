@@ -13,6 +13,8 @@ use pitchleak_core::{Leak, Parameter};
 /// What may be off, one at a time.
 pub(super) const ERRORS: [Parameter; 5] =
     [Parameter::GainA, Parameter::GainB, Parameter::GainPosition, Parameter::OffsetA, Parameter::OffsetB];
+/// The meters' zeros, which may both be off.
+const ZEROS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 /// An error of fewer standard deviations is none.
 const SURE_SIGMAS: f64 = 5.0;
 /// Larger gains are mistakes of the unit.
@@ -35,7 +37,7 @@ pub(crate) fn sensor_error(stretch: &impl Continuity) -> Option<Explanation> {
         Some((mistake(errors, &fit), fit))
     };
     let singles = ERRORS.iter().filter_map(|error| score(&[*error]));
-    let mut found: Vec<_> = singles.chain(score(&[Parameter::OffsetA, Parameter::OffsetB])).collect();
+    let mut found: Vec<_> = singles.chain(score(&ZEROS)).collect();
     found.sort_by(|(_, a), (_, b)| a.chi_square().total_cmp(&b.chi_square()));
     let (_, best) = *found.first()?;
     let most = best.chi_square() + APART * best.worst().max(1.0);
@@ -50,13 +52,12 @@ pub(crate) fn sensor_error(stretch: &impl Continuity) -> Option<Explanation> {
 /// at once, one of them negative, look like a zero, so that it stays unsure beside all three.
 fn fewer_leaks(all: Priors, errors: &[Parameter]) -> Vec<Priors> {
     let mut suppositions = vec![all];
-    if errors.iter().all(|error| matches!(error, Parameter::OffsetA | Parameter::OffsetB)) {
-        let without = |leaks: &[Leak]| leaks.iter().fold(all, |priors, leak| priors.without(*leak));
-        suppositions.push(without(&Leak::ALL));
-        suppositions.extend(Leak::ALL.map(|only| {
-            let others: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| *leak != only).collect();
-            without(&others)
-        }));
+    if errors.iter().all(|error| ZEROS.contains(error)) {
+        let only = |kept: Option<Leak>| {
+            Leak::ALL.into_iter().filter(|leak| Some(*leak) != kept).fold(all, Priors::without)
+        };
+        suppositions.push(only(None));
+        suppositions.extend(Leak::ALL.map(|leak| only(Some(leak))));
     }
     suppositions
 }
@@ -74,8 +75,7 @@ fn explains(fit: &Fit, declared: &Fit, errors: &[Parameter]) -> bool {
 
 fn is_sure(fit: &Fit, error: Parameter) -> bool {
     let found = fit.parameter(error);
-    let is_zero = matches!(error, Parameter::OffsetA | Parameter::OffsetB);
-    found.value.abs() >= SURE_SIGMAS * found.std && (is_zero || found.value.abs() <= MOST_GAIN)
+    found.value.abs() >= SURE_SIGMAS * found.std && (ZEROS.contains(&error) || found.value.abs() <= MOST_GAIN)
 }
 
 /// As a mistake of the readings; a gain g stands for readings 1/(1 − g) times too large.
@@ -89,6 +89,6 @@ fn mistake(errors: &[Parameter], fit: &Fit) -> Mistake {
         [Parameter::OffsetA] => Mistake::Zero(Readings::FlowA, zero_m3s(Parameter::OffsetA)),
         [Parameter::OffsetB] => Mistake::Zero(Readings::FlowB, zero_m3s(Parameter::OffsetB)),
         [Parameter::GainPosition] => Mistake::Scaled(Readings::Position, factor(Parameter::GainPosition)),
-        _ => Mistake::Zeros([Parameter::OffsetA, Parameter::OffsetB].map(zero_m3s)),
+        _ => Mistake::Zeros(ZEROS.map(zero_m3s)),
     }
 }

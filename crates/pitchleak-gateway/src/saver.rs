@@ -5,12 +5,12 @@ use crate::failure::Failure;
 use crate::input::Input;
 use crate::summaries::Summaries;
 use pitchleak::live::{Checkpoint, Snapshot, SummaryEvent};
+use rustix::process::{getpriority_process, setpriority_process};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// A tenth of the processor, while the thread of the samples wants all of it.
-#[cfg(target_os = "linux")]
 const NICER: i32 = 10;
 
 /// What is to be written, and the deliveries that may be acknowledged then.
@@ -49,11 +49,7 @@ pub fn start(
 
 /// Where samples come meanwhile on the same core, they go first. On Linux a priority is the thread's own.
 fn give_way() {
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::process::{getpriority_process, setpriority_process};
-        let _ = getpriority_process(None).and_then(|nice| setpriority_process(None, nice + NICER));
-    }
+    let _ = getpriority_process(None).and_then(|nice| setpriority_process(None, nice + NICER));
 }
 
 fn work(checkpoint: &Checkpoint, summaries: &Summaries, queue: &Receiver<Job>, inbox: &SyncSender<Input>) {
