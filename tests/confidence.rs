@@ -50,9 +50,9 @@ fn two_effects_are_both_named_and_their_values_hold() {
         let worst = tally::deviations(case, answer).into_iter().fold(0.0, f64::max);
         assert!(worst < 4.5, "{}", tally::line(case, answer));
     }
-    // Viscous friction beside a position gain passes for a line's resistance in one; dry friction leaves more than noise in two.
-    assert!(first + 1 >= answers.len(), "{first} of {}:\n{}", answers.len(), lines(&answers));
-    assert!(explained + 3 >= answers.len(), "{explained} of {}:\n{}", answers.len(), lines(&answers));
+    // Dry friction leaves more than noise in two.
+    assert!(first == answers.len(), "{first} of {}:\n{}", answers.len(), lines(&answers));
+    assert!(explained + 2 >= answers.len(), "{explained} of {}:\n{}", answers.len(), lines(&answers));
 }
 
 #[test]
@@ -60,6 +60,21 @@ fn an_effect_that_no_table_has_is_never_surely_explained_by_another() {
     for (case, answer) in asked(questions::outside(26), 0, 2) {
         let surely = answer.effects.iter().any(|effect| effect.confident);
         assert!(!(surely && answer.verdict == Verdict::Explained), "{}", tally::line(&case, &answer));
+    }
+}
+
+/// A pressure sensor with play is named with its width, and not as one that answers late.
+#[test]
+fn a_sensor_that_hangs_behind_is_no_sensor_that_is_late() {
+    let mut cases = questions::further(48);
+    cases.retain(|case| case.name == "pressure sensor with play");
+    assert!(cases.len() >= 6);
+    for (case, answer) in asked(cases, 0, 2) {
+        assert!(tally::first_is_true(&case, &answer), "{}", tally::line(&case, &answer));
+        let off = answer.effects[0].value / case.truth[0].1 - 1.0;
+        assert!(off.abs() < 0.15, "{}", tally::line(&case, &answer));
+        let late = answer.effects.iter().any(|effect| effect.confident && effect.id.contains("_lag"));
+        assert!(!late, "{}", tally::line(&case, &answer));
     }
 }
 

@@ -233,6 +233,7 @@ fn single(count: usize) -> Vec<Case> {
             }
             16 => {
                 read.pressure_play = 3e4 * large;
+                case.truth = vec![("pressure_hysteresis_a", read.pressure_play)];
                 "pressure sensor with play"
             }
             17 => {

@@ -63,6 +63,9 @@ pub(crate) const LONGEST_WINDOW_S: f64 = BLOCK_S;
 pub(crate) const LEAST_SURE_SIGMA: f64 = 3.0;
 /// See [`LEAST_SURE_SIGMA`].
 pub(crate) const LEAST_SURE_SHARE: f64 = 5e-3;
+/// A pressure has turned once its smoothed reading has come back by so many standard deviations of its noise. Chosen: noise alone
+/// turns it seldom, and real turns are seen soon.
+pub(crate) const TURNED_SIGMA: f64 = 1.5;
 
 // Weak form.
 
@@ -131,6 +134,8 @@ pub(crate) const FEWEST_TO_SIMPLIFY: usize = 3;
 /// While the residual is larger than the noise, an effect must mend this share of it to be named.
 /// Chosen: below that it is too small to be told from what the wrong equations make of it.
 pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;
+/// An effect shows in the forces alone where that share of its column stands in them. Chosen: the rest moves nothing.
+pub(crate) const FORCE_ONLY_SHARE: f64 = 0.99;
 /// A candidate below this share of the best is not worth a search for its constants. Chosen for cost.
 pub(crate) const IN_THE_RUNNING: f64 = 0.4;
 /// Standard deviations by the jackknife that an effect must have beside an unexplained residual. Chosen: three.

@@ -2,11 +2,13 @@
 
 use crate::rig::Rig;
 use crate::trace::Record;
-use pitchleak_core::effects::EffectKind;
+use pitchleak_core::effects::{EffectKind, Play};
 use pitchleak_core::{EffectSet, FadingMemoryFilter, Model, PerLeak, Sample, Signals};
 
 /// Memory of the derivatives that effects such as dead volume or drag ask for, s.
 const MEMORY_S: f64 = 0.05;
+/// No pressure is read finer than this, Pa.
+const FINEST_PA: f64 = 1.0;
 /// Where a trace has no temperature, K.
 const USUAL_TEMPERATURE_K: f64 = 313.15;
 
@@ -16,6 +18,8 @@ pub(super) struct Correction {
     effects: EffectSet<f64>,
     model: Model<f64>,
     rates: Rates,
+    #[serde(default)]
+    sides: Sides,
     /// Sizes of the effects' own leak flows, summed over time, m³.
     leaked_m3: PerLeak<f64>,
     time_s: f64,
@@ -31,6 +35,21 @@ struct Rates {
     qb: FadingMemoryFilter<f64>,
 }
 
+/// Which way the pressures went last.
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
+struct Sides {
+    /// A pressure has turned once it has come back by twice this, Pa.
+    turned_pa: f64,
+    pa: Option<Play<f64>>,
+    pb: Option<Play<f64>>,
+}
+
+impl Sides {
+    fn of(smooth_pa: f64, play: &mut Option<Play<f64>>, turned_pa: f64) -> f64 {
+        play.get_or_insert(Play::new(smooth_pa)).side(turned_pa, smooth_pa)
+    }
+}
+
 impl Correction {
     /// The correction for a rig; `None` where its file has no effects.
     pub fn of(rig: &Rig) -> Option<Self> {
@@ -40,7 +59,15 @@ impl Correction {
         let model = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks_m3spa: PerLeak::default() };
         let filter = FadingMemoryFilter::new(MEMORY_S);
         let rates = Rates { x: filter, pa: filter, pb: filter, qa: filter, qb: filter };
-        Some(Self { effects: rig.effect_set(), model, rates, leaked_m3: PerLeak::default(), time_s: 0.0 })
+        let sides = Sides { turned_pa: rig.sensors().pressure.noise_std.max(FINEST_PA), ..Sides::default() };
+        Some(Self {
+            effects: rig.effect_set(),
+            model,
+            rates,
+            sides,
+            leaked_m3: PerLeak::default(),
+            time_s: 0.0,
+        })
     }
 
     /// Sensor effects are undone on the readings; what physical effects take is subtracted from the flows.
@@ -90,6 +117,10 @@ impl Correction {
             dpb_pas: pb.slope(),
             d2pa_pas2: pa.curvature(),
             d2pb_pas2: pb.curvature(),
+            pa_side: Sides::of(pa.value(), &mut self.sides.pa, self.sides.turned_pa),
+            pb_side: Sides::of(pb.value(), &mut self.sides.pb, self.sides.turned_pa),
+            dpa_side_ps: 0.0,
+            dpb_side_ps: 0.0,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: self.rates.qa.update(dt_s, qa).slope(),

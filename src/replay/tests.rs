@@ -91,6 +91,28 @@ fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
     assert!((gapped / whole - 1.0).abs() < 1e-3, "{whole} {gapped}");
 }
 
+/// What hangs behind by a known play is brought back to the truth but for a moment after each turn.
+#[test]
+fn a_declared_hysteresis_is_taken_out_of_the_readings() {
+    use crate::rig::EffectValue;
+    use pitchleak_core::effects::Play;
+    let (mut rig, width_pa) = (Rig::paper(), 1e5);
+    rig.instruments = rig.instruments.with_accuracy(1e-3);
+    rig.effects.insert(pitchleak_core::Effect::PressureHysteresisA, EffectValue::new(width_pa, None));
+    let mut correction = Correction::of(&rig).expect("an effect");
+    let all = records(&[]);
+    let mut play = Play::new(all[0].sample.pa_pa);
+    let (mut before, mut after) = (0.0, 0.0);
+    for record in all {
+        let truth = record.sample.pa_pa;
+        let mut shown = record;
+        shown.sample.pa_pa = play.update(width_pa, truth);
+        before += (shown.sample.pa_pa - truth).powi(2);
+        after += (correction.correct(&shown).sample.pa_pa - truth).powi(2);
+    }
+    assert!(after < 0.25 * before, "{}", (after / before).sqrt());
+}
+
 #[test]
 fn a_rig_that_cannot_be_is_refused() {
     let mut rig = Rig::paper();

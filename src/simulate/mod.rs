@@ -13,6 +13,7 @@ mod reading;
 mod recording;
 mod sensing;
 pub mod sensor_fault;
+mod sensor_memory;
 mod span;
 mod writer;
 
@@ -32,10 +33,10 @@ pub use writer::{Columns, Row, TraceLayout, TraceWriter};
 
 use crate::Rig;
 use crate::reference::Reference;
-use pitchleak_core::effects::LaggedReading;
 use pitchleak_core::emulator::{Emulator, EmulatorParams};
 use pitchleak_core::plant::PlantError;
-use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sample, Signals};
+use pitchleak_core::{EffectSet, Model, PerLeak, Sample, Signals};
+use sensor_memory::RememberingSensor;
 
 /// What is simulated: a rig, what it follows, its leaks, and for how long.
 #[derive(Clone, Debug)]
@@ -246,38 +247,14 @@ impl Scenario {
     }
 }
 
-/// The emulator with the sensors' own lags.
+/// The emulator with what its sensors remember.
 struct RunningRig {
     emulator: Emulator<f64>,
     /// Coefficients that its leaks have now, m³/(s·Pa).
     leaks_m3spa: PerLeak<f64>,
-    /// What the sensors do to the readings beside their lags.
+    /// What the sensors do to the readings at once.
     prompt: EffectSet<f64>,
-    lagging: Vec<Lagging>,
-}
-
-/// Sensors that answer late by an effect.
-struct Lagging {
-    effect: Effect,
-    lag_s: f64,
-    readings: [Option<LaggedReading<f64>>; 2],
-}
-
-impl Lagging {
-    /// Sensors that have shown these signals for long; none where the effect delays nothing.
-    fn new(effect: Effect, lag_s: f64, signals: &mut Signals<f64>) -> Option<Self> {
-        let readings = effect.late(signals).map(|signal| signal.map(|now| LaggedReading::new(*now)));
-        readings.iter().any(Option::is_some).then_some(Self { effect, lag_s, readings })
-    }
-
-    /// Puts the late readings in the signals' place.
-    fn show(&mut self, step_s: f64, signals: &mut Signals<f64>) {
-        for (signal, reading) in self.effect.late(signals).into_iter().zip(&mut self.readings) {
-            if let (Some(signal), Some(reading)) = (signal, reading) {
-                *signal = reading.update(step_s, self.lag_s, *signal);
-            }
-        }
-    }
+    remembering: Vec<RememberingSensor>,
 }
 
 impl RunningRig {
@@ -289,24 +266,24 @@ impl RunningRig {
         params.internal_step_s = STEP_S;
         let (position_m, load_n) = reference.at(t_s);
         let emulator = Emulator::new(params, position_m, load_n)?;
-        let (mut prompt, mut lagging) = (EffectSet::default(), Vec::new());
+        let (mut prompt, mut remembering) = (EffectSet::default(), Vec::new());
         let mut now = emulator.reading().signals;
         for active in effects.iter() {
-            match Lagging::new(active.effect, active.value, &mut now) {
-                Some(sensor) => lagging.push(sensor),
+            match RememberingSensor::new(active.effect, active.value, &mut now) {
+                Some(sensor) => remembering.push(sensor),
                 None => {
                     // As many fit as there were, and they were within their bounds.
                     let _ = prompt.set(active.effect, active.value, active.constants);
                 }
             }
         }
-        Ok(Self { emulator, leaks_m3spa: PerLeak::default(), prompt, lagging })
+        Ok(Self { emulator, leaks_m3spa: PerLeak::default(), prompt, remembering })
     }
 
     fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
         self.emulator.step(step_s, position_m, load_n)?;
         let mut signals = self.emulator.reading().signals;
-        self.lagging.iter_mut().for_each(|one| one.show(step_s, &mut signals));
+        self.remembering.iter_mut().for_each(|one| one.show(step_s, &mut signals));
         Ok(())
     }
 
@@ -315,7 +292,7 @@ impl RunningRig {
         let reading = self.emulator.reading();
         let signals = reading.signals;
         let mut seen = signals;
-        self.lagging.iter_mut().for_each(|one| one.show(0.0, &mut seen));
+        self.remembering.iter_mut().for_each(|one| one.show(0.0, &mut seen));
         let shown = self.prompt.read(&seen);
         Truth {
             t_s,

@@ -1,6 +1,8 @@
 //! The table of effects and the maps between truth and reading.
 
-use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectError, EffectKind, LaggedReading};
+use pitchleak_core::effects::{
+    EffectConstant, EffectConstants, EffectError, EffectKind, LaggedReading, Play,
+};
 use pitchleak_core::{Effect, EffectSet, Model, PerLeak, SensorSpread, Sensors, Signals};
 use proptest::prelude::*;
 
@@ -20,6 +22,10 @@ fn signals() -> impl Strategy<Value = Signals<f64>> {
             dpb_pas: dpb,
             d2pa_pas2: d2pa,
             d2pb_pas2: d2pb,
+            pa_side: 0.7,
+            pb_side: -0.4,
+            dpa_side_ps: 5.0,
+            dpb_side_ps: -7.0,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: dqa,
@@ -189,6 +195,33 @@ fn late_sensors_are_those_that_a_lag_delays() {
         assert_eq!(!late.is_empty(), effect.spec().unit == "s", "{effect}");
         assert!(late.iter().all(|signal| (signal + 0.5).abs() < 1e-12), "{effect}: {late:?}");
     }
+}
+
+/// Play is the distance by which a reading hangs behind: rising it reads less, falling more.
+#[test]
+fn sensors_with_play_are_those_that_hang_behind() {
+    let rising = Signals { pa_side: 1.0, pb_side: 1.0, ..Signals::default() };
+    for effect in Effect::ALL.iter().copied() {
+        let mut shown = effect.read(0.5, &rising);
+        let hanging = effect.hanging(&mut shown).map(|signal| *signal);
+        assert_eq!(hanging, effect.spec().id.contains("_hysteresis").then_some(-0.5), "{effect}");
+    }
+}
+
+/// Once it has moved through its play the sensor reads what the map between truth and reading says, either way.
+#[test]
+fn a_sensor_with_play_hangs_behind_on_both_sides() {
+    let (width, mut own, mut known) = (3.0_f64, Play::new(0.0), Play::new(0.0));
+    let way = (0..200).map(|i| f64::from(i - 2 * (i - 100).max(0)));
+    for signal in way {
+        let (reading, side) = (own.update(width, signal), known.side(width, signal));
+        let truth = Signals { pa_pa: signal, pa_side: side, ..Signals::default() };
+        let mapped = Effect::PressureHysteresisA.read(width, &truth).pa_pa;
+        assert!((reading - mapped).abs() < 1e-9 && side.abs() <= 1.0, "{signal}: {reading} {mapped}");
+    }
+    assert!(
+        (own.update(width, 1.0) - 4.0).abs() < 1e-12 && (own.update(width, f64::NAN) - 4.0).abs() < 1e-12
+    );
 }
 
 /// A fit varies exactly the constants that an effect's term depends on.

@@ -38,6 +38,7 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
     let reasons: Vec<String> = [
         rivals(one),
         remainder(fit, one, judgement),
+        unnamed(fit, one, judgement),
         company(selection, one, judgement),
         lopsided(selection, one),
         bounds(fit, one),
@@ -97,6 +98,23 @@ fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Str
          believed without a measurement of its own"
             .to_owned()
     })
+}
+
+/// Where it acts something else is left, of which a candidate beyond chance mends too little for a name of its own: the rest of what that
+/// does may stand under this one's name.
+fn unnamed(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let acts = acts_in(fit, one.term);
+    let is_rival = |candidate: &usize| {
+        let also = acts_in(fit, *candidate);
+        let needed = search::critical_sigma(fit, fit.constants(*candidate)).powi(2) * dispersion;
+        let is_near = |equation: Equation| acts[equation] && also[equation] && judgement.left[equation] > 0.0;
+        Equation::ALL.into_iter().any(is_near)
+            && fit.score(&fit.free, *candidate).is_some_and(|score| score.chi2_drop > needed)
+    };
+    let rival = search::open(fit).into_iter().find(is_rival)?;
+    let id = fit.problem.terms[rival].effect()?.spec().id;
+    Some(format!("more than noise is left where it acts, and {id} goes with that"))
 }
 
 /// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that

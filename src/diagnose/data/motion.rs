@@ -1,11 +1,15 @@
-//! The speed that friction feels: from the flows where they are measured, which know it ten times
+//! What a trace says of the ways its signals go. The speed that friction feels: from the flows where they are measured, which know it ten times
 //! better than the position's difference does, else from the slope of the position.
 
 use super::series::Series;
-use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
+use crate::diagnose::thresholds::{
+    LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE, TURNED_SIGMA,
+};
+use pitchleak_core::effects::Play;
 use pitchleak_core::{EffectSet, Model, Sensors, Signals};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
+#[derive(Default)]
 pub(crate) struct Motion {
     /// m/s, one per sample; NaN where it can't be told.
     pub(crate) v_mps: Vec<f64>,
@@ -13,6 +17,10 @@ pub(crate) struct Motion {
     pub(crate) std_mps: f64,
     /// Root mean square, m/s.
     pub(crate) rms_mps: f64,
+    /// On which side of its play sensor A would read, −1 to 1.
+    pub(crate) pa_side: Vec<f64>,
+    /// The same of sensor B.
+    pub(crate) pb_side: Vec<f64>,
 }
 
 impl Motion {
@@ -24,11 +32,13 @@ impl Motion {
         sensors: &Sensors<f64>,
     ) -> Self {
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
-        if has(&series.qa_m3s) || has(&series.qb_m3s) {
+        let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
             Self::from_flow(series, model, effects, sensors)
         } else {
             Self::from_position(series, effects, sensors)
-        }
+        };
+        let side = |values: &[f64]| sides(values, sensors.pressure.noise_std, series.step_s());
+        Self { pa_side: side(&series.pa_pa), pb_side: side(&series.pb_pa), ..own }
     }
 
     fn from_flow(
@@ -44,7 +54,7 @@ impl Motion {
         let (half, step) = (half_window(std, rms, 2.0), series.step_s());
         let half = half.min(longest_half(step));
         let v_mps = smooth(&raw, half);
-        Self { v_mps, std_mps: std / ((2 * half + 1) as f64).sqrt(), rms_mps: rms }
+        Self { v_mps, std_mps: std / ((2 * half + 1) as f64).sqrt(), rms_mps: rms, ..Self::default() }
     }
 
     fn from_position(series: &Series, effects: &EffectSet<f64>, sensors: &Sensors<f64>) -> Self {
@@ -54,7 +64,7 @@ impl Motion {
         let n = (2 * half + 1) as f64;
         let std = sensors.position.noise_std * (12.0 / (n * n * n)).sqrt() / series.step_s().max(1e-9);
         let rms_mps = root_mean_square(&v_mps);
-        Self { v_mps, std_mps: std, rms_mps }
+        Self { v_mps, std_mps: std, rms_mps, ..Self::default() }
     }
 
     /// Below this speed the direction of motion is not known.
@@ -128,6 +138,16 @@ fn smooth(values: &[f64], half: usize) -> Vec<f64> {
             window.iter().sum::<f64>() / window.len() as f64
         })
         .collect()
+}
+
+/// Which way a signal went last, from its reading: a sensor with play lies on that side of it until it has come back through all of it,
+/// and its reading stands meanwhile. Seen once the reading, smoothed over a block, has turned by [`TURNED_SIGMA`] of its noise.
+fn sides(values: &[f64], noise_std: f64, step_s: f64) -> Vec<f64> {
+    let half = longest_half(step_s);
+    let turned = TURNED_SIGMA * noise_std / ((2 * half + 1) as f64).sqrt();
+    let smooth = smooth(values, half);
+    let mut play = Play::new(smooth.first().copied().unwrap_or(0.0));
+    smooth.into_iter().map(|value| play.side(turned, value)).collect()
 }
 
 /// Least-squares slope over `half` samples on each side.

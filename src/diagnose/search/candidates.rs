@@ -15,7 +15,7 @@ pub(crate) fn open(fit: &Fit<'_>) -> Vec<usize> {
 }
 
 /// The size in σ that the score of a candidate with these constants needs.
-pub(super) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
+pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
     let problem = fit.problem;
     let count = problem.terms.iter().filter(|term| term.effect().is_some()).count();
     let trials = if problem.is_usual(constants) { 1 } else { CONSTANTS_TRIALS };

@@ -7,9 +7,10 @@ mod exchange;
 mod interaction;
 mod select;
 mod selection;
+mod split;
 mod trials;
 
-pub(crate) use candidates::{open, strongest_nameless};
+pub(crate) use candidates::{critical_sigma, open, strongest_nameless};
 pub use collinearity::{Candidate, Collinearity};
 pub(crate) use interaction::interactions;
 pub(crate) use selection::{Selected, Selection, loss};
@@ -27,7 +28,7 @@ pub(crate) fn search<'a>(
     let mut last = error(&declared);
     let mut all = Selection::none(declared);
     for _ in 0..MOST_STEPS {
-        if !all.add_next(progress) {
+        if !all.add_next(progress) && !split::split_one(&mut all, progress) {
             break;
         }
         all.refine_friction(progress);
@@ -38,6 +39,8 @@ pub(crate) fn search<'a>(
         all.effects.iter_mut().for_each(|one| _ = one.mended_percent.get_or_insert(mended));
         last = now;
     }
+    // The last exchange may have left some.
+    all.drop_needless(progress);
     all.drop_doubtful(progress);
     all.find_confusable();
     exchange::simplify(&mut all, progress);

@@ -10,6 +10,15 @@ use crate::diagnose::thresholds::{AGREED_SIGMA, CONFUSABLE_CHI2, LEAST_MENDED_SH
 impl Selection<'_> {
     /// Adds the next effect; false when nothing further is significant.
     pub(super) fn add_next(&mut self, progress: Progress<'_>) -> bool {
+        self.add_best(|_, _| true, progress)
+    }
+
+    /// The same among some terms alone.
+    pub(super) fn add_best(
+        &mut self,
+        is_wanted: impl Fn(&Fit<'_>, usize) -> bool,
+        progress: Progress<'_>,
+    ) -> bool {
         let fit = &self.fit;
         let is_added =
             |i: &&usize| fit.problem.priors[**i].is_none() && fit.problem.terms[**i].effect().is_some();
@@ -17,7 +26,8 @@ impl Selection<'_> {
             return false;
         }
         let trials = Candidates::of(fit).trials(&fit.free);
-        let Some(trial) = trials.into_iter().find(|trial| deserves_a_name(fit, trial)) else { return false };
+        let is_next = |trial: &Trial| is_wanted(fit, trial.score.term) && deserves_a_name(fit, trial);
+        let Some(trial) = trials.into_iter().find(is_next) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         self.effects.push(Selected {
@@ -32,17 +42,21 @@ impl Selection<'_> {
         true
     }
 
-    /// Drops an effect that those added later have made needless.
+    /// Drops effects that those added later have made needless.
     pub(super) fn drop_needless(&mut self, progress: Progress<'_>) {
+        while let Some(at) = self.first_needless() {
+            self.drop_at(at, progress);
+        }
+    }
+
+    fn first_needless(&self) -> Option<usize> {
         let fit = &self.fit;
         let dispersion = fit.dispersion(fit.free.chi2);
         let is_needless = |one: &Selected| {
             let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
             loss(fit, &[one.term]) / dispersion < needed
         };
-        if let Some(at) = self.effects.iter().position(is_needless) {
-            self.drop_at(at, progress);
-        }
+        self.effects.iter().position(is_needless)
     }
 
     /// Drops effects that the pieces of the data do not agree upon: where the model stays incomplete, a good score

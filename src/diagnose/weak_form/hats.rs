@@ -220,6 +220,8 @@ impl Means {
             pb_pa: moved(mean.pb_pa, mean.dpb_pas),
             dpa_pas: moved(mean.dpa_pas, mean.d2pa_pas2),
             dpb_pas: moved(mean.dpb_pas, mean.d2pb_pas2),
+            pa_side: moved(mean.pa_side, mean.dpa_side_ps),
+            pb_side: moved(mean.pb_side, mean.dpb_side_ps),
             qa_m3s: moved(mean.qa_m3s, mean.dqa_m3s2),
             qb_m3s: moved(mean.qb_m3s, mean.dqb_m3s2),
             ..*mean
@@ -231,6 +233,7 @@ impl Means {
 fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
     let even = Even::about(series, at, dt);
     let middle = |values: &[f64]| step_mean(values, at, even);
+    let half_way = |values: &[f64]| (values[at] + values[at - 1]) / 2.0;
     let rate = |values: &[f64]| (values[at] - values[at - 1]) / dt;
     let reading = Signals {
         x_m: middle(&series.x_m),
@@ -242,6 +245,10 @@ fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
         dpb_pas: rate(&series.pb_pa),
         d2pa_pas2: curvature(&series.pa_pa, at, dt, even),
         d2pb_pas2: curvature(&series.pb_pa, at, dt, even),
+        pa_side: half_way(&motion.pa_side),
+        pb_side: half_way(&motion.pb_side),
+        dpa_side_ps: rate(&motion.pa_side),
+        dpb_side_ps: rate(&motion.pb_side),
         qa_m3s: middle(&series.qa_m3s),
         qb_m3s: middle(&series.qb_m3s),
         dqa_m3s2: rate(&series.qa_m3s),

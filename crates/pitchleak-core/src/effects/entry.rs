@@ -83,6 +83,7 @@ macro_rules! effects {
         $(term $term:expr;)?
         $(reads $reads:expr;)?
         $(late [$($late:ident),*];)?
+        $(hangs [$hangs:ident];)?
         $(constants [$($constant:ident),*];)?
         $(prior $sensor:ident.$spread:ident;)?
         $(carries $left_side:ident;)?
@@ -138,6 +139,14 @@ macro_rules! effects {
                     _ => {}
                 }
                 late
+            }
+
+            /// The signal that a sensor with play hangs behind; its value is the play on either side. None for all other effects.
+            pub fn hanging<T>(self, signals: &mut Signals<T>) -> Option<&mut T> {
+                match self {
+                    $($(Self::$variant => Some(&mut signals.$hangs),)?)*
+                    _ => None,
+                }
             }
 
             /// The term of one unit of a physical effect on the right of eq. (1)–(2). Sensor effects have none: the

@@ -10,7 +10,7 @@ mod table;
 
 pub use constants::{EffectConstant, EffectConstantSpec, EffectConstants};
 pub use entry::{EffectKind, EffectSpec, LeftSide};
-pub use sensor::LaggedReading;
+pub use sensor::{LaggedReading, Play};
 pub use set::{ActiveEffect, EffectError, EffectSet};
 pub use table::{Effect, UnknownEffect};
 

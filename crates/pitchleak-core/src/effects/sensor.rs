@@ -77,3 +77,33 @@ impl<T: Real> LaggedReading<T> {
         self.reading
     }
 }
+
+/// The dynamic form of [`Effect::PressureHysteresisA`]: what is moved with play hangs behind what moves it (the play operator of
+/// Krasnosel'skii and Pokrovskii 1989, "Systems with Hysteresis"). [`Effect::read`] knows it by the side of the play alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Play<T> {
+    middle: T,
+}
+
+impl<T: Real> Play<T> {
+    /// In the middle of its play at `signal`.
+    pub fn new(signal: T) -> Self {
+        Self { middle: signal }
+    }
+
+    /// What hangs behind `signal` by no more than `play` either way. What is not a number is passed over.
+    pub fn update(&mut self, play: T, signal: T) -> T {
+        let (low, high) = (signal - play, signal + play);
+        if low.is_finite() && high.is_finite() {
+            self.middle = self.middle.max(low).min(high);
+        }
+        self.middle
+    }
+
+    /// Moves on to `signal`, and says where in a play of this width it lies: 1 as far ahead as it can be, −1 as far behind.
+    pub fn side(&mut self, play: T, signal: T) -> T {
+        let ahead = (signal - self.update(play, signal)) / play;
+        if ahead.is_finite() { ahead } else { T::zero() }
+    }
+}

@@ -5,6 +5,7 @@
 //!     term |at, model, constants| …;    what one unit takes, on the right of eq. (1)–(2), or
 //!     reads |at, one, none| …;          what one unit does to the readings
 //!     late [signals];                   sensors that answer late: the signals that the value delays, s
+//!     hangs [signal];                   sensors with play: the signal that hangs behind by the value, either way
 //!     constants [names];                in which the term is not linear
 //!     prior sensor.spread;              the declared error of the sensor that the effect is
 //!     carries LeftSide;                 the measured left side of eq. (1) to which the term is in proportion
@@ -241,6 +242,18 @@ effects! {
         "The load cell reads a constant share too much or too little."
         "Calibrate the load cell."
         "A known weight on the load cell."
+    PressureHysteresisA "pressure_hysteresis_a" ["Pa"] Sensor 0.0 .. 2e6, 5e4;
+        reads |at, _, none| shift(Signals { pa_pa: -at.pa_side, dpa_pas: -at.dpa_side_ps, ..none });
+        hangs [pa_pa];
+        "Pressure sensor A hangs behind, rising and falling, by the value named: play or friction in its mechanism, or hysteresis of its membrane, which look alike."
+        "Exercise pressure sensor A over its range, check its mounting torque, and replace it if its hysteresis is beyond the data sheet's."
+        "A reference gauge at port A, the pressure stopped on its way up and on its way down: what is read differs by twice the value named, however long one waits; behind a lag it would meet."
+    PressureHysteresisB "pressure_hysteresis_b" ["Pa"] Sensor 0.0 .. 2e6, 5e4;
+        reads |at, _, none| shift(Signals { pb_pa: -at.pb_side, dpb_pas: -at.dpb_side_ps, ..none });
+        hangs [pb_pa];
+        "Pressure sensor B hangs behind, rising and falling, by the value named: play or friction in its mechanism, or hysteresis of its membrane, which look alike."
+        "Exercise pressure sensor B over its range, check its mounting torque, and replace it if its hysteresis is beyond the data sheet's."
+        "A reference gauge at port B, the pressure stopped on its way up and on its way down: what is read differs by twice the value named, however long one waits; behind a lag it would meet."
 }
 
 impl core::fmt::Display for Effect {

@@ -23,6 +23,14 @@ pub struct Signals<T> {
     pub d2pa_pas2: T,
     /// P̈_B, Pa/s².
     pub d2pb_pas2: T,
+    /// Where the reading of P_A lies in the sensor's play: 1 behind a rising pressure, −1 behind a falling one.
+    pub pa_side: T,
+    /// The same of P_B.
+    pub pb_side: T,
+    /// Its rate at A, 1/s.
+    pub dpa_side_ps: T,
+    /// Its rate at B, 1/s.
+    pub dpb_side_ps: T,
     /// Flow Q_A, m³/s.
     pub qa_m3s: T,
     /// Flow Q_B, m³/s.
@@ -131,6 +139,10 @@ impl<T: Real> Signals<T> {
             dpb_pas: f(self.dpb_pas, other.dpb_pas),
             d2pa_pas2: f(self.d2pa_pas2, other.d2pa_pas2),
             d2pb_pas2: f(self.d2pb_pas2, other.d2pb_pas2),
+            pa_side: f(self.pa_side, other.pa_side),
+            pb_side: f(self.pb_side, other.pb_side),
+            dpa_side_ps: f(self.dpa_side_ps, other.dpa_side_ps),
+            dpb_side_ps: f(self.dpb_side_ps, other.dpb_side_ps),
             qa_m3s: f(self.qa_m3s, other.qa_m3s),
             qb_m3s: f(self.qb_m3s, other.qb_m3s),
             dqa_m3s2: f(self.dqa_m3s2, other.dqa_m3s2),
