@@ -75,7 +75,7 @@ impl Estimator {
     }
 
     /// Takes in one record.
-    #[inline]
+    // Not inlined: here the core's arithmetic is compiled once, not in every crate that replays.
     pub fn update(&mut self, record: &Record) -> Update<f64> {
         // A step of no length makes the core start anew.
         let dt_s = record.step_s();

@@ -1,5 +1,6 @@
 //! A running replay as bytes: its name and version, the state in CBOR (RFC 8949), and a checksum over both.
 
+use ciborium::Value;
 use flate2::Crc;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -54,10 +55,26 @@ pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, RestoreError>
     if sum != checksum(content) {
         return Err(RestoreError::Checksum);
     }
-    let malformed = |error: ciborium::de::Error<std::io::Error>| RestoreError::Content(error.to_string());
     let mut rest = content.get(HEAD.len()..).unwrap_or_default();
-    let state = ciborium::from_reader(&mut rest).map_err(malformed)?;
-    if rest.is_empty() { Ok(state) } else { Err(RestoreError::Content("more than one".to_owned())) }
+    let malformed = |error: ciborium::de::Error<std::io::Error>| RestoreError::Content(error.to_string());
+    let tree: Value = ciborium::from_reader(&mut rest).map_err(malformed)?;
+    if !rest.is_empty() {
+        return Err(RestoreError::Content("more than one".to_owned()));
+    }
+    if holds_nan(&tree) {
+        return Err(RestoreError::Content("a number in it is none".to_owned()));
+    }
+    tree.deserialized().map_err(|ciborium::value::Error::Custom(why)| RestoreError::Content(why))
+}
+
+/// Whether a number is none; infinities stand for bounds that are not there.
+fn holds_nan(tree: &Value) -> bool {
+    match tree {
+        Value::Float(number) => number.is_nan(),
+        Value::Array(values) => values.iter().any(holds_nan),
+        Value::Map(entries) => entries.iter().any(|(_, value)| holds_nan(value)),
+        _ => false,
+    }
 }
 
 fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
@@ -74,18 +91,4 @@ fn foreign(bytes: &[u8]) -> RestoreError {
         }
         _ => RestoreError::Content("it begins with other bytes".to_owned()),
     }
-}
-
-/// Whether every number in a state is one; infinities stand for bounds that are not there.
-pub(super) fn has_no_nan(state: &impl Serialize) -> bool {
-    let mut stack: Vec<ciborium::Value> = ciborium::Value::serialized(state).into_iter().collect();
-    while let Some(value) = stack.pop() {
-        match value {
-            ciborium::Value::Float(number) if number.is_nan() => return false,
-            ciborium::Value::Array(values) => stack.extend(values),
-            ciborium::Value::Map(entries) => stack.extend(entries.into_iter().map(|(_, value)| value)),
-            _ => {}
-        }
-    }
-    true
 }
