@@ -85,27 +85,26 @@ pub fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayErr
     replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
 }
 
-/// The last estimate, or the last notice where there is none.
-fn watched(trace: &[u8], accuracy: f64) -> Result<EstimateEvent, String> {
-    let (mut last, mut events) = (Err(String::new()), Vec::new());
+/// All that a stream says, line by line.
+pub fn events(trace: &[u8], accuracy: f64) -> Vec<Event> {
+    let mut events = Vec::new();
     let mut watch = Watch::new(LiveConfig::of(rig(accuracy)), Some(LineFormat::Csv));
-    for line in trace.split(|byte| *byte == b'\n') {
-        watch.take(line, &mut events);
-        last = last_said(last, &mut events);
-    }
+    trace.split(|byte| *byte == b'\n').for_each(|line| watch.take(line, &mut events));
     watch.finish(&mut events);
-    last_said(last, &mut events)
+    events
 }
 
-fn last_said(
-    before: Result<EstimateEvent, String>,
-    events: &mut Vec<Event>,
-) -> Result<EstimateEvent, String> {
-    events.drain(..).fold(before, |last, event| match (event, last) {
-        (Event::Estimate(estimate), _) => Ok(*estimate),
-        (Event::Notice(notice), Err(_)) => Err(notice.text),
-        (_, last) => last,
-    })
+/// The last estimate, or the last notice where there is none.
+fn watched(trace: &[u8], accuracy: f64) -> Result<EstimateEvent, String> {
+    let mut last = Err(String::new());
+    for event in events(trace, accuracy) {
+        last = match (event, last) {
+            (Event::Estimate(estimate), _) => Ok(*estimate),
+            (Event::Notice(notice), Err(_)) => Err(notice.text),
+            (_, last) => last,
+        };
+    }
+    last
 }
 
 /// A stated figure may be off by this much, or by its own 3 σ, L/min.

@@ -8,6 +8,8 @@ use pitchleak::units::LPM_PER_M3S;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 
 const DURATION_S: f64 = 60.0;
+/// When a leak opens that does so at once, s.
+pub const OPENS_S: f64 = 30.0;
 /// Size of a leak, L/min; the alarm stands at 0.1.
 const LEAK_LPM: f64 = 0.5;
 /// Of which about this passes an orifice: C √P, where the estimator has C P.
@@ -39,25 +41,40 @@ pub fn rig(accuracy: f64) -> Rig {
 
 /// A minute of a cylinder in wind at 100 Hz; each sample is that of one instant of a simulation in steps of 1 ms.
 pub fn truths(wind: WindCase, leaking: Leaking) -> Vec<Truth> {
-    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let laminar = |leak: Leak| match leak {
         _ if leaking == Some(leak) => LeakSize::MeanFlow((LEAK_LPM - TURBULENT_LPM) / LPM_PER_M3S),
         Leak::Internal => LeakSize::Coefficient(WEEPING_M3SPA),
         _ => LeakSize::default(),
     };
-    let scenario = Scenario {
+    let scenario = scenario(wind, PerLeak::from_fn(laminar).map(LeakCourse::from), effects(leaking));
+    let beginning = Scenario { duration_s: SIZED_OVER_S, ..scenario.clone() };
+    scenario.collect(beginning.leak_coefficients().expect("within reach")).expect("runs")
+}
+
+/// The same cylinder, of which a leak of this mean flow opens at once after half of the minute.
+pub fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
+    let size = |which| {
+        let size = LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
+        LeakCourse::from_onset(size, OPENS_S)
+    };
+    let scenario = scenario(wind, PerLeak::from_fn(size), effects(None));
+    let open = Scenario { start_s: scenario.start_s + OPENS_S, ..scenario.clone() };
+    scenario.collect(open.leak_coefficients().expect("within reach")).expect("runs")
+}
+
+fn scenario(wind: WindCase, leaks: PerLeak<LeakCourse>, effects: EffectSet<f64>) -> Scenario {
+    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
+    Scenario {
         rig: rig(1e-2),
         reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
-        leaks: PerLeak::from_fn(laminar).map(LeakCourse::from),
+        leaks,
         oil_temperature: None,
-        effects: effects(leaking),
+        effects,
         start_s: 20.0,
         warm_up_s: 10.0,
         duration_s: DURATION_S,
         sample_rate_hz: 100.0,
-    };
-    let beginning = Scenario { duration_s: SIZED_OVER_S, ..scenario.clone() };
-    scenario.collect(beginning.leak_coefficients().expect("within reach")).expect("runs")
+    }
 }
 
 fn effects(leaking: Leaking) -> EffectSet<f64> {

@@ -8,6 +8,7 @@ mod statement;
 mod text;
 mod trend;
 mod verdict;
+mod zeros;
 
 pub use episode::Episode;
 pub use reason::{Reason, ReasonId};

@@ -1,10 +1,10 @@
 //! Why a verdict is doubtful or not sure, each with what to check.
 
-use super::statement::{interval, join, with_interval};
+use super::statement::{interval, join};
+use super::zeros::zeros;
 use super::{Findings, Misfit};
 use crate::channels::ChannelFaultKind;
-use crate::units::LPM_PER_M3S;
-use crate::wiring::{HOW_WIRED, SingleZero, Wiring, ZeroCheck};
+use crate::wiring::{HOW_WIRED, Wiring};
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
@@ -83,7 +83,7 @@ pub struct Reason {
 }
 
 impl Reason {
-    fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
+    pub(super) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
         Self { id, text: text.into(), suggestion: Some(suggestion.into()) }
     }
 }
@@ -105,16 +105,6 @@ const BULK_MODULUS_SIGMAS: f64 = 3.0;
 const NEGATIVE_SHARE: f64 = 0.5;
 const NEGATIVE_SHARE_OF_LARGEST: f64 = 0.13;
 
-/// χ² by which a leak has to explain the trace better than zeros that are off: one of 2 % of full scale costs 4.
-const LEAK_OVER_ZEROS: f64 = 4.0;
-/// Zeros that would have to be off by more than this, as shares of full scale, both meters together (root of the sum of
-/// squares), for a leak that is larger than one zero may be off, are not: a leak through an orifice would pass for them
-/// otherwise.
-const ZEROS_AT_MOST: f64 = 0.023;
-const ZERO_AT_MOST: f64 = 0.02;
-/// χ² by which one steady zero beside all leaks has to explain the trace better to count: five standard deviations.
-const ZERO_BEYOND_CHANCE: f64 = 25.0;
-
 /// What contradicts the model or the sensors, the likeliest cause first.
 pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
     let channels = findings
@@ -127,7 +117,7 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
         mostly_bad_rows(findings),
         bulk_modulus_impossible(findings),
         negative_leak(findings),
-        offset_or_leak(findings).or_else(|| offset_in_leak(findings)),
+        zeros(findings),
         keeps_changing(findings),
         model_does_not_fit(findings),
         several_leaks(findings),
@@ -223,68 +213,6 @@ fn negative_leak(findings: &Findings<'_>) -> Option<Reason> {
         "check the zeros of the flow meters, or declare how far they may be off (`bias`); `pitchleak diagnose` looks for \
          an effect that the rig file lacks",
     ))
-}
-
-fn offset_or_leak(findings: &Findings<'_>) -> Option<Reason> {
-    let zeros = findings.suspicions.zeros?;
-    let leak = Leak::ALL.into_iter().find(|leak| {
-        let explained = zeros.for_leak[*leak] < LEAK_OVER_ZEROS;
-        findings.active[*leak] && explained && may_be_zeros(findings, &zeros, *leak)
-    })?;
-    let offsets = zeros.offsets_without_m3s[leak].map(|offset| offset.scaled(LPM_PER_M3S));
-    let off = offsets.iter().zip(["qa", "qb"]).filter(|(offset, _)| offset.value.abs() > 2.0 * offset.std);
-    let off = off
-        .map(|(offset, name)| format!("{name} by {} L/min", with_interval(offset.value, Some(offset.std))));
-    let off: Vec<_> = off.collect();
-    let by = if off.is_empty() { String::new() } else { format!(" ({})", off.join(", ")) };
-    Some(Reason::new(
-        ReasonId::OffsetOrLeak,
-        format!(
-            "zeros of the flow meters that are off{by} explain this trace nearly as well as the {} leak does (χ² {:+.1})",
-            leak.label(),
-            zeros.for_leak[leak]
-        ),
-        ZEROS_TELL,
-    ))
-}
-
-const ZEROS_TELL: &str = "read the meters with their valves shut, or record while the pressures change; how far zeros may be \
-                          off belongs in the rig file (`bias`)";
-
-/// A leak that is there, but whose size has a meter's zero in it.
-fn offset_in_leak(findings: &Findings<'_>) -> Option<Reason> {
-    let zeros = findings.suspicions.zeros?;
-    let single = ["qa", "qb"].into_iter().zip(zeros.single).filter_map(|(name, zero)| Some((name, zero?)));
-    let changed = |zero: &SingleZero| {
-        let shift_lpm = zero.shift_m3s.map(|shift| shift * LPM_PER_M3S);
-        let matters = |leak: &Leak| shift_lpm[*leak].abs() >= findings.threshold_lpm[*leak];
-        let leak = Leak::ALL.into_iter().find(|leak| findings.active[*leak] && matters(leak))?;
-        Some((leak, shift_lpm[leak]))
-    };
-    let likely = single.filter(|(_, zero)| zero.drop >= ZERO_BEYOND_CHANCE);
-    let likely = likely.filter_map(|(name, zero)| Some((name, zero, changed(&zero)?)));
-    let (name, zero, (leak, shift_lpm)) = likely.max_by(|(_, a, _), (_, b, _)| a.drop.total_cmp(&b.drop))?;
-    let offset = zero.offset_m3s.scaled(LPM_PER_M3S);
-    Some(Reason::new(
-        ReasonId::OffsetOrLeak,
-        format!(
-            "a zero of {name} that is off by {} L/min explains this trace better (χ² {:+.0}); the {} leak is then {:.2} L/min {}",
-            with_interval(offset.value, Some(offset.std)),
-            -zero.drop,
-            leak.label(),
-            shift_lpm.abs(),
-            if shift_lpm < 0.0 { "smaller" } else { "larger" }
-        ),
-        ZEROS_TELL,
-    ))
-}
-
-/// Whether meters are off by so much now and then.
-fn may_be_zeros(findings: &Findings<'_>, zeros: &ZeroCheck, leak: Leak) -> bool {
-    let [a, b] = findings.meters_lpm;
-    let [off_a, off_b] = zeros.offsets_without_m3s[leak].map(|offset| offset.value * LPM_PER_M3S);
-    (off_a / a).hypot(off_b / b) <= ZEROS_AT_MOST
-        || findings.leakage[leak].mean_lpm <= ZERO_AT_MOST * a.min(b)
 }
 
 fn keeps_changing(findings: &Findings<'_>) -> Option<Reason> {

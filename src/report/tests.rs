@@ -301,15 +301,22 @@ fn a_leak_that_a_zero_explains_as_well_is_in_doubt() {
         offsets_without_m3s: PerLeak::from_fn(|_| [off, none]),
         leaks_m3spa: PerLeak::default(),
         single: [None; 2],
+        duration_s: 60.0,
     };
-    let held = |for_leak| Found {
-        suspicions: Suspicions { zeros: Some(zeros(for_leak)), ..Suspicions::default() },
+    let against = |zeros| Found {
+        suspicions: Suspicions { zeros: Some(zeros), ..Suspicions::default() },
         ..found(INTERNAL)
     };
+    let held = |for_leak| against(zeros(for_leak));
     assert_eq!(held(30.0).judged(), (Status::Leak, vec![]));
     assert_eq!(held(3.0).judged(), (Status::Doubtful, vec!["offset_or_leak"]));
     let text = held(3.0).verdict().text;
-    assert!(text.contains("(qa by 0.2000 ± 0.0012 L/min)"), "{text}");
+    assert!(text.contains("(qa by 0.2000 ± 0.0012 L/min) explain this trace nearly as well"), "{text}");
+    // Beside zeros that are off by 2 % of full scale chance alone gives a leak so much.
+    let early = against(ZeroCheck { duration_s: 2.5, ..zeros(6.0) });
+    assert_eq!(early.judged(), (Status::Doubtful, vec!["offset_or_leak"]));
+    assert!(early.verdict().text.contains("explain the 2.5 s that count so far nearly as well"));
+    assert_eq!(against(ZeroCheck { for_zeros: 12.0, ..zeros(6.0) }).judged(), (Status::Leak, vec![]));
 }
 
 /// A large leak that only zeros beyond belief explain stands, and hides no smaller one that a zero explains.
@@ -323,25 +330,30 @@ fn a_leak_larger_than_zeros_stands_and_hides_none() {
         offsets_without_m3s: PerLeak::from_fn(|_| [far, none]),
         leaks_m3spa: PerLeak::default(),
         single: [None; 2],
+        duration_s: 60.0,
     };
     let mut large = found(INTERNAL);
     large.suspicions.zeros = Some(zeros);
     assert_eq!(large.judged(), (Status::Leak, vec![]));
     large.active.external_a = true;
     large.leakage.external_a.mean_lpm = 0.2;
+    large.suspicions.zeros =
+        Some(ZeroCheck { for_leak: PerLeak { internal: 1e3, ..PerLeak::default() }, ..zeros });
     assert_eq!(large.judged(), (Status::Doubtful, vec!["offset_or_leak"]));
     assert!(large.verdict().text.contains("as the external A leak does"));
 }
 
 /// The leak is beyond doubt, how large it is isn't.
 #[test]
-fn a_zero_that_is_surely_off_and_changes_a_leak_by_its_threshold_is_a_doubt() {
+fn a_zero_that_may_be_off_and_change_a_leak_by_its_threshold_is_a_doubt() {
     let none = Estimate { value: 0.0, std: 1e-8 };
-    let judged = |drop, shift_lpm: f64| {
+    let judged = |drop, shift_lpm: f64, std_lpm: f64| {
+        let beside = Estimate { value: 0.5 + shift_lpm, std: std_lpm }.scaled(1.0 / LPM_PER_M3S);
         let single = SingleZero {
             drop,
             offset_m3s: Estimate { value: 0.2 / LPM_PER_M3S, std: 1e-8 },
             shift_m3s: PerLeak { internal: shift_lpm / LPM_PER_M3S, ..PerLeak::default() },
+            flows_m3s: PerLeak { internal: beside, ..PerLeak::default() },
         };
         let zeros = ZeroCheck {
             for_leak: PerLeak { internal: 1e3, ..PerLeak::default() },
@@ -352,8 +364,14 @@ fn a_zero_that_is_surely_off_and_changes_a_leak_by_its_threshold_is_a_doubt() {
             // That of the other meter, which explains a little more, changes no leak.
             single: [
                 Some(single),
-                Some(SingleZero { drop: drop + 1.0, shift_m3s: PerLeak::default(), ..single }),
+                Some(SingleZero {
+                    drop: drop + 1.0,
+                    shift_m3s: PerLeak::default(),
+                    flows_m3s: PerLeak::default(),
+                    ..single
+                }),
             ],
+            duration_s: 60.0,
         };
         let found = Found {
             suspicions: Suspicions { zeros: Some(zeros), ..Suspicions::default() },
@@ -361,9 +379,15 @@ fn a_zero_that_is_surely_off_and_changes_a_leak_by_its_threshold_is_a_doubt() {
         };
         (found.judged(), found.verdict().text)
     };
-    assert_eq!(judged(40.0, -0.05).0, (Status::Leak, vec![]));
-    assert_eq!(judged(20.0, -0.2).0, (Status::Leak, vec![]));
-    let (doubted, text) = judged(40.0, -0.2);
+    assert_eq!(judged(40.0, -0.05, 0.01).0, (Status::Leak, vec![]));
+    assert_eq!(judged(1.0, -0.05, 0.01).0, (Status::Leak, vec![]));
+    assert_eq!(judged(5.0, -0.08, 0.04).0, (Status::Leak, vec![]));
+    for (drop, shift_lpm, std_lpm) in [(10.0, -0.08, 0.04), (0.0, 0.0, 0.06)] {
+        let (doubted, text) = judged(drop, shift_lpm, std_lpm);
+        assert_eq!(doubted, (Status::Doubtful, vec!["offset_or_leak"]));
+        assert!(text.contains("How large the internal leak is cannot be told from a zero of qa"), "{text}");
+    }
+    let (doubted, text) = judged(40.0, -0.2, 0.01);
     assert_eq!(doubted, (Status::Doubtful, vec!["offset_or_leak"]));
     assert!(text.contains("A zero of qa that is off by 0.2000 ± 0.0012 L/min"), "{text}");
     assert!(text.contains("the internal leak is then 0.20 L/min smaller"), "{text}");

@@ -9,8 +9,14 @@ use pitchleak_core::{Leak, PerLeak};
 
 /// What both continuity equations say of a stretch of samples, and the force balance.
 pub(crate) trait Continuity {
-    /// Fits the model with these priors; `None` where the samples are too few.
-    fn fit(&self, priors: &Priors) -> Option<Fit>;
+    /// Fits the model with these priors; the fewer the samples, the more the priors say. `None` where readings lead to no
+    /// number.
+    fn fit_of_any_length(&self, priors: &Priors) -> Option<Fit>;
+
+    /// The same; `None` where the samples are too few to say anything.
+    fn fit(&self, priors: &Priors) -> Option<Fit> {
+        self.fit_of_any_length(priors).filter(|fit| fit.row_count() >= LEAST_ROWS)
+    }
 
     /// The rig.
     fn rig(&self) -> &Rig;
@@ -33,9 +39,11 @@ pub struct Recorded<'a> {
     duration_s: f64,
     /// With the noise of the sensors alone.
     equations: Equations,
-    /// Of them; none of too few records for a block.
-    sums: Option<BothSums>,
+    sums: BothSums,
 }
+
+/// Fewer rows say nothing.
+const LEAST_ROWS: usize = 30;
 
 /// Pressure noise through the leaks, which halves a residual at the most, can't explain this one.
 const HOPELESS: f64 = 20.0;
@@ -52,14 +60,14 @@ impl<'a> Recorded<'a> {
 }
 
 impl Continuity for Recorded<'_> {
-    fn fit(&self, priors: &Priors) -> Option<Fit> {
-        let found = Fit::of(self.sums.as_ref()?, self.rig, priors)?;
+    fn fit_of_any_length(&self, priors: &Priors) -> Option<Fit> {
+        let found = Fit::of(&self.sums, self.rig, priors)?;
         if found.worst() > HOPELESS {
             return Some(found);
         }
         // Pressure noise reaches the equations through the leaks, which only a fit tells.
         let equations = Equations::of(&self.blocks, &Noise::new(self.rig, found.leaks()));
-        Fit::of(&BothSums::of(&[&equations])?, self.rig, priors)
+        Fit::of(&BothSums::of(&[&equations]), self.rig, priors)
     }
 
     fn rig(&self) -> &Rig {

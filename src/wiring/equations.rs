@@ -320,11 +320,12 @@ impl Sums {
 pub(super) struct BothSums([Sums; 2]);
 
 impl BothSums {
-    /// With slopes about the middle of the stretches; none where there are no blocks.
-    pub fn of(parts: &[&Equations]) -> Option<Self> {
+    /// With slopes about the middle of the stretches.
+    pub fn of(parts: &[&Equations]) -> Self {
         let spans = || parts.iter().filter_map(|part| part.span_s());
-        let middle_s = 0.5 * (spans().next()?[0] + spans().next_back()?[1]);
-        Some(Self([0, 1].map(|which| Sums::of(parts, which, middle_s))))
+        let ends = spans().next().zip(spans().next_back());
+        let middle_s = ends.map_or(0.0, |([begin_s, _], [_, end_s])| 0.5 * (begin_s + end_s));
+        Self([0, 1].map(|which| Sums::of(parts, which, middle_s)))
     }
 
     /// Flow balance and position against the flows, for parameters in these units.

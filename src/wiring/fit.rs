@@ -28,16 +28,10 @@ pub(crate) struct Fit {
 const PRIOR_SIGMAS: f64 = 4.0;
 /// A leak this many standard deviations below zero is negative.
 const NEGATIVE_SIGMAS: f64 = 6.0;
-/// Fewer rows say nothing.
-const LEAST_ROWS: usize = 30;
-
 impl Fit {
-    /// By these sums; `None` where their rows are too few.
+    /// By these sums; without rows the priors.
     pub(super) fn of(sums: &BothSums, rig: &Rig, Priors(priors): &Priors) -> Option<Self> {
         let [balance, travel] = &sums.scaled(priors);
-        if balance.rows + travel.rows < LEAST_ROWS {
-            return None;
-        }
         let cholesky = (SMatrix::identity() + balance.matrix + travel.matrix).cholesky()?;
         let parameters = cholesky.solve(&(balance.vector + travel.vector));
         let ratio = |sums: &Sums| (sums.rows > 0).then(|| sums.left(&parameters) / sums.rows as f64);

@@ -25,6 +25,16 @@ pub struct ZeroCheck {
     pub leaks_m3spa: PerLeak<Estimate<f64>>,
     /// The zero of each meter alone, off and steady.
     pub single: [Option<SingleZero>; 2],
+    /// How long the records are, s.
+    pub duration_s: f64,
+}
+
+impl ZeroCheck {
+    /// By how much χ² is larger without this leak where zeros may be off: what zeros and leaks explain alike counts for
+    /// none, so that it follows chance (2 degrees of freedom) where there is no leak, however few the records.
+    pub fn for_leak_beside_zeros(&self, leak: Leak) -> f64 {
+        self.for_leak[leak] + self.for_zeros
+    }
 }
 
 /// One meter's zero that is off, and steady, beside all leaks.
@@ -36,13 +46,15 @@ pub struct SingleZero {
     pub offset_m3s: Estimate<f64>,
     /// By how much the leaks' mean flows then change, m³/s.
     pub shift_m3s: PerLeak<f64>,
+    /// What they then are, m³/s: as well as they are known if this zero may be off.
+    pub flows_m3s: PerLeak<Estimate<f64>>,
 }
 
 /// What a bend gives a fit to choose (leaks, their slopes and the oil once more) is worth less in χ² by chance.
 const BEYOND_CHANCE: f64 = 25.0;
 
-/// Holds leaks against zeros, by generalised least squares over all the records; both may change through them. `None`
-/// where the records are too few. Use an [`Excerpt`](super::Excerpt) of a long trace.
+/// Holds leaks against zeros, by generalised least squares over all the records; both may change through them. Of few
+/// records nothing is for a leak. `None` where there are none. Use an [`Excerpt`](super::Excerpt) of a long trace.
 pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     changing_leaks_or_zeros(&Recorded::new(records, rig)?)
 }
@@ -68,7 +80,7 @@ fn straight(stretch: &impl Continuity) -> Priors {
 }
 
 fn with_free_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<Fit> {
-    stretch.fit(&leaks.with_zeros_off(stretch.rig(), stretch.duration_s()))
+    stretch.fit_of_any_length(&leaks.with_zeros_off(stretch.rig(), stretch.duration_s()))
 }
 
 /// Whether leaks that go straight in each half, quarter or eighth of the records explain them better than zeros do with
@@ -101,8 +113,8 @@ pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> O
 /// The same where the fit with free zeros is at hand.
 fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: &Fit) -> Option<ZeroCheck> {
     let zeros = leaks.with_zeros_off(stretch.rig(), stretch.duration_s());
-    let declared = stretch.fit(leaks)?;
-    let without = PerLeak::from_fn(|leak| stretch.fit(&zeros.without(leak)).unwrap_or(*free));
+    let declared = stretch.fit_of_any_length(leaks)?;
+    let without = PerLeak::from_fn(|leak| stretch.fit_of_any_length(&zeros.without(leak)).unwrap_or(*free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
     let beyond = |other: &Fit| (other.chi_square() - declared.chi_square()) / inflation;
@@ -114,6 +126,7 @@ fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: &Fit) -> Optio
         leaks_m3spa: free.leak_coefficients(),
         single: [Parameter::OffsetA, Parameter::OffsetB]
             .map(|zero| single_zero(stretch, leaks, &declared, zero)),
+        duration_s: stretch.duration_s(),
     })
 }
 
@@ -123,11 +136,12 @@ fn single_zero(
     declared: &Fit,
     zero: Parameter,
 ) -> Option<SingleZero> {
-    let fit = stretch.fit(&leaks.with_zero_off(zero, stretch.rig()))?;
-    let flow_m3s = |fit: &Fit, leak: Leak| fit.flow_m3s(leak, stretch.driven(leak).sizes).value;
+    let fit = stretch.fit_of_any_length(&leaks.with_zero_off(zero, stretch.rig()))?;
+    let flows_m3s = |fit: &Fit| PerLeak::from_fn(|leak| fit.flow_m3s(leak, stretch.driven(leak).sizes));
     Some(SingleZero {
         drop: (declared.chi_square() - fit.chi_square()) / fit.worst().max(1.0),
         offset_m3s: fit.parameter(zero),
-        shift_m3s: PerLeak::from_fn(|leak| flow_m3s(&fit, leak) - flow_m3s(declared, leak)),
+        shift_m3s: flows_m3s(&fit).zip(flows_m3s(declared)).map(|(beside, alone)| beside.value - alone.value),
+        flows_m3s: flows_m3s(&fit),
     })
 }
