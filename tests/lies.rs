@@ -27,7 +27,7 @@ const ACCURACIES: [f64; 1] = [3e-3];
 const WINDS: [WindCase; 2] = [WindCase::Mps5, WindCase::Mps13];
 /// Leaks of 0.5 L/min beside honest sensors are known for sure within this time of a stream's begin, s.
 const SURE_WITHIN_S: f64 = 10.0;
-/// Of 48 streams so many may state a size that is a little off, once.
+/// Of 48 streams so many may state a size that is off by more than 0.1 L/min.
 const MISSIZED: usize = 1;
 /// Another platform rounds otherwise and may turn a coin or two, as a share of a family's runs.
 const SLACK: f64 = 0.01;
