@@ -8,8 +8,8 @@ use pitchleak_core::Leak;
 
 /// χ² by which a leak has to explain the trace better than zeros that are off: one of 2 % of full scale costs 4.
 const LEAK_OVER_ZEROS: f64 = 4.0;
-/// χ² that a leak has to explain beside zeros that are off: beyond chance, four standard deviations.
-const LEAK_BESIDE_ZEROS: f64 = 16.0;
+/// χ² that a leak has to explain beside zeros that are off: beyond chance, three standard deviations.
+const LEAK_BESIDE_ZEROS: f64 = 9.0;
 /// Zeros that would have to be off by more than this, as shares of full scale, both meters together (root of the sum of
 /// squares), for a leak that stands alone and is larger than one zero may be off, are not: a leak through an orifice would
 /// pass for them otherwise.
@@ -19,8 +19,10 @@ const ZERO_AT_MOST: f64 = 0.02;
 const ZERO_BEYOND_CHANCE: f64 = 25.0;
 /// The same for what it may change to count: three standard deviations.
 const ZERO_LIKELY: f64 = 9.0;
-/// A leak is known to its alarm's threshold beside a zero that may be off where this many standard deviations are.
+/// A leak is known beside a zero that may be off where this many standard deviations are within its alarm's threshold …
 const KNOWN_SIGMAS: f64 = 2.0;
+/// … or this share of it: who acts on it acts alike.
+const KNOWN_SHARE: f64 = 1.0 / 3.0;
 /// Of a shorter stretch it is said how short it is, s.
 const SHORT_S: f64 = 10.0;
 
@@ -101,14 +103,15 @@ fn offset_in_leak(findings: &Findings<'_>, zeros: &ZeroCheck) -> Option<String> 
     ))
 }
 
-/// A leak is there, but as long as a meter's zero may be off its size is not known to its alarm's threshold: the stretch
-/// is too short to tell, or says that the zero is off, if only by chance.
+/// A leak is there, but as long as a meter's zero may be off its size is not known: the stretch is too short to tell, or
+/// says that the zero is off, if only by chance.
 fn size_unknown(findings: &Findings<'_>, zeros: &ZeroCheck) -> Option<String> {
     let is_unknown = |zero: &SingleZero, leak: Leak| {
         let std_lpm = LPM_PER_M3S * zero.flows_m3s[leak].std;
         let shift_lpm = LPM_PER_M3S * zero.shift_m3s[leak].abs();
         let threshold_lpm = findings.threshold_lpm[leak];
-        KNOWN_SIGMAS * std_lpm >= threshold_lpm
+        let share_lpm = KNOWN_SHARE * LPM_PER_M3S * zero.flows_m3s[leak].value;
+        KNOWN_SIGMAS * std_lpm >= threshold_lpm.max(share_lpm)
             || zero.drop >= ZERO_LIKELY && shift_lpm + std_lpm >= threshold_lpm
     };
     let (name, zero, leak) = singles(zeros).find_map(|(name, zero)| {
