@@ -382,7 +382,9 @@ fn a_zero_that_may_be_off_and_change_a_leak_by_its_threshold_is_a_doubt() {
     assert_eq!(judged(40.0, -0.05, 0.01).0, (Status::Leak, vec![]));
     assert_eq!(judged(1.0, -0.05, 0.01).0, (Status::Leak, vec![]));
     assert_eq!(judged(5.0, -0.08, 0.04).0, (Status::Leak, vec![]));
-    for (drop, shift_lpm, std_lpm) in [(10.0, -0.08, 0.04), (0.0, 0.0, 0.06)] {
+    // Of 0.5 L/min a third is more than the threshold, of 0.2 L/min it isn't.
+    assert_eq!(judged(0.0, 0.0, 0.08).0, (Status::Leak, vec![]));
+    for (drop, shift_lpm, std_lpm) in [(10.0, -0.08, 0.04), (0.0, 0.0, 0.09), (0.0, -0.3, 0.06)] {
         let (doubted, text) = judged(drop, shift_lpm, std_lpm);
         assert_eq!(doubted, (Status::Doubtful, vec!["offset_or_leak"]));
         assert!(text.contains("How large the internal leak is cannot be told from a zero of qa"), "{text}");

@@ -4,7 +4,7 @@ use pitchleak_core::PerLeak;
 /// How large a simulated laminar leak is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LeakSize {
-    /// Its mean flow over the run, m³/s. The coefficient follows from the run's own mean |P_L|, P_A
+    /// Its mean flow over the run's first minute, m³/s. The coefficient follows from the run's own mean |P_L|, P_A
     /// or P_B.
     MeanFlow(f64),
     /// Its coefficient, m³/(s·Pa).

@@ -30,8 +30,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
 
-    /// Leak past the piston: mean flow over the run ("0.5 L/min") or coefficient ("0.02 L/min/bar"); it may
-    /// grow ("0.1 L/min -> 0.5 L/min @ 10 s..300 s"), begin or end ("0.5 L/min @ ..200 s"), come and go
+    /// Leak past the piston: mean flow over the run's first minute ("0.5 L/min") or coefficient ("0.02
+    /// L/min/bar"); it may grow ("0.1 L/min -> 0.5 L/min @ 10 s..300 s"), begin or end ("0.5 L/min @ ..200 s"), come and go
     /// ("0.5 L/min every 60 s for 10 s")
     #[arg(long, value_name = "Q", default_value = "0")]
     leak_internal: LeakCourse,
