@@ -5,6 +5,7 @@ use super::event::NoticeEvent;
 use super::watch::Watch;
 use crate::Rig;
 use crate::output::{self, OutputError};
+use crate::replay::every_number;
 use ciborium::Value;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -213,7 +214,8 @@ fn saved(mut body: &[u8]) -> Result<Saved, Option<String>> {
     if !body.is_empty() {
         return Err(Some("something follows its end".to_owned()));
     }
-    if !has_possible_numbers(&tree) {
+    // Of the watch itself; estimators look at their own.
+    if !every_number(&tree, &|number| number.abs() <= LARGEST) {
         return Err(Some("a number in it is impossible".to_owned()));
     }
     let saved: Saved = tree.deserialized().map_err(|ciborium::value::Error::Custom(why)| Some(why))?;
@@ -225,16 +227,6 @@ fn saved(mut body: &[u8]) -> Result<Saved, Option<String>> {
 
 /// Beyond any time in s and any flow in L/min.
 const LARGEST: f64 = 1e15;
-
-/// Of the watch itself; estimators look at their own.
-fn has_possible_numbers(tree: &Value) -> bool {
-    match tree {
-        Value::Float(number) => number.abs() <= LARGEST,
-        Value::Array(values) => values.iter().all(has_possible_numbers),
-        Value::Map(entries) => entries.iter().all(|(_, value)| has_possible_numbers(value)),
-        _ => true,
-    }
-}
 
 /// CRC-32 (ISO-HDLC), as of gzip.
 fn checksum(bytes: &[u8]) -> u32 {

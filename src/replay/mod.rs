@@ -22,6 +22,7 @@ pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
 pub use sketch::Sketch;
 pub use state::RestoreError;
+pub(crate) use state::every_number;
 pub use stream::Stream;
 
 use crate::channels::ChannelMonitor;

@@ -61,19 +61,20 @@ pub(super) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, RestoreError>
     if !rest.is_empty() {
         return Err(RestoreError::Content("more than one".to_owned()));
     }
-    if holds_nan(&tree) {
+    // Infinities stand for bounds that are not there.
+    if !every_number(&tree, &|number| !number.is_nan()) {
         return Err(RestoreError::Content("a number in it is none".to_owned()));
     }
     tree.deserialized().map_err(|ciborium::value::Error::Custom(why)| RestoreError::Content(why))
 }
 
-/// Whether a number is none; infinities stand for bounds that are not there.
-fn holds_nan(tree: &Value) -> bool {
+/// Whether all numbers in a tree of CBOR that may have decimals are possible.
+pub(crate) fn every_number(tree: &Value, is_possible: &impl Fn(f64) -> bool) -> bool {
     match tree {
-        Value::Float(number) => number.is_nan(),
-        Value::Array(values) => values.iter().any(holds_nan),
-        Value::Map(entries) => entries.iter().any(|(_, value)| holds_nan(value)),
-        _ => false,
+        Value::Float(number) => is_possible(*number),
+        Value::Array(values) => values.iter().all(|value| every_number(value, is_possible)),
+        Value::Map(entries) => entries.iter().all(|(_, value)| every_number(value, is_possible)),
+        _ => true,
     }
 }
 

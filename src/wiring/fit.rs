@@ -28,6 +28,7 @@ pub(crate) struct Fit {
 const PRIOR_SIGMAS: f64 = 4.0;
 /// A leak this many standard deviations below zero is negative.
 const NEGATIVE_SIGMAS: f64 = 6.0;
+
 impl Fit {
     /// By these sums; without rows the priors.
     pub(super) fn of(sums: &BothSums, rig: &Rig, Priors(priors): &Priors) -> Option<Self> {

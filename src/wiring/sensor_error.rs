@@ -6,6 +6,7 @@ use super::fit::Fit;
 use super::mistake::Mistake;
 use super::priors::Priors;
 use super::readings::Readings;
+use super::zeros::ZEROS;
 use super::{APART, LEAST_DROP};
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Leak, Parameter};
@@ -13,8 +14,6 @@ use pitchleak_core::{Leak, Parameter};
 /// What may be off, one at a time.
 pub(super) const ERRORS: [Parameter; 5] =
     [Parameter::GainA, Parameter::GainB, Parameter::GainPosition, Parameter::OffsetA, Parameter::OffsetB];
-/// The meters' zeros, which may both be off.
-const ZEROS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 /// An error of fewer standard deviations is none.
 const SURE_SIGMAS: f64 = 5.0;
 /// Larger gains are mistakes of the unit.

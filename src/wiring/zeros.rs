@@ -50,6 +50,8 @@ pub struct SingleZero {
     pub flows_m3s: PerLeak<Estimate<f64>>,
 }
 
+/// The meters' zeros, which may both be off.
+pub(super) const ZEROS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 /// What a bend gives a fit to choose (leaks, their slopes and the oil once more) is worth less in χ² by chance.
 const BEYOND_CHANCE: f64 = 25.0;
 
@@ -124,8 +126,7 @@ fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: &Fit) -> Optio
         offsets_m3s: free.offsets_m3s(),
         offsets_without_m3s: without.map(|fit| fit.offsets_m3s()),
         leaks_m3spa: free.leak_coefficients(),
-        single: [Parameter::OffsetA, Parameter::OffsetB]
-            .map(|zero| single_zero(stretch, leaks, &declared, zero)),
+        single: ZEROS.map(|zero| single_zero(stretch, leaks, &declared, zero)),
         duration_s: stretch.duration_s(),
     })
 }
@@ -138,10 +139,11 @@ fn single_zero(
 ) -> Option<SingleZero> {
     let fit = stretch.fit_of_any_length(&leaks.with_zero_off(zero, stretch.rig()))?;
     let flows_m3s = |fit: &Fit| PerLeak::from_fn(|leak| fit.flow_m3s(leak, stretch.driven(leak).sizes));
+    let beside_m3s = flows_m3s(&fit);
     Some(SingleZero {
         drop: (declared.chi_square() - fit.chi_square()) / fit.worst().max(1.0),
         offset_m3s: fit.parameter(zero),
-        shift_m3s: flows_m3s(&fit).zip(flows_m3s(declared)).map(|(beside, alone)| beside.value - alone.value),
-        flows_m3s: flows_m3s(&fit),
+        shift_m3s: beside_m3s.zip(flows_m3s(declared)).map(|(beside, alone)| beside.value - alone.value),
+        flows_m3s: beside_m3s,
     })
 }
