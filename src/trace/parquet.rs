@@ -3,9 +3,13 @@
 use super::format::Format;
 
 #[cfg(feature = "parquet")]
+mod columns;
+#[cfg(feature = "parquet")]
 mod guard;
 #[cfg(feature = "parquet")]
 mod rows;
+#[cfg(feature = "parquet")]
+mod zstd;
 
 #[cfg(feature = "parquet")]
 pub(super) const FORMAT: Format =

@@ -8,6 +8,7 @@ import pandas as pd
 import polars
 import pyarrow as pa
 import pyarrow.dataset
+import pyarrow.parquet
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -108,6 +109,25 @@ def test_tables_that_are_not_in_memory_yet(trace, expected, tmp_path):
         pl.replay(frame.lazy().drop("t_s"))
     with pytest.raises(polars.exceptions.ColumnNotFoundError):
         pl.replay(frame.lazy().select("t"))
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda frame, path: frame.write_parquet(path),
+        lambda frame, path: frame.write_parquet(path, compression_level=19, row_group_size=300),
+        lambda frame, path: frame.to_pandas().to_parquet(path),
+        lambda frame, path: pyarrow.parquet.write_table(
+            frame.to_arrow(), path, compression="zstd", data_page_version="2.0", data_page_size=1000
+        ),
+    ],
+    ids=["polars", "polars, small groups", "pandas", "pyarrow, zstd in pages of version 2"],
+)
+def test_a_file_of_parquet_as_its_writer_writes_it(trace, expected, tmp_path, write):
+    path = tmp_path / "t.parquet"
+    write(polars.DataFrame(trace), path)
+    read = pl.replay(path)
+    assert (read.estimates, read.leakage) == (expected.estimates, expected.leakage)
 
 
 @pytest.mark.parametrize("empty", [polars.DataFrame(), pd.DataFrame(), pa.table({}), {}, polars.LazyFrame()])

@@ -1,3 +1,4 @@
+use super::columns::{self, Columns};
 use super::guard::guarded;
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -16,7 +17,6 @@ use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
-use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
@@ -60,9 +60,9 @@ pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
 }
 
 fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
-    let file: Arc<dyn FileReader> = match stream.file.take() {
-        Some(file) => Arc::new(SerializedFileReader::new(file).map_err(damaged)?),
-        None => Arc::new(SerializedFileReader::new(Bytes::from(stream.hold()?)).map_err(damaged)?),
+    let file = match stream.file.take() {
+        Some(file) => columns::open(file).map_err(damaged)?,
+        None => columns::open(Bytes::from(stream.hold()?)).map_err(damaged)?,
     };
     let fields = fields(file.as_ref());
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
@@ -112,17 +112,17 @@ fn damaged(error: ParquetError) -> TraceFault {
             let codec = what.rsplit(' ').next().unwrap_or_default();
             TraceFault::Ambiguous {
                 what: format!("compressed by {codec}, which is not read"),
-                settle: "write it with compression=\"snappy\", \"gzip\", \"lz4\" or none".to_owned(),
+                settle: "write it with compression=\"zstd\", \"snappy\", \"gzip\", \"lz4\" or none"
+                    .to_owned(),
             }
         }
         other => TraceFault::Damaged(other.to_string().replace('\n', " ")),
     }
 }
 
-fn fields(file: &dyn FileReader) -> Vec<Field> {
-    let schema = file.metadata().file_metadata().schema_descr();
+fn fields(file: &dyn Columns) -> Vec<Field> {
     let flat = |column: &ColumnDescriptor| column.max_rep_level() == 0 && column.max_def_level() <= 1;
-    let fields = schema.columns().iter().enumerate().filter(|(_, column)| flat(column));
+    let fields = file.described().iter().enumerate().filter(|(_, column)| flat(column));
     let fields = fields.map(|(place, column)| Field {
         place,
         name: column.name().to_owned(),
@@ -166,24 +166,23 @@ fn is_plain(field: &Field, rig: &Rig) -> bool {
 
 /// The first rows as text, as those of a file of text are looked at; without the columns whose cells nobody asks, because
 /// a page of each would be read twice.
-fn sample(file: &dyn FileReader, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow>, TraceFault> {
+fn sample(file: &dyn Columns, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow>, TraceFault> {
     let mut rows: Vec<TextRow> = Vec::new();
-    if file.num_row_groups() == 0 {
+    if file.row_groups().is_empty() {
         return Ok(rows);
     }
-    let group = file.get_row_group(0).map_err(damaged)?;
     for (index, field) in fields.iter().enumerate() {
         let cells: Vec<String> = match field.kind {
             Kind::Other => continue,
             Kind::Number if is_plain(field, rig) => continue,
             Kind::Stamp(_) => vec!["2000-01-01T00:00:00".to_owned()],
             Kind::Text => {
-                let mut reader = group.get_column_reader(field.place).map_err(damaged)?;
+                let mut reader = file.read(0, field.place).map_err(damaged)?;
                 let texts = texts(&mut reader, field.optional, SAMPLE)?;
                 texts.iter().map(|text| String::from_utf8_lossy(text.data()).into_owned()).collect()
             }
             Kind::Number => {
-                let mut reader = group.get_column_reader(field.place).map_err(damaged)?;
+                let mut reader = file.read(0, field.place).map_err(damaged)?;
                 let values = numbers(&mut reader, field.optional, SAMPLE)?;
                 values
                     .iter()
@@ -205,7 +204,7 @@ fn sample(file: &dyn FileReader, fields: &[Field], rig: &Rig) -> Result<Vec<Text
 
 /// Row group after row group, a few thousand rows at a time.
 struct Batches {
-    file: Arc<dyn FileReader>,
+    file: Arc<dyn Columns>,
     read: Vec<Read>,
     group: usize,
     /// Of the row group that is being read; none before it is.
@@ -220,11 +219,10 @@ impl Batches {
     fn next(&mut self) -> Result<Option<Vec<Cells<'static>>>, TraceFault> {
         loop {
             if self.open.is_empty() {
-                if self.group == self.file.num_row_groups() {
+                if self.group == self.file.row_groups().len() {
                     return Ok(None);
                 }
-                let group = self.file.get_row_group(self.group).map_err(damaged)?;
-                let open = self.read.iter().map(|read| group.get_column_reader(read.place));
+                let open = self.read.iter().map(|read| self.file.read(self.group, read.place));
                 self.open = open.collect::<Result<_, _>>().map_err(damaged)?;
                 self.group += 1;
             }

@@ -138,6 +138,20 @@ fn every_compression_that_costs_no_build_is_read() {
     }
 }
 
+/// As polars writes them of itself, and pyarrow in pages of version 2, whose levels are not compressed.
+const BY_ZSTD: [(&str, &[u8]); 2] = [
+    ("polars", include_bytes!("../../../fuzz/seeds/parquet/polars.parquet")),
+    ("pages of version 2", include_bytes!("../../../fuzz/seeds/parquet/arrow-pages-2.parquet")),
+];
+
+#[test]
+fn zstd_is_read() {
+    let plain = read(file_by(Compression::UNCOMPRESSED, &with_time("t_s", doubles(|i| i)), ROWS)).unwrap();
+    for (writer, bytes) in BY_ZSTD {
+        assert_eq!(read(bytes.to_vec()).unwrap(), plain, "{writer}");
+    }
+}
+
 #[test]
 fn what_is_no_trace_is_one_line() {
     let message = |bytes| read(bytes).unwrap_err().to_string();
@@ -159,6 +173,18 @@ proptest::proptest! {
         bytes[at] = byte;
         if let Err(error) = read(bytes) {
             proptest::prop_assert!(!error.to_string().contains('\n'));
+        }
+    }
+
+    #[test]
+    fn any_byte_may_be_wrong_where_zstd_compresses(at in 0..100_000_usize, byte in 0..=255_u8) {
+        for (_, bytes) in BY_ZSTD {
+            let mut bytes = bytes.to_vec();
+            let at = at % bytes.len();
+            bytes[at] = byte;
+            if let Err(error) = read(bytes) {
+                proptest::prop_assert!(!error.to_string().contains('\n'));
+            }
         }
     }
 }
