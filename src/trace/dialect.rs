@@ -8,6 +8,7 @@ use super::encoding::Encoding;
 use super::error::TraceFault;
 use super::format::Stream;
 use super::inspect::proposals;
+use super::mistaken::mistaken;
 use super::proposal::Proposal;
 use super::records::{Records, Stop};
 use super::stamp::Epoch;
@@ -41,6 +42,9 @@ impl Dialect {
             // Nothing but line ends, or a stream that fails before its first line.
             return Err(records.next().map_or_else(stopped_early, |_| TraceFault::Empty));
         };
+        if let Some(fault) = mistaken(ahead).filter(|_| table.bound.is_err()) {
+            return Err(fault);
+        }
         if table.headers.iter().any(|header| header.contains('\0')) {
             return Err(TraceFault::Format("not a CSV file: the header row is binary"));
         }

@@ -14,6 +14,7 @@ mod inspect;
 mod inspect_text;
 mod line;
 mod mat;
+mod mistaken;
 mod number;
 mod parquet;
 mod proposal;

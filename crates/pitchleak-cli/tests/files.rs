@@ -118,7 +118,11 @@ fn estimates_are_written_as_parquet() {
     let bytes = std::fs::read(folder.path().join("e.parquet")).unwrap();
     assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"));
     let columns = pitchleak(&["columns", "e.parquet"], folder.path());
-    assert!(text(&columns.stderr).contains("no column for"), "{}", text(&columns.stderr));
+    assert!(
+        text(&columns.stderr).contains("estimates that `replay --out` wrote"),
+        "{}",
+        text(&columns.stderr)
+    );
 }
 
 #[test]
@@ -129,4 +133,70 @@ fn manual_pages_are_of_the_program_and_its_commands() {
         assert!(page.contains(".TH") && page.contains(&name.replace('-', "\\-")), "{page}");
     }
     assert_eq!(pitchleak(&["man", "fly"], folder.path()).status.code(), Some(2));
+}
+
+/// What is given in a trace's place by mistake: as the program itself writes it.
+#[test]
+fn what_is_no_trace_says_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let run = |arguments: &str| {
+        let output = pitchleak(&arguments.split(' ').collect::<Vec<_>>(), folder.path());
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {}", text(&output.stderr));
+        output.stdout
+    };
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/traces/rig.toml"), path("rig.toml"))
+        .unwrap();
+    run("simulate --wind 13 --duration 5s --out t.csv");
+    run("replay t.csv --out estimates.csv --report report.html");
+    run("replay t.csv --out estimates.parquet");
+    run("fleet t.csv --out fleet.csv");
+    run("fleet t.csv --out fleet.parquet");
+    for (name, arguments) in [
+        ("replay.json", "replay t.csv --json"),
+        ("check.json", "check t.csv --json"),
+        ("fleet.json", "fleet t.csv --json"),
+        ("columns.json", "columns t.csv --json"),
+    ] {
+        std::fs::write(path(name), run(arguments)).unwrap();
+    }
+    std::fs::write(path("rigs.csv"), "trace,rig,cylinder\n*.csv,rig.toml,\n").unwrap();
+    std::fs::write(path("samples.json"), "{\"t_s\": 0, \"x_mm\": 1}\n{\"t_s\": 0.01, \"x_mm\": 1}\n")
+        .unwrap();
+    std::fs::write(path("watch.json"), "{\"type\":\"estimate\",\"cylinder\":\"1\"}\n").unwrap();
+    std::fs::write(path("page.html"), "<!DOCTYPE html>\n<HTML><body>a,b,c,d\n1,2,3,4\n").unwrap();
+    let kinds = [
+        ("rig.toml", "a rig file, not a trace: give it by `--rig FILE`"),
+        ("t.json", "what is true of a simulated trace"),
+        ("replay.json", "a result of pitchleak"),
+        ("check.json", "a result of pitchleak"),
+        ("fleet.json", "a result of pitchleak"),
+        ("columns.json", "a result of pitchleak"),
+        ("report.html", "a report of pitchleak for a browser"),
+        ("estimates.csv", "estimates that `replay --out` wrote"),
+        ("estimates.parquet", "estimates that `replay --out` wrote"),
+        ("fleet.csv", "a table that `fleet --out` wrote"),
+        ("fleet.parquet", "a table that `fleet --out` wrote"),
+        ("rigs.csv", "a table of rig files"),
+        ("watch.json", "what `pitchleak watch` wrote"),
+        ("samples.json", "JSON, not a table"),
+        ("page.html", "a page for a browser (HTML)"),
+    ];
+    for (name, said) in kinds {
+        for command in ["replay", "columns"] {
+            let output = pitchleak(&[command, name], folder.path());
+            let error = text(&output.stderr);
+            assert_eq!((output.status.code(), error.lines().count()), (Some(2), 1), "{command}: {error}");
+            assert!(error.starts_with(&format!("error: {name}: {said}")), "{command}: {error}");
+        }
+    }
+}
+
+/// A logger may have any words above its table.
+#[test]
+fn a_trace_is_read_whatever_stands_above_it() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "a.csv", "[cylinder]\n7\nt_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm", plain);
+    let output = pitchleak(&["replay", "a.csv"], folder.path());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
 }

@@ -8,6 +8,7 @@ use crate::trace::columns::{Content, Layout, shorten, standard};
 use crate::trace::dialect::time_format;
 use crate::trace::error::TraceFault;
 use crate::trace::format::{Rows, Stream};
+use crate::trace::mistaken::mistaken;
 use crate::trace::quality::Counted;
 use crate::trace::stamp::{Epoch, seconds_between};
 use crate::trace::table::{Cells, TableRows};
@@ -67,7 +68,8 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let fields = fields(file.as_ref());
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     let sample = sample(file.as_ref(), &fields, rig)?;
-    let bound = bind(&names, None, &sample, rig)?;
+    let bound = bind(&names, None, &sample, rig)
+        .map_err(|fault| mistaken(names.join(",").as_bytes()).unwrap_or(fault))?;
     let mut layout = Layout { counted: Counted::Rows, ..bound.layout };
     let mut read = Vec::new();
     for (index, (field, bound_column)) in fields.iter().zip(&layout.columns).enumerate() {
