@@ -13,7 +13,7 @@ const FORMATS: &[Format] = &[
     mat::FORMAT,
     Format::refused(
         b"\x89HDF",
-        "HDF5 cannot be read: export the trace as .csv, .parquet or a MAT file of version 5 (save -v6)",
+        "HDF5 cannot be read but in MAT files: export the trace as .csv, .parquet or .mat",
     ),
     Format::refused(b"PK\x03\x04", "an Excel workbook or a zip archive: save the sheet as CSV"),
     Format::refused(b"\xd0\xcf\x11\xe0", "an Excel workbook: save the sheet as CSV"),

@@ -52,7 +52,6 @@ pub(super) struct Stream {
 /// More than this of a file that is not read as a stream is not held, bytes.
 pub(super) const MOST_HELD: u64 = 1 << 30;
 
-#[cfg(feature = "parquet")]
 impl Stream {
     /// All bytes.
     pub(super) fn hold(self) -> Result<Vec<u8>, TraceFault> {

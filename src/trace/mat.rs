@@ -1,6 +1,9 @@
-//! MAT files of version 5, as MATLAB and Octave write them (`save -v6`, `-v7`): a numeric vector per signal.
+//! MAT files as MATLAB and Octave write them (version 5: `save -v6`, `-v7`; 7.3: `-v7.3`): a numeric vector per signal.
 //!
 //! MathWorks, "MAT-File Format", chapter 1 (Level 5).
+
+mod hdf5;
+mod vector;
 
 use super::bind::bind;
 use super::columns::shorten;
@@ -29,6 +32,9 @@ const INT64: u32 = 12;
 const UINT64: u32 = 13;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
+
+/// What the header says of a file that is HDF5 behind it; big-endian machines write none.
+const VERSION_7_3: [u8; 2] = [0, 2];
 
 /// No name or list of dimensions is longer, bytes.
 const LONGEST_HEADER: u32 = 4096;
@@ -93,13 +99,17 @@ fn with_others(
 type Named<T> = Vec<(String, T)>;
 
 /// The vectors of a file, and what else is in it.
-fn read(mut stream: Stream) -> Result<(Named<Vec<f64>>, Named<&'static str>), TraceFault> {
+type Variables = (Named<Vec<f64>>, Named<&'static str>);
+
+const TOO_LARGE: &str = "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet";
+
+/// The vectors of a file, and what else is in it.
+fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
     let mut header = [0; 128];
     stream.bytes.read_exact(&mut header).map_err(damaged)?;
-    if header.starts_with(b"MATLAB 7.3") {
-        return Err(TraceFault::Format(
-            "a MAT file of version 7.3 (HDF5), which is not read: load it and save it with save -v7, or as CSV",
-        ));
+    if header.get(124..126) == Some(&VERSION_7_3) {
+        stream.bytes = Box::new(io::Cursor::new(header).chain(stream.bytes));
+        return hdf5::read(&stream.hold()?);
     }
     let big_endian = match header.get(126..) {
         Some(b"IM") => false,
@@ -244,9 +254,7 @@ impl<R: Read> Elements<R> {
             let what = format!("has {size} bytes beside its tag, which has room for 4");
             return Err(damaged_variable(&name, &what));
         }
-        *budget = budget.checked_sub(length).ok_or(TraceFault::Format(
-            "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet",
-        ))?;
+        *budget = budget.checked_sub(length).ok_or(TraceFault::Format(TOO_LARGE))?;
         let values = self.numbers(kind, width, size, padding(size, small))?;
         Ok(Some(Variable { name, values: Values::Vector(values) }))
     }
@@ -260,34 +268,34 @@ impl<R: Read> Elements<R> {
             let count = left.min(piece.len());
             let bytes = piece.get_mut(..count).unwrap_or_default();
             self.bytes.read_exact(bytes).map_err(damaged)?;
-            values.extend(bytes.chunks_exact(width).map(|number| self.number(kind, number)));
+            values.extend(bytes.chunks_exact(width).map(|bytes| number(kind, self.big_endian, bytes)));
             left -= count;
         }
         io::copy(&mut self.bytes.by_ref().take(u64::from(padding)), &mut io::sink()).map_err(damaged)?;
         Ok(values)
     }
+}
 
-    fn number(&self, kind: u32, bytes: &[u8]) -> f64 {
-        let mut word = [0; 8];
-        for (index, byte) in bytes.iter().enumerate() {
-            let place = if self.big_endian { bytes.len() - 1 - index } else { index };
-            if let Some(to) = word.get_mut(place) {
-                *to = *byte;
-            }
+fn number(kind: u32, big_endian: bool, bytes: &[u8]) -> f64 {
+    let mut word = [0; 8];
+    for (index, byte) in bytes.iter().enumerate() {
+        let place = if big_endian { bytes.len() - 1 - index } else { index };
+        if let Some(to) = word.get_mut(place) {
+            *to = *byte;
         }
-        let [a, b, c, d, ..] = word;
-        match kind {
-            INT8 => f64::from(i8::from_le_bytes([a])),
-            UINT8 => f64::from(a),
-            INT16 => f64::from(i16::from_le_bytes([a, b])),
-            UINT16 => f64::from(u16::from_le_bytes([a, b])),
-            INT32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-            UINT32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-            SINGLE => f64::from(f32::from_le_bytes([a, b, c, d])),
-            INT64 => i64::from_le_bytes(word) as f64,
-            UINT64 => u64::from_le_bytes(word) as f64,
-            _ => f64::from_le_bytes(word),
-        }
+    }
+    let [a, b, c, d, ..] = word;
+    match kind {
+        INT8 => f64::from(i8::from_le_bytes([a])),
+        UINT8 => f64::from(a),
+        INT16 => f64::from(i16::from_le_bytes([a, b])),
+        UINT16 => f64::from(u16::from_le_bytes([a, b])),
+        INT32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+        UINT32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+        SINGLE => f64::from(f32::from_le_bytes([a, b, c, d])),
+        INT64 => i64::from_le_bytes(word) as f64,
+        UINT64 => u64::from_le_bytes(word) as f64,
+        _ => f64::from_le_bytes(word),
     }
 }
 

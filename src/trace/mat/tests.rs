@@ -124,14 +124,54 @@ fn small_numbers_are_of_any_type() {
     );
 }
 
+/// Vectors of several types, compact, contiguous and in compressed chunks, beside a struct and a text.
+const VERSION_7_3: &[u8] = include_bytes!("../../../fuzz/seeds/mat/version-7.3.mat");
+
+#[test]
+fn version_7_3_is_read() {
+    let records = read(VERSION_7_3.to_vec()).unwrap();
+    assert_eq!(records, read(file(false, false, CLASS_DOUBLE, 50)).unwrap());
+    let without = |name: &str| {
+        let mut bytes = VERSION_7_3.to_vec();
+        let at = bytes.windows(name.len()).position(|part| part == name.as_bytes()).unwrap();
+        bytes[at] = b'z';
+        read(bytes).unwrap_err().to_string()
+    };
+    let text = without("x_mm");
+    assert!(text.contains("variable `data` is a struct") && text.contains("-struct"), "{text}");
+}
+
+#[test]
+fn damage_to_version_7_3_is_one_line() {
+    for length in [128, 512, 520, 600, VERSION_7_3.len() / 2, VERSION_7_3.len() - 1] {
+        let message = read(VERSION_7_3[..length].to_vec()).unwrap_err().to_string();
+        assert!(message.contains("damaged") && !message.contains('\n'), "{length}: {message}");
+    }
+    let superblock = |version: u8| {
+        let mut bytes = VERSION_7_3.to_vec();
+        bytes[520] = version;
+        read(bytes).unwrap_err().to_string()
+    };
+    assert!(superblock(2).contains("in a form of HDF5 that is not read"), "{}", superblock(2));
+}
+
+proptest::proptest! {
+    #[test]
+    fn any_byte_of_version_7_3_may_be_wrong(at in 512..100_000_usize, byte in 0..=255_u8) {
+        let mut bytes = VERSION_7_3.to_vec();
+        let at = at % bytes.len();
+        bytes[at] = byte;
+        if let Err(error) = read(bytes) {
+            proptest::prop_assert!(!error.to_string().contains('\n'));
+        }
+    }
+}
+
 #[test]
 fn what_is_not_read_is_refused_by_name() {
     let message = |bytes| read(bytes).unwrap_err().to_string();
     let text = message(file(false, false, CLASS_STRUCT, 50));
     assert!(text.contains("variable `t_s` is a struct") && text.contains("-struct"), "{text}");
-    let mut newer = b"MATLAB 7.3 MAT-file".to_vec();
-    newer.resize(600, 0);
-    assert!(message(newer).contains("save -v7"));
     assert!(message(b"\x89HDF\r\n\x1a\n".to_vec()).contains("HDF5"));
     assert!(message(b"PK\x03\x04....".to_vec()).contains("Excel"));
 }
