@@ -157,6 +157,28 @@ impl<const N: usize> Envelopes<N> {
         }
         rows
     }
+
+    /// Each quantity's median in at most `columns` stretches of the same length; none where it was not there.
+    pub fn courses(&self, columns: usize) -> [Vec<Option<f64>>; N] {
+        let rows = self.rows();
+        let columns = columns.min(rows.len());
+        let (first, last) = rows.first().zip(rows.last()).map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
+        let column = |t_s: f64| {
+            let share = (t_s - first) / (last - first).max(f64::MIN_POSITIVE);
+            ((share * columns as f64) as usize).min(columns.saturating_sub(1))
+        };
+        std::array::from_fn(|n| {
+            let mut sums = vec![(0.0, 0_u32); columns];
+            for row in &rows {
+                let range = row.ranges.get(n).copied().flatten();
+                if let (Some((sum, count)), Some(range)) = (sums.get_mut(column(row.t_s)), range) {
+                    *sum += range.median;
+                    *count += 1;
+                }
+            }
+            sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
+        })
+    }
 }
 
 impl<const N: usize> Default for Stretch<N> {

@@ -27,6 +27,7 @@
 
 pub use pitchleak_core as core;
 
+mod bar;
 pub mod channels;
 pub mod check;
 pub mod cramer_rao;

@@ -2,9 +2,11 @@
 //! can and cannot identify.
 
 mod readings;
+mod sketch;
 mod text;
 
 pub use readings::Reading;
+pub use sketch::Sketch;
 
 use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::replay::{Replay, ReplayError, replay};

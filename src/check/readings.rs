@@ -32,8 +32,14 @@ struct Channel {
     most: f64,
 }
 
-const SIGNALS: [Signal; 6] =
+pub(super) const SIGNALS: [Signal; 6] =
     [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
+
+/// Of each of [`SIGNALS`], SI.
+pub(super) fn values(record: &Record) -> [Option<f64>; SIGNALS.len()] {
+    let s = &record.sample;
+    [Some(s.x_m), Some(s.pa_pa), Some(s.pb_pa), s.qa_m3s, s.qb_m3s, s.force_n]
+}
 
 impl Default for Extremes {
     fn default() -> Self {
@@ -44,10 +50,8 @@ impl Default for Extremes {
 
 impl Extremes {
     pub fn add(&mut self, record: &Record) {
-        let s = &record.sample;
-        let values = [Some(s.x_m), Some(s.pa_pa), Some(s.pb_pa), s.qa_m3s, s.qb_m3s, s.force_n];
         self.rows += 1;
-        for (channel, value) in self.channels.iter_mut().zip(values) {
+        for (channel, value) in self.channels.iter_mut().zip(values(record)) {
             if let Some(value) = value {
                 channel.count += 1;
                 channel.least = channel.least.min(value);

@@ -10,6 +10,7 @@ mod judge;
 mod report;
 mod rig_table;
 mod row;
+mod sketch;
 mod table;
 mod traces;
 mod trend;

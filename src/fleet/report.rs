@@ -1,5 +1,6 @@
 //! A fleet as JSON, and in short for people.
 
+use super::sketch::{Bars, CELLS};
 use super::{CylinderTrend, FleetRow, LongTrend};
 use crate::report::{Palette, Status};
 use pitchleak_core::Leak;
@@ -79,6 +80,16 @@ impl<'a> FleetReport<'a> {
 
     /// How many of which verdict, and a line for each trace that asks for somebody, the worst first.
     pub fn to_text(&self, palette: &Palette) -> String {
+        self.text(palette, false)
+    }
+
+    /// The same for a terminal that knows Unicode: with a bar of the largest leak in each line, and the course of each leak
+    /// that grows.
+    pub fn to_terminal(&self, palette: &Palette) -> String {
+        self.text(palette, true)
+    }
+
+    fn text(&self, palette: &Palette, draws: bool) -> String {
         let Counts { leak, sound, doubtful, not_sure, error } = self.counts;
         let mut text = format!(
             "{} of {}: {leak} leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
@@ -89,18 +100,26 @@ impl<'a> FleetReport<'a> {
             let _ = write!(text, ", {error} not judged");
         }
         text.push('\n');
+        self.write_worst(&mut text, palette, draws);
+        self.write_trends(&mut text, draws);
+        text
+    }
+
+    fn write_worst(&self, text: &mut String, palette: &Palette, draws: bool) {
         let worst = self.worst();
-        if !worst.is_empty() {
+        let (shown, more) = worst.split_at(worst.len().min(LINES));
+        let bars = Bars::of(shown).filter(|_| draws);
+        if !shown.is_empty() {
             text.push('\n');
         }
-        for row in worst.iter().take(LINES) {
-            text.push_str(&line(row, palette));
+        text.push_str(&bars.as_ref().map_or_else(String::new, |bars| bars.legend(palette)));
+        for row in shown {
+            let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(row));
+            text.push_str(&line(row, &bar, palette));
         }
-        if worst.len() > LINES {
-            let _ = writeln!(text, "… and {} more", worst.len() - LINES);
+        if !more.is_empty() {
+            let _ = writeln!(text, "… and {} more", more.len());
         }
-        self.write_trends(&mut text);
-        text
     }
 
     /// The traces that ask for somebody, the worst first.
@@ -129,13 +148,15 @@ impl<'a> FleetReport<'a> {
         growing
     }
 
-    fn write_trends(&self, text: &mut String) {
+    fn write_trends(&self, text: &mut String, draws: bool) {
         let growing = self.growing();
         if !growing.is_empty() {
             text.push('\n');
         }
         for (cylinder, leak, long) in growing.iter().take(LINES) {
-            let _ = writeln!(text, "GROWS     {cylinder}  {} by {}", leak.label(), long.rate());
+            let course =
+                if draws { format!("{:<CELLS$}  ", self.course(cylinder, *leak)) } else { String::new() };
+            let _ = writeln!(text, "GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate());
         }
         if growing.len() > LINES {
             let _ = writeln!(text, "… and {} more", growing.len() - LINES);
@@ -147,7 +168,7 @@ fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
-fn line(row: &FleetRow, palette: &Palette) -> String {
+fn line(row: &FleetRow, bar: &str, palette: &Palette) -> String {
     let word = row.word();
     let (colour, reset) = row.status.map_or(palette.caution(), |status| palette.verdict(status));
     let found = match (&row.error, row.status) {
@@ -161,7 +182,7 @@ fn line(row: &FleetRow, palette: &Palette) -> String {
         None if row.path.starts_with(&row.cylinder) => format!("{}  ", row.path),
         None => format!("{}  {}  ", row.cylinder, row.path),
     };
-    format!("{colour}{word:<8}{reset}  {place}{found}\n")
+    format!("{colour}{word:<8}{reset}  {bar}{place}{found}\n")
 }
 
 fn leaks(row: &FleetRow) -> String {

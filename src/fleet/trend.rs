@@ -41,10 +41,10 @@ pub struct LongTrend {
 }
 
 /// One trace's flow of one leak, L/min.
-struct Point {
-    at: Timestamp,
-    flow: Estimate<f64>,
-    threshold_lpm: f64,
+pub(super) struct Point {
+    pub(super) at: Timestamp,
+    pub(super) flow: Estimate<f64>,
+    pub(super) threshold_lpm: f64,
 }
 
 impl CylinderTrend {
@@ -112,7 +112,7 @@ impl LongTrend {
 }
 
 impl Point {
-    fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
+    pub(super) fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
         let found = row.leaks?[leak];
         let std = found.std_lpm.filter(|std| *std > 0.0)?;
         let half = jiff::SignedDuration::try_from_secs_f64(row.duration_s? / 2.0).ok()?;

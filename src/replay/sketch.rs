@@ -58,23 +58,7 @@ impl Sketch {
 
     /// Each leak's flow over the trace in at most `columns` stretches of the same length, L/min; none where it pauses.
     pub fn courses_lpm(&self, columns: usize) -> PerLeak<Vec<Option<f64>>> {
-        let rows = self.flows_lpm.rows();
-        let columns = columns.min(rows.len());
-        let (first, last) = rows.first().zip(rows.last()).map_or((0.0, 0.0), |(a, b)| (a.t_s, b.t_s));
-        let column = |t_s: f64| {
-            let share = (t_s - first) / (last - first).max(f64::MIN_POSITIVE);
-            ((share * columns as f64) as usize).min(columns.saturating_sub(1))
-        };
-        PerLeak::from_fn(|leak| {
-            let mut sums = vec![(0.0, 0_u32); columns];
-            for row in &rows {
-                let flow = row.ranges.get(leak as usize).copied().flatten();
-                if let (Some((sum, count)), Some(flow)) = (sums.get_mut(column(row.t_s)), flow) {
-                    *sum += flow.median;
-                    *count += 1;
-                }
-            }
-            sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
-        })
+        let courses = self.flows_lpm.courses(columns);
+        PerLeak::from_fn(|leak| courses.get(leak as usize).cloned().unwrap_or_default())
     }
 }

@@ -2,6 +2,7 @@
 
 use super::text::Palette;
 use super::{Leakage, ReplayReport};
+use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, scale, scale_text};
 use crate::replay::Sketch;
 use crate::spark::level;
 use pitchleak_core::{Estimate, Leak};
@@ -12,57 +13,29 @@ const BAR: usize = 32;
 /// Cells of a course.
 const COURSE: usize = 60;
 
-/// What stands in a cell of a bar, later ones over earlier ones.
-const ZERO: char = '│';
-const INTERVAL: char = '━';
-const LIMIT: char = '┊';
-const VALUE: char = '●';
-
 /// Writes the bars, on one scale for all leaks.
 pub(super) fn write_bars(out: &mut String, report: &ReplayReport, sketch: &Sketch, palette: &Palette) {
-    let known: Vec<_> =
-        Leak::ALL.into_iter().filter(|leak| report.estimates.leaks()[*leak].identifiable).collect();
-    let ends = known.iter().flat_map(|leak| {
-        let [low, high] = interval(&report.leakage[*leak]);
-        [low, high, sketch.threshold_lpm()[*leak]]
-    });
-    let ends = ends.filter(|end| end.is_finite());
-    let (low, high) = ends.fold((0.0_f64, 0.0_f64), |(low, high), end| (low.min(end), high.max(end)));
-    if known.is_empty() || high <= low {
-        return;
-    }
+    let known = Leak::ALL.into_iter().filter(|leak| report.estimates.leaks()[*leak].identifiable);
+    let bars: Vec<(Leak, Bar)> =
+        known.map(|leak| (leak, bar(&report.leakage[leak], sketch.threshold_lpm()[leak]))).collect();
+    let Some(ends) = scale(bars.iter().map(|(_, bar)| bar)) else { return };
     let (faint, reset) = palette.faint();
-    // No minus before a zero.
-    let from = if low > -0.005 { 0.0 } else { low };
-    let scale = format!("{from:.2} to {high:.2} L/min");
+    let range = scale_text(ends);
     let _ = writeln!(
         out,
-        "\n{faint}{:<12}{scale:<width$}  {VALUE} now  {INTERVAL} 95 %  {LIMIT} alarm level{reset}",
+        "\n{faint}{:<12}{range:<width$}  {VALUE} now  {INTERVAL} 95 %  {LIMIT} alarm level{reset}",
         "leak",
         width = BAR
     );
-    for leak in known {
-        let bar = bar(&report.leakage[leak], sketch.threshold_lpm()[leak], [low, high]);
-        let _ = writeln!(out, "{:<12}{}", leak.label(), bar.trim_end());
+    for (leak, bar) in bars {
+        let _ = writeln!(out, "{:<12}{}", leak.label(), bar.text(ends, BAR).trim_end());
     }
 }
 
-fn interval(leakage: &Leakage) -> [f64; 2] {
+fn bar(leakage: &Leakage, threshold_lpm: f64) -> Bar {
     let value = leakage.mean_lpm;
-    leakage.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95())
-}
-
-fn bar(leakage: &Leakage, threshold_lpm: f64, [low, high]: [f64; 2]) -> String {
-    let cell =
-        |value: f64| (((value - low) / (high - low)).clamp(0.0, 1.0) * (BAR - 1) as f64).round() as usize;
-    let mut cells = [' '; BAR];
-    let mut put = |at: usize, mark: char| cells.iter_mut().skip(at).take(1).for_each(|cell| *cell = mark);
-    put(cell(0.0), ZERO);
-    let [from, to] = interval(leakage).map(cell);
-    (from..=to).for_each(|at| put(at, INTERVAL));
-    put(cell(threshold_lpm), LIMIT);
-    put(cell(leakage.mean_lpm), VALUE);
-    cells.into_iter().collect()
+    let interval = leakage.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95());
+    Bar { interval, value: (value, VALUE), limit: threshold_lpm }
 }
 
 /// Writes how large each leak was over the trace; what is above the alarm level stands out.
@@ -112,14 +85,6 @@ fn is_above(flow: &Option<f64>, threshold_lpm: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_bar_shows_value_interval_and_alarm_level() {
-        let leakage = Leakage { mean_lpm: 0.5, std_lpm: Some(0.05), net_mean_lpm: None };
-        assert_eq!(bar(&leakage, 0.1, [0.0, 0.62]), "│    ┊              ━━━━━●━━━━━ ");
-        let unsure = Leakage { std_lpm: None, ..leakage };
-        assert_eq!(bar(&unsure, 0.5, [0.0, 0.5]).trim_end(), format!("│{}●", " ".repeat(30)));
-    }
 
     #[test]
     fn a_course_is_empty_where_the_trace_pauses_and_stands_out_above_the_alarm_level() {

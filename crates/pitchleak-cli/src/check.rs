@@ -2,7 +2,7 @@ use crate::failure::Failure;
 use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::check::check;
+use pitchleak::check::{Sketch, check};
 use pitchleak::page::{History, Page, PageFile};
 use std::path::PathBuf;
 
@@ -31,10 +31,14 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     let inputs = trace.files();
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
+    let mut sketch = (output::draws() && !arguments.json).then(Sketch::default);
     let (mut reader, bar) = trace.open()?;
     let report = check(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
+        }
+        if let Some(sketch) = &mut sketch {
+            sketch.add(replay, record);
         }
         Ok::<_, Failure>(())
     })?;
@@ -45,6 +49,9 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     output::note(&report.trace);
     output::warn(&report.trace.warnings);
     let json = arguments.json.then(|| report.to_json()).transpose()?;
-    trace.print(json, || report.to_text(&output::palette()))?;
+    trace.print(json, || match &sketch {
+        Some(sketch) => report.to_terminal(&output::palette(), sketch),
+        None => report.to_text(&output::palette()),
+    })?;
     Ok(Outcome::Done)
 }

@@ -67,6 +67,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     output::print(&if arguments.json {
         report.to_json()? + "\n"
+    } else if output::draws() {
+        report.to_terminal(&output::palette())
     } else {
         report.to_text(&output::palette())
     })?;
