@@ -19,6 +19,7 @@ mod write;
 pub use errors::FleetError;
 pub use identity::TraceIdentity;
 pub use judge::{Stopped, judge, judge_all, judge_opened};
+pub(crate) use report::count;
 pub use report::{Counts, FleetReport};
 pub use rig_table::RigTable;
 pub use row::{FleetLeak, FleetRow};

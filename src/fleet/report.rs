@@ -164,7 +164,8 @@ impl<'a> FleetReport<'a> {
     }
 }
 
-fn count(number: usize, what: &str) -> String {
+/// With an `s` behind many.
+pub(crate) fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 

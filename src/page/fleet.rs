@@ -5,7 +5,7 @@ use super::history::ink;
 use super::machine::{facts, short};
 use super::{Card, Head, Page, Section, Tone};
 use crate::envelope::Range;
-use crate::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend};
+use crate::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend, count};
 use crate::report::{Status, advice, capital, with_interval};
 use crate::units::S_PER_DAY;
 use jiff::Timestamp;
@@ -40,7 +40,7 @@ impl Page {
             },
             Section { id: "made", title: "How this was made", body: made(report) },
         ];
-        let subject = format!("{} traces of {} cylinders", report.traces, report.cylinders);
+        let subject = count(report.traces, "trace");
         Self { kind: "fleet", subject, head: head(report, &worst, &growing), sections, charts }
     }
 }
@@ -55,8 +55,8 @@ fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) 
         _ => (format!("{leak} LEAKS"), Tone::Leak),
     };
     let mut sentence = format!(
-        "Of {} traces {leak} show a leak, {sound} are sound, {doubtful} doubtful, {not_sure} not sure",
-        report.traces
+        "{}: {leak} with a leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
+        count(report.traces, "trace")
     );
     if error > 0 {
         sentence += &format!(", and {error} could not be judged");
@@ -75,7 +75,7 @@ fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) 
         word,
         tone,
         sentence,
-        data: format!("{} cylinders", report.cylinders),
+        data: count(report.cylinders, "cylinder"),
         cards: vec![
             Card {
                 title: "What to do first",
