@@ -11,7 +11,7 @@ use crate::report::{
 use crate::rig::Rig;
 use crate::units::{LPM_PER_BAR, LPM_PER_M3S, duration};
 use maud::{Markup, html};
-use pitchleak_core::{AlarmState, Estimate, Leak};
+use pitchleak_core::{AlarmState, Leak};
 
 impl Page {
     /// The report of a replay of `rig`, with what was gathered on the way.
@@ -96,10 +96,7 @@ fn open(report: &ReplayReport) -> Markup {
 /// The leaks as bars on a common scale.
 fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
     let ends = |leak: Leak| {
-        let leakage = report.leakage[leak];
-        let [low, high] = leakage
-            .std_lpm
-            .map_or([leakage.mean_lpm; 2], |std| Estimate { value: leakage.mean_lpm, std }.ci95());
+        let [low, high] = report.leakage[leak].ci95();
         [low, high, rig.alarms.threshold_m3s[leak] * LPM_PER_M3S]
     };
     let known = |leak: &Leak| report.estimates.leaks()[*leak].identifiable;

@@ -236,6 +236,12 @@ impl Leakage {
         Self { mean_lpm: lpm.value, net_mean_lpm: None, std_lpm: Some(lpm.std) }
     }
 
+    /// The interval that holds the mean with 95 % probability, L/min; without length where nothing is known of its error.
+    pub(crate) fn ci95(&self) -> [f64; 2] {
+        let value = self.mean_lpm;
+        self.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95())
+    }
+
     /// Whether it is below zero by more than chance, which no leak is.
     pub(crate) fn is_negative(&self) -> bool {
         self.std_lpm.is_some_and(|std| self.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)

@@ -5,7 +5,7 @@ use super::{Leakage, ReplayReport};
 use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, scale, scale_text};
 use crate::replay::Sketch;
 use crate::spark::level;
-use pitchleak_core::{Estimate, Leak};
+use pitchleak_core::Leak;
 use std::fmt::Write;
 
 /// Cells of a bar.
@@ -33,9 +33,7 @@ pub(super) fn write_bars(out: &mut String, report: &ReplayReport, sketch: &Sketc
 }
 
 fn bar(leakage: &Leakage, threshold_lpm: f64) -> Bar {
-    let value = leakage.mean_lpm;
-    let interval = leakage.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95());
-    Bar { interval, value: (value, VALUE), limit: threshold_lpm }
+    Bar { interval: leakage.ci95(), value: (leakage.mean_lpm, VALUE), limit: threshold_lpm }
 }
 
 /// Writes how large each leak was over the trace; what is above the alarm level stands out.

@@ -143,6 +143,11 @@ fn no_longer_weighed(findings: &Findings<'_>) -> impl Iterator<Item = String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
+    // What may be none does not fall.
+    let [low, _] = findings.leakage[leak].ci95();
+    if value < 0.0 && low <= 0.0 {
+        return None;
+    }
     let slope = with_interval(value.abs(), Some(std));
     let verb = if value > 0.0 { "grows" } else { "falls" };
     let reaches = trend.reaches_threshold_in_s.map(|time| {

@@ -458,6 +458,17 @@ fn the_papers_law_is_never_sure() {
 }
 
 #[test]
+fn a_doubt_without_a_rig_file_says_so() {
+    let text = |found: Found, rig: &str| {
+        ReplayReport { rig: rig.to_owned(), ..found.report() }.to_text(&Palette::PLAIN)
+    };
+    let unsure = || Found { misfit: None, ..sound() };
+    assert!(text(unsure(), Rig::PAPER_NAME).contains("also  no rig file was given"));
+    assert!(!text(unsure(), "rig.toml").contains("no rig file"));
+    assert!(!text(sound(), Rig::PAPER_NAME).contains("also"));
+}
+
+#[test]
 fn a_leak_that_grows_says_when_it_matters() {
     let mut growing = sound();
     let (flow, slope) = (Estimate { value: 0.01, std: 1e-3 }, Estimate { value: 1e-4, std: 1e-5 });
@@ -465,6 +476,12 @@ fn a_leak_that_grows_says_when_it_matters() {
     let text = growing.verdict().text;
     assert!(text.contains("internal leak grows by 0.360 ± 0.071 L/min per hour"), "{text}");
     assert!(text.contains("it is at 0.10 L/min in 15 min (13 min to 19 min)"), "{text}");
+    let mut falling = sound();
+    falling.trends.internal = LeakTrend::new(flow, slope.scaled(-1.0), 0.1);
+    falling.leakage.internal = Leakage { mean_lpm: 0.01, std_lpm: Some(1e-3), net_mean_lpm: None };
+    assert!(falling.verdict().text.contains("internal leak falls by 0.360"), "{}", falling.verdict().text);
+    falling.leakage.internal = Leakage { mean_lpm: 1e-3, std_lpm: Some(1e-3), net_mean_lpm: None };
+    assert!(!falling.verdict().text.contains("falls"), "what may be none does not fall");
 }
 
 #[test]

@@ -90,6 +90,10 @@ pub(crate) fn misfit(normalised_innovation: [f64; 2]) -> Option<String> {
     })
 }
 
+/// What a doubt may come from where nobody said whose trace it is.
+const NO_RIG: &str = "no rig file was given: areas, stroke and sensors are those of the paper's cylinder (wu2011); say yours in \
+                      rig.toml beside the trace or by --rig";
+
 /// Which rig a report rests on.
 pub(crate) fn rig_line(rig: &str) -> String {
     if rig == Rig::PAPER_NAME {
@@ -140,10 +144,15 @@ impl ReplayReport {
     /// Reasons beyond the one that the verdict names.
     fn write_reasons(&self, out: &mut String, palette: &Palette) {
         let Palette { caution, reset, .. } = palette;
-        for (at, reason) in self.verdict.reasons.iter().skip(1).enumerate() {
+        let reasons = self.verdict.reasons.iter().skip(1).map(|reason| {
             let suggestion = reason.suggestion.as_ref().map(|text| format!("; {text}")).unwrap_or_default();
+            format!("{}{suggestion}", reason.text)
+        });
+        let no_rig =
+            (self.rig == Rig::PAPER_NAME && !self.verdict.status.is_sure()).then(|| NO_RIG.to_owned());
+        for (at, reason) in reasons.chain(no_rig).enumerate() {
             let before = if at == 0 { "\n" } else { "" };
-            let _ = writeln!(out, "{before}{caution}also{reset}  {}{suggestion}", reason.text);
+            let _ = writeln!(out, "{before}{caution}also{reset}  {reason}");
         }
         out.push('\n');
     }

@@ -67,7 +67,7 @@ impl Marks {
 
     fn add(&mut self, cell: &str) {
         let number = cell.trim_start_matches(['+', '-']);
-        if !number.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == ',') {
+        if !number.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == ',') || is_date(number) {
             return;
         }
         self.cells += 1;
@@ -103,6 +103,14 @@ impl Marks {
     }
 }
 
+/// Whether it is no number but a date or a time: other characters, or marks as between day, month and year.
+fn is_date(cell: &str) -> bool {
+    let in_threes = |mark: char| cell.split(mark).skip(1).all(|group| group.len() == 3);
+    let is_between = |mark: char| cell.matches(mark).count() > 1 && !in_threes(mark);
+    let other = |c: char| !c.is_ascii_digit() && !".,eE+-".contains(c);
+    cell.contains(other) || is_between('.') || is_between(',')
+}
+
 /// Whether a number could be thousands: one to three digits, not led by 0, and three behind the mark.
 fn is_group(number: &str, mark: char) -> bool {
     let Some((before, behind)) = number.split_once(mark) else { return false };
@@ -129,6 +137,7 @@ mod tests {
         assert!(of(&["1,234.5", "5,678.5"]).unwrap_err().contains("thousands"));
         assert!(of(&["5.000.000", "0,5"]).unwrap_err().contains("thousands"));
         assert!(of(&["5.5", "0,5"]).unwrap_err().contains("--decimal"));
+        assert_eq!(of(&["19.11.2026 06:30:00,250", "19.11.2026", "0,5", "06:30:00.25"]), Ok(Decimal::Comma));
         let ms: Vec<String> = (900..1100)
             .map(|i| if i < 1000 { i.to_string() } else { format!("1.{:03}", i - 1000) })
             .collect();

@@ -24,6 +24,8 @@ pub enum Why {
     Name,
     /// The name; the unit is one in which its values are possible on this rig.
     NameAndValues,
+    /// Its unit alone, and its place among the columns.
+    Unit,
     /// Its values alone, and its place among the columns.
     Values,
 }
@@ -34,6 +36,7 @@ impl Why {
         match self {
             Self::Name => "by its name",
             Self::NameAndValues => "by its name; the unit by its values: check it",
+            Self::Unit => "by its unit and place: check it",
             Self::Values => "by its values and place: check it",
         }
     }
@@ -46,6 +49,25 @@ pub(super) struct Unread<'a> {
     pub(super) unit: &'a str,
     /// Its first cells, none of them empty.
     pub(super) cells: Vec<&'a str>,
+}
+
+impl Unread<'_> {
+    /// The unit below or within the header, where it is one of this dimension.
+    fn unit(&self, dimension: Dimension) -> Option<HeaderUnit> {
+        let within = || header::parts(self.header).find_map(|(_, unit)| HeaderUnit::by_name(unit, dimension));
+        HeaderUnit::by_name(self.unit, dimension).or_else(within)
+    }
+
+    /// Whether there is one, of what is not time: that shows by its rising.
+    fn says_unit(&self) -> bool {
+        let dimensions = Signal::ALL.into_iter().filter_map(Signal::dimension);
+        dimensions.filter(|dimension| *dimension != Dimension::Time).any(|one| self.unit(one).is_some())
+    }
+
+    /// As `[columns]` would name it with the unit that it says.
+    fn named(&self, found: HeaderUnit) -> ForeignColumn {
+        ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(self.header, Some(found.unit)) }
+    }
 }
 
 /// What a word says of a quantity, and of a side.
@@ -97,7 +119,11 @@ pub(super) fn propose(
         let open = |signal: &Signal| {
             wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
         };
-        proposals.extend(by_values(column, decimal, rig, open));
+        let proposal = match column.says_unit() {
+            true => by_unit(column, open),
+            false => by_values(column, decimal, rig, open),
+        };
+        proposals.extend(proposal);
     }
     proposals.sort_by_key(|proposal| proposal.signal);
     proposals
@@ -119,11 +145,8 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
         _ => quantity,
     };
     let dimension = signal.dimension()?;
-    let split = header::parts(column.header).find_map(|(_, unit)| HeaderUnit::by_name(unit, dimension));
-    if let Some(found) = HeaderUnit::by_name(column.unit, dimension).or(split) {
-        let foreign =
-            ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(column.header, Some(found.unit)) };
-        return Some(Proposal { signal, column: foreign, why: Why::Name });
+    if let Some(found) = column.unit(dimension) {
+        return Some(Proposal { signal, column: column.named(found), why: Why::Name });
     }
     if signal == Signal::Time && times::guess(&column.cells).is_ok() {
         let foreign = ForeignColumn::new(column.header, None);
@@ -131,6 +154,16 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     }
     let unit = possible_unit(signal, &values(column, decimal), rig)?;
     Some(Proposal { signal, column: ForeignColumn::new(column.header, Some(unit)), why: Why::NameAndValues })
+}
+
+/// The signals that a trace needs, in their usual order.
+fn by_unit(column: &Unread<'_>, open: impl Fn(&Signal) -> bool) -> Option<Proposal> {
+    use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
+    let in_order = [Position, PressureA, PressureB, FlowA, FlowB, Force];
+    in_order.into_iter().filter(open).find_map(|signal| {
+        let found = column.unit(signal.dimension()?)?;
+        Some(Proposal { signal, column: column.named(found), why: Why::Unit })
+    })
 }
 
 /// Times rise, flows go both ways, and position comes before the pressures.
@@ -293,6 +326,29 @@ mod tests {
             found,
             "t = { name = \"CH0\", unit = \"ms\" }; x = { name = \"CH1\", unit = \"mm\" }; pa = { name = \"CH2\", unit = \"bar\" }; \
              pb = { name = \"CH3\", unit = \"bar\" }; qa = { name = \"CH4\", unit = \"L/min\" }"
+        );
+    }
+
+    #[test]
+    fn a_unit_is_as_the_file_says_it() {
+        let cells = (0..20).map(|i| (i % 7).to_string()).collect::<Vec<_>>();
+        let cells: Vec<&str> = cells.iter().map(String::as_str).collect();
+        let of = |header: &'static str, unit: &'static str| Unread { header, unit, cells: cells.clone() };
+        let unread =
+            [of("AI0", "cm"), of("AI1", "MPa"), of("AI2 [psi]", ""), of("AI3", "°C"), of("AI4", "l/min")];
+        let found = propose(&unread, &Signal::ALL, Decimal::Point, &Rig::paper());
+        let found: Vec<_> = found
+            .iter()
+            .map(|one| (one.signal, one.column.name.as_str(), one.column.unit.map(|unit| unit.text), one.why))
+            .collect();
+        assert_eq!(
+            found,
+            [
+                (Signal::Position, "AI0", Some("cm"), Why::Unit),
+                (Signal::PressureA, "AI1", Some("MPa"), Why::Unit),
+                (Signal::PressureB, "AI2 [psi]", Some("psi"), Why::Unit),
+                (Signal::FlowA, "AI4", Some("L/min"), Why::Unit),
+            ]
         );
     }
 

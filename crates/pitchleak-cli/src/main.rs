@@ -29,8 +29,8 @@ struct Cli {
 }
 
 const EXIT_STATUS: &str = "\
-Exit status: 0 done; 1 a fault was found and --fail-on-fault was given; 2 bad input or usage, or, at the
-end of `fleet`, traces that could not be judged; 130 Ctrl-C or the signal to end.
+Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
+2 bad input or usage, or traces that could not be judged; 130 Ctrl-C or the signal to end.
 Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
