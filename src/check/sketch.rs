@@ -60,7 +60,7 @@ impl Sketch {
 
     /// Says what the bars show.
     pub(super) fn legend() -> String {
-        format!("{INTERVAL} hidden  {LIMIT} alarm level")
+        format!("{INTERVAL} hidden by noise  {LIMIT} alarm level")
     }
 
     /// A bar for each leak of these resolutions, L/min, on one scale.

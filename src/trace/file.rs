@@ -17,6 +17,12 @@ const FORMATS: &[Format] = &[
     ),
     Format::refused(b"PK\x03\x04", "an Excel workbook or a zip archive: save the sheet as CSV"),
     Format::refused(b"\xd0\xcf\x11\xe0", "an Excel workbook: save the sheet as CSV"),
+    Format::refused(b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it (zstd -d), or compress it by gzip"),
+    Format::refused(b"\xfd7zX", "compressed by xz: unpack it (xz -d), or compress it by gzip"),
+    Format::refused(
+        b"TDSm",
+        "TDMS, of LabVIEW: export it as CSV; in Python, examples/mdf4_and_tdms.py reads it",
+    ),
     csv::FORMAT,
 ];
 

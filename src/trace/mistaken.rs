@@ -1,4 +1,4 @@
-//! Text files that are given in a trace's place by mistake, and what to do with each: asked only where no trace was found.
+//! Files that are given in a trace's place by mistake, and what to do with each: asked only where no trace was found.
 
 use super::encoding::text;
 use super::error::TraceFault;
@@ -55,6 +55,11 @@ const KINDS: &[Shown] = &[
         begins: "cylinder,path,begins,rig,status,",
         holds: "",
         line: "a table that `fleet --out` wrote, not a trace: give the traces that it is of",
+    },
+    Shown {
+        begins: "mdf     ",
+        holds: "",
+        line: "MDF, a measurement file: export it as CSV; in Python, examples/mdf4_and_tdms.py reads it",
     },
     Shown {
         begins: "trace,rig",

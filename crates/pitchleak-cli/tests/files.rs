@@ -165,7 +165,9 @@ fn what_is_no_trace_says_what_it_is() {
         .unwrap();
     std::fs::write(path("watch.json"), "{\"type\":\"estimate\",\"cylinder\":\"1\"}\n").unwrap();
     std::fs::write(path("page.html"), "<!DOCTYPE html>\n<HTML><body>a,b,c,d\n1,2,3,4\n").unwrap();
+    std::fs::write(path("m.mf4"), [b"MDF     4.10    pitch\0\0".as_slice(), &[0; 200]].concat()).unwrap();
     let kinds = [
+        ("m.mf4", "MDF, a measurement file"),
         ("rig.toml", "a rig file, not a trace: give it by `--rig FILE`"),
         ("t.json", "what is true of a simulated trace"),
         ("replay.json", "a result of pitchleak"),

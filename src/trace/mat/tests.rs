@@ -174,6 +174,8 @@ fn what_is_not_read_is_refused_by_name() {
     assert!(text.contains("variable `t_s` is a struct") && text.contains("-struct"), "{text}");
     assert!(message(b"\x89HDF\r\n\x1a\n".to_vec()).contains("HDF5"));
     assert!(message(b"PK\x03\x04....".to_vec()).contains("Excel"));
+    assert!(message(b"\x28\xb5\x2f\xfd....".to_vec()).contains("compressed by zstd"));
+    assert!(message(b"TDSm....".to_vec()).contains("TDMS"));
 }
 
 #[test]
