@@ -53,7 +53,10 @@ fn to_do(report: &ReplayReport) -> Markup {
             html! { ol { @for leak in &verdict.faults { li { strong { (capital(leak.label())) " leak: " } (advice(*leak)) "." } } } }
         }
         Status::Doubtful | Status::NotSure => {
-            html! { ol { @for reason in &verdict.reasons { (what(reason)) } } }
+            html! { ol {
+                @for reason in &verdict.reasons { (what(reason)) }
+                @if let Some(missing) = report.missing_rig() { li { (prose(&capital(missing))) "." } }
+            } }
         }
     }
 }

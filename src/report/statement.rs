@@ -93,10 +93,16 @@ fn apparent(findings: &Findings<'_>, faults: &[Leak]) -> Option<String> {
     let flow = |leak: &Leak| {
         let flow =
             findings.is_known(*leak).then(|| format!(" of {} L/min", interval(&findings.leakage[*leak])));
-        format!("{} leak{}", leak.label(), flow.unwrap_or_default())
+        flow.unwrap_or_default()
     };
-    let named: Vec<_> = faults.iter().map(flow).collect();
-    (!named.is_empty()).then(|| format!("Until then an apparent {} stays in doubt.", named.join(", ")))
+    match faults {
+        [] => None,
+        [one] => Some(format!("Until then an apparent {} leak{} stays in doubt.", one.label(), flow(one))),
+        many => {
+            let named: Vec<_> = many.iter().map(|leak| format!("{}{}", leak.label(), flow(leak))).collect();
+            Some(format!("Until then these apparent leaks stay in doubt: {}.", named.join(", ")))
+        }
+    }
 }
 
 /// Episodes that ended, and sudden changes.

@@ -197,6 +197,23 @@ fn a_negative_leak_is_evidence_against_the_model_where_it_is_as_large_as_leaks_t
 }
 
 #[test]
+fn apparent_leaks_are_told_one_by_one() {
+    let text = |active| {
+        let misfit = Some(Misfit { balance: 9.0, ..SOUND });
+        Found { misfit, ..found(active) }.verdict().text
+    };
+    let one = text(INTERNAL);
+    assert!(
+        one.contains("Until then an apparent internal leak of 0.4785 ± 0.0022 L/min stays in doubt."),
+        "{one}"
+    );
+    let two = text(PerLeak { external_b: true, ..INTERNAL });
+    let expected =
+        "Until then these apparent leaks stay in doubt: internal of 0.4785 ± 0.0022 L/min, external B.";
+    assert!(two.contains(expected), "{two}");
+}
+
+#[test]
 fn a_misfit_anywhere_in_the_trace_is_a_doubt() {
     for misfit in [
         Misfit { balance: 3.0, ..SOUND },

@@ -107,6 +107,11 @@ pub(crate) fn rig_line(rig: &str) -> String {
 const MOST_ALARMS: usize = 12;
 
 impl ReplayReport {
+    /// Says so where a verdict in doubt rests on no rig file.
+    pub(crate) fn missing_rig(&self) -> Option<&'static str> {
+        (self.rig == Rig::PAPER_NAME && !self.verdict.status.is_sure()).then_some(NO_RIG)
+    }
+
     /// The report for people, in the colours of `palette`.
     pub fn to_text(&self, palette: &Palette) -> String {
         self.text(palette, None)
