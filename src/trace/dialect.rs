@@ -42,7 +42,9 @@ impl Dialect {
             // Nothing but line ends, or a stream that fails before its first line.
             return Err(records.next().map_or_else(stopped_early, |_| TraceFault::Empty));
         };
-        if let Some(fault) = mistaken(ahead).filter(|_| table.bound.is_err()) {
+        if table.bound.is_err()
+            && let Some(fault) = mistaken(ahead)
+        {
             return Err(fault);
         }
         if table.headers.iter().any(|header| header.contains('\0')) {

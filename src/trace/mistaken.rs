@@ -63,7 +63,7 @@ const KINDS: &[Shown] = &[
     },
     Shown {
         begins: "trace,rig",
-        holds: "",
+        holds: ".toml",
         line: "a table of rig files, not a trace: `pitchleak fleet` reads it by `--rig FILE`",
     },
 ];
