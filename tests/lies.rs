@@ -29,15 +29,17 @@ const WINDS: [WindCase; 2] = [WindCase::Mps5, WindCase::Mps13];
 const SURE_WITHIN_S: f64 = 10.0;
 /// Of 48 streams so many may state a size that is off by more than 0.1 L/min.
 const MISSIZED: usize = 1;
+/// Share of the mistakes in doubt that are named at the least.
+const NAMED: f64 = 0.85;
 /// Another platform rounds otherwise and may turn a coin or two, as a share of a family's runs.
 const SLACK: f64 = 0.01;
 
 /// Right and confidently wrong ones of each row.
 fn read(text: &str) -> BTreeMap<String, (usize, usize)> {
     let line = |line: &str| {
-        let mut cells = line.rsplitn(5, ',');
+        let mut cells = line.rsplitn(6, ',');
         let mut count = || cells.next().and_then(|cell| cell.parse().ok());
-        let [_named, wrong, _doubt, right] = [count()?, count()?, count()?, count()?];
+        let [_misnamed, _named, wrong, _doubt, right] = [count()?, count()?, count()?, count()?, count()?];
         Some((cells.next()?.to_owned(), (right, wrong)))
     };
     text.lines().skip(1).filter_map(line).collect()
@@ -82,7 +84,7 @@ fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
     let before = read(&std::fs::read_to_string(path).expect("the snapshot is there"));
     assert_eq!(before.len(), outcomes.len(), "the lies have changed: write the snapshot anew");
     for (door, family) in Door::ALL.into_iter().flat_map(|door| Family::ALL.map(|family| (door, family))) {
-        let (mut runs, mut lost, mut wrong) = (0, 0, Vec::new());
+        let (mut runs, mut lost, mut misnamed, mut wrong) = (0, 0, 0, Vec::new());
         let own = |outcome: &&Outcome| outcome.door == door && outcome.lie.family == family;
         for outcome in outcomes.iter().filter(own) {
             let key = table::key(outcome);
@@ -90,17 +92,32 @@ fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
                 before.get(&key).unwrap_or_else(|| panic!("{key} is not in the snapshot"));
             runs += outcome.runs();
             lost += right.saturating_sub(outcome.right);
+            misnamed += outcome.misnamed;
             if outcome.confidently_wrong > *wrong_before {
                 wrong.push(key);
             }
         }
         let slack = (SLACK * runs as f64) as usize;
         assert!(wrong.len() <= slack, "{door:?}, {family:?}: newly confidently wrong: {wrong:#?}");
-        // To doubt a trace whose meters lie is no loss.
         let must_be_sure = matches!(family, Family::Honest | Family::Harmless);
+        assert!(!must_be_sure || misnamed == 0, "{door:?}, {family:?}: {misnamed} accused of wrong wires");
+        // To doubt a trace whose meters lie is no loss.
         assert!(
             !must_be_sure || lost <= slack,
             "{door:?}, {family:?}: {lost} of {runs} right and sure ones are lost"
         );
     }
+    mistakes_are_named(&outcomes);
+}
+
+/// Of `replay`'s doubts that a mistake is behind.
+fn mistakes_are_named(outcomes: &[Outcome]) {
+    let own = |one: &&Outcome| one.door == Door::Replay && one.lie.family == Family::Mistake;
+    let sum = |of: fn(&Outcome) -> usize| outcomes.iter().filter(own).map(of).sum::<usize>();
+    let (doubts, named, misnamed) = (sum(|one| one.in_doubt), sum(|one| one.named), sum(|one| one.misnamed));
+    assert!(named as f64 >= NAMED * doubts as f64, "of {doubts} mistakes in doubt {named} are named");
+    assert!(
+        misnamed as f64 <= SLACK * doubts as f64,
+        "of {doubts} mistakes in doubt {misnamed} are called another"
+    );
 }

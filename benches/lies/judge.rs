@@ -5,7 +5,7 @@ use crate::plant::{Leaking, rig};
 use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::live::{EstimateEvent, Event, LineFormat, LiveConfig, LiveLeakage, Watch};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::report::{Reason, ReplayReport, Status};
+use pitchleak::report::{Reason, ReasonId, ReplayReport, Status};
 use pitchleak::simulate::{
     Biases, Reading, Row, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
 };
@@ -130,18 +130,28 @@ fn is_size(said: &Said, leak: Leak, truths: &[Truth]) -> bool {
     off_lpm <= FIGURE_LPM.max(3.0 * stated.std_lpm.unwrap_or(0.0))
 }
 
-/// The judgement at each door of what the sensors of `accuracy` show of `truths`, with a lie, and whether that is named.
-pub fn ask(
-    truths: &[Truth],
-    leaking: Leaking,
-    lie: &Lie,
-    accuracy: f64,
-    seed: u64,
-) -> [(Judgement, bool); 2] {
+/// What a door makes of a trace.
+#[derive(Clone, Copy)]
+pub struct Judged {
+    pub judgement: Judgement,
+    /// The lie is named.
+    pub named: bool,
+    /// A mistake of wiring is named that it is not.
+    pub misnamed: bool,
+}
+
+/// At each door, of what the sensors of `accuracy` show of `truths`, with a lie.
+pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> [Judged; 2] {
     let (trace, shown) = recorded(truths, lie, accuracy, seed);
     Door::ALL.map(|door| match door.said(trace.clone(), accuracy) {
-        Err(words) => (Judgement::InDoubt, has_words(&words, lie)),
-        Ok(said) => (judge(&said, leaking, shown), names(&said, lie)),
+        Err(words) => {
+            Judged { judgement: Judgement::InDoubt, named: has_words(&words, lie), misnamed: false }
+        }
+        Ok(said) => {
+            let named = names(&said, lie);
+            let accused = said.reasons.iter().any(|reason| reason.id == ReasonId::Wiring);
+            Judged { judgement: judge(&said, leaking, shown), named, misnamed: accused && !named }
+        }
     })
 }
 

@@ -19,6 +19,8 @@ pub struct Outcome {
     pub confidently_wrong: usize,
     /// Those in doubt with the lie among the reasons.
     pub named: usize,
+    /// Those with another mistake of wiring among them.
+    pub misnamed: usize,
 }
 
 impl Outcome {
@@ -37,8 +39,8 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome>
             let asked: Vec<_> =
                 (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
             Door::ALL.map(|door| {
-                let judgements = || asked.iter().map(|doors| doors[door as usize]);
-                let count = |which| judgements().filter(|(judgement, _)| *judgement == which).count();
+                let judged = || asked.iter().map(|doors| doors[door as usize]);
+                let count = |which| judged().filter(|one| one.judgement == which).count();
                 Outcome {
                     door,
                     lie,
@@ -48,7 +50,8 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome>
                     right: count(Judgement::Right),
                     in_doubt: count(Judgement::InDoubt),
                     confidently_wrong: count(Judgement::ConfidentlyWrong),
-                    named: judgements().filter(|(_, named)| *named).count(),
+                    named: judged().filter(|one| one.named).count(),
+                    misnamed: judged().filter(|one| one.misnamed).count(),
                 }
             })
         };

@@ -6,7 +6,8 @@ use crate::plant::leak_name;
 use crate::sweep::Outcome;
 use std::fmt::Write;
 
-pub const HEADER: &str = "door,family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named\n";
+pub const HEADER: &str =
+    "door,family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named,misnamed\n";
 
 /// What a row of the bench is about, as the first cells of its line.
 pub fn key(outcome: &Outcome) -> String {
@@ -18,27 +19,31 @@ pub fn key(outcome: &Outcome) -> String {
 /// Every row.
 pub fn csv(outcomes: &[Outcome]) -> String {
     let line = |one: &Outcome| {
-        let Outcome { right, in_doubt, confidently_wrong, named, .. } = one;
-        format!("{},{right},{in_doubt},{confidently_wrong},{named}\n", key(one))
+        let Outcome { right, in_doubt, confidently_wrong, named, misnamed, .. } = one;
+        format!("{},{right},{in_doubt},{confidently_wrong},{named},{misnamed}\n", key(one))
     };
     HEADER.to_owned() + &outcomes.iter().map(line).collect::<String>()
 }
 
-/// Runs, and those right, in doubt, confidently wrong, named, of the outcomes that match.
-fn sums(outcomes: &[Outcome], matches: impl Fn(&Outcome) -> bool) -> [usize; 5] {
-    outcomes.iter().filter(|one| matches(one)).fold([0; 5], |[runs, right, doubt, wrong, named], one| {
-        [
-            runs + one.runs(),
-            right + one.right,
-            doubt + one.in_doubt,
-            wrong + one.confidently_wrong,
-            named + one.named,
-        ]
-    })
+/// Runs, and those right, in doubt, confidently wrong, named, misnamed, of the outcomes that match.
+fn sums(outcomes: &[Outcome], matches: impl Fn(&Outcome) -> bool) -> [usize; 6] {
+    outcomes.iter().filter(|one| matches(one)).fold(
+        [0; 6],
+        |[runs, right, doubt, wrong, named, misnamed], one| {
+            [
+                runs + one.runs(),
+                right + one.right,
+                doubt + one.in_doubt,
+                wrong + one.confidently_wrong,
+                named + one.named,
+                misnamed + one.misnamed,
+            ]
+        },
+    )
 }
 
-fn line(out: &mut String, name: &str, [runs, right, doubt, wrong, named]: [usize; 5]) {
-    let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {named} | {wrong} |");
+fn line(out: &mut String, name: &str, [runs, right, doubt, wrong, named, misnamed]: [usize; 6]) {
+    let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {named} | {misnamed} | {wrong} |");
 }
 
 /// The tables for people, door by door.
@@ -55,7 +60,7 @@ fn tables(door: Door, outcomes: &[Outcome]) -> String {
     let head = |out: &mut String, title: &str, what: &str| {
         let _ = write!(
             out,
-            "## `{}`: {title}\n\n| {what} | runs | right | in doubt | of these named | confidently wrong |\n|---|---|---|---|---|---|\n",
+            "## `{}`: {title}\n\n| {what} | runs | right | in doubt | of these named | misnamed | confidently wrong |\n|---|---|---|---|---|---|---|\n",
             door.name()
         );
     };

@@ -6,6 +6,7 @@
 mod blocks;
 mod candidates;
 mod continuity;
+mod contradiction;
 mod equations;
 mod excerpt;
 mod explanation;
@@ -41,36 +42,24 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
 use continuity::Continuity;
+use contradiction::{Declared, is_near};
 use fit::Fit;
 use force::ForceBalance;
 use noise::{ScatterRatios, Verdict};
 use priors::Priors;
 use rayon::prelude::*;
 
-/// Mean square residual, over the declared noise, from which the declared wiring is in doubt …
-const FAR: f64 = 4.0;
-/// … and up to which a mistake explains the trace, …
-const NEAR: f64 = 1.3;
-/// … or as far beyond 1 as chance carries a mean of χ² terms, in standard deviations of it.
-const CHANCE_SIGMAS: f64 = 4.0;
-/// … or that share of the declared wiring's, and this: a leak of another law than C P leaves more than noise.
-const FAR_CONTRAST: f64 = 50.0;
-const NEAR_AT_MOST: f64 = 4.0;
 /// The declared wiring's mean square residual must be this many times the mistake's.
 const CONTRAST: f64 = 4.0;
 /// χ² that a mistake must explain at the least, and that parts two mistakes that can be told apart.
 const LEAST_DROP: f64 = 60.0;
 const APART: f64 = 25.0;
-/// Without misfit a leak so far below zero, in standard deviations, contradicts the declared wiring.
-const IMPOSSIBLE_SIGMAS: f64 = 10.0;
 /// More mistakes than this that cannot be told apart explain nothing.
 const MOST_ALIKE: usize = 4;
 /// A lost sign must have turned so many readings.
 const LEAST_TURNED: u64 = 30;
 /// Range of readings that have more in them than noise, in standard deviations of it.
 const CONTENT_SIGMAS: f64 = 12.0;
-/// A mistake that leaves readings out must leave at least so many rows.
-const ENOUGH_ROWS: usize = 40;
 /// Share of the readings that must be possible on the rig.
 const POSSIBLE_SHARE: f64 = 0.99;
 
@@ -117,14 +106,12 @@ pub(crate) fn exchanged_so_far(stretch: &impl Continuity) -> Option<Explanation>
 /// does, or nothing explains them, or too much.
 pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
     let (records, rig) = (stretch.records, stretch.rig());
-    let priors = Priors::declared(rig);
     let balance = stretch.force_balance();
     if let Some(exchanged) = balance.as_ref().and_then(|balance| exchanged_by(balance, stretch)) {
         return Some(exchanged);
     }
-    let declared = stretch.fit(&priors)?;
-    let contradicted = declared.worst() >= FAR || declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
-    if !contradicted || sensor_errors_explain(stretch) {
+    let contradicted = Declared::by_each_law(stretch);
+    if contradicted.is_empty() || sensor_errors_explain(stretch) {
         return None;
     }
     if let Some((readings, turned)) = signs::lost(records, rig) {
@@ -136,27 +123,27 @@ pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
     if balance.is_some_and(|balance| balance.holds()) {
         candidates.retain(|mistake| !EXCHANGED_PRESSURES.contains(mistake));
     }
-    let score = |mistake: Mistake| {
+    let possible = |mistake: Mistake| {
         let mended = mistake.mend(records, rig);
         let lossy = matches!(mistake, Mistake::Size(_))
             && !(is_wanted(mistake, records) && turns_many(&mended, records));
-        if lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig) {
-            return None;
-        }
-        let fit = Recorded::new(&mended, rig)?.fit(&priors)?;
         let scatter = ratios.verdict(mistake);
-        let wanted = scatter != Verdict::Against && flows_overshoot(mistake, &declared);
-        (wanted && explains(&fit, &declared)).then_some(Scored { mistake, fit, scatter })
+        let out = lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig);
+        (!out && scatter != Verdict::Against).then(|| (mended, scatter))
     };
-    let found: Vec<Scored> = candidates.into_par_iter().filter_map(score).collect();
-    let alike = best(found, declared.row_count());
-    let first = alike.first()?.fit;
-    if alike.len() > MOST_ALIKE {
-        return None;
-    }
-    Some(Explanation {
-        mistakes: with_lost_signs(alike.iter().map(|one| one.mistake).collect(), records),
-        evidence: Evidence::Residual { before: declared.worst().sqrt(), after: first.worst().sqrt() },
+    contradicted.iter().find_map(|declared| {
+        let score = |mistake: &Mistake| {
+            let (mended, scatter) = possible(*mistake)?;
+            let fit = Recorded::new(&mended, rig)?.fit(&declared.priors)?;
+            let explained = declared.is_explained_by(*mistake, &fit);
+            explained.then_some(Scored { mistake: *mistake, fit, scatter })
+        };
+        let alike = best(candidates.par_iter().filter_map(score).collect(), declared.fit.row_count());
+        let first = alike.first()?.fit;
+        (alike.len() <= MOST_ALIKE).then(|| Explanation {
+            mistakes: with_lost_signs(alike.iter().map(|one| one.mistake).collect(), records),
+            evidence: Evidence::Residual { before: declared.fit.worst().sqrt(), after: first.worst().sqrt() },
+        })
     })
 }
 
@@ -187,40 +174,12 @@ fn sensor_errors_explain(stretch: &impl Continuity) -> bool {
     fit.is_some_and(|fit| is_near(&fit) && fit.is_possible())
 }
 
-fn is_near(fit: &Fit) -> bool {
-    fit.ratios.iter().zip(fit.rows).all(|(ratio, rows)| {
-        let chance = CHANCE_SIGMAS * (2.0 / rows.max(1) as f64).sqrt();
-        ratio.is_none_or(|ratio| ratio <= NEAR.max(1.0 + chance))
-    })
-}
-
-fn explains(fit: &Fit, declared: &Fit) -> bool {
-    let rows = fit.row_count() as f64;
-    let drop = (declared.mean_chi_square() - fit.mean_chi_square()) * rows;
-    let enough_rows = fit.row_count() >= ENOUGH_ROWS.min(declared.row_count() / 2);
-    let contradiction_gone = declared.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS && declared.worst() < FAR;
-    let explained = drop >= LEAST_DROP && declared.worst() >= CONTRAST * fit.worst();
-    let near =
-        is_near(fit) || (fit.worst() <= NEAR_AT_MOST && declared.worst() >= FAR_CONTRAST * fit.worst());
-    near && fit.is_possible() && enough_rows && (explained || contradiction_gone)
-}
-
 /// A size is never negative: only such readings can be sizes.
 fn is_wanted(mistake: Mistake, records: &[Record]) -> bool {
     let Mistake::Size(readings) = mistake else { return true };
     let positive = |flow: Option<f64>, wanted: bool| !wanted || flow.is_none_or(|flow| flow >= 0.0);
     let (a, b) = (readings != Readings::FlowB, readings != Readings::FlowA);
     records.iter().all(|r| positive(r.sample.qa_m3s, a) && positive(r.sample.qb_m3s, b))
-}
-
-/// Flows read too large carry the piston too far; where they do not, dividing them only makes the residual small.
-fn flows_overshoot(mistake: Mistake, declared: &Fit) -> bool {
-    match mistake {
-        Mistake::Scaled(Readings::FlowA | Readings::FlowB | Readings::Flows, factor) if factor > 1.0 => {
-            declared.ratios[1].is_some_and(|ratio| ratio >= FAR)
-        }
-        _ => true,
-    }
 }
 
 /// Whether a factor leaves nothing but noise of the readings: what says nothing contradicts nothing.

@@ -1,11 +1,12 @@
 //! A leak through an orifice, Q = C √P, against the model's C P: cracks and loose fittings leak so.
 
 use super::continuity::Continuity;
+use super::contradiction::is_near;
 use super::fit::Fit;
 use super::priors::Priors;
 use super::sensor_error::ERRORS;
 use super::zeros::{ZeroCheck, held_against_zeros};
-use super::{APART, LEAST_DROP, is_near};
+use super::{APART, LEAST_DROP};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// A coefficient further below zero is no orifice's, standard deviations.
