@@ -78,6 +78,31 @@ fn a_sensor_that_hangs_behind_is_no_sensor_that_is_late() {
     }
 }
 
+/// A pressure sensor whose scale bends may pass for one with a gain and an offset, and a leak that grows faster than its pressure for one
+/// that opens at a pressure: where the traces do not tell, no name is sure.
+#[test]
+fn a_bend_that_fits_as_well_takes_confidence_from_gain_and_offset_and_from_a_cracking_pressure() {
+    let mut cases = questions::outside(208);
+    cases.iter_mut().for_each(|case| case.seed += 41_000);
+    cases.retain(|case| [43_087, 43_134].contains(&case.seed));
+    for (case, answer) in asked(cases, 0, 1) {
+        assert!(["bent pressure sensor", "steep leak"].contains(&case.name.as_str()), "{}", case.name);
+        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", tally::line(&case, &answer));
+    }
+}
+
+/// The size of a leak above a pressure is known no better than that pressure is.
+#[test]
+fn a_leak_above_a_pressure_has_the_spread_of_the_pressure_in_its_own() {
+    let mut cases = questions::further(48);
+    cases.iter_mut().for_each(|case| case.seed += 43_000);
+    cases.retain(|case| case.name == "leak above a pressure");
+    for (case, answer) in asked(cases, 0, 1) {
+        let worst = tally::deviations(&case, &answer).into_iter().fold(0.0, f64::max);
+        assert!(tally::first_is_true(&case, &answer) && worst < 4.0, "{}", tally::line(&case, &answer));
+    }
+}
+
 /// Stops of a heavy piston between two samples at 20 Hz: what is left of the forces there was noise to the fit, then friction.
 #[test]
 fn a_stop_that_samples_do_not_see_is_neither_noise_nor_friction() {

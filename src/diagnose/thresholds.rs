@@ -63,9 +63,10 @@ pub(crate) const LONGEST_WINDOW_S: f64 = BLOCK_S;
 pub(crate) const LEAST_SURE_SIGMA: f64 = 3.0;
 /// See [`LEAST_SURE_SIGMA`].
 pub(crate) const LEAST_SURE_SHARE: f64 = 5e-3;
-/// A pressure has turned once its smoothed reading has come back by so many standard deviations of its noise. Chosen: noise alone
-/// turns it seldom, and real turns are seen soon.
-pub(crate) const TURNED_SIGMA: f64 = 1.5;
+/// A pressure reading moves once it has left its last place by so many standard deviations of its smoothed noise, and has turned once it
+/// has come back by twice that. Chosen: noise turns what stands for ten seconds one
+/// time in ten, and real turns are seen soon.
+pub(crate) const TURNED_SIGMA: f64 = 3.0;
 
 // Weak form.
 

@@ -82,8 +82,8 @@ fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Str
     if one.beaten_by_nameless {
         return Some("a product of signals without a name fits better".to_owned());
     }
-    if one.is_like_nameless {
-        return Some("a product of signals without a name fits as well".to_owned());
+    if let Some(product) = one.like_nameless {
+        return Some(format!("what no effect of the table makes fits as well: {}", product.words()));
     }
     let mut acts = acts_in(fit, one.term);
     if acts.force {

@@ -4,7 +4,7 @@ use super::confidence;
 use super::verdict::Judgement;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Calibration, FoundEffect};
-use crate::diagnose::search::{Selected, Selection};
+use crate::diagnose::search::{self, Selected, Selection};
 use pitchleak_core::{Effect, Estimate};
 
 /// An effect of the answer.
@@ -14,6 +14,7 @@ pub(crate) fn found(selection: &Selection<'_>, one: &Selected, judgement: &Judge
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
     let std = confidence::std_with_oil(fit, one.term).unwrap_or(std);
+    let std = std.hypot(search::std_of_constants(fit, one.term));
     let spec = effect.spec();
     let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
     let constants = fit.constants(one.term);

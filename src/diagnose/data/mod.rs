@@ -6,6 +6,7 @@ mod files;
 mod motion;
 mod sensor_noise;
 mod series;
+mod side;
 mod traces;
 mod unresolved;
 mod wiring;

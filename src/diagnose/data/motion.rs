@@ -2,10 +2,8 @@
 //! better than the position's difference does, else from the slope of the position.
 
 use super::series::Series;
-use crate::diagnose::thresholds::{
-    LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE, TURNED_SIGMA,
-};
-use pitchleak_core::effects::Play;
+use super::side::Sides;
+use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
 use pitchleak_core::{EffectSet, Model, Sensors, Signals};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
@@ -17,10 +15,10 @@ pub(crate) struct Motion {
     pub(crate) std_mps: f64,
     /// Root mean square, m/s.
     pub(crate) rms_mps: f64,
-    /// On which side of its play sensor A would read, −1 to 1.
-    pub(crate) pa_side: Vec<f64>,
+    /// On which side of its play sensor A would read.
+    pub(crate) pa: Sides,
     /// The same of sensor B.
-    pub(crate) pb_side: Vec<f64>,
+    pub(crate) pb: Sides,
 }
 
 impl Motion {
@@ -37,8 +35,10 @@ impl Motion {
         } else {
             Self::from_position(series, effects, sensors)
         };
-        let side = |values: &[f64]| sides(values, sensors.pressure.noise_std, series.step_s());
-        Self { pa_side: side(&series.pa_pa), pb_side: side(&series.pb_pa), ..own }
+        let half = longest_half(series.step_s()) / 2;
+        let noise_std = sensors.pressure.noise_std / ((2 * half + 1) as f64).sqrt();
+        let sides = |values: &[f64]| Sides::of(&series.t_s, &smooth(values, half), noise_std);
+        Self { pa: sides(&series.pa_pa), pb: sides(&series.pb_pa), ..own }
     }
 
     fn from_flow(
@@ -138,16 +138,6 @@ fn smooth(values: &[f64], half: usize) -> Vec<f64> {
             window.iter().sum::<f64>() / window.len() as f64
         })
         .collect()
-}
-
-/// Which way a signal went last, from its reading: a sensor with play lies on that side of it until it has come back through all of it,
-/// and its reading stands meanwhile. Seen once the reading, smoothed over a block, has turned by [`TURNED_SIGMA`] of its noise.
-fn sides(values: &[f64], noise_std: f64, step_s: f64) -> Vec<f64> {
-    let half = longest_half(step_s);
-    let turned = TURNED_SIGMA * noise_std / ((2 * half + 1) as f64).sqrt();
-    let smooth = smooth(values, half);
-    let mut play = Play::new(smooth.first().copied().unwrap_or(0.0));
-    smooth.into_iter().map(|value| play.side(turned, value)).collect()
 }
 
 /// Least-squares slope over `half` samples on each side.

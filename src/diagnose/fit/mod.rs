@@ -7,6 +7,7 @@ mod predict;
 mod problem;
 mod regression;
 mod score;
+mod widening;
 
 pub(crate) use gauss_newton::Fit;
 pub use gauss_newton::Progress;
@@ -14,3 +15,4 @@ pub(crate) use predict::MeanFlow;
 pub(crate) use problem::Problem;
 pub(crate) use regression::Solution;
 pub(crate) use score::{PartialColumn, Score};
+pub(crate) use widening::UnknownConstant;

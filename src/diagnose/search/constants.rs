@@ -1,7 +1,7 @@
 //! Constants in which an effect is not linear, fitted by the score they give.
 
 use super::candidates::Candidates;
-use crate::diagnose::fit::{Fit, Score, Solution};
+use crate::diagnose::fit::{Fit, Score, Solution, UnknownConstant};
 use crate::diagnose::thresholds::{
     FIRST_STEP, LAST_STEP, LEAST_CLIMB, MOST_CLIMBS, SEARCH_STARTS, WORTH_SEARCHING,
 };
@@ -27,6 +27,13 @@ impl Range {
 fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     let Some(effect) = fit.problem.terms[term].effect() else { return vec![] };
     effect.constants().iter().filter_map(|parameter| range(fit, effect, *parameter)).collect()
+}
+
+/// What an effect's value has of spread because its constants are not known.
+pub(crate) fn std_of_constants(fit: &Fit<'_>, term: usize) -> f64 {
+    let unknown = |Range { parameter, low, high }| UnknownConstant { parameter, range: (low, high) };
+    let unknown: Vec<_> = free(fit, term).into_iter().map(unknown).collect();
+    fit.std_of_constants(term, &unknown)
 }
 
 /// Whether an effect has such constants.

@@ -12,6 +12,7 @@ mod trials;
 
 pub(crate) use candidates::{critical_sigma, open, strongest_nameless};
 pub use collinearity::{Candidate, Collinearity};
+pub(crate) use constants::std_of_constants;
 pub(crate) use interaction::interactions;
 pub(crate) use selection::{Selected, Selection, loss};
 

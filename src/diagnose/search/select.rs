@@ -1,11 +1,12 @@
 //! Forward selection by the score test, with backward elimination, each step confirmed on data that it did not fit.
 
-use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop};
+use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop, strongest_nameless};
 use super::selection::{Selected, Selection, loss, with};
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{AGREED_SIGMA, CONFUSABLE_CHI2, LEAST_MENDED_SHARE, MOST_EFFECTS};
+use crate::diagnose::weak_form::Nameless;
 
 impl Selection<'_> {
     /// Adds the next effect; false when nothing further is significant.
@@ -35,7 +36,7 @@ impl Selection<'_> {
             p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
             mended_percent: None,
             confusable_with: vec![],
-            is_like_nameless: false,
+            like_nameless: None,
             beaten_by_nameless: nameless_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
         });
         self.fit = with(fit, &[], &trial, progress);
@@ -83,7 +84,8 @@ impl Selection<'_> {
             let lost = without.chi2 - fit.free.chi2;
             let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
             let rivals = candidates.trials(&without).into_iter().filter(is_close);
-            one.is_like_nameless = lost - nameless_chi2_drop(fit, &without) < CONFUSABLE_CHI2 * dispersion;
+            let is_near = |(_, chi2_drop): &(Nameless, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
+            one.like_nameless = strongest_nameless(fit, &without).filter(is_near).map(|(product, _)| product);
             one.confusable_with =
                 rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
         }

@@ -5,6 +5,7 @@ use super::constants;
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::thresholds::{CONFUSABLE_CHI2, LEAST_CLIMB};
+use crate::diagnose::weak_form::Nameless;
 use pitchleak_core::Effect;
 
 /// One effect of the answer, by its place among the problem's terms.
@@ -16,8 +17,8 @@ pub(crate) struct Selected {
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
-    /// A product of signals without a name fits nearly as well in its place.
-    pub(crate) is_like_nameless: bool,
+    /// A product of signals without a name that fits nearly as well in its place.
+    pub(crate) like_nameless: Option<Nameless>,
     /// A product of signals without a name would have fitted better.
     pub(crate) beaten_by_nameless: bool,
 }
@@ -31,7 +32,7 @@ impl Selected {
             p_value: 1.0,
             mended_percent: None,
             confusable_with: vec![],
-            is_like_nameless: false,
+            like_nameless: None,
             beaten_by_nameless: false,
         }
     }

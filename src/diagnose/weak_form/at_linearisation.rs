@@ -12,8 +12,8 @@ use super::whitening::Whitening;
 use crate::diagnose::data::{Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
-use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::{Effect, Sensors};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -62,7 +62,7 @@ impl<'a> WeakForm<'a> {
         let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
         let mut rows = rows.at_places(columns.places, columns.terms.len());
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
-        add_unresolved(&mut sensitivities, &mut rows, traces, sensors);
+        add_unresolved(&mut sensitivities, &mut rows, (traces, &motions), (sensors, &noise_at));
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
@@ -141,18 +141,26 @@ pub(crate) fn residual_rows(
     Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
 }
 
-/// More noise where a trace moves faster than its samples tell.
+/// More noise where a trace moves faster than its samples tell, and where a sensor is somewhere in its play.
 fn add_unresolved(
     sensitivities: &mut [PerEquation<Sensitivity>],
     rows: &mut Rows,
-    traces: &[Series],
-    sensors: &Sensors<f64>,
+    (traces, motions): (&[Series], &[Motion]),
+    (sensors, at): (&Sensors<f64>, &Linearisation),
 ) {
+    let noise_std = sensors.pressure.noise_std;
+    let plays = [Effect::PressureHysteresisA, Effect::PressureHysteresisB]
+        .map(|effect| at.value(Term::Effect(effect)) / noise_std);
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
-        let times = unresolved[row.trace()].loudness(row.samples_in(&traces[row.trace()].t_s));
+        let samples = row.samples_in(&traces[row.trace()].t_s);
+        let mut times = unresolved[row.trace()].loudness(samples.clone());
+        let motion = &motions[row.trace()];
+        let somewhere = [(&motion.pa, plays[0]), (&motion.pb, plays[1])]
+            .map(|(sides, play)| sides.loudness(samples.clone(), play));
+        times[1..].iter_mut().zip(somewhere).for_each(|(times, play)| *times = times.hypot(play));
         *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
-        row.is_jolted = own.force.is_speed_loud();
+        row.is_unseen = own.force.is_speed_loud() || somewhere.into_iter().any(|play| play > 1.0);
     }
 }
 

@@ -88,19 +88,14 @@ impl Linearisation {
         constants: &EffectConstants<f64>,
     ) -> Terms<f64> {
         let own = term.unit_term(at, &self.model, constants);
-        let Some(effect) = term.effect().filter(|effect| effect.spec().kind == EffectKind::Sensor) else {
-            return own;
-        };
-        let step = DERIVATIVE_STEP * effect.spec().default_size;
-        let read = |value: f64| effect.read(value, at);
-        if self.effects.iter().all(|one| one.effect.spec().kind == EffectKind::Sensor)
-            || is_same(&read(step), at)
-        {
+        let step = DERIVATIVE_STEP * term.usual_size();
+        let Some((above, below)) = term.read(step, at).zip(term.read(-step, at)) else { return own };
+        let is_physical = |kind| kind != EffectKind::Sensor;
+        if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) || is_same(&above, at) {
             return own;
         }
-        let known =
-            |at: &Signals<f64>| self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
-        own.plus(-0.5 / step, known(&read(step)).plus(-1.0, known(&read(-step))))
+        let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);
+        own.plus(-0.5 / step, known(&above).plus(-1.0, known(&below)))
     }
 
     /// Value of a term here; what the model does not know is zero.

@@ -4,6 +4,7 @@ mod at_linearisation;
 mod column;
 mod hats;
 mod linearisation;
+mod nameless;
 mod noise_model;
 mod rows;
 mod sensitivity;
@@ -13,8 +14,9 @@ mod whitening;
 
 pub(crate) use at_linearisation::{Columns, WeakForm, residual_rows};
 pub(crate) use linearisation::Linearisation;
+pub(crate) use nameless::Nameless;
 pub(crate) use noise_model::NoiseModel;
 pub(crate) use rows::{Entry, Row, Rows};
 pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
-pub(crate) use terms::{DECLARED, Nameless, Term, all_terms};
+pub(crate) use terms::{DECLARED, Term, all_terms};
 pub(crate) use whitening::Whitening;

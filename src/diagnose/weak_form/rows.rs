@@ -27,8 +27,9 @@ pub(crate) struct Row {
     pub(crate) mean: Signals<f64>,
     /// Share of the hat during which the direction of motion is unknown.
     pub(crate) stuck: f64,
-    /// Whether the speed jumps between samples: neither pressures nor load show the impulse that it takes.
-    pub(crate) is_jolted: bool,
+    /// Whether its balance of forces is not seen: the speed jumps between samples, and neither pressures nor load show the impulse that it
+    /// takes; or a pressure sensor lies somewhere in a play that is larger than its noise.
+    pub(crate) is_unseen: bool,
 }
 
 impl Row {
@@ -165,7 +166,7 @@ impl Rows {
             samples,
             mean,
             stuck: hat.unsure_s / block_s,
-            is_jolted: false,
+            is_unseen: false,
         });
         for equation in Equation::ALL {
             if hat.missing_s[equation] > SLIVER * block_s {
@@ -186,10 +187,10 @@ impl Rows {
         (own.stretch == later.stretch).then_some(later)
     }
 
-    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where the speed jumps.
+    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where its forces are unseen.
     pub(crate) fn counts(&self, entry: &Entry) -> bool {
         let row = &self.rows[entry.row];
-        entry.equation != Equation::Force || row.stuck <= SLIVER && !row.is_jolted
+        entry.equation != Equation::Force || row.stuck <= SLIVER && !row.is_unseen
     }
 }
 

@@ -1,6 +1,7 @@
 //! The unknowns of the fit: the declared model's own four constants, every effect of the core's
 //! table, and a few products of signals without a name that only serve to say "something else is there".
 
+use super::nameless::Nameless;
 use super::sensitivity::Channel;
 use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
 use pitchleak_core::{Effect, Model, Signals, Terms};
@@ -22,74 +23,6 @@ pub(crate) enum Term {
     Nameless(Nameless),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
-}
-
-/// Products of signals that stand for effects nobody listed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Nameless {
-    /// Leak past the piston in proportion to |ẋ| P_L.
-    SpeedLeak,
-    /// Leak past the piston in proportion to ẋ P_L.
-    DirectionLeak,
-    /// Leak past the piston in proportion to P_L |P_L|.
-    SquareLeak,
-    /// Leak past the piston in proportion to the spool's opening |ẋ|/√P times P_L.
-    SpoolLeak,
-    /// Flow of meter A in proportion to |Q_A|.
-    BentMeterA,
-    /// Flow of meter B in proportion to |Q_B|.
-    BentMeterB,
-    /// Force in proportion to ẋ |ẋ|.
-    SquareFriction,
-    /// Storage in proportion to the pressure: V P Ṗ.
-    StiffeningOil,
-}
-
-impl Nameless {
-    pub(crate) const ALL: [Self; 8] = [
-        Self::SpeedLeak,
-        Self::DirectionLeak,
-        Self::SquareLeak,
-        Self::SpoolLeak,
-        Self::BentMeterA,
-        Self::BentMeterB,
-        Self::SquareFriction,
-        Self::StiffeningOil,
-    ];
-
-    /// For people.
-    pub(crate) fn words(self) -> &'static str {
-        match self {
-            Self::SpeedLeak => "a leak past the piston that grows with speed times load pressure",
-            Self::DirectionLeak => "a leak past the piston that turns with speed times load pressure",
-            Self::SquareLeak => "a leak past the piston that grows with the square of the load pressure",
-            Self::SpoolLeak => "a leak past the piston that follows the valve's opening",
-            Self::BentMeterA => "a meter A whose scale differs between both ways",
-            Self::BentMeterB => "a meter B whose scale differs between both ways",
-            Self::SquareFriction => "a friction that grows with the square of the speed",
-            Self::StiffeningOil => "an oil that stiffens as the pressure rises",
-        }
-    }
-
-    fn unit_term(self, at: &Signals<f64>, model: &Model<f64>) -> Terms<f64> {
-        let load = at.pa_pa - at.pb_pa;
-        let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
-        let force = |force_n: f64| Terms { force_n, ..Terms::default() };
-        match self {
-            Self::SpeedLeak => past(at.v_mps.abs() * load),
-            Self::DirectionLeak => past(at.v_mps * load),
-            Self::SquareLeak => past(load * load.abs()),
-            Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
-            Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
-            Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
-            Self::SquareFriction => force(at.v_mps * at.v_mps.abs()),
-            Self::StiffeningOil => Terms {
-                chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.pa_pa * at.dpa_pas,
-                chamber_b_m3s: model.cylinder.volume_b_m3(at.x_m) * at.pb_pa * at.dpb_pas,
-                force_n: 0.0,
-            },
-        }
-    }
 }
 
 /// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
@@ -151,6 +84,22 @@ impl Term {
         }
     }
 
+    /// What the sensors show of the truth with the term at this value; none where it is no sensor's.
+    pub(super) fn read(self, value: f64, truth: &Signals<f64>) -> Option<Signals<f64>> {
+        match self {
+            Self::Effect(effect) if effect.spec().kind == EffectKind::Sensor => {
+                Some(effect.read(value, truth))
+            }
+            Self::Nameless(product) => product.read(value, truth),
+            _ => None,
+        }
+    }
+
+    /// A size that shows clearly.
+    pub(super) fn usual_size(self) -> f64 {
+        self.effect().map_or(Nameless::USUAL_BEND, |effect| effect.spec().default_size)
+    }
+
     /// Whether it is a leak.
     pub(crate) fn is_leak(self) -> bool {
         match self {
@@ -169,7 +118,7 @@ impl Term {
                 let at = Signals { a_mps2: if is_sensor { 0.0 } else { PROBE.a_mps2 }, ..PROBE };
                 effect.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n != 0.0
             }
-            Self::Nameless(product) => product == Nameless::SquareFriction,
+            Self::Nameless(product) => product.in_force(),
             Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
             _ => false,
         }
