@@ -11,6 +11,9 @@ use crate::trace::format::MOST_HELD;
 /// Where MATLAB puts the superblock: behind its own header.
 const SUPERBLOCK: usize = 512;
 
+/// Bytes of a name; MATLAB's have 63 at the most.
+const LONGEST_NAME: usize = 1024;
+
 /// Types of header messages.
 const DATASPACE: u64 = 0x01;
 const DATATYPE: u64 = 0x03;
@@ -54,7 +57,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// A file, and how often it may still be looked at: what points at itself has no end.
+/// A file, and how often it may still be looked at: what points at itself has no end, and what is pointed at by many is
+/// no longer in proportion to the file.
 pub(super) struct File<'a> {
     bytes: &'a [u8],
     base: u64,
@@ -126,9 +130,15 @@ impl<'a> File<'a> {
         Ok((Self { bytes, base, looks: bytes.len() }, head.number(8)?))
     }
 
+    /// One more of what takes a byte of the file at the least.
+    fn look(&mut self) -> Found<()> {
+        self.looks = self.looks.checked_sub(1).ok_or(Trouble::Damaged)?;
+        Ok(())
+    }
+
     /// All from an address on.
     pub(super) fn at(&mut self, address: u64) -> Found<Front<'a>> {
-        self.looks = self.looks.checked_sub(1).ok_or(Trouble::Damaged)?;
+        self.look()?;
         let start = self.base.checked_add(address).and_then(|start| usize::try_from(start).ok());
         start.and_then(|start| self.bytes.get(start..)).map(Front).ok_or(Trouble::Damaged)
     }
@@ -147,6 +157,7 @@ impl<'a> File<'a> {
         while let Some(mut block) = blocks.pop() {
             while seen < count && block.0.len() >= 8 {
                 seen += 1;
+                self.look()?;
                 let (kind, size, flags) = (block.number(2)?, block.number(2)?, block.number(1)?);
                 block.take(3)?;
                 let data = block.take(size)?;
@@ -182,9 +193,11 @@ impl<'a> File<'a> {
             }
             node.take(2)?;
             for _ in 0..node.number(2)? {
+                self.look()?;
                 let mut name = Front(names);
                 name.take(node.number(8)?)?;
-                let end = memchr::memchr(0, name.0).ok_or(Trouble::Damaged)?;
+                let end =
+                    name.0.iter().take(LONGEST_NAME).position(|byte| *byte == 0).ok_or(Trouble::Damaged)?;
                 let name = String::from_utf8_lossy(name.take(end as u64)?).into_owned();
                 members.push((name, node.number(8)?));
                 node.take(24)?;
@@ -206,6 +219,7 @@ impl<'a> File<'a> {
             let entries = node.number(2)?;
             node.take(16)?;
             for _ in 0..entries {
+                self.look()?;
                 let (key, child) = (node.take(key)?, node.number(8)?);
                 match level.checked_sub(1) {
                     None => leaves.push((key, child)),

@@ -155,6 +155,30 @@ fn damage_to_version_7_3_is_one_line() {
     assert!(superblock(2).contains("in a form of HDF5 that is not read"), "{}", superblock(2));
 }
 
+/// A group of which each of 4000 entries points at the same 4000 members: a file of 200 kB, 16 million names.
+#[test]
+fn what_is_pointed_at_by_many_takes_no_more_than_the_file() {
+    const MANY: u16 = 4000;
+    let mut bytes = VERSION_7_3.to_vec();
+    let find = |what: &[u8]| VERSION_7_3.windows(what.len()).position(|part| part == what).unwrap();
+    let (tree, first_member) = (find(b"TREE"), find(b"SNOD") + 8);
+    let address = |at: usize| ((at - 512) as u64).to_le_bytes();
+    let members = bytes.len();
+    bytes.extend([b"SNOD".as_slice(), &[1, 0], &MANY.to_le_bytes()].concat());
+    bytes.extend(VERSION_7_3[first_member..first_member + 40].repeat(usize::from(MANY)));
+    let entries = bytes.len();
+    bytes.extend([&VERSION_7_3[tree..tree + 6], &MANY.to_le_bytes(), &[0xff; 16]].concat());
+    bytes.extend([[0; 8], address(members)].concat().repeat(usize::from(MANY)));
+    let (before, after) = (address(tree), address(entries));
+    for at in 512..members - 8 {
+        if bytes[at..at + 8] == before {
+            bytes[at..at + 8].copy_from_slice(&after);
+        }
+    }
+    let message = read(bytes).unwrap_err().to_string();
+    assert!(message.contains("contradicts itself"), "{message}");
+}
+
 proptest::proptest! {
     #[test]
     fn any_byte_of_version_7_3_may_be_wrong(at in 512..100_000_usize, byte in 0..=255_u8) {

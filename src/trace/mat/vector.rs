@@ -158,6 +158,10 @@ fn chunks(
         key.take(8 * before.len() as u64)?;
         leaves.push((key.number(8)?, held, passed, address));
     }
+    // Also where each holds one number of use.
+    if size.saturating_mul(leaves.len() as u64) > MOST_HELD {
+        return Err(Trouble::TooLarge);
+    }
     leaves.sort_unstable();
     let mut values = Vec::new();
     for (start, held, passed, address) in leaves {
