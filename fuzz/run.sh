@@ -28,7 +28,7 @@ for door in "${doors[@]}"; do
     mkdir -p "$corpus" "seeds/$door" "artifacts/$door"
     log=target/$door.log
     DOOR=$door "target/$host/release/door" "$corpus" "seeds/$door" -max_total_time="$seconds" -timeout=10 \
-        -rss_limit_mb=2048 -max_len=4096 -artifact_prefix="artifacts/$door/" -print_final_stats=1 >"$log" 2>&1 || status=1
+        -rss_limit_mb=2048 -artifact_prefix="artifacts/$door/" -print_final_stats=1 >"$log" 2>&1 || status=1
     runs=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
     covered=$(grep -o 'cov: [0-9]*' "$log" | tail -1)
     slowest=$(sed -n 's/^stat::slowest_unit_time_sec: *//p' "$log")

@@ -132,10 +132,10 @@ fn slopes(
             channel.slope(*order, &seen, (std, row.block_s), |at| {
                 let mut unit = noise.at.both_unit_terms(term, constants, at, at);
                 // Forces feel another speed than the position's.
-                if *channel == Channel::FeltSpeed {
-                    (unit.chamber_a, unit.chamber_b) = (0.0, 0.0);
-                } else {
-                    unit.force = 0.0;
+                match *channel {
+                    Channel::FeltSpeed => (unit.chamber_a, unit.chamber_b) = (0.0, 0.0),
+                    Channel::Position | Channel::FlowA | Channel::FlowB => unit.force = 0.0,
+                    Channel::PressureA | Channel::PressureB | Channel::Force => {}
                 }
                 unit
             })

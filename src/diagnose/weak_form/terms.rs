@@ -134,6 +134,12 @@ impl Term {
         let effect = match self {
             Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => return STORAGE,
             Self::Nameless(Nameless::DirectionLeak) => return SPEED,
+            Self::Nameless(Nameless::BentPressureA) => {
+                return &[(Channel::PressureA, 0), (Channel::PressureA, 1)];
+            }
+            Self::Nameless(Nameless::BentPressureB) => {
+                return &[(Channel::PressureB, 0), (Channel::PressureB, 1)];
+            }
             // The direction turns with what both meters read.
             Self::Effect(Effect::InternalLeakDirection) => return FLOWS,
             Self::Effect(effect) => effect,
