@@ -153,9 +153,7 @@ impl ReplayReport {
             let suggestion = reason.suggestion.as_ref().map(|text| format!("; {text}")).unwrap_or_default();
             format!("{}{suggestion}", reason.text)
         });
-        let no_rig =
-            (self.rig == Rig::PAPER_NAME && !self.verdict.status.is_sure()).then(|| NO_RIG.to_owned());
-        for (at, reason) in reasons.chain(no_rig).enumerate() {
+        for (at, reason) in reasons.chain(self.missing_rig().map(str::to_owned)).enumerate() {
             let before = if at == 0 { "\n" } else { "" };
             let _ = writeln!(out, "{before}{caution}also{reset}  {reason}");
         }

@@ -129,7 +129,7 @@ pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
             && !(is_wanted(mistake, records) && turns_many(&mended, records));
         let scatter = ratios.verdict(mistake);
         let out = lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig);
-        (!out && scatter != Verdict::Against).then(|| (mended, scatter))
+        (!out && scatter != Verdict::Against).then_some((mended, scatter))
     };
     contradicted.iter().find_map(|declared| {
         let score = |mistake: &Mistake| {
