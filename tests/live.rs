@@ -4,7 +4,9 @@
 
 use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak, Sample};
-use pitchleak::live::{Batch, BatchFormat, Checkpoint, EstimateEvent, Event, LiveConfig, Snapshot, Watch};
+use pitchleak::live::{
+    Batch, BatchFormat, Checkpoint, EstimateEvent, Event, LiveConfig, OutputFormat, Snapshot, Watch,
+};
 use pitchleak::replay::{ReplayError, Stream, replay};
 use pitchleak::report::{Status, Verdict};
 use pitchleak::trace::{BadRows, TraceReader};
@@ -157,6 +159,25 @@ fn bad_rows_count_once_however_often_they_come() {
         twice.take(BatchFormat::Csv, &text, true);
     }
     assert!(plain.state() == twice.state());
+}
+
+#[test]
+fn a_name_with_a_line_break_is_told_in_one_line() {
+    let mut feed = Feed::new();
+    feed.take(
+        BatchFormat::Json,
+        r#"{"cylinder":"T7\nB2\u001b[2J","t_s":0.0,"x_m":0.1,"pa_pa":1e6,"pb_pa":1e6}"#,
+        false,
+    );
+    feed.watch.finish(&mut feed.events);
+    assert!(!feed.events.is_empty());
+    for event in &feed.events {
+        let [influx, ndjson] =
+            [OutputFormat::Influx, OutputFormat::Ndjson].map(|format| event.line(format).unwrap());
+        assert!(influx.contains("too_many_cylinders") && influx.contains("T7"), "{influx}");
+        assert!(!influx.trim_end().contains(char::is_control), "{influx:?}");
+        assert!(!ndjson.trim_end().contains(char::is_control), "{ndjson:?}");
+    }
 }
 
 #[test]

@@ -151,7 +151,8 @@ impl Event {
             Self::Summary(event) => ("pitchleak_summary", &event.cylinder, event.time_ns),
         };
         let mut line = tagged(name, "cylinder", cylinder);
-        let quoted = |text: &str| text.replace('\\', "\\\\").replace('"', "\\\"");
+        let quoted =
+            |text: &str| text.replace(char::is_control, " ").replace('\\', "\\\\").replace('"', "\\\"");
         // Writing to a string does not fail.
         let _ = match self {
             Self::Estimate(event) => {

@@ -1,6 +1,7 @@
 //! Influx line protocol: measurement, tags, fields, time in ns.
 
 use super::format::{CYLINDER, Fields};
+use crate::trace::shorten;
 use jiff::Timestamp;
 use std::borrow::Cow;
 
@@ -49,7 +50,7 @@ fn pair(text: &str) -> Result<(Cow<'_, str>, Cow<'_, str>), String> {
     let mut parts = split(text, '=');
     match (parts.next(), parts.next(), parts.next()) {
         (Some(name), Some(value), None) if !name.is_empty() => Ok((plain(name), plain(number(value)))),
-        _ => Err(format!("`{}` is no name=value", text.chars().take(40).collect::<String>())),
+        _ => Err(format!("`{}` is no name=value", shorten(text, 40))),
     }
 }
 

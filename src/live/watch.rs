@@ -6,6 +6,7 @@ use super::format::{Fields, LineFormat, Parser};
 use super::layouts::Layouts;
 use super::notices::Notices;
 use crate::Rig;
+use crate::trace::shorten;
 use std::collections::BTreeMap;
 
 /// A longer name is none.
@@ -176,7 +177,7 @@ fn rig_of<'a>(
     if let Some(cylinder) = cylinders.get(name) {
         return Ok(cylinder.rig());
     }
-    let shown = || name.chars().take(40).collect::<String>();
+    let shown = || shorten(name, 40);
     let full = cylinders.len() >= config.most_cylinders;
     if full || name.len() > LONGEST_NAME || name.contains(char::is_control) {
         return Err(("too_many_cylinders", format!("`{}` is left out", shown())));

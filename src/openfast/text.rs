@@ -1,4 +1,5 @@
 use super::{Channel, Problem, Run, bare_unit, latin1};
+use crate::trace::shorten;
 
 /// Longest piece of a bad value that a message quotes.
 const QUOTED: usize = 24;
@@ -59,8 +60,7 @@ fn push(run: &mut Run, row: &str, line: usize) -> Result<(), Problem> {
     }
     let columns = std::iter::once(&mut run.time_s).chain(run.channels.iter_mut().map(|c| &mut c.values));
     for (column, (text, values)) in cells(row).zip(columns).enumerate() {
-        let text_error =
-            || Problem::NotANumber { line, column: column + 1, text: text.chars().take(QUOTED).collect() };
+        let text_error = || Problem::NotANumber { line, column: column + 1, text: shorten(text, QUOTED) };
         values.push(text.parse().map_err(|_| text_error())?);
     }
     Ok(())

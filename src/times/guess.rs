@@ -2,6 +2,7 @@
 
 use super::civil::{open_order, plain_order};
 use super::{DateOrder, TimeFormat, TimeKind};
+use crate::trace::shorten;
 
 /// Why the cells of a column do not say how they are to be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,7 +44,7 @@ pub fn guess(cells: &[&str]) -> Result<TimeFormat, TimeFault> {
 }
 
 fn sample(cells: &[&str]) -> String {
-    cells.first().map_or_else(String::new, |cell| cell.chars().take(40).collect())
+    cells.first().map_or_else(String::new, |cell| shorten(cell, 40))
 }
 
 fn fits(cells: &[&str], reads: impl Fn(&str) -> bool) -> bool {

@@ -261,7 +261,7 @@ fn accepted(signal: Signal, map: &ColumnMap) -> String {
 }
 
 /// A text from a file as it may stand in a message: one line, and not endless.
-pub(super) fn shorten(text: &str, most: usize) -> String {
+pub(crate) fn shorten(text: &str, most: usize) -> String {
     let clean: String = text.chars().take(most).flat_map(char::escape_debug).collect();
     let clean = clean.replace("\\'", "'").replace("\\\"", "\"");
     if text.chars().nth(most).is_some() { clean + "…" } else { clean }

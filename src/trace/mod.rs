@@ -28,6 +28,7 @@ mod stamped;
 mod table;
 mod table_text;
 
+pub(crate) use columns::shorten;
 pub use error::{TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, Taken};
