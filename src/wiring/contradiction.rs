@@ -41,10 +41,14 @@ impl Declared {
     pub fn by_each_law(stretch: &impl Continuity) -> Vec<Self> {
         let rig = stretch.rig();
         let plain = Priors::declared(rig);
-        let orifices = Leak::ALL.into_iter().fold(plain, |all, leak| all.with_orifice(leak, rig));
-        let (Some(fit), Some(through)) = (stretch.fit(&plain), stretch.fit(&orifices)) else { return vec![] };
-        let least = fit.worst().min(through.worst());
+        let Some(fit) = stretch.fit(&plain) else { return vec![] };
         let impossible = fit.negative_leak_sigmas() >= IMPOSSIBLE_SIGMAS;
+        if fit.worst() < NOT_NOISE && !impossible {
+            return vec![];
+        }
+        let orifices = plain.with_orifices(Leak::ALL, rig);
+        let Some(through) = stretch.fit(&orifices) else { return vec![] };
+        let least = fit.worst().min(through.worst());
         let plain = Self { priors: plain, fit, impossible, least };
         // Beside its orifice a leak as C P may be anything.
         let orifices = Self { priors: orifices, fit: through, impossible: false, least };

@@ -131,14 +131,20 @@ pub fn explain(stretch: &Recorded<'_>) -> Option<Explanation> {
         let out = lossy || !is_possible(&mended, rig) || has_vanished(mistake, &mended, rig);
         (!out && scatter != Verdict::Against).then_some((mended, scatter))
     };
-    contradicted.iter().find_map(|declared| {
-        let score = |mistake: &Mistake| {
-            let (mended, scatter) = possible(*mistake)?;
-            let fit = Recorded::new(&mended, rig)?.fit(&declared.priors)?;
+    let score = |mistake: &Mistake| {
+        let (mended, scatter) = possible(*mistake)?;
+        let mended = Recorded::new(&mended, rig)?;
+        let by_law = |declared: &Declared| {
+            let fit = mended.fit(&declared.priors)?;
             let explained = declared.is_explained_by(*mistake, &fit);
             explained.then_some(Scored { mistake: *mistake, fit, scatter })
         };
-        let alike = best(candidates.par_iter().filter_map(score).collect(), declared.fit.row_count());
+        Some(contradicted.iter().map(by_law).collect::<Vec<_>>())
+    };
+    let scored: Vec<_> = candidates.par_iter().filter_map(score).collect();
+    contradicted.iter().enumerate().find_map(|(law, declared)| {
+        let found = scored.iter().filter_map(|by_law| *by_law.get(law)?).collect();
+        let alike = best(found, declared.fit.row_count());
         let first = alike.first()?.fit;
         (alike.len() <= MOST_ALIKE).then(|| Explanation {
             mistakes: with_lost_signs(alike.iter().map(|one| one.mistake).collect(), records),

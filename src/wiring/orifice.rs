@@ -35,7 +35,7 @@ pub(crate) fn orifice(stretch: &impl Continuity, leaks: PerLeak<bool>) -> Option
     let rig = stretch.rig();
     let plain = Priors::declared(rig);
     let leaking: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| leaks[*leak]).collect();
-    let through = leaking.iter().fold(plain, |all, leak| all.with_orifice(*leak, rig));
+    let through = plain.with_orifices(leaking.iter().copied(), rig);
     let declared = stretch.fit(&plain)?;
     let fit = stretch.fit(&through)?;
     let backwards = Leak::ALL.into_iter().any(|leak| fit.orifice_sigmas(leak) < -NEGATIVE_SIGMAS);

@@ -94,10 +94,12 @@ impl Priors {
         self
     }
 
-    /// The same rig with a leak part of which may pass an orifice: Q = C √|P|, of P's sign (Merritt 1967, section 3.3).
-    pub fn with_orifice(mut self, leak: Leak, rig: &Rig) -> Self {
+    /// The same rig with leaks part of which may pass an orifice: Q = C √|P|, of P's sign (Merritt 1967, section 3.3).
+    pub fn with_orifices(mut self, leaks: impl IntoIterator<Item = Leak>, rig: &Rig) -> Self {
         let full_scale_pa = rig.instruments.pressure.full_scale;
-        self.0[ORIFICES + leak as usize] = self.0[LEAKS + leak as usize] * full_scale_pa.sqrt();
+        for leak in leaks {
+            self.0[ORIFICES + leak as usize] = self.0[LEAKS + leak as usize] * full_scale_pa.sqrt();
+        }
         self
     }
 
