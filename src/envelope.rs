@@ -33,6 +33,8 @@ impl Spot {
 /// `N` quantities over time.
 #[derive(Clone, Debug)]
 pub struct Envelopes<const N: usize> {
+    time: RisingTime,
+    paused: bool,
     start_s: f64,
     stretch_s: f64,
     most: usize,
@@ -63,14 +65,14 @@ struct Spread {
 
 /// Times that never go back, however often the clock is set.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct RisingTime {
+struct RisingTime {
     last_s: Option<f64>,
     shift_s: f64,
 }
 
 impl RisingTime {
     /// `t_s`, counted on where it is before the last one.
-    pub fn after_last(&mut self, t_s: f64) -> f64 {
+    fn after_last(&mut self, t_s: f64) -> f64 {
         if let Some(last_s) = self.last_s.filter(|last_s| t_s < *last_s) {
             self.shift_s += last_s - t_s;
         }
@@ -108,11 +110,18 @@ impl<const N: usize> Default for Envelopes<N> {
 impl<const N: usize> Envelopes<N> {
     /// Of so many stretches, at least half of them where the trace has as many rows.
     pub fn of_at_most(most: usize) -> Self {
-        Self { start_s: 0.0, stretch_s: SHORTEST_S, most, stretches: Vec::new() }
+        let time = RisingTime::default();
+        Self { time, paused: false, start_s: 0.0, stretch_s: SHORTEST_S, most, stretches: Vec::new() }
     }
 
-    /// Takes in what there is at `t_s`, which grows; `after_gap` where the trace pauses before.
-    pub fn add(&mut self, t_s: f64, after_gap: bool, spots: &[Option<Spot>; N]) {
+    /// The trace pauses before what comes next.
+    pub fn pause(&mut self) {
+        self.paused = true;
+    }
+
+    /// Takes in what there is at `t_s`; a time before the last one is counted on from that.
+    pub fn add(&mut self, t_s: f64, spots: &[Option<Spot>; N]) {
+        let t_s = self.time.after_last(t_s);
         if self.stretches.is_empty() {
             self.start_s = t_s;
         }
@@ -125,7 +134,7 @@ impl<const N: usize> Envelopes<N> {
             self.stretches.push(Stretch::default());
         }
         if let Some(stretch) = self.stretches.get_mut(index) {
-            stretch.add(t_s, after_gap, spots);
+            stretch.add(t_s, std::mem::take(&mut self.paused), spots);
         }
     }
 
@@ -278,7 +287,7 @@ mod tests {
         let mut envelopes = Envelopes::default();
         for k in 0..count {
             let t_s = f64::from(k) * 0.01;
-            envelopes.add(t_s, false, &[Some(Spot::at(value(t_s)))]);
+            envelopes.add(t_s, &[Some(Spot::at(value(t_s)))]);
         }
         envelopes.rows()
     }
@@ -327,7 +336,10 @@ mod tests {
         for k in 0..200_000_u32 {
             let late = k >= 100_000;
             let t_s = 0.01 * f64::from(k) + if late { 300.0 } else { 0.0 };
-            envelopes.add(t_s, k == 100_000, &[Some(Spot::at(1.0))]);
+            if k == 100_000 {
+                envelopes.pause();
+            }
+            envelopes.add(t_s, &[Some(Spot::at(1.0))]);
         }
         let rows = envelopes.rows();
         let breaks: Vec<_> = rows.iter().filter(|row| row.ranges[0].is_none()).collect();
@@ -338,8 +350,8 @@ mod tests {
     #[test]
     fn what_is_missing_or_no_number_leaves_no_mark() {
         let mut envelopes = Envelopes::<2>::default();
-        envelopes.add(5.0, false, &[None, Some(Spot::at(f64::NAN))]);
-        envelopes.add(1e12, false, &[Some(Spot { low: 1.0, value: 2.0, high: f64::INFINITY }), None]);
+        envelopes.add(5.0, &[None, Some(Spot::at(f64::NAN))]);
+        envelopes.add(1e12, &[Some(Spot { low: 1.0, value: 2.0, high: f64::INFINITY }), None]);
         assert!(envelopes.rows().iter().all(|row| row.ranges == [None; 2]));
         assert_eq!(envelopes.rows().len(), 2);
     }

@@ -2,6 +2,11 @@
 
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
+/// A mark for each value between `low` and `high`, a blank where there is none.
+pub(crate) fn course(values: &[Option<f64>], [low, high]: [f64; 2]) -> String {
+    values.iter().map(|value| value.map_or(' ', |value| level((value - low) / (high - low)))).collect()
+}
+
 /// The mark for a share of the greatest height.
 pub(crate) fn level(share: f64) -> char {
     let index = (share * LEVELS.len() as f64) as usize;

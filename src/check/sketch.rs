@@ -1,9 +1,9 @@
 use super::Reading;
 use super::readings::{SIGNALS, values};
 use crate::bar::{Bar, INTERVAL, LIMIT, ZERO, scale};
-use crate::envelope::{Envelopes, RisingTime, Spot};
-use crate::replay::Replay;
-use crate::spark::level;
+use crate::envelope::{Envelopes, Spot};
+use crate::rig::Rig;
+use crate::spark::course;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Leak, PerLeak};
@@ -20,30 +20,25 @@ const BAR: usize = 32;
 #[derive(Clone, Debug)]
 pub struct Sketch {
     signals: Envelopes<{ SIGNALS.len() }>,
-    time: RisingTime,
-    paused: bool,
     threshold_lpm: PerLeak<f64>,
 }
 
-impl Default for Sketch {
-    fn default() -> Self {
+impl Sketch {
+    /// Of a check by `rig` that has not begun.
+    pub fn new(rig: &Rig) -> Self {
         Self {
             signals: Envelopes::of_at_most(STRETCHES),
-            time: RisingTime::default(),
-            paused: false,
-            threshold_lpm: PerLeak::default(),
+            threshold_lpm: rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S),
         }
     }
-}
 
-impl Sketch {
-    /// Takes in a record, and the replay that has taken it in before.
-    pub fn add(&mut self, replay: &Replay, record: &Record) {
-        self.threshold_lpm = replay.rig().alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
-        self.paused |= record.after_gap;
-        let t_s = self.time.after_last(record.t_s);
+    /// Takes in a record.
+    pub fn add(&mut self, record: &Record) {
+        if record.after_gap {
+            self.signals.pause();
+        }
         let spots = values(record).map(|value| value.map(Spot::at));
-        self.signals.add(t_s, std::mem::take(&mut self.paused), &spots);
+        self.signals.add(record.t_s, &spots);
     }
 
     /// Each signal over the trace, from its lowest to its highest reading; in the order of `readings`.
@@ -51,9 +46,7 @@ impl Sketch {
         let courses = self.signals.courses(COURSE);
         let of = |reading: &Reading| {
             let place = SIGNALS.iter().position(|signal| signal.name() == reading.signal)?;
-            let share = |value: f64| (value - reading.least) / (reading.most - reading.least);
-            let mark = |value: &Option<f64>| value.map_or(' ', |value| level(share(value)));
-            Some(courses.get(place)?.iter().map(mark).collect())
+            Some(course(courses.get(place)?, [reading.least, reading.most]))
         };
         readings.iter().map(|reading| of(reading).unwrap_or_default()).collect()
     }
@@ -78,16 +71,14 @@ impl Sketch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Rig;
 
     fn sketch() -> Sketch {
-        let replay = Replay::new(&Rig::paper()).expect("the paper's rig");
-        let mut sketch = Sketch::default();
+        let mut sketch = Sketch::new(&Rig::paper());
         for i in (0..1000).filter(|i| !(400..600).contains(i)) {
             let mut record = Record { t_s: 0.01 * f64::from(i), after_gap: i == 600, ..Record::default() };
             record.sample.x_m = 1e-4 * f64::from(i);
             record.sample.qb_m3s = None;
-            sketch.add(&replay, &record);
+            sketch.add(&record);
         }
         sketch
     }

@@ -6,7 +6,7 @@ use super::{FleetReport, FleetRow};
 use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
 use crate::report::Palette;
-use crate::spark::level;
+use crate::spark::course;
 use pitchleak_core::Leak;
 
 /// Cells of a bar or a course.
@@ -65,9 +65,9 @@ impl FleetReport<'_> {
         let mut flows = Envelopes::<1>::default();
         for point in &points {
             let t_s = first.duration_until(point.at).as_secs_f64();
-            flows.add(t_s, false, &[Some(Spot::at(point.flow.value))]);
+            flows.add(t_s, &[Some(Spot::at(point.flow.value))]);
         }
-        let [course] = flows.courses(CELLS);
-        course.iter().map(|flow| flow.map_or(' ', |flow| level(flow / top))).collect()
+        let [flows] = flows.courses(CELLS);
+        course(&flows, [0.0, top])
     }
 }

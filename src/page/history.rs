@@ -1,7 +1,7 @@
 //! What a page shows over time, gathered while a trace goes by, in bounded memory.
 
 use super::chart::{Chart, Charts, Ink, Limit, Line};
-use crate::envelope::{Envelopes, Range, RisingTime, Row, Spot};
+use crate::envelope::{Envelopes, Range, Row, Spot};
 use crate::replay::Replay;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
@@ -52,7 +52,6 @@ impl Quantity {
 #[derive(Clone, Debug, Default)]
 pub struct History {
     envelopes: Envelopes<QUANTITIES>,
-    time: RisingTime,
     leaks_lpm: PerLeak<Option<Spot>>,
     odometer: Option<Spot>,
 }
@@ -66,8 +65,10 @@ impl History {
                 replay.estimator().normalised_innovation().map(|[_, odometer]| Spot::at(odometer));
         }
         let spots = self.spots(replay, record);
-        let t_s = self.time.after_last(record.t_s);
-        self.envelopes.add(t_s, record.after_gap, &spots);
+        if record.after_gap {
+            self.envelopes.pause();
+        }
+        self.envelopes.add(record.t_s, &spots);
     }
 
     fn spots(&self, replay: &Replay, record: &Record) -> [Option<Spot>; QUANTITIES] {

@@ -203,7 +203,7 @@ fn cells(row: &Row) -> Vec<String> {
 /// A curve as a screen shows it.
 fn stretches(points: &[(f64, f64)]) -> Vec<(f64, Option<Range>)> {
     let mut envelopes = Envelopes::<1>::of_at_most(MOST_POINTS);
-    points.iter().for_each(|(t_s, value)| envelopes.add(*t_s, false, &[Some(Spot::at(*value))]));
+    points.iter().for_each(|(t_s, value)| envelopes.add(*t_s, &[Some(Spot::at(*value))]));
     envelopes.rows().into_iter().map(|row| (row.t_s, row.ranges.first().copied().flatten())).collect()
 }
 

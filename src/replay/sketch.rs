@@ -1,5 +1,6 @@
 use super::Replay;
-use crate::envelope::{Envelopes, RisingTime, Spot};
+use crate::envelope::{Envelopes, Spot};
+use crate::rig::Rig;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Leak, PerLeak};
@@ -12,38 +13,33 @@ const STRETCHES: usize = 480;
 #[derive(Clone, Debug)]
 pub struct Sketch {
     flows_lpm: Envelopes<3>,
-    time: RisingTime,
-    paused: bool,
     threshold_lpm: PerLeak<f64>,
     ends_s: Option<[f64; 2]>,
 }
 
-impl Default for Sketch {
-    fn default() -> Self {
+impl Sketch {
+    /// Of a replay by `rig` that has not begun.
+    pub fn new(rig: &Rig) -> Self {
         Self {
             flows_lpm: Envelopes::of_at_most(STRETCHES),
-            time: RisingTime::default(),
-            paused: false,
-            threshold_lpm: PerLeak::default(),
+            threshold_lpm: rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S),
             ends_s: None,
         }
     }
-}
 
-impl Sketch {
     /// Takes in a record, and the replay that has taken it in before; `renewed` where its estimates are new.
     pub fn add(&mut self, replay: &Replay, record: &Record, renewed: bool) {
-        self.paused |= record.after_gap;
+        if record.after_gap {
+            self.flows_lpm.pause();
+        }
         let [first_s, _] = self.ends_s.unwrap_or([record.t_s; 2]);
         self.ends_s = Some([first_s, record.t_s]);
         if !renewed {
             return;
         }
-        self.threshold_lpm = replay.rig().alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         let flows = replay.watched_flows_m3s();
         let spots = Leak::ALL.map(|leak| Some(Spot::at(flows[leak].value * LPM_PER_M3S)));
-        let t_s = self.time.after_last(record.t_s);
-        self.flows_lpm.add(t_s, std::mem::take(&mut self.paused), &spots);
+        self.flows_lpm.add(record.t_s, &spots);
     }
 
     /// Times of the first and the last record, s.

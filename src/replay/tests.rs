@@ -45,7 +45,7 @@ fn a_gap_is_no_hold_time() {
 #[test]
 fn a_terminal_sees_the_course_of_each_leak_and_its_pause() {
     let rig = Rig::paper();
-    let (mut replay, mut sketch) = (Replay::new(&rig).expect("the paper's rig"), Sketch::default());
+    let (mut replay, mut sketch) = (Replay::new(&rig).expect("the paper's rig"), Sketch::new(&rig));
     for record in records(&[1000]) {
         let renewed = replay.push(&record);
         sketch.add(&replay, &record, renewed);

@@ -4,7 +4,7 @@ use super::text::Palette;
 use super::{Leakage, ReplayReport};
 use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, scale, scale_text};
 use crate::replay::Sketch;
-use crate::spark::level;
+use crate::spark::course;
 use pitchleak_core::Leak;
 use std::fmt::Write;
 
@@ -64,14 +64,15 @@ pub(super) fn write_courses(out: &mut String, report: &ReplayReport, sketch: &Sk
     );
 }
 
-fn line(course: &[Option<f64>], threshold_lpm: f64, top: f64, palette: &Palette) -> String {
+fn line(flows: &[Option<f64>], threshold_lpm: f64, top: f64, palette: &Palette) -> String {
     let mut text = String::new();
     let same = |a: &Option<f64>, b: &Option<f64>| is_above(a, threshold_lpm) == is_above(b, threshold_lpm);
-    for run in course.chunk_by(same) {
+    for run in flows.chunk_by(same) {
         let above = run.first().is_some_and(|flow| is_above(flow, threshold_lpm));
         let (colour, reset) = if above { palette.fault() } else { ("", "") };
-        let marks = run.iter().map(|flow| flow.map_or(' ', |flow| level(flow / top)));
-        text.extend(colour.chars().chain(marks).chain(reset.chars()));
+        text += colour;
+        text += &course(run, [0.0, top]);
+        text += reset;
     }
     text.trim_end().to_owned()
 }

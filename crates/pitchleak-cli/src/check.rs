@@ -31,14 +31,14 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     let inputs = trace.files();
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
-    let mut sketch = (output::draws() && !arguments.json).then(Sketch::default);
+    let mut sketch = (output::draws() && !arguments.json).then(|| Sketch::new(&trace.rig));
     let (mut reader, bar) = trace.open()?;
     let report = check(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
         }
         if let Some(sketch) = &mut sketch {
-            sketch.add(replay, record);
+            sketch.add(record);
         }
         Ok::<_, Failure>(())
     })?;

@@ -65,7 +65,7 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
-    let mut sketch = (output::draws() && !arguments.json).then(Sketch::default);
+    let mut sketch = (output::draws() && !arguments.json).then(|| Sketch::new(&trace.rig));
     let (mut reader, bar) = trace.open()?;
     let report = replay(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {

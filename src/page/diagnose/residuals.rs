@@ -26,10 +26,9 @@ pub(super) fn over_time(diagnosis: &Diagnosis) -> Envelopes<COLUMNS> {
     }
     spots.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut envelopes = Envelopes::default();
-    let mut breaks = false;
     for same in spots.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
         if same.iter().all(|(.., value)| value.is_nan()) {
-            breaks = true;
+            envelopes.pause();
             continue;
         }
         let mut row = [None; COLUMNS];
@@ -38,7 +37,7 @@ pub(super) fn over_time(diagnosis: &Diagnosis) -> Envelopes<COLUMNS> {
                 *place = Some(Spot::at(*value));
             }
         }
-        envelopes.add(same.first().map_or(0.0, |first| first.0), std::mem::take(&mut breaks), &row);
+        envelopes.add(same.first().map_or(0.0, |first| first.0), &row);
     }
     envelopes
 }
