@@ -279,8 +279,9 @@ pub fn status(base: &str, word: &str) -> Message {
     Message { topic: topics::of_cylinder(base, "", "status"), payload, keeping: Keeping::Latest }
 }
 
+/// Its begin, in signs that a terminal shows and does not obey.
 fn shown(topic: &str) -> String {
-    topic.chars().take(80).collect()
+    topic.chars().take(80).flat_map(char::escape_debug).collect()
 }
 
 #[cfg(test)]

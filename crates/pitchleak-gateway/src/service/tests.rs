@@ -18,6 +18,8 @@ impl Broker for Fake {
         self.published.lock().expect("no panic").push(message);
     }
 
+    fn send(&self) {}
+
     fn acknowledge(&self, tickets: Vec<Ticket>) {
         self.acknowledged.lock().expect("no panic").extend(tickets);
     }
@@ -136,6 +138,24 @@ fn what_is_of_no_use_is_acknowledged_too_or_it_would_come_for_ever() {
     for kind in ["too_large", "unknown_topic", "unreadable"] {
         assert!(text.contains(&format!("kind=\"{kind}\"")), "{kind} in {text}");
     }
+}
+
+/// A terminal that shows the log or a notice obeys nothing that stands in a topic.
+#[test]
+fn control_characters_of_a_topic_are_told_escaped() {
+    let (mut service, broker, _queue) = service();
+    service.take(delivery("else\nwhere\u{1b}[31m\u{2028}é", Ok("[]"), 1));
+    service.take(delivery("pitch/a\rb/samples", Err(100_000_000), 2));
+    let published = broker.published.lock().expect("no panic");
+    let texts = published.iter().map(|message| {
+        let notice: serde_json::Value = serde_json::from_str(&message.payload).expect("JSON");
+        notice["text"].as_str().expect("a text").to_owned()
+    });
+    let texts: Vec<_> = texts.collect();
+    assert_eq!(
+        texts,
+        [r"line 0: else\nwhere\u{1b}[31m\u{2028}é", r"line 0: 100000000 bytes from pitch/a\rb/samples"]
+    );
 }
 
 #[test]
