@@ -6,7 +6,7 @@ use pitchleak::Rig;
 use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Snapshot, Watch};
 use std::io::{self, BufRead};
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Watch cylinders live: samples in on standard input, estimates and alarms out on standard output
@@ -90,28 +90,43 @@ fn serve(
     format: OutputFormat,
 ) -> Result<(), Failure> {
     let mut events = Vec::new();
-    let mut saved = Instant::now();
+    let (mut saved, mut changed) = (Instant::now(), false);
     loop {
-        match inputs.recv() {
-            Ok(Input::Lines(lines)) => lines.iter().for_each(|line| watch.take(line, &mut events)),
-            Ok(Input::TooLong) => {
+        let wait = (changed && checkpoint.is_some()).then(|| CHECKPOINT.saturating_sub(saved.elapsed()));
+        match next(inputs, wait) {
+            Some(Input::Lines(lines)) => lines.iter().for_each(|line| watch.take(line, &mut events)),
+            Some(Input::TooLong) => {
                 watch.notice("too_long", format!("longer than {LONGEST_LINE} bytes"), &mut events);
             }
-            Ok(Input::Failed(error)) => return Err(Failure::Input(error)),
-            Ok(Input::End) | Err(_) => {
+            Some(Input::Failed(error)) => return Err(Failure::Input(error)),
+            Some(Input::End) => {
                 watch.finish(&mut events);
                 return print(&events, format);
             }
+            None => {}
         }
+        changed = true;
         print(&events, format)?;
         events.clear();
         if let Some(checkpoint) = checkpoint.filter(|_| saved.elapsed() >= CHECKPOINT) {
             // A disk that is full now may have room later: the samples go on.
-            if let Err(error) = checkpoint.save(&Snapshot::of(watch)) {
-                output::complain("warning", &error);
+            let written = checkpoint.save(&Snapshot::of(watch));
+            if let Err(error) = &written {
+                output::complain("warning", error);
             }
-            saved = Instant::now();
+            (saved, changed) = (Instant::now(), written.is_err());
         }
+    }
+}
+
+/// What wakes the watch next; none where nothing does within `wait`.
+fn next(inputs: &Receiver<Input>, wait: Option<Duration>) -> Option<Input> {
+    match wait {
+        None => Some(inputs.recv().unwrap_or(Input::End)),
+        Some(wait) => match inputs.recv_timeout(wait) {
+            Err(RecvTimeoutError::Timeout) => None,
+            input => Some(input.unwrap_or(Input::End)),
+        },
     }
 }
 

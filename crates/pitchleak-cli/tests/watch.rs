@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_pitchleak");
 
@@ -194,6 +195,23 @@ fn a_signal_ends_it_with_its_state_saved() {
     let events = feed(&mut watch(&arguments, Some(&rig)), rest.to_owned());
     let whole = feed(&mut watch(&[], Some(&rig)), input);
     assert_eq!(of_kind(&events, "estimate").last(), of_kind(&whole, "estimate").last());
+}
+
+/// A source that says much and then nothing.
+#[test]
+fn what_came_before_a_silence_is_in_a_checkpoint_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = spawn(&mut watch(&["--state", folder.path().to_str().unwrap()], None));
+    let mut stdin = child.stdin.take().unwrap();
+    let input = ndjson(&text(&data().join("traces/both.csv.gz")), &["T7/B2"]);
+    stdin.write_all(input.as_bytes()).unwrap();
+    let begun = Instant::now();
+    while !folder.path().join("watch.state").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(30), "no checkpoint");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
 }
 
 #[test]
