@@ -2,7 +2,7 @@
 
 use super::csv::Csv;
 use super::format::Fields;
-use super::{ndjson, neuron};
+use super::{ndjson, neuron, plain_json};
 use serde_json::value::RawValue;
 
 /// How a message holds its samples.
@@ -47,7 +47,8 @@ pub(super) fn parse<'a>(batch: &Batch<'a>) -> Result<Vec<Result<Fields<'a>, Stri
 
 /// All at once where each is a sample, else one by one.
 fn array(payload: &str) -> Result<Vec<Result<Fields<'_>, String>>, String> {
-    if let Ok(samples) = serde_json::from_str::<Vec<Fields<'_>>>(payload) {
+    let all = plain_json::array(payload).or_else(|| serde_json::from_str::<Vec<Fields<'_>>>(payload).ok());
+    if let Some(samples) = all {
         return Ok(samples.into_iter().map(Ok).collect());
     }
     let samples: Vec<&RawValue> =

@@ -44,12 +44,12 @@ pub(super) struct Fields<'a> {
 pub(super) const CYLINDER: &str = "cylinder";
 
 /// Cells of a line at the most, as a rule: all signals and a name.
-const ROOM: usize = 16;
+pub(super) const ROOM: usize = 16;
 
 impl<'a> Fields<'a> {
-    /// None yet.
-    pub(super) fn with_room() -> Self {
-        let (names, cells) = (Vec::with_capacity(ROOM), Vec::with_capacity(ROOM));
+    /// None yet, and so many to come.
+    pub(super) fn with_room(room: usize) -> Self {
+        let (names, cells) = (Vec::with_capacity(room), Vec::with_capacity(room));
         Self { cylinder: Cow::Borrowed(""), names, cells }
     }
 

@@ -17,6 +17,7 @@ mod ndjson;
 mod neuron;
 mod notices;
 mod order;
+mod plain_json;
 mod watch;
 
 pub use batch::{Batch, BatchFormat};

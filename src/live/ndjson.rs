@@ -1,13 +1,15 @@
 //! A JSON object a line. Numbers are taken as they stand, and read as those of a file are.
 
-use super::format::Fields;
+use super::format::{Fields, ROOM};
+use super::plain_json;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::borrow::Cow;
 use std::fmt;
 
 pub(super) fn parse(line: &str) -> Result<Fields<'_>, String> {
-    serde_json::from_str(line).map_err(|error| format!("not a JSON object: {error}"))
+    let plain = plain_json::object(line).map(Ok);
+    plain.unwrap_or_else(|| serde_json::from_str(line)).map_err(|error| format!("not a JSON object: {error}"))
 }
 
 /// Without the quotes of a string; null is a missing value.
@@ -36,7 +38,7 @@ impl<'de> Visitor<'de> for Members {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Fields<'de>, A::Error> {
-        let mut fields = Fields::with_room();
+        let mut fields = Fields::with_room(ROOM);
         while let Some((Text(name), value)) = map.next_entry::<Text<'de>, &'de RawValue>()? {
             fields.push(name, cell(value.get()));
         }

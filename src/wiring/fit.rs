@@ -4,7 +4,7 @@
 use super::equations::{BothSums, Sums};
 use super::priors::{LEAKS, OFFSETS, ORIFICES, PARAMETERS, Priors, Vector};
 use crate::rig::Rig;
-use nalgebra::SMatrix;
+use nalgebra::{Cholesky, Const, SMatrix};
 use pitchleak_core::{Estimate, Leak, Parameter, PerLeak};
 
 /// What a fit leaves.
@@ -16,9 +16,9 @@ pub(crate) struct Fit {
     pub rows: [usize; 2],
     /// χ² of the parameters against their priors.
     penalty: f64,
-    /// In prior standard deviations, and their covariance.
+    /// In prior standard deviations, and the inverse of their covariance: most fits are asked for few spreads or none.
     parameters: Vector,
-    covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    information: Cholesky<f64, Const<PARAMETERS>>,
     /// Units of the parameters, SI.
     units: Vector,
     compressibility_per_pa: f64,
@@ -33,8 +33,8 @@ impl Fit {
     /// By these sums; without rows the priors.
     pub(super) fn of(sums: &BothSums, rig: &Rig, Priors(priors): &Priors) -> Option<Self> {
         let [balance, travel] = &sums.scaled(priors);
-        let cholesky = (SMatrix::identity() + balance.matrix + travel.matrix).cholesky()?;
-        let parameters = cholesky.solve(&(balance.vector + travel.vector));
+        let information = (SMatrix::identity() + balance.matrix + travel.matrix).cholesky()?;
+        let parameters = information.solve(&(balance.vector + travel.vector));
         let ratio = |sums: &Sums| (sums.rows > 0).then(|| sums.left(&parameters) / sums.rows as f64);
         Some(Self {
             ratios: [ratio(balance), ratio(travel)],
@@ -43,7 +43,7 @@ impl Fit {
             units: *priors,
             compressibility_per_pa: 1.0 / rig.fluid.bulk_modulus_pa + parameters[0] * priors[0],
             parameters,
-            covariance: cholesky.inverse(),
+            information,
         })
     }
 
@@ -55,7 +55,10 @@ impl Fit {
     }
 
     fn std(&self, at: usize) -> f64 {
-        self.covariance[(at, at)].sqrt()
+        let mut covariances = Vector::zeros();
+        covariances[at] = 1.0;
+        self.information.solve_mut(&mut covariances);
+        covariances[at].sqrt()
     }
 
     /// A parameter in SI; its spread grows with the misfit.
@@ -119,7 +122,7 @@ impl Fit {
         let mut weights = Vector::zeros();
         weights[plain] = pressure * self.units[plain];
         weights[orifice] = root * self.units[orifice];
-        let variance = self.worst().max(1.0) * weights.dot(&(self.covariance * weights));
+        let variance = self.worst().max(1.0) * weights.dot(&self.information.solve(&weights));
         Estimate { value: weights.dot(&self.parameters), std: variance.max(0.0).sqrt() }
     }
 

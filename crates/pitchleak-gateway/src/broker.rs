@@ -5,8 +5,11 @@ use std::time::{Duration, Instant};
 
 /// A way to a broker. Nothing here waits.
 pub trait Broker {
-    /// Hands over a message, to be sent once the connection allows.
+    /// Hands over a message, to be sent once the connection allows, with the next [`send`](Self::send) at the latest.
     fn publish(&self, message: Message);
+
+    /// Has sent what was handed over: many messages at once cost less than each by itself.
+    fn send(&self);
 
     /// Acknowledges deliveries in the order in which they came. Those of a connection that is gone are passed over: they
     /// will come again.

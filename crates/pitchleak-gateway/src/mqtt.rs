@@ -21,8 +21,10 @@ use tokio::sync::Notify;
 pub const LARGEST_PAYLOAD: usize = 1024 * 1024;
 /// The largest packet of MQTT: refused, it would come again for ever.
 const LARGEST_PACKET: usize = 268_435_460;
-/// Requests between our tasks and the connection.
+/// Requests between our tasks and the connection, and in one writing to the network.
 const REQUESTS: usize = 64;
+/// Packets that are read before the first of them is handed over.
+const READS: usize = 16;
 /// Between attempts to connect.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 const LONGEST_PAUSE: Duration = Duration::from_secs(15);
@@ -80,6 +82,10 @@ impl Broker for Mqtt {
         self.outbox.put(message);
     }
 
+    fn send(&self) {
+        self.outbox.send();
+    }
+
     fn acknowledge(&self, tickets: Vec<Ticket>) {
         self.outbox.acknowledge(tickets);
     }
@@ -96,6 +102,8 @@ fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> Mqtt
         .set_keep_alive(config.keep_alive_s)
         .set_clean_session(false)
         .set_ack_mode(AckMode::Manual)
+        .set_max_request_batch(REQUESTS)
+        .set_read_batch_size(READS)
         .set_max_packet_size(LARGEST_PACKET, LARGEST_PAYLOAD)
         .set_last_will(LastWill::new(gone.topic, gone.payload, QoS::AtLeastOnce, true));
     reach
@@ -245,11 +253,11 @@ async fn send(client: AsyncClient, outbox: Arc<Outbox>, shared: Arc<Shared>, inb
 
 async fn publish(client: &AsyncClient, outbox: &Arc<Outbox>, message: Message, inbox: &SyncSender<Input>) {
     let options = PublishOptions::at_least_once();
-    let (topic, payload) = (message.topic.clone(), message.payload.clone());
     let Keeping::Each(number) = message.keeping else {
-        let _ = client.publish(topic, payload, options.retain(true)).await;
+        let _ = client.publish(message.topic, message.payload, options.retain(true)).await;
         return;
     };
+    let (topic, payload) = (message.topic.clone(), message.payload.clone());
     let Ok(notice) = client.publish_tracked(topic, payload, options).await else { return };
     let (outbox, inbox) = (Arc::clone(outbox), inbox.clone());
     tokio::spawn(async move {

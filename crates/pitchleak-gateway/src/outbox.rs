@@ -58,7 +58,10 @@ impl Outbox {
                 }
             }
         }
-        drop(waiting);
+    }
+
+    /// Wakes the network thread for what was put.
+    pub fn send(&self) {
         self.filled.notify_one();
     }
 

@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 const INPUTS: usize = 64;
 /// Between two looks at the clock.
 const TICK: Duration = Duration::from_millis(100);
+/// While more comes in, what goes out waits so long for company.
+const TOGETHER: Duration = Duration::from_millis(2);
 /// For the last messages, at the end.
 const GOODBYE: Duration = Duration::from_secs(3);
 /// For the last checkpoint.
@@ -74,8 +76,13 @@ pub fn run(config: Config) -> Result<(), Failure> {
 
 fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, notify: &mut Notify) {
     let mut ticked = Instant::now();
+    let mut sent = ticked;
     loop {
-        match inputs.recv_timeout(TICK) {
+        let input = inputs.try_recv().or_else(|_| {
+            service.broker.send();
+            inputs.recv_timeout(TICK)
+        });
+        match input {
             Ok(input) => {
                 if !service.take(input) {
                     return;
@@ -85,6 +92,10 @@ fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, notify: 
             Err(RecvTimeoutError::Disconnected) => return,
         }
         let now = Instant::now();
+        if now.duration_since(sent) >= TOGETHER {
+            sent = now;
+            service.broker.send();
+        }
         // A flood leaves no pause.
         if now.duration_since(ticked) >= TICK / 10 {
             ticked = now;

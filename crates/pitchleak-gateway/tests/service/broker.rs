@@ -5,10 +5,15 @@ use crate::harness::{
 };
 use std::time::Duration;
 
+/// A number that whoever runs the tests asks for, as a longer one takes its time.
+fn asked(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
 #[test]
 fn killed_at_random_moments_it_ends_as_an_undisturbed_run() {
     let Some(mut broker) = Mosquitto::start("max_inflight_messages 0") else { return };
-    let kills: u64 = std::env::var("PITCHLEAK_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(6);
+    let kills: u64 = asked("PITCHLEAK_KILLS").unwrap_or(6);
     let listener = Listener::new(broker.port, "pitchleak/#");
     let mut gateway = Gateway::new(&broker, |text| text.replace("port =", "in_flight = 300\nport ="));
     gateway.start();
@@ -60,6 +65,7 @@ fn a_network_that_is_cut_and_mended_changes_nothing() {
             broker.cut();
             gateway.wait_for("no_broker");
             wait_until("that is told", || gateway.get("/health").contains("no connection"));
+            std::thread::sleep(Duration::from_secs(asked("PITCHLEAK_CUT_S").unwrap_or(0)));
             broker.mend();
         }
     }
