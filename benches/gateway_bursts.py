@@ -2,12 +2,13 @@
 """Time to the estimate where many cylinders send their second's samples in the same moment.
 
     pip install paho-mqtt && cargo build --release -p pitchleak-cli -p pitchleak-gateway
-    python benches/gateway_bursts.py [--cylinders 200] [--seconds 60]
+    python benches/gateway_bursts.py [--cylinders 200] [--seconds 60] [--over 0]
 
 A mosquitto on loopback (TLS and password for the gateway), the gateway on one core, broker and sender on another where
-there is one. Every second all cylinders send a JSON array of 100 samples, back to back. What is printed: the time from
-the burst's begin to an estimate at a subscriber, the service's own time (`pitchleak_latency_seconds`), its processor
-time and its memory.
+there is one. Every second each cylinder sends a JSON array of 100 samples: all back to back, or spread over so many
+seconds. What is printed: the time from the moment in which a message is due (the burst's begin, where it is one) to its
+estimate at a subscriber, the service's own time (`pitchleak_latency_seconds`), the processor time of each thread and
+program, and the service's memory.
 """
 
 import argparse
@@ -99,9 +100,15 @@ def wait_for(what):
     raise TimeoutError(what)
 
 
-def processor_s(pid):
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def processor_s(gateway, broker):
+    """What each thread of the gateway has taken, the broker, and this program (sender and subscriber)."""
+    spent = {"sender and subscriber": time.process_time()}
+    for who, pid in (("gateway", gateway.pid), ("broker", broker.pid)):
+        for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+            ns = int((task / "schedstat").read_text().split()[0])
+            name = f"{who}: {(task / 'comm').read_text().strip()}"
+            spent[name] = spent.get(name, 0.0) + ns / 1e9
+    return spent
 
 
 def share(times, part):
@@ -118,10 +125,11 @@ def buckets(text):
 
 
 class Bursts:
-    """Sends bursts and hears the estimates."""
+    """Sends a second's messages, over so many seconds, and hears the estimates."""
 
-    def __init__(self, port, cylinders):
-        self.names = [f"B{k}" for k in range(cylinders)]
+    def __init__(self, port, cylinders, over_s):
+        self.topics = [f"pitch/B{k}/samples" for k in range(cylinders)]
+        self.after_s = [over_s * k / cylinders for k in range(cylinders)]
         self.heard, self.all_heard = [], threading.Event()
         self.client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
         self.client.max_inflight_messages_set(0)
@@ -131,25 +139,27 @@ class Bursts:
         self.client.subscribe("pitchleak/+/estimate")
         self.client.loop_start()
 
-    def hear(self, _client, _data, _message):
-        self.heard.append(time.perf_counter())
-        if len(self.heard) >= len(self.names):
+    def hear(self, _client, _data, message):
+        self.heard.append((message.topic, time.perf_counter()))
+        if len(self.heard) >= len(self.topics):
             self.all_heard.set()
 
     def send(self, payload):
-        """Times from the burst's begin to each estimate, s."""
+        """Times from the moment in which a message is due to its estimate, s."""
         self.heard.clear()
         self.all_heard.clear()
         begin = time.perf_counter()
-        for name in self.names:
-            self.client.publish(f"pitch/{name}/samples", payload, qos=1)
-        self.all_heard.wait(0.9)
-        times = [heard - begin for heard in self.heard]
+        for topic, after_s in zip(self.topics, self.after_s, strict=True):
+            time.sleep(max(0.0, begin + after_s - time.perf_counter()))
+            self.client.publish(topic, payload, qos=1)
+        self.all_heard.wait(max(0.0, begin + 0.98 - time.perf_counter()))
+        heard = list(self.heard)
         time.sleep(max(0.0, begin + 1.0 - time.perf_counter()))
-        return times
+        # pitchleak/B7/estimate
+        return [at - begin - self.after_s[int(topic.split("/")[1][1:])] for topic, at in heard]
 
 
-def measure(folder, cylinders, seconds):
+def measure(folder, cylinders, seconds, over_s):
     tls_port, port, http_port = free_port(), free_port(), free_port()
     payloads = messages(folder, seconds + WARM_UP)
     os.sched_setaffinity(0, {CORES[-1]})
@@ -158,12 +168,12 @@ def measure(folder, cylinders, seconds):
     gateway = start_gateway(folder, tls_port, http_port, cylinders)
     try:
         wait_for(lambda: "pitchleak_connected 1" in get(http_port, "/metrics"))
-        bursts = Bursts(port, cylinders)
+        bursts = Bursts(port, cylinders, over_s)
         for payload in payloads[:WARM_UP]:
             bursts.send(payload)
-        before, spent = buckets(get(http_port, "/metrics")), processor_s(gateway.pid)
+        before, begun = buckets(get(http_port, "/metrics")), processor_s(gateway, broker)
         times = [bursts.send(payload) for payload in payloads[WARM_UP:]]
-        spent = processor_s(gateway.pid) - spent
+        spent = {who: s - begun.get(who, 0.0) for who, s in processor_s(gateway, broker).items()}
         text = get(http_port, "/metrics")
         status = pathlib.Path(f"/proc/{gateway.pid}/status").read_text()
     finally:
@@ -178,18 +188,22 @@ def main():
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--cylinders", type=int, default=200)
     arguments.add_argument("--seconds", type=int, default=60)
+    arguments.add_argument("--over", type=float, default=0.0, help="s: 0 is a burst, at most 0.9")
     arguments = arguments.parse_args()
     cylinders, seconds = arguments.cylinders, arguments.seconds
     with tempfile.TemporaryDirectory() as folder:
-        times, spent, own, text, peak_kb = measure(pathlib.Path(folder), cylinders, seconds)
+        times, spent, own, text, peak_kb = measure(pathlib.Path(folder), cylinders, seconds, arguments.over)
     every = [one for burst in times for one in burst]
     last = [max(burst) for burst in times if burst]
     ms = {part: 1e3 * share(every, part) for part in (0.5, 0.9, 0.99, 1.0)}
     print(f"{cylinders} cylinders, {seconds} bursts, {len(every)} of {cylinders * seconds} estimates heard")
-    shares = ", ".join(f"{100 * part:.0f} % {one:.0f}" for part, one in ms.items())
-    print(f"from a burst's begin to an estimate, ms: {shares}")
-    print(f"a burst's last: half within {1e3 * share(last, 0.5):.0f} ms, 90 % {1e3 * share(last, 0.9):.0f}")
-    print(f"processor time of the gateway: {1e3 * spent / cylinders / seconds:.3f} ms a message")
+    shares = ", ".join(f"{100 * part:.0f} % {one:.1f}" for part, one in ms.items())
+    print(f"from the moment in which a message is due to its estimate, ms: {shares}")
+    print(f"a second's slowest: half within {1e3 * share(last, 0.5):.0f} ms, 90 % {1e3 * share(last, 0.9):.0f}")
+    ms_each = {who: 1e3 * s / cylinders / seconds for who, s in spent.items()}
+    whole = sum(ms for who, ms in ms_each.items() if who.startswith("gateway"))
+    print(f"processor time of the gateway: {whole:.3f} ms a message")
+    print("of which and beside it: " + ", ".join(f"{who} {ms:.3f}" for who, ms in ms_each.items()))
     total = own[float("inf")]
     within = [f"{100 * count / total:.1f} % within {1e3 * bound:.0f} ms" for bound, count in own.items()]
     print("in the service: " + ", ".join(within))
