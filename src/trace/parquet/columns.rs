@@ -1,59 +1,49 @@
 //! The columns of a Parquet file.
 
-use super::zstd::ZstdPages;
-use parquet::basic::Compression;
-use parquet::column::page::PageReader;
+use super::footer::Footer;
+use super::leaf::Leaf;
+use super::pages::Pages;
 use parquet::column::reader::{ColumnReader, get_column_reader};
-use parquet::errors::Result;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::errors::{ParquetError, Result};
 use parquet::file::reader::ChunkReader;
-use parquet::file::serialized_reader::SerializedPageReader;
-use parquet::schema::types::ColumnDescPtr;
 use std::sync::Arc;
 
 /// A file of columns, on a disk or in memory.
 pub(super) trait Columns: Send + Sync {
-    fn metadata(&self) -> &ParquetMetaData;
+    fn leaves(&self) -> &[Leaf];
+
+    /// How many groups of rows there are.
+    fn groups(&self) -> usize;
 
     /// The column at `place` of a group of rows.
     fn read(&self, group: usize, place: usize) -> Result<ColumnReader>;
-
-    fn row_groups(&self) -> &[RowGroupMetaData] {
-        self.metadata().row_groups()
-    }
-
-    fn described(&self) -> &[ColumnDescPtr] {
-        self.metadata().file_metadata().schema_descr().columns()
-    }
 }
 
 pub(super) fn open(bytes: impl ChunkReader + 'static) -> Result<Arc<dyn Columns>> {
-    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;
-    Ok(Arc::new(Pages { bytes: Arc::new(bytes), metadata }))
+    let footer = Footer::of(&bytes)?;
+    Ok(Arc::new(InFile { bytes: Arc::new(bytes), footer }))
 }
 
-struct Pages<R> {
+struct InFile<R> {
     bytes: Arc<R>,
-    metadata: ParquetMetaData,
+    footer: Footer,
 }
 
-impl<R: ChunkReader + 'static> Columns for Pages<R> {
-    fn metadata(&self) -> &ParquetMetaData {
-        &self.metadata
+impl<R: ChunkReader + 'static> Columns for InFile<R> {
+    fn leaves(&self) -> &[Leaf] {
+        &self.footer.leaves
+    }
+
+    fn groups(&self) -> usize {
+        self.footer.groups.len()
     }
 
     fn read(&self, group: usize, place: usize) -> Result<ColumnReader> {
-        let group = self.metadata.row_group(group);
-        let (column, rows) = (group.column(place), usize::try_from(group.num_rows())?);
-        let of = |column| SerializedPageReader::new(Arc::clone(&self.bytes), column, rows, None);
-        let pages: Box<dyn PageReader> = match column.compression() {
-            // Said to be plain, so that its pages come as they are.
-            Compression::ZSTD(_) => {
-                let plain = column.clone().into_builder().set_compression(Compression::UNCOMPRESSED);
-                Box::new(ZstdPages(of(&plain.build()?)?))
-            }
-            _ => Box::new(of(column)?),
+        let chunk = self.footer.groups.get(group).and_then(|chunks| chunks.get(place));
+        let (Some(chunk), Some(leaf)) = (chunk, self.footer.leaves.get(place)) else {
+            return Err(ParquetError::General("a column that is not there".to_owned()));
         };
-        Ok(get_column_reader(column.column_descr_ptr(), pages))
+        let pages = Pages::of(Arc::clone(&self.bytes), *chunk, leaf.is_optional())?;
+        Ok(get_column_reader(leaf.descriptor()?, Box::new(pages)))
     }
 }

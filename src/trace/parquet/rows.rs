@@ -1,5 +1,7 @@
+use super::codec::UNREAD;
 use super::columns::{self, Columns};
 use super::guard::guarded;
+use super::leaf::Kind;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::times::TimeFormat;
@@ -14,11 +16,9 @@ use crate::trace::stamp::{Epoch, seconds_between};
 use crate::trace::table::{Cells, TableRows};
 use crate::trace::table_text::{TextRow, column};
 use bytes::Bytes;
-use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
-use parquet::schema::types::ColumnDescriptor;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
@@ -26,16 +26,6 @@ use std::sync::{Arc, OnceLock};
 const BATCH: usize = 4096;
 /// So many rows say how times are written.
 const SAMPLE: usize = 100;
-
-/// What the cells of a column are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Number,
-    /// Times, so many nanoseconds each.
-    Stamp(i64),
-    Text,
-    Other,
-}
 
 /// A column without a nest.
 struct Field {
@@ -109,55 +99,28 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
 }
 
 fn damaged(error: ParquetError) -> TraceFault {
-    match error {
-        ParquetError::NYI(what) | ParquetError::General(what) if what.contains("feature") => {
-            let codec = what.rsplit(' ').next().unwrap_or_default();
-            TraceFault::Ambiguous {
-                what: format!("compressed by {codec}, which is not read"),
-                settle: "write it with compression=\"zstd\", \"snappy\", \"gzip\", \"lz4\" or none"
-                    .to_owned(),
-            }
-        }
-        other => TraceFault::Damaged(other.to_string().replace('\n', " ")),
+    let what = match error {
+        ParquetError::NYI(what) | ParquetError::General(what) | ParquetError::EOF(what) => what,
+        other => other.to_string(),
+    };
+    match what.strip_prefix(UNREAD) {
+        Some(codec) => TraceFault::Ambiguous {
+            what: format!("compressed by {codec}, which is not read"),
+            settle: "write it with compression=\"zstd\", \"snappy\", \"gzip\", \"lz4\" or none".to_owned(),
+        },
+        None => TraceFault::Damaged(what.replace('\n', " ")),
     }
 }
 
 fn fields(file: &dyn Columns) -> Vec<Field> {
-    let flat = |column: &ColumnDescriptor| column.max_rep_level() == 0 && column.max_def_level() <= 1;
-    let fields = file.described().iter().enumerate().filter(|(_, column)| flat(column));
-    let fields = fields.map(|(place, column)| Field {
+    let fields = file.leaves().iter().enumerate().filter(|(_, leaf)| leaf.is_flat());
+    let fields = fields.map(|(place, leaf)| Field {
         place,
-        name: column.name().to_owned(),
-        kind: kind(column),
-        optional: column.max_def_level() > 0,
+        name: leaf.name.clone(),
+        kind: leaf.kind,
+        optional: leaf.is_optional(),
     });
     fields.collect()
-}
-
-fn kind(column: &ColumnDescriptor) -> Kind {
-    let stamp_ns = match (column.logical_type_ref(), column.converted_type()) {
-        (Some(LogicalType::Timestamp(stamp)), _) => match stamp.unit {
-            TimeUnit::MILLIS => Some(1_000_000),
-            TimeUnit::MICROS => Some(1_000),
-            _ => Some(1),
-        },
-        (_, ConvertedType::TIMESTAMP_MILLIS) => Some(1_000_000),
-        (_, ConvertedType::TIMESTAMP_MICROS) => Some(1_000),
-        (Some(LogicalType::Integer(_)) | None, _) => None,
-        (Some(LogicalType::String), _) => return Kind::Text,
-        _ => return Kind::Other,
-    };
-    match (column.physical_type(), stamp_ns) {
-        (Physical::INT64, Some(ns)) => Kind::Stamp(ns),
-        (Physical::INT96, _) => Kind::Stamp(1),
-        (Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE, None)
-            if column.converted_type() != ConvertedType::DECIMAL =>
-        {
-            Kind::Number
-        }
-        (Physical::BYTE_ARRAY, None) if column.converted_type() == ConvertedType::UTF8 => Kind::Text,
-        _ => Kind::Other,
-    }
 }
 
 /// Whether a column's header alone says that it holds numbers, and of which signal.
@@ -170,7 +133,7 @@ fn is_plain(field: &Field, rig: &Rig) -> bool {
 /// a page of each would be read twice.
 fn sample(file: &dyn Columns, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow>, TraceFault> {
     let mut rows: Vec<TextRow> = Vec::new();
-    if file.row_groups().is_empty() {
+    if file.groups() == 0 {
         return Ok(rows);
     }
     for (index, field) in fields.iter().enumerate() {
@@ -221,7 +184,7 @@ impl Batches {
     fn next(&mut self) -> Result<Option<Vec<Cells<'static>>>, TraceFault> {
         loop {
             if self.open.is_empty() {
-                if self.group == self.file.row_groups().len() {
+                if self.group == self.file.groups() {
                     return Ok(None);
                 }
                 let open = self.read.iter().map(|read| self.file.read(self.group, read.place));

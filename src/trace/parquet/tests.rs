@@ -132,7 +132,13 @@ fn every_kind_of_time_and_number_is_read() {
 #[test]
 fn every_compression_that_costs_no_build_is_read() {
     let plain = read(file_by(Compression::UNCOMPRESSED, &with_time("t_s", doubles(|i| i)), ROWS)).unwrap();
-    for codec in [Compression::SNAPPY, Compression::GZIP(GzipLevel::default()), Compression::LZ4_RAW] {
+    let codecs = [
+        Compression::SNAPPY,
+        Compression::GZIP(GzipLevel::default()),
+        Compression::LZ4,
+        Compression::LZ4_RAW,
+    ];
+    for codec in codecs {
         let bytes = file_by(codec, &with_time("t_s", doubles(|i| i)), ROWS);
         assert_eq!(read(bytes).unwrap(), plain, "{codec}");
     }
@@ -163,6 +169,42 @@ fn what_is_no_trace_is_one_line() {
     for length in [4, 8, 100, whole.len() / 2, whole.len() - 1] {
         assert!(message(whole[..length].to_vec()).contains("damaged"), "{length}");
     }
+}
+
+/// Files of few bytes that say more than there is: each once took gigabytes, minutes, or the process with it.
+const FORGED: [(&[u8], &str); 7] = [
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-columns.parquet"), "fewer columns than it says"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-dictionary.parquet"), "fewer values than it says"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-footer-list.parquet"), "breaks off"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-footer-map.parquet"), "breaks off"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-page-list.parquet"), "breaks off"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-size-lz4.parquet"), "more than a gigabyte"),
+    (include_bytes!("../../../fuzz/seeds/parquet/forged-size-snappy.parquet"), "more than a gigabyte"),
+];
+
+#[test]
+fn forged_counts_and_sizes_are_refused() {
+    for (bytes, words) in FORGED {
+        let error = read(bytes.to_vec()).unwrap_err().to_string();
+        assert!(error.contains("damaged") && error.contains(words), "{error} lacks {words}");
+    }
+}
+
+/// It once ended in a stack overflow, which no guard holds.
+#[test]
+fn columns_within_columns_without_end_are_one_line() {
+    let depth = 200_000_u32;
+    // Version, and the list of the schema, whose length takes seven bits a byte.
+    let mut footer = vec![0x15, 2, 0x19, 0xfc];
+    footer.extend([depth as u8 | 0x80, (depth >> 7) as u8 | 0x80, (depth >> 14) as u8]);
+    // Required, named g, with one member.
+    (1..depth).for_each(|_| footer.extend([0x35, 0, 0x18, 1, b'g', 0x15, 2, 0]));
+    // A double, required, named w; no rows, no groups of rows.
+    footer.extend([0x15, 10, 0x25, 0, 0x18, 1, b'w', 0, 0x16, 0, 0x19, 0x0c, 0]);
+    let length = (footer.len() as u32).to_le_bytes();
+    let file = [b"PAR1", footer.as_slice(), &length, b"PAR1"].concat();
+    let error = read(file).unwrap_err().to_string();
+    assert!(error.contains("no column for time"), "{error}");
 }
 
 proptest::proptest! {
