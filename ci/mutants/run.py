@@ -65,12 +65,14 @@ def write(mutants):
 
 
 def blamed(message):
-    """The mutants in whose code a compiler's error lies."""
+    """The mutants in whose code a compiler's error lies; where there is none, the last that is written above it."""
     for span in message["spans"]:
         if span["is_primary"]:
-            line = (COPY / span["file_name"]).read_text().splitlines()[span["line_start"] - 1]
+            lines = (COPY / span["file_name"]).read_text().splitlines()[: span["line_start"]]
+            line = lines.pop()
             before = re.findall(r"mutant\((\d+)\)", line[: span["column_start"]])
-            yield from map(int, before[-1:] or re.findall(r"mutant\((\d+)\)", line))
+            found = before[-1:] or re.findall(r"mutant\((\d+)\)", line)
+            yield from map(int, found or re.findall(r"mutant\((\d+)\)", "\n".join(lines))[-1:])
 
 
 def build(arguments):

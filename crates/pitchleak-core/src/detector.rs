@@ -158,6 +158,36 @@ mod tests {
         assert!((by_hand - 0.373_68).abs() < 1e-5);
     }
 
+    /// No estimator has a spread of zero: from one that says so nothing follows.
+    #[test]
+    fn without_a_spread_the_confidence_sequence_is_unbounded() {
+        for std in [0.0, f64::NAN] {
+            let width: f64 = confidence_half_width(std, 1.0, 0.01);
+            assert!(width.is_infinite() && width > 0.0, "{std}: {width}");
+        }
+    }
+
+    /// Four estimates of a quarter of a second are the second that evidence has to last.
+    #[test]
+    fn the_hold_time_is_over_when_it_has_passed() {
+        let mut detector = LeakDetector::new(AlarmSettings::default());
+        let changes: [_; 4] = std::array::from_fn(|_| detector.update(0.25, &flows(0.3, 0.005)).internal);
+        assert_eq!(changes, [None, None, None, Some(AlarmState::Raised)]);
+    }
+
+    /// Two minutes of a small leak that may as well be a large one.
+    #[test]
+    fn an_alarm_stays_while_the_leak_may_still_be_there() {
+        let mut detector = LeakDetector::new(AlarmSettings::default());
+        for _ in 0..8 {
+            let _ = detector.update(0.25, &flows(0.3, 0.005));
+        }
+        assert!(detector.active().internal);
+        for _ in 0..480 {
+            assert_eq!(detector.update(0.25, &flows(0.01, 0.1)).internal, None);
+        }
+    }
+
     #[test]
     fn raises_after_the_hold_time_and_clears_with_hysteresis() {
         let mut detector = LeakDetector::new(AlarmSettings::default());
