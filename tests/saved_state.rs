@@ -56,6 +56,19 @@ fn interrupted_anywhere_it_goes_on_to_the_last_bit() {
     }
 }
 
+/// A version is told as it is written; what is none is not printed.
+#[test]
+fn another_version_is_named_and_what_is_none_is_not() {
+    let mut state = streams()[0].save().unwrap();
+    let version = b"\x71pitchleak.state/".len();
+    state[version] = b'0';
+    assert!(
+        matches!(Stream::restore(&state), Err(RestoreError::Version(name)) if name == "pitchleak.state/0")
+    );
+    state[version] = b'\x1b';
+    assert!(matches!(Stream::restore(&state), Err(RestoreError::Content(_))));
+}
+
 /// Of 6000, 782 were once read as other numbers.
 #[test]
 fn no_single_wrong_bit_is_read() {

@@ -179,6 +179,18 @@ fn what_is_pointed_at_by_many_takes_no_more_than_the_file() {
     assert!(message.contains("contradicts itself"), "{message}");
 }
 
+/// Chunks of a gigabyte each, of which sixteen numbers are needed: four of them are not unpacked for fifty numbers.
+#[test]
+fn chunks_that_unpack_to_more_than_a_gigabyte_are_refused() {
+    let mut bytes = VERSION_7_3.to_vec();
+    // Sides of the first array's chunks: one by sixteen numbers of eight bytes.
+    let sides = [1_u32, 16, 8].map(u32::to_le_bytes).concat();
+    let at = bytes.windows(sides.len()).position(|part| part == sides).unwrap();
+    bytes[at..at + 4].copy_from_slice(&(1_u32 << 23).to_le_bytes());
+    let message = read(bytes).unwrap_err().to_string();
+    assert!(message.contains("more than a gigabyte"), "{message}");
+}
+
 proptest::proptest! {
     #[test]
     fn any_byte_of_version_7_3_may_be_wrong(at in 512..100_000_usize, byte in 0..=255_u8) {
