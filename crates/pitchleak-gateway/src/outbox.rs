@@ -24,6 +24,8 @@ struct Waiting {
     /// Topics in the order of their first message.
     topics: VecDeque<String>,
     latest: BTreeMap<String, Message>,
+    /// Something was put that the network thread was not woken for.
+    unsaid: bool,
     closing: bool,
 }
 
@@ -43,6 +45,7 @@ impl Outbox {
 
     pub fn put(&self, message: Message) {
         let mut waiting = self.waiting();
+        waiting.unsaid = true;
         match message.keeping {
             Keeping::Each(_) if waiting.each.len() < MOST_EACH => waiting.each.push_back(message),
             // The service still has it, and hands it over again after a restart.
@@ -60,9 +63,11 @@ impl Outbox {
         }
     }
 
-    /// Wakes the network thread for what was put.
+    /// Wakes the network thread if something was put since.
     pub fn send(&self) {
-        self.filled.notify_one();
+        if std::mem::take(&mut self.waiting().unsaid) {
+            self.filled.notify_one();
+        }
     }
 
     pub fn acknowledge(&self, tickets: Vec<Ticket>) {
