@@ -215,3 +215,55 @@ impl<T: Real, const N: usize> Block<T, N> {
 pub(super) fn symmetric<T: Copy, const N: usize>(matrix: &[[T; N]; N], i: usize, j: usize) -> T {
     if i >= j { matrix[i][j] } else { matrix[j][i] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const F: [[f64; 4]; 4] =
+        [[0.3, -1.2, 2.0, 0.7], [1.0, 0.4, -0.6, 1.5], [-0.8, 2.1, 0.2, -0.3], [0.5, 0.9, 1.1, -1.7]];
+    const Y: [f64; 4] = [1.4, -0.3, 2.2, 0.6];
+    const WEIGHT: f64 = 2.5;
+    const AGE_S: f64 = 0.1;
+
+    /// Two weighted observations and two balances.
+    fn block() -> Block<f64, 4> {
+        let mut sums = BlockSums::new();
+        (0..2).for_each(|k| sums.add(&F[k], &[0.0; LEAKS], Y[k], WEIGHT));
+        let balance =
+            |k: usize| Some(Balance { equation: Equation { left: Y[k], columns: F[k] }, age_s: AGE_S });
+        Block::new(0.0, &sums, &[balance(2), balance(3)], 0.0)
+    }
+
+    /// Row by row, as its definition says.
+    #[test]
+    fn chi_square_is_that_of_the_rows() {
+        for theta in [[0.0; 4], [0.2, -1.1, 0.4, 2.0]] {
+            let left = |k: usize| Y[k] - F[k].iter().zip(theta).map(|(f, theta)| f * theta).sum::<f64>();
+            let expected = WEIGHT * (left(0).powi(2) + left(1).powi(2)) + left(2).powi(2) + left(3).powi(2);
+            let (chi_square, count) = block().chi_square(&theta);
+            assert!((chi_square / expected - 1.0).abs() < 1e-12, "{chi_square} {expected}");
+            assert!((count - 4.0).abs() < f64::EPSILON);
+        }
+    }
+
+    /// A row of this age tells of slopes what the row (f, −age ∘ f) tells.
+    #[test]
+    fn slopes_have_the_information_of_aged_rows() {
+        let block = block();
+        let sum = |term: &dyn Fn(usize) -> f64| AGE_S * (term(2) + term(3));
+        for i in 0..LEAKS {
+            let own = leak_column(i);
+            for j in 0..4 {
+                let expected = sum(&|k| F[k][own] * F[k][j]);
+                assert!((block.aged[i][j] - expected).abs() < 1e-12);
+            }
+            for j in 0..=i {
+                let (row, column) = of_slopes(i, j);
+                let expected = AGE_S * sum(&|k| F[k][own] * F[k][leak_column(j)]);
+                assert!((block.matrix[row][column] - expected).abs() < 1e-12);
+            }
+            assert!((block.aged_vector[i] - sum(&|k| F[k][own] * Y[k])).abs() < 1e-12);
+        }
+    }
+}

@@ -413,6 +413,31 @@ mod tests {
         assert_eq!((together.matrix, together.vector), (apart.matrix, apart.vector));
     }
 
+    /// Errors in variables: noise in column 0, known in its variance, takes nothing off the parameter, whose deviation from
+    /// a mean is what rows tell. Without, a fifth of 1.5 would be missing.
+    #[test]
+    fn known_noise_in_column_0_biases_nothing() {
+        const NOISE: f64 = 0.5;
+        let (mean_0, truth) = (0.9, [0.6, -1.2, 2.0, 0.7]);
+        let row = |k: u32| {
+            let t = f64::from(k / 2) * 0.1;
+            let f = [1.0, t.cos(), (0.7 * t).sin(), (1.3 * t).sin()];
+            let y: f64 = mean_0 + f.iter().zip(truth).map(|(f, truth)| f * truth).sum::<f64>();
+            let noisy = f[0] + if k.is_multiple_of(2) { NOISE } else { -NOISE };
+            ([noisy, f[1], f[2], f[3]], y - noisy * mean_0)
+        };
+        let mut information = Information::new();
+        for block_of in [0..1000, 1000..4000] {
+            let count = f64::from(block_of.end - block_of.start);
+            let mut sums = BlockSums::new();
+            block_of.map(row).for_each(|(f, y)| sums.add(&f, &[0.0; 3], y, 100.0));
+            information.add(&Block::new(1.0, &sums, &[None; 2], 100.0 * count * NOISE * NOISE));
+        }
+        let prior = Prior { mean_0, ..PRIOR };
+        let found = information.solve(&prior).solution().mean;
+        assert!(found.iter().zip(truth).all(|(found, truth)| (found - truth).abs() < 1e-3), "{found:?}");
+    }
+
     #[test]
     fn forgetting_everything_returns_to_the_prior() {
         let mut information = Information::new();
