@@ -55,7 +55,7 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: &[u64]) -> Vec<OnIts
 }
 
 /// Leaks of this mean flow, L/min, that open at once beside honest sensors.
-fn openings(accuracies: &[f64], winds: &[WindCase], seeds: &[u64], size_lpm: f64) -> Vec<OnItsWay> {
+pub fn openings(accuracies: &[f64], winds: &[WindCase], seeds: &[u64], size_lpm: f64) -> Vec<OnItsWay> {
     let cylinders: Vec<_> = winds.iter().flat_map(|wind| OPENING.map(|leak| (*wind, leak))).collect();
     let of_cylinder = |(wind, leak): &(WindCase, Leak)| {
         let truths = opening(*wind, *leak, size_lpm);

@@ -18,6 +18,17 @@ pub(crate) trait Continuity {
         self.fit_of_any_length(priors).filter(|fit| fit.row_count() >= LEAST_ROWS)
     }
 
+    /// The same of any length where no leak is below zero: oil comes out, never in. Leaks that would be are taken out, one
+    /// after the other, the surest first.
+    fn fit_of_outflows(&self, priors: &Priors) -> Option<Fit> {
+        let mut priors = *priors;
+        loop {
+            let fit = self.fit_of_any_length(&priors)?;
+            let Some(inflow) = fit.most_negative_leak() else { return Some(fit) };
+            priors = priors.without(inflow);
+        }
+    }
+
     /// The rig.
     fn rig(&self) -> &Rig;
 

@@ -115,6 +115,13 @@ impl Fit {
         below.into_iter().fold(0.0, f64::max)
     }
 
+    /// The leak that lies furthest below zero, in its standard deviations; none where none does.
+    pub fn most_negative_leak(&self) -> Option<Leak> {
+        let sigmas = |leak: &Leak| self.parameters[LEAKS + *leak as usize] / self.std(LEAKS + *leak as usize);
+        let least = Leak::ALL.into_iter().min_by(|a, b| sigmas(a).total_cmp(&sigmas(b)))?;
+        (sigmas(&least) < 0.0).then_some(least)
+    }
+
     /// Mean flow of a leak by both laws where P and √P across it were on average these, m³/s; its spread grows with the
     /// misfit.
     pub fn flow_m3s(&self, leak: Leak, [pressure, root]: [f64; 2]) -> Estimate<f64> {
