@@ -21,13 +21,13 @@ pub struct Reading {
     pub flow_lag: f64,
     pub pressure_lag_a: f64,
     pub position_gain: f64,
-    // What no table has.
-    /// Meter A reads Q + this × Q².
-    pub bent_meter: f64,
     /// Meter A reads nothing below this flow.
     pub dead_band: f64,
     /// The position hangs behind by this much on each side.
     pub backlash: f64,
+    // What no table has.
+    /// Meter A reads Q + this × Q².
+    pub bent_meter: f64,
     /// Meter A's zero at the end, m³/s.
     pub drifting_zero: f64,
     /// Reading of P_A per square of the pressure.

@@ -197,10 +197,12 @@ fn single(count: usize) -> Vec<Case> {
             }
             8 => {
                 read.dead_band = 0.3 / 60e3 * volume * large;
+                case.truth = vec![("flow_meter_dead_band_a", read.dead_band)];
                 "dead band"
             }
             9 => {
                 read.backlash = 1e-4 * size * large;
+                case.truth = vec![("position_hysteresis", read.backlash)];
                 "backlash"
             }
             10 => {

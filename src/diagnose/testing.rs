@@ -35,7 +35,8 @@ pub(crate) fn torn_seal(seconds: u32) -> Series {
     })
 }
 
-fn seen(seconds: u32, ailment: impl Fn(&mut Sample<f64>)) -> Series {
+/// Some seconds of one whose samples have this ailment.
+pub(crate) fn seen(seconds: u32, ailment: impl Fn(&mut Sample<f64>)) -> Series {
     let (mut series, mut random) = (Series::default(), seeded(7));
     for (k, mut sample) in (0_u32..).zip(Motion::wind_like(LEAKS).samples(seconds)) {
         ailment(&mut sample);

@@ -9,6 +9,8 @@ use pitchleak_core::{EffectSet, FadingMemoryFilter, Model, PerLeak, Sample, Sign
 const MEMORY_S: f64 = 0.05;
 /// No pressure is read finer than this, Pa.
 const FINEST_PA: f64 = 1.0;
+/// Below this share of its dead band a reading is none but for noise: half way between both.
+const UNREAD_SHARE: f64 = 0.5;
 /// Where a trace has no temperature, K.
 const USUAL_TEMPERATURE_K: f64 = 313.15;
 
@@ -70,18 +72,20 @@ impl Correction {
         })
     }
 
-    /// Sensor effects are undone on the readings; what physical effects take is subtracted from the flows.
+    /// Sensor effects are undone on the readings; what physical effects take is subtracted from the flows. A flow within its meter's dead
+    /// band is not known: its chamber rests.
     pub fn correct(&mut self, record: &Record) -> Record {
         let reading = self.signals(record);
         let truth = self.effects.correct(&reading);
+        let unread = self.unread(&reading);
         let any = self.effects.terms(&truth, &self.model, |kind| kind != EffectKind::Force);
         let of = |kind: EffectKind| self.effects.terms(&truth, &self.model, |k| k == kind);
         let sample = Sample {
             x_m: truth.x_m,
             pa_pa: truth.pa_pa,
             pb_pa: truth.pb_pa,
-            qa_m3s: record.sample.qa_m3s.map(|_| truth.qa_m3s - any.chamber_a_m3s),
-            qb_m3s: record.sample.qb_m3s.map(|_| truth.qb_m3s - any.chamber_b_m3s),
+            qa_m3s: record.sample.qa_m3s.filter(|_| !unread.qa_m3s).map(|_| truth.qa_m3s - any.chamber_a_m3s),
+            qb_m3s: record.sample.qb_m3s.filter(|_| !unread.qb_m3s).map(|_| truth.qb_m3s - any.chamber_b_m3s),
             force_n: record.sample.force_n.map(|_| truth.force_n),
         };
         let leaks = PerLeak {
@@ -98,6 +102,21 @@ impl Correction {
     /// Mean leak flows of the effects themselves, m³/s: what a leak of another law carries beside the laminar one.
     pub fn mean_leaks_m3s(&self) -> PerLeak<f64> {
         self.leaked_m3.map(|sum| if self.time_s > 0.0 { sum / self.time_s } else { 0.0 })
+    }
+
+    /// Which readings show nothing because of a dead band.
+    fn unread(&self, reading: &Signals<f64>) -> Signals<bool> {
+        let mut unread = Signals::default();
+        for active in self.effects.iter() {
+            let mut shown = *reading;
+            let is_silent = |flow: &mut f64| flow.abs() < UNREAD_SHARE * active.value;
+            if active.effect.deaf(&mut shown).is_some_and(is_silent)
+                && let Some(own) = active.effect.deaf(&mut unread)
+            {
+                *own = true;
+            }
+        }
+        unread
     }
 
     fn signals(&mut self, record: &Record) -> Signals<f64> {
@@ -121,6 +140,11 @@ impl Correction {
             pb_side: Sides::of(pb.value(), &mut self.sides.pb, self.sides.turned_pa),
             dpa_side_ps: 0.0,
             dpb_side_ps: 0.0,
+            // Where in its play the position sensor lies is not seen here.
+            x_side: 0.0,
+            dx_side_ps: 0.0,
+            qa_unread: 0.0,
+            qb_unread: 0.0,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: self.rates.qa.update(dt_s, qa).slope(),

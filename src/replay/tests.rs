@@ -113,6 +113,27 @@ fn a_declared_hysteresis_is_taken_out_of_the_readings() {
     assert!(after < 0.25 * before, "{}", (after / before).sqrt());
 }
 
+/// What a meter does not show is not known: its chamber rests, and the other flow stays as it is.
+#[test]
+fn within_a_declared_dead_band_the_flow_is_missing() {
+    use crate::rig::EffectValue;
+    let (mut rig, band_m3s) = (Rig::paper(), 2e-5);
+    rig.effects.insert(pitchleak_core::Effect::FlowMeterDeadBandA, EffectValue::new(band_m3s, None));
+    let mut correction = Correction::of(&rig).expect("an effect");
+    let (mut shown, mut hidden) = (0, 0);
+    for record in records(&[]) {
+        let truth = record.sample.qa_m3s.expect("is measured");
+        let is_hidden = truth.abs() < band_m3s;
+        let mut read = record;
+        read.sample.qa_m3s = Some(if is_hidden { 0.1 * truth } else { truth });
+        let corrected = correction.correct(&read).sample;
+        assert_eq!(corrected.qa_m3s, (!is_hidden).then_some(truth));
+        assert_eq!(corrected.qb_m3s, record.sample.qb_m3s);
+        *if is_hidden { &mut hidden } else { &mut shown } += 1;
+    }
+    assert!(shown > 200 && hidden > 200, "{shown} {hidden}");
+}
+
 #[test]
 fn a_rig_that_cannot_be_is_refused() {
     let mut rig = Rig::paper();

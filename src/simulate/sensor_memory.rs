@@ -1,9 +1,10 @@
-//! Sensors whose readings depend on what was before, by an effect.
+//! Sensors whose readings are no linear map of what they measure at that instant: they depend on what was before, or not at all on what
+//! is too small.
 
 use pitchleak_core::effects::{LaggedReading, Play};
 use pitchleak_core::{Effect, Signals};
 
-/// A sensor with a memory, and what it remembers.
+/// Such a sensor, and what it remembers.
 pub(super) struct RememberingSensor {
     effect: Effect,
     /// Of the effect.
@@ -16,6 +17,8 @@ enum Memory {
     Late([Option<LaggedReading<f64>>; 2]),
     /// It hangs behind.
     Hanging(Play<f64>),
+    /// It shows nothing of what is smaller than the value, and remembers nothing.
+    Deaf,
 }
 
 impl RememberingSensor {
@@ -24,7 +27,8 @@ impl RememberingSensor {
         let hanging = effect.hanging(signals).map(|signal| Memory::Hanging(Play::new(*signal)));
         let late = effect.late(signals).map(|signal| signal.map(|now| LaggedReading::new(*now)));
         let late = late.iter().any(Option::is_some).then_some(Memory::Late(late));
-        hanging.or(late).map(|memory| Self { effect, value, memory })
+        let deaf = effect.deaf(signals).map(|_| Memory::Deaf);
+        hanging.or(late).or(deaf).map(|memory| Self { effect, value, memory })
     }
 
     /// Puts the readings in the signals' place.
@@ -40,6 +44,11 @@ impl RememberingSensor {
             Memory::Hanging(play) => {
                 if let Some(signal) = self.effect.hanging(signals) {
                     *signal = play.update(self.value, *signal);
+                }
+            }
+            Memory::Deaf => {
+                if let Some(signal) = self.effect.deaf(signals).filter(|signal| signal.abs() < self.value) {
+                    *signal = 0.0;
                 }
             }
         }

@@ -26,6 +26,10 @@ fn signals() -> impl Strategy<Value = Signals<f64>> {
             pb_side: -0.4,
             dpa_side_ps: 5.0,
             dpb_side_ps: -7.0,
+            x_side: -0.6,
+            dx_side_ps: 4.0,
+            qa_unread: 0.3,
+            qb_unread: -0.9,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: dqa,
@@ -200,11 +204,23 @@ fn late_sensors_are_those_that_a_lag_delays() {
 /// Play is the distance by which a reading hangs behind: rising it reads less, falling more.
 #[test]
 fn sensors_with_play_are_those_that_hang_behind() {
-    let rising = Signals { pa_side: 1.0, pb_side: 1.0, ..Signals::default() };
+    let rising = Signals { x_side: 1.0, pa_side: 1.0, pb_side: 1.0, ..Signals::default() };
     for effect in Effect::ALL.iter().copied() {
         let mut shown = effect.read(0.5, &rising);
         let hanging = effect.hanging(&mut shown).map(|signal| *signal);
         assert_eq!(hanging, effect.spec().id.contains("_hysteresis").then_some(-0.5), "{effect}");
+    }
+}
+
+/// A dead band is the flow below which a meter shows none: of a flow at its edge it takes all.
+#[test]
+fn meters_with_a_dead_band_are_those_that_lose_it() {
+    let band = 0.5;
+    let edge = Signals { qa_m3s: band, qb_m3s: -band, qa_unread: 1.0, qb_unread: -1.0, ..Signals::default() };
+    for effect in Effect::ALL.iter().copied() {
+        let mut shown = effect.read(band, &edge);
+        let silent = effect.deaf(&mut shown).map(|signal| *signal);
+        assert_eq!(silent, effect.spec().id.contains("_dead_band").then_some(0.0), "{effect}");
     }
 }
 

@@ -1,6 +1,8 @@
 //! The traces and what is declared of them.
 
+mod backlash;
 mod channels;
+mod dead_band;
 mod declared;
 mod files;
 mod motion;

@@ -1,6 +1,8 @@
 //! What a trace says of the ways its signals go. The speed that friction feels: from the flows where they are measured, which know it ten times
 //! better than the position's difference does, else from the slope of the position.
 
+use super::backlash::Followed;
+use super::dead_band::{Beside, median_of_three, within_band};
 use super::series::Series;
 use super::side::Sides;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
@@ -19,6 +21,12 @@ pub(crate) struct Motion {
     pub(crate) pa: Sides,
     /// The same of sensor B.
     pub(crate) pb: Sides,
+    /// The same of the position sensor.
+    pub(crate) x: Sides,
+    /// Where in its meter's dead band flow A would lie: zero while the meter shows something.
+    pub(crate) qa: Sides,
+    /// The same of flow B.
+    pub(crate) qb: Sides,
 }
 
 impl Motion {
@@ -31,38 +39,39 @@ impl Motion {
     ) -> Self {
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
-            Self::from_flow(series, model, effects, sensors)
+            let [qa, qb] = within_bands(series, model, sensors);
+            let (v_mps, std_mps, rms_mps) = from_flow(series, model, effects, sensors, [&qa.side, &qb.side]);
+            Self { v_mps, std_mps, rms_mps, qa, qb, ..Self::default() }
         } else {
             Self::from_position(series, effects, sensors)
         };
         let half = longest_half(series.step_s()) / 2;
         let noise_std = sensors.pressure.noise_std / ((2 * half + 1) as f64).sqrt();
         let sides = |values: &[f64]| Sides::of(&series.t_s, &smooth(values, half), noise_std);
-        Self { pa: sides(&series.pa_pa), pb: sides(&series.pb_pa), ..own }
+        let way_m = own.way_m(&series.t_s);
+        let stretches = (series.stretches(), series.step_s());
+        let x = Followed::new(stretches, (&series.x_m, &way_m), sensors.position.noise_std).sides();
+        let (pa, pb) = (sides(&series.pa_pa), sides(&series.pb_pa));
+        Self { pa, pb, x, ..own }
     }
 
-    fn from_flow(
-        series: &Series,
-        model: &Model<f64>,
-        effects: &EffectSet<f64>,
-        sensors: &Sensors<f64>,
-    ) -> Self {
-        let raw = raw_speed(series, model, effects);
-        let rms = root_mean_square(&raw);
-        let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
-            .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
-        let (half, step) = (half_window(std, rms, 2.0), series.step_s());
-        let half = half.min(longest_half(step));
-        let v_mps = smooth(&raw, half);
-        Self { v_mps, std_mps: std / ((2 * half + 1) as f64).sqrt(), rms_mps: rms, ..Self::default() }
+    /// Where the piston would be by its speed, m.
+    fn way_m(&self, t_s: &[f64]) -> Vec<f64> {
+        let (mut way_m, mut before_s) = (0.0, t_s.first().copied().unwrap_or_default());
+        let each = t_s.iter().zip(&self.v_mps);
+        each.map(|(t, v)| {
+            way_m += if v.is_finite() { v * (t - before_s).max(0.0) } else { 0.0 };
+            before_s = *t;
+            way_m
+        })
+        .collect()
     }
 
     fn from_position(series: &Series, effects: &EffectSet<f64>, sensors: &Sensors<f64>) -> Self {
         let half = longest_half(series.step_s()).max(1);
         let true_speed = |v_mps: f64| effects.correct(&Signals { v_mps, ..Signals::default() }).v_mps;
         let v_mps: Vec<f64> = slope(&series.t_s, &series.x_m, half).into_iter().map(true_speed).collect();
-        let n = (2 * half + 1) as f64;
-        let std = sensors.position.noise_std * (12.0 / (n * n * n)).sqrt() / series.step_s().max(1e-9);
+        let std = slope_std(sensors.position.noise_std, half, series.step_s());
         let rms_mps = root_mean_square(&v_mps);
         Self { v_mps, std_mps: std, rms_mps, ..Self::default() }
     }
@@ -71,6 +80,45 @@ impl Motion {
     pub(crate) fn least_sure_mps(&self) -> f64 {
         (LEAST_SURE_SIGMA * self.std_mps).max(LEAST_SURE_SHARE * self.rms_mps)
     }
+}
+
+/// Speed, standard deviation of its noise, and its root mean square, m/s.
+fn from_flow(
+    series: &Series,
+    model: &Model<f64>,
+    effects: &EffectSet<f64>,
+    sensors: &Sensors<f64>,
+    unread: [&[f64]; 2],
+) -> (Vec<f64>, f64, f64) {
+    let raw = raw_speed(series, model, effects, unread);
+    let rms = root_mean_square(&raw);
+    let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
+        .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
+    let (half, step) = (half_window(std, rms, 2.0), series.step_s());
+    let half = half.min(longest_half(step));
+    (smooth(&raw, half), std / ((2 * half + 1) as f64).sqrt(), rms)
+}
+
+/// Where in dead bands of their meters the flows A and B would lie: what the other meter shows says how they go on meanwhile, or
+/// the position where that shows nothing either.
+fn within_bands(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> [Sides; 2] {
+    let (step, cylinder) = (series.step_s(), &model.cylinder);
+    let half = longest_half(step).max(1);
+    let speed = slope(&series.t_s, &series.x_m, half);
+    let speed_std = slope_std(sensors.position.noise_std, half, step);
+    let (qa, qb) = (median_of_three(&series.qa_m3s), median_of_three(&series.qb_m3s));
+    let (qa_std, qb_std) = (sensors.flow_a.noise_std, sensors.flow_b.noise_std);
+    let of =
+        |(own, own_std): (&[f64], f64), (other, other_std): (&[f64], f64), area: f64, other_area: f64| {
+            let times = |values: &[f64], factor: f64| values.iter().map(|value| factor * value).collect();
+            let ratio = area / other_area;
+            let meter = Beside { flow_m3s: times(other, -ratio), std_m3s: ratio.abs() * other_std };
+            let position = Beside { flow_m3s: times(&speed, area), std_m3s: area.abs() * speed_std };
+            within_band(&series.t_s, own, own_std, &[meter, position])
+        };
+    // What flows into B is what the piston sweeps, the other way round.
+    let (area_a, area_b) = (cylinder.area_a_m2, -cylinder.area_b_m2);
+    [of((&qa, qa_std), (&qb, qb_std), area_a, -area_b), of((&qb, qb_std), (&qa, qa_std), area_b, -area_a)]
 }
 
 fn longest_half(step_s: f64) -> usize {
@@ -85,8 +133,13 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
     ((std / (SPEED_NOISE_SHARE * rms)).powf(power) / 2.0).min(1e6) as usize
 }
 
-/// Speed from eq. (1), both chambers averaged where both have a meter.
-fn raw_speed(series: &Series, model: &Model<f64>, effects: &EffectSet<f64>) -> Vec<f64> {
+/// Speed from eq. (1), both chambers averaged where both have a meter. `unread`: where in their dead bands the flows lie.
+fn raw_speed(
+    series: &Series,
+    model: &Model<f64>,
+    effects: &EffectSet<f64>,
+    [qa_unread, qb_unread]: [&[f64]; 2],
+) -> Vec<f64> {
     let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks_m3spa, model.fluid.bulk_modulus_pa);
     let rate = |values: &[f64], at: usize| {
         let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
@@ -105,6 +158,8 @@ fn raw_speed(series: &Series, model: &Model<f64>, effects: &EffectSet<f64>) -> V
                 qb_m3s: series.qb_m3s[at],
                 dqa_m3s2: rate(&series.qa_m3s, at),
                 dqb_m3s2: rate(&series.qb_m3s, at),
+                qa_unread: qa_unread[at],
+                qb_unread: qb_unread[at],
                 ..Signals::default()
             };
             let seen = effects.correct(&reading);
@@ -138,6 +193,12 @@ fn smooth(values: &[f64], half: usize) -> Vec<f64> {
             window.iter().sum::<f64>() / window.len() as f64
         })
         .collect()
+}
+
+/// Standard deviation of [`slope`] by noise.
+fn slope_std(noise_std: f64, half: usize, step_s: f64) -> f64 {
+    let n = (2 * half + 1) as f64;
+    noise_std * (12.0 / (n * n * n)).sqrt() / step_s.max(1e-9)
 }
 
 /// Least-squares slope over `half` samples on each side.

@@ -1,5 +1,5 @@
 //! On which side of its play a sensor lies, read from what it shows: behind a pressure that rises or falls, or on its way from one side to the
-//! other, while its reading stands. How far on that way it is nothing shows.
+//! other, while its reading stands. How far on that way it is nothing shows of a pressure; of a position the flows do (`backlash.rs`).
 
 use crate::diagnose::thresholds::{BLOCK_S, TURNED_SIGMA};
 use pitchleak_core::effects::Play;
@@ -8,14 +8,14 @@ use std::ops::Range;
 /// Of one reading, sample by sample.
 #[derive(Default)]
 pub(crate) struct Sides {
-    /// 1 behind a rising pressure, −1 behind a falling one; while the reading stands what is to be expected.
+    /// 1 behind what rises, −1 behind what falls; in between what is to be expected.
     pub(crate) side: Vec<f64>,
-    /// Standard deviation of that: zero where the reading moves.
+    /// Standard deviation of that: zero where it is known.
     pub(crate) side_std: Vec<f64>,
 }
 
 /// Standard deviation of a side anywhere between −1 and 1.
-const ANYWHERE: f64 = 0.577_350_269_189_625_8;
+pub(super) const ANYWHERE: f64 = 0.577_350_269_189_625_8;
 /// A reading stands when it has not moved for so long, s: noise alone hides slow motion for less.
 const LONGEST_STILL_S: f64 = BLOCK_S / 2.0;
 /// Of a reading that stands, what its sensor's side is on average, of the straight way from the last motion to the next.

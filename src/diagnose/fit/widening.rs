@@ -65,3 +65,90 @@ impl Fit<'_> {
         column(above).into_iter().zip(column(below)).map(|(a, b)| factor * (a - b)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::data::Series;
+    use crate::diagnose::fit::Problem;
+    use crate::diagnose::testing::{declared, seen};
+    use crate::diagnose::weak_form::Term;
+    use pitchleak_core::Effect;
+
+    const CRACKING_PA: f64 = 1e6;
+
+    /// Half a minute of a cylinder with a valve across the piston that opens at [`CRACKING_PA`].
+    fn opening() -> Series {
+        seen(30, |sample| {
+            let load = sample.load_pressure_pa();
+            let past = 2e-11 * (load - load.clamp(-CRACKING_PA, CRACKING_PA));
+            sample.qa_m3s = sample.qa_m3s.map(|q| q + past);
+            sample.qb_m3s = sample.qb_m3s.map(|q| q - past);
+        })
+    }
+
+    fn cracking(low: f64, high: f64) -> UnknownConstant {
+        UnknownConstant { parameter: EffectConstant::CrackingPressure, range: (low, high) }
+    }
+
+    /// The fit with the valve beside the leaks, and its place.
+    fn with_fit(of: impl Fn(&Fit<'_>, usize)) {
+        let traces = [opening()];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(Effect::InternalLeakCracking)).expect("is a term");
+        let constants = problem.usual(term).with(EffectConstant::CrackingPressure, CRACKING_PA);
+        of(&Fit::declared(&problem, &|| ()).with(term, constants, &|| ()), term);
+    }
+
+    /// The spread is that of a fit with the law's derivative as one more column, known beforehand to lie in the constant's range.
+    #[test]
+    fn an_unknown_constant_widens_as_one_more_column_would() {
+        with_fit(|fit, term| {
+            let (low, high): (f64, f64) = (0.5e6, 1.5e6);
+            let own = fit.estimate(term).expect("is fitted");
+            let name = fit.problem.terms[term];
+            let at = |pa: f64| {
+                let constants = fit.constants(term).with(EffectConstant::CrackingPressure, pa);
+                fit.regression.counting(fit.white_column(name, constants))
+            };
+            let step = 1e4;
+            let slope = |(above, below): (f64, f64)| own.value * (above - below) / (2.0 * step);
+            let above = at(CRACKING_PA + step);
+            let more: Vec<f64> = above.into_iter().zip(at(CRACKING_PA - step)).map(slope).collect();
+            let solution = &fit.bounded;
+            let count = solution.terms.len();
+            let normal = solution.inverse.clone().try_inverse().expect("is regular");
+            let dot = |a: &[f64]| a.iter().zip(&more).map(|(a, b)| a * b).sum::<f64>();
+            let all = DMatrix::from_fn(count + 1, count + 1, |i, j| match (i < count, j < count) {
+                (true, true) => normal[(i, j)],
+                (false, false) => dot(&more) + 12.0 / (high - low).powi(2),
+                _ => dot(&fit.regression.columns[solution.terms[i.min(j)]]),
+            });
+            let place = solution.terms.iter().position(|one| *one == term).expect("is fitted");
+            let wide = all.try_inverse().expect("is regular")[(place, place)];
+            let by_hand = (wide - solution.inverse[(place, place)]).sqrt() / fit.regression.scale[term];
+            let told = fit.std_of_constants(term, &[cracking(low, high)]);
+            assert!((told / by_hand - 1.0).abs() < 0.02, "{told} {by_hand}");
+            assert!(told > 0.1 * own.std, "{told} beside {}", own.std);
+        });
+    }
+
+    #[test]
+    fn a_constant_that_is_known_widens_nothing_and_none_does_neither() {
+        with_fit(|fit, term| {
+            let spread = |half_pa: f64| {
+                fit.std_of_constants(term, &[cracking(CRACKING_PA - half_pa, CRACKING_PA + half_pa)])
+            };
+            let (narrow, wide) = (spread(1.0), spread(5e5));
+            assert!(wide > 0.0 && narrow < 0.01 * wide, "{narrow} {wide}");
+            let leak = fit.problem.place(Term::Internal).expect("is a term");
+            let unnamed = fit.problem.place(Term::Effect(Effect::AccumulatorA)).expect("is a term");
+            // No constant, a constant in which the term is linear, a term that is not fitted.
+            let all =
+                [(term, vec![]), (leak, vec![cracking(5e5, 1.5e6)]), (unnamed, vec![cracking(5e5, 1.5e6)])];
+            for (term, unknown) in all {
+                assert!(fit.std_of_constants(term, &unknown) <= 0.0);
+            }
+        });
+    }
+}

@@ -141,26 +141,37 @@ pub(crate) fn residual_rows(
     Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
 }
 
-/// More noise where a trace moves faster than its samples tell, and where a sensor is somewhere in its play.
+/// More noise where a trace moves faster than its samples tell, and where a sensor is somewhere in its play or dead band.
 fn add_unresolved(
     sensitivities: &mut [PerEquation<Sensitivity>],
     rows: &mut Rows,
     (traces, motions): (&[Series], &[Motion]),
     (sensors, at): (&Sensors<f64>, &Linearisation),
 ) {
-    let noise_std = sensors.pressure.noise_std;
-    let plays = [Effect::PressureHysteresisA, Effect::PressureHysteresisB]
-        .map(|effect| at.value(Term::Effect(effect)) / noise_std);
+    // As loudness is listed: position, pressures, flows.
+    let plays = [
+        (Effect::PositionHysteresis, sensors.position),
+        (Effect::PressureHysteresisA, sensors.pressure),
+        (Effect::PressureHysteresisB, sensors.pressure),
+        (Effect::FlowMeterDeadBandA, sensors.flow_a),
+        (Effect::FlowMeterDeadBandB, sensors.flow_b),
+    ]
+    .map(|(effect, sensor)| at.value(Term::Effect(effect)) / sensor.noise_std);
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let samples = row.samples_in(&traces[row.trace()].t_s);
         let mut times = unresolved[row.trace()].loudness(samples.clone());
         let motion = &motions[row.trace()];
-        let somewhere = [(&motion.pa, plays[0]), (&motion.pb, plays[1])]
-            .map(|(sides, play)| sides.loudness(samples.clone(), play));
-        times[1..].iter_mut().zip(somewhere).for_each(|(times, play)| *times = times.hypot(play));
+        let sides = [&motion.x, &motion.pa, &motion.pb, &motion.qa, &motion.qb].into_iter().zip(plays);
+        let [x, pa, pb, qa, qb, _] = &mut times;
+        let mut is_unseen = false;
+        for (times, (sides, play)) in [x, pa, pb, qa, qb].into_iter().zip(sides) {
+            let somewhere = sides.loudness(samples.clone(), play);
+            *times = times.hypot(somewhere);
+            is_unseen |= somewhere > 1.0;
+        }
         *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
-        row.is_unseen = own.force.is_speed_loud() || somewhere.into_iter().any(|play| play > 1.0);
+        row.is_unseen = own.force.is_speed_loud() || is_unseen;
     }
 }
 

@@ -222,6 +222,7 @@ impl Means {
             dpb_pas: moved(mean.dpb_pas, mean.d2pb_pas2),
             pa_side: moved(mean.pa_side, mean.dpa_side_ps),
             pb_side: moved(mean.pb_side, mean.dpb_side_ps),
+            x_side: moved(mean.x_side, mean.dx_side_ps),
             qa_m3s: moved(mean.qa_m3s, mean.dqa_m3s2),
             qb_m3s: moved(mean.qb_m3s, mean.dqb_m3s2),
             ..*mean
@@ -249,6 +250,11 @@ fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
         pb_side: half_way(&motion.pb.side),
         dpa_side_ps: rate(&motion.pa.side),
         dpb_side_ps: rate(&motion.pb.side),
+        x_side: half_way(&motion.x.side),
+        dx_side_ps: rate(&motion.x.side),
+        // As the readings beside which they stand: what both jump by at the band's edge cancels.
+        qa_unread: middle(&motion.qa.side),
+        qb_unread: middle(&motion.qb.side),
         qa_m3s: middle(&series.qa_m3s),
         qb_m3s: middle(&series.qb_m3s),
         dqa_m3s2: rate(&series.qa_m3s),

@@ -75,7 +75,9 @@ impl Nameless {
             Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
             Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
             Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
-            Self::BentPressureA | Self::BentPressureB => self.misread(at, model),
+            Self::BentPressureA | Self::BentPressureB => {
+                model.misread(Self::USUAL_BEND, |value| self.read(value, at).unwrap_or(*at))
+            }
             Self::SquareFriction => Terms { force_n: at.v_mps * at.v_mps.abs(), ..Terms::default() },
             Self::StiffeningOil => Terms {
                 chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.pa_pa * at.dpa_pas,
@@ -83,14 +85,6 @@ impl Nameless {
                 force_n: 0.0,
             },
         }
-    }
-
-    /// What a misreading leaves over per unit. The residual is linear in each pressure: the difference is exact.
-    fn misread(self, at: &Signals<f64>, model: &Model<f64>) -> Terms<f64> {
-        let with =
-            |value: f64| self.read(value, at).map_or_else(Terms::default, |read| model.residual(&read));
-        let size = Self::USUAL_BEND;
-        with(size).zip(with(-size), |above, below| (above - below) / (2.0 * size))
     }
 
     /// What the sensors show of the truth; none where no sensor is at fault.

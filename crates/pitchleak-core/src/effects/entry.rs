@@ -84,6 +84,7 @@ macro_rules! effects {
         $(reads $reads:expr;)?
         $(late [$($late:ident),*];)?
         $(hangs [$hangs:ident];)?
+        $(deaf [$deaf:ident];)?
         $(constants [$($constant:ident),*];)?
         $(prior $sensor:ident.$spread:ident;)?
         $(carries $left_side:ident;)?
@@ -145,6 +146,15 @@ macro_rules! effects {
             pub fn hanging<T>(self, signals: &mut Signals<T>) -> Option<&mut T> {
                 match self {
                     $($(Self::$variant => Some(&mut signals.$hangs),)?)*
+                    _ => None,
+                }
+            }
+
+            /// The signal that a meter with a dead band shows as zero while it is smaller than the effect's value. None for all other
+            /// effects.
+            pub fn deaf<T>(self, signals: &mut Signals<T>) -> Option<&mut T> {
+                match self {
+                    $($(Self::$variant => Some(&mut signals.$deaf),)?)*
                     _ => None,
                 }
             }

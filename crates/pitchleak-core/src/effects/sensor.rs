@@ -45,13 +45,9 @@ pub(super) fn correct<T: Real>(effect: Effect, value: T, reading: &Signals<T>) -
 }
 
 /// What one unit of a sensor effect adds, to first order, to the declared model's residual when
-/// that is computed from the readings. The residual is quadratic in the signals, so the central
-/// difference is exact whatever its step.
+/// that is computed from the readings.
 pub(super) fn unit_term<T: Real>(effect: Effect, at: &Signals<T>, model: &Model<T>) -> Terms<T> {
-    let step = T::lit(effect.spec().default_size);
-    let above = model.residual(&read(effect, step, at));
-    let below = model.residual(&read(effect, -step, at));
-    above.zip(below, |above, below| (above - below) / (step + step))
+    model.misread(T::lit(effect.spec().default_size), |value| read(effect, value, at))
 }
 
 /// The dynamic form of [`Effect::FlowMeterLag`] and [`Effect::PressureLagA`]: τ y' + y = u by backward Euler,

@@ -6,6 +6,7 @@
 //!     reads |at, one, none| …;          what one unit does to the readings
 //!     late [signals];                   sensors that answer late: the signals that the value delays, s
 //!     hangs [signal];                   sensors with play: the signal that hangs behind by the value, either way
+//!     deaf [signal];                    meters with a dead band: the signal that reads zero while it is smaller than the value
 //!     constants [names];                in which the term is not linear
 //!     prior sensor.spread;              the declared error of the sensor that the effect is
 //!     carries LeftSide;                 the measured left side of eq. (1) to which the term is in proportion
@@ -254,6 +255,24 @@ effects! {
         "Pressure sensor B hangs behind, rising and falling, by the value named: play or friction in its mechanism, or hysteresis of its membrane, which look alike."
         "Exercise pressure sensor B over its range, check its mounting torque, and replace it if its hysteresis is beyond the data sheet's."
         "A reference gauge at port B, the pressure stopped on its way up and on its way down: what is read differs by twice the value named, however long one waits; behind a lag it would meet."
+    PositionHysteresis "position_hysteresis" ["m"] Sensor 0.0 .. 5e-2, 5e-4;
+        reads |at, _, none| shift(Signals { x_m: -at.x_side, v_mps: -at.dx_side_ps, ..none });
+        hangs [x_m];
+        "The position sensor hangs behind, extending and retracting, by the value named: backlash in its coupling, rod eye or gear, or a slack cable."
+        "Tighten the position sensor's coupling, replace worn rod eyes or the cable's spring, or declare the play."
+        "The piston pushed to and fro by hand or at low pressure: how far it goes before the position sensor follows is twice the value named."
+    FlowMeterDeadBandA "flow_meter_dead_band_a" ["m3/s"] Sensor 0.0 .. 1e-3, 5e-6;
+        reads |at, _, none| shift(Signals { qa_m3s: -at.qa_unread, ..none });
+        deaf [qa_m3s];
+        "Flow meter A shows nothing while less than the value named flows, either way: a turbine or gear wheel that does not start, or a cut-off for small flows in its electronics."
+        "Take the cut-off out of flow meter A's settings, use a meter of a smaller range, or declare the dead band."
+        "The piston moved slower and slower: the flow below which meter A shows nothing while the position still changes."
+    FlowMeterDeadBandB "flow_meter_dead_band_b" ["m3/s"] Sensor 0.0 .. 1e-3, 5e-6;
+        reads |at, _, none| shift(Signals { qb_m3s: -at.qb_unread, ..none });
+        deaf [qb_m3s];
+        "Flow meter B shows nothing while less than the value named flows, either way: a turbine or gear wheel that does not start, or a cut-off for small flows in its electronics."
+        "Take the cut-off out of flow meter B's settings, use a meter of a smaller range, or declare the dead band."
+        "The piston moved slower and slower: the flow below which meter B shows nothing while the position still changes."
 }
 
 impl core::fmt::Display for Effect {

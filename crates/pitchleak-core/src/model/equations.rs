@@ -31,6 +31,14 @@ pub struct Signals<T> {
     pub dpa_side_ps: T,
     /// Its rate at B, 1/s.
     pub dpb_side_ps: T,
+    /// Where the reading of x lies in the sensor's play: 1 behind a piston that extends, −1 behind one that retracts.
+    pub x_side: T,
+    /// Its rate, 1/s.
+    pub dx_side_ps: T,
+    /// Flow Q_A that its meter does not show, as a share of the meter's dead band: 0 outside of it, −1 to 1 within.
+    pub qa_unread: T,
+    /// The same of Q_B.
+    pub qb_unread: T,
     /// Flow Q_A, m³/s.
     pub qa_m3s: T,
     /// Flow Q_B, m³/s.
@@ -108,6 +116,15 @@ impl<T: Real> Model<T> {
     }
 }
 
+impl<T: Real> Model<T> {
+    /// What one unit of a misreading adds to [`Self::residual`], to first order; `read` says what the sensors show with so much of it. The
+    /// residual is quadratic in the signals: the central difference is exact whatever its step, where readings are linear in their error.
+    pub fn misread(&self, step: T, read: impl Fn(T) -> Signals<T>) -> Terms<T> {
+        let (above, below) = (self.residual(&read(step)), self.residual(&read(-step)));
+        above.zip(below, |above, below| (above - below) / (step + step))
+    }
+}
+
 impl<T: Real> Terms<T> {
     /// Each number of `self` with its partner of `other` through `f`.
     #[inline]
@@ -143,6 +160,10 @@ impl<T: Real> Signals<T> {
             pb_side: f(self.pb_side, other.pb_side),
             dpa_side_ps: f(self.dpa_side_ps, other.dpa_side_ps),
             dpb_side_ps: f(self.dpb_side_ps, other.dpb_side_ps),
+            x_side: f(self.x_side, other.x_side),
+            dx_side_ps: f(self.dx_side_ps, other.dx_side_ps),
+            qa_unread: f(self.qa_unread, other.qa_unread),
+            qb_unread: f(self.qb_unread, other.qb_unread),
             qa_m3s: f(self.qa_m3s, other.qa_m3s),
             qb_m3s: f(self.qb_m3s, other.qb_m3s),
             dqa_m3s2: f(self.dqa_m3s2, other.dqa_m3s2),
