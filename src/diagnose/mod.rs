@@ -65,7 +65,6 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
     let Selection { fit, effects } = &selection;
-    let interactions = search::interactions(fit, effects);
     Diagnosis {
         samples: Samples::of(&train),
         effects: effects.iter().filter_map(|one| assess::found(&selection, one, &judgement)).collect(),
@@ -78,11 +77,11 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
             judgement.complaints,
             &before,
             (!effects.is_empty()).then_some(&after),
-            &interactions,
+            &judgement.interactions,
         ),
         before,
         after,
-        interactions,
+        interactions: judgement.interactions,
         holds,
     }
 }

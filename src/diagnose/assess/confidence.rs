@@ -6,7 +6,9 @@ use super::verdict::Judgement;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::search::{self, Selected, Selection};
-use crate::diagnose::thresholds::{CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE};
+use crate::diagnose::thresholds::{
+    AGREED_SIGMA, CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE,
+};
 use crate::diagnose::weak_form::Term;
 use pitchleak_core::Effect;
 use pitchleak_core::effects::EffectKind;
@@ -42,6 +44,8 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
         company(selection, one, judgement),
         lopsided(selection, one),
         bounds(fit, one),
+        negative_mass(fit, one),
+        replaceable(fit, one),
         leaks(fit, one),
         held_out(fit, one, judgement),
         sensors(&judgement.failures),
@@ -91,7 +95,10 @@ fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Str
         acts = PerEquation::from_fn(|_| true);
     }
     let there = |equation: Equation| if acts[equation] { judgement.left[equation] } else { 0.0 };
-    let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>() + adequacy::nameless_excess(fit);
+    let named = fit.problem.terms[one.term].effect().map(|effect| effect.spec().id);
+    let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>()
+        + adequacy::nameless_excess(fit)
+        + judgement.mended_by_products(fit, named);
     let mended = search::loss(fit, &[one.term]);
     (left > UNMENDED_SHARE * (mended + left)).then(|| {
         "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
@@ -159,6 +166,25 @@ fn lopsided(selection: &Selection<'_>, one: &Selected) -> Option<String> {
 /// Its value is at an end of what physics allows.
 fn bounds(fit: &Fit<'_>, one: &Selected) -> Option<String> {
     fit.is_at_bound(one.term).then(|| "its value is at the end of what is possible".to_owned())
+}
+
+/// With it nothing would have a mass, or less.
+fn negative_mass(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let own =
+        fit.estimate(one.term).filter(|_| fit.problem.terms[one.term] == Term::Effect(Effect::AddedMass))?;
+    let declared_kg = fit.problem.declared_cylinder().moving_mass_kg;
+    (own.value - own.std < -declared_kg)
+        .then(|| format!("with it hardly anything would move of the {declared_kg:.1} kg that are declared"))
+}
+
+/// A candidate too weak for a name, which these traces do not rule out either, would take most of it away.
+fn replaceable(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let own = fit.estimate(one.term)?;
+    let spread = own.std.hypot(unnamed_shift(fit, one.term));
+    (own.value.abs() < AGREED_SIGMA * spread).then(|| {
+        "beside an effect too weak for a name, which these traces do not rule out, it could be none"
+            .to_owned()
+    })
 }
 
 /// With it a leak comes out below zero.

@@ -4,8 +4,9 @@ use super::adequacy::{Inadequacy, inadequacy};
 use super::confidence::ratio_note;
 use super::leaks::negative_leaks;
 use crate::diagnose::equation::{Equation, PerEquation};
+use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
-use crate::diagnose::search::Selection;
+use crate::diagnose::search::{self, Selection};
 use crate::diagnose::thresholds::MOST_ROUNDS;
 
 /// What the search makes of the traces.
@@ -19,6 +20,17 @@ pub(crate) struct Judgement {
     pub(crate) left: PerEquation<f64>,
     /// Where the effects together made the error on held-out samples smaller.
     pub(crate) fell: PerEquation<bool>,
+    /// Pairs of effects that act on each other.
+    pub(crate) interactions: Vec<Interaction>,
+}
+
+impl Judgement {
+    /// What the strongest product of two effects would mend of the sum of squares, `beside` being none of them: their laws are wrong by that.
+    pub(crate) fn mended_by_products(&self, fit: &Fit<'_>, beside: Option<&str>) -> f64 {
+        let is_beside = |found: &&Interaction| !found.effects.iter().any(|id| Some(*id) == beside);
+        let percents = self.interactions.iter().filter(is_beside).map(|found| found.mended_percent);
+        percents.fold(0.0, f64::max) / 100.0 * fit.free.chi2
+    }
 }
 
 /// Judges the model with the effects by its errors on held-out samples, `before` without them and `after`, and by what is
@@ -47,7 +59,8 @@ pub(crate) fn judge(
         (true, false, true) => Verdict::Explained,
         (true, false, false) => Verdict::PartlyExplained,
     };
-    Judgement { verdict, complaints, failures, left, fell }
+    let interactions = search::interactions(fit, effects);
+    Judgement { verdict, complaints, failures, left, fell, interactions }
 }
 
 /// All sentences for people: `after` is none where no effect was named.

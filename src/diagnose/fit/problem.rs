@@ -5,7 +5,7 @@ use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, wh
 use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
-use pitchleak_core::{Effect, Model, PerLeak, Sensors};
+use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors};
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -49,6 +49,11 @@ impl<'a> Problem<'a> {
     pub(super) fn declared_terms(&self) -> Vec<usize> {
         let is_declared = |i: &usize| DECLARED.contains(&self.terms[*i]) || self.priors[*i].is_some();
         (0..self.terms.len()).filter(is_declared).collect()
+    }
+
+    /// The cylinder that the rig file declares.
+    pub(crate) fn declared_cylinder(&self) -> &Cylinder<f64> {
+        &self.start.model.cylinder
     }
 
     /// The place of a term.
