@@ -16,6 +16,8 @@ pub(super) struct Followed<'a> {
     pub(super) noise_std_m: f64,
 }
 
+/// χ² by which a play must explain the reading better than none does: six standard deviations, for the best of many plays is taken.
+const EVIDENT_CHI2: f64 = 36.0;
 /// Ratio of two plays that are tried one after the other.
 const NEXT_PLAY: f64 = 1.2;
 /// Steps of the last search between two of them.
@@ -31,10 +33,9 @@ impl<'a> Followed<'a> {
         Self { stretches, samples_per_block, x_m, way_m, noise_std_m }
     }
 
-    /// The sides, with the play that explains most of how way and reading differ; with one as small as the noise where none explains
-    /// anything.
+    /// The sides, with the play that explains most of how way and reading differ; none where that is no more than noise makes.
     pub(super) fn sides(&self) -> Sides {
-        self.sides_with(self.likely_play().unwrap_or(self.noise_std_m.max(f64::MIN_POSITIVE)))
+        self.likely_play().map_or_else(|| Sides::none(self.x_m.len()), |play_m| self.sides_with(play_m))
     }
 
     fn sides_with(&self, play_m: f64) -> Sides {
@@ -51,8 +52,8 @@ impl<'a> Followed<'a> {
         own
     }
 
-    /// The play with the least squares of what is left of the difference between way and reading, block by block; none where that is least
-    /// without any.
+    /// The play with the least squares of what is left of the difference between way and reading, block by block; none where it is
+    /// hardly less than without any.
     fn likely_play(&self) -> Option<f64> {
         let gone = without_mean(self.steps(|at| self.way_m[at] - self.x_m[at]));
         let left = |play_m: f64| {
@@ -68,7 +69,8 @@ impl<'a> Followed<'a> {
             play_m *= NEXT_PLAY;
         }
         let none = gone.iter().map(|gone| gone * gone).sum::<f64>();
-        let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 < none)?;
+        let evident = none - EVIDENT_CHI2 * 2.0 * self.noise_std_m.powi(2) / self.samples_per_block as f64;
+        let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 < evident)?;
         let refine = |(best, share): ((f64, f64), f64), _| {
             let beside = [best.1 * share, best.1 / share].map(|play_m| (left(play_m), play_m));
             (beside.into_iter().fold(best, |best, one| if one.0 < best.0 { one } else { best }), share.sqrt())
@@ -138,8 +140,10 @@ mod tests {
     #[test]
     fn a_sensor_without_play_has_none_and_a_new_stretch_begins_unknown() {
         let (read, way, _) = hanging(0.0);
-        let likely = followed(&read, &way).likely_play();
-        assert!(likely.is_none_or(|play_m| play_m < NOISE_M), "{likely:?}");
+        let own = followed(&read, &way);
+        let likely = own.likely_play();
+        assert!(likely.is_none(), "{likely:?}");
+        assert!(own.sides().side.iter().all(|side| *side == 0.0));
         let two = Followed { stretches: vec![0..3000, 3000..6000], ..followed(&read, &way) };
         let sides = two.sides_with(5e-4);
         assert!(sides.side_std[3000] > 0.0 && sides.side_std[2999] == 0.0 && sides.side_std[5999] == 0.0);

@@ -73,7 +73,8 @@ impl Motion {
         let v_mps: Vec<f64> = slope(&series.t_s, &series.x_m, half).into_iter().map(true_speed).collect();
         let std = slope_std(sensors.position.noise_std, half, series.step_s());
         let rms_mps = root_mean_square(&v_mps);
-        Self { v_mps, std_mps: std, rms_mps, ..Self::default() }
+        let [qa, qb] = [(); 2].map(|()| Sides::none(series.len()));
+        Self { v_mps, std_mps: std, rms_mps, qa, qb, ..Self::default() }
     }
 
     /// Below this speed the direction of motion is not known.

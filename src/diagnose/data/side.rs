@@ -31,6 +31,11 @@ struct Moved {
 }
 
 impl Sides {
+    /// Of so many readings without play.
+    pub(super) fn none(count: usize) -> Self {
+        Self { side: vec![0.0; count], side_std: vec![0.0; count] }
+    }
+
     /// Of a reading that is smoothed, with what noise is left.
     pub(super) fn of(t_s: &[f64], smooth: &[f64], noise_std: f64) -> Self {
         let play = TURNED_SIGMA * noise_std;
