@@ -33,7 +33,7 @@ impl Footer {
         let length = match end.split_first_chunk::<4>() {
             Some((length, b"PAR1")) => u64::from(u32::from_le_bytes(*length)),
             Some((_, b"PARE")) => return Err(damaged("encrypted")),
-            _ => return Err(damaged("no footer at its end: cut short?")),
+            _ => return Err(damaged("Parquet without a footer: cut short?")),
         };
         let start = before_end.checked_sub(length).filter(|_| length <= LONGEST);
         let start = start.ok_or_else(|| damaged("a footer longer than the file, or than 64 MB"))?;
