@@ -18,15 +18,19 @@ pub(crate) trait Continuity {
         self.fit_of_any_length(priors).filter(|fit| fit.row_count() >= LEAST_ROWS)
     }
 
-    /// The same of any length where no leak is below zero: oil comes out, never in. Leaks that would be are taken out, one
-    /// after the other, the surest first.
+    /// The same of any length where no leak is below zero: oil comes out, never in.
     fn fit_of_outflows(&self, priors: &Priors) -> Option<Fit> {
-        let mut priors = *priors;
-        loop {
-            let fit = self.fit_of_any_length(&priors)?;
-            let Some(inflow) = fit.most_negative_leak() else { return Some(fit) };
+        self.without_inflows(self.fit_of_any_length(priors)?, *priors)
+    }
+
+    /// What `fit`, of these priors, becomes where no leak is below zero. Leaks that would be are taken out, one after the
+    /// other, the surest first.
+    fn without_inflows(&self, mut fit: Fit, mut priors: Priors) -> Option<Fit> {
+        while let Some(inflow) = fit.most_negative_leak() {
             priors = priors.without(inflow);
+            fit = self.fit_of_any_length(&priors)?;
         }
+        Some(fit)
     }
 
     /// The rig.

@@ -70,7 +70,7 @@ pub(crate) fn zero_check_lately(records: &[Record], rig: &Rig) -> Option<ZeroChe
         let leaks = straight(&stretch);
         let free = with_free_zeros(&stretch, &leaks)?;
         if !do_leaks_bend(&stretch, &free) {
-            return held_against_zeros(&stretch, &leaks);
+            return against_zeros(&stretch, &leaks, free);
         }
         stretch = Recorded::new(stretch.records.split_at(stretch.records.len() / 2).1, rig)?;
     }
@@ -109,9 +109,16 @@ pub(crate) fn changing_leaks_or_zeros(stretch: &impl Continuity) -> Option<ZeroC
 
 /// The same of `leaks`. Zeros that explain a leak only beside another one that lets oil in don't explain it.
 pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<ZeroCheck> {
+    against_zeros(stretch, leaks, with_free_zeros(stretch, leaks)?)
+}
+
+/// The same where the fit with free zeros is at hand.
+fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: Fit) -> Option<ZeroCheck> {
     let zeros = leaks.with_zeros_off(stretch.rig(), stretch.duration_s());
-    let free = stretch.fit_of_outflows(&zeros)?;
-    let declared = stretch.fit_of_outflows(leaks)?;
+    let free = stretch.without_inflows(free, zeros)?;
+    // A leak's size must be known whatever the others are: that of a zero beside them is held against these.
+    let signed = stretch.fit_of_any_length(leaks)?;
+    let declared = stretch.without_inflows(signed, *leaks)?;
     let without = PerLeak::from_fn(|leak| stretch.fit_of_outflows(&zeros.without(leak)).unwrap_or(free));
     // Where nothing fits, nothing is told apart.
     let inflation = free.worst().max(1.0);
@@ -122,21 +129,24 @@ pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> O
         offsets_m3s: free.offsets_m3s(),
         offsets_without_m3s: without.map(|fit| fit.offsets_m3s()),
         leaks_m3spa: free.leak_coefficients(),
-        single: ZEROS.map(|zero| single_zero(stretch, leaks, zero)),
+        single: ZEROS.map(|zero| single_zero(stretch, leaks, &signed, zero)),
         duration_s: stretch.duration_s(),
     })
 }
 
-fn single_zero(stretch: &impl Continuity, leaks: &Priors, zero: Parameter) -> Option<SingleZero> {
-    // A leak's size must be known whatever the others are.
-    let declared = stretch.fit_of_any_length(leaks)?;
+fn single_zero(
+    stretch: &impl Continuity,
+    leaks: &Priors,
+    declared: &Fit,
+    zero: Parameter,
+) -> Option<SingleZero> {
     let fit = stretch.fit_of_any_length(&leaks.with_zero_off(zero, stretch.rig()))?;
     let flows_m3s = |fit: &Fit| PerLeak::from_fn(|leak| fit.flow_m3s(leak, stretch.driven(leak).sizes));
     let beside_m3s = flows_m3s(&fit);
     Some(SingleZero {
         drop: (declared.chi_square() - fit.chi_square()) / fit.worst().max(1.0),
         offset_m3s: fit.parameter(zero),
-        shift_m3s: beside_m3s.zip(flows_m3s(&declared)).map(|(beside, alone)| beside.value - alone.value),
+        shift_m3s: beside_m3s.zip(flows_m3s(declared)).map(|(beside, alone)| beside.value - alone.value),
         flows_m3s: beside_m3s,
     })
 }

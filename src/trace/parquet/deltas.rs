@@ -2,9 +2,10 @@
 //! room for as many as such a page says, and holds texts that each begin with the whole one before.
 //! <https://github.com/apache/parquet-format/blob/master/Encodings.md>
 
+use super::footer::damaged;
 use super::thrift::Front;
 use crate::trace::format::MOST_HELD;
-use parquet::errors::{ParquetError, Result};
+use parquet::errors::Result;
 
 /// More texts than this are not in a page: plain, each takes four bytes beside its own.
 const MOST_TEXTS: u64 = MOST_HELD / 16;
@@ -84,10 +85,6 @@ fn bits_at(packed: &[u8], at: u64, width: u64) -> i64 {
 
 fn length(number: i64) -> Result<u64> {
     u64::try_from(number).map_err(|_| damaged("a length below zero"))
-}
-
-fn damaged(what: &str) -> ParquetError {
-    ParquetError::General(what.to_owned())
 }
 
 #[cfg(test)]

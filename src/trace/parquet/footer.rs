@@ -104,6 +104,7 @@ fn leaves(schema: Value<'_>) -> Result<Vec<Leaf>> {
     Ok(leaves)
 }
 
-fn damaged(what: &str) -> ParquetError {
+/// What the file says of itself can't be.
+pub(super) fn damaged(what: &str) -> ParquetError {
     ParquetError::General(what.to_owned())
 }

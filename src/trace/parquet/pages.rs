@@ -3,7 +3,7 @@
 
 use super::codec::Codec;
 use super::deltas::{from_differences, from_lengths};
-use super::footer::Chunk;
+use super::footer::{Chunk, damaged};
 use super::thrift::{Fields, structure};
 use crate::trace::format::MOST_HELD;
 use bytes::Bytes;
@@ -254,8 +254,4 @@ fn encoded(number: u32) -> Result<Encoding> {
         9 => Encoding::BYTE_STREAM_SPLIT,
         _ => return Err(damaged("a page in an unknown encoding")),
     })
-}
-
-fn damaged(what: &str) -> ParquetError {
-    ParquetError::General(what.to_owned())
 }
