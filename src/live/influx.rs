@@ -1,7 +1,7 @@
 //! Influx line protocol: measurement, tags, fields, time in ns.
 
 use super::format::{CYLINDER, Fields};
-use crate::trace::shorten;
+use crate::header::shorten;
 use jiff::Timestamp;
 use std::borrow::Cow;
 

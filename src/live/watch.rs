@@ -6,7 +6,7 @@ use super::format::{Fields, LineFormat, Parser};
 use super::layouts::Layouts;
 use super::notices::Notices;
 use crate::Rig;
-use crate::trace::shorten;
+use crate::header::shorten;
 use std::collections::BTreeMap;
 
 /// A longer name is none.

@@ -1,0 +1,262 @@
+//! Which column of a header row holds which signal, and in which unit.
+
+use crate::header::shorten;
+use super::error::TraceFault;
+use super::proposal::near;
+use super::quality::Counted;
+use crate::rig::{ColumnMap, ForeignColumn, Rig};
+use crate::signal::Signal;
+use crate::times::TimeFormat;
+use crate::units::Unit;
+
+/// What one column of the file is read as.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    /// As in the header row.
+    pub(super) header: String,
+    pub(super) content: Content,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Content {
+    /// A number; the unit is none where it is SI already.
+    Number(Signal, Option<Unit>),
+    Timestamp,
+    Ignored,
+}
+
+impl Content {
+    pub(super) fn signal(self) -> Option<Signal> {
+        match self {
+            Self::Number(signal, _) => Some(signal),
+            Self::Timestamp => Some(Signal::Timestamp),
+            Self::Ignored => None,
+        }
+    }
+}
+
+/// The columns of a trace in the order of the file.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) columns: Vec<Column>,
+    /// Mapped columns of optional signals that the header does not have.
+    pub(super) absent: Vec<String>,
+    /// How rows are numbered in messages.
+    pub(super) counted: Counted,
+    /// How time stamps are written.
+    pub(super) time: TimeFormat,
+    /// How the file was read where it is not as the contract writes one.
+    pub(super) reading: Option<String>,
+}
+
+impl Layout {
+    /// Reads a header row.
+    pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
+        let mut columns: Vec<_> = headers.iter().map(|header| bind(header.trim(), map)).collect();
+        prefer_time(&mut columns);
+        let layout = Self {
+            columns,
+            absent: absent(headers, map),
+            counted: Counted::Lines,
+            time: declared_time(map),
+            reading: None,
+        };
+        layout.check_doubled()?;
+        layout.check_units()?;
+        layout.check_missing(map)?;
+        Ok(layout)
+    }
+
+    /// Whether the trace has a column for `signal`.
+    pub(super) fn has(&self, signal: Signal) -> bool {
+        self.header_of(signal).is_some()
+    }
+
+    /// As [`has`](Self::has), where a timestamp is as good as a time.
+    fn gives(&self, signal: Signal) -> bool {
+        self.has(signal) || (signal == Signal::Time && self.has(Signal::Timestamp))
+    }
+
+    /// Each signal's column as a rig file's `[columns]` would name it.
+    pub(super) fn column_map(&self, map: &ColumnMap) -> ColumnMap {
+        let entry = |column: &Column| match column.content {
+            Content::Number(signal, unit) => {
+                let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
+                let read = map.get(&signal).filter(|mapped| mapped.name.trim() == column.header);
+                let own = || ForeignColumn::new(&column.header, unit.or_else(si));
+                Some((signal, read.cloned().unwrap_or_else(own)))
+            }
+            Content::Timestamp => {
+                let own = || ForeignColumn::new(&column.header, None);
+                Some((Signal::Timestamp, map.get(&Signal::Timestamp).cloned().unwrap_or_else(own)))
+            }
+            Content::Ignored => None,
+        };
+        self.columns.iter().filter_map(entry).collect()
+    }
+
+    /// The header of the column that holds `signal`.
+    pub(super) fn header_of(&self, signal: Signal) -> Option<&str> {
+        let column = self.columns.iter().find(|column| column.content.signal() == Some(signal));
+        column.map(|column| column.header.as_str())
+    }
+
+    /// The unit of the column that holds `signal`; none where it is SI.
+    pub(super) fn unit_of(&self, signal: Signal) -> Option<Unit> {
+        self.columns.iter().find_map(|column| match column.content {
+            Content::Number(known, unit) if known == signal => unit,
+            _ => None,
+        })
+    }
+
+    pub(super) fn ignored(&self) -> Vec<String> {
+        let is_named = |column: &&Column| column.content == Content::Ignored && !column.header.is_empty();
+        self.columns.iter().filter(is_named).map(|column| shorten(&column.header, 40)).collect()
+    }
+
+    fn check_doubled(&self) -> Result<(), TraceFault> {
+        for signal in Signal::ALL {
+            let mut columns = self.columns.iter().filter(|column| column.content.signal() == Some(signal));
+            if let (Some(first), Some(second)) = (columns.next(), columns.next()) {
+                return Err(TraceFault::DoubledColumn {
+                    signal: signal.name(),
+                    first: shorten(&first.header, 40),
+                    second: shorten(&second.header, 40),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// A column such as `pa_psi` is an error, unless the signal also comes in a unit that is known.
+    fn check_units(&self) -> Result<(), TraceFault> {
+        let ignored = self.columns.iter().filter(|column| column.content == Content::Ignored);
+        for column in ignored {
+            let Some((signal, unit)) = foreign_unit(&column.header) else { continue };
+            let Some(dimension) = signal.dimension() else { continue };
+            if !self.gives(signal) {
+                return Err(TraceFault::UnknownUnit {
+                    column: shorten(&column.header, 40),
+                    signal: signal.name(),
+                    unit: unit.to_owned(),
+                    allowed: dimension.suffixes(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_missing(&self, map: &ColumnMap) -> Result<(), TraceFault> {
+        for (signal, words) in REQUIRED {
+            if self.gives(signal) {
+                continue;
+            }
+            let mut headers: Vec<_> = self.columns.iter().map(|column| column.header.as_str()).collect();
+            if headers.is_empty() {
+                headers.push("no column");
+            }
+            return Err(TraceFault::MissingColumn {
+                signal: words.to_owned(),
+                accepted: accepted(signal, map),
+                found: shorten(&headers.join(", "), 160),
+                hint: String::new(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// What every trace must have, in words.
+pub(super) const REQUIRED: [(Signal, &str); 4] = [
+    (Signal::Time, "time"),
+    (Signal::Position, "piston position"),
+    (Signal::PressureA, "pressure A"),
+    (Signal::PressureB, "pressure B"),
+];
+
+/// What the headers say one by one, where they do not make a trace together.
+pub(super) fn partly(headers: &[String], rig: &Rig) -> Vec<Content> {
+    headers.iter().map(|header| bind(header.trim(), &rig.columns).content).collect()
+}
+
+fn bind(header: &str, map: &ColumnMap) -> Column {
+    let mapped = map.iter().find(|(_, column)| column.name.trim() == header);
+    let content = match mapped {
+        Some((Signal::Timestamp, _)) => Content::Timestamp,
+        Some((signal, column)) => column.reading().map_or(Content::Ignored, |unit| number(*signal, unit)),
+        None => bind_by_suffix(header),
+    };
+    Column { header: header.to_owned(), content }
+}
+
+fn bind_by_suffix(header: &str) -> Content {
+    match standard(header) {
+        Some((signal, Some(unit))) => number(signal, unit),
+        Some(_) => Content::Timestamp,
+        None => Content::Ignored,
+    }
+}
+
+/// The signal of a header as the contract writes it, and its unit; a timestamp has none.
+pub(super) fn standard(header: &str) -> Option<(Signal, Option<Unit>)> {
+    if header == Signal::Timestamp.name() {
+        return Some((Signal::Timestamp, None));
+    }
+    let (name, suffix) = header.rsplit_once('_')?;
+    let signal = Signal::by_name(name)?;
+    Some((signal, Some(signal.dimension()?.by_suffix(suffix)?)))
+}
+
+/// As `[columns]` says it; ISO 8601 where it doesn't.
+fn declared_time(map: &ColumnMap) -> TimeFormat {
+    let declared = map.get(&Signal::Timestamp);
+    TimeFormat {
+        kind: declared.and_then(|column| column.format.clone()).unwrap_or_default(),
+        zone: declared.and_then(|column| column.zone.clone()),
+    }
+}
+
+fn number(signal: Signal, unit: Unit) -> Content {
+    Content::Number(signal, (!unit.is_si()).then_some(unit))
+}
+
+/// Where both a number and a timestamp give the time, the number does.
+fn prefer_time(columns: &mut [Column]) {
+    if columns.iter().any(|column| column.content.signal() == Some(Signal::Time)) {
+        let stamps = columns.iter_mut().filter(|column| column.content == Content::Timestamp);
+        stamps.for_each(|column| column.content = Content::Ignored);
+    }
+}
+
+/// The signal and the one word after it, of a header that names no unit we know.
+fn foreign_unit(header: &str) -> Option<(Signal, &str)> {
+    if let Some(signal) = Signal::by_name(header) {
+        return Some((signal, ""));
+    }
+    let (name, unit) = header.rsplit_once('_')?;
+    Signal::by_name(name).map(|signal| (signal, unit))
+}
+
+fn absent(headers: &[String], map: &ColumnMap) -> Vec<String> {
+    let absent = map.values().filter(|column| !headers.iter().any(|h| h.trim() == column.name.trim()));
+    let text = |column: &ForeignColumn| {
+        let near = near(&column.name, headers.iter().map(|header| header.trim()));
+        let near = near.map_or_else(String::new, |near| format!(" (`{}` is near)", shorten(near, 40)));
+        shorten(&column.name, 40) + &near
+    };
+    absent.map(text).collect()
+}
+
+fn accepted(signal: Signal, map: &ColumnMap) -> String {
+    let suffixes = signal.dimension().map(crate::units::Dimension::units).unwrap_or_default();
+    let mut names: Vec<_> = suffixes
+        .iter()
+        .filter_map(|unit| unit.suffix)
+        .map(|suffix| format!("{}_{suffix}", signal.name()))
+        .collect();
+    if signal == Signal::Time {
+        names.push(Signal::Timestamp.name().to_owned());
+    }
+    names.extend(map.get(&signal).map(|column| format!("`{}` of [columns]", shorten(&column.name, 40))));
+    names.join(" or ")
+}

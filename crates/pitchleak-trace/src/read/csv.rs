@@ -1,0 +1,361 @@
+//! Rows of a CSV stream as numbers in SI.
+
+use crate::header::shorten;
+use super::columns::{Content, Layout};
+use super::dialect::Dialect;
+use super::error::TraceFault;
+use super::format::{Format, Reading, Stream};
+use super::number::plain_number;
+use super::quality::{BadReason, BadRow, Counted};
+use super::records::{Record, Records, Stop, Text};
+use super::row::{Fault, Next, Row, RowSource, check_present};
+use super::stamp::Epoch;
+use crate::rig::{Decimal, Rig};
+use crate::signal::Signal;
+use crate::times::TimeKind;
+
+/// Text is whatever no other format knows as its own.
+pub(super) const FORMAT: Format = Format {
+    starts_with: b"",
+    reading: Reading::Rows(|stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?))),
+};
+
+struct CsvRows {
+    records: Records,
+    splitting: Splitting,
+    gzip: bool,
+}
+
+/// How a record is split, and into what.
+struct Splitting {
+    delimiter: u8,
+    decimal: Decimal,
+    layout: Layout,
+    epoch: Epoch,
+    /// Lengths of the last cells of the row read last and of the one before.
+    last_cells: [usize; 2],
+}
+
+impl CsvRows {
+    /// Reads all before the first row.
+    fn open(stream: Stream, rig: &Rig) -> Result<Self, TraceFault> {
+        let gzip = stream.gzip;
+        let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
+        let dialect = Dialect::of(table, encoding, rig)?;
+        dialect.skip_header(&mut records).map_err(stopped_early)?;
+        let Dialect { delimiter, decimal, layout, .. } = dialect;
+        let epoch = Epoch::new(layout.time.clone());
+        let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
+        Ok(Self { records, splitting, gzip })
+    }
+
+    #[cold]
+    fn stopped(&self, stop: Stop) -> Result<Next, TraceFault> {
+        let line = self.records.next_line();
+        match stop {
+            Stop::End => Ok(Next::End),
+            Stop::TooLong => Err(TraceFault::TooLong(line)),
+            Stop::Failed(source) if self.gzip => {
+                Ok(Next::CutOff(format!("the gzip stream breaks off in line {line} ({source})")))
+            }
+            Stop::Failed(source) => Err(TraceFault::Read { line: line - 1, source }),
+        }
+    }
+}
+
+impl RowSource for CsvRows {
+    fn layout(&self) -> &Layout {
+        &self.splitting.layout
+    }
+
+    fn epoch_ns(&self) -> Option<i64> {
+        self.splitting.epoch.first_ns()
+    }
+
+    #[inline]
+    fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
+        match self.records.next() {
+            Ok(record) => match self.splitting.read(&record, row) {
+                Ok(()) if record.unended && self.splitting.may_be_cut() => Ok(Next::CutOff(format!(
+                    "line {} is the last, has no line end and may be cut",
+                    record.line
+                ))),
+                Ok(()) => Ok(Next::Row),
+                Err(fault) => Ok(Next::Bad(self.splitting.describe(&record, &fault))),
+            },
+            Err(stop) => self.stopped(stop),
+        }
+    }
+}
+
+/// Before the first row.
+pub(super) fn stopped_early(stop: Stop) -> TraceFault {
+    match stop {
+        Stop::End => TraceFault::Empty,
+        Stop::TooLong => TraceFault::TooLong(1),
+        Stop::Failed(source) => TraceFault::Read { line: 0, source },
+    }
+}
+
+impl Splitting {
+    /// Whether the row read last ends before its last cell may have been whole: in fewer characters than the one before.
+    fn may_be_cut(&self) -> bool {
+        let [last, before] = self.last_cells;
+        last < before
+    }
+
+    #[inline]
+    fn read(&mut self, record: &Record<'_>, row: &mut Row) -> Result<(), Fault> {
+        *row = Row { line: record.line, ..Row::empty() };
+        match record.text {
+            Text::Plain(text, end) => {
+                let (delimiter, decimal) = (self.delimiter, self.decimal);
+                let cells =
+                    Plain { text, end, delimiter, decimal, at: 0, length: 0, places: 0, ended: false };
+                read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
+            }
+            Text::Unquoted(text, ends) => {
+                let cells = Unquoted { text, ends, decimal: self.decimal, at: 0, length: 0 };
+                read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
+            }
+        }
+    }
+
+    #[cold]
+    fn describe(&self, record: &Record<'_>, fault: &Fault) -> BadRow {
+        describe(&self.layout, record.line, &record.cells(self.delimiter), fault)
+    }
+}
+
+/// Reads the cells of a row as their columns say; `last_cells` are the lengths of the last cells of rows.
+#[inline(always)]
+pub(super) fn read_cells<'a>(
+    layout: &Layout,
+    epoch: &mut Epoch,
+    last_cells: &mut [usize; 2],
+    mut cells: impl Cells<'a>,
+    row: &mut Row,
+) -> Result<(), Fault> {
+    for (index, column) in layout.columns.iter().enumerate() {
+        if cells.ended() {
+            return Err(Fault { column: None, reason: BadReason::ShortRow });
+        }
+        let read = match &column.content {
+            Content::Number(signal, unit) => {
+                cells.number().map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value))))
+            }
+            Content::Ignored => {
+                cells.cell();
+                Ok(())
+            }
+            Content::Timestamp => epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds)),
+        };
+        read.map_err(|reason| Fault { column: Some(index), reason })?;
+    }
+    *last_cells = [cells.length(), last_cells[0]];
+    if cells.ended() {
+        check_present(&layout.columns, row)
+    } else {
+        Err(Fault { column: None, reason: BadReason::LongRow })
+    }
+}
+
+/// Words for a bad row of these cells.
+#[cold]
+pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Fault) -> BadRow {
+    let columns = &layout.columns;
+    let detail = match fault.reason {
+        BadReason::ShortRow | BadReason::LongRow => {
+            format!("{} cells, {} expected", cells.len(), columns.len())
+        }
+        BadReason::Missing => "empty".to_owned(),
+        reason => {
+            let cell = fault.column.and_then(|index| cells.get(index));
+            let cell = cell.map(|cell| String::from_utf8_lossy(cell)).unwrap_or_default();
+            let cell = cell.trim();
+            match cell.parse::<f64>() {
+                // Not quoted, so that no output of ours ever holds such a word.
+                Ok(value) if !value.is_finite() => "not a finite number".to_owned(),
+                _ if reason == BadReason::NotATime => {
+                    format!("`{}` is {}", shorten(cell, 40), expected_time(&layout.time.kind))
+                }
+                _ => format!("`{}` is {}", shorten(cell, 40), reason.text()),
+            }
+        }
+    };
+    let column = fault.column.and_then(|index| columns.get(index));
+    let column = column.map(|column| shorten(&column.header, 40));
+    BadRow { line, counted: Counted::Lines, column, reason: fault.reason, detail }
+}
+
+fn expected_time(kind: &TimeKind) -> String {
+    match kind {
+        TimeKind::Iso => "not a time in ISO 8601".to_owned(),
+        kind => format!("not a time in the format `{kind}`"),
+    }
+}
+
+/// The cells of one record, one after the other.
+pub(super) trait Cells<'a> {
+    /// Whether the last one has been read.
+    fn ended(&self) -> bool;
+
+    /// Passes over a cell and gives its text.
+    fn cell(&mut self) -> &'a [u8];
+
+    /// Bytes of the cell read last, without blanks around it.
+    fn length(&self) -> usize;
+
+    /// What stands before the decimals.
+    fn decimal(&self) -> Decimal {
+        Decimal::Point
+    }
+
+    /// Reads a cell as a number; NaN where it is empty.
+    #[inline]
+    fn number(&mut self) -> Result<f64, BadReason> {
+        let decimal = self.decimal();
+        read_number(self.cell(), decimal)
+    }
+}
+
+/// A record without quotes.
+struct Plain<'a> {
+    /// It, and what stands behind it.
+    text: &'a [u8],
+    /// Where it ends: with `text`, or at a line end.
+    end: usize,
+    delimiter: u8,
+    decimal: Decimal,
+    at: usize,
+    /// Bytes of the cell before, and its decimals.
+    length: usize,
+    places: usize,
+    ended: bool,
+}
+
+impl<'a> Plain<'a> {
+    #[inline(always)]
+    fn rest(&self) -> &'a [u8] {
+        self.text.get(self.at..self.end).unwrap_or_default()
+    }
+
+    /// Passes over a cell where it is so long.
+    #[inline(always)]
+    fn passes(&mut self, length: usize) -> bool {
+        let end = self.at + length;
+        let ended = end == self.end;
+        let is_cell = ended || self.text.get(end) == Some(&self.delimiter);
+        if is_cell {
+            (self.at, self.length, self.ended) = (end + 1, length, ended);
+        }
+        is_cell
+    }
+}
+
+impl<'a> Cells<'a> for Plain<'a> {
+    #[inline(always)]
+    fn ended(&self) -> bool {
+        self.ended
+    }
+
+    #[inline]
+    fn cell(&mut self) -> &'a [u8] {
+        let rest = self.rest();
+        let end = memchr::memchr(self.delimiter, rest);
+        self.ended = end.is_none();
+        let cell = end.map_or(rest, |end| rest.get(..end).unwrap_or_default());
+        self.length = cell.trim_ascii().len();
+        self.at += cell.len() + 1;
+        cell
+    }
+
+    #[inline(always)]
+    fn length(&self) -> usize {
+        self.length
+    }
+
+    /// Most cells are a number and no more: its end is the cell's.
+    #[inline(always)]
+    fn number(&mut self) -> Result<f64, BadReason> {
+        if self.decimal == Decimal::Comma {
+            return read_number(self.cell(), Decimal::Comma);
+        }
+        // No number goes on behind a line end.
+        let text = self.text.get(self.at..).unwrap_or_default();
+        if let Some((value, length)) = plain_number(text, &mut self.places)
+            && self.passes(length)
+        {
+            return Ok(value);
+        }
+        if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(self.rest())
+            && value.is_finite()
+            && self.passes(length)
+        {
+            return Ok(value);
+        }
+        read_number(self.cell(), Decimal::Point)
+    }
+}
+
+/// A record whose quotes were taken off.
+struct Unquoted<'a> {
+    text: &'a [u8],
+    /// Of the cells that are left.
+    ends: &'a [usize],
+    decimal: Decimal,
+    at: usize,
+    length: usize,
+}
+
+impl<'a> Cells<'a> for Unquoted<'a> {
+    fn decimal(&self) -> Decimal {
+        self.decimal
+    }
+
+    fn ended(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    fn cell(&mut self) -> &'a [u8] {
+        let Some((&end, ends)) = self.ends.split_first() else { return &[] };
+        let cell = self.text.get(self.at..end).unwrap_or_default();
+        (self.at, self.ends, self.length) = (end, ends, cell.trim_ascii().len());
+        cell
+    }
+
+    fn length(&self) -> usize {
+        self.length
+    }
+}
+
+/// A cell with whatever blanks around its number; NaN where it is empty.
+#[cold]
+fn read_number(cell: &[u8], decimal: Decimal) -> Result<f64, BadReason> {
+    let mut cell = cell.trim_ascii();
+    if cell.is_empty() {
+        return Ok(f64::NAN);
+    }
+    let mut with_point = [0; LONGEST_NUMBER];
+    if decimal == Decimal::Comma {
+        cell = pointed(cell, &mut with_point).ok_or(BadReason::NotANumber)?;
+    }
+    let value = fast_float2::parse::<f64, _>(cell).ok().filter(|value| value.is_finite());
+    value.ok_or(BadReason::NotANumber)
+}
+
+/// No number has more digits, bytes.
+const LONGEST_NUMBER: usize = 64;
+
+/// The cell with a point for its comma; none where it has a point already, which would stand between thousands.
+fn pointed<'a>(cell: &[u8], into: &'a mut [u8; LONGEST_NUMBER]) -> Option<&'a [u8]> {
+    let into = into.get_mut(..cell.len())?;
+    for (to, from) in into.iter_mut().zip(cell) {
+        *to = match from {
+            b'.' => return None,
+            b',' => b'.',
+            other => *other,
+        };
+    }
+    Some(into)
+}

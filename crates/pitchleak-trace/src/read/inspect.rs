@@ -1,0 +1,217 @@
+//! How a file would be read, for a person to look at before it is.
+
+use super::bind::Bound;
+use crate::header::shorten;
+use super::columns::{Content, Layout, partly};
+use super::decimal::decimal;
+use super::dialect::Dialect;
+use super::error::{TraceError, TraceFault};
+use super::file;
+use super::format::Format;
+use super::proposal::{Proposal, Unread, near, propose};
+use super::table_text::{TextTable, bare_unit};
+use crate::rig::{ColumnMap, Decimal, Rig};
+use crate::signal::Signal;
+use serde::Serialize;
+use std::fs::File;
+use std::path::Path;
+
+/// How a file would be read, as `columns --json` prints it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FileReading {
+    /// `pitchleak.columns/1`.
+    pub schema: &'static str,
+    /// As the user named it.
+    pub path: String,
+    /// How its text is written; none of a binary file.
+    pub text: Option<TextReading>,
+    /// How times are written; none where a column gives seconds.
+    pub time_format: Option<String>,
+    /// Its columns in their order.
+    pub columns: Vec<ColumnReading>,
+    /// Why it is not read as it is.
+    pub problem: Option<String>,
+    /// Lines of `[columns]` that would name what is missing, each with what speaks for it.
+    pub proposals: Vec<ProposedLine>,
+    /// Names in `[columns]` that the file does not have, with a near one.
+    pub misspelt: Vec<String>,
+}
+
+/// How a text file is written.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TextReading {
+    /// `comma`, `semicolon`, `tab` or `bar`.
+    pub delimiter: &'static str,
+    /// `point` or `comma`; none where it is not clear.
+    pub decimal: Option<&'static str>,
+    /// The line that names the columns, from 1.
+    pub header_line: u64,
+    /// The line of units below it.
+    pub units_line: Option<u64>,
+}
+
+/// One column.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ColumnReading {
+    /// As in the file.
+    pub header: String,
+    /// The signal that is read from it.
+    pub signal: Option<&'static str>,
+    /// Its unit.
+    pub unit: Option<&'static str>,
+    /// Its first cells.
+    pub first: Vec<String>,
+}
+
+/// A line for `[columns]`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProposedLine {
+    /// E.g. `pa = { name = "Head pressure", unit = "bar" }`.
+    pub line: String,
+    /// What speaks for it.
+    pub why: &'static str,
+}
+
+impl FileReading {
+    /// Name and version of the JSON form.
+    pub const SCHEMA: &'static str = "pitchleak.columns/1";
+    /// So many cells of a column are shown.
+    const SHOWN: usize = 4;
+
+    /// Looks at a file's first lines, or at the names of its columns.
+    ///
+    /// # Errors
+    /// Where there is nothing to look at: the file cannot be opened, or is of no known format.
+    pub fn of(path: impl AsRef<Path>, rig: &Rig) -> Result<Self, TraceError> {
+        let name = path.as_ref().display().to_string();
+        Self::look(path.as_ref(), rig)
+            .map(|reading| Self { path: name.clone(), ..reading })
+            .map_err(|fault| TraceError { trace: name, fault })
+    }
+
+    fn look(path: &Path, rig: &Rig) -> Result<Self, TraceFault> {
+        let (format, stream) = if path == Path::new("-") {
+            file::start(Box::new(std::io::stdin()), None)?
+        } else {
+            let file = File::open(path).map_err(TraceFault::Open)?;
+            file::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
+        };
+        if let Format { starts_with: b"", .. } = format {
+            let (_, _, table) = Dialect::first_lines(stream, rig)?;
+            return Ok(Self::of_table(table, rig));
+        }
+        Ok(Self::of_layout(format.open(stream, rig)?.layout()))
+    }
+
+    fn empty() -> Self {
+        Self {
+            schema: Self::SCHEMA,
+            path: String::new(),
+            text: None,
+            time_format: None,
+            columns: Vec::new(),
+            problem: None,
+            proposals: Vec::new(),
+            misspelt: Vec::new(),
+        }
+    }
+
+    fn of_layout(layout: &Layout) -> Self {
+        let columns =
+            layout.columns.iter().map(|column| read_column(&column.header, column.content, Vec::new()));
+        Self { columns: columns.collect(), ..Self::empty() }
+    }
+
+    fn of_table(table: TextTable, rig: &Rig) -> Self {
+        let everything: Vec<Vec<&str>> = (0..table.headers.len()).map(|index| table.column(index)).collect();
+        let marks = rig.csv.decimal.or_else(|| decimal(&everything).ok());
+        let text = TextReading {
+            delimiter: table.delimiter.name(),
+            decimal: marks.map(Decimal::name),
+            header_line: table.header_line,
+            units_line: table.units.as_ref().map(|row| row.line),
+        };
+        let found = match &table.bound {
+            Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
+            Err(_) => partly(&table.headers, rig),
+        };
+        let columns = table.headers.iter().zip(found.iter()).enumerate().map(|(index, (header, content))| {
+            let first =
+                table.column(index).into_iter().take(Self::SHOWN).map(|cell| shorten(cell, 40)).collect();
+            read_column(header, *content, first)
+        });
+        let columns = columns.collect();
+        let proposals = proposals(&table, &found, rig).iter().map(line).collect();
+        let misspelt = misspelt(&table.headers, &rig.columns);
+        let dialect = Dialect::of(table, super::encoding::Encoding::Utf8, rig);
+        let time_format =
+            dialect.as_ref().ok().filter(|dialect| dialect.layout.has(Signal::Timestamp)).map(|dialect| {
+                let time = &dialect.layout.time;
+                let zone = time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
+                format!("{}{zone}", time.kind)
+            });
+        let problem = dialect.err().map(|fault| fault.to_string());
+        Self { text: Some(text), time_format, columns, problem, proposals, misspelt, ..Self::empty() }
+    }
+
+    /// One line of JSON.
+    ///
+    /// # Errors
+    /// None in practice: every field has a JSON form.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string(self)
+    }
+}
+
+fn read_column(header: &str, content: Content, first: Vec<String>) -> ColumnReading {
+    let (signal, unit) = match content {
+        Content::Number(signal, unit) => {
+            let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
+            (Some(signal.name()), unit.or_else(si).map(|unit| unit.text))
+        }
+        Content::Timestamp => (Some(Signal::Timestamp.name()), None),
+        Content::Ignored => (None, None),
+    };
+    ColumnReading { header: shorten(header, 60), signal, unit, first }
+}
+
+/// What the columns that are not read may be.
+pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<Proposal> {
+    let has = |signal: Signal| found.iter().any(|content| content.signal() == Some(signal));
+    let has_time = has(Signal::Time) || has(Signal::Timestamp);
+    let is_time = |signal: &Signal| matches!(signal, Signal::Time | Signal::Timestamp);
+    let wanted: Vec<Signal> =
+        Signal::ALL.into_iter().filter(|signal| !(has(*signal) || has_time && is_time(signal))).collect();
+    let unit = |index: usize| {
+        let cell = table.units.as_ref().and_then(|row| row.cells.get(index));
+        cell.map(|cell| bare_unit(cell)).unwrap_or_default()
+    };
+    let unread: Vec<Unread<'_>> = (0..)
+        .zip(&table.headers)
+        .zip(found)
+        .filter(|(_, content)| **content == Content::Ignored)
+        .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
+        .collect();
+    let cells: Vec<Vec<&str>> = unread.iter().map(|column| column.cells.clone()).collect();
+    let decimal = rig.csv.decimal.or_else(|| decimal(&cells).ok()).unwrap_or_default();
+    let mut proposals = propose(&unread, &wanted, decimal, rig);
+    if proposals.iter().any(|proposal| proposal.signal == Signal::Time) {
+        proposals.retain(|proposal| proposal.signal != Signal::Timestamp);
+    }
+    proposals
+}
+
+fn line(proposal: &Proposal) -> ProposedLine {
+    let line = format!("{} = {}", proposal.signal.name(), proposal.column.to_toml(proposal.signal));
+    ProposedLine { line, why: proposal.why.text() }
+}
+
+fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {
+    let absent = map.iter().filter(|(_, column)| !headers.iter().any(|header| header == column.name.trim()));
+    let text = |(signal, column): (&Signal, &crate::rig::ForeignColumn)| {
+        let near = near(&column.name, headers.iter().map(String::as_str));
+        let near = near.map_or_else(String::new, |near| format!("; `{}` is near", shorten(near, 40)));
+        format!("{}: the file has no column `{}`{near}", signal.name(), shorten(&column.name, 40))
+    };
+    absent.map(text).collect()
+}

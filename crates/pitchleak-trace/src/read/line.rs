@@ -1,0 +1,123 @@
+//! Rows that come one by one as text, such as the lines of a live feed.
+
+use super::columns::{Column, Content, Layout};
+use super::csv::{Cells, describe, read_cells};
+use super::error::TraceFault;
+use super::quality::{BadRow, Counted};
+use super::row::Row;
+use super::row_validator::RowValidator;
+use super::stamp::Epoch;
+use super::{BadRows, Record};
+use crate::rig::{ColumnMap, Rig};
+use crate::signal::Signal;
+
+/// What the cells of a line hold, by their names, which are those of a trace's columns.
+#[derive(Clone, Debug)]
+pub struct LineLayout(Layout);
+
+impl LineLayout {
+    /// The layout of cells of these names.
+    ///
+    /// # Errors
+    /// As for the header row of a trace.
+    pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
+        Layout::new(names, &rig.columns).map(|layout| {
+            let time = rig.csv.time.clone().unwrap_or(layout.time);
+            Self(Layout { counted: Counted::Lines, time, ..layout })
+        })
+    }
+
+    /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); none where it cannot be read.
+    pub fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Option<f64> {
+        let is_time =
+            |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));
+        let at = self.0.columns.iter().position(is_time)?;
+        let mut cells = LineCells { cells, at };
+        let time_s = match self.0.columns.get(at)?.content {
+            Content::Timestamp => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell()),
+            Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
+            Content::Ignored => return None,
+        };
+        time_s.ok().filter(|time_s| time_s.is_finite())
+    }
+
+    /// The column of each signal, as a rig file's `[columns]` would name it; `map` is the one it was made with.
+    pub fn columns(&self, map: &ColumnMap) -> ColumnMap {
+        self.0.column_map(map)
+    }
+
+    /// A validator for lines like these.
+    pub fn validator(&self, rig: &Rig, bad_rows: BadRows) -> RowValidator {
+        let mut validator = RowValidator::new(rig, &self.0);
+        validator.set_bad_rows(bad_rows);
+        validator
+    }
+}
+
+/// What became of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Taken {
+    /// It is in the estimates; says whether they are new.
+    Good {
+        /// Whether the estimates are new.
+        renewed: bool,
+    },
+    /// It was counted and left out.
+    Bad(BadRow),
+}
+
+/// What was read of a line.
+pub enum LineRead {
+    /// It is `record`.
+    Good,
+    /// With the row as it was read, where a sensor's reading in it is out of range.
+    Bad(BadRow, Option<Box<Record>>),
+}
+
+/// Reads the cells of a line into `record`; a bad row is an error only where those are fatal.
+///
+/// # Errors
+/// A bad row where those are fatal.
+pub fn read(
+    layout: &LineLayout,
+    line: u64,
+    cells: &[&[u8]],
+    epoch_ns: &mut Option<i64>,
+    validator: &mut RowValidator,
+    record: &mut Record,
+) -> Result<LineRead, TraceFault> {
+    let LineLayout(layout) = layout;
+    let mut row = Row { line, ..Row::empty() };
+    let mut epoch = Epoch::since(*epoch_ns, layout.time.clone());
+    let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
+    *epoch_ns = epoch.first_ns();
+    let bad = match read {
+        Ok(()) => validator.check(&row, layout, record),
+        Err(fault) => Some(describe(layout, line, cells, &fault)),
+    };
+    let Some(bad) = bad else { return Ok(LineRead::Good) };
+    validator.skip(bad.clone())?;
+    Ok(LineRead::Bad(bad, validator.take_refused().map(Box::new)))
+}
+
+/// Cells that were split before.
+struct LineCells<'a> {
+    cells: &'a [&'a [u8]],
+    at: usize,
+}
+
+impl<'a> Cells<'a> for LineCells<'a> {
+    fn ended(&self) -> bool {
+        self.at >= self.cells.len()
+    }
+
+    fn cell(&mut self) -> &'a [u8] {
+        let cell = self.cells.get(self.at).copied().unwrap_or_default();
+        self.at += 1;
+        cell
+    }
+
+    fn length(&self) -> usize {
+        self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
+    }
+}

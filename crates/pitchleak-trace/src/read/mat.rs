@@ -1,0 +1,319 @@
+//! MAT files as MATLAB and Octave write them (version 5: `save -v6`, `-v7`; 7.3: `-v7.3`): a numeric vector per signal.
+//!
+//! MathWorks, "MAT-File Format", chapter 1 (Level 5).
+
+mod hdf5;
+mod vector;
+
+use super::bind::bind;
+use crate::header::shorten;
+use super::error::TraceFault;
+use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
+use super::quality::Counted;
+use super::stamped::{Stamped, sample};
+use super::table::TableRows;
+use crate::rig::Rig;
+use flate2::read::ZlibDecoder;
+use std::io::{self, Read};
+use std::sync::Arc;
+
+pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows(open) };
+
+/// Types of data elements.
+const INT8: u32 = 1;
+const UINT8: u32 = 2;
+const INT16: u32 = 3;
+const UINT16: u32 = 4;
+const INT32: u32 = 5;
+const UINT32: u32 = 6;
+const SINGLE: u32 = 7;
+const DOUBLE: u32 = 9;
+const INT64: u32 = 12;
+const UINT64: u32 = 13;
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// What the header says of a file that is HDF5 behind it; big-endian machines write none.
+const VERSION_7_3: [u8; 2] = [0, 2];
+
+/// No name or list of dimensions is longer, bytes.
+const LONGEST_HEADER: u32 = 4096;
+
+/// A variable of the file.
+struct Variable {
+    name: String,
+    values: Values,
+}
+
+enum Values {
+    Vector(Vec<f64>),
+    /// What it is instead.
+    Other(&'static str),
+}
+
+fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    let (variables, others) = read(stream)?;
+    let longest = variables.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+    let (columns, short): (Vec<_>, Vec<_>) =
+        variables.into_iter().partition(|(_, values)| values.len() == longest);
+    let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
+    let values: Vec<Vec<f64>> = columns.into_iter().map(|(_, values)| values).collect();
+    let bound =
+        bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
+    let mut layout = bound.layout;
+    layout.counted = Counted::Rows;
+    let stamps = Stamped::new(&layout, &bound.foreign, rig, &values)?;
+    layout.time = stamps.format.clone();
+    let layout = Arc::new(layout);
+    let cells = stamps.cells(&layout, values);
+    let mut once = Some(cells);
+    Ok(Box::new(TableRows::over(layout, Box::new(move || Ok(once.take())))))
+}
+
+/// Where a signal is missing, what else the file holds may be why.
+fn with_others(
+    fault: TraceFault,
+    others: &[(String, &'static str)],
+    short: &[(String, Vec<f64>)],
+) -> TraceFault {
+    let (other, short) = (others.first(), short.first());
+    let name = other.map(|(name, _)| name).or(short.map(|(name, _)| name));
+    let name = name.map(|name| shorten(name, 40)).unwrap_or_default();
+    match (fault, other, short) {
+        (TraceFault::MissingColumn { .. }, Some((_, "struct")), _) => TraceFault::Ambiguous {
+            what: format!("variable `{name}` is a struct, which is not read"),
+            settle: format!("save its fields as variables: save('trace.mat', '-struct', '{name}')"),
+        },
+        (TraceFault::MissingColumn { .. }, Some((_, kind)), _) => TraceFault::Ambiguous {
+            what: format!("variable `{name}` is a {kind}, which is not read"),
+            settle: "save each signal as a numeric vector, e.g. t_s, x_mm, pa_bar, pb_bar".to_owned(),
+        },
+        (TraceFault::MissingColumn { signal, accepted, found, .. }, None, Some((_, values))) => {
+            let hint = format!("; `{name}` has {} values and not as many as these", values.len());
+            TraceFault::MissingColumn { signal, accepted, found, hint }
+        }
+        (fault, ..) => fault,
+    }
+}
+
+type Named<T> = Vec<(String, T)>;
+
+/// The vectors of a file, and what else is in it.
+type Variables = (Named<Vec<f64>>, Named<&'static str>);
+
+const TOO_LARGE: &str = "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet";
+
+/// The vectors of a file, and what else is in it.
+fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
+    let mut header = [0; 128];
+    stream.bytes.read_exact(&mut header).map_err(damaged)?;
+    if header.get(124..126) == Some(&VERSION_7_3) {
+        stream.bytes = Box::new(io::Cursor::new(header).chain(stream.bytes));
+        return hdf5::read(&stream.hold()?);
+    }
+    let big_endian = match header.get(126..) {
+        Some(b"IM") => false,
+        Some(b"MI") => true,
+        _ => {
+            return Err(TraceFault::Format(
+                "a MAT file of another version than 5: save it with save -v7, or as CSV",
+            ));
+        }
+    };
+    let mut budget = MOST_HELD / 8;
+    let (mut vectors, mut others) = (Vec::new(), Vec::new());
+    let mut elements = Elements { bytes: stream.bytes, big_endian };
+    while let Some((kind, size)) = elements.outer_tag()? {
+        let mut inside = elements.bytes.by_ref().take(u64::from(size));
+        let variable = match kind {
+            MATRIX => Elements { bytes: &mut inside, big_endian }.variable(&mut budget)?,
+            COMPRESSED => {
+                let mut inflated = Elements { bytes: ZlibDecoder::new(&mut inside), big_endian };
+                let variable = match inflated.tag()? {
+                    (MATRIX, ..) => inflated.variable(&mut budget)?,
+                    _ => None,
+                };
+                // Its checksum stands at its end.
+                if matches!(variable, Some(Variable { values: Values::Vector(_), .. })) {
+                    inflated.bytes.read(&mut [0]).map_err(damaged)?;
+                }
+                variable
+            }
+            _ => None,
+        };
+        io::copy(&mut inside, &mut io::sink()).map_err(damaged)?;
+        if inside.limit() > 0 {
+            return Err(damaged(io::ErrorKind::UnexpectedEof.into()));
+        }
+        match variable {
+            Some(Variable { name, values: Values::Vector(values) }) => vectors.push((name, values)),
+            Some(Variable { name, values: Values::Other(kind) }) => others.push((name, kind)),
+            None => {}
+        }
+    }
+    Ok((vectors, others))
+}
+
+fn damaged(error: io::Error) -> TraceFault {
+    TraceFault::Damaged(format!("the MAT file breaks off ({error})"))
+}
+
+fn damaged_variable(name: &str, what: &str) -> TraceFault {
+    TraceFault::Damaged(format!("`{}` {what}", shorten(name, 40)))
+}
+
+/// Data elements, one after the other.
+struct Elements<R> {
+    bytes: R,
+    big_endian: bool,
+}
+
+impl<R: Read> Elements<R> {
+    fn u32(&self, bytes: [u8; 4]) -> u32 {
+        if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
+    }
+
+    fn word(&mut self) -> Result<u32, TraceFault> {
+        let mut bytes = [0; 4];
+        self.bytes.read_exact(&mut bytes).map_err(damaged)?;
+        Ok(self.u32(bytes))
+    }
+
+    /// Type and size of the next variable; none at the end of the file.
+    fn outer_tag(&mut self) -> Result<Option<(u32, u32)>, TraceFault> {
+        let mut first = [0; 4];
+        let mut read = 0;
+        while let Some(rest) = first.get_mut(read..).filter(|rest| !rest.is_empty()) {
+            match self.bytes.read(rest).map_err(damaged)? {
+                0 if read == 0 => return Ok(None),
+                0 => return Err(damaged(io::ErrorKind::UnexpectedEof.into())),
+                count => read += count,
+            }
+        }
+        let kind = self.u32(first);
+        Ok(Some((kind, self.word()?)))
+    }
+
+    /// Type and size of an element within a variable, and whether its data fill the second half of its tag.
+    fn tag(&mut self) -> Result<(u32, u32, bool), TraceFault> {
+        let word = self.word()?;
+        match word >> 16 {
+            0 => Ok((word, self.word()?, false)),
+            size => Ok((word & 0xffff, size, true)),
+        }
+    }
+
+    /// A short element.
+    fn short(&mut self) -> Result<(u32, Vec<u8>), TraceFault> {
+        let (kind, size, small) = self.tag()?;
+        if size > if small { 4 } else { LONGEST_HEADER } {
+            return Err(TraceFault::Damaged("a name or size in the MAT file has no end".to_owned()));
+        }
+        let mut bytes = vec![0; (size + padding(size, small)) as usize];
+        self.bytes.read_exact(&mut bytes).map_err(damaged)?;
+        bytes.truncate(size as usize);
+        Ok((kind, bytes))
+    }
+
+    /// A variable after its own tag; none where it has no name.
+    fn variable(&mut self, budget: &mut u64) -> Result<Option<Variable>, TraceFault> {
+        let (_, flags) = self.short()?;
+        let flags = flags.first_chunk().map_or(0, |bytes| self.u32(*bytes));
+        let (_, sizes) = self.short()?;
+        let sizes: Vec<u64> = sizes.as_chunks().0.iter().map(|bytes| u64::from(self.u32(*bytes))).collect();
+        let (_, name) = self.short()?;
+        let name: String = String::from_utf8_lossy(&name).trim_end_matches('\0').to_owned();
+        if name.is_empty() {
+            return Ok(None);
+        }
+        let other = |kind| Ok(Some(Variable { name: name.clone(), values: Values::Other(kind) }));
+        match flags & 0xff {
+            1 => return other("cell array"),
+            2 => return other("struct"),
+            3 | 16 | 17 | 18 => return other("object"),
+            4 => return other("text"),
+            5 => return other("sparse matrix"),
+            6..=15 => {}
+            _ => return other("variable of an unknown class"),
+        }
+        if flags & 0x0800 != 0 {
+            return other("complex array");
+        }
+        let length =
+            sizes.iter().try_fold(1_u64, |length, size| length.checked_mul(*size)).unwrap_or(u64::MAX);
+        if sizes.iter().filter(|size| **size != 1).count() > 1 {
+            return other("matrix");
+        }
+        let (kind, size, small) = self.tag()?;
+        let width =
+            width(kind).ok_or_else(|| damaged_variable(&name, &format!("holds data of type {kind}")))?;
+        if length.checked_mul(width as u64) != Some(u64::from(size)) {
+            return Err(damaged_variable(&name, &format!("has {size} bytes for {length} numbers")));
+        }
+        if small && size > 4 {
+            let what = format!("has {size} bytes beside its tag, which has room for 4");
+            return Err(damaged_variable(&name, &what));
+        }
+        *budget = budget.checked_sub(length).ok_or(TraceFault::Format(TOO_LARGE))?;
+        let values = self.numbers(kind, width, size, padding(size, small))?;
+        Ok(Some(Variable { name, values: Values::Vector(values) }))
+    }
+
+    /// Numbers in pieces: memory is taken as they come, whatever the tag promises.
+    fn numbers(&mut self, kind: u32, width: usize, size: u32, padding: u32) -> Result<Vec<f64>, TraceFault> {
+        let mut values = Vec::new();
+        let mut piece = vec![0; 64 * 1024];
+        let mut left = size as usize;
+        while left > 0 {
+            let count = left.min(piece.len());
+            let bytes = piece.get_mut(..count).unwrap_or_default();
+            self.bytes.read_exact(bytes).map_err(damaged)?;
+            values.extend(bytes.chunks_exact(width).map(|bytes| number(kind, self.big_endian, bytes)));
+            left -= count;
+        }
+        io::copy(&mut self.bytes.by_ref().take(u64::from(padding)), &mut io::sink()).map_err(damaged)?;
+        Ok(values)
+    }
+}
+
+fn number(kind: u32, big_endian: bool, bytes: &[u8]) -> f64 {
+    let mut word = [0; 8];
+    for (index, byte) in bytes.iter().enumerate() {
+        let place = if big_endian { bytes.len() - 1 - index } else { index };
+        if let Some(to) = word.get_mut(place) {
+            *to = *byte;
+        }
+    }
+    let [a, b, c, d, ..] = word;
+    match kind {
+        INT8 => f64::from(i8::from_le_bytes([a])),
+        UINT8 => f64::from(a),
+        INT16 => f64::from(i16::from_le_bytes([a, b])),
+        UINT16 => f64::from(u16::from_le_bytes([a, b])),
+        INT32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+        UINT32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+        SINGLE => f64::from(f32::from_le_bytes([a, b, c, d])),
+        INT64 => i64::from_le_bytes(word) as f64,
+        UINT64 => u64::from_le_bytes(word) as f64,
+        _ => f64::from_le_bytes(word),
+    }
+}
+
+/// Bytes of a number; none of what is no number.
+fn width(kind: u32) -> Option<usize> {
+    match kind {
+        INT8 | UINT8 => Some(1),
+        INT16 | UINT16 => Some(2),
+        INT32 | UINT32 | SINGLE => Some(4),
+        DOUBLE | INT64 | UINT64 => Some(8),
+        _ => None,
+    }
+}
+
+/// Bytes behind the data: elements end at multiples of eight bytes, those within a tag with the tag.
+fn padding(size: u32, small: bool) -> u32 {
+    if small { 4_u32.saturating_sub(size) } else { size.wrapping_neg() & 7 }
+}
+
+#[cfg(test)]
+mod tests;

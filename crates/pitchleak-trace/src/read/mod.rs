@@ -1,0 +1,286 @@
+//! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
+
+mod bind;
+mod clock;
+mod columns;
+mod csv;
+mod decimal;
+mod dialect;
+mod encoding;
+mod error;
+mod file;
+mod format;
+mod inspect;
+mod inspect_text;
+mod line;
+mod mat;
+mod mistaken;
+mod number;
+mod parquet;
+mod proposal;
+mod quality;
+mod range;
+mod records;
+mod row;
+mod row_validator;
+mod stamp;
+mod stamped;
+mod table;
+mod table_text;
+
+pub use error::{TraceError, TraceFault};
+pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
+pub use line::{LineLayout, Taken};
+pub use line::{LineRead, read as read_line};
+pub use quality::{BadReason, BadRow, Counted, TraceQuality};
+pub use range::OVERRANGE;
+pub use row_validator::RowValidator;
+pub use stamp::seconds_between;
+pub use table::{Batch, ColumnContent, TableLayout};
+
+use crate::rig::{ColumnMap, Rig};
+use crate::signal::Signal;
+use crate::times::Clock;
+use pitchleak_core::{PerLeak, Sample};
+use row::{Next, Row, RowSource};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use table::TableRows;
+
+/// One good row of a trace, in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Record {
+    /// Line of the file, from 1; of columns in memory the row, from 0.
+    pub line: u64,
+    /// Time as in the file, s; since the first row where the file has time stamps.
+    pub t_s: f64,
+    /// Time since the record before, s: positive, and 0 for the first record.
+    pub dt_s: f64,
+    /// The trace pauses before this record, or its clock begins anew: nothing is known of the time
+    /// between.
+    pub after_gap: bool,
+    /// The readings.
+    pub sample: Sample<f64>,
+    /// Piston speed, m/s.
+    pub speed_mps: Option<f64>,
+    /// Oil temperature, K.
+    pub temperature_k: Option<f64>,
+    /// Reference flows of the internal, external A and external B leak, m³/s.
+    pub leak_m3s: PerLeak<Option<f64>>,
+}
+
+impl Record {
+    /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
+    #[inline]
+    pub fn step_s(&self) -> f64 {
+        if self.after_gap { 0.0 } else { self.dt_s }
+    }
+}
+
+/// What becomes of a bad row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub enum BadRows {
+    /// Counted, the first few kept with their place, and skipped.
+    #[default]
+    Skip,
+    /// The end of the reading, as an error. So is a compressed stream that breaks off.
+    Fatal,
+}
+
+/// Reads a trace row by row: a file, a stream, or columns in memory.
+pub struct TraceReader<'a> {
+    name: String,
+    rows: Box<dyn RowSource + Send + 'a>,
+    row: Row,
+    validator: RowValidator,
+    done: bool,
+    /// Stamp from which the seconds of columns in memory count.
+    first_ns: Option<i64>,
+}
+
+impl TraceReader<'static> {
+    /// Opens a trace file, CSV (also gzip), Parquet or MAT by its first bytes, or standard input where `path` is `-`, and
+    /// reads its header. The rig gives foreign column names and the ranges that readings must lie in.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, is no trace, or its header lacks a signal, gives one twice or
+    /// in an unknown unit.
+    pub fn open(path: impl AsRef<Path>, rig: &Rig) -> Result<Self, TraceError> {
+        Self::open_through(path, rig, |file| Box::new(file))
+    }
+
+    /// As [`open`](Self::open), with the file read through what `wrap` makes of it, e.g. a progress bar.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_through(
+        path: impl AsRef<Path>,
+        rig: &Rig,
+        wrap: impl FnOnce(File) -> Box<dyn Read + Send>,
+    ) -> Result<Self, TraceError> {
+        let path = path.as_ref();
+        if path == Path::new("-") {
+            return Self::from_stream("standard input", Box::new(std::io::stdin()), rig);
+        }
+        let name = path.display().to_string();
+        match File::open(path) {
+            Ok(file) => {
+                // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
+                let again = file.try_clone().ok();
+                Self::from_source(&name, wrap(file), again, rig)
+            }
+            Err(error) => Err(TraceError { trace: name, fault: TraceFault::Open(error) }),
+        }
+    }
+
+    /// As [`open`](Self::open), from any stream; `name` is for messages.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_stream(name: &str, stream: Box<dyn Read + Send>, rig: &Rig) -> Result<Self, TraceError> {
+        Self::from_source(name, stream, None, rig)
+    }
+
+    fn from_source(
+        name: &str,
+        stream: Box<dyn Read + Send>,
+        file: Option<File>,
+        rig: &Rig,
+    ) -> Result<Self, TraceError> {
+        match file::open(stream, file, rig) {
+            Ok(rows) => Ok(Self::over(name, rows, rig)),
+            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
+        }
+    }
+}
+
+impl<'a> TraceReader<'a> {
+    /// Reads columns in memory without copying them: `layout` says what they hold, `batches` are their
+    /// values, in SI or in the units that the headers name. A reading that is missing is NaN.
+    ///
+    /// # Errors
+    /// Where the columns of a batch are not of one length.
+    pub fn from_table(
+        name: &str,
+        layout: &TableLayout,
+        batches: Vec<Batch<'a>>,
+        rig: &Rig,
+    ) -> Result<Self, TraceError> {
+        match TableRows::new(layout, batches) {
+            Ok(rows) => Ok(Self::over(name, Box::new(rows), rig)),
+            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
+        }
+    }
+
+    fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
+        let validator = RowValidator::new(rig, rows.layout());
+        Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false, first_ns: None }
+    }
+
+    /// Says from which time stamp the seconds of columns in memory count, ns since 1970.
+    #[must_use]
+    pub fn since(mut self, first_ns: Option<i64>) -> Self {
+        self.first_ns = first_ns;
+        self
+    }
+
+    /// Goes on where another part of the same trace ended; rows of columns in memory count on from there.
+    #[must_use]
+    pub fn resuming(mut self, before: RowValidator) -> Self {
+        self.rows.count_from(before.rows_seen());
+        self.validator = before;
+        self
+    }
+
+    /// What has to be kept for the next part of the trace.
+    pub fn into_validator(self) -> RowValidator {
+        self.validator
+    }
+
+    /// Says what becomes of bad rows.
+    #[must_use]
+    pub fn with_bad_rows(mut self, bad_rows: BadRows) -> Self {
+        self.validator.set_bad_rows(bad_rows);
+        self
+    }
+
+    /// The trace as the user named it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The column of each signal, as a rig file's `[columns]` would name it; `map` is the one it was read with.
+    pub fn columns(&self, map: &ColumnMap) -> ColumnMap {
+        self.rows.layout().column_map(map)
+    }
+
+    /// Whether the trace has a column for `signal`.
+    pub fn has(&self, signal: Signal) -> bool {
+        self.rows.layout().has(signal)
+    }
+
+    /// The clock of its time stamps; none before the first row, and where it has no stamps.
+    pub fn clock(&self) -> Option<Clock> {
+        Clock::new(self.rows.epoch_ns().or(self.first_ns)?, &self.rows.layout().time)
+    }
+
+    /// What was noticed so far.
+    pub fn quality(&self) -> &TraceQuality {
+        self.validator.quality()
+    }
+
+    /// Reads the next good row into `record`; `false` at the end of the trace, and from then on.
+    ///
+    /// # Errors
+    /// Where the trace has no good row at all, cannot be read on, or has a bad row and those are
+    /// [fatal](BadRows::Fatal).
+    // Once per sample: a call and its result through memory are a tenth of the sample's time.
+    #[inline(always)]
+    pub fn next_record(&mut self, record: &mut Record) -> Result<bool, TraceError> {
+        self.next_record_or(record, |_| {})
+    }
+
+    /// As [`next_record`](Self::next_record); `refused` sees the rows on the way that are whole, but have a reading that is out
+    /// of its sensor's range.
+    ///
+    /// # Errors
+    /// As [`next_record`](Self::next_record).
+    #[inline(always)]
+    pub fn next_record_or(
+        &mut self,
+        record: &mut Record,
+        mut refused: impl FnMut(&Record),
+    ) -> Result<bool, TraceError> {
+        while !self.done {
+            let taken = match self.rows.next_row(&mut self.row).map_err(|fault| self.error(fault))? {
+                Next::Row => self.validator.take(&self.row, self.rows.layout(), record),
+                Next::Bad(bad) => self.validator.skip(bad).map(|()| false),
+                Next::CutOff(why) => {
+                    self.done = true;
+                    self.validator.cut_off(why).map(|()| false)
+                }
+                Next::End => {
+                    self.done = true;
+                    Ok(false)
+                }
+            };
+            match taken {
+                Ok(true) => return Ok(true),
+                Ok(false) => self.validator.take_refused().iter().for_each(&mut refused),
+                Err(fault) => {
+                    self.done = true;
+                    return Err(self.error(fault));
+                }
+            }
+        }
+        self.validator.end().map(|()| false).map_err(|fault| self.error(fault))
+    }
+
+    fn error(&self, fault: TraceFault) -> TraceError {
+        TraceError { trace: self.name.clone(), fault }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,257 @@
+//! The pages of a column, one after the other. The crate `parquet` unpacks what a page holds before anyone can ask how much
+//! it is, and makes room for as many values as the page says that it has.
+
+use super::codec::Codec;
+use super::deltas::{from_differences, from_lengths};
+use super::footer::{Chunk, damaged};
+use super::thrift::{Fields, structure};
+use crate::read::format::MOST_HELD;
+use bytes::Bytes;
+use parquet::basic::Encoding;
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::reader::ChunkReader;
+use std::sync::Arc;
+
+/// Bytes read for the head of a page: at first, and at most (it may hold the least and the largest text).
+const HEAD: u64 = 1 << 10;
+const LONGEST_HEAD: u64 = 1 << 24;
+
+/// Kinds of pages.
+const DATA: i64 = 0;
+const DICTIONARY: i64 = 2;
+const DATA_2: i64 = 3;
+
+pub(super) struct Pages<R> {
+    file: Arc<R>,
+    codec: Codec,
+    /// Whether cells may be missing: then levels stand before the values.
+    optional: bool,
+    /// Where the next one begins, and the bytes from there to the column's end.
+    at: u64,
+    left: u64,
+}
+
+impl<R: ChunkReader> Pages<R> {
+    pub(super) fn of(file: Arc<R>, chunk: Chunk, optional: bool) -> Result<Self> {
+        Ok(Self { file, codec: Codec::of(chunk.codec)?, optional, at: chunk.start, left: chunk.length })
+    }
+
+    fn take(&mut self, length: u64) -> Result<Bytes> {
+        if length > self.left || length > MOST_HELD {
+            return Err(damaged("a page is longer than its column"));
+        }
+        let bytes = self.file.get_bytes(self.at, length as usize)?;
+        self.at += length;
+        self.left -= length;
+        Ok(bytes)
+    }
+
+    /// The head of the next page in its bytes.
+    fn head<T>(&mut self, read: impl Fn(&Fields<'_>) -> Result<T>) -> Result<T> {
+        let mut look = HEAD;
+        loop {
+            let bytes = self.file.get_bytes(self.at, look.min(self.left) as usize)?;
+            match structure(&bytes) {
+                Ok((fields, length)) => {
+                    let head = read(&fields)?;
+                    self.at += length as u64;
+                    self.left -= length as u64;
+                    return Ok(head);
+                }
+                Err(ParquetError::EOF(_)) if look < self.left && look < LONGEST_HEAD => look *= 16,
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+/// What a page's head says.
+struct Head {
+    packed: u64,
+    size: u64,
+    /// None of pages that hold no values.
+    content: Option<Content>,
+}
+
+enum Content {
+    Data {
+        num_values: u32,
+        encoding: Encoding,
+        levels: Encoding,
+    },
+    Data2 {
+        num_values: u32,
+        num_nulls: u32,
+        num_rows: u32,
+        encoding: Encoding,
+        levels: [u32; 2],
+        is_packed: bool,
+    },
+    Dictionary {
+        num_values: u32,
+        encoding: Encoding,
+    },
+}
+
+impl Head {
+    fn of(fields: &Fields<'_>) -> Result<Self> {
+        let size = |id| Ok::<_, ParquetError>(u64::try_from(fields.needed(id)?.whole()?)?);
+        let content = match fields.needed(1)?.whole()? {
+            DATA => Some(Content::data(&fields.needed(5)?.fields()?)?),
+            DICTIONARY => Some(Content::dictionary(&fields.needed(7)?.fields()?)?),
+            DATA_2 => Some(Content::data_2(&fields.needed(8)?.fields()?)?),
+            _ => None,
+        };
+        Ok(Self { packed: size(3)?, size: size(2)?, content })
+    }
+}
+
+impl Content {
+    fn data(fields: &Fields<'_>) -> Result<Self> {
+        let [num_values, encoding, levels] = [1, 2, 3].map(|id| count(fields, id));
+        Ok(Self::Data { num_values: num_values?, encoding: encoded(encoding?)?, levels: encoded(levels?)? })
+    }
+
+    fn data_2(fields: &Fields<'_>) -> Result<Self> {
+        let [num_values, num_nulls, num_rows, encoding, definition, repetition] =
+            [1, 2, 3, 4, 5, 6].map(|id| count(fields, id));
+        Ok(Self::Data2 {
+            num_values: num_values?,
+            num_nulls: num_nulls?,
+            num_rows: num_rows?,
+            encoding: encoded(encoding?)?,
+            levels: [repetition?, definition?],
+            is_packed: fields.get(7).is_none_or(|packed| packed.is_true()),
+        })
+    }
+
+    fn dictionary(fields: &Fields<'_>) -> Result<Self> {
+        Ok(Self::Dictionary { num_values: count(fields, 1)?, encoding: encoded(count(fields, 2)?)? })
+    }
+
+    /// The page of these bytes, which are `size` once they are unpacked.
+    fn page(self, bytes: &Bytes, size: u64, codec: Codec) -> Result<Page> {
+        match self {
+            Self::Data { num_values, encoding, levels } => Ok(Page::DataPage {
+                buf: codec.unpacked(&[], bytes, size)?,
+                num_values,
+                encoding,
+                def_level_encoding: levels,
+                rep_level_encoding: levels,
+                statistics: None,
+            }),
+            Self::Data2 { num_values, num_nulls, num_rows, encoding, levels, is_packed } => {
+                let [repetition, definition] = levels;
+                // Levels stand before what is compressed.
+                let split = u64::from(repetition) + u64::from(definition);
+                let split = usize::try_from(split).ok().and_then(|split| bytes.split_at_checked(split));
+                let (before, values) = split.ok_or_else(|| damaged("levels longer than their page"))?;
+                let codec = if is_packed { codec } else { Codec::Plain };
+                Ok(Page::DataPageV2 {
+                    buf: codec.unpacked(before, values, size)?,
+                    num_values,
+                    encoding,
+                    num_nulls,
+                    num_rows,
+                    def_levels_byte_len: definition,
+                    rep_levels_byte_len: repetition,
+                    is_compressed: is_packed,
+                    statistics: None,
+                })
+            }
+            Self::Dictionary { num_values, encoding } => {
+                let buf = codec.unpacked(&[], bytes, size)?;
+                if num_values as usize > buf.len() {
+                    return Err(damaged("a dictionary has fewer values than it says"));
+                }
+                Ok(Page::DictionaryPage { buf, num_values, encoding, is_sorted: false })
+            }
+        }
+    }
+}
+
+impl<R: ChunkReader> PageReader for Pages<R> {
+    fn get_next_page(&mut self) -> Result<Option<Page>> {
+        while self.left > 0 {
+            let head = self.head(Head::of)?;
+            let bytes = self.take(head.packed)?;
+            if let Some(content) = head.content {
+                let page = content.page(&bytes, head.size, self.codec)?;
+                return plain_texts(page, self.optional).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Asked by nobody who reads a column from its begin to its end.
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
+        Err(damaged("pages are read one after the other"))
+    }
+
+    fn skip_next_page(&mut self) -> Result<()> {
+        self.get_next_page().map(drop)
+    }
+}
+
+impl<R: ChunkReader> Iterator for Pages<R> {
+    type Item = Result<Page>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+/// The page with texts as they are, where they are written as differences.
+fn plain_texts(mut page: Page, optional: bool) -> Result<Page> {
+    let levels = match &page {
+        Page::DataPage { buf, num_values, def_level_encoding, .. } if optional => {
+            levels(buf, *num_values, *def_level_encoding)?
+        }
+        Page::DataPageV2 { def_levels_byte_len, rep_levels_byte_len, .. } => {
+            *def_levels_byte_len as usize + *rep_levels_byte_len as usize
+        }
+        _ => 0,
+    };
+    if let Page::DataPage { buf, encoding, .. } | Page::DataPageV2 { buf, encoding, .. } = &mut page {
+        let plain = match encoding {
+            Encoding::DELTA_LENGTH_BYTE_ARRAY => from_lengths,
+            Encoding::DELTA_BYTE_ARRAY => from_differences,
+            _ => return Ok(page),
+        };
+        let split = buf.split_at_checked(levels).ok_or_else(|| damaged("levels longer than their page"))?;
+        let (levels, values) = split;
+        (*buf, *encoding) = ([levels, &plain(values)?].concat().into(), Encoding::PLAIN);
+    }
+    Ok(page)
+}
+
+/// The bytes of the levels of a page of version 1: one bit a value, or as many as they say.
+fn levels(page: &[u8], num_values: u32, encoding: Encoding) -> Result<usize> {
+    if encoding != Encoding::RLE {
+        return Ok(num_values.div_ceil(8) as usize);
+    }
+    let length = page.first_chunk().map(|length| u32::from_le_bytes(*length) as usize);
+    length.and_then(|length| length.checked_add(4)).ok_or_else(|| damaged("a page without its levels"))
+}
+
+fn count(fields: &Fields<'_>, id: usize) -> Result<u32> {
+    Ok(u32::try_from(fields.needed(id)?.whole()?)?)
+}
+
+fn encoded(number: u32) -> Result<Encoding> {
+    #[expect(deprecated, reason = "old files have levels of it")]
+    let bit_packed = Encoding::BIT_PACKED;
+    Ok(match number {
+        0 => Encoding::PLAIN,
+        2 => Encoding::PLAIN_DICTIONARY,
+        3 => Encoding::RLE,
+        4 => bit_packed,
+        5 => Encoding::DELTA_BINARY_PACKED,
+        6 => Encoding::DELTA_LENGTH_BYTE_ARRAY,
+        7 => Encoding::DELTA_BYTE_ARRAY,
+        8 => Encoding::RLE_DICTIONARY,
+        9 => Encoding::BYTE_STREAM_SPLIT,
+        _ => return Err(damaged("a page in an unknown encoding")),
+    })
+}

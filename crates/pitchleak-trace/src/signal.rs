@@ -1,0 +1,104 @@
+//! The signals that a trace may hold, and what each measures.
+
+use crate::units::Dimension;
+
+/// One signal of a trace; the names are those of the column headers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+pub enum Signal {
+    /// `t`: time.
+    Time,
+    /// `timestamp`: time in ISO 8601, instead of `t`.
+    Timestamp,
+    /// `x`: piston position from the A end.
+    Position,
+    /// `v`: piston speed.
+    Speed,
+    /// `pa`: pressure of the piston-side chamber, gauge.
+    PressureA,
+    /// `pb`: pressure of the rod-side chamber, gauge.
+    PressureB,
+    /// `qa`: flow into the piston-side chamber.
+    FlowA,
+    /// `qb`: flow into the rod-side chamber.
+    FlowB,
+    /// `force`: load force against extension.
+    Force,
+    /// `temp`: oil temperature.
+    Temperature,
+    /// `q_int`: reference flow of the internal leak.
+    LeakInternal,
+    /// `q_ext_a`: reference flow of the external leak at A.
+    LeakExternalA,
+    /// `q_ext_b`: reference flow of the external leak at B.
+    LeakExternalB,
+}
+
+impl Signal {
+    /// Every signal, in the order of the contract's table.
+    pub const ALL: [Self; 13] = [
+        Self::Time,
+        Self::Timestamp,
+        Self::Position,
+        Self::Speed,
+        Self::PressureA,
+        Self::PressureB,
+        Self::FlowA,
+        Self::FlowB,
+        Self::Force,
+        Self::Temperature,
+        Self::LeakInternal,
+        Self::LeakExternalA,
+        Self::LeakExternalB,
+    ];
+
+    /// The name that a column header starts with.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Time => "t",
+            Self::Timestamp => "timestamp",
+            Self::Position => "x",
+            Self::Speed => "v",
+            Self::PressureA => "pa",
+            Self::PressureB => "pb",
+            Self::FlowA => "qa",
+            Self::FlowB => "qb",
+            Self::Force => "force",
+            Self::Temperature => "temp",
+            Self::LeakInternal => "q_int",
+            Self::LeakExternalA => "q_ext_a",
+            Self::LeakExternalB => "q_ext_b",
+        }
+    }
+
+    /// The signal of this name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|signal| signal.name() == name)
+    }
+
+    /// What the signal measures; a timestamp has no unit.
+    pub fn dimension(self) -> Option<Dimension> {
+        match self {
+            Self::Time => Some(Dimension::Time),
+            Self::Timestamp => None,
+            Self::Position => Some(Dimension::Length),
+            Self::Speed => Some(Dimension::Speed),
+            Self::PressureA | Self::PressureB => Some(Dimension::Pressure),
+            Self::Force => Some(Dimension::Force),
+            Self::Temperature => Some(Dimension::Temperature),
+            Self::FlowA | Self::FlowB | Self::LeakInternal | Self::LeakExternalA | Self::LeakExternalB => {
+                Some(Dimension::Flow)
+            }
+        }
+    }
+
+    /// Whether a row without this reading is of no use.
+    pub fn is_required(self) -> bool {
+        matches!(self, Self::Time | Self::Timestamp | Self::Position | Self::PressureA | Self::PressureB)
+    }
+
+    /// Whether a sensor of the cylinder reads it.
+    pub fn is_sensor(self) -> bool {
+        use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
+        matches!(self, Position | PressureA | PressureB | FlowA | FlowB | Force)
+    }
+}
