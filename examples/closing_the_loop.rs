@@ -9,10 +9,11 @@ use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, LPM_PER_M3S, PerLeak};
 use pitchleak::diagnose::{Declared, Diagnosis, Series, diagnose};
-use pitchleak::figure::{Ink, Line, Panel, svg};
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing};
 use pitchleak::trace::TraceReader;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak_view::figure::{Ink, Line, Panel, svg};
+use pitchleak_view::{Palette, Text};
 use std::error::Error;
 
 /// A minute of wind on a cylinder with a worn spot, through sensors of 0.3 % of full scale.
@@ -89,7 +90,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The last of several traces is judged, not fitted.
     let (train, test) = traces.split_at(traces.len().saturating_sub(1).max(1));
     let diagnosis = diagnose(train, test, &Declared::of(&rig), &|| ());
-    print!("{}", diagnosis.to_text());
+    print!("{}", diagnosis.to_text(&Palette::PLAIN));
     std::fs::write(out, svg(&panels(&diagnosis), 1)?)?;
     Ok(())
 }

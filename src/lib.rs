@@ -27,25 +27,18 @@
 
 pub use pitchleak_core as core;
 
-mod bar;
 pub mod channels;
 pub mod check;
-pub mod cramer_rao;
 pub mod curve;
 pub mod diagnose;
-mod envelope;
-pub mod figure;
 pub mod fleet;
 pub mod live;
 pub mod output;
-pub mod page;
 pub mod reference;
 pub mod replay;
 pub mod report;
-pub mod reproduce;
 pub mod score;
 pub mod simulate;
-mod spark;
 pub mod viscosity;
 pub mod wind;
 pub mod wiring;

@@ -6,7 +6,6 @@
 use pitchleak::core::{
     Emulator, EmulatorParams, Estimate, Leak, Model, PerLeak, Rls, RlsSettings, Sample, Update,
 };
-use pitchleak::reproduce;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_testkit::{noisy, seeded};
 
@@ -29,7 +28,7 @@ struct Truth {
 impl Truth {
     /// The paper's rig in a wind, with leaks as `leaks_m3spa` gives them over time.
     fn simulate(wind: WindCase, duration_s: f64, leaks_m3spa: impl Fn(f64) -> PerLeak<f64>) -> Self {
-        let rig = reproduce::rig();
+        let rig = pitchleak_reproduce::rig();
         let history = History::of(&Wind::BuiltIn(wind)).unwrap();
         let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
         // There and back again, so that a run may be longer than the wind.
@@ -92,7 +91,7 @@ fn holds(estimate: &Estimate<f64>, truth: f64) -> f64 {
 }
 
 fn estimate(truth: &Truth, accuracy_percent: f64, leak: Leak) -> Tally {
-    let rig = reproduce::rig();
+    let rig = pitchleak_reproduce::rig();
     let sensors = rig.instruments.with_accuracy(accuracy_percent / 100.0).spread();
     let mut tally = Tally::default();
     for seed in 0..SEEDS {

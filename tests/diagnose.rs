@@ -8,6 +8,7 @@ use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak_view::{Palette, Text};
 use std::f64::consts::TAU;
 
 const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 1e-12 };
@@ -218,7 +219,7 @@ fn effects_beside_an_unexplained_remainder_are_doubted() {
     let answer = ask(series, &rig());
     assert_eq!(answer.verdict, Verdict::PartlyExplained, "{:?}", answer.notes);
     assert!(answer.effects.iter().all(|effect| !effect.confident && effect.doubt.is_some()));
-    assert!(answer.to_text().contains("Doubtful"));
+    assert!(answer.to_text(&Palette::PLAIN).contains("Doubtful"));
 }
 
 #[test]

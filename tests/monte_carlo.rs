@@ -2,7 +2,7 @@
 //! sound cylinder stay silent?
 
 use pitchleak::core::{Fluid, LeakDetector, PerLeak, Rls, RlsSettings, Sensors, Update};
-use pitchleak::cramer_rao::CramerRaoModel;
+use pitchleak_reproduce::cramer_rao::CramerRaoModel;
 use pitchleak_testkit::{Motion, NormalScatter, coverage_bounds, noisy, seeded, sensors_of};
 use rand::RngExt;
 

@@ -3,10 +3,10 @@
 
 use pitchleak::core::{EffectSet, Leak, PerLeak};
 use pitchleak::replay::Replay;
-use pitchleak::reproduce::{Run, SAMPLE_RATE_HZ, rig};
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak_reproduce::{Run, SAMPLE_RATE_HZ, rig};
 use rayon::prelude::*;
 use std::thread;
 

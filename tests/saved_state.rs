@@ -9,6 +9,7 @@ use pitchleak::trace::{BadRows, TraceReader};
 use pitchleak_testkit::Motion;
 use pitchleak_testkit::rig::with_sensors_of;
 use pitchleak_testkit::trace_text::file;
+use pitchleak_view::Text;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -133,7 +134,7 @@ fn forged_numbers_lead_to_no_nan() {
             taken += 1;
             extend(&mut forged, part(1500..1800));
             let report = forged.report("t").unwrap();
-            let text = report.to_text(&pitchleak::report::Palette::PLAIN);
+            let text = report.to_text(&pitchleak_view::Palette::PLAIN);
             assert!(!text.contains("NaN") && !text.contains("inf"), "bit {bit} of byte {at}: {text}");
         }
     }

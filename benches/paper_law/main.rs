@@ -8,8 +8,8 @@ mod window;
 
 use nelder_mead::{Found, lowest};
 use pitchleak::core::PaperGains;
-use pitchleak::reproduce::{Case, Run, rig};
 use pitchleak::wind::WindCase;
+use pitchleak_reproduce::{Case, Run, rig};
 use window::{Oil, Score, Window};
 
 /// Windows, s: the paper's, and what 280 s of each wind hold.

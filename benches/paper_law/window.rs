@@ -3,8 +3,8 @@
 use pitchleak::core::{
     Butterworth, Momentum, PaperGains, PaperLaw, PerLeak, Sample, force_imbalance_n, regressors,
 };
-use pitchleak::reproduce::{Run, SAMPLE_RATE_HZ, rig};
 use pitchleak::simulate::{Biases, Sensing};
+use pitchleak_reproduce::{Run, SAMPLE_RATE_HZ, rig};
 
 const CUTOFF_HZ: f64 = 5.0;
 const STEP_S: f64 = 1.0 / SAMPLE_RATE_HZ;

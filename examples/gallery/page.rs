@@ -3,8 +3,8 @@
 use crate::case::{ACCURACY, ALIKE, Case, DURATION_S, Rival};
 use pitchleak::core::{Effect, LPM_PER_M3S};
 use pitchleak::diagnose::{BinnedResidual, Equation, FoundEffect};
-use pitchleak::figure::{FigureError, Ink, Line, Panel, svg};
 use pitchleak::units::effect_unit;
+use pitchleak_view::figure::{FigureError, Ink, Line, Panel, svg};
 use std::fmt::Write;
 
 /// The effect's name in words.
@@ -80,7 +80,7 @@ fn write_found(out: &mut String, case: &Case) {
     for one in &found.effects {
         let _ = writeln!(out, "- {}", named(case, one));
     }
-    let verdict = found.verdict.sentence().split(':').next().unwrap_or_default();
+    let verdict = pitchleak_view::text::sentence(found.verdict).split(':').next().unwrap_or_default();
     let _ = writeln!(out, "\nIts verdict: *{verdict}*.");
     if let Some(limit) = case.limit {
         let _ = writeln!(

@@ -4,6 +4,7 @@ use super::{Dice, trace_text};
 use pitchleak::Rig;
 use pitchleak::diagnose::{Declared, Series, diagnose};
 use pitchleak::trace::TraceReader;
+use pitchleak_view::{Palette, Text, residual_figures};
 use std::io::Cursor;
 
 pub fn enter(bytes: &[u8]) {
@@ -23,8 +24,8 @@ pub fn enter(bytes: &[u8]) {
     let Ok(mut reader) = TraceReader::from_stream("fuzz", stream, &rig) else { return };
     let Ok(series) = Series::read(&mut reader) else { return };
     let diagnosis = diagnose(&[series], &[], &Declared::of(&rig), &|| ());
-    let text = diagnosis.to_text();
+    let text = diagnosis.to_text(&Palette::PLAIN);
     assert!(!text.contains("NaN"), "{text}");
-    let _ = diagnosis.figures();
+    let _ = residual_figures(&diagnosis);
     Rig::parse(&diagnosis.rig(&rig).to_toml(), "fuzz").expect("reads what it wrote");
 }

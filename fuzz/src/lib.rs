@@ -23,8 +23,9 @@ mod trace;
 use pitchleak::Rig;
 use pitchleak::live::{Event, LiveLeakage, OutputFormat};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::report::{Palette, ReplayReport};
+use pitchleak::report::ReplayReport;
 use pitchleak::trace::TraceReader;
+use pitchleak_view::{Palette, Text};
 use std::fmt::Write;
 use std::io::Cursor;
 

@@ -89,7 +89,7 @@ impl Default for ChannelMonitor {
 
 impl ChannelMonitor {
     /// Whether records can have led to it.
-    pub(crate) fn is_possible(&self) -> bool {
+    pub fn is_possible(&self) -> bool {
         self.channels.iter().all(Channel::is_possible)
     }
 
@@ -142,12 +142,12 @@ impl ChannelMonitor {
     }
 
     /// A stream's next stretch begins.
-    pub(crate) fn next_stretch(&mut self) {
+    pub fn next_stretch(&mut self) {
         self.channels.iter_mut().for_each(Channel::next_stretch);
     }
 
     /// As if channels had been stuck in the last two stretches alone.
-    pub(crate) fn lately(&self) -> Self {
+    pub fn lately(&self) -> Self {
         Self { channels: self.channels.map(Channel::lately), ..*self }
     }
 }

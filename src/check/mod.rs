@@ -2,11 +2,8 @@
 //! can and cannot identify.
 
 mod readings;
-mod sketch;
-mod text;
 
-pub use readings::Reading;
-pub use sketch::Sketch;
+pub use readings::{Reading, SIGNALS, values};
 
 use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::replay::{Replay, ReplayError, replay};

@@ -32,11 +32,12 @@ struct Channel {
     most: f64,
 }
 
-pub(super) const SIGNALS: [Signal; 6] =
+/// What a check tells of, in the order of its table.
+pub const SIGNALS: [Signal; 6] =
     [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
 
 /// Of each of [`SIGNALS`], SI.
-pub(super) fn values(record: &Record) -> [Option<f64>; SIGNALS.len()] {
+pub fn values(record: &Record) -> [Option<f64>; SIGNALS.len()] {
     let s = &record.sample;
     [Some(s.x_m), Some(s.pa_pa), Some(s.pb_pa), s.qa_m3s, s.qb_m3s, s.force_n]
 }

@@ -14,11 +14,12 @@
 //! The derivation is in `docs/closing-the-loop.md`.
 
 mod assess;
+mod calibrated_rig;
 mod data;
 mod equation;
 mod fit;
+mod json;
 mod outcome;
-mod present;
 mod search;
 mod statistics;
 #[cfg(test)]
@@ -33,7 +34,6 @@ pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
     Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
-pub(crate) use present::{in_a_row::in_a_row, labels};
 pub use search::{Candidate, Collinearity};
 
 use assess::{HeldOut, model_fit};

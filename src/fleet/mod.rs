@@ -10,7 +10,6 @@ mod judge;
 mod report;
 mod rig_table;
 mod row;
-mod sketch;
 mod table;
 mod traces;
 mod trend;
@@ -19,13 +18,12 @@ mod write;
 pub use errors::FleetError;
 pub use identity::TraceIdentity;
 pub use judge::{Stopped, judge, judge_all, judge_opened};
-pub(crate) use report::count;
-pub use report::{Counts, FleetReport};
+pub use report::{Counts, FleetReport, count};
 pub use rig_table::RigTable;
 pub use row::{FleetLeak, FleetRow};
 pub use table::{FleetColumn, FleetTable};
 pub use traces::{FleetRig, FleetTrace};
-pub use trend::{CylinderTrend, LongTrend};
+pub use trend::{CylinderTrend, LongTrend, Point};
 pub use write::FleetFile;
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
-//! A fleet as JSON, and in short for people.
+//! What was found of a fleet, and in which order it asks for somebody.
 
-use super::sketch::{Bars, CELLS};
 use super::{CylinderTrend, FleetRow, LongTrend};
-use crate::report::{Palette, Status};
+use crate::report::Status;
 use pitchleak_core::Leak;
 use serde::Serialize;
 use std::collections::HashSet;
-use std::fmt::Write;
 
 /// What was found of a fleet, as `fleet --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,9 +37,6 @@ pub struct Counts {
     /// The trace could not be judged.
     pub error: usize,
 }
-
-/// Lines of single traces in the text.
-const LINES: usize = 20;
 
 impl<'a> FleetReport<'a> {
     /// Name and version of the JSON form.
@@ -78,52 +73,8 @@ impl<'a> FleetReport<'a> {
         serde_json::to_string_pretty(self)
     }
 
-    /// How many of which verdict, and a line for each trace that asks for somebody, the worst first.
-    pub fn to_text(&self, palette: &Palette) -> String {
-        self.text(palette, false)
-    }
-
-    /// The same for a terminal that knows Unicode: with a bar of the largest leak in each line, and the course of each leak
-    /// that grows.
-    pub fn to_terminal(&self, palette: &Palette) -> String {
-        self.text(palette, true)
-    }
-
-    fn text(&self, palette: &Palette, draws: bool) -> String {
-        let Counts { leak, sound, doubtful, not_sure, error } = self.counts;
-        let mut text = format!(
-            "{} of {}: {leak} leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
-            count(self.traces, "trace"),
-            count(self.cylinders, "cylinder")
-        );
-        if error > 0 {
-            let _ = write!(text, ", {error} not judged");
-        }
-        text.push('\n');
-        self.write_worst(&mut text, palette, draws);
-        self.write_trends(&mut text, draws);
-        text
-    }
-
-    fn write_worst(&self, text: &mut String, palette: &Palette, draws: bool) {
-        let worst = self.worst();
-        let (shown, more) = worst.split_at(worst.len().min(LINES));
-        let bars = Bars::of(shown).filter(|_| draws);
-        if !shown.is_empty() {
-            text.push('\n');
-        }
-        text.push_str(&bars.as_ref().map_or_else(String::new, |bars| bars.legend(palette)));
-        for row in shown {
-            let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(row));
-            text.push_str(&line(row, &bar, palette));
-        }
-        if !more.is_empty() {
-            let _ = writeln!(text, "… and {} more", more.len());
-        }
-    }
-
     /// The traces that ask for somebody, the worst first.
-    pub(crate) fn worst(&self) -> Vec<&'a FleetRow> {
+    pub fn worst(&self) -> Vec<&'a FleetRow> {
         let urgency = |row: &FleetRow| match row.status {
             Some(Status::Leak) => 0,
             Some(Status::Doubtful) => 1,
@@ -137,7 +88,7 @@ impl<'a> FleetReport<'a> {
     }
 
     /// The leaks that grow from trace to trace beyond doubt, the fastest first, with their cylinders.
-    pub(crate) fn growing(&self) -> Vec<(&str, Leak, &LongTrend)> {
+    pub fn growing(&self) -> Vec<(&str, Leak, &LongTrend)> {
         let mut growing = Vec::new();
         for CylinderTrend { cylinder, leaks } in &self.trends {
             let known = leaks.iter().filter_map(|(leak, long)| Some((leak, long.as_ref()?)));
@@ -147,50 +98,9 @@ impl<'a> FleetReport<'a> {
         growing.sort_by(|(_, _, a), (_, _, b)| b.trend.slope_lpm_per_h.total_cmp(&a.trend.slope_lpm_per_h));
         growing
     }
-
-    fn write_trends(&self, text: &mut String, draws: bool) {
-        let growing = self.growing();
-        if !growing.is_empty() {
-            text.push('\n');
-        }
-        for (cylinder, leak, long) in growing.iter().take(LINES) {
-            let course =
-                if draws { format!("{:<CELLS$}  ", self.course(cylinder, *leak)) } else { String::new() };
-            let _ = writeln!(text, "GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate());
-        }
-        if growing.len() > LINES {
-            let _ = writeln!(text, "… and {} more", growing.len() - LINES);
-        }
-    }
 }
 
 /// With an `s` behind many.
-pub(crate) fn count(number: usize, what: &str) -> String {
+pub fn count(number: usize, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
-}
-
-fn line(row: &FleetRow, bar: &str, palette: &Palette) -> String {
-    let word = row.word();
-    let (colour, reset) = row.status.map_or(palette.caution(), |status| palette.verdict(status));
-    let found = match (&row.error, row.status) {
-        (Some(error), _) => error.clone(),
-        (None, Some(Status::Leak)) => leaks(row),
-        (None, _) => row.reasons.join(", "),
-    };
-    let place = match &row.error {
-        // Names the file by itself.
-        Some(_) => String::new(),
-        None if row.path.starts_with(&row.cylinder) => format!("{}  ", row.path),
-        None => format!("{}  {}  ", row.cylinder, row.path),
-    };
-    format!("{colour}{word:<8}{reset}  {bar}{place}{found}\n")
-}
-
-fn leaks(row: &FleetRow) -> String {
-    let flow = |leak: &Leak| {
-        let of = row.leaks.map(|leaks| leaks[*leak])?;
-        let spread = of.ci95.map_or_else(String::new, |[low, high]| format!(" ± {:.3}", (high - low) / 2.0));
-        Some(format!("{} {:.3}{spread} L/min", leak.label(), of.mean_lpm))
-    };
-    row.faults.iter().filter_map(flow).collect::<Vec<_>>().join(", ")
 }

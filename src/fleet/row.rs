@@ -128,7 +128,7 @@ impl FleetRow {
     }
 
     /// As at the head of its line.
-    pub(crate) fn word(&self) -> &'static str {
+    pub fn word(&self) -> &'static str {
         self.status.map_or("ERROR", Status::word)
     }
 

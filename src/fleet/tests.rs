@@ -2,9 +2,8 @@ use super::*;
 use crate::Rig;
 use crate::output::Inputs;
 use crate::replay::{ReplayError, replay};
-use crate::report::Palette;
 use crate::trace::TraceReader;
-use pitchleak_core::{Leak, PerLeak};
+use pitchleak_core::PerLeak;
 use pitchleak_testkit::Motion;
 use pitchleak_testkit::rig::PAPER;
 use pitchleak_testkit::trace_text::file;
@@ -191,36 +190,6 @@ fn a_table_has_a_format_and_is_written_over_no_trace() {
 }
 
 #[test]
-fn the_text_has_the_worst_first() {
-    let farm = farm();
-    let rows = rows(&FleetTrace::find(&pattern(&farm, "**/*.csv"), &FleetRig::Beside).unwrap());
-    let text = FleetReport::of(&rows).to_text(&Palette::PLAIN);
-    let lines: Vec<_> = text.lines().collect();
-    assert_eq!(lines[0], "4 traces of 2 cylinders: 2 leak, 1 sound, 0 doubtful, 0 not sure, 1 not judged");
-    assert!(lines[2].starts_with("LEAK") && lines[2].contains("internal 1."), "{text}");
-    assert!(lines[4].starts_with("ERROR") && lines.len() == 5, "{text}");
-}
-
-#[test]
-fn a_terminal_sees_each_line_beside_its_alarm_level() {
-    let farm = farm();
-    let rows = rows(&FleetTrace::find(&pattern(&farm, "**/*.csv"), &FleetRig::Beside).unwrap());
-    let report = FleetReport::of(&rows);
-    let [plain, shown] = [report.to_text(&Palette::PLAIN), report.to_terminal(&Palette::PLAIN)];
-    assert!(!plain.contains(['●', '┊']));
-    let lines: Vec<_> = shown.lines().collect();
-    assert!(lines[2].trim_start().starts_with("0.00 to 1.") && lines[2].ends_with("alarm level"), "{shown}");
-    for line in &lines[3..5] {
-        let bar: String = line.chars().skip(10).take(20).collect();
-        assert!(line.starts_with("LEAK      │┊    ") && bar.trim_end().ends_with(['●', '━']), "{shown}");
-    }
-    assert!(lines[5].starts_with(&format!("ERROR{}", " ".repeat(27))), "{shown}");
-    let sound: Vec<_> = rows.into_iter().filter(|row| row.error.is_none() && row.faults.is_empty()).collect();
-    let report = FleetReport::of(&sound);
-    assert_eq!(report.to_terminal(&Palette::PLAIN), report.to_text(&Palette::PLAIN));
-}
-
-#[test]
 fn a_leak_that_grows_from_day_to_day_is_told() {
     let farm = TempDir::new().unwrap();
     for day in 1..=5 {
@@ -240,8 +209,6 @@ fn a_leak_that_grows_from_day_to_day_is_told() {
     assert!((internal.mean_lpm - flow(4)).abs() < 0.01);
     let json: serde_json::Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
     assert_eq!(json["trends"][0]["leaks"]["internal"]["traces"], 5);
-    let course = report.course(&rows[0].cylinder, Leak::Internal);
-    assert!(course.chars().count() == 5 && course.ends_with("██"), "{course}");
 }
 
 #[cfg(feature = "parquet")]

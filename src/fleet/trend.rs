@@ -41,10 +41,13 @@ pub struct LongTrend {
 }
 
 /// One trace's flow of one leak, L/min.
-pub(super) struct Point {
-    pub(super) at: Timestamp,
-    pub(super) flow: Estimate<f64>,
-    pub(super) threshold_lpm: f64,
+pub struct Point {
+    /// When.
+    pub at: Timestamp,
+    /// The leak, L/min.
+    pub flow: Estimate<f64>,
+    /// Its alarm level, L/min.
+    pub threshold_lpm: f64,
 }
 
 impl CylinderTrend {
@@ -82,7 +85,7 @@ impl LongTrend {
     }
 
     /// How fast the leak grows, and when it is at its alarm's threshold if it goes on like this, for people.
-    pub(crate) fn rate(&self) -> String {
+    pub fn rate(&self) -> String {
         let Estimate { value, std } = self.monthly_lpm();
         let reached = self.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
             let [days, low, high] = [time.value, time.ci95[0], time.ci95[1]].map(|s| s / S_PER_DAY);
@@ -112,7 +115,8 @@ impl LongTrend {
 }
 
 impl Point {
-    pub(super) fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
+    /// None where the row tells nothing of this leak, or not when.
+    pub fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
         let found = row.leaks?[leak];
         let std = found.std_lpm.filter(|std| *std > 0.0)?;
         let half = jiff::SignedDuration::try_from_secs_f64(row.duration_s? / 2.0).ok()?;

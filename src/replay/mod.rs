@@ -10,7 +10,6 @@ mod estimator;
 mod known;
 mod pressures;
 mod scoring;
-mod sketch;
 mod spikes;
 mod state;
 mod stream;
@@ -20,7 +19,6 @@ mod temperature;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
-pub use sketch::Sketch;
 pub use state::RestoreError;
 pub(crate) use state::every_number;
 pub use stream::Stream;

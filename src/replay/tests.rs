@@ -43,28 +43,6 @@ fn a_gap_is_no_hold_time() {
 }
 
 #[test]
-fn a_terminal_sees_the_course_of_each_leak_and_its_pause() {
-    let rig = Rig::paper();
-    let (mut replay, mut sketch) = (Replay::new(&rig).expect("the paper's rig"), Sketch::new(&rig));
-    for record in records(&[1000]) {
-        let renewed = replay.push(&record);
-        sketch.add(&replay, &record, renewed);
-    }
-    let courses = sketch.courses_lpm(40);
-    assert_eq!(courses.internal.len(), 40);
-    let pause = courses.internal.iter().filter(|flow| flow.is_none()).count();
-    // A minute of 80 s.
-    assert!((25..35).contains(&pause), "{courses:?}");
-    let usual = courses.internal.iter().flatten().filter(|flow| **flow > 0.1).count();
-    assert!(usual + 2 >= 40 - pause, "{courses:?}");
-    let report = replay.report(TraceSummary::new("trace", &crate::trace::TraceQuality::default()));
-    let palette = crate::report::Palette::PLAIN;
-    let shown = report.to_terminal(&palette, &sketch);
-    assert!(shown.contains("███     ") && shown.contains('●'), "{shown}");
-    assert!(!report.to_text(&palette).contains(['█', '●', '┊']));
-}
-
-#[test]
 fn the_papers_law_waits_as_long() {
     let mut rig = Rig::paper();
     rig.estimator.kind = EstimatorKind::Paper;

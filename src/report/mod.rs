@@ -2,20 +2,16 @@
 
 mod episode;
 mod reason;
-mod sketch;
 mod spell;
 mod statement;
-mod text;
 mod trend;
 mod verdict;
 mod zeros;
 
 pub use episode::Episode;
-pub use reason::{Reason, ReasonId};
+pub use reason::{MISFIT, Reason, ReasonId};
 pub use spell::Spell;
-pub(crate) use statement::{advice, capital, interval, with_interval};
-pub use text::{Palette, data_line};
-pub(crate) use text::{misfit, rig_line};
+pub use statement::{advice, capital, interval, with_interval};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
 pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
 
@@ -132,7 +128,7 @@ impl TraceSummary {
     }
 
     /// Whether seconds are no unit for its times.
-    pub(crate) fn is_long(&self) -> bool {
+    pub fn is_long(&self) -> bool {
         self.duration_s >= LONG_S
     }
 }
@@ -237,13 +233,13 @@ impl Leakage {
     }
 
     /// The interval that holds the mean with 95 % probability, L/min; without length where nothing is known of its error.
-    pub(crate) fn ci95(&self) -> [f64; 2] {
+    pub fn ci95(&self) -> [f64; 2] {
         let value = self.mean_lpm;
         self.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95())
     }
 
     /// Whether it is below zero by more than chance, which no leak is.
-    pub(crate) fn is_negative(&self) -> bool {
+    pub fn is_negative(&self) -> bool {
         self.std_lpm.is_some_and(|std| self.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)
     }
 }

@@ -60,7 +60,7 @@ impl ReasonId {
     }
 
     /// Whether a leak of another law than C P can be behind it.
-    pub(crate) fn may_be_orifice(self) -> bool {
+    pub fn may_be_orifice(self) -> bool {
         matches!(self, Self::NegativeLeak | Self::KeepsChanging | Self::ModelDoesNotFit)
     }
 }
@@ -89,7 +89,7 @@ impl Reason {
 }
 
 /// Mean of ν²/S over the trace that still is no misfit, or what chance makes of few innovations …
-pub(super) const MISFIT: f64 = 2.5;
+pub const MISFIT: f64 = 2.5;
 const CHANCE_SIGMAS: f64 = 5.0;
 /// … and in the worst quarter of a minute: leaks that open and are mended surprise a few blocks.
 const WORST_MISFIT: f64 = 3.0;
@@ -245,7 +245,7 @@ impl Misfit {
     }
 
     /// Whether model and declared noise do not explain it.
-    pub(crate) fn contradicts(&self) -> bool {
+    pub fn contradicts(&self) -> bool {
         let balance = self.balance > self.chance().max(MISFIT) || self.worst_window > WORST_MISFIT;
         balance || self.worst_odometer > ODOMETER_MISFIT
     }

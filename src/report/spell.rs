@@ -42,14 +42,14 @@ impl Spell {
     }
 
     /// From when to when.
-    pub(crate) fn when(&self, trace: &TraceSummary) -> String {
+    pub fn when(&self, trace: &TraceSummary) -> String {
         let from = trace.time(self.from_s, 1);
         self.to_s
             .map_or_else(|| format!("from {from} on"), |to_s| format!("{from} to {}", trace.time(to_s, 1)))
     }
 
     /// How large, and how long or how often.
-    pub(crate) fn size(&self) -> String {
+    pub fn size(&self) -> String {
         let Self { mean_lpm, peak_lpm, times, stood_s, .. } = *self;
         let long = match times {
             1 => format!("for {}", duration(stood_s)),

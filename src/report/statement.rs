@@ -6,7 +6,7 @@ use crate::wiring::Orifice;
 use pitchleak_core::{Estimate, Leak};
 
 /// Where to look for a leak.
-pub(crate) fn advice(leak: Leak) -> &'static str {
+pub fn advice(leak: Leak) -> &'static str {
     match leak {
         Leak::Internal => "oil passes the piston seal: plan its change, check the bore for scoring",
         Leak::ExternalA => "oil leaves the piston-side chamber: check its port, hose, fittings and valve",
@@ -184,7 +184,7 @@ fn sentence(text: &str) -> String {
 }
 
 /// With a capital first letter.
-pub(crate) fn capital(text: &str) -> String {
+pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
@@ -202,12 +202,12 @@ pub(super) fn join(leaks: &[Leak], word: &str) -> String {
 }
 
 /// Mean flow and half width of its 95 % interval, L/min.
-pub(crate) fn interval(leakage: &Leakage) -> String {
+pub fn interval(leakage: &Leakage) -> String {
     with_interval(leakage.mean_lpm, leakage.std_lpm)
 }
 
 /// Value and half width of the 95 % interval, to two digits of the half width.
-pub(crate) fn with_interval(value: f64, std: Option<f64>) -> String {
+pub fn with_interval(value: f64, std: Option<f64>) -> String {
     let Some(half) = std.map(|std| Estimate { value, std }.half_width95()).filter(|half| half.is_finite())
     else {
         return format!("{value:.4}");

@@ -25,7 +25,7 @@ pub use oil_temperature::{OilTemperature, OilTemperatureError};
 pub use plan::{Noise, Plan, PlanError, ShareError, share_of_full_scale};
 pub use reading::Reading;
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile};
-pub(crate) use sensing::Normal;
+pub use sensing::Normal;
 pub use sensing::{Biases, Sensing};
 pub use sensor_fault::{SensorFault, SensorFaults};
 pub use span::{Span, SpanError};

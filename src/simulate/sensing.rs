@@ -82,7 +82,7 @@ impl Sensing {
 
 /// Normal random numbers by the transform of Box and Muller (1958).
 #[derive(Clone, Debug)]
-pub(crate) struct Normal {
+pub struct Normal {
     uniform: ChaCha8Rng,
     spare: Option<f64>,
 }

@@ -80,13 +80,13 @@ impl Wiring {
     }
 
     /// It in one sentence, without a full stop.
-    pub(crate) fn sentence(&self) -> String {
+    pub fn sentence(&self) -> String {
         format!("{}; {}", self.suggestion, self.remedy(HOW_WIRED))
     }
 }
 
 /// What to check of a mistake of wiring.
-pub(crate) const HOW_WIRED: &str = "how the columns are wired and recorded";
+pub const HOW_WIRED: &str = "how the columns are wired and recorded";
 
 impl Explanation {
     /// In words; `columns` are those that the trace was read by.

@@ -2,8 +2,10 @@ use crate::failure::Failure;
 use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::check::{Sketch, check};
-use pitchleak::page::{History, Page, PageFile};
+use pitchleak::check::check;
+use pitchleak_view::Text;
+use pitchleak_view::page::{History, Page, PageFile};
+use pitchleak_view::text::CheckSketch;
 use std::path::PathBuf;
 
 /// Check traces: data quality, excitation, what they can and cannot identify
@@ -31,7 +33,7 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     let inputs = trace.files();
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
-    let mut sketch = (output::draws() && !arguments.json).then(|| Sketch::new(&trace.rig));
+    let mut sketch = (output::draws() && !arguments.json).then(|| CheckSketch::new(&trace.rig));
     let (mut reader, bar) = trace.open()?;
     let report = check(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
@@ -50,7 +52,7 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     output::warn(&report.trace.warnings);
     let json = arguments.json.then(|| report.to_json()).transpose()?;
     trace.print(json, || match &sketch {
-        Some(sketch) => report.to_terminal(&output::palette(), sketch),
+        Some(sketch) => sketch.to_text(&report, &output::palette()),
         None => report.to_text(&output::palette()),
     })?;
     Ok(Outcome::Done)

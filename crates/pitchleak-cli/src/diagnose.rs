@@ -6,8 +6,9 @@ use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::diagnose::{Declared, Roles, Series, Traces, diagnose};
 use pitchleak::output::{Inputs, OutputFile, make_folder};
-use pitchleak::page::{Page, PageFile};
 use pitchleak::trace::{BadRows, TraceReader};
+use pitchleak_view::page::{Page, PageFile};
+use pitchleak_view::{Palette, Text, residual_figures};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -104,14 +105,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         page.finish(&Page::of_diagnosis(&diagnosis, &rig, &names))?;
     }
     if let Some(folder) = &arguments.out {
-        for (name, figure) in diagnosis.figures()? {
+        for (name, figure) in residual_figures(&diagnosis)? {
             pitchleak::output::write(folder.join(name), figure, &inputs)?;
         }
     }
     let text = if arguments.json {
         serde_json::to_string_pretty(&diagnosis)? + "\n"
     } else {
-        format!("rig {}\n{}", rig.name, diagnosis.to_text())
+        format!("rig {}\n{}", rig.name, diagnosis.to_text(&Palette::PLAIN))
     };
     output::print(&text)?;
     Ok(Outcome::Done)

@@ -1,14 +1,14 @@
 use pitchleak::diagnose::FittedAndJudged;
-use pitchleak::figure::FigureError;
 use pitchleak::fleet::FleetError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
-use pitchleak::page::PageError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
-use pitchleak::reproduce::ReproduceError;
 use pitchleak::rig::RigError;
 use pitchleak::simulate::{PlanError, RecordingError};
 use pitchleak::trace::TraceError;
+use pitchleak_reproduce::ReproduceError;
+use pitchleak_view::figure::FigureError;
+use pitchleak_view::page::PageError;
 use std::io;
 
 /// Why a command ended early; one line for people each.

@@ -4,7 +4,9 @@ use clap::Args;
 use pitchleak::fleet::{
     FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
 };
-use pitchleak::page::{Page, PageFile};
+use pitchleak_view::Text;
+use pitchleak_view::page::{Page, PageFile};
+use pitchleak_view::text::fleet_terminal;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -68,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     output::print(&if arguments.json {
         report.to_json()? + "\n"
     } else if output::draws() {
-        report.to_terminal(&output::palette())
+        fleet_terminal(&report, &output::palette())
     } else {
         report.to_text(&output::palette())
     })?;

@@ -1,7 +1,8 @@
 //! Standard output and standard error.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use pitchleak::report::{Palette, TraceSummary};
+use pitchleak::report::TraceSummary;
+use pitchleak_view::Palette;
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};

@@ -2,9 +2,11 @@ use crate::failure::Failure;
 use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::page::{History, Page, PageFile};
-use pitchleak::replay::{EstimateFile, Sketch, replay};
+use pitchleak::replay::{EstimateFile, replay};
 use pitchleak::rig::EstimatorKind;
+use pitchleak_view::Text;
+use pitchleak_view::page::{History, Page, PageFile};
+use pitchleak_view::text::ReplaySketch;
 use std::path::PathBuf;
 
 /// Replay traces: estimate their leaks and say what to do
@@ -65,7 +67,7 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     let mut file = arguments.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
-    let mut sketch = (output::draws() && !arguments.json).then(|| Sketch::new(&trace.rig));
+    let mut sketch = (output::draws() && !arguments.json).then(|| ReplaySketch::new(&trace.rig));
     let (mut reader, bar) = trace.open()?;
     let report = replay(&mut reader, &trace.rig, |replay, record, renewed| {
         if let Some(history) = &mut history {
@@ -88,7 +90,7 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     output::warn(&report.trace.warnings);
     let json = arguments.json.then(|| report.to_json()).transpose()?;
     trace.print(json, || match &sketch {
-        Some(sketch) => report.to_terminal(&output::palette(), sketch),
+        Some(sketch) => sketch.to_text(&report, &output::palette()),
         None => report.to_text(&output::palette()),
     })?;
     let fault = arguments.fail_on_fault && !report.verdict.faults.is_empty();

@@ -2,8 +2,8 @@ use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::output::{Inputs, make_folder};
-use pitchleak::page::{Page, PageFile};
-use pitchleak::reproduce::{Progress, detection, reproduce};
+use pitchleak_reproduce::{Progress, detection, reproduce};
+use pitchleak_view::page::PageFile;
 use std::path::PathBuf;
 
 /// Rerun the paper's experiment: four winds, two leak settings, its law and ours on the same readings
@@ -50,7 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         reproduction.write(directory)?;
     }
     if let Some(page) = page {
-        page.finish(&Page::of_reproduction(&reproduction)?)?;
+        page.finish(&pitchleak_reproduce::page(&reproduction)?)?;
     }
     let report = &reproduction.report;
     output::print(&if arguments.json { report.to_json()? + "\n" } else { report.to_text() })?;

@@ -7,7 +7,8 @@ use crate::threads::detached;
 use pitchleak::diagnose::{
     Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
 };
-use pitchleak::page::Page;
+use pitchleak_view::page::Page;
+use pitchleak_view::{Palette, Text};
 use pyo3::prelude::*;
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -57,7 +58,7 @@ pub fn diagnose(
     })?;
     let json = serde_json::to_string(&diagnosis).map_err(value_error)?;
     let saved = Rig(diagnosis.rig(&rig.0));
-    let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text());
+    let text = format!("rig {}\n{}", rig.0.name, diagnosis.to_text(&Palette::PLAIN));
     let page = Page::of_diagnosis(&diagnosis, &rig.0, &names).to_html();
     Ok((
         json,

@@ -10,9 +10,9 @@ use pitchleak::fleet::{
     TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
-use pitchleak::page::Page;
-use pitchleak::report::Palette;
 use pitchleak::trace::TraceReader;
+use pitchleak_view::page::Page;
+use pitchleak_view::{Palette, Text};
 use pyo3::exceptions::{PyFileNotFoundError, PyIsADirectoryError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;

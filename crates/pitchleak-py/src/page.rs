@@ -5,7 +5,7 @@ use crate::rig::Rig;
 use crate::signals::Signals;
 use crate::source::Source;
 use pitchleak::output::Inputs;
-use pitchleak::page::{History, Page, PageError, PageFile};
+use pitchleak_view::page::{History, Page, PageError, PageFile};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 

@@ -6,7 +6,7 @@ use crate::signals::{Signals, Stop};
 use crate::source::Source;
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::replay::EstimateRow;
-use pitchleak::report::Palette;
+use pitchleak_view::{Palette, Text};
 use pyo3::prelude::*;
 
 /// A report for programs (JSON) and for people.

@@ -1,8 +1,7 @@
 use crate::errors::{output_error, value_error};
 use crate::threads::detached;
 use pitchleak::output::make_folder;
-use pitchleak::page::Page;
-use pitchleak::reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
+use pitchleak_reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -25,7 +24,7 @@ pub fn reproduce(
     let done = done.map_err(value_error)?;
     let page = py.detach(|| {
         out.map(|directory| done.write(&directory)).transpose()?;
-        Page::of_reproduction(&done)
+        pitchleak_reproduce::page(&done)
     });
     let page = page.map_err(|error| match error {
         ReproduceError::Output(error) => output_error(py, &error),

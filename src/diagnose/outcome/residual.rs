@@ -1,6 +1,8 @@
 //! What a model leaves over.
 
 use crate::diagnose::equation::Equation;
+use crate::diagnose::statistics::bonferroni_sigma;
+use crate::diagnose::thresholds::{CHANCE_RATE, RESIDUAL_TESTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -63,6 +65,11 @@ impl EquationResidual {
         found.sort_by(|a, b| b.1.sigma.abs().total_cmp(&a.1.sigma.abs()));
         found
     }
+
+    /// Those that chance would hardly bring among all tests of this kind.
+    pub fn beyond_chance(&self) -> Vec<(&'static str, Correlation)> {
+        self.goes_with(bonferroni_sigma(CHANCE_RATE, RESIDUAL_TESTS))
+    }
 }
 
 /// What is left against one variable: means in bins of equal count.
@@ -81,4 +88,19 @@ pub struct BinnedResidual {
     pub std_error: Vec<f64>,
     /// Correlation of the two.
     pub correlation: f64,
+}
+
+impl BinnedResidual {
+    /// Whether the traces have the variable, and it moves.
+    pub fn varies(&self) -> bool {
+        let ends = self.at.first().zip(self.at.last());
+        ends.is_some_and(|(first, last)| last - first > 1e-9 * last.abs().max(first.abs()))
+    }
+
+    /// How far the bins' means are from one another, in their standard errors, squared and summed: what a correlation cannot see
+    /// of a hump.
+    pub fn strength(&self) -> f64 {
+        let pairs = self.mean.iter().zip(&self.std_error).filter(|(_, error)| **error > 0.0);
+        pairs.map(|(mean, error)| (mean / error).powi(2)).sum()
+    }
 }

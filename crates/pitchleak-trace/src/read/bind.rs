@@ -1,10 +1,10 @@
 //! Binds the headers of a file to signals: those of the contract, those of `[columns]`, and foreign ones that name signal
 //! and unit.
 
-use crate::header::shorten;
 use super::columns::{Layout, standard};
 use super::error::TraceFault;
 use super::table_text::{TextRow, bare_unit, column};
+use crate::header::shorten;
 use crate::header::{self, HeaderUnit};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;

@@ -1,9 +1,9 @@
 //! Which column of a header row holds which signal, and in which unit.
 
-use crate::header::shorten;
 use super::error::TraceFault;
 use super::proposal::near;
 use super::quality::Counted;
+use crate::header::shorten;
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
 use crate::times::TimeFormat;

@@ -1,6 +1,5 @@
 //! Rows of a CSV stream as numbers in SI.
 
-use crate::header::shorten;
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
 use super::error::TraceFault;
@@ -10,6 +9,7 @@ use super::quality::{BadReason, BadRow, Counted};
 use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_present};
 use super::stamp::Epoch;
+use crate::header::shorten;
 use crate::rig::{Decimal, Rig};
 use crate::signal::Signal;
 use crate::times::TimeKind;

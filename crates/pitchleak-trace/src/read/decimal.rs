@@ -1,7 +1,7 @@
 //! Whether numbers have a decimal point or a comma.
 
-use crate::header::shorten;
 use super::error::TraceFault;
+use crate::header::shorten;
 use crate::rig::Decimal;
 
 /// What the marks in the cells of a column, or of all, speak for.

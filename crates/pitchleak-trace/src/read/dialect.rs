@@ -1,7 +1,6 @@
 //! How a text file of numbers is written: found in its first lines, said where it is not as this program writes one, and
 //! refused where it can be read in two ways.
 
-use crate::header::shorten;
 use super::columns::{Content, Layout, REQUIRED, partly};
 use super::csv::stopped_early;
 use super::decimal::decimal;
@@ -14,6 +13,7 @@ use super::proposal::Proposal;
 use super::records::{Records, Stop};
 use super::stamp::Epoch;
 use super::table_text::TextTable;
+use crate::header::shorten;
 use crate::rig::{ColumnMap, Decimal, Delimiter, Rig};
 use crate::signal::Signal;
 use crate::times::{self, TimeFault, TimeFormat, TimeKind};

@@ -1,7 +1,6 @@
 //! How a file would be read, for a person to look at before it is.
 
 use super::bind::Bound;
-use crate::header::shorten;
 use super::columns::{Content, Layout, partly};
 use super::decimal::decimal;
 use super::dialect::Dialect;
@@ -10,6 +9,7 @@ use super::file;
 use super::format::Format;
 use super::proposal::{Proposal, Unread, near, propose};
 use super::table_text::{TextTable, bare_unit};
+use crate::header::shorten;
 use crate::rig::{ColumnMap, Decimal, Rig};
 use crate::signal::Signal;
 use serde::Serialize;

@@ -6,12 +6,12 @@ mod hdf5;
 mod vector;
 
 use super::bind::bind;
-use crate::header::shorten;
 use super::error::TraceFault;
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
 use super::quality::Counted;
 use super::stamped::{Stamped, sample};
 use super::table::TableRows;
+use crate::header::shorten;
 use crate::rig::Rig;
 use flate2::read::ZlibDecoder;
 use std::io::{self, Read};

@@ -1,11 +1,11 @@
 use super::clock::{Clock, Step};
-use crate::header::shorten;
 use super::columns::Layout;
 use super::error::TraceFault;
 use super::quality::{BadReason, BadRow, TraceQuality};
 use super::range::Ranges;
 use super::row::Row;
 use super::{BadRows, Record};
+use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::readable;

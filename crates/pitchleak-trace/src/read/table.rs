@@ -1,10 +1,10 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
-use crate::header::shorten;
 use super::columns::{Content, Layout};
 use super::error::{TraceError, TraceFault};
 use super::quality::{BadReason, BadRow, Counted};
 use super::row::{Next, Row, RowSource, check_present};
+use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::Unit;

@@ -173,8 +173,14 @@ fn what_is_no_trace_is_one_line() {
 
 /// Files of few bytes that say more than there is: each once took gigabytes, minutes, or the process with it.
 const FORGED: [(&[u8], &str); 7] = [
-    (include_bytes!("../../../../../fuzz/seeds/parquet/forged-columns.parquet"), "fewer columns than it says"),
-    (include_bytes!("../../../../../fuzz/seeds/parquet/forged-dictionary.parquet"), "fewer values than it says"),
+    (
+        include_bytes!("../../../../../fuzz/seeds/parquet/forged-columns.parquet"),
+        "fewer columns than it says",
+    ),
+    (
+        include_bytes!("../../../../../fuzz/seeds/parquet/forged-dictionary.parquet"),
+        "fewer values than it says",
+    ),
     (include_bytes!("../../../../../fuzz/seeds/parquet/forged-footer-list.parquet"), "breaks off"),
     (include_bytes!("../../../../../fuzz/seeds/parquet/forged-footer-map.parquet"), "breaks off"),
     (include_bytes!("../../../../../fuzz/seeds/parquet/forged-page-list.parquet"), "breaks off"),

@@ -1,0 +1,26 @@
+//! Results as lines of text: verdict first, then what backs it.
+
+mod check;
+mod check_sketch;
+mod diagnosis;
+mod fleet;
+mod fleet_sketch;
+mod replay;
+mod replay_sketch;
+mod replay_terminal;
+
+pub use check_sketch::CheckSketch;
+pub(crate) use diagnosis::companions;
+pub use diagnosis::sentence;
+pub use fleet::fleet_terminal;
+pub use replay::data_line;
+pub(crate) use replay::{misfit, missing_rig, rig_line};
+pub use replay_sketch::ReplaySketch;
+
+use crate::Palette;
+
+/// A result that people read.
+pub trait Text {
+    /// In the colours of `palette`.
+    fn to_text(&self, palette: &Palette) -> String;
+}

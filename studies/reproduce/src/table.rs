@@ -1,0 +1,273 @@
+//! Rows of the paper's table: medians and worst cases over all seeds.
+
+use super::protocol::Case;
+use super::trial::{TrialScore, mean};
+use pitchleak::core::{Estimate, ExcitationSettings};
+use serde::Serialize;
+
+/// The five figures of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ErrorMetrics {
+    /// Mean leakage error in steady state, % of the window's mean |Q|.
+    pub leakage_mean_error_percent: f64,
+    /// Peak leakage error in steady state, % of the window's mean |Q|.
+    pub leakage_peak_error_percent: f64,
+    /// Mean coefficient error in steady state, %.
+    pub coefficient_mean_error_percent: f64,
+    /// Peak coefficient error in steady state, %.
+    pub coefficient_peak_error_percent: f64,
+    /// Time until the coefficient stays within 5 %, s; `null` where it does not.
+    pub convergence_time_s: Option<f64>,
+}
+
+/// What noise alone allows: the figures of an efficient estimator in the same windows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bound {
+    /// Its medians over all seeds.
+    #[serde(flatten)]
+    pub median: Scored,
+    /// Cramér–Rao bound on the coefficient's standard deviation at the end of a window, %: median
+    /// over the windows.
+    pub coefficient_std_percent: f64,
+    /// The same 2 s after the window's start.
+    pub coefficient_std_after_2s_percent: f64,
+    /// Root mean square of (error at the end of the window / bound of that window): 1 is as good as
+    /// any unbiased estimator.
+    pub error_over_bound: f64,
+}
+
+/// One row: wind × case × leak × estimator, over all seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Mean wind, m/s.
+    pub wind_mps: u32,
+    /// Leak setting.
+    pub case: Case,
+    /// `internal` or `external_a`.
+    pub leak: &'static str,
+    /// `paper` or `rls`.
+    pub estimator: &'static str,
+    /// Whether the windows tell this leak apart, by the Cramér–Rao bound: 95 % within 0.1 L/min or a
+    /// tenth of the leak. Only then there are figures.
+    pub identifiable: bool,
+    /// Medians over all seeds.
+    #[serde(flatten)]
+    pub median: Scored,
+    /// Worst over all seeds; `null` where not identifiable.
+    pub worst: Option<ErrorMetrics>,
+    /// Share of the seeds that converged, %.
+    pub converged_percent: f64,
+    /// Share of the seeds whose 95 % interval at the end of the window holds the truth, %; `null` for
+    /// the paper's law.
+    pub coverage_percent: Option<f64>,
+    /// The bound beside it.
+    pub bound: Bound,
+}
+
+/// The five figures, or nulls where the row is not identifiable.
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
+pub struct Scored {
+    /// See [`ErrorMetrics::leakage_mean_error_percent`].
+    pub leakage_mean_error_percent: Option<f64>,
+    /// See [`ErrorMetrics::leakage_peak_error_percent`].
+    pub leakage_peak_error_percent: Option<f64>,
+    /// See [`ErrorMetrics::coefficient_mean_error_percent`].
+    pub coefficient_mean_error_percent: Option<f64>,
+    /// See [`ErrorMetrics::coefficient_peak_error_percent`].
+    pub coefficient_peak_error_percent: Option<f64>,
+    /// See [`ErrorMetrics::convergence_time_s`].
+    pub convergence_time_s: Option<f64>,
+}
+
+/// What one seed adds to a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub score: TrialScore,
+    /// The same of an efficient estimator.
+    pub efficient: TrialScore,
+    pub window: WindowBound,
+}
+
+/// The bound of one leak in one window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WindowBound {
+    /// Standard deviation of the coefficient, share of the truth.
+    pub coefficient: f64,
+    /// The same after the first 2 s.
+    pub coefficient_early: f64,
+    /// Whether the leak is identifiable in it: 95 % within 0.1 L/min or a tenth of itself.
+    pub identifiable: bool,
+}
+
+impl WindowBound {
+    /// From the bounds on the coefficient `leak` at the end and early on, m³/(s·Pa), and the mean size of
+    /// the pressure that drives it.
+    pub fn new(leak: f64, (std, early): (f64, f64), pressure_pa: f64) -> Self {
+        let flow_m3s = Estimate { value: leak, std }.scaled(pressure_pa);
+        Self {
+            coefficient: std / leak,
+            coefficient_early: early / leak,
+            identifiable: ExcitationSettings::default().resolves(&flow_m3s),
+        }
+    }
+}
+
+/// The five figures of all seeds, by `pick`.
+fn error_metrics<'a>(
+    scores: impl Iterator<Item = &'a TrialScore> + Clone,
+    pick: fn(Vec<f64>) -> f64,
+) -> ErrorMetrics {
+    let all = |of: fn(&TrialScore) -> f64| pick(scores.clone().map(of).collect());
+    let time = all(|s| s.convergence_s.unwrap_or(f64::INFINITY));
+    ErrorMetrics {
+        leakage_mean_error_percent: all(|s| s.leakage_mean),
+        leakage_peak_error_percent: all(|s| s.leakage_peak),
+        coefficient_mean_error_percent: all(|s| s.coefficient_mean),
+        coefficient_peak_error_percent: all(|s| s.coefficient_peak),
+        convergence_time_s: Some(time).filter(|t| t.is_finite()),
+    }
+}
+
+impl Row {
+    pub(super) fn of(
+        wind_mps: u32,
+        case: Case,
+        leak: &'static str,
+        estimator: &'static str,
+        entries: &[Entry],
+    ) -> Self {
+        let identifiable = 2 * entries.iter().filter(|e| e.window.identifiable).count() >= entries.len();
+        let scores = entries.iter().map(|e| &e.score);
+        let best = error_metrics(entries.iter().map(|e| &e.efficient), median);
+        let covered: Vec<f64> = entries
+            .iter()
+            .filter_map(|e| e.score.covered)
+            .map(|yes| 100.0 * f64::from(u8::from(yes)))
+            .collect();
+        let of_windows =
+            |of: fn(&WindowBound) -> f64| median(entries.iter().map(|e| of(&e.window)).collect());
+        let ratio = |e: &Entry| (e.score.final_error / (100.0 * e.window.coefficient)).powi(2);
+        Self {
+            wind_mps,
+            case,
+            leak,
+            estimator,
+            identifiable,
+            median: if identifiable {
+                error_metrics(scores.clone(), median).into()
+            } else {
+                Scored::default()
+            },
+            worst: identifiable.then(|| error_metrics(scores.clone(), worst)),
+            converged_percent: 100.0 * mean(scores.map(|s| f64::from(u8::from(s.convergence_s.is_some())))),
+            coverage_percent: (!covered.is_empty()).then(|| mean(covered.into_iter())),
+            bound: Bound {
+                median: if identifiable { best.into() } else { Scored::default() },
+                coefficient_std_percent: 100.0 * of_windows(|w| w.coefficient),
+                coefficient_std_after_2s_percent: 100.0 * of_windows(|w| w.coefficient_early),
+                error_over_bound: mean(entries.iter().map(ratio)).sqrt(),
+            },
+        }
+    }
+}
+
+impl From<ErrorMetrics> for Scored {
+    fn from(figures: ErrorMetrics) -> Self {
+        Self {
+            leakage_mean_error_percent: Some(figures.leakage_mean_error_percent),
+            leakage_peak_error_percent: Some(figures.leakage_peak_error_percent),
+            coefficient_mean_error_percent: Some(figures.coefficient_mean_error_percent),
+            coefficient_peak_error_percent: Some(figures.coefficient_peak_error_percent),
+            convergence_time_s: figures.convergence_time_s,
+        }
+    }
+}
+
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn worst(values: Vec<f64>) -> f64 {
+    values.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The table for people: medians, worst case in brackets; below each leak the efficient estimator.
+pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
+    let mut out = format!(
+        "{title}\n{:33}| {:^29} | {:^29} | {:^13} | coefficient's bound\n\
+         {:>4} {:>4}  {:<10}  {:<9}| {:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
+        "",
+        "leakage error %",
+        "coefficient error %",
+        "within 5 %",
+        "m/s",
+        "case",
+        "leak",
+        "law",
+        "mean",
+        "peak",
+        "mean",
+        "peak",
+        "after s",
+        "1s, 2 s",
+        "1s, end",
+        "ratio"
+    );
+    for leak in rows.chunk_by(|a, b| (a.wind_mps, a.case, a.leak) == (b.wind_mps, b.case, b.leak)) {
+        leak.iter().for_each(|row| out += &line(row));
+        leak.last().into_iter().filter(|row| row.identifiable).for_each(|row| out += &limit_line(row));
+    }
+    out
+}
+
+fn line(row: &Row) -> String {
+    let head =
+        format!("{:>4} {:>4}  {:<10}  {:<9}| ", row.wind_mps, u8::from(row.case), row.leak, row.estimator);
+    let bound = &row.bound;
+    let Some(worst) = row.worst else {
+        return format!("{head}not identifiable: bound {:.1} %\n", bound.coefficient_std_percent);
+    };
+    let [a, b, c, d, e] = row.median.cells();
+    let [wa, wb, wc, wd, we] = Scored::from(worst).cells();
+    let pair = |median: String, worst: String| format!("{median} ({worst})");
+    format!(
+        "{head}{:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
+        pair(a, wa),
+        pair(b, wb),
+        pair(c, wc),
+        pair(d, wd),
+        pair(e, we),
+        short(bound.coefficient_std_after_2s_percent),
+        short(bound.coefficient_std_percent),
+        short(bound.error_over_bound)
+    )
+}
+
+/// What an efficient estimator would show.
+fn limit_line(row: &Row) -> String {
+    let [a, b, c, d, e] = row.bound.median.cells();
+    format!("{:>24}{:<9}| {a:>7}{b:>15}        | {c:>7}{d:>15}        | {e:>6}\n", "", "limit")
+}
+
+impl Scored {
+    fn cells(&self) -> [String; 5] {
+        [
+            self.leakage_mean_error_percent,
+            self.leakage_peak_error_percent,
+            self.coefficient_mean_error_percent,
+            self.coefficient_peak_error_percent,
+            self.convergence_time_s,
+        ]
+        .map(|value| value.map_or_else(|| "-".into(), short))
+    }
+}
+
+/// A number in at most five characters.
+fn short(value: f64) -> String {
+    match value {
+        v if v >= 1000.0 => ">999".into(),
+        v if v >= 100.0 => format!("{v:.0}"),
+        v => format!("{v:.2}"),
+    }
+}

@@ -1,0 +1,160 @@
+//! One estimator on one noisy 20 s window, and how far off it was.
+
+use super::protocol::{ReproduceError, SAMPLE_RATE_HZ, driving_pressures_pa};
+use pitchleak::Rig;
+use pitchleak::core::{Butterworth, Estimate, FilterError, Leak, PerLeak};
+use pitchleak::replay::Estimator;
+use pitchleak::simulate::{Sensing, Truth};
+use pitchleak::trace::Record;
+
+/// Cut-off of the filter on leak flows and pressures, Hz, Section IV.
+const CUTOFF_HZ: f64 = 5.0;
+/// The estimate has converged once its coefficient stays within this share of the truth.
+const BAND: f64 = 0.05;
+/// Where it converges later than this, or never, s, the rest of the window counts as steady state.
+const LATEST_STEADY_S: f64 = 10.0;
+
+/// One leak in one window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrialScore {
+    /// Mean of |Q̂ − Q| in steady state over the mean of |Q|, %.
+    pub leakage_mean: f64,
+    /// Peak of |Q̂ − Q| in steady state over the mean of |Q|, %.
+    pub leakage_peak: f64,
+    /// Mean of |Ĉ/C − 1| in steady state, %.
+    pub coefficient_mean: f64,
+    /// Peak of the same, %.
+    pub coefficient_peak: f64,
+    /// Time until |Ĉ/C − 1| stays within 5 %, s; `None` if it does not.
+    pub convergence_s: Option<f64>,
+    /// Ĉ/C − 1 at the end, %.
+    pub final_error: f64,
+    /// Whether the 95 % interval at the end holds the truth; `None` from the paper's law.
+    pub covered: Option<bool>,
+}
+
+/// What was estimated over time.
+#[derive(Clone, Debug, Default)]
+pub struct EstimateHistory {
+    /// Time since the window began, s.
+    pub t_s: Vec<f64>,
+    /// Coefficients, m³/(s·Pa).
+    pub coefficients: Vec<PerLeak<Estimate<f64>>>,
+    /// Leak flows by eq. (15), from pressures through the 5 Hz filter, m³/s.
+    pub flows_m3s: Vec<PerLeak<f64>>,
+    /// True leak flows through the same filter, m³/s.
+    pub references_m3s: Vec<PerLeak<f64>>,
+}
+
+impl EstimateHistory {
+    /// The rig's estimator on a window as `sensing` reads it.
+    ///
+    /// # Errors
+    /// Where the rig has no estimator, or the filter does not exist at the protocol's rate.
+    pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, ReproduceError> {
+        let mut estimator = Estimator::new(rig)?;
+        let mut history = Self::default();
+        let mut filters = Filters::default();
+        let dt_s = 1.0 / SAMPLE_RATE_HZ;
+        for (index, truth) in window.iter().enumerate() {
+            let sample = sensing.read(&truth.sample);
+            let t_s = index as f64 * dt_s;
+            let record =
+                Record { t_s, dt_s: if index == 0 { 0.0 } else { dt_s }, sample, ..Record::default() };
+            estimator.update(&record);
+            let (read, references) = filters.advance(driving_pressures_pa(&sample), truth.leaks_m3s)?;
+            let coefficients = estimator.leak_coefficients();
+            let [bias_a, bias_b] = estimator.pressure_biases_pa();
+            let found = PerLeak { internal: bias_a - bias_b, external_a: bias_a, external_b: bias_b };
+            let flows = coefficients.zip(read.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
+            history.push(index, coefficients, flows, references);
+        }
+        Ok(history)
+    }
+
+    /// Adds what stands after sample `index`.
+    pub(super) fn push(
+        &mut self,
+        index: usize,
+        coefficients: PerLeak<Estimate<f64>>,
+        flows_m3s: PerLeak<f64>,
+        references_m3s: PerLeak<f64>,
+    ) {
+        self.t_s.push(index as f64 / SAMPLE_RATE_HZ);
+        self.coefficients.push(coefficients);
+        self.flows_m3s.push(flows_m3s);
+        self.references_m3s.push(references_m3s);
+    }
+
+    /// Mean of |Ĉ/C − 1| over the second half of the window.
+    pub fn late_error(&self, truth: f64, leak: Leak) -> f64 {
+        let late = self.coefficients.iter().skip(self.coefficients.len() / 2);
+        mean(late.map(|c| (c[leak].value / truth - 1.0).abs()))
+    }
+
+    /// Scores one leak, whose true coefficient is `truth`.
+    pub fn score(&self, truth: f64, leak: Leak) -> TrialScore {
+        let coefficient =
+            |k: usize| self.coefficients.get(k).map_or(f64::NAN, |c| (c[leak].value / truth - 1.0).abs());
+        let count = self.t_s.len();
+        let converged =
+            (0..count).rev().find(|&k| coefficient(k).is_nan() || coefficient(k) > BAND).map_or(0, |k| k + 1);
+        let latest = ((LATEST_STEADY_S * SAMPLE_RATE_HZ) as usize).min(count);
+        let steady = converged.min(latest);
+        let mean_size = mean(self.references_m3s.iter().map(|q| q[leak].abs()));
+        let leakage = self.flows_m3s.iter().zip(&self.references_m3s).skip(steady);
+        let leakage = || leakage.clone().map(|(q, r)| (q[leak] - r[leak]).abs() / mean_size);
+        let last = self.coefficients.last();
+        let estimate = last.map_or(Estimate { value: f64::NAN, std: f64::NAN }, |c| c[leak]);
+        let [low, high] = estimate.ci95();
+        TrialScore {
+            leakage_mean: 100.0 * mean(leakage()),
+            leakage_peak: 100.0 * leakage().fold(0.0, f64::max),
+            coefficient_mean: 100.0 * mean((steady..count).map(coefficient)),
+            coefficient_peak: 100.0 * (steady..count).map(coefficient).fold(0.0, f64::max),
+            convergence_s: (converged < count).then(|| converged as f64 / SAMPLE_RATE_HZ),
+            final_error: 100.0 * (estimate.value / truth - 1.0),
+            covered: (estimate.std > 0.0).then_some(low <= truth && truth <= high),
+        }
+    }
+}
+
+/// The paper's filter on the pressures that drive the leaks and on the true leak flows; it starts settled on
+/// the first values.
+#[derive(Default)]
+pub(super) struct Filters(Option<(PerLeakFilter, PerLeakFilter)>);
+
+type PerLeakFilter = PerLeak<Butterworth<f64>>;
+
+impl Filters {
+    /// Pressures, Pa, and leak flows, m³/s, behind the filter.
+    pub fn advance(
+        &mut self,
+        pressures: PerLeak<f64>,
+        leaks: PerLeak<f64>,
+    ) -> Result<(PerLeak<f64>, PerLeak<f64>), FilterError> {
+        let (of_pressures, of_leaks) = match &mut self.0 {
+            Some(filters) => filters,
+            none => none.insert((settled(pressures)?, settled(leaks)?)),
+        };
+        Ok((advance(of_pressures, pressures), advance(of_leaks, leaks)))
+    }
+}
+
+fn settled(start: PerLeak<f64>) -> Result<PerLeakFilter, FilterError> {
+    let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
+    Ok(start.map(|start| {
+        let mut filter = filter;
+        filter.reset(start);
+        filter
+    }))
+}
+
+fn advance(filters: &mut PerLeakFilter, values: PerLeak<f64>) -> PerLeak<f64> {
+    PerLeak::from_fn(|leak| filters[leak].update(values[leak]))
+}
+
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
