@@ -1,19 +1,9 @@
 //! A small blind bench against its snapshot: `data/blind-snapshot.csv` says how often each effect was named right.
 //! After a deliberate change: `BLIND_SNAPSHOT=write cargo test --release --test blind`, and read the difference.
 
-#[allow(dead_code, reason = "the tables of the bench read more of it")]
-#[path = "../benches/blind/attainable.rs"]
-mod attainable;
-#[allow(dead_code, reason = "the tables of the bench read more of it")]
-#[path = "../benches/blind/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "the tables of the bench read more of it")]
-#[path = "../benches/blind/tally.rs"]
-mod tally;
-
-use cases::{Ailment, Case, Excitation, cases};
+use pitchleak_testkit::blind::tables::{Tally, sweep};
+use pitchleak_testkit::blind::{Ailment, Case, Excitation, cases};
 use std::collections::BTreeMap;
-use tally::Tally;
 
 const ACCURACIES: [f64; 1] = [1e-3];
 const MULTIPLES: [f64; 1] = [3.0];
@@ -58,16 +48,13 @@ fn written(rows: &[(String, Answers)]) -> String {
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn regress_names_are_right_as_often_as_in_the_snapshot() {
-    if cfg!(debug_assertions) {
-        eprintln!("too slow without optimisation: nothing tested");
-        return;
-    }
     let all: Vec<Case> = [Excitation::Wind, Excitation::MultiSine]
         .into_iter()
         .flat_map(|excitation| cases(excitation, &ACCURACIES, &MULTIPLES))
         .collect();
-    let tallies = tally::sweep(&all, |case| if case.ailment == Ailment::None { SOUND_SEEDS } else { 1 });
+    let tallies = sweep(&all, |case| if case.ailment == Ailment::None { SOUND_SEEDS } else { 1 });
     let rows: Vec<(String, Answers)> =
         all.iter().zip(&tallies).map(|(case, tally)| answers(case, tally)).collect();
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/blind-snapshot.csv");

@@ -1,36 +1,21 @@
 //! A small piece of the bench of confidence (`cargo bench --bench confidence`): sound rigs, two effects at once, effects that no
 //! table has.
 
-#[allow(dead_code, reason = "the bench asks more of it")]
-#[path = "../benches/confidence/cases.rs"]
-mod cases;
-#[allow(dead_code, reason = "the bench asks more of it")]
-#[path = "../benches/confidence/plant.rs"]
-mod plant;
-#[allow(dead_code, reason = "the bench asks more of it")]
-#[path = "../benches/confidence/questions.rs"]
-mod questions;
-#[allow(dead_code, reason = "the bench prints more of it")]
-#[path = "../benches/confidence/tally.rs"]
-mod tally;
-
-use cases::Case;
 use pitchleak::diagnose::{Diagnosis, Verdict};
+use pitchleak_testkit::confidence::plant::Rest;
+use pitchleak_testkit::confidence::{Case, all_named, ask_all, deviations, first_is_true, line, questions};
 
 /// Every `stride`th from `first`.
 fn asked(cases: Vec<Case>, first: usize, stride: usize) -> Vec<(Case, Diagnosis)> {
-    if cfg!(debug_assertions) {
-        eprintln!("too slow without optimisation: nothing tested");
-        return vec![];
-    }
-    tally::ask_all(&cases.into_iter().skip(first).step_by(stride).collect::<Vec<_>>())
+    ask_all(&cases.into_iter().skip(first).step_by(stride).collect::<Vec<_>>())
 }
 
 fn lines(answers: &[(Case, Diagnosis)]) -> String {
-    answers.iter().map(|(case, answer)| tally::line(case, answer) + "\n").collect()
+    answers.iter().map(|(case, answer)| line(case, answer) + "\n").collect()
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
     let answers = asked(questions::sound(1), 2, 9);
     let sound = answers.iter().filter(|(_, answer)| answer.verdict == Verdict::NoMissingEffect).count();
@@ -39,16 +24,16 @@ fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn two_effects_are_both_named_and_their_values_hold() {
     let answers = asked(questions::two(24), 0, 2);
-    let is_explained = |(case, answer): &&(Case, Diagnosis)| {
-        answer.verdict == Verdict::Explained && tally::all_named(case, answer)
-    };
+    let is_explained =
+        |(case, answer): &&(Case, Diagnosis)| answer.verdict == Verdict::Explained && all_named(case, answer);
     let explained = answers.iter().filter(is_explained).count();
-    let first = answers.iter().filter(|(case, answer)| tally::first_is_true(case, answer)).count();
+    let first = answers.iter().filter(|(case, answer)| first_is_true(case, answer)).count();
     for (case, answer) in &answers {
-        let worst = tally::deviations(case, answer).into_iter().fold(0.0, f64::max);
-        assert!(worst < 4.5, "{}", tally::line(case, answer));
+        let worst = deviations(case, answer).into_iter().fold(0.0, f64::max);
+        assert!(worst < 4.5, "{}", line(case, answer));
     }
     // Dry friction leaves more than noise in two.
     assert!(first == answers.len(), "{first} of {}:\n{}", answers.len(), lines(&answers));
@@ -56,57 +41,62 @@ fn two_effects_are_both_named_and_their_values_hold() {
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn an_effect_that_no_table_has_is_never_surely_explained_by_another() {
     for (case, answer) in asked(questions::outside(26), 0, 2) {
         let surely = answer.effects.iter().any(|effect| effect.confident);
-        assert!(!(surely && answer.verdict == Verdict::Explained), "{}", tally::line(&case, &answer));
+        assert!(!(surely && answer.verdict == Verdict::Explained), "{}", line(&case, &answer));
     }
 }
 
 /// A pressure sensor with play is named with its width, and not as one that answers late.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_sensor_that_hangs_behind_is_no_sensor_that_is_late() {
     let mut cases = questions::further(72);
     cases.retain(|case| case.name == "pressure sensor with play");
     assert!(cases.len() >= 6);
     for (case, answer) in asked(cases, 0, 2) {
-        assert!(tally::first_is_true(&case, &answer), "{}", tally::line(&case, &answer));
+        assert!(first_is_true(&case, &answer), "{}", line(&case, &answer));
         let off = answer.effects[0].value / case.truth[0].1 - 1.0;
         let is_explained = answer.verdict == Verdict::Explained;
-        assert!(off.abs() < 0.1 && is_explained, "{}", tally::line(&case, &answer));
+        assert!(off.abs() < 0.1 && is_explained, "{}", line(&case, &answer));
         let late = answer.effects.iter().any(|effect| effect.confident && effect.id.contains("_lag"));
-        assert!(!late, "{}", tally::line(&case, &answer));
+        assert!(!late, "{}", line(&case, &answer));
     }
 }
 
 /// Backlash of the position and a dead band of a meter are named before all else, and their sizes hold. Sensors of 1 % hide the smallest.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn backlash_and_a_dead_band_are_named_in_their_size() {
     let mut cases = questions::further(96);
     cases.retain(|case| ["backlash", "dead band"].contains(&case.name.as_str()) && case.accuracy < 1e-2);
     assert!(cases.len() >= 10, "{}", cases.len());
     for (case, answer) in asked(cases, 0, 2) {
-        let worst = tally::deviations(&case, &answer).into_iter().fold(0.0, f64::max);
-        assert!(tally::first_is_true(&case, &answer) && worst < 4.0, "{}", tally::line(&case, &answer));
+        let worst = deviations(&case, &answer).into_iter().fold(0.0, f64::max);
+        assert!(first_is_true(&case, &answer) && worst < 4.0, "{}", line(&case, &answer));
     }
 }
 
 /// A hose is its resistance, volume and inertia; clocks that drift apart are a lag that no law of the table has all the time.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_hose_and_clocks_apart_come_out_first_as_what_they_are_made_of() {
     let mut cases = questions::further(48);
     cases.retain(|case| ["hose with inertia", "clocks apart"].contains(&case.name.as_str()));
     assert!(cases.len() >= 8);
     for (case, answer) in asked(cases, 0, 3) {
-        assert!(tally::first_is_true(&case, &answer), "{}", tally::line(&case, &answer));
+        assert!(first_is_true(&case, &answer), "{}", line(&case, &answer));
         let is_sure = answer.effects.iter().any(|effect| effect.confident);
-        assert!(case.name == "hose with inertia" || !is_sure, "{}", tally::line(&case, &answer));
+        assert!(case.name == "hose with inertia" || !is_sure, "{}", line(&case, &answer));
     }
 }
 
 /// Beside large effects that act on each other, or are as large as what is declared, no small wrong name is sure: a meter's lag of 0.2 ms and a
 /// line's resistance beside a hose, and a mass that takes away all that is declared beside an accumulator.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn what_an_error_of_a_large_effect_leaves_is_no_sure_small_one() {
     let of = |mut cases: Vec<Case>, draw: u64, seed: u64| {
         cases.iter_mut().for_each(|case| case.seed += draw);
@@ -118,13 +108,14 @@ fn what_an_error_of_a_large_effect_leaves_is_no_sure_small_one() {
     for (case, answer) in asked(cases, 0, 1) {
         let is_true = |id: &str| case.truth.iter().any(|(own, _)| *own == id);
         let wrong = answer.effects.iter().any(|effect| effect.confident && !is_true(effect.id));
-        assert!(!wrong && tally::first_is_true(&case, &answer), "{}", tally::line(&case, &answer));
+        assert!(!wrong && first_is_true(&case, &answer), "{}", line(&case, &answer));
     }
 }
 
 /// A pressure sensor whose scale bends may pass for one with a gain and an offset, and a leak that grows faster than its pressure for one
 /// that opens at a pressure: where the traces do not tell, no name is sure.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_bend_that_fits_as_well_takes_confidence_from_gain_and_offset_and_from_a_cracking_pressure() {
     let mut cases = questions::outside(208);
     cases.iter_mut().for_each(|case| case.seed += 41_000);
@@ -132,46 +123,49 @@ fn a_bend_that_fits_as_well_takes_confidence_from_gain_and_offset_and_from_a_cra
     assert_eq!(cases.len(), 2);
     for (case, answer) in asked(cases, 0, 1) {
         assert!(["bent pressure sensor", "steep leak"].contains(&case.name.as_str()), "{}", case.name);
-        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", tally::line(&case, &answer));
+        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", line(&case, &answer));
     }
 }
 
 /// The size of a leak above a pressure is known no better than that pressure is.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_leak_above_a_pressure_has_the_spread_of_the_pressure_in_its_own() {
     let mut cases = questions::further(48);
     cases.iter_mut().for_each(|case| case.seed += 43_000);
     cases.retain(|case| case.name == "leak above a pressure");
     for (case, answer) in asked(cases, 0, 1) {
-        let worst = tally::deviations(&case, &answer).into_iter().fold(0.0, f64::max);
-        assert!(tally::first_is_true(&case, &answer) && worst < 4.0, "{}", tally::line(&case, &answer));
+        let worst = deviations(&case, &answer).into_iter().fold(0.0, f64::max);
+        assert!(first_is_true(&case, &answer) && worst < 4.0, "{}", line(&case, &answer));
     }
 }
 
 /// Stops of a heavy piston between two samples at 20 Hz: what is left of the forces there was noise to the fit, then friction.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_stop_that_samples_do_not_see_is_neither_noise_nor_friction() {
     let large = |seed| Case {
         size: 5.0,
         rate_hz: 20.0,
-        rest: plant::Rest::Half,
+        rest: Rest::Half,
         seconds: 600.0,
         pressure_full_scale: 40e6,
         ..Case::sound("stops", seed)
     };
     for (case, answer) in asked([9509, 200_509].map(large).into(), 0, 1) {
-        assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{}", tally::line(&case, &answer));
+        assert_eq!(answer.verdict, Verdict::NoMissingEffect, "{}", line(&case, &answer));
     }
 }
 
 /// A meter that reads the position a little leaves less than noise, in a colour: no name beside it is sure.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn beside_what_is_small_but_no_noise_a_weak_effect_is_doubtful() {
     let mut cases: Vec<Case> = questions::outside(7).split_off(6);
     cases.iter_mut().for_each(|case| case.seed += 11_000);
     for (case, answer) in asked(cases, 0, 1) {
         assert_eq!(case.name, "cross-talk");
-        assert!(!answer.effects.is_empty(), "{}", tally::line(&case, &answer));
-        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", tally::line(&case, &answer));
+        assert!(!answer.effects.is_empty(), "{}", line(&case, &answer));
+        assert!(answer.effects.iter().all(|effect| !effect.confident), "{}", line(&case, &answer));
     }
 }

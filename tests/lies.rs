@@ -1,27 +1,10 @@
 //! A small bench of lies against its snapshot: `data/lies-snapshot.csv` says how each trace was judged.
 //! After a deliberate change: `LIES_SNAPSHOT=write cargo test --release --test lies`, and read the difference.
 
-#[path = "../benches/lies/judge.rs"]
-mod judge;
-#[path = "../benches/lies/lie.rs"]
-mod lie;
-#[allow(dead_code, reason = "the bench prints more of it")]
-#[path = "../benches/lies/on_its_way.rs"]
-mod on_its_way;
-#[allow(dead_code, reason = "the bench also lets leaks open")]
-#[path = "../benches/lies/plant.rs"]
-mod plant;
-#[path = "../benches/lies/sweep.rs"]
-mod sweep;
-#[allow(dead_code, reason = "the bench prints more of it")]
-#[path = "../benches/lies/table.rs"]
-mod table;
-
-use judge::Door;
-use lie::{Family, LIES};
 use pitchleak::wind::WindCase;
+use pitchleak_testkit::lies::judge::{Door, Outcome, csv, key, sweep};
+use pitchleak_testkit::lies::{Family, LIES, OPENS_S, on_its_way};
 use std::collections::{BTreeMap, BTreeSet};
-use sweep::Outcome;
 
 const ACCURACIES: [f64; 1] = [3e-3];
 const WINDS: [WindCase; 2] = [WindCase::Mps5, WindCase::Mps13];
@@ -57,11 +40,8 @@ fn every_lie_has_a_name_of_its_own() {
 
 /// Whatever a stream says before its last word was read as well, and acted on.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn no_word_of_a_stream_is_confidently_wrong_where_a_meters_zero_is_off() {
-    if cfg!(debug_assertions) {
-        eprintln!("too slow without optimisation: nothing tested");
-        return;
-    }
     let streams = on_its_way::sweep(&ACCURACIES, &WINDS, &[1]);
     let wrong: Vec<_> = streams.iter().filter(|stream| !stream.wrong_s.is_empty()).collect();
     assert!(wrong.iter().all(|stream| stream.names_no_other()), "{wrong:#?}");
@@ -74,27 +54,21 @@ fn no_word_of_a_stream_is_confidently_wrong_where_a_meters_zero_is_off() {
 
 /// No leak lets oil in: zeros explain a leak beside another one that does, and only so in calm wind.
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_small_leak_that_opens_beside_honest_sensors_is_soon_sure() {
-    if cfg!(debug_assertions) {
-        eprintln!("too slow without optimisation: nothing tested");
-        return;
-    }
     for stream in on_its_way::openings(&ACCURACIES, &WINDS, &[1], 0.2) {
-        let sure_s = stream.sure_s.map(|s| s - plant::OPENS_S);
+        let sure_s = stream.sure_s.map(|s| s - OPENS_S);
         assert!(sure_s.is_some_and(|s| s <= SMALL_LEAK_SURE_WITHIN_S), "{sure_s:?}: {stream:#?}");
     }
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
-    if cfg!(debug_assertions) {
-        eprintln!("too slow without optimisation: nothing tested");
-        return;
-    }
-    let outcomes = sweep::sweep(&ACCURACIES, &WINDS, 1);
+    let outcomes = sweep(&ACCURACIES, &WINDS, 1);
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/lies-snapshot.csv");
     if std::env::var_os("LIES_SNAPSHOT").is_some() {
-        std::fs::write(path, table::csv(&outcomes)).expect("the snapshot is written");
+        std::fs::write(path, csv(&outcomes)).expect("the snapshot is written");
     }
     let before = read(&std::fs::read_to_string(path).expect("the snapshot is there"));
     assert_eq!(before.len(), outcomes.len(), "the lies have changed: write the snapshot anew");
@@ -102,7 +76,7 @@ fn regress_no_family_is_judged_worse_than_in_the_snapshot() {
         let (mut runs, mut lost, mut misnamed, mut wrong) = (0, 0, 0, Vec::new());
         let own = |outcome: &&Outcome| outcome.door == door && outcome.lie.family == family;
         for outcome in outcomes.iter().filter(own) {
-            let key = table::key(outcome);
+            let key = key(outcome);
             let (right, wrong_before) =
                 before.get(&key).unwrap_or_else(|| panic!("{key} is not in the snapshot"));
             runs += outcome.runs();

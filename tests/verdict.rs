@@ -1,23 +1,12 @@
 //! The verdict on traces whose sensors lie: is each kind of reason given where it should be, and none where nothing is
 //! wrong?
 
-#[allow(dead_code, reason = "the bench asks more of it")]
-#[path = "../benches/lies/judge.rs"]
-mod judge;
-#[allow(dead_code, reason = "the bench has more of them")]
-#[path = "../benches/lies/lie.rs"]
-mod lie;
-#[allow(dead_code, reason = "the bench also lets leaks open")]
-#[path = "../benches/lies/plant.rs"]
-mod plant;
-
-use judge::{Judgement, Said, judge, recorded};
-use lie::{Family, Lie};
 use pitchleak::core::{EffectSet, Leak, PerLeak};
 use pitchleak::report::{ReplayReport, Status};
 use pitchleak::simulate::{Scenario, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
-use plant::{LEAKING, leak_name, truths};
+use pitchleak_testkit::lies::judge::{self, Judgement, Said, judge, recorded};
+use pitchleak_testkit::lies::{Family, LEAKING, Lie, leak_name, rig, truths};
 use rayon::prelude::*;
 
 fn lie(faults: &'static [&'static str]) -> Lie {
@@ -114,7 +103,7 @@ fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let leaks = PerLeak { external_a: course.parse().expect("a course"), ..PerLeak::default() };
     let scenario = Scenario {
-        rig: plant::rig(1e-2),
+        rig: rig(1e-2),
         reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
         leaks,
         oil_temperature: None,

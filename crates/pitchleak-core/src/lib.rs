@@ -48,6 +48,7 @@
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+pub mod continuity;
 mod detector;
 pub mod effects;
 pub mod emulator;

@@ -2,19 +2,11 @@
 
 use crate::errors::trace_error;
 use crate::rig::Rig;
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, TimestampNanosecondType};
-use arrow_array::{Array, RecordBatch};
-use arrow_buffer::ScalarBuffer;
-use arrow_cast::cast;
-use arrow_schema::{DataType, TimeUnit};
-use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
-use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::type_object::PyTypeInfo;
 use pyo3::types::{PyType, PyWeakrefReference};
-use pyo3_arrow::input::AnyRecordBatch;
 
 /// What the columns of a table are read as, by their headers.
 #[pyclass(frozen, module = "pitchleak._pitchleak")]
@@ -68,7 +60,6 @@ pub struct Table {
 enum Column {
     Ignored,
     Numpy(Py<PyArray1<f64>>),
-    Arrow(ScalarBuffer<f64>),
     Converted(Vec<f64>),
 }
 
@@ -81,17 +72,17 @@ enum Given<'py> {
 
 #[pymethods]
 impl Table {
-    /// Contiguous float64 arrays, int64 nanoseconds for timestamps, None where ignored. ``first_ns`` is
-    /// where timestamps count from, else their own first.
+    /// Of each batch of rows a contiguous float64 array per header, int64 nanoseconds for timestamps, None where
+    /// ignored. ``first_ns`` is where timestamps count from, else their own first.
     #[staticmethod]
-    #[pyo3(signature = (layout, columns, first_ns = None))]
+    #[pyo3(signature = (layout, batches, first_ns = None))]
     fn from_arrays(
         layout: &Layout,
-        columns: Vec<Option<Given<'_>>>,
+        batches: Vec<Vec<Option<Given<'_>>>>,
         first_ns: Option<i64>,
     ) -> PyResult<Self> {
         let mut first_ns = first_ns;
-        let hold = |column: Option<Given<'_>>| match column {
+        let mut hold = |column: Option<Given<'_>>| match column {
             None => Ok(Column::Ignored),
             Some(Given::Numbers(array)) if is_plain(&array) => Ok(Column::Numpy(array.unbind())),
             Some(Given::Numbers(_)) => Err(PyValueError::new_err("arrays must be contiguous")),
@@ -100,27 +91,9 @@ impl Table {
                 Ok(Column::Converted(seconds(times.iter().copied(), &mut first_ns)))
             }
         };
-        let columns = columns.into_iter().map(hold).collect::<PyResult<_>>()?;
-        Ok(Self { layout: layout.clone(), batches: vec![columns], first_ns })
-    }
-
-    /// Anything with the Arrow PyCapsule interface.
-    #[staticmethod]
-    #[pyo3(signature = (data, rig, first_ns = None))]
-    fn from_arrow(
-        py: Python<'_>,
-        data: &Bound<'_, PyAny>,
-        rig: &Rig,
-        first_ns: Option<i64>,
-    ) -> PyResult<Self> {
-        // A library that breaks off halfway, or columns that are no table.
-        let read = data.extract::<AnyRecordBatch>().and_then(|data| Ok(data.into_table()?));
-        let (batches, schema) = read.map_err(|error| unreadable(py, &error))?.into_inner();
-        let headers: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
-        let layout = Layout::new(py, headers, rig)?;
-        let mut first_ns = first_ns;
-        let batches = batches.iter().map(|batch| arrow_columns(batch, &layout.read, &mut first_ns));
-        Ok(Self { batches: batches.collect::<PyResult<_>>()?, layout, first_ns })
+        let batches = batches.into_iter().map(|columns| columns.into_iter().map(&mut hold).collect());
+        let batches = batches.collect::<PyResult<_>>()?;
+        Ok(Self { layout: layout.clone(), batches, first_ns })
     }
 
     /// Where its timestamps count from, ns since 1970; None where it has none.
@@ -129,32 +102,29 @@ impl Table {
         self.first_ns
     }
 
-    /// Bytes of the columns that had to be converted; the others are not copied.
+    /// The columns of each batch, times in seconds; float64 ones are those that were lent, not copies.
     #[getter]
-    fn converted_bytes(&self) -> usize {
-        let size = |column: &Column| match column {
-            Column::Converted(values) => size_of_val(values.as_slice()),
-            _ => 0,
+    fn batches<'py>(&self, py: Python<'py>) -> Batches<'py> {
+        let array = |column: &Column| match column {
+            Column::Ignored => None,
+            Column::Numpy(array) => Some(array.bind(py).clone()),
+            Column::Converted(values) => Some(PyArray1::from_slice(py, values)),
         };
-        self.batches.iter().flatten().map(size).sum()
+        self.batches.iter().map(|batch| batch.iter().map(array).collect()).collect()
     }
 
-    /// As one batch of copies, times in seconds: what is read of them is the same.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
-        let (py, this) = (slf.py(), slf.get());
-        let lent = this.lend(py)?;
-        let batches = this.slices(&lent)?;
-        let copied = |(index, content): (usize, ColumnContent)| {
-            let parts: Vec<_> = batches.iter().filter_map(|batch| batch.get(index).copied()).collect();
-            (content != ColumnContent::Ignored).then(|| parts.concat().into_pyarray(py))
-        };
-        let columns = this.layout.read.contents().enumerate().map(copied).collect();
-        Ok((slf.get_type().getattr("from_arrays")?, (this.layout.clone(), columns, this.first_ns)))
+        let this = slf.get();
+        let parts = (this.layout.clone(), this.batches(slf.py()), this.first_ns);
+        Ok((slf.get_type().getattr("from_arrays")?, parts))
     }
 }
 
+/// An array per header in each batch.
+type Batches<'py> = Vec<Vec<Option<Bound<'py, PyArray1<f64>>>>>;
+
 /// What [`Table::from_arrays`] makes a table of.
-type Parts<'py> = (Layout, Vec<Option<Bound<'py, PyArray1<f64>>>>, Option<i64>);
+type Parts<'py> = (Layout, Batches<'py>, Option<i64>);
 
 impl Table {
     pub fn layout(&self) -> &TableLayout {
@@ -174,7 +144,6 @@ impl Table {
     pub fn slices<'a>(&'a self, lent: &'a [Vec<Option<Lent<'_>>>]) -> PyResult<Vec<Vec<&'a [f64]>>> {
         let slice = |(column, lent): (&'a Column, &'a Option<Lent<'_>>)| match (column, lent) {
             (Column::Numpy(_), Some(array)) => array.as_slice(),
-            (Column::Arrow(buffer), _) => Ok(&buffer[..]),
             (Column::Converted(values), _) => Ok(&values[..]),
             (Column::Ignored | Column::Numpy(_), _) => Ok(&[][..]),
         };
@@ -223,65 +192,4 @@ fn seconds(times_ns: impl Iterator<Item = i64>, first_ns: &mut Option<i64>) -> V
         seconds_between(i128::from(*first_ns.get_or_insert(time)), i128::from(time))
     };
     times_ns.map(&mut since_first).collect()
-}
-
-fn arrow_columns(
-    batch: &RecordBatch,
-    layout: &TableLayout,
-    first_ns: &mut Option<i64>,
-) -> PyResult<Vec<Column>> {
-    let schema = batch.schema();
-    let columns = layout.contents().zip(batch.columns()).zip(schema.fields());
-    let read =
-        |((content, array), field): ((ColumnContent, &arrow_array::ArrayRef), &arrow_schema::FieldRef)| {
-            match content {
-                ColumnContent::Ignored => Ok(Column::Ignored),
-                ColumnContent::Numbers => numbers(field.name(), array),
-                ColumnContent::Timestamps => timestamps(field.name(), array, first_ns),
-            }
-        };
-    columns.map(read).collect()
-}
-
-/// A column without nulls and of f64 is taken as it is.
-fn numbers(name: &str, array: &dyn Array) -> PyResult<Column> {
-    let kind = array.data_type();
-    let whole = matches!(kind, DataType::Null) || kind.is_floating() || kind.is_integer();
-    if !whole {
-        return Err(wrong_type(name, kind, "numbers"));
-    }
-    let floats = cast(array, &DataType::Float64).map_err(|_| wrong_type(name, kind, "numbers"))?;
-    let floats = floats.as_primitive::<Float64Type>();
-    if floats.null_count() == 0 {
-        return Ok(Column::Arrow(floats.values().clone()));
-    }
-    Ok(Column::Converted(floats.iter().map(|value| value.unwrap_or(f64::NAN)).collect()))
-}
-
-fn timestamps(name: &str, array: &dyn Array, first_ns: &mut Option<i64>) -> PyResult<Column> {
-    let kind = array.data_type();
-    if !matches!(kind, DataType::Timestamp(..)) {
-        return Err(wrong_type(name, kind, "timestamps"));
-    }
-    let zone = match kind {
-        DataType::Timestamp(_, zone) => zone.clone(),
-        _ => None,
-    };
-    let times = cast(array, &DataType::Timestamp(TimeUnit::Nanosecond, zone))
-        .map_err(|_| wrong_type(name, kind, "timestamps"))?;
-    let times = times.as_primitive::<TimestampNanosecondType>();
-    Ok(Column::Converted(seconds(times.iter().map(|time| time.unwrap_or(NOT_A_TIME)), first_ns)))
-}
-
-/// Of pyo3-arrow's errors some are a bare `Exception`; Python's own stay what they are.
-fn unreadable(py: Python<'_>, error: &PyErr) -> PyErr {
-    if error.get_type(py).is(PyException::type_object(py)) {
-        let text = error.value(py).to_string().replace('\n', " ");
-        return PyValueError::new_err(format!("no table of columns: {text}"));
-    }
-    error.clone_ref(py)
-}
-
-fn wrong_type(name: &str, found: &DataType, wanted: &str) -> PyErr {
-    PyTypeError::new_err(format!("column `{name}` holds {found}; {wanted} are expected"))
 }

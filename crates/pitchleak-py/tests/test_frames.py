@@ -1,6 +1,8 @@
 """A trace in whatever kind of frame it comes: the same numbers to the last bit, or a typed error."""
 
+import sys
 import warnings
+from decimal import Decimal
 
 import duckdb
 import numpy as np
@@ -155,6 +157,106 @@ def test_columns_of_any_number_type_without_a_copy_of_their_own(trace):
         pa.table(rounded),
     ):
         assert same(pl.replay(data), expected)
+
+
+class Capsule:
+    """A table of a library that nobody knows, by its interface alone."""
+
+    def __init__(self, table):
+        self.table = table
+
+    def __arrow_c_stream__(self, requested_schema=None):
+        return self.table.__arrow_c_stream__(requested_schema)
+
+
+def decimals(values):
+    return pa.array([Decimal(str(value)) for value in values], pa.decimal128(20, 10))
+
+
+@pytest.mark.parametrize(
+    ("make", "rounding"),
+    [
+        (pa.array, 0.0),
+        (lambda values: pa.array(values).dictionary_encode(), 0.0),
+        (lambda values: pa.array(values.astype(np.float32)), 1e-7),
+        (decimals, 1e-15),
+        (
+            lambda values: pa.chunked_array([pa.array(values[:10]), pa.array(values[10:11]), pa.array(values[11:])]),
+            True,
+        ),
+    ],
+    ids=["float64", "dictionary", "float32", "decimal", "cut at other rows"],
+)
+def test_arrow_columns_of_any_type_of_number(trace, make, rounding):
+    read = make(trace["pa_bar"]).cast(pa.float64()).to_numpy(zero_copy_only=False)
+    np.testing.assert_allclose(read, trace["pa_bar"], rtol=rounding)
+    expected = pl.replay(trace | {"pa_bar": read})
+    table = pa.table(trace | {"pa_bar": make(trace["pa_bar"])})
+    for data in (table, table.combine_chunks().to_batches()[0], Capsule(table)):
+        assert same(pl.replay(data), expected)
+
+
+def test_polars_columns_of_any_type_of_number(trace):
+    whole = trace | {"temp_c": np.full(len(trace["t_s"]), 40.0)}
+    expected = pl.replay(whole)
+    frame = polars.DataFrame(whole)
+    for kind in (polars.Int8, polars.UInt64, polars.Int128, polars.Float32, polars.Decimal(10, 2)):
+        assert same(pl.replay(frame.with_columns(polars.col("temp_c").cast(kind))), expected), kind
+    cut = polars.concat([frame["pa_bar"][:7], frame["pa_bar"][7:]], rechunk=False)
+    assert cut.n_chunks() == 2 and same(pl.replay(frame.with_columns(cut)), expected)
+    missing = frame.with_columns(polars.Series("temp_c", [None] * len(frame)))
+    assert same(pl.replay(missing), pl.replay(whole | {"temp_c": np.full(len(frame), np.nan)}))
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_time_stamps_of_any_unit_and_zone(unit, zone):
+    count = 300
+    columns = {"x_m": np.full(count, 0.1), "pa_pa": np.full(count, 5e6), "pb_pa": np.full(count, 4e6)}
+    seconds = np.arange(count) + np.datetime64("2026-10-25T00:58:00", "s")
+    expected = pl.replay(columns | {"timestamp": seconds})
+    late = [*seconds[:100].tolist(), None, *seconds[101:].tolist()]
+    stamps = pa.array(seconds).cast(pa.timestamp(unit, zone))
+    table = pa.table(columns | {"timestamp": stamps})
+    frames = [table, Capsule(table)] if unit == "s" else [table, Capsule(table), polars.from_arrow(table)]
+    for frame in frames:
+        out = pl.replay(frame)
+        assert same(out, expected) and out.trace.begins == "2026-10-25T00:58:00+00:00"
+    with pytest.warns(pl.TraceWarning, match="row 100, column `timestamp`"):
+        out = pl.replay(pa.table(columns | {"timestamp": pa.array(late, pa.timestamp(unit, zone))}))
+    assert out.trace.skipped == 1
+
+
+def test_times_beyond_nanoseconds_are_missing():
+    times = np.array(["2026-01-01", "9999-01-01", "2026-01-01T00:00:01"], "datetime64[s]")
+    columns = {"x_m": np.full(3, 0.1), "pa_pa": np.full(3, 5e6), "pb_pa": np.full(3, 4e6), "timestamp": times}
+    for frame in (columns, pa.table(columns)):
+        with pytest.warns(pl.TraceWarning, match="row 1, column `timestamp`"):
+            assert pl.replay(frame).trace.skipped == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "error", "words"),
+    [
+        (Capsule(pa.chunked_array([[1.0, 2.0]])), ValueError, "no table of columns: "),
+        (pa.array([1.0, 2.0]), ValueError, "no table of columns: "),
+        (pa.table([[1.0], [2.0]], names=["t_s", "t_s"]), ValueError, "`t_s`"),
+        (pa.table({"timestamp": [1.0]}), pl.TraceError, "no column"),
+        (pa.table({"timestamp": [1.0], "x_m": [1.0], "pa_pa": [1.0], "pb_pa": [1.0]}), TypeError, "timestamps are"),
+        (pa.table({"t_s": [True], "x_m": [1.0], "pa_pa": [1.0], "pb_pa": [1.0]}), TypeError, "`t_s` holds bool"),
+    ],
+)
+def test_arrow_that_is_no_trace(data, error, words):
+    with pytest.raises(error, match=words) as raised:
+        pl.replay(data)
+    assert "\n" not in str(raised.value)
+
+
+def test_without_pyarrow_polars_needs_nothing_and_others_say_what(trace, expected, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert same(pl.replay(polars.DataFrame(trace)), expected)
+    with pytest.raises(ImportError, match="pitchleak\\[arrow\\]"):
+        pl.replay(Capsule(polars.DataFrame(trace)))
 
 
 KINDS = {

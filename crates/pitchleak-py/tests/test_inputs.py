@@ -162,7 +162,7 @@ def test_an_error_carries_column_and_row():
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (pa.table(sound(3) | {"x_m": ["a", "b", "c"]}), "column `x_m` holds Utf8; numbers are expected"),
+        (pa.table(sound(3) | {"x_m": ["a", "b", "c"]}), "column `x_m` holds string; numbers are expected"),
         (polars.DataFrame(sound(3) | {"x_m": [True, False, None]}), "column `x_m` holds Boolean"),
         (pd.DataFrame({0: [1.0]}), "column names are texts such as `t_s`; 0 is none"),
         (42, "int is no trace"),

@@ -116,13 +116,31 @@ def test_time_stamps(columns, rig):
             np.testing.assert_allclose(out.table[column], values, rtol=1e-9, atol=1e-15)
 
 
+def addresses(batch):
+    return [array.__array_interface__["data"][0] for array in batch]
+
+
 def test_float64_columns_are_not_copied(columns, rig):
     from pitchleak import _inputs
 
-    for frame in (columns, pd.DataFrame(columns), polars.DataFrame(columns), pa.table(columns)):
-        assert _inputs.source(frame, rig).converted_bytes == 0
-    taken = _inputs.source(pa.table(columns | {"pa_bar": pa.array([None, *columns["pa_bar"][1:]])}), rig)
-    assert taken.converted_bytes == 8 * len(columns["t_s"])
+    table, polar = pa.table(columns), polars.DataFrame(columns)
+    in_pandas = pd.DataFrame(columns)
+    for frame, arrays in (
+        (columns, columns.values()),
+        (in_pandas, [in_pandas[name].to_numpy() for name in columns]),
+        (polar, [polar[name].to_numpy() for name in columns]),
+        (table, [table[name].chunk(0).to_numpy() for name in columns]),
+    ):
+        (batch,) = _inputs.source(frame, rig).batches
+        assert addresses(batch) == addresses(arrays)
+    for whole, pieces in (
+        (table, pa.concat_tables([table[:1500], table[1500:]])),
+        (polar, polars.concat([polar[:1500], polar[1500:]], rechunk=False)),
+    ):
+        (batch,) = _inputs.source(whole, rig).batches
+        first, second = _inputs.source(pieces, rig).batches
+        assert addresses(first) == addresses(batch)
+        assert addresses(second) == [address + 8 * 1500 for address in addresses(batch)]
 
 
 def test_other_columns_may_hold_anything(columns, rig):

@@ -1,10 +1,18 @@
 //! What the tests of several crates share. Nothing here is part of the product.
 //!
+//! With the feature `judges` it also holds the plants, lies and judges that `benches/` and their reduced tests call.
+//!
 //! What cannot be read or does not exist panics: a validation without its data has failed.
 
 #![allow(clippy::expect_used, reason = "tests want to stop where something is missing")]
 
+#[cfg(feature = "judges")]
+pub mod blind;
+#[cfg(feature = "judges")]
+pub mod confidence;
 pub mod hopsan;
+#[cfg(feature = "judges")]
+pub mod lies;
 mod motion;
 mod noise;
 pub mod rig;

@@ -1,9 +1,9 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::balance::Equation;
 use super::parameter::{LEAKS, leak_column};
 use crate::Real;
+use crate::continuity::Equation;
 
 /// Sums of the position filter's whitened observations over one block.
 #[derive(Clone, Copy, Debug)]

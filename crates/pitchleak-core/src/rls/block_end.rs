@@ -1,17 +1,15 @@
 //! What happens at a block's end: it is held against what was foretold, and learnt from.
 
-use super::balance::{Equation, Integrals, combine};
 use super::block::{BALANCES, Balance, Block, BlockSums};
 use super::change_detector::ChangeDetector;
 use super::evidence::Evidence;
 use super::information::Solution;
 use super::innovation_monitor::InnovationMonitor;
-use super::ma1_whitener::Ma1Whitener;
 use super::parameter::{LEAKS, Parameter};
-use super::pressure_means::Watched;
 use super::update::{Innovation, Update};
 use super::{AVERAGING_S, Rls, prior};
 use crate::Real;
+use crate::continuity::{BlockPressures, Equation, Integrals, MovingAverage, combine};
 
 /// Share of its usual length that a block has after a sudden change: what it tells is then known as soon as the usual block
 /// would end, at the usual 25 samples a block.
@@ -35,7 +33,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let watched = balance.as_ref().zip(innovation);
         let changed =
             watched.is_some_and(|(equation, by_known)| self.has_changed(equation, by_known, inflation));
-        self.block = Watched::default();
+        self.block = BlockPressures::default();
         self.block_time_s = self.settings.block_time_s;
         self.fed = Integrals::default();
         if changed {
@@ -85,7 +83,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.slopes_ps = outlook.slopes_ps;
         let (mut chi_square, mut count) = outlook.chi_square;
         for Balance { equation, .. } in self.balances.iter().flatten() {
-            let left = equation.remainder(&self.solution.mean);
+            let left = equation.residual(&self.solution.mean);
             chi_square -= left * left;
             count -= T::one();
         }
@@ -144,31 +142,17 @@ impl<T: Real, const N: usize> Rls<T, N> {
             return None;
         }
         let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
-        let mut equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
+        let equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
         let stored = self.stored_oil_variance(
             weight_a,
             weight_b,
             [self.noise.pressure_pa * self.noise.pressure_pa; 2],
         ) * self.compressibility
             * self.compressibility;
-        let mut variance = self.both.balance_variance * self.fed.time_square + stored;
-        if let Some(memory) = &self.memory {
-            let share = memory.share();
-            equation.left += share * memory.left;
-            for (now, before) in equation.columns.iter_mut().zip(&memory.columns) {
-                *now += share * *before;
-            }
-            variance += memory.stored * (T::one() - share);
-        } else {
-            variance += stored;
-        }
-        self.memory = Some(Ma1Whitener { left: equation.left, columns: equation.columns, stored, variance });
-        let scale = T::one() / variance.sqrt();
-        equation.left *= scale;
-        for value in &mut equation.columns {
-            *value *= scale;
-        }
-        Some(equation)
+        let flows = self.both.balance_variance * self.fed.time_square;
+        let now = MovingAverage::after(self.memory.as_ref(), equation, flows, stored);
+        self.memory = Some(now);
+        Some(now.whitened())
     }
 
     fn watch_balance(&mut self, equation: &Equation<T, N>) -> Innovation<T> {
@@ -179,7 +163,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
             let noise = T::lit(2.0)
                 * self.stored_oil_variance(weight_a, weight_b, self.pressure_noise.variance_pa2());
-            self.compensate(noise / memory.variance);
+            self.compensate(noise / memory.variance());
         }
         innovation
     }
@@ -189,8 +173,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn compensate_odometer(&mut self) {
         let Some(odometer) = &self.position_filter else { return };
         let noise = self.stored_oil_variance(
-            self.both.odometer_a,
-            self.both.odometer_b,
+            self.both.position_a,
+            self.both.position_b,
             self.pressure_noise.variance_pa2(),
         );
         self.compensate(noise * odometer.weight_sum);

@@ -1,8 +1,8 @@
-use super::balance::Equation;
 use super::information::Solution;
 use super::parameter::{LEAKS, leak_column};
 use super::update::Innovation;
 use crate::Real;
+use crate::continuity::Equation;
 
 /// Page's test on ν²/S, which is χ²₁ as long as nothing changes: drift, largest step and bound. A false
 /// change comes at most once per exp(0.398 · 40) ≈ 8·10⁶ blocks, three weeks at four blocks a second

@@ -169,11 +169,11 @@ fn log_growth<T: Real, const N: usize>(before: &Foretold<'_, T, N>, after: &Lear
 
 #[cfg(test)]
 mod tests {
-    use super::super::balance::Equation;
     use super::super::block::{Balance, BlockSums};
     use super::super::information::{Information, Prior};
     use super::super::trend::Trend;
     use super::*;
+    use crate::continuity::Equation;
     use nalgebra::{DMatrix, DVector};
     use std::vec::Vec;
 

@@ -2,10 +2,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::Parameter;
-use super::balance::Equation;
 use super::block::{Block, symmetric};
 use super::update::Innovation;
 use crate::Real;
+use crate::continuity::Equation;
 
 /// Normal equations of a linear regression with a unit prior, and what noise in column 0 does to them.
 ///
@@ -98,7 +98,7 @@ impl<T: Real, const N: usize> Solution<T, N> {
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn predict(&self, equation: &Equation<T, N>) -> Innovation<T> {
         Innovation {
-            value: equation.remainder(&self.mean),
+            value: equation.residual(&self.mean),
             variance: T::one() + self.variance(&equation.columns),
         }
     }

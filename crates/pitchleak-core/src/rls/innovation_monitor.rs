@@ -57,70 +57,10 @@ fn significant_ratio<T: Real>(sum: T, count: T) -> T {
     if may_be { sum / (count + T::lit(2.0) * (T::lit(2.0) * count).sqrt()) } else { T::zero() }
 }
 
-/// Variance of both pressure sensors' white noise from second differences of the signal, which cancel its slope:
-/// E (p₂ − 2 p₁ + p₀)² = 6 σ² (von Neumann et al. 1941 use first differences).
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct NoiseMeter<T> {
-    last_rise: Option<[T; 2]>,
-    sum: [T; 2],
-    count: T,
-}
-
-impl<T: Real> NoiseMeter<T> {
-    #[inline]
-    pub fn add(&mut self, before: [T; 2], now: [T; 2]) {
-        let rise = [now[0] - before[0], now[1] - before[1]];
-        let Some(last) = &mut self.last_rise else {
-            self.last_rise = Some(rise);
-            return;
-        };
-        let keep = T::lit(0.999);
-        for i in 0..2 {
-            let second = rise[i] - last[i];
-            self.sum[i] = keep * self.sum[i] + second * second;
-        }
-        self.count = keep * self.count + T::one();
-        *last = rise;
-    }
-
-    /// A gap: the next difference starts anew.
-    pub fn interrupt(&mut self) {
-        self.last_rise = None;
-    }
-
-    /// Variances, Pa².
-    pub fn variance_pa2(&self) -> [T; 2] {
-        let variance = |sum: T| sum / (T::lit(6.0) * self.count);
-        if self.count > T::zero() { self.sum.map(variance) } else { [T::zero(); 2] }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use pitchleak_testkit::white_noise;
-
-    /// White noise on a slope: the slope cancels, the noise is read as large as it is.
-    #[test]
-    fn the_meter_reads_the_noise_and_not_the_slope() {
-        let (std_pa, slope_pa) = (5e4, 1e3);
-        let mut meter = NoiseMeter::default();
-        let mut before = 0.0;
-        let mut readings = [0.0; 40];
-        let mut noise = white_noise(1).enumerate();
-        for reading in &mut readings {
-            // A few times the meter's memory of a thousand samples.
-            for (k, unit) in noise.by_ref().take(3000) {
-                let now = slope_pa * k as f64 + std_pa * unit;
-                meter.add([before, 0.0], [now, 0.0]);
-                before = now;
-            }
-            *reading = meter.variance_pa2()[0].sqrt() / std_pa;
-        }
-        let mean = readings.iter().sum::<f64>() / readings.len() as f64;
-        assert!((mean - 1.0).abs() < 0.02, "{mean} of the noise");
-    }
 
     /// χ²₁ innovations stay as they are; twice as large ones widen the intervals by what they are more.
     #[test]

@@ -14,7 +14,6 @@
 //!
 //! Time and memory per sample are constant; nothing is ever differentiated.
 
-mod balance;
 mod block;
 mod block_end;
 mod change_detector;
@@ -24,42 +23,37 @@ mod evidence;
 mod excitation;
 mod information;
 mod innovation_monitor;
-mod ma1_whitener;
 mod mixture;
 mod model_bank;
-mod noise;
 mod offset_prior;
 mod parameter;
 mod position_filter;
-mod pressure_means;
 mod prior;
 mod settings;
 mod trend;
 mod update;
-mod weights;
 mod zeros;
 
+use crate::continuity::{
+    BlockPressures, Integrals, Measured, MovingAverage, NoiseStd, PressureMeans, PressureNoise, Step,
+    Weights, combine,
+};
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
-use balance::{Fed, FedChambers, Integrals, combine};
 use block::{BALANCES, Balance, BlockSums};
 use change_detector::ChangeDetector;
 pub use error::RlsError;
 pub use estimates::Estimates;
 pub use excitation::{Excitation, ExcitationReport, ExcitationSettings};
 use information::{Prior, Solution};
-use innovation_monitor::{InnovationMonitor, NoiseMeter};
-use ma1_whitener::Ma1Whitener;
+use innovation_monitor::InnovationMonitor;
 use model_bank::{ModelBank, STEPS};
-use noise::NoiseStd;
 use offset_prior::OffsetPrior;
 use parameter::LEAKS;
 pub use parameter::Parameter;
 use position_filter::PositionFilter;
-use pressure_means::{PressureMeans, Watched};
 use prior::{offset_units, prior_spread};
 pub use settings::RlsSettings;
 pub use update::{Innovation, Update};
-use weights::Weights;
 use zeros::Zeros;
 
 /// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
@@ -110,14 +104,14 @@ pub struct Rls<T, const N: usize> {
     unlearnt_s: T,
     /// Blocks of the balance since then; after a sudden change the first one counts at once.
     unlearnt: usize,
-    block: Watched<T>,
+    block: BlockPressures<T>,
     /// How long it will be, s.
     block_time_s: T,
     /// The part of the block in which both flows were measured.
     fed: Integrals<T>,
-    pressure_noise: NoiseMeter<T>,
+    pressure_noise: PressureNoise<T>,
     /// The balance equation's moving-average noise filter: last whitened block.
-    memory: Option<Ma1Whitener<T, N>>,
+    memory: Option<MovingAverage<T, N>>,
     /// Variance of the sensor noise in the compressibility's column, over the rows' own, summed over the block.
     column_noise: T,
     bank: ModelBank<T, N>,
@@ -165,10 +159,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
             balances: [None; BALANCES],
             unlearnt_s: T::zero(),
             unlearnt: 0,
-            block: Watched::default(),
+            block: BlockPressures::default(),
             block_time_s: settings.block_time_s,
             fed: Integrals::default(),
-            pressure_noise: NoiseMeter::default(),
+            pressure_noise: PressureNoise::default(),
             memory: None,
             column_noise: T::zero(),
             bank: ModelBank::new(settings.forgetting_time_s),
@@ -194,11 +188,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if !integrable {
             return self.restart(sample);
         }
-        let fed = Fed::over(&last, sample);
-        let step = Integrals::step(&self.cylinder, dt_s, &last, sample, &fed);
+        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, &last, sample);
         self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
         self.block.add(&step);
-        self.advance(&step, fed.chambers, sample.x_m);
+        self.advance(&step, measured, sample.x_m);
         let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
         if full {
             self.close_block()
@@ -211,29 +204,29 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// PositionFilter step to the reading `x_m`, by whichever flows both ends of the step have.
     #[inline]
-    fn advance(&mut self, step: &Integrals<T>, fed: FedChambers, x_m: T) {
+    fn advance(&mut self, step: &Integrals<T>, measured: Measured, x_m: T) {
         let of_one;
-        let weights = match fed {
-            FedChambers::Both => {
+        let weights = match measured {
+            Measured::Both => {
                 self.fed.add(step);
                 &self.both
             }
-            FedChambers::Neither => return self.anchor(x_m),
+            Measured::Neither => return self.anchor(x_m),
             one => {
-                of_one = self.weights_of_one(one == FedChambers::OnlyA);
+                of_one = self.weights_of_one(one == Measured::OnlyA);
                 &of_one
             }
         };
         let Some(odometer) = &mut self.position_filter else { return };
         let sensor_variance = self.noise.position_m * self.noise.position_m;
         let mut equation =
-            combine(step, weights.odometer_a, weights.odometer_b, self.compressibility, &self.scale);
+            combine(step, weights.position_a, weights.position_b, self.compressibility, &self.scale);
         let gain = Parameter::GainPosition as usize;
         if N > gain {
             // The gain acts on the piston's travel: what the flows say less what the leaks take.
-            equation.columns[gain] = -equation.remainder(&self.solution.mean) * self.scale[gain];
+            equation.columns[gain] = -equation.residual(&self.solution.mean) * self.scale[gain];
         }
-        let variance = weights.odometer_variance * step.time_square;
+        let variance = weights.position_variance * step.time_square;
         odometer.advance(
             step.time,
             equation.left,

@@ -8,6 +8,8 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Nanoseconds = npt.NDArray[np.int64]
 
+_NOT_A_TIME = np.datetime64("NaT", "ns")
+
 
 def numbers(name: str, values: Any) -> Floats:
     """``values`` as contiguous, aligned float64; a missing value becomes NaN."""
@@ -33,7 +35,9 @@ def nanoseconds(name: str, values: Any) -> Nanoseconds:
             raise TypeError(f"column `{name}`: not times in ISO 8601 ({error})") from None
     if array.dtype.kind != "M":
         raise TypeError(f"column `{name}` holds {array.dtype}; times (datetime64) are expected")
-    return np.ascontiguousarray(array.astype("datetime64[ns]")).view(np.int64)
+    times = array.astype("datetime64[ns]")
+    # numpy wraps around beyond the years 1678 to 2262.
+    return np.ascontiguousarray(np.where(times.astype(array.dtype) == array, times, _NOT_A_TIME)).view(np.int64)
 
 
 def _to_numpy(values: Any) -> npt.NDArray[Any]:

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
+from ._arrow import from_arrow, from_polars
 from ._collected import collected
 from ._columns import nanoseconds, numbers
 from ._index import with_index
@@ -51,8 +52,10 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
     data = collected(data, rig)
     if isinstance(data, Mapping) or _is_pandas(data):
         return _from_columns(data, rig, first_ns)
+    if type(data).__module__.partition(".")[0] == "polars" and type(data).__name__ == "DataFrame":
+        return from_polars(data, rig, first_ns)
     if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
-        return Table.from_arrow(data, rig, first_ns)
+        return from_arrow(data, rig, first_ns)
     raise TypeError(f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path")
 
 
@@ -91,4 +94,4 @@ def _from_columns(data: Any, rig: Rig, first_ns: int | None) -> Table:
         read[content](header, data[header]) if content in read else None
         for header, content in zip(headers, layout.contents, strict=True)
     ]
-    return Table.from_arrays(layout, columns, first_ns)
+    return Table.from_arrays(layout, [columns], first_ns)

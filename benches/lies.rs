@@ -5,14 +5,9 @@
 //! every row, e.g. `-- 3 rows.csv`. `-- on-its-way 1 2 0.003` judges all that streams say where a
 //! meter's zero is off: seeds, and the sensors' accuracies.
 
-mod judge;
-mod lie;
-mod on_its_way;
-mod plant;
-mod sweep;
-mod table;
-
 use pitchleak::wind::WindCase;
+use pitchleak_testkit::lies::judge::{csv, summary, sweep};
+use pitchleak_testkit::lies::on_its_way;
 
 const ACCURACIES: [f64; 3] = [1e-3, 3e-3, 1e-2];
 
@@ -25,10 +20,10 @@ fn main() {
         let accuracies: Vec<f64> = accuracies.iter().filter_map(|a| a.parse().ok()).collect();
         return on_its_way::print(&accuracies, &seeds);
     }
-    let outcomes = sweep::sweep(&ACCURACIES, &WindCase::ALL, seeds);
-    print!("{}", table::summary(&outcomes));
+    let outcomes = sweep(&ACCURACIES, &WindCase::ALL, seeds);
+    print!("{}", summary(&outcomes));
     for file in arguments.iter().filter(|a| a.ends_with(".csv")) {
-        if let Err(error) = std::fs::write(file, table::csv(&outcomes)) {
+        if let Err(error) = std::fs::write(file, csv(&outcomes)) {
             eprintln!("{file}: {error}");
         }
     }

@@ -1,10 +1,11 @@
-use super::balance::Integrals;
+use super::integrals::Integrals;
 use crate::{LeakPressures, PerLeak, Real};
 
-/// A block of the balance: how long it is by now, and its pressures.
+/// A block's length by now, and its pressures.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Watched<T> {
+pub struct BlockPressures<T> {
+    /// ∫ dt, s.
     pub time_s: T,
     /// Number of steps.
     pub steps: T,
@@ -14,7 +15,8 @@ pub(super) struct Watched<T> {
     b: T,
 }
 
-impl<T: Real> Watched<T> {
+impl<T: Real> BlockPressures<T> {
+    /// Goes on over `step`, the time that follows.
     #[inline]
     pub fn add(&mut self, step: &Integrals<T>) {
         self.time_s += step.time;
@@ -28,7 +30,7 @@ impl<T: Real> Watched<T> {
 /// block's mean, so that sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct PressureMeans<T> {
+pub struct PressureMeans<T> {
     time: T,
     load: T,
     load_sign: T,
@@ -37,7 +39,8 @@ pub(super) struct PressureMeans<T> {
 }
 
 impl<T: Real> PressureMeans<T> {
-    pub fn add_block(&mut self, block: &Watched<T>, keep: T) {
+    /// Takes in a block; all before it counts by `keep` (0 to 1).
+    pub fn add_block(&mut self, block: &BlockPressures<T>, keep: T) {
         self.forget(keep);
         self.time += block.time_s;
         let load = block.a - block.b;
@@ -47,6 +50,7 @@ impl<T: Real> PressureMeans<T> {
         self.b += block.b;
     }
 
+    /// Weighs all that was taken in by `keep` (0 to 1).
     pub fn forget(&mut self, keep: T) {
         self.time *= keep;
         self.load *= keep;
@@ -55,6 +59,7 @@ impl<T: Real> PressureMeans<T> {
         self.b *= keep;
     }
 
+    /// The means; zero before the first block.
     pub fn means(&self) -> LeakPressures<T> {
         let per_time = if self.time > T::zero() { T::one() / self.time } else { T::zero() };
         let mean = |sum: T| sum * per_time;
@@ -73,8 +78,8 @@ impl<T: Real> PressureMeans<T> {
 mod tests {
     use super::*;
 
-    fn block(time_s: f64, pa_pa: f64, pb_pa: f64) -> Watched<f64> {
-        Watched { time_s, steps: 25.0, a: pa_pa * time_s, b: pb_pa * time_s }
+    fn block(time_s: f64, pa_pa: f64, pb_pa: f64) -> BlockPressures<f64> {
+        BlockPressures { time_s, steps: 25.0, a: pa_pa * time_s, b: pb_pa * time_s }
     }
 
     /// What is weighed by time and forgetting is the mean: Σ w P / Σ w.

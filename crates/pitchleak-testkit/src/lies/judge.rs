@@ -1,7 +1,6 @@
-//! What an operator would believe at a door of the program, and whether it is so.
+//! What an operator would believe at a door of the program, whether it is so, and the tables of `docs/bench-of-lies.md`.
 
-use crate::lie::Lie;
-use crate::plant::{Leaking, rig};
+use super::{Family, LEAKING, LIES, Leaking, Lie, leak_name, rig, truths};
 use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::live::{EstimateEvent, Event, LineFormat, LiveConfig, LiveLeakage, Watch};
 use pitchleak::replay::{ReplayError, replay};
@@ -11,6 +10,9 @@ use pitchleak::simulate::{
 };
 use pitchleak::trace::TraceReader;
 use pitchleak::units::LPM_PER_M3S;
+use pitchleak::wind::WindCase;
+use rayon::prelude::*;
+use std::fmt::Write;
 use std::io::Cursor;
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -184,4 +186,144 @@ pub fn recorded<'a>(truths: &'a [Truth], lie: &Lie, accuracy: f64, seed: u64) ->
         }
     }
     (writer.into_inner(), truths.get(..shown_rows).unwrap_or_default())
+}
+
+/// One row of the bench, over its seeds.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    pub door: Door,
+    pub lie: &'static Lie,
+    pub leaking: Leaking,
+    pub accuracy: f64,
+    pub wind: WindCase,
+    pub right: usize,
+    pub in_doubt: usize,
+    pub confidently_wrong: usize,
+    /// Those in doubt with the lie among the reasons.
+    pub named: usize,
+    /// Those with another mistake of wiring among them.
+    pub misnamed: usize,
+}
+
+impl Outcome {
+    pub fn runs(&self) -> usize {
+        self.right + self.in_doubt + self.confidently_wrong
+    }
+}
+
+/// Every lie × leak × accuracy × wind at each door, `seeds` times each; the order and the seeds don't depend on the cores.
+pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome> {
+    let cylinders: Vec<_> = winds.iter().flat_map(|wind| LEAKING.map(|leaking| (*wind, leaking))).collect();
+    let of_cylinder = |(wind, leaking): &(WindCase, Leaking)| {
+        let truths = truths(*wind, *leaking);
+        let cases: Vec<_> = accuracies.iter().flat_map(|a| LIES.iter().map(move |lie| (*a, lie))).collect();
+        let outcomes = |(accuracy, lie): &(f64, &'static Lie)| {
+            let asked: Vec<_> =
+                (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
+            Door::ALL.map(|door| {
+                let judged = || asked.iter().map(|doors| doors[door as usize]);
+                let count = |which| judged().filter(|one| one.judgement == which).count();
+                Outcome {
+                    door,
+                    lie,
+                    leaking: *leaking,
+                    accuracy: *accuracy,
+                    wind: *wind,
+                    right: count(Judgement::Right),
+                    in_doubt: count(Judgement::InDoubt),
+                    confidently_wrong: count(Judgement::ConfidentlyWrong),
+                    named: judged().filter(|one| one.named).count(),
+                    misnamed: judged().filter(|one| one.misnamed).count(),
+                }
+            })
+        };
+        cases.par_iter().flat_map_iter(outcomes).collect::<Vec<_>>()
+    };
+    cylinders.par_iter().map(of_cylinder).collect::<Vec<_>>().concat()
+}
+
+pub const HEADER: &str =
+    "door,family,lie,leak,accuracy,wind,right,in_doubt,confidently_wrong,named,misnamed\n";
+
+/// What a row of the bench is about, as the first cells of its line.
+pub fn key(outcome: &Outcome) -> String {
+    let Outcome { door, lie, leaking, accuracy, wind, .. } = outcome;
+    let (door, family, leak) = (door.name(), lie.family.name(), leak_name(*leaking));
+    format!("{door},{family},{},{leak},{accuracy},{}", lie.name, wind.mean_mps())
+}
+
+/// Every row.
+pub fn csv(outcomes: &[Outcome]) -> String {
+    let line = |one: &Outcome| {
+        let Outcome { right, in_doubt, confidently_wrong, named, misnamed, .. } = one;
+        format!("{},{right},{in_doubt},{confidently_wrong},{named},{misnamed}\n", key(one))
+    };
+    HEADER.to_owned() + &outcomes.iter().map(line).collect::<String>()
+}
+
+/// Runs, and those right, in doubt, confidently wrong, named, misnamed, of the outcomes that match.
+fn sums(outcomes: &[Outcome], matches: impl Fn(&Outcome) -> bool) -> [usize; 6] {
+    outcomes.iter().filter(|one| matches(one)).fold(
+        [0; 6],
+        |[runs, right, doubt, wrong, named, misnamed], one| {
+            [
+                runs + one.runs(),
+                right + one.right,
+                doubt + one.in_doubt,
+                wrong + one.confidently_wrong,
+                named + one.named,
+                misnamed + one.misnamed,
+            ]
+        },
+    )
+}
+
+fn line(out: &mut String, name: &str, [runs, right, doubt, wrong, named, misnamed]: [usize; 6]) {
+    let _ = writeln!(out, "| {name} | {runs} | {right} | {doubt} | {named} | {misnamed} | {wrong} |");
+}
+
+/// The tables for people, door by door.
+pub fn summary(outcomes: &[Outcome]) -> String {
+    let of_door = |door: Door| {
+        let own: Vec<Outcome> = outcomes.iter().filter(|one| one.door == door).copied().collect();
+        tables(door, &own)
+    };
+    Door::ALL.map(of_door).join("\n")
+}
+
+fn tables(door: Door, outcomes: &[Outcome]) -> String {
+    let mut out = String::new();
+    let head = |out: &mut String, title: &str, what: &str| {
+        let _ = write!(
+            out,
+            "## `{}`: {title}\n\n| {what} | runs | right | in doubt | of these named | misnamed | confidently wrong |\n|---|---|---|---|---|---|---|\n",
+            door.name()
+        );
+    };
+    head(&mut out, "by family", "family");
+    for family in Family::ALL {
+        line(&mut out, family.name(), sums(outcomes, |one| one.lie.family == family));
+    }
+    out.push('\n');
+    for (title, what, families) in [
+        ("right and sure is asked", "accuracy, wind", &[Family::Honest, Family::Harmless][..]),
+        ("right or in doubt is asked", "accuracy, wind", &[Family::Offset, Family::Mistake][..]),
+    ] {
+        head(&mut out, title, what);
+        let mut conditions: Vec<_> = outcomes.iter().map(|one| (one.accuracy, one.wind)).collect();
+        conditions.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        conditions.dedup();
+        for (accuracy, wind) in conditions {
+            let same = |one: &Outcome| one.accuracy.to_bits() == accuracy.to_bits() && one.wind == wind;
+            let name = format!("{:.1} %, {} m/s", 100.0 * accuracy, wind.mean_mps());
+            line(&mut out, &name, sums(outcomes, |one| families.contains(&one.lie.family) && same(one)));
+        }
+        out.push('\n');
+    }
+    head(&mut out, "by lie", "lie");
+    for lie in LIES {
+        let name = format!("{} ({})", lie.name, lie.family.name());
+        line(&mut out, &name, sums(outcomes, |one| one.lie.name == lie.name));
+    }
+    out
 }

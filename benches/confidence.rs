@@ -5,12 +5,7 @@
 //! `further`, `outside`, `better`), a number that thins the cases out, `seeds=7000` for rigs drawn anew, `only=1007` for the case with that
 //! seed, and `each` for a line per case.
 
-mod cases;
-mod plant;
-mod questions;
-mod tally;
-
-use cases::Case;
+use pitchleak_testkit::confidence::{Case, ask_all, line, questions, summary};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -33,10 +28,10 @@ fn main() {
     for (kind, mut cases) in all.into_iter().filter(|(kind, _)| wanted(kind)) {
         cases.iter_mut().for_each(|case| case.seed += further);
         cases.retain(|case| only.is_none_or(|seed: u64| case.seed == seed));
-        let answers = tally::ask_all(&cases);
+        let answers = ask_all(&cases);
         if each {
-            answers.iter().for_each(|(case, answer)| println!("{}", tally::line(case, answer)));
+            answers.iter().for_each(|(case, answer)| println!("{}", line(case, answer)));
         }
-        println!("{kind}: {}", tally::summary(&answers));
+        println!("{kind}: {}", summary(&answers));
     }
 }

@@ -1,8 +1,7 @@
 //! What a stream says on its way: every estimate and every alarm, not the last word alone.
 
-use crate::judge::{Judgement, Said, events, judge, recorded};
-use crate::lie::{Family, LIES, Lie};
-use crate::plant::{LEAKING, Leaking, OPENS_S, opening, truths};
+use super::judge::{Judgement, Said, events, judge, recorded};
+use super::{Family, LEAKING, LIES, Leaking, Lie, OPENS_S, opening, truths};
 use pitchleak::core::{AlarmState, Leak};
 use pitchleak::live::Event;
 use pitchleak::simulate::Truth;

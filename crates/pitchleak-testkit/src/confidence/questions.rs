@@ -1,7 +1,7 @@
 //! What is asked: sound rigs of all sizes, rates and lengths, two effects at once, effects that no table has.
 
-use crate::cases::Case;
-use crate::plant::Rest;
+use super::Case;
+use super::plant::Rest;
 
 const SIZES: [f64; 5] = [0.6, 1.0, 1.7, 3.0, 5.0];
 const RATES: [f64; 5] = [20.0, 50.0, 100.0, 200.0, 500.0];

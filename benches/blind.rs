@@ -4,12 +4,7 @@
 //! `cargo bench --bench blind` prints the tables of `docs/blind-bench.md`. After `--`: seeds per cell, seeds
 //! for the sound rig, words to pick effects, and a file for every row, e.g. `-- 5 100 friction sound rows.csv`.
 
-mod attainable;
-mod cases;
-mod table;
-mod tally;
-
-use cases::{Ailment, Case, Excitation, cases};
+use pitchleak_testkit::blind::{Ailment, Case, Excitation, cases, tables};
 
 const ACCURACIES: [f64; 3] = [1e-3, 3e-3, 1e-2];
 const MULTIPLES: [f64; 3] = [1.0, 2.0, 5.0];
@@ -25,11 +20,11 @@ fn main() {
         |case: &Case| words.is_empty() || words.iter().any(|w| case.ailment.name().contains(w.as_str()));
     let all = [Excitation::Wind, Excitation::MultiSine].into_iter();
     let all: Vec<Case> = all.flat_map(|e| cases(e, &ACCURACIES, &MULTIPLES)).filter(wanted).collect();
-    let tallies = tally::sweep(&all, |case| if case.ailment == Ailment::None { sound_seeds } else { seeds });
+    let tallies = tables::sweep(&all, |case| if case.ailment == Ailment::None { sound_seeds } else { seeds });
     let rows: Vec<_> = all.iter().zip(&tallies).collect();
-    print!("{}", table::summary(&rows));
+    print!("{}", tables::summary(&rows));
     for file in files {
-        if let Err(error) = std::fs::write(file, table::csv(&rows)) {
+        if let Err(error) = std::fs::write(file, tables::csv(&rows)) {
             eprintln!("{file}: {error}");
         }
     }

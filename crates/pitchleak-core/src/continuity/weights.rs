@@ -6,16 +6,16 @@ use crate::{Cylinder, PerLeak, Real};
 /// Chamber A reads A_A ẋ = Q_A − …, chamber B −A_B ẋ = Q_B − …. Generalised least squares splits the pair
 /// into two equations whose errors are independent:
 /// - the *balance* A_B·(A) + A_A·(B), in which the piston speed cancels;
-/// - the *odometer* ẋ = w_A·(A) + w_B·(B), the best speed that the flows can tell.
+/// - the *position* equation ẋ = w_A·(A) + w_B·(B), the best speed that the flows can tell.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Weights<T> {
+pub struct Weights<T> {
     /// w_A, 1/m².
-    pub odometer_a: T,
+    pub position_a: T,
     /// w_B, 1/m².
-    pub odometer_b: T,
-    /// Variance of the odometer's error, (m/s)² per sample.
-    pub odometer_variance: T,
+    pub position_b: T,
+    /// Variance of the position equation's error, (m/s)² per sample.
+    pub position_variance: T,
     /// Variance of the balance's error, (m²·m³/s)² per sample; infinite where a chamber rests.
     pub balance_variance: T,
 }
@@ -33,15 +33,15 @@ impl<T: Real> Weights<T> {
         let var_b = noise.flow_b_m3s * noise.flow_b_m3s + pressure * (own_b * own_b + c * c);
         let cov = -pressure * c * (own_a + own_b);
         let (aa, ab) = (cylinder.area_a_m2, cylinder.area_b_m2);
-        // Balance variance gᵀΣg with g = (A_B, A_A); the odometer's follows from det Σ.
+        // Balance variance gᵀΣg with g = (A_B, A_A); that of the position follows from det Σ.
         let two = T::lit(2.0);
         let balance = ab * ab * var_a + two * aa * ab * cov + aa * aa * var_b;
         let pull_a = aa * var_b + ab * cov;
         let pull_b = -(ab * var_a + aa * cov);
         Self {
-            odometer_a: pull_a / balance,
-            odometer_b: pull_b / balance,
-            odometer_variance: (var_a * var_b - cov * cov) / balance,
+            position_a: pull_a / balance,
+            position_b: pull_b / balance,
+            position_variance: (var_a * var_b - cov * cov) / balance,
             balance_variance: balance,
         }
     }
@@ -52,9 +52,9 @@ impl<T: Real> Weights<T> {
         let area = cylinder.area_a_m2;
         let variance = noise.chamber_variance(noise.flow_a_m3s, own, leaks.internal);
         Self {
-            odometer_a: T::one() / area,
-            odometer_b: T::zero(),
-            odometer_variance: variance / (area * area),
+            position_a: T::one() / area,
+            position_b: T::zero(),
+            position_variance: variance / (area * area),
             balance_variance: T::infinity(),
         }
     }
@@ -65,9 +65,9 @@ impl<T: Real> Weights<T> {
         let area = cylinder.area_b_m2;
         let variance = noise.chamber_variance(noise.flow_b_m3s, own, leaks.internal);
         Self {
-            odometer_a: T::zero(),
-            odometer_b: -T::one() / area,
-            odometer_variance: variance / (area * area),
+            position_a: T::zero(),
+            position_b: -T::one() / area,
+            position_variance: variance / (area * area),
             balance_variance: T::infinity(),
         }
     }
@@ -108,21 +108,21 @@ mod tests {
         (found / expected - 1.0).abs() < 1e-9
     }
 
-    /// Chamber A reads A_A ẋ, chamber B −A_B ẋ: whichever meters there are, the odometer counts ẋ once.
+    /// Chamber A reads A_A ẋ, chamber B −A_B ẋ: whichever meters there are, the position equation counts ẋ once.
     #[test]
-    fn an_odometer_counts_the_speed_once() {
+    fn the_position_equation_counts_the_speed_once() {
         let cylinder = Cylinder::<f64>::paper();
         let noise = NoiseStd { flow_a_m3s: 1e-6, flow_b_m3s: 2e-6, pressure_pa: 5e4, position_m: 1e-3 };
         let leaks = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
         for weights in [Weights::both, Weights::only_a, Weights::only_b] {
-            let Weights { odometer_a, odometer_b, .. } = weights(&cylinder, &noise, &leaks);
-            let counted = odometer_a * cylinder.area_a_m2 - odometer_b * cylinder.area_b_m2;
+            let Weights { position_a, position_b, .. } = weights(&cylinder, &noise, &leaks);
+            let counted = position_a * cylinder.area_a_m2 - position_b * cylinder.area_b_m2;
             assert!((counted - 1.0).abs() < 1e-12, "{counted}");
         }
     }
 
     proptest! {
-        /// The odometer is the generalised least-squares estimate of ẋ from Q_A = A_A ẋ, Q_B = −A_B ẋ; the balance,
+        /// The position equation is the generalised least-squares estimate of ẋ from Q_A = A_A ẋ, Q_B = −A_B ẋ; the balance,
         /// in which ẋ cancels, keeps what is left of the covariance.
         #[test]
         fn both_are_generalised_least_squares((noise, leaks) in errors()) {
@@ -132,8 +132,8 @@ mod tests {
             let inverse = covariance.try_inverse().unwrap();
             let variance = 1.0 / (speed.transpose() * inverse * speed).x;
             let best = inverse * speed * variance;
-            prop_assert!(near(weights.odometer_a, best.x) && near(weights.odometer_b, best.y), "{weights:?} {best}");
-            prop_assert!(near(weights.odometer_variance, variance));
+            prop_assert!(near(weights.position_a, best.x) && near(weights.position_b, best.y), "{weights:?} {best}");
+            prop_assert!(near(weights.position_variance, variance));
             let cancelling = Vector2::new(AREAS.y, AREAS.x);
             prop_assert!(near(weights.balance_variance, (cancelling.transpose() * covariance * cancelling).x));
         }
@@ -143,11 +143,11 @@ mod tests {
         fn one_chamber_counts_alone((noise, leaks) in errors()) {
             let covariance = covariance(&noise, &leaks);
             let a = Weights::only_a(&cylinder(), &noise, &leaks);
-            prop_assert!(near(a.odometer_a, 1.0 / AREAS.x) && a.odometer_b == 0.0);
-            prop_assert!(near(a.odometer_variance, covariance.m11 / AREAS.x.powi(2)));
+            prop_assert!(near(a.position_a, 1.0 / AREAS.x) && a.position_b == 0.0);
+            prop_assert!(near(a.position_variance, covariance.m11 / AREAS.x.powi(2)));
             let b = Weights::only_b(&cylinder(), &noise, &leaks);
-            prop_assert!(near(b.odometer_b, -1.0 / AREAS.y) && b.odometer_a == 0.0);
-            prop_assert!(near(b.odometer_variance, covariance.m22 / AREAS.y.powi(2)));
+            prop_assert!(near(b.position_b, -1.0 / AREAS.y) && b.position_a == 0.0);
+            prop_assert!(near(b.position_variance, covariance.m22 / AREAS.y.powi(2)));
             prop_assert!(a.balance_variance.is_infinite() && b.balance_variance.is_infinite());
         }
     }

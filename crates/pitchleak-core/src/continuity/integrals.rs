@@ -1,0 +1,127 @@
+use crate::{Cylinder, Real, Sample};
+
+/// Integrals of one chamber's continuity equation (Q = A ẋ + κ V Ṗ + leaks, κ = 1/β), by the
+/// trapezoidal rule over a step or summed over a block.
+///
+/// No derivative is taken of a noisy signal: ∫ V Ṗ dt is V at mid-step times the pressure's rise.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ChamberIntegrals<T> {
+    /// ∫ Q dt, m³.
+    pub flow: T,
+    /// ∫ V dP, m³·Pa.
+    pub compression: T,
+    /// ∫ P dt, Pa·s.
+    pub pressure: T,
+}
+
+/// Both chambers over the same time.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Integrals<T> {
+    /// Chamber A.
+    pub a: ChamberIntegrals<T>,
+    /// Chamber B.
+    pub b: ChamberIntegrals<T>,
+    /// ∫ dt, s.
+    pub time: T,
+    /// Σ dt², s²: times the variance of one sample it is the variance of ∫ Q dt.
+    pub time_square: T,
+    /// Number of steps.
+    pub steps: T,
+}
+
+/// From one sample to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<T> {
+    /// A chamber whose flow was not measured at both ends has none here.
+    pub integrals: Integrals<T>,
+    /// Chambers whose flow was measured at both ends.
+    pub measured: Measured,
+}
+
+/// Chambers whose flow was measured all through: the equation of any other rests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "they say it themselves")]
+pub enum Measured {
+    Both,
+    OnlyA,
+    OnlyB,
+    Neither,
+}
+
+/// Sums of the flows at both ends of a step, m³/s.
+struct Flows<T> {
+    measured: Measured,
+    a_m3s: T,
+    b_m3s: T,
+}
+
+impl<T: Real> Flows<T> {
+    #[inline]
+    fn between(last: &Sample<T>, now: &Sample<T>) -> Self {
+        match (last.qa_m3s, now.qa_m3s, last.qb_m3s, now.qb_m3s) {
+            (Some(a), Some(a_now), Some(b), Some(b_now)) => {
+                Self { measured: Measured::Both, a_m3s: a + a_now, b_m3s: b + b_now }
+            }
+            _ => Self::not_both(last, now),
+        }
+    }
+
+    #[cold]
+    fn not_both(last: &Sample<T>, now: &Sample<T>) -> Self {
+        let none = T::zero();
+        let (measured, a_m3s, b_m3s) = match (last.qa_m3s, now.qa_m3s, last.qb_m3s, now.qb_m3s) {
+            (Some(a), Some(a_now), ..) => (Measured::OnlyA, a + a_now, none),
+            (.., Some(b), Some(b_now)) => (Measured::OnlyB, none, b + b_now),
+            _ => (Measured::Neither, none, none),
+        };
+        Self { measured, a_m3s, b_m3s }
+    }
+}
+
+impl<T: Real> Step<T> {
+    /// The step from `last` to `now`, `dt_s` later. A position beyond the stroke counts as its end.
+    #[inline]
+    pub fn between(cylinder: &Cylinder<T>, dt_s: T, last: &Sample<T>, now: &Sample<T>) -> Self {
+        let flows = Flows::between(last, now);
+        let half = T::lit(0.5);
+        let half_dt = half * dt_s;
+        let x = (half * (last.x_m + now.x_m)).at_least(T::zero()).at_most(cylinder.stroke_m);
+        let integrals = Integrals {
+            a: ChamberIntegrals {
+                flow: half_dt * flows.a_m3s,
+                compression: cylinder.volume_a_m3(x) * (now.pa_pa - last.pa_pa),
+                pressure: half_dt * (last.pa_pa + now.pa_pa),
+            },
+            b: ChamberIntegrals {
+                flow: half_dt * flows.b_m3s,
+                compression: cylinder.volume_b_m3(x) * (now.pb_pa - last.pb_pa),
+                pressure: half_dt * (last.pb_pa + now.pb_pa),
+            },
+            time: dt_s,
+            time_square: dt_s * dt_s,
+            steps: T::one(),
+        };
+        Self { integrals, measured: flows.measured }
+    }
+}
+
+impl<T: Real> Integrals<T> {
+    /// Goes on over `step`, the time that follows.
+    pub fn add(&mut self, step: &Self) {
+        self.a.add(&step.a);
+        self.b.add(&step.b);
+        self.time += step.time;
+        self.time_square += step.time_square;
+        self.steps += step.steps;
+    }
+}
+
+impl<T: Real> ChamberIntegrals<T> {
+    fn add(&mut self, step: &Self) {
+        self.flow += step.flow;
+        self.compression += step.compression;
+        self.pressure += step.pressure;
+    }
+}
