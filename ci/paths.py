@@ -28,6 +28,6 @@ def missing(document):
     yield from (path for path in LINKED.findall(text) if not (document.parent / path).exists())
 
 
-documents = [path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")) if path.name != "CHANGELOG.md"]
+documents = [ROOT / file for file in FILES if file.endswith(".md") and file != "CHANGELOG.md"]
 lost = [f"{document.relative_to(ROOT)} names {path}" for document in documents for path in missing(document)]
 sys.exit("\n".join(lost) or 0)
