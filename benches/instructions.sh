@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Instructions per sample of each estimator, by callgrind (needs valgrind); fails where one takes more than README and
-# docs/estimators.md say.
+# docs/bench/estimators.md say.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 binary=$(cargo bench --bench instructions --no-run --message-format=json 2>/dev/null |

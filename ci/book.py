@@ -60,6 +60,7 @@ def assemble() -> None:
     shutil.copytree(DOCS / "book/katex/fonts", SOURCE / "katex/fonts")
     for chapter in chapters():
         to = SOURCE / "SUMMARY.md" if chapter.name == "SUMMARY.md" else place(chapter)
+        to.parent.mkdir(parents=True, exist_ok=True)
 
         def turned(link: re.Match[str], chapter: Path = chapter, here: Path = to.parent) -> str:
             target = (chapter.parent / link[2]).resolve()

@@ -71,7 +71,7 @@ fn a_terminal_sees_each_line_beside_its_alarm_level() {
 fn a_terminal_sees_the_course_of_a_leak_that_grows_from_day_to_day() {
     let farm = TempDir::new().unwrap();
     for day in 1..=5 {
-        let internal = 0.8e-12 + 0.02e-12 * f64::from(day);
+        let internal = 0.8e-12 + 0.5e-12 * f64::from(day);
         let motion = Motion::sines(PerLeak { internal, external_a: 0.0, external_b: 0.0 });
         fs::write(farm.path().join(format!("2026-05-0{day}.csv")), file(&motion.rows(2000))).unwrap();
     }

@@ -4,7 +4,7 @@
 //! (file ids 1 to 4). A file is recognised by its content, not by its name.
 //!
 //! ```no_run
-//! let run = pitchleak::openfast::read("run.outb".as_ref())?;
+//! let run = pitchleak_trace::openfast::read("run.outb".as_ref())?;
 //! let pitch = run.channel("BldPitch1").ok_or("no pitch in this run")?;
 //! println!("{} samples of pitch in {}", pitch.values.len(), pitch.unit);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
