@@ -2,7 +2,7 @@
 
     cargo install --locked cargo-mutants
     python3 ci/mutants/run.py 200 crates/pitchleak-core/src -- -p pitchleak-core
-    python3 ci/mutants/run.py 30 src/trace -- -p pitchleak --lib --test replay
+    python3 ci/mutants/run.py 30 crates/pitchleak-trace/src -- -p pitchleak-trace
 
 SAMPLE FOLDER -- arguments of `cargo test`. cargo-mutants lists what could be changed, in a sample by seed 9; a copy in
 target/mutants chooses one by the variable MUTANT. A mutant that doesn't compile doesn't count; one that hangs is
@@ -36,7 +36,8 @@ pub fn mutant(id: u32) -> bool {
 
 
 def sample(count, folder):
-    package = "pitchleak-core" if "pitchleak-core" in folder else "pitchleak"
+    named = re.match(r"crates/([\w-]+)/", folder)
+    package = named[1] if named else "pitchleak"
     command = ["cargo", "mutants", "--list", "--json", "--package", package]
     listed = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout)
     fitting = [entry for entry in listed if entry["file"].startswith(folder) and entry["genre"] in GENRES]
