@@ -1,13 +1,13 @@
 //! The blind judge: worlds, motions, leaks and rigs drawn from a seed; what every giver of verdicts makes of the same traces.
 //!
-//! `cargo bench --bench judge` prints the tables of `docs/judge.md`. After `--`, in any order:
+//! `cargo bench --bench judge` prints the tables of `docs/bench/judge.md`. After `--`, in any order:
 //! `worlds=lag,zero` (parts of names; `held-out`, `known`), `draws=4` per world, `number=7` that draw alone, `seed=6c429f8` (else the
 //! version's commit), `accuracy=0.003`, `seconds=60`, `rows.csv` for a line per trace, `wrong` for a line per wrong verdict, `each` for all.
 
 use pitchleak_testkit::judge::Case;
 use pitchleak_testkit::judge::givers::{Replay, VerdictGiver};
 use pitchleak_testkit::judge::score::{Judgement, Scored, Sum};
-use pitchleak_testkit::judge::worlds::{WORLDS, World};
+use pitchleak_testkit::judge::worlds::{WORLDS, Wires, World};
 use rayon::prelude::*;
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -76,11 +76,11 @@ fn main() {
     let givers: [&dyn VerdictGiver; 1] = [&Replay];
     let scored = judged(&cases, &givers);
     println!("Seed {seed}, {} traces of {seconds} s.", cases.len());
-    for (place, giver) in givers.iter().enumerate() {
-        let rows: Vec<(&Case, &Scored)> = cases.iter().zip(scored.iter().map(|all| &all[place])).collect();
-        table(giver.name(), &worlds, &rows);
-        lines(giver.name(), &rows, &options);
-    }
+    let rows_of = |place: usize| cases.iter().zip(scored.iter().map(|all| &all[place])).collect();
+    let rows: Vec<Rows<'_>> = (0..givers.len()).map(rows_of).collect();
+    side_by_side(&givers, &worlds, &rows);
+    givers.iter().zip(&rows).for_each(|(giver, own)| details(giver.name(), own));
+    givers.iter().zip(&rows).for_each(|(giver, own)| lines(giver.name(), own, &options));
     for file in options.0.iter().filter(|word| word.ends_with(".csv")) {
         let rows = givers.iter().enumerate().flat_map(|(place, giver)| {
             cases.iter().zip(&scored).map(move |(case, all)| csv(giver.name(), case, &all[place]))
@@ -113,25 +113,52 @@ fn judged(cases: &[Case], givers: &[&dyn VerdictGiver]) -> Vec<Vec<Scored>> {
     scored
 }
 
-fn table(giver: &str, worlds: &[&World], rows: &[(&Case, &Scored)]) {
-    let columns = Sum::HEAD.matches('|').count() + 2;
-    println!("\n| `{giver}` | {} |\n|{}", Sum::HEAD, "---|".repeat(columns));
-    let line = |name: &str, of: &dyn Fn(&Case) -> bool| {
-        let own = rows.iter().filter(|(case, _)| of(case)).map(|(_, scored)| *scored);
-        println!("| {name} | {} |", Sum::of(own).cells());
+type Rows<'a> = Vec<(&'a Case, &'a Scored)>;
+
+/// A table's row: its name, and which cases are in it.
+type Group = (String, Box<dyn Fn(&Case) -> bool>);
+
+/// Every world, and sums over them.
+fn groups(worlds: &[&'static World]) -> Vec<Group> {
+    let of_world = |world: &&'static World| -> Group {
+        let (name, mark) = (world.name, if world.held_out { " †" } else { "" });
+        (format!("{}{mark}", name.replace('|', "\\|")), Box::new(move |case| case.world.name == name))
     };
-    for world in worlds {
-        let mark = if world.held_out { " †" } else { "" };
-        line(&format!("{}{mark}", world.name.replace('|', "\\|")), &|case| case.world.name == world.name);
-    }
-    let wrong_wires = |case: &Case| case.world.ailment().wires != Default::default();
-    line("**known, without wiring**", &|case| !case.world.held_out && !wrong_wires(case));
-    line("**wiring**", &wrong_wires);
-    line("**held out** †", &|case| case.world.held_out);
-    line("**all**", &|_| true);
+    let wrong_wires = |case: &Case| case.world.ailment().wires != Wires::Right;
+    let mut groups: Vec<_> = worlds.iter().map(of_world).collect();
+    groups.push((
+        "**known, without wiring**".into(),
+        Box::new(move |case| !case.world.held_out && !wrong_wires(case)),
+    ));
+    groups.push(("**wiring**".into(), Box::new(wrong_wires)));
+    groups.push(("**held out** †".into(), Box::new(|case| case.world.held_out)));
+    groups.push(("**all**".into(), Box::new(|_| true)));
+    groups
 }
 
-fn lines(giver: &str, rows: &[(&Case, &Scored)], options: &Options) {
+fn sum(rows: &Rows<'_>, is_in: &dyn Fn(&Case) -> bool) -> Sum {
+    Sum::of(rows.iter().filter(|(case, _)| is_in(case)).map(|(_, scored)| *scored))
+}
+
+/// Right / open / wrong of all givers, world by world.
+fn side_by_side(givers: &[&dyn VerdictGiver], worlds: &[&'static World], rows: &[Rows<'_>]) {
+    let names: String = givers.iter().map(|giver| format!(" | `{}`", giver.name())).collect();
+    println!("\n| right / open / wrong %{names} |\n|---|{}", "---|".repeat(givers.len()));
+    for (name, is_in) in groups(worlds) {
+        let cells: String = rows.iter().map(|own| format!(" | {}", sum(own, &is_in).shares())).collect();
+        println!("| {name}{cells} |");
+    }
+}
+
+/// All figures of one giver, in sum.
+fn details(giver: &str, rows: &Rows<'_>) {
+    println!("\n| `{giver}` | {} |\n|{}", Sum::HEAD, "---|".repeat(Sum::HEAD.matches('|').count() + 2));
+    for (name, is_in) in groups(&[]) {
+        println!("| {name} | {} |", sum(rows, &is_in).cells());
+    }
+}
+
+fn lines(giver: &str, rows: &Rows<'_>, options: &Options) {
     let wanted =
         |one: &Scored| options.has("each") || (options.has("wrong") && one.judgement == Judgement::Wrong);
     for (case, one) in rows.iter().filter(|(_, one)| wanted(one)) {

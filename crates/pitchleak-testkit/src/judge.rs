@@ -1,6 +1,6 @@
 //! The blind judge: worlds, motions, leaks and rigs drawn from a seed, shown to all who give verdicts, and their words held against the truth.
 //!
-//! Nobody tunes on it. `cargo bench --bench judge` runs it; `docs/judge.md` has its table as it fell.
+//! Nobody tunes on it. `cargo bench --bench judge` runs it; `docs/bench/judge.md` has its table as it fell.
 
 #![allow(missing_docs, reason = "cells of the bench's own tables")]
 

@@ -219,18 +219,25 @@ impl Sum {
     pub const HEAD: &'static str = "runs | right / open / wrong % | log loss | intervals hold % of | half width L/min | \
                                     so at 0.9 to 0.99, % of | so above, % of | cause named | sound part blamed";
 
+    /// Right / open / wrong, %; nothing where there are no runs.
+    pub fn shares(&self) -> String {
+        if self.runs == 0 {
+            return String::new();
+        }
+        let [right, open, wrong] = [self.right, self.open, self.wrong].map(|n| percent(n, self.runs));
+        format!("{right:.0} / {open:.0} / {wrong:.1}")
+    }
+
     pub fn cells(&self) -> String {
-        let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
         let of = |part: usize, whole: usize| match whole {
             0 => "-".to_owned(),
             _ => format!("{:.0} of {whole}", percent(part, whole)),
         };
-        let mut out = format!("{} | ", self.runs);
-        let [right, open, wrong] = [self.right, self.open, self.wrong].map(|n| percent(n, self.runs));
+        let mut out = format!("{} | {} | ", self.runs, self.shares());
         let width = self.widths.get(self.widths.len() / 2).map_or("-".into(), |w| format!("{w:.3}"));
         let _ = write!(
             out,
-            "{right:.0} / {open:.0} / {wrong:.1} | {:.3} | {} | {width} | {} | {} | {} | {}",
+            "{:.3} | {} | {width} | {} | {} | {} | {}",
             self.log_loss / self.runs.max(1) as f64,
             of(self.holding, self.intervals),
             of(self.likely[1], self.likely[0]),
@@ -240,4 +247,8 @@ impl Sum {
         );
         out
     }
+}
+
+fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole.max(1) as f64
 }
