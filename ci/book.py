@@ -3,7 +3,7 @@
     python ci/book.py      # needs mdbook (ci/requirements.txt), target/release/pitchleak and examples/gallery there
 
 The chapters are those of docs/SUMMARY.md; the gallery of effects gets a page for each entry of the table of effects,
-commands and thresholds get theirs from the code (`reference.py`).
+commands, JSON and thresholds get theirs from the code (`reference.py`).
 A file of the repository that a chapter links to comes along. Exit status 1 if a link, an anchor or a file is missing,
 if a page would ask the network for anything, if a browser complains of one, or if axe-core finds a serious barrier.
 """
@@ -95,9 +95,10 @@ def gallery() -> None:
 
 def generated() -> None:
     """What is made from the code, below the chapters' own words."""
-    for name, made in (("commands.md", reference.commands()), ("thresholds.md", reference.thresholds())):
-        with (SOURCE / name).open("a") as chapter:
-            chapter.write(f"\n{made}")
+    made = {"commands": reference.commands, "json": reference.json_output, "thresholds": reference.thresholds}
+    for name, make in made.items():
+        with (SOURCE / f"{name}.md").open("a") as chapter:
+            chapter.write(f"\n{make()}")
 
 
 class Page(html.parser.HTMLParser):

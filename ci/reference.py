@@ -1,5 +1,6 @@
-"""Reference that is made from the code when the book is built: the help of each command, and the thresholds."""
+"""Reference that is made from the code when the book is built: commands, their JSON, and the thresholds."""
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -34,3 +35,38 @@ def thresholds() -> str:
             rows.append(f"| `{name}` | {value} | {kind[1].lower() if kind else ''} | {text} |")
         tables.append(f"## {title}\n\n" + "\n".join(rows) + "\n")
     return "\n".join(tables)
+
+
+def shortened(value: object) -> object:
+    """Long lists and tables by their first entry, numbers by four digits: enough to see what is where."""
+    if isinstance(value, dict):
+        entries = list(value.items())
+        is_table = len(entries) > 12 and all(isinstance(one, dict) for one in value.values())
+        shown = {key: shortened(one) for key, one in (entries[:1] if is_table else entries)}
+        return shown | ({"…": "…"} if is_table else {})
+    if isinstance(value, list):
+        shown = [shortened(one) for one in value[:2]]
+        return shown if len(value) < 3 else [*shown[:1], "…"]
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def laid_out(value: object, indent: str = "") -> str:
+    """A line for whatever fits into one."""
+    line = json.dumps(value, ensure_ascii=False)
+    if len(indent) + len(line) <= 110 or not isinstance(value, (dict, list)):
+        return line
+    within = indent + "  "
+    if isinstance(value, list):
+        return "[\n" + ",\n".join(within + laid_out(one, within) for one in value) + f"\n{indent}]"
+    entries = (f"{within}{json.dumps(key)}: {laid_out(one, within)}" for key, one in value.items())
+    return "{\n" + ",\n".join(entries) + f"\n{indent}}}"
+
+
+def json_output() -> str:
+    """What `--json` of each command prints for one trace, shortened."""
+    sections = []
+    for command in ("replay", "check", "diagnose", "fleet"):
+        run = [PROGRAM, command, "data/traces/both.csv.gz", "--json"]
+        printed = subprocess.run(run, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+        sections.append(f"## {command}\n\n```json\n{laid_out(shortened(json.loads(printed)))}\n```\n")
+    return "\n".join(sections)
