@@ -25,7 +25,7 @@ while read -r estimator limit; do
 done <<END
 paper-law 61
 paper 113
-rls 640
+rls 650
 rls-offsets 940
 rls-gains 1960
 END

@@ -1,8 +1,9 @@
 """Builds the documentation site of docs/ into target/book/html and checks it.
 
-    python ci/book.py                 # needs mdbook (ci/requirements.txt) and target/release/examples/gallery
+    python ci/book.py      # needs mdbook (ci/requirements.txt), target/release/pitchleak and examples/gallery there
 
-The chapters are those of docs/SUMMARY.md; the gallery of effects gets a page for each entry of the table of effects.
+The chapters are those of docs/SUMMARY.md; the gallery of effects gets a page for each entry of the table of effects,
+commands, JSON and thresholds get theirs from the code (`reference.py`).
 A file of the repository that a chapter links to comes along. Exit status 1 if a link, an anchor or a file is missing,
 if a page would ask the network for anything, if a browser complains of one, or if axe-core finds a serious barrier.
 """
@@ -18,6 +19,8 @@ import sys
 import tempfile
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
+
+import reference
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -88,6 +91,14 @@ def gallery() -> None:
     if GALLERY not in text:
         sys.exit("docs/SUMMARY.md has no gallery")
     summary.write_text(text.replace(GALLERY, GALLERY + below))
+
+
+def generated() -> None:
+    """What is made from the code, below the chapters' own words."""
+    made = {"commands": reference.commands, "json": reference.json_output, "thresholds": reference.thresholds}
+    for name, make in made.items():
+        with (SOURCE / f"{name}.md").open("a") as chapter:
+            chapter.write(f"\n{make()}")
 
 
 class Page(html.parser.HTMLParser):
@@ -162,6 +173,7 @@ def complaints(pages: dict[Path, Page]) -> list[str]:
 
 assemble()
 gallery()
+generated()
 subprocess.run(["mdbook", "build", BOOK], check=True)
 built = {path: Page(path) for path in (BOOK / "html").rglob("*.html") if path.name not in ("toc.html", "404.html")}
 print(f"{len(built)} pages in {BOOK.relative_to(ROOT)}/html")

@@ -12,6 +12,8 @@ pub mod blind;
 pub mod confidence;
 pub mod hopsan;
 #[cfg(feature = "judges")]
+pub mod judge;
+#[cfg(feature = "judges")]
 pub mod lies;
 mod motion;
 mod noise;

@@ -41,6 +41,7 @@
 //! assert!((block.a.pressure - 5e6 * 0.25).abs() < 1e-6 && block.a.compression == 0.0);
 //! ```
 
+mod clocks;
 mod equation;
 mod integrals;
 mod moving_average;
@@ -48,6 +49,7 @@ mod noise;
 mod pressure_means;
 mod weights;
 
+pub use clocks::{Clocks, Next, PerChannel, Readings, Row};
 pub use equation::{Equation, combine};
 pub use integrals::{ChamberIntegrals, Integrals, Measured, Step};
 pub use moving_average::MovingAverage;

@@ -17,6 +17,7 @@
 mod block;
 mod block_end;
 mod change_detector;
+mod channel_clocks;
 mod error;
 mod estimates;
 mod evidence;
@@ -35,8 +36,8 @@ mod update;
 mod zeros;
 
 use crate::continuity::{
-    BlockPressures, Integrals, Measured, MovingAverage, NoiseStd, PressureMeans, PressureNoise, Step,
-    Weights, combine,
+    BlockPressures, Clocks, Integrals, Measured, MovingAverage, NoiseStd, PressureMeans, PressureNoise,
+    Readings, Step, Weights, combine,
 };
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 use block::{BALANCES, Balance, BlockSums};
@@ -121,6 +122,9 @@ pub struct Rls<T, const N: usize> {
     change: ChangeDetector<T, N>,
     innovations: InnovationMonitor<T>,
     pressures: PressureMeans<T>,
+    clocks: Clocks<T>,
+    /// Step by which the last sample was taken in without a wait, s; zero where it waited.
+    step_s: T,
 }
 
 impl<T: Real, const N: usize> Rls<T, N> {
@@ -171,6 +175,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
             slopes_ps: [(T::zero(), T::zero()); LEAKS],
             innovations: InnovationMonitor::default(),
             pressures: PressureMeans::default(),
+            clocks: Clocks::new(settings.max_step_s),
+            step_s: T::zero(),
         })
     }
 
@@ -181,17 +187,29 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if !self.plausible(sample) {
             return Update::Rejected;
         }
-        let Some(last) = self.last.replace(Sample { force_n: None, ..*sample }) else {
+        if !self.clocks.is_empty() {
+            return self.update_on_clocks(dt_s, &Readings::from(sample));
+        }
+        let Some(last) = self.last.as_ref().filter(|_| self.is_integrable(dt_s)) else {
             return self.restart(sample);
         };
-        let integrable = dt_s > T::zero() && dt_s <= self.settings.max_step_s;
-        if !integrable {
-            return self.restart(sample);
+        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, last, sample);
+        if measured != Measured::Both {
+            return self.update_without_a_flow(dt_s, sample);
         }
-        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, &last, sample);
         self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
-        self.block.add(&step);
-        self.advance(&step, measured, sample.x_m);
+        self.last = Some(Sample { force_n: None, ..*sample });
+        self.step_s = dt_s;
+        self.fed.add(&step);
+        let weights = self.both;
+        self.advance(&step, &weights, Some(sample.x_m));
+        self.finish(&step)
+    }
+
+    /// The step is taken in: what is due at its end.
+    #[inline(always)]
+    fn finish(&mut self, step: &Integrals<T>) -> Update<T> {
+        self.block.add(step);
         let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
         if full {
             self.close_block()
@@ -202,22 +220,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
     }
 
-    /// PositionFilter step to the reading `x_m`, by whichever flows both ends of the step have.
-    #[inline]
-    fn advance(&mut self, step: &Integrals<T>, measured: Measured, x_m: T) {
-        let of_one;
-        let weights = match measured {
-            Measured::Both => {
-                self.fed.add(step);
-                &self.both
-            }
-            Measured::Neither => return self.anchor(x_m),
-            one => {
-                of_one = self.weights_of_one(one == Measured::OnlyA);
-                &of_one
-            }
-        };
-        let Some(odometer) = &mut self.position_filter else { return };
+    /// The position equation's step; none is compared with where the position was not read.
+    #[inline(always)]
+    fn advance(&mut self, step: &Integrals<T>, weights: &Weights<T>, x_m: Option<T>) {
+        let Some(position) = &mut self.position_filter else { return };
         let sensor_variance = self.noise.position_m * self.noise.position_m;
         let mut equation =
             combine(step, weights.position_a, weights.position_b, self.compressibility, &self.scale);
@@ -227,22 +233,21 @@ impl<T: Real, const N: usize> Rls<T, N> {
             equation.columns[gain] = -equation.residual(&self.solution.mean) * self.scale[gain];
         }
         let variance = weights.position_variance * step.time_square;
-        odometer.advance(
-            step.time,
-            equation.left,
-            &equation.columns,
-            variance,
-            x_m,
-            sensor_variance,
-            &mut self.sums,
-        );
+        position.carry(step.time, &equation, variance);
+        if let Some(x_m) = x_m {
+            position.compare(x_m, sensor_variance, &mut self.sums);
+        }
     }
 
-    /// Weights where only one flow is measured, that of chamber A or B.
+    /// Weights where not all flows are measured, or their noise is another.
     #[cold]
-    fn weights_of_one(&self, a: bool) -> Weights<T> {
-        let only = if a { Weights::only_a } else { Weights::only_b };
-        only(&self.cylinder, &self.noise, &self.possible_leaks_m3spa())
+    fn weights_of(&self, measured: Measured, noise: &NoiseStd<T>) -> Weights<T> {
+        let weights = match measured {
+            Measured::OnlyA => Weights::only_a,
+            Measured::OnlyB => Weights::only_b,
+            Measured::Both | Measured::Neither => Weights::both,
+        };
+        weights(&self.cylinder, noise, &self.possible_leaks_m3spa())
     }
 
     /// The leaks found decide how much pressure noise the equations carry, and how much of the pressures'
@@ -265,30 +270,42 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn anchor(&mut self, x_m: T) {
         let variance = self.noise.position_m * self.noise.position_m;
         match &mut self.position_filter {
-            Some(odometer) => odometer.anchor(x_m, variance),
+            Some(filter) => filter.anchor(x_m, variance),
             None => self.position_filter = Some(PositionFilter::anchored(x_m, variance)),
         }
     }
 
     #[cold]
     fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
+        self.last = Some(Sample { force_n: None, ..*sample });
         self.anchor(sample.x_m);
         self.memory = None;
         self.pressure_noise.interrupt();
         Update::Started
     }
 
+    #[inline]
+    fn is_integrable(&self, dt_s: T) -> bool {
+        dt_s > T::zero() && dt_s <= self.settings.max_step_s
+    }
+
     /// Finite, and within ten times what any pitch cylinder meets.
     #[inline]
     fn plausible(&self, sample: &Sample<T>) -> bool {
-        let pressure_limit = T::lit(1e9);
-        let flow_limit = T::lit(1e3) * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
+        let (x_limit, pressure_limit, flow_limit) = self.limits();
         let flow_ok = |q: Option<T>| q.is_none_or(|q| q.abs() <= flow_limit);
-        sample.x_m.abs() <= T::lit(2.0) * self.cylinder.stroke_m
+        sample.x_m.abs() <= x_limit
             && sample.pa_pa.abs() <= pressure_limit
             && sample.pb_pa.abs() <= pressure_limit
             && flow_ok(sample.qa_m3s)
             && flow_ok(sample.qb_m3s)
+    }
+
+    /// Largest position, m, pressure, Pa, and flow, m³/s, that are readings.
+    #[inline]
+    fn limits(&self) -> (T, T, T) {
+        let flow = T::lit(1e3) * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
+        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), flow)
     }
 }
 

@@ -1,8 +1,9 @@
 use super::block::BlockSums;
 use super::parameter::{LEAKS, leak_column};
 use crate::Real;
+use crate::continuity::Equation;
 
-/// Position whitener: a scalar Kalman filter that carries the piston by the flows (the odometer) and is
+/// Position whitener: a scalar Kalman filter that carries the piston by the flows and is
 /// corrected by the position sensor.
 ///
 /// Its innovation is white, so the regression on it is generalised least squares. The filtered position
@@ -40,39 +41,33 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
         }
     }
 
-    /// Carries the piston over `dt_s` by `travel_m` − `columns`ᵀθ, whose error has variance `variance_m2`, and compares
-    /// with the reading `x_m`; the whitened observation goes to `sums`.
-    #[inline]
-    #[expect(clippy::too_many_arguments, reason = "the step, what its flows say, and the reading")]
-    pub fn advance(
-        &mut self,
-        dt_s: T,
-        travel_m: T,
-        columns: &[T; N],
-        variance_m2: T,
-        x_m: T,
-        sensor_variance_m2: T,
-        sums: &mut BlockSums<T, N>,
-    ) {
+    /// Carries the piston over `dt_s` by what the flows say, `travel` in m, whose error has variance `variance_m2`.
+    #[inline(always)]
+    pub fn carry(&mut self, dt_s: T, travel: &Equation<T, N>, variance_m2: T) {
         // What came before is a step older now, what comes is half a step old.
         let half_s = T::lit(0.5) * dt_s;
         for i in 0..LEAKS {
-            let (g, c) = (self.sensitivity[leak_column(i)], columns[leak_column(i)]);
+            let (g, c) = (self.sensitivity[leak_column(i)], travel.columns[leak_column(i)]);
             self.aged[i] += half_s * (g + g + c);
         }
-        for (g, c) in self.sensitivity.iter_mut().zip(columns) {
+        for (g, c) in self.sensitivity.iter_mut().zip(&travel.columns) {
             *g += *c;
         }
-        let predicted = self.position_m + travel_m;
-        let variance = self.variance_m2 + variance_m2;
-        let weight = T::one() / (variance + sensor_variance_m2);
-        let innovation = predicted - x_m;
+        self.position_m += travel.left;
+        self.variance_m2 += variance_m2;
+    }
+
+    /// Compares with the reading `x_m`; the whitened observation goes to `sums`.
+    #[inline(always)]
+    pub fn compare(&mut self, x_m: T, sensor_variance_m2: T, sums: &mut BlockSums<T, N>) {
+        let weight = T::one() / (self.variance_m2 + sensor_variance_m2);
+        let innovation = self.position_m - x_m;
         sums.add(&self.sensitivity, &self.aged, innovation, weight);
         self.weight_sum += weight;
-        let gain = variance * weight;
+        let gain = self.variance_m2 * weight;
         let keep = T::one() - gain;
-        self.position_m = predicted - gain * innovation;
-        self.variance_m2 = keep * variance;
+        self.position_m -= gain * innovation;
+        self.variance_m2 *= keep;
         for g in &mut self.sensitivity {
             *g *= keep;
         }
