@@ -31,7 +31,7 @@ def make_farm(farm: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         trace = pl.simulate(13, leak_internal=f"{lpm * day} L/min", noise="0.3 %", seed=day, duration=20)
         pyarrow.parquet.write_table(trace.to_arrow(), folder / f"2026-05-{day:02}.parquet")
-        (folder / "rig.toml").write_text(pl.Rig.paper().to_toml().replace("accuracy = 0.01", "accuracy = 0.003"))
+        (folder / "rig.toml").write_text(pl.Rig.paper().replace(accuracy="0.3 %").to_toml())
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ EFFECTS = {"position_gain": 0.02, "coulomb_friction": 300.0}
 
 
 def main(picture=None):
-    rig = pl.Rig.parse(pl.Rig.paper().to_toml().replace("accuracy = 0.01", "accuracy = 0.001"), "turbine 7")
+    rig = pl.Rig.paper().replace(accuracy="0.1 %", name="turbine 7")
     trace = pl.simulate(21, rig, noise="rig", effects=EFFECTS, seed=5, duration=60).columns
 
     before = pl.replay(trace, rig)

@@ -38,13 +38,10 @@ pub struct Counts {
     pub error: usize,
 }
 
-impl<'a> FleetReport<'a> {
-    /// Name and version of the JSON form.
-    pub const SCHEMA: &'static str = "pitchleak.fleet/1";
-
-    /// The report on `rows`.
-    pub fn of(rows: &'a [FleetRow]) -> Self {
-        let mut counts = Counts::default();
+impl Counts {
+    /// Counts rows.
+    pub fn of<'a>(rows: impl IntoIterator<Item = &'a FleetRow>) -> Self {
+        let mut counts = Self::default();
         for row in rows {
             *match row.status {
                 Some(Status::Leak) => &mut counts.leak,
@@ -54,6 +51,17 @@ impl<'a> FleetReport<'a> {
                 None => &mut counts.error,
             } += 1;
         }
+        counts
+    }
+}
+
+impl<'a> FleetReport<'a> {
+    /// Name and version of the JSON form.
+    pub const SCHEMA: &'static str = "pitchleak.fleet/1";
+
+    /// The report on `rows`.
+    pub fn of(rows: &'a [FleetRow]) -> Self {
+        let counts = Counts::of(rows);
         let cylinders = rows.iter().map(|row| row.cylinder.as_str()).collect::<HashSet<_>>().len();
         Self {
             schema: Self::SCHEMA,

@@ -26,7 +26,6 @@ pub fn trace_error(py: Python<'_>, error: &EngineTraceError) -> PyErr {
     if let TraceFault::Open(source) = &error.fault {
         return file_error(py, &error.trace, source);
     }
-    let raised = TraceError::new_err(error.to_string());
     let (column, row, line) = match &error.fault {
         TraceFault::BadRow(bad) => place(bad),
         TraceFault::NoRows { first: Some(bad), .. } => place(bad),
@@ -35,6 +34,26 @@ pub fn trace_error(py: Python<'_>, error: &EngineTraceError) -> PyErr {
         }
         _ => (None, None, None),
     };
+    placed(py, error.to_string(), column, row, line)
+}
+
+/// Rows that are not in the order of time; `row` is the first that goes back.
+pub fn out_of_order(py: Python<'_>, column: &String, row: usize, how_often: &str) -> PyErr {
+    let text = format!(
+        "rows are in no order of time: column `{column}` goes back {how_often}, first at row {row}; sort them by it \
+         (rows of several cylinders: also name the column that tells them apart, as `group`)"
+    );
+    placed(py, text, Some(column), Some(row as u64), None)
+}
+
+fn placed(
+    py: Python<'_>,
+    text: String,
+    column: Option<&String>,
+    row: Option<u64>,
+    line: Option<u64>,
+) -> PyErr {
+    let raised = TraceError::new_err(text);
     let value = raised.value(py);
     let set = value.setattr("column", column).and_then(|()| value.setattr("row", row));
     match set.and_then(|()| value.setattr("line", line)) {

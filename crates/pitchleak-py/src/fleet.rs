@@ -4,10 +4,11 @@ use crate::errors::{output_error, rig_error, value_error};
 use crate::rig::Rig;
 use crate::signals::{Signals, Stop, Stopped};
 use crate::source::Source;
-use crate::table::NAME;
+use crate::table::{NAME, NOT_A_TIME};
+use numpy::PyArray1;
 use pitchleak::fleet::{
-    FleetColumn, FleetError, FleetFile, FleetReport, FleetRig, FleetRow as Row, FleetTable, FleetTrace,
-    TraceIdentity, judge_opened,
+    Counts, FleetColumn, FleetError, FleetFile, FleetReport, FleetRig, FleetRow as Row, FleetTable,
+    FleetTrace, TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
 use pitchleak::trace::TraceReader;
@@ -104,7 +105,14 @@ pub fn fleet_row(
     }
 }
 
-/// Rows as columns: header, kind (`numbers`, `texts`, `times`, `counts`, `flags`), values.
+/// Traces by status, and `error`, as JSON.
+#[pyfunction]
+pub fn fleet_counts(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
+    serde_json::to_string(&Counts::of(rows.iter().map(|row| &row.0))).map_err(value_error)
+}
+
+/// Rows as columns: header, kind (`numbers`, `texts`, `times`, `counts`, `flags`), values. Numbers are an array with NaN for
+/// none, times an array of milliseconds since 1970 with the least integer for none, as numpy has it.
 #[pyfunction]
 pub fn fleet_table<'py>(
     py: Python<'py>,
@@ -115,16 +123,25 @@ pub fn fleet_table<'py>(
         let (kind, values) = match column {
             FleetColumn::Texts(values) => ("texts", values.into_pyobject(py)?.into_any()),
             FleetColumn::Times(values) => {
-                let texts: Vec<_> = values.iter().map(|time| time.map(|time| time.to_string())).collect();
-                ("times", texts.into_pyobject(py)?.into_any())
+                let milliseconds = values.iter().map(|time| time.map_or(NOT_A_TIME, |t| t.as_millisecond()));
+                ("times", PyArray1::from_iter(py, milliseconds).into_any())
             }
-            FleetColumn::Numbers(values) => ("numbers", values.into_pyobject(py)?.into_any()),
+            FleetColumn::Numbers(values) => {
+                let numbers = values.iter().map(|number| number.unwrap_or(f64::NAN));
+                ("numbers", PyArray1::from_iter(py, numbers).into_any())
+            }
             FleetColumn::Counts(values) => ("counts", values.into_pyobject(py)?.into_any()),
             FleetColumn::Flags(values) => ("flags", values.into_pyobject(py)?.into_any()),
         };
         Ok((name.clone(), kind, values))
     };
     table.columns().iter().map(column).collect()
+}
+
+/// Trends by cylinder as JSON.
+#[pyfunction]
+pub fn fleet_trends(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
+    serde_json::to_string(&FleetReport::of(&cloned(&rows)).trends).map_err(value_error)
 }
 
 /// Counts, trends and rows as JSON.

@@ -10,6 +10,7 @@ mod page;
 mod replay;
 mod reproduce;
 mod rig;
+mod rig_arguments;
 mod signals;
 mod simulate;
 mod source;
@@ -29,7 +30,8 @@ mod _pitchleak {
     use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::fleet::{
-        FleetRow, fleet_json, fleet_page, fleet_row, fleet_save, fleet_table, fleet_text, fleet_traces,
+        FleetRow, fleet_counts, fleet_json, fleet_page, fleet_row, fleet_save, fleet_table, fleet_text,
+        fleet_traces, fleet_trends,
     };
     #[pymodule_export]
     use crate::linkage::Linkage;

@@ -1,16 +1,26 @@
 use crate::errors::rig_error;
+use crate::rig_arguments;
 use pitchleak::Rig as EngineRig;
 use pitchleak::rig::EstimatorKind;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::path::PathBuf;
 
 /// A rig file: the cylinder, its oil, its sensors, its alarms.
 ///
-/// Build one with :meth:`paper`, :meth:`load` or :meth:`parse`; it never changes.
+/// Arguments are the keys of a rig file: ``area_a``, ``area_b``, ``stroke``, ``moving_mass``, ``dead_volume_a``,
+/// ``dead_volume_b``; ``bulk_modulus``, ``bulk_modulus_std``; the sensors' data sheets ``flow`` (or ``flow_a``,
+/// ``flow_b``), ``pressure``, ``position``, ``force`` as dicts, ``accuracy`` for all of them; ``estimator``, ``alarms``,
+/// ``columns``, ``csv``, ``effects`` as dicts; ``name`` for messages. A quantity is a text with its unit or a
+/// number in SI. Raises :class:`RigError`, which names the argument. See also :meth:`paper`, :meth:`load`, :meth:`parse`
+/// and :meth:`replace`; a rig never changes.
 ///
 /// >>> import pitchleak as pl
-/// >>> rig = pl.Rig.paper()
+/// >>> rig = pl.Rig(
+/// ...     area_a="12.6 cm^2", area_b="9.4 cm^2", stroke="200 mm", moving_mass="20 kg",
+/// ...     bulk_modulus="0.8 GPa", pressure={"full_scale": "160 bar", "accuracy": "0.5 %"},
+/// ... )
 /// >>> rig.stroke_m, rig.bulk_modulus_pa
 /// (0.2, 800000000.0)
 #[pyclass(frozen, eq, module = "pitchleak")]
@@ -19,6 +29,24 @@ pub struct Rig(pub EngineRig);
 
 #[pymethods]
 impl Rig {
+    #[new]
+    #[pyo3(signature = (**arguments))]
+    fn new(arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        rig_arguments::rig(arguments).map(Self)
+    }
+
+    /// This rig with other values: arguments as for :class:`Rig`. Entries of a dict are put into the one that is there,
+    /// None takes out what a rig file may leave out. Where more changes than how a trace is read, so does the name.
+    ///
+    /// >>> import pitchleak as pl
+    /// >>> better = pl.Rig.paper().replace(stroke="250 mm", accuracy="0.1 %")
+    /// >>> better.stroke_m, better.name
+    /// (0.25, 'wu2011, changed')
+    #[pyo3(signature = (**arguments))]
+    fn replace(&self, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        rig_arguments::replaced(&self.0, arguments).map(Self)
+    }
+
     /// The rig of Wu et al. (2011), Section III.
     #[staticmethod]
     fn paper() -> Self {
@@ -139,6 +167,10 @@ impl Rig {
             self.0.fluid.bulk_modulus_pa / 1e9,
             self.0.fluid.bulk_modulus_std_pa / 1e9,
         )
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("pitchleak._html")?.call_method1("rig", (slf,))
     }
 
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (String, String))> {

@@ -1,6 +1,6 @@
 //! Columns that Python holds, lent to the engine without a copy where they are f64 already.
 
-use crate::errors::trace_error;
+use crate::errors::{out_of_order, trace_error};
 use crate::rig::Rig;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
@@ -47,7 +47,12 @@ impl Layout {
 pub const NAME: &str = "data";
 
 /// Time that is not a time, ns: as numpy and pandas write it.
-const NOT_A_TIME: i64 = i64::MIN;
+pub const NOT_A_TIME: i64 = i64::MIN;
+
+/// Rows that go back in time oftener than this, and oftener than once in so many rows, are in no order of time. Chosen: a
+/// clock that is set back, or a logger's late reading, is rarer; rows in any other order go back at every second one.
+const MOST_STEPS_BACK: usize = 3;
+const ROWS_PER_STEP_BACK: usize = 20;
 
 /// Columns in memory, and what they hold.
 #[pyclass(frozen, module = "pitchleak._pitchleak")]
@@ -77,6 +82,7 @@ impl Table {
     #[staticmethod]
     #[pyo3(signature = (layout, batches, first_ns = None))]
     fn from_arrays(
+        py: Python<'_>,
         layout: &Layout,
         batches: Vec<Vec<Option<Given<'_>>>>,
         first_ns: Option<i64>,
@@ -93,7 +99,9 @@ impl Table {
         };
         let batches = batches.into_iter().map(|columns| columns.into_iter().map(&mut hold).collect());
         let batches = batches.collect::<PyResult<_>>()?;
-        Ok(Self { layout: layout.clone(), batches, first_ns })
+        let table = Self { layout: layout.clone(), batches, first_ns };
+        table.check_order(py)?;
+        Ok(table)
     }
 
     /// Where its timestamps count from, ns since 1970; None where it has none.
@@ -127,6 +135,29 @@ type Batches<'py> = Vec<Vec<Option<Bound<'py, PyArray1<f64>>>>>;
 type Parts<'py> = (Layout, Batches<'py>, Option<i64>);
 
 impl Table {
+    /// Refuses rows of which so many go back in time that they are in another order: shuffled, or sorted by something else.
+    /// Single steps back are the reader's to judge.
+    fn check_order(&self, py: Python<'_>) -> PyResult<()> {
+        let Some(time) = self.layout.read.time() else { return Ok(()) };
+        let lent = self.lend(py)?;
+        let (mut rows, mut back, mut first) = (0, 0, None);
+        for batch in self.slices(&lent)? {
+            let times = batch.get(time).copied().unwrap_or_default();
+            let steps_back = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
+            if steps_back > 0 && first.is_none() {
+                first = times.windows(2).position(|pair| pair[1] < pair[0]).map(|row| rows + row + 1);
+            }
+            back += steps_back;
+            rows += times.len();
+        }
+        match first.zip(self.layout.headers.get(time)) {
+            Some((row, header)) if back > MOST_STEPS_BACK.max(rows / ROWS_PER_STEP_BACK) => {
+                Err(out_of_order(py, header, row, &format!("{back} times in {rows} rows")))
+            }
+            _ => Ok(()),
+        }
+    }
+
     pub fn layout(&self) -> &TableLayout {
         &self.layout.read
     }

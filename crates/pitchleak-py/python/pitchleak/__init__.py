@@ -12,74 +12,23 @@ numpy arrays, or a path; its columns are named ``<signal>_<unit>`` as in trace f
 10.1109/TMECH.2011.2142400.
 """
 
-from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
-from ._diagnose import Diagnosis, diagnose
-from ._estimator import Estimator
-from ._fleet import Fleet, FleetLeak, FleetRow, LongTrend, fleet
-from ._inputs import TraceWarning
-from ._pitchleak import Linkage, Rig, RigError, TraceError, __version__
-from ._replay import Replay, Replays, replay
-from ._reproduce import Reproduction, reproduce
-from ._results import (
-    Alarm,
-    Episode,
-    Estimate,
-    Estimates,
-    Leakage,
-    OilShare,
-    PerLeak,
-    ReachTime,
-    Reason,
-    Score,
-    Slope,
-    Spell,
-    Trace,
-    Trend,
-    Verdict,
-)
-from ._simulate import Simulation, simulate
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Alarm",
-    "ChannelFault",
-    "Check",
-    "Diagnosis",
-    "Episode",
-    "Estimate",
-    "Estimates",
-    "Estimator",
-    "Fleet",
-    "FleetLeak",
-    "FleetRow",
-    "Leakage",
-    "Linkage",
-    "LongTrend",
-    "OilShare",
-    "PerLeak",
-    "Reach",
-    "ReachTime",
-    "Reading",
-    "Reason",
-    "Replay",
-    "Replays",
-    "Reproduction",
-    "Rig",
-    "RigError",
-    "Score",
-    "Simulation",
-    "Slope",
-    "Spell",
-    "Trace",
-    "TraceError",
-    "TraceWarning",
-    "Trend",
-    "Verdict",
-    "Wiring",
-    "__version__",
-    "check",
-    "diagnose",
-    "fleet",
-    "replay",
-    "reproduce",
-    "simulate",
-]
+if TYPE_CHECKING:
+    from ._api import *  # noqa: F403
+    from ._api import __all__ as __all__
+
+
+def __getattr__(name: str) -> Any:
+    """Imports all, and numpy with it, when the first name is asked for."""
+    if not name.startswith("_") or name in ("__all__", "__version__"):
+        api = import_module(f"{__name__}._api")
+        globals().update({known: getattr(api, known) for known in ("__all__", *api.__all__)})
+    if name in globals():
+        return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__getattr__("__all__")})

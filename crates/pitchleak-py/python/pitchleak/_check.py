@@ -157,7 +157,13 @@ class Check(Raw, Paged, Tabular):
         return _html.page(repr(self)[1:-1], _html.table(headers, signals), shown)
 
 
-def check(data: Any, rig: Rig | _inputs.Path | None = None, *, strict: bool = False) -> Check:
+def check(
+    data: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    columns: _inputs.Columns | None = None,
+    strict: bool = False,
+) -> Check:
     """Checks a trace: data quality, excitation, what it can and cannot identify.
 
     Takes what :func:`replay` takes, and raises what it raises.
@@ -167,7 +173,7 @@ def check(data: Any, rig: Rig | _inputs.Path | None = None, *, strict: bool = Fa
     >>> pl.check(trace.columns).leaks.external_a.identifiable
     True
     """
-    rig = _inputs.rig_for(data, rig)
+    rig = _inputs.rig_for(data, rig, columns)
     source = _inputs.source(data, rig)
     report, text = _pitchleak.check(source, rig, strict)
     raw = json.loads(report)

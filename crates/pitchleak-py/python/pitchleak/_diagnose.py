@@ -312,6 +312,7 @@ def diagnose(
     rig: Rig | _inputs.Path | None = None,
     *,
     test: Any = (),
+    columns: _inputs.Columns | None = None,
     strict: bool = False,
     progress: Progress = True,
 ) -> Diagnosis:
@@ -319,14 +320,13 @@ def diagnose(
 
     ``data`` is a trace as :func:`replay` takes it, or a list of traces of one rig that are fitted
     together; ``test`` are the traces to judge on, else blocks that each fit leaves out. A file that is in both is a
-    ``ValueError``; one that is given twice is read once, with a :class:`TraceWarning`. ``progress`` is True (a count of
-    fits where tqdm is installed and somebody watches), False, or a function of the fits done and NaN: nobody knows how
-    many there will be.
+    ``ValueError``; one that is given twice is read once, with a :class:`TraceWarning`. ``columns`` names foreign
+    columns as for :func:`replay`. ``progress`` is True (a count of fits where tqdm is installed and somebody watches),
+    False, or a function of the fits done and NaN: nobody knows how many there will be.
 
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, effects={"viscous_friction": 3000.0}, noise="0.1 %", duration=60)
-    >>> rig = pl.Rig.parse(pl.Rig.paper().to_toml().replace("accuracy = 0.01", "accuracy = 0.001"))
-    >>> found = pl.diagnose(trace.columns, rig)
+    >>> found = pl.diagnose(trace.columns, pl.Rig.paper().replace(accuracy="0.1 %"))
     >>> found.effects[0].id
     'viscous_friction'
     """
@@ -334,7 +334,7 @@ def diagnose(
     judged_on = list(test) if isinstance(test, (list, tuple)) else [test]
     if not train:
         raise ValueError("no trace to fit")
-    rig = _inputs.rig_for(train[0], rig)
+    rig = _inputs.rig_for(train[0], rig, columns)
     fitted = [_inputs.source(trace, rig) for trace in train]
     judged = [_inputs.source(trace, rig) for trace in judged_on]
     with shown(progress, " fits") as at:

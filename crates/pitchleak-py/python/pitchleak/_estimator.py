@@ -15,8 +15,9 @@ class Estimator(_pitchleak.Estimator):
     ``replay`` on the whole, to the last bit. An estimator may be used from several threads, each call at a
     time.
 
-    ``rig`` is a :class:`Rig` or the path of a rig file, the built-in one where left out; ``estimator`` is
-    ``rls`` or ``paper``; ``strict`` makes bad samples raise instead of being skipped.
+    ``rig`` is a :class:`Rig` or the path of a rig file, the built-in one where left out; ``columns`` names foreign
+    columns as for ``replay``; ``estimator`` is ``rls`` or ``paper``; ``strict`` makes bad samples raise
+    instead of being skipped.
 
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, leak_external_a="0.5 L/min", duration=10)
@@ -30,9 +31,14 @@ class Estimator(_pitchleak.Estimator):
     """
 
     def __new__(
-        cls, rig: Rig | _inputs.Path | None = None, *, estimator: str | None = None, strict: bool = False
+        cls,
+        rig: Rig | _inputs.Path | None = None,
+        *,
+        columns: _inputs.Columns | None = None,
+        estimator: str | None = None,
+        strict: bool = False,
     ) -> Self:
-        return super().__new__(cls, _inputs.rig_for(None, rig), estimator=estimator, strict=strict)
+        return super().__new__(cls, _inputs.rig_for(None, rig, columns), estimator=estimator, strict=strict)
 
     def extend(self, data: Any) -> int:
         """Takes in the next part of the trace, with columns as :func:`replay` takes them.

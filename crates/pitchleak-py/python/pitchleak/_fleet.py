@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -128,7 +128,7 @@ class Fleet(Paged, Tabular):
     @property
     def counts(self) -> dict[str, int]:
         """Traces by status, and ``error``."""
-        counts: dict[str, int] = self.to_dict()["counts"]
+        counts: dict[str, int] = json.loads(_pitchleak.fleet_counts(self._rows))
         return counts
 
     @cached_property
@@ -139,7 +139,7 @@ class Fleet(Paged, Tabular):
         def long(raw: dict[str, Any] | None) -> LongTrend | None:
             return None if raw is None else record(LongTrend, raw | {"from_": raw["from"]})
 
-        entries = self.to_dict()["trends"]
+        entries = json.loads(_pitchleak.fleet_trends(self._rows))
         return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in entries}
 
     @property
@@ -282,12 +282,8 @@ class Fleet(Paged, Tabular):
         return min(self.rows, key=_urgency).cylinder
 
 
-def _column(kind: str, values: list[Any]) -> Any:
-    if kind == "numbers":
-        return np.array(values, np.float64)
-    if kind == "times":
-        return np.array([None if time is None else time.rstrip("Z") for time in values], "datetime64[ms]")
-    return values
+def _column(kind: str, values: Any) -> Any:
+    return values.view("datetime64[ms]") if kind == "times" else values
 
 
 def _urgency(row: FleetRow) -> tuple[int, float]:
@@ -310,14 +306,13 @@ class _Job:
     cylinder: str
     begins: str | None
     rig: Rig | str | None
+    columns: _inputs.Columns | None
 
 
 def _judge(job: _Job, stop: Stop | None = None) -> _pitchleak.FleetRow:
     """Judges one trace; runs in any thread, process or machine that has the file."""
-    rig = job.rig
     try:
-        if not isinstance(rig, Rig):
-            rig = Rig.paper() if rig is None else Rig.load(rig)
+        rig = _inputs.rig_for(None, job.rig, job.columns)
         source = _inputs.source(job.data, rig)
     except (OSError, RigError, TraceError) as error:
         path = str(job.data) if _inputs.is_path(job.data) else "data"
@@ -329,6 +324,7 @@ def fleet(
     traces: Any,
     rigs: Rigs | None = None,
     *,
+    columns: _inputs.Columns | None = None,
     map: Map | None = None,
     progress: Progress = True,
 ) -> Fleet:
@@ -337,7 +333,8 @@ def fleet(
     ``traces`` are paths or patterns (``"farm/**/*.parquet"``), one or a list, or data by the names of their cylinders,
     as :func:`replay` takes it. ``rigs`` is a :class:`Rig` or a rig file for all, a table of rig files (``.csv``,
     docs/fleet.md), or rigs by the names of the cylinders; left out, it is ``rig.toml`` beside each file, else the
-    built-in one. A trace that can't be used becomes a row with its ``error``, and a :class:`TraceWarning` says so.
+    built-in one. ``columns`` names foreign columns as for :func:`replay`. A trace that can't be used becomes a row with
+    its ``error``, and a :class:`TraceWarning` says so.
 
     ``map`` is any map, and says where the work is done: the builtin ``map``, that of a process pool, ``joblib``'s in a
     lambda, a Dask client's; futures are waited for. Left out, it is all cores of this machine. ``progress`` is True
@@ -350,7 +347,7 @@ def fleet(
     >>> found.table["cylinder"], found.table["status"]
     (['T1/B1', 'T1/B2'], ['sound', 'leak'])
     """
-    jobs = _jobs(traces, rigs)
+    jobs = _jobs(traces, rigs, columns)
     if map is None:
         rows = on_all_cores(_judge, jobs, progress, "trace")
     else:
@@ -374,24 +371,25 @@ def _gathered(results: Iterable[Any], count: int, progress: Progress) -> list[_p
     return rows
 
 
-def _jobs(traces: Any, rigs: Rigs | None) -> list[_Job]:
+def _jobs(traces: Any, rigs: Rigs | None, columns: _inputs.Columns | None) -> list[_Job]:
     if isinstance(traces, Mapping):
-        return [_named_job(str(cylinder), data, _rig_of(str(cylinder), rigs)) for cylinder, data in traces.items()]
+        named = ((str(cylinder), data) for cylinder, data in traces.items())
+        return [_named_job(cylinder, data, _rig_of(cylinder, rigs), columns) for cylinder, data in named]
     patterns = [traces] if _inputs.is_path(traces) else list(traces)
     file = os.fspath(rigs) if isinstance(rigs, (str, os.PathLike)) else None
     found = _pitchleak.fleet_traces([os.fspath(pattern) for pattern in patterns], file)
     one = rigs if isinstance(rigs, Rig) else None
-    jobs = [_Job(path, cylinder, begins, one or beside) for path, cylinder, begins, beside in found]
+    jobs = [_Job(path, cylinder, begins, one or beside, columns) for path, cylinder, begins, beside in found]
     if not isinstance(rigs, Mapping):
         return jobs
-    return [_Job(job.data, job.cylinder, job.begins, _rig_of(job.cylinder, rigs)) for job in jobs]
+    return [replace(job, rig=_rig_of(job.cylinder, rigs)) for job in jobs]
 
 
-def _named_job(cylinder: str, data: Any, rig: Rig | str | None) -> _Job:
+def _named_job(cylinder: str, data: Any, rig: Rig | str | None, columns: _inputs.Columns | None) -> _Job:
     if rig is None and _inputs.is_path(data):
         ((path, _, begins, beside),) = _pitchleak.fleet_traces([os.fspath(data)], None)
-        return _Job(path, cylinder, begins, beside)
-    return _Job(data, cylinder, None, rig)
+        return _Job(path, cylinder, begins, beside, columns)
+    return _Job(data, cylinder, None, rig, columns)
 
 
 def _rig_of(cylinder: str, rigs: Rigs | None) -> Rig | str | None:

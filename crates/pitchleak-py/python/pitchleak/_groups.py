@@ -1,6 +1,6 @@
 """A table of many cylinders, taken apart by the column that names them."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,25 +24,38 @@ def split(data: Any, by: str) -> dict[Hashable, Any]:
         parts = data.partition_by(by, as_dict=True, include_key=False, maintain_order=True)
         return {key: part for (key,), part in parts.items()}
     if isinstance(data, Mapping):
-        return _split_arrays(data, by)
+        _require(by, data)
+        arrays = {name: np.asarray(values) for name, values in data.items()}
+        keys, codes = np.unique(arrays.pop(by), return_inverse=True)
+        names = list(keys) if keys.dtype.kind in "mM" else keys.tolist()
+        return _split(names, codes, lambda rows: {name: values[rows] for name, values in arrays.items()})
     if hasattr(data, "__arrow_c_stream__"):
-        table = optional("pyarrow", "arrow").table(data)
-        return _split_arrays({name: table[name].to_numpy() for name in table.column_names}, by)
+        return _split_arrow(optional("pyarrow", "arrow").table(data), by)
     raise TypeError(f"{type(data).__name__} has no groups: give a data frame, an Arrow table or a dict of arrays")
 
 
-def _split_arrays(data: Mapping[str, Any], by: str) -> dict[Hashable, Any]:
-    _require(by, data)
-    keys, firsts, places = np.unique(np.asarray(data[by]), return_index=True, return_inverse=True)
-    rest = {name: np.asarray(values) for name, values in data.items() if name != by}
-    names = keys.tolist()
+def _split_arrow(table: Any, by: str) -> dict[Hashable, Any]:
+    """Parts of the same types as the table; a key is what Python has for it, None for a null."""
+    _require(by, table.column_names)
+    keys = table[by].combine_chunks().dictionary_encode(null_encoding="encode")
+    rest = table.drop_columns(by)
+
+    def part(rows: Any) -> Any:
+        return rest.slice(rows.start, rows.stop - rows.start) if isinstance(rows, slice) else rest.take(rows)
+
+    return _split(keys.dictionary.to_pylist(), keys.indices.to_numpy(), part)
+
+
+def _split(keys: list[Any], codes: Any, part: Callable[[Any], Any]) -> dict[Hashable, Any]:
+    """Parts by their keys, of the rows that have the place of the key; ``part`` gets a slice or their numbers."""
+    order = np.argsort(codes, kind="stable")
+    ends = np.cumsum(np.bincount(codes, minlength=len(keys)))
+    by_key = [order[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
     parts: dict[Hashable, Any] = {}
-    for group in np.argsort(firsts):
-        rows = np.flatnonzero(places == group)
+    for key, rows in sorted(zip(keys, by_key, strict=True), key=lambda one: one[1][0]):
         # Rows that follow each other are a view.
-        together = len(rows) > 0 and rows[-1] - rows[0] + 1 == len(rows)
-        pick: Any = slice(rows[0], rows[-1] + 1) if together else rows
-        parts[names[group]] = {name: values[pick] for name, values in rest.items()}
+        together = rows[-1] - rows[0] + 1 == len(rows)
+        parts[key] = part(slice(rows[0], rows[-1] + 1) if together else rows)
     return parts
 
 

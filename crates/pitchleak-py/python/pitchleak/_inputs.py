@@ -13,6 +13,8 @@ from ._index import with_index
 from ._pitchleak import Layout, Rig, Table, TraceError
 
 Path: TypeAlias = str | os.PathLike[str]
+#: What foreign columns are, as ``[columns]`` of a rig file has it: headers with their units, or dicts, by signal.
+Columns: TypeAlias = Mapping[str, str | Mapping[str, Any]]
 Source: TypeAlias = str | Table
 
 
@@ -59,12 +61,19 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
     raise TypeError(f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path")
 
 
-def rig_for(data: Any, rig: Rig | Path | None) -> Rig:
-    """The rig given, else the one beside a file, else the built-in one."""
+def rig_for(data: Any, rig: Rig | Path | None, columns: Columns | None = None) -> Rig:
+    """The rig given, else the one beside a file, else the built-in one; with ``columns``."""
+    found = _rig_for(data, rig)
+    return found if columns is None else found.replace(columns=columns)
+
+
+def _rig_for(data: Any, rig: Rig | Path | None) -> Rig:
     if isinstance(rig, Rig):
         return rig
-    if rig is not None:
+    if isinstance(rig, (str, os.PathLike)):
         return Rig.load(rig)
+    if rig is not None:
+        raise TypeError(f"`rig`: {type(rig).__name__} is none; give a pitchleak.Rig or the path of a rig file")
     return Rig.beside(data) if is_path(data) else Rig.paper()
 
 

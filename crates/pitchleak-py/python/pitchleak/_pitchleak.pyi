@@ -10,6 +10,8 @@ _Floats: TypeAlias = npt.NDArray[np.float64]
 _Path: TypeAlias = str | os.PathLike[str]
 _Source: TypeAlias = _Path | Table
 _Readings: TypeAlias = float | npt.ArrayLike
+_Quantity: TypeAlias = float | str
+_Section: TypeAlias = Mapping[str, Any]
 _Columns: TypeAlias = list[tuple[str, _Floats]]
 _Residuals: TypeAlias = list[tuple[str, list[float], list[float]]]
 
@@ -27,6 +29,7 @@ __all__ = [
     "check",
     "check_page",
     "diagnose",
+    "fleet_counts",
     "fleet_json",
     "fleet_page",
     "fleet_row",
@@ -34,6 +37,7 @@ __all__ = [
     "fleet_table",
     "fleet_text",
     "fleet_traces",
+    "fleet_trends",
     "over_time",
     "replay",
     "replay_page",
@@ -52,6 +56,58 @@ class RigError(ValueError): ...
 
 @final
 class Rig:
+    def __new__(
+        cls,
+        *,
+        area_a: _Quantity,
+        area_b: _Quantity,
+        stroke: _Quantity,
+        moving_mass: _Quantity,
+        bulk_modulus: _Quantity,
+        dead_volume_a: _Quantity = ...,
+        dead_volume_b: _Quantity = ...,
+        bulk_modulus_std: _Quantity = ...,
+        accuracy: _Quantity = ...,
+        flow: _Section = ...,
+        flow_a: _Section = ...,
+        flow_b: _Section = ...,
+        pressure: _Section = ...,
+        position: _Section = ...,
+        force: _Section = ...,
+        estimator: str | _Section = ...,
+        alarms: _Section = ...,
+        columns: _Section = ...,
+        csv: _Section = ...,
+        effects: _Section = ...,
+        name: str = "rig",
+        **sections: _Section,
+    ) -> Self: ...
+    def replace(
+        self,
+        *,
+        area_a: _Quantity = ...,
+        area_b: _Quantity = ...,
+        stroke: _Quantity = ...,
+        moving_mass: _Quantity = ...,
+        bulk_modulus: _Quantity = ...,
+        dead_volume_a: _Quantity = ...,
+        dead_volume_b: _Quantity = ...,
+        bulk_modulus_std: _Quantity = ...,
+        accuracy: _Quantity = ...,
+        flow: _Section | None = ...,
+        flow_a: _Section | None = ...,
+        flow_b: _Section | None = ...,
+        pressure: _Section | None = ...,
+        position: _Section | None = ...,
+        force: _Section | None = ...,
+        estimator: str | _Section | None = ...,
+        alarms: _Section | None = ...,
+        columns: _Section | None = ...,
+        csv: _Section | None = ...,
+        effects: _Section | None = ...,
+        name: str = ...,
+        **sections: _Section | None,
+    ) -> Rig: ...
     @staticmethod
     def paper() -> Rig: ...
     @staticmethod
@@ -85,6 +141,7 @@ class Rig:
     def alarm_thresholds_lpm(self) -> list[float]: ...
     @property
     def effects(self) -> dict[str, float]: ...
+    def _repr_html_(self) -> str: ...
     def __eq__(self, value: object, /) -> bool: ...
     def __ne__(self, value: object, /) -> bool: ...
     def __reduce__(self) -> tuple[Any, tuple[str, str]]: ...
@@ -209,8 +266,10 @@ def reproduce(
     seeds: int, out: _Path | None, progress: Callable[[float, float], Any] | None = None
 ) -> tuple[str, str, str]: ...
 def fleet_traces(patterns: Sequence[str], rigs: _Path | None) -> list[tuple[str, str, str | None, str | None]]: ...
+def fleet_trends(rows: Sequence[FleetRow]) -> str: ...
 def fleet_row(source: _Source, cylinder: str, begins: str | None, rig: Rig, stop: Stop | None = None) -> FleetRow: ...
-def fleet_table(rows: Sequence[FleetRow]) -> list[tuple[str, str, list[Any]]]: ...
+def fleet_table(rows: Sequence[FleetRow]) -> list[tuple[str, str, Any]]: ...
+def fleet_counts(rows: Sequence[FleetRow]) -> str: ...
 def fleet_json(rows: Sequence[FleetRow]) -> str: ...
 def fleet_page(rows: Sequence[FleetRow]) -> str: ...
 def fleet_text(rows: Sequence[FleetRow]) -> str: ...

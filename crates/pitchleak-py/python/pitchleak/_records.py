@@ -3,41 +3,57 @@
 import dataclasses
 import types
 import typing
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 T = TypeVar("T")
+
+#: Makes a value of JSON what a field's type asks for; None where it is that already.
+_Convert: TypeAlias = Callable[[Any], Any] | None
 
 
 def record(cls: type[T], data: Mapping[str, Any]) -> T:
     """``data`` as a dataclass: unknown keys are left out, missing ones take the field's default."""
-    hints = _hints(cls)  # type: ignore[arg-type]
-    fields = [field for field in dataclasses.fields(cls) if field.init]  # type: ignore[arg-type]
-    known = {f.name: _value(hints[f.name], data[f.name]) for f in fields if f.name in data}
+    known = {}
+    for name, convert in _fields(typing.cast(Hashable, cls)):
+        if name in data:
+            value = data[name]
+            known[name] = value if convert is None or value is None else convert(value)
     return cls(**known)
 
 
 @cache
-def _hints(cls: Hashable) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
+def _fields(cls: Any) -> tuple[tuple[str, _Convert], ...]:
+    hints = typing.get_type_hints(cls)
+    return tuple((field.name, _converter(hints[field.name])) for field in dataclasses.fields(cls) if field.init)
 
 
-def _value(kind: Any, data: Any) -> Any:
+def _converter(kind: Any) -> _Convert:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if data is None or kind is Any:
-        return data
     if origin in (typing.Union, types.UnionType):
         (kind,) = [argument for argument in arguments if argument is not types.NoneType]
-        return _value(kind, data)
+        return _converter(kind)
     if origin is tuple:
-        each = arguments[0]
-        return tuple(_value(each, item) for item in data)
+        return _tuple(_or_none(_converter(arguments[0])))
     if origin is dict:
-        return {key: _value(arguments[1], item) for key, item in data.items()}
+        return _entries(dict, _or_none(_converter(arguments[1])))
     if dataclasses.is_dataclass(origin):  # a generic one, such as PerLeak[Leakage]
-        (each,) = arguments
-        return origin(**{key: _value(each, item) for key, item in data.items()})  # type: ignore[operator]
+        return _entries(typing.cast(Callable[..., Any], origin), _or_none(_converter(arguments[0])))
     if dataclasses.is_dataclass(kind):
-        return record(kind, data)  # type: ignore[arg-type]
-    return data
+        return lambda data: record(kind, data)  # type: ignore[arg-type]
+    return None
+
+
+def _tuple(each: _Convert) -> _Convert:
+    return tuple if each is None else lambda items: tuple(map(each, items))
+
+
+def _entries(make: Callable[..., Any], each: _Convert) -> _Convert:
+    if each is None:
+        return lambda items: make(**items)
+    return lambda items: make(**{key: each(item) for key, item in items.items()})
+
+
+def _or_none(convert: _Convert) -> _Convert:
+    return None if convert is None else lambda value: None if value is None else convert(value)

@@ -174,6 +174,7 @@ def replay(
     data: list[Any] | tuple[Any, ...],
     rig: Rig | _inputs.Path | None = None,
     *,
+    columns: _inputs.Columns | None = None,
     estimator: str | None = None,
     strict: bool = False,
     group: None = None,
@@ -184,6 +185,7 @@ def replay(
     data: Any,
     rig: Rig | _inputs.Path | None = None,
     *,
+    columns: _inputs.Columns | None = None,
     estimator: str | None = None,
     strict: bool = False,
     group: str,
@@ -194,6 +196,7 @@ def replay(
     data: Any,
     rig: Rig | _inputs.Path | None = None,
     *,
+    columns: _inputs.Columns | None = None,
     estimator: str | None = None,
     strict: bool = False,
     group: None = None,
@@ -203,6 +206,7 @@ def replay(
     data: Any,
     rig: Rig | _inputs.Path | None = None,
     *,
+    columns: _inputs.Columns | None = None,
     estimator: str | None = None,
     strict: bool = False,
     group: str | None = None,
@@ -214,9 +218,11 @@ def replay(
     arrays, or the path of a trace file. Columns are named ``<signal>_<unit>`` as in trace files; float64
     ones are not copied. NaN is a missing reading. ``rig`` is a :class:`Rig` or the path of a rig file;
     left out, it is ``rig.toml`` beside a file, else the built-in one (``out.rig`` says which).
-    ``estimator`` is ``rls`` (both chamber equations, docs/estimators.md) or ``paper`` (the law of Wu et
-    al. 2011, eq. 8 to 13). Bad rows are skipped and counted (:class:`TraceWarning`), or, where
-    ``strict``, raise :class:`TraceError` with ``column`` and ``row``.
+    ``columns`` names foreign columns by signal (``{"pa": "Head pressure [bar]"}``, or dicts with ``name``, ``unit``,
+    ``scale``, ``offset``), over those of the rig. ``estimator`` is ``rls`` (both chamber equations,
+    docs/estimators.md) or ``paper`` (the law of Wu et al. 2011, eq. 8 to 13). Bad rows are skipped and
+    counted (:class:`TraceWarning`), or, where ``strict``, raise :class:`TraceError` with ``column`` and ``row``.
+    Columns in memory whose rows are in no order of time raise it too.
 
     Many cylinders at once, on all cores: a list of such data, or the name of the column that tells them
     apart as ``group``; the result is then a :class:`Replays`. ``progress`` is True (a bar over the cylinders
@@ -231,10 +237,10 @@ def replay(
     (2000,)
     """
     if group is not None:
-        return _many(split(data, group), rig, estimator, strict, progress)
+        return _many(split(data, group), rig, columns, estimator, strict, progress)
     if isinstance(data, (list, tuple)):
-        return _many(dict(enumerate(data)), rig, estimator, strict, progress)
-    out = _one(data, _inputs.rig_for(data, rig), estimator, strict)
+        return _many(dict(enumerate(data)), rig, columns, estimator, strict, progress)
+    out = _one(data, _inputs.rig_for(data, rig, columns), estimator, strict)
     _inputs.warn(out.trace.warnings)
     return out
 
@@ -251,6 +257,7 @@ def _one(data: Any, rig: Rig, estimator: str | None, strict: bool, stop: Stop | 
 def _many(
     traces: Mapping[Hashable, Any],
     rig: Rig | _inputs.Path | None,
+    columns: _inputs.Columns | None,
     estimator: str | None,
     strict: bool,
     progress: Progress,
@@ -260,7 +267,7 @@ def _many(
     def work(item: tuple[Hashable, Any], stop: Stop) -> Replay:
         key, data = item
         try:
-            return _one(data, _inputs.rig_for(data, rig), estimator, strict, stop)
+            return _one(data, _inputs.rig_for(data, rig, columns), estimator, strict, stop)
         except Exception as error:
             error.add_note(f"in cylinder {key!r}")
             raise

@@ -51,6 +51,15 @@ impl TableLayout {
             Content::Ignored => ColumnContent::Ignored,
         })
     }
+
+    /// Which of the headers is that of the time.
+    pub fn time(&self) -> Option<usize> {
+        self.0.columns.iter().position(|column| match column.content {
+            Content::Number(signal, _) => signal == Signal::Time,
+            Content::Timestamp => true,
+            Content::Ignored => false,
+        })
+    }
 }
 
 /// A column that is read.
