@@ -31,6 +31,7 @@ pub mod channels;
 pub mod check;
 pub mod curve;
 pub mod diagnose;
+pub mod explain;
 pub mod fleet;
 pub mod live;
 pub mod output;

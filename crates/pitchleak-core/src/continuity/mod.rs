@@ -15,6 +15,8 @@
 //! - [`Equation`] and [`combine`]: the row that such a combination is, with a column for each [`Parameter`](crate::Parameter).
 //! - [`MovingAverage`]: what the pressures' noise at the ends of blocks does, inverted, so that rows are independent.
 //! - [`BlockPressures`] and [`PressureMeans`]: the pressures at which leak flows are quoted.
+//! - [`ContinuityStatistic`]: all that any explanation of the readings asks, in constant memory: whitened rows with a column
+//!   for every [`RawSum`] of a [`Block`], as Gram matrices of segments of the trace.
 //!
 //! ```
 //! use pitchleak_core::continuity::{Integrals, Measured, Step};
@@ -41,18 +43,24 @@
 //! assert!((block.a.pressure - 5e6 * 0.25).abs() < 1e-6 && block.a.compression == 0.0);
 //! ```
 
+mod block_sums;
 mod clocks;
 mod equation;
+mod gram;
 mod integrals;
 mod moving_average;
 mod noise;
 mod pressure_means;
 mod weights;
+mod whitening;
 
+pub use block_sums::{Block, BlockSums, RAW_SUMS, RawSum};
 pub use clocks::{Clocks, Next, PerChannel, Readings, Row};
 pub use equation::{Equation, combine};
+pub use gram::{CHANNELS, ContinuityStatistic, Segment, column};
 pub use integrals::{ChamberIntegrals, Integrals, Measured, Step};
 pub use moving_average::MovingAverage;
 pub use noise::{NoiseStd, PressureNoise};
 pub use pressure_means::{BlockPressures, PressureMeans};
 pub use weights::Weights;
+pub use whitening::{COLUMNS, EQUATIONS, VOLUME_POWERS};

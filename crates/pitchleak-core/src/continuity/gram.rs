@@ -1,0 +1,358 @@
+//! The sufficient statistic of the continuity equations: Gram matrices of their whitened rows, by segments of the trace.
+//!
+//! Whatever is linear in the raw sums can be asked of them afterwards: a zero, gain, lag or area set free, an exchange of
+//! columns. Memory is constant: where all segments are full, those two neighbours become one that differ least.
+
+use super::block_sums::{Block, BlockSums, RAW_SUMS, RawSum};
+use super::whitening::{COLUMNS, EQUATIONS, Row, RowNoise, VOLUME_POWERS, Whitener};
+use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
+
+/// Entries of a packed symmetric matrix, row by row of its lower triangle.
+const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
+/// Blocks of a segment that was never merged: 4 s, the resolution of a change's time. Fewer cost the position its
+/// memory, as each segment's noise begins anew; chosen.
+const SEGMENT_BLOCKS: u32 = 16;
+/// Two neighbours that differ by so many standard deviations are as dear to merge as two of twice the length; chosen.
+const DIFFERENCE_SIGMAS: f64 = 3.0;
+/// Mean size of a third difference of white noise of unit standard deviation: √(20 · 2/π).
+const THIRD_DIFFERENCE: f64 = 3.568_248_232;
+
+/// The statistic, in at most `S` segments.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub struct ContinuityStatistic<T, const S: usize> {
+    blocks: BlockSums<T>,
+    whitener: Whitener<T>,
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
+    segments: [Segment<T>; S],
+    used: usize,
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
+    lagged: [[T; PACKED]; EQUATIONS],
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
+    before: [[T; COLUMNS]; EQUATIONS],
+    scatter: [Scatter<T>; CHANNELS],
+    time_s: T,
+    sizes: PerLeak<T>,
+    roots: PerLeak<T>,
+}
+
+/// Channels whose scatter is watched: position, P_A, P_B, Q_A, Q_B.
+pub const CHANNELS: usize = 5;
+
+/// Gram matrices of a stretch of the trace.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub struct Segment<T> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
+    gram: [[T; PACKED]; EQUATIONS],
+    integral_noise: [[T; 3]; EQUATIONS],
+    end_noise: [[[T; 3]; VOLUME_POWERS]; EQUATIONS],
+    rows: [T; EQUATIONS],
+    blocks: u32,
+    time_s: T,
+}
+
+/// Mean size of the third differences of a channel's readings.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Scatter<T> {
+    last: [T; 3],
+    known: u32,
+    sum: T,
+    count: T,
+}
+
+impl<T: Real> Scatter<T> {
+    fn add(&mut self, reading: Option<T>, after_gap: bool) {
+        if after_gap {
+            self.known = 0;
+        }
+        let Some(now) = reading else { return };
+        let [one, two, three] = self.last;
+        if self.known >= 3 {
+            self.sum += (now - T::lit(3.0) * (one - two) - three).abs();
+            self.count += T::one();
+        }
+        self.last = [now, one, two];
+        self.known = self.known.saturating_add(1);
+    }
+
+    fn std(&self) -> Option<T> {
+        (self.count > T::zero()).then(|| self.sum / (self.count * T::lit(THIRD_DIFFERENCE)))
+    }
+}
+
+impl<T: Real> Default for Segment<T> {
+    fn default() -> Self {
+        Self {
+            gram: [[T::zero(); PACKED]; EQUATIONS],
+            integral_noise: [[T::zero(); 3]; EQUATIONS],
+            end_noise: [[[T::zero(); 3]; VOLUME_POWERS]; EQUATIONS],
+            rows: [T::zero(); EQUATIONS],
+            blocks: 0,
+            time_s: T::zero(),
+        }
+    }
+}
+
+/// Place of an entry of a packed symmetric matrix.
+const fn packed(i: usize, j: usize) -> usize {
+    if i >= j { i * (i + 1) / 2 + j } else { j * (j + 1) / 2 + i }
+}
+
+/// Column of a raw sum in the equation of chamber A (0) or B (1).
+pub const fn column(raw: RawSum, chamber: usize) -> usize {
+    chamber * RAW_SUMS + raw as usize
+}
+
+/// Sums over time, by what they are sums of.
+const AGED: [(RawSum, RawSum); 3] = [
+    (RawSum::AgedPressureA, RawSum::PressureA),
+    (RawSum::AgedPressureB, RawSum::PressureB),
+    (RawSum::AgedTime, RawSum::Time),
+];
+
+impl<T: Real> Segment<T> {
+    /// Product of two columns, summed over the rows of an equation; unit noise.
+    pub fn product(&self, equation: usize, i: usize, j: usize) -> T {
+        self.gram[equation][packed(i, j)]
+    }
+
+    /// Rows of an equation.
+    pub fn rows(&self, equation: usize) -> T {
+        self.rows[equation]
+    }
+
+    /// How long it is, s.
+    pub fn time_s(&self) -> T {
+        self.time_s
+    }
+
+    /// What integrated noise of unit variance per s² adds to a product of chambers' columns: A A, A B, B B.
+    pub fn integral_noise(&self, equation: usize) -> [T; 3] {
+        self.integral_noise[equation]
+    }
+
+    /// What noise of unit variance at the blocks' ends adds to products of chambers' columns, times products of volumes:
+    /// 1, V_A, V_B, V_A², V_A V_B, V_B².
+    pub fn end_noise(&self, equation: usize) -> [[T; 3]; VOLUME_POWERS] {
+        self.end_noise[equation]
+    }
+
+    fn add(&mut self, equation: usize, row: &Row<T>) {
+        let gram = &mut self.gram[equation];
+        let mut place = gram.iter_mut();
+        for (i, one) in row.columns.iter().enumerate() {
+            for (other, entry) in row.columns[..=i].iter().zip(place.by_ref()) {
+                *entry += *one * *other;
+            }
+        }
+        let RowNoise { integral, end } = row.noise;
+        for (sum, value) in self.integral_noise[equation].iter_mut().zip(integral) {
+            *sum += value;
+        }
+        for (sums, values) in self.end_noise[equation].iter_mut().zip(end) {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += value;
+            }
+        }
+        self.rows[equation] += T::one();
+    }
+
+    /// Its time counts from `earlier_s` before its begin.
+    fn shift_time(&mut self, earlier_s: T) {
+        for gram in &mut self.gram {
+            for chamber in 0..2 {
+                for (aged, plain) in AGED {
+                    let (aged, plain) = (column(aged, chamber), column(plain, chamber));
+                    let square = gram[packed(aged, aged)]
+                        + earlier_s
+                            * (T::lit(2.0) * gram[packed(aged, plain)]
+                                + earlier_s * gram[packed(plain, plain)]);
+                    for other in (0..COLUMNS).filter(|other| *other != aged) {
+                        gram[packed(aged, other)] += earlier_s * gram[packed(plain, other)];
+                    }
+                    gram[packed(aged, aged)] = square;
+                }
+            }
+        }
+    }
+
+    /// Puts the segment that follows to it.
+    fn append(&mut self, next: &Self) {
+        let mut next = *next;
+        next.shift_time(self.time_s);
+        for equation in 0..EQUATIONS {
+            for (sum, value) in self.gram[equation].iter_mut().zip(next.gram[equation]) {
+                *sum += value;
+            }
+            for (sum, value) in self.integral_noise[equation].iter_mut().zip(next.integral_noise[equation]) {
+                *sum += value;
+            }
+            for (sums, values) in self.end_noise[equation].iter_mut().zip(next.end_noise[equation]) {
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value;
+                }
+            }
+            self.rows[equation] += next.rows[equation];
+        }
+        self.blocks += next.blocks;
+        self.time_s += next.time_s;
+    }
+
+    /// What it costs to make one of two neighbours: their length, and how much their mean residuals differ.
+    fn cost(&self, next: &Self) -> T {
+        let mut chi_square = T::zero();
+        for equation in 0..EQUATIONS {
+            let (one, other) = (self.mean_residual(equation), next.mean_residual(equation));
+            if let (Some((a, information_a)), Some((b, information_b))) = (one, other) {
+                let information = information_a * information_b / (information_a + information_b);
+                chi_square += (a - b) * (a - b) * information;
+            }
+        }
+        let length = T::lit(f64::from(self.blocks) + f64::from(next.blocks));
+        length * (T::one() + chi_square / T::lit(DIFFERENCE_SIGMAS * DIFFERENCE_SIGMAS))
+    }
+
+    /// The constant flow into chamber A that an equation has left over, m³/s, and its information.
+    fn mean_residual(&self, equation: usize) -> Option<(T, T)> {
+        let time = column(RawSum::Time, 0);
+        let information = self.product(equation, time, time);
+        let residual = self.product(equation, time, column(RawSum::ResidualA, 0))
+            + self.product(equation, time, column(RawSum::ResidualB, 1));
+        (information > T::zero()).then(|| (residual / information, information))
+    }
+}
+
+impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
+    /// No reading yet.
+    pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
+        Self {
+            blocks: BlockSums::new(cylinder, fluid),
+            whitener: Whitener::new(cylinder, fluid, sensors),
+            segments: [Segment::default(); S],
+            used: 0,
+            lagged: [[T::zero(); PACKED]; EQUATIONS],
+            before: [[T::zero(); COLUMNS]; EQUATIONS],
+            scatter: [Scatter::default(); CHANNELS],
+            time_s: T::zero(),
+            sizes: PerLeak::default(),
+            roots: PerLeak::default(),
+        }
+    }
+
+    /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
+    pub fn push(&mut self, dt_s: T, sample: &Sample<T>) {
+        let readings =
+            [Some(sample.x_m), Some(sample.pa_pa), Some(sample.pb_pa), sample.qa_m3s, sample.qb_m3s];
+        let after_gap = dt_s <= T::zero();
+        for (scatter, reading) in self.scatter.iter_mut().zip(readings) {
+            scatter.add(reading, after_gap);
+        }
+        if !after_gap {
+            let pressures = PerLeak {
+                internal: sample.load_pressure_pa(),
+                external_a: sample.pa_pa,
+                external_b: sample.pb_pa,
+            };
+            self.time_s += dt_s;
+            self.sizes = self.sizes.zip(pressures).map(|(sum, pressure)| sum + dt_s * pressure.abs());
+            self.roots = self.roots.zip(pressures).map(|(sum, p)| sum + dt_s * signed_root(p).abs());
+        }
+        if let Some(block) = self.blocks.push(dt_s, sample) {
+            self.add(&block);
+        }
+    }
+
+    /// The segments so far, oldest first.
+    pub fn segments(&self) -> &[Segment<T>] {
+        self.segments.get(..self.used).unwrap_or(&self.segments)
+    }
+
+    /// Mean size of the pressure across each leak, Pa.
+    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
+        self.sizes.map(|sum| sum / self.time_s)
+    }
+
+    /// Mean root of that size, √Pa.
+    pub fn mean_roots(&self) -> PerLeak<T> {
+        self.roots.map(|sum| sum / self.time_s)
+    }
+
+    /// Standard deviation of each channel's readings as their third differences tell it; the motion's share in those is
+    /// small but for slow sampling.
+    pub fn scatter(&self) -> [Option<T>; CHANNELS] {
+        self.scatter.map(|scatter| scatter.std())
+    }
+
+    /// Product of two columns of neighbouring rows, symmetric, over the whole trace.
+    pub fn lagged_product(&self, equation: usize, i: usize, j: usize) -> T {
+        self.lagged[equation][packed(i, j)]
+    }
+
+    fn add(&mut self, block: &Block<T>) {
+        let is_full = self.segments[..self.used].last().is_none_or(|last| last.blocks >= SEGMENT_BLOCKS);
+        if is_full || block.begins_at.is_some() {
+            self.begin_segment();
+        }
+        let mut block = *block;
+        let begins_s = self.segments[..self.used].last().map_or(T::zero(), |last| last.time_s);
+        for (aged, plain) in AGED {
+            block.sums[aged as usize] += begins_s * block.sums[plain as usize];
+        }
+        let rows = self.whitener.push(&block);
+        let Some(segment) = self.used.checked_sub(1).and_then(|last| self.segments.get_mut(last)) else {
+            return;
+        };
+        for (equation, row) in rows.into_iter().enumerate() {
+            let Some(row) = row else { continue };
+            segment.add(equation, &row);
+            add_lagged(&mut self.lagged[equation], &self.before[equation], &row.columns);
+            self.before[equation] = row.columns;
+        }
+        segment.blocks += 1;
+        segment.time_s += block.sums[RawSum::Time as usize];
+    }
+
+    /// Makes room where there is none; a segment's noise is independent of that of those before.
+    fn begin_segment(&mut self) {
+        if self.used == S {
+            let cheapest = (1..S)
+                .map(|next| (next, self.segments[next - 1].cost(&self.segments[next])))
+                .fold((1, T::infinity()), |best, one| if one.1 < best.1 { one } else { best })
+                .0;
+            let next = self.segments[cheapest];
+            self.segments[cheapest - 1].append(&next);
+            self.segments.copy_within(cheapest + 1.., cheapest);
+            self.used -= 1;
+        }
+        self.segments[self.used] = Segment::default();
+        self.used += 1;
+        self.whitener.begin_anew();
+        self.before = [[T::zero(); COLUMNS]; EQUATIONS];
+    }
+}
+
+fn add_lagged<T: Real>(lagged: &mut [T; PACKED], before: &[T; COLUMNS], now: &[T; COLUMNS]) {
+    let mut place = lagged.iter_mut();
+    let half = T::lit(0.5);
+    for i in 0..COLUMNS {
+        for (j, entry) in (0..=i).zip(place.by_ref()) {
+            *entry += half * (now[i] * before[j] + before[i] * now[j]);
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! Exact whitening of the blocks' noise, a moving average of two equations.
+//!
+//! Over a block both equations carry flow noise D of their own, and at each end the position's and the pressures'
+//! noise E, which the next block carries with the opposite sign:
+//!
+//!   cov(e_k, e_k) = D_k + E_k + E_{k−1},   cov(e_k, e_{k−1}) = −E_{k−1}.
+//!
+//! The innovations w_k = e_k + K_k w_{k−1} with K_k = E_{k−1} S_{k−1}⁻¹ and variance S_k = D_k + E_k + E_{k−1} − K_k E_{k−1}
+//! are white (Brockwell, Davis: Time Series: Theory and Methods, 1991, §5.2, the innovations algorithm for a moving average).
+//! Both rows are in metres of travel, e_A/A_A and e_B/A_B.
+
+use super::block_sums::{Block, RAW_SUMS};
+use crate::{Cylinder, Fluid, Real, Sensors};
+
+/// Columns: each raw sum in chamber A's equation, then each in chamber B's.
+pub const COLUMNS: usize = 2 * RAW_SUMS;
+/// The *balance* e_A/A_A + e_B/A_B, in which the piston's travel cancels, and chamber A's equation given it (where only
+/// one chamber is fed, its own).
+pub const EQUATIONS: usize = 2;
+/// Sensors cannot be perfect: their resolution is at least this share of the range, as in the estimator; chosen.
+const RESOLUTION: f64 = 1e-6;
+
+type Matrix2<T> = [[T; 2]; 2];
+
+/// A whitened row: unit variance, independent of all others.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<T> {
+    /// By raw sum and chamber.
+    pub columns: [T; COLUMNS],
+    /// What noise adds to products of columns.
+    pub noise: RowNoise<T>,
+}
+
+/// Products of the columns' own noise in a row, for noise of unit variance: of chamber A's column with itself, A's with
+/// B's, B's with itself.
+#[derive(Clone, Copy, Debug)]
+pub struct RowNoise<T> {
+    /// Of integrals over the blocks, times Σ dt².
+    pub integral: [T; 3],
+    /// Of readings at the blocks' ends, times 1, V_A, V_B, V_A², V_A V_B and V_B², m³.
+    pub end: [[T; 3]; VOLUME_POWERS],
+}
+
+/// Products of volumes up to the second order.
+pub const VOLUME_POWERS: usize = 6;
+
+/// The recursion.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub struct Whitener<T> {
+    area_m2: [T; 2],
+    /// Variances: flows A and B, (m³/s)²; position, m²; κ₀ times a pressure, 1.
+    flow_variance: [T; 2],
+    position_variance: T,
+    strain_variance: T,
+    /// E of the last block's end.
+    end: Matrix2<T>,
+    /// E S⁻¹ of the last block.
+    gain: Matrix2<T>,
+    /// Innovations of the last block, by column.
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
+    last: [[T; COLUMNS]; 2],
+    /// Covariances between the rows of two chambers' columns, for a unit source in each: of noise that is integrated, and
+    /// of that at the ends of blocks before.
+    integral: [Matrix2<T>; 3],
+    ends: [Matrix2<T>; 3],
+    begun: bool,
+}
+
+impl<T: Real> Whitener<T> {
+    /// Whitens blocks of readings of such sensors.
+    pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
+        let resolution = T::lit(RESOLUTION);
+        let flow_floor = resolution * cylinder.area_a_m2 * cylinder.stroke_m;
+        let square = |value: T| value * value;
+        let strain = sensors.pressure.noise_std.at_least(T::one()) / fluid.bulk_modulus_pa;
+        Self {
+            area_m2: [cylinder.area_a_m2, cylinder.area_b_m2],
+            flow_variance: [sensors.flow_a, sensors.flow_b]
+                .map(|flow| square(flow.noise_std.at_least(flow_floor))),
+            position_variance: square(sensors.position.noise_std.at_least(resolution * cylinder.stroke_m)),
+            strain_variance: square(strain),
+            end: [[T::zero(); 2]; 2],
+            gain: [[T::zero(); 2]; 2],
+            last: [[T::zero(); COLUMNS]; 2],
+            integral: [[[T::zero(); 2]; 2]; 3],
+            ends: [[[T::zero(); 2]; 2]; 3],
+            begun: false,
+        }
+    }
+
+    /// The next block is independent of those before.
+    pub fn begin_anew(&mut self) {
+        self.begun = false;
+    }
+
+    /// The whitened rows of a block, by equation; none of an equation that rests.
+    pub fn push(&mut self, block: &Block<T>) -> [Option<Row<T>>; EQUATIONS] {
+        if let Some(volumes_m3) = block.begins_at.or(Some(block.volumes_m3).filter(|_| !self.begun)) {
+            self.end = self.end_variance(volumes_m3);
+            self.gain = [[T::zero(); 2]; 2];
+            self.last = [[T::zero(); COLUMNS]; 2];
+            self.integral = [[[T::zero(); 2]; 2]; 3];
+            self.ends = [[[T::zero(); 2]; 2]; 3];
+            self.begun = true;
+        }
+        self.carry_noise(block);
+        let now = self.end_variance(block.volumes_m3);
+        let mut variance = add(&add(&now, &self.end), &scaled(&product(&self.gain, &self.end), -T::one()));
+        let flown = |side: usize| {
+            let area = self.area_m2[side];
+            self.flow_variance[side] * block.time_square_s2[side] / (area * area)
+        };
+        variance[0][0] += flown(0);
+        variance[1][1] += flown(1);
+        self.innovate(block);
+        let rows = self.rotated(block, &variance);
+        self.gain = product(&now, &inverse(&variance, block.fed));
+        self.end = now;
+        for side in 0..2 {
+            if !block.fed[side] {
+                self.last[side] = [T::zero(); COLUMNS];
+            }
+        }
+        rows
+    }
+
+    /// E: noise of the readings at a block's end, m².
+    fn end_variance(&self, volumes_m3: [T; 2]) -> Matrix2<T> {
+        let x = self.position_variance;
+        let own = |side: usize| {
+            let stored_m = volumes_m3[side] / self.area_m2[side];
+            x + stored_m * stored_m * self.strain_variance
+        };
+        [[own(0), -x], [-x, own(1)]]
+    }
+
+    fn innovate(&mut self, block: &Block<T>) {
+        let [[aa, ab], [ba, bb]] = self.gain;
+        let [last_a, last_b] = &mut self.last;
+        for (a, b) in last_a.iter_mut().zip(last_b.iter_mut()) {
+            (*a, *b) = (aa * *a + ab * *b, ba * *a + bb * *b);
+        }
+        for (raw, value) in block.sums.iter().enumerate() {
+            last_a[raw] += *value / self.area_m2[0];
+            last_b[RAW_SUMS + raw] += *value / self.area_m2[1];
+        }
+    }
+
+    /// Covariance of the innovations' noise per unit of noise, before this block's own ends.
+    fn carry_noise(&mut self, block: &Block<T>) {
+        let gain = self.gain;
+        let turned = |covariance: &Matrix2<T>| product(&product(&gain, covariance), &transposed(&gain));
+        // A reading at the block's begin is in this block with the opposite sign of the one before.
+        let back = add(&gain, &[[-T::one(), T::zero()], [T::zero(), -T::one()]]);
+        let time_square = block.time_square_s2[0].at_least(block.time_square_s2[1]);
+        for (pair, (of, with)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
+            let mut unit = [[T::zero(); 2]; 2];
+            let scale = T::one() / (self.area_m2[of] * self.area_m2[with]);
+            unit[of][with] = scale;
+            self.integral[pair] = add(&turned(&self.integral[pair]), &scaled(&unit, time_square));
+            let begin = product(&product(&back, &unit), &transposed(&back));
+            self.ends[pair] = add(&turned(&self.ends[pair]), &begin);
+        }
+    }
+
+    /// The balance and what chamber A's row tells besides, each of unit variance.
+    fn rotated(&self, block: &Block<T>, variance: &Matrix2<T>) -> [Option<Row<T>>; EQUATIONS] {
+        let one = T::one();
+        match block.fed {
+            [true, true] => {
+                let [[aa, ab], [_, bb]] = *variance;
+                let balance = aa + ab + ab + bb;
+                let share = (aa + ab) / balance;
+                let rest = (aa - share * (aa + ab)).at_least(T::lit(RESOLUTION) * aa);
+                let (of_balance, of_rest) = (one / balance.sqrt(), one / rest.sqrt());
+                let row_b = -share * of_rest;
+                [
+                    Some(self.row([of_balance, of_balance], block)),
+                    Some(self.row([of_rest + row_b, row_b], block)),
+                ]
+            }
+            [true, false] => [None, Some(self.row([one / variance[0][0].sqrt(), T::zero()], block))],
+            [false, true] => [None, Some(self.row([T::zero(), one / variance[1][1].sqrt()], block))],
+            [false, false] => [None, None],
+        }
+    }
+
+    /// A row that takes so much of both chambers' innovations.
+    fn row(&self, weights: [T; 2], block: &Block<T>) -> Row<T> {
+        let [a, b] = weights;
+        let mut columns = [T::zero(); COLUMNS];
+        for (place, (of_a, of_b)) in columns.iter_mut().zip(self.last[0].iter().zip(&self.last[1])) {
+            *place = a * *of_a + b * *of_b;
+        }
+        let seen = |c: &Matrix2<T>| a * a * c[0][0] + a * b * (c[0][1] + c[1][0]) + b * b * c[1][1];
+        let [area_a, area_b] = self.area_m2;
+        let own = [a * a / (area_a * area_a), a * b / (area_a * area_b), b * b / (area_b * area_b)];
+        let mut end = self.ends.map(|before| seen(&before));
+        for (place, own) in end.iter_mut().zip(own) {
+            *place += own;
+        }
+        let [va, vb] = block.volumes_m3;
+        let powers = [T::one(), va, vb, va * va, va * vb, vb * vb];
+        let noise = RowNoise {
+            integral: self.integral.map(|covariance| seen(&covariance)),
+            end: powers.map(|power| end.map(|value| power * value)),
+        };
+        Row { columns, noise }
+    }
+}
+
+fn add<T: Real>(a: &Matrix2<T>, b: &Matrix2<T>) -> Matrix2<T> {
+    [[a[0][0] + b[0][0], a[0][1] + b[0][1]], [a[1][0] + b[1][0], a[1][1] + b[1][1]]]
+}
+
+fn scaled<T: Real>(a: &Matrix2<T>, by: T) -> Matrix2<T> {
+    a.map(|row| row.map(|value| by * value))
+}
+
+fn transposed<T: Real>(a: &Matrix2<T>) -> Matrix2<T> {
+    [[a[0][0], a[1][0]], [a[0][1], a[1][1]]]
+}
+
+fn product<T: Real>(a: &Matrix2<T>, b: &Matrix2<T>) -> Matrix2<T> {
+    let entry = |i: usize, j: usize| a[i][0] * b[0][j] + a[i][1] * b[1][j];
+    [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
+}
+
+/// Inverse among the equations that do not rest.
+fn inverse<T: Real>(a: &Matrix2<T>, fed: [bool; 2]) -> Matrix2<T> {
+    let zero = T::zero();
+    match fed {
+        [true, true] => {
+            let determinant = a[0][0] * a[1][1] - a[0][1] * a[1][0];
+            let [[aa, ab], [ba, bb]] = *a;
+            [[bb / determinant, -ab / determinant], [-ba / determinant, aa / determinant]]
+        }
+        [true, false] => [[T::one() / a[0][0], zero], [zero, zero]],
+        [false, true] => [[zero, zero], [zero, T::one() / a[1][1]]],
+        [false, false] => [[zero; 2]; 2],
+    }
+}

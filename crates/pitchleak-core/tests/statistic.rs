@@ -1,0 +1,120 @@
+//! Laws of the sufficient statistic: whitened noise is white, its products are foretold in closed form, segments add.
+
+use pitchleak_core::continuity::{COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, column};
+use pitchleak_core::{Cylinder, Fluid, Sample, Sensors};
+use pitchleak_testkit::{noisy, seeded};
+
+const STEP_S: f64 = 0.01;
+
+fn cylinder() -> Cylinder<f64> {
+    Cylinder { dead_volume_a_m3: 5e-5, dead_volume_b_m3: 3e-5, ..Cylinder::paper() }
+}
+
+/// A cylinder at rest as these sensors would read it, noise and all.
+fn at_rest(seed: u64, rows: usize) -> Vec<Sample<f64>> {
+    let still =
+        Sample { x_m: 0.07, pa_pa: 5e6, pb_pa: 3e6, qa_m3s: Some(0.0), qb_m3s: Some(0.0), force_n: None };
+    let mut rng = seeded(seed);
+    (0..rows).map(|_| noisy(&still, &Sensors::paper(), &mut rng)).collect()
+}
+
+fn statistic<const S: usize>(samples: &[Sample<f64>]) -> Box<ContinuityStatistic<f64, S>> {
+    let mut statistic = Box::new(ContinuityStatistic::new(&cylinder(), &Fluid::paper(), &Sensors::paper()));
+    for (index, sample) in samples.iter().enumerate() {
+        statistic.push(if index == 0 { 0.0 } else { STEP_S }, sample);
+    }
+    statistic
+}
+
+/// y'y of the declared equations, and of neighbouring rows.
+fn left_side(statistic: &ContinuityStatistic<f64, 12>, equation: usize) -> (f64, f64, f64) {
+    let columns = [column(RawSum::ResidualA, 0), column(RawSum::ResidualB, 1)];
+    let pairs = || columns.into_iter().flat_map(|i| columns.map(|j| (i, j)));
+    let square = pairs()
+        .map(|(i, j)| statistic.segments().iter().map(|s| s.product(equation, i, j)).sum::<f64>())
+        .sum();
+    let lagged = pairs().map(|(i, j)| statistic.lagged_product(equation, i, j)).sum();
+    let rows = statistic.segments().iter().map(|s| s.rows(equation)).sum();
+    (square, lagged, rows)
+}
+
+#[test]
+fn whitened_noise_is_white() {
+    let (mut square, mut lagged, mut rows) = ([0.0; EQUATIONS], [0.0; EQUATIONS], [0.0; EQUATIONS]);
+    for seed in 0..20 {
+        let statistic = statistic::<12>(&at_rest(seed, 3000));
+        for equation in 0..EQUATIONS {
+            let (s, l, n) = left_side(&statistic, equation);
+            square[equation] += s;
+            lagged[equation] += l;
+            rows[equation] += n;
+        }
+    }
+    for equation in 0..EQUATIONS {
+        let std = (2.0 / rows[equation]).sqrt();
+        let (variance, correlation) = (square[equation] / rows[equation], lagged[equation] / rows[equation]);
+        assert!((variance - 1.0).abs() < 4.0 * std, "{equation} {variance} {std}");
+        assert!(correlation.abs() < 4.0 / rows[equation].sqrt(), "{equation} {correlation}");
+    }
+}
+
+/// What noise adds to the products of columns is what the recursion foretells, per unit of each sensor's noise.
+#[test]
+fn noise_of_columns_is_foretold() {
+    let sensors = Sensors::<f64>::paper();
+    // The first of a pair of volumes: V_A² is the fourth product.
+    let cases = [
+        (RawSum::Travel, sensors.position.noise_std, 0),
+        (RawSum::StorageA, 1e-6 * sensors.pressure.noise_std, 3),
+    ];
+    for (raw, std, power) in cases {
+        for equation in 0..EQUATIONS {
+            let (mut found, mut foretold) = (0.0, 0.0);
+            for seed in 0..20 {
+                for segment in statistic::<12>(&at_rest(100 + seed, 3000)).segments() {
+                    found += segment.product(equation, column(raw, 0), column(raw, 0));
+                    foretold += std * std * segment.end_noise(equation)[power][0];
+                }
+            }
+            assert!((found / foretold - 1.0).abs() < 0.06, "{raw:?} {equation} {found} {foretold}");
+        }
+    }
+}
+
+/// One segment of the whole is the sum of its parts, moments in time included, but for noise that begins anew at a border.
+#[test]
+fn segments_add() {
+    let samples = at_rest(7, 6000);
+    let (few, many) = (statistic::<2>(&samples), statistic::<40>(&samples));
+    assert_eq!((few.segments().len(), many.segments().len()), (2, 15));
+    for equation in 0..EQUATIONS {
+        for i in 0..COLUMNS {
+            let total = |products: Vec<f64>| products.iter().sum::<f64>();
+            let one = total(few.segments().iter().map(|s| s.product(equation, i, i)).collect());
+            let is_aged = i % (COLUMNS / 2) >= RawSum::AgedPressureA as usize;
+            if !is_aged {
+                let other = total(many.segments().iter().map(|s| s.product(equation, i, i)).collect());
+                assert!((one - other).abs() <= 1e-9 * one.abs(), "{equation} {i} {one} {other}");
+            }
+        }
+    }
+    // ∫t dt over a segment of length T is T²/2.
+    for segment in few.segments() {
+        let (time, aged) = (column(RawSum::Time, 0), column(RawSum::AgedTime, 0));
+        let mean = segment.product(0, aged, time) / segment.product(0, time, time);
+        assert!((mean / (0.5 * segment.time_s()) - 1.0).abs() < 0.05, "{mean} {}", segment.time_s());
+    }
+}
+
+/// Where a flow is missing only its equation rests.
+#[test]
+fn a_missing_flow_rests() {
+    let mut samples = at_rest(9, 3000);
+    for sample in &mut samples[1000..2000] {
+        sample.qb_m3s = None;
+    }
+    let statistic = statistic::<12>(&samples);
+    let rows = |equation: usize| statistic.segments().iter().map(|s| s.rows(equation)).sum::<f64>();
+    assert!((rows(0) - 79.0).abs() < 4.0, "{}", rows(0));
+    assert!((rows(1) - 119.0).abs() < 4.0, "{}", rows(1));
+}

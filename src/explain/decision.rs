@@ -1,0 +1,285 @@
+//! What the posterior says of the leaks, and what an operator acts on.
+
+use super::equations::Statistic;
+use super::hypothesis::LeakCourse;
+use super::posterior::{Tables, Weighed, weigh};
+use crate::report::Status;
+use crate::rig::Rig;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{Leak, PerLeak};
+use serde::Serialize;
+
+/// α: a verdict is sure where at most this probability speaks against it. Chosen; a user's to change.
+pub const ALPHA: f64 = 0.05;
+/// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
+const WIRING_DOUBT: f64 = 0.5;
+/// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
+const WANDER_DOUBT: f64 = 0.3;
+/// A noise scale of so many times the readings' own scatter contradicts the model. A guess.
+const MISFIT_DOUBT: f64 = 2.0;
+/// Explanations below this probability are not listed.
+const LEAST_LISTED: f64 = 0.01;
+
+/// What is believed of a leak at the trace's end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Belief {
+    /// Mean flow, L/min.
+    pub mean_lpm: f64,
+    /// Standard deviation of the mixture, L/min.
+    pub std_lpm: f64,
+    /// Quantiles of 2.5, 50 and 97.5 %, L/min.
+    pub quantiles_lpm: [f64; 3],
+    /// Where there is such a leak, it is smaller than this with 97.5 %, L/min.
+    pub below_lpm: f64,
+}
+
+/// An explanation that is left.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Explained {
+    /// Ids of what it is made of, joined by `+`.
+    pub id: String,
+    /// Posterior probability.
+    pub probability: f64,
+    /// In words.
+    pub text: String,
+    /// What to do about it.
+    pub remedy: Option<String>,
+    /// Lines for `[columns]` or the rig file that mend it.
+    pub columns: Vec<String>,
+    /// Ids that no trace of these readings tells it from.
+    pub cannot_be_told_from: Vec<&'static str>,
+    /// Mean leaks under it, L/min.
+    pub leakage: PerLeak<f64>,
+}
+
+/// The verdict of the posterior.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Decision {
+    /// In a word.
+    pub status: Status,
+    /// Leaks that are above their threshold.
+    pub faults: Vec<Leak>,
+    /// Leaks that are below it.
+    pub ruled_out: Vec<Leak>,
+    /// That each leak is above its threshold at the trace's end.
+    pub probability: PerLeak<f64>,
+    /// How large each leak is.
+    pub leakage: PerLeak<Belief>,
+    /// Best first.
+    pub explanations: Vec<Explained>,
+    /// Noise scale over the readings' own scatter.
+    pub misfit: f64,
+    /// Probability that zeros wander.
+    pub wander: f64,
+    /// Probability of a mistake of wiring, sign or unit.
+    pub wiring: f64,
+}
+
+/// Explains a trace; `None` where there is too little of it.
+pub fn explain(statistic: &Statistic, rig: &Rig) -> Option<Decision> {
+    let tables = Tables::new();
+    let weighed = weigh(statistic, rig, &tables)?;
+    Some(decide(&weighed, rig))
+}
+
+fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
+    let mass = |is: &dyn Fn(&Weighed<'_>) -> bool| {
+        weighed.iter().filter(|one| is(one)).map(|one| one.probability).sum::<f64>()
+    };
+    let threshold_m3s = rig.alarms.threshold_m3s;
+    let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, leak));
+    let probability = PerLeak::from_fn(|leak| beliefs[leak].above(threshold_m3s[leak]));
+    let wiring = mass(&|one| one.hypothesis.wiring.is_some());
+    let wander = mass(&|one| one.hypothesis.state.wander.0 > 0.0);
+    let misfit = weighed.iter().map(|one| one.probability * one.misfit).sum();
+    let is_ruled_out = |leak: &Leak| {
+        wander < WANDER_DOUBT
+            && probability[*leak] <= ALPHA
+            && beliefs[*leak].quantile_if_there(1.0 - ALPHA) <= threshold_m3s[*leak]
+    };
+    let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - ALPHA).collect();
+    let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
+    let status = if wiring > WIRING_DOUBT || misfit > MISFIT_DOUBT {
+        Status::Doubtful
+    } else if !faults.is_empty() {
+        Status::Leak
+    } else if ruled_out.len() == Leak::ALL.len() {
+        Status::Sound
+    } else {
+        Status::NotSure
+    };
+    Decision {
+        status,
+        faults,
+        ruled_out,
+        probability,
+        leakage: beliefs.map(|marginal| marginal.belief()),
+        explanations: listed(weighed),
+        misfit,
+        wander,
+        wiring,
+    }
+}
+
+/// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
+struct Marginal {
+    none: f64,
+    flows_m3s: Vec<(f64, f64)>,
+}
+
+impl Marginal {
+    fn of(weighed: &[Weighed<'_>], leak: Leak) -> Self {
+        let mut none = 0.0;
+        let mut flows_m3s = Vec::new();
+        for one in weighed {
+            if one.hypothesis.leaks[leak as usize].is_none() {
+                none += one.probability;
+            } else {
+                let points = one.leaks_m3s.iter().zip(&one.weights);
+                flows_m3s
+                    .extend(points.map(|(flows, weight)| (flows[leak as usize], weight * one.probability)));
+            }
+        }
+        flows_m3s.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Self { none, flows_m3s }
+    }
+
+    fn above(&self, threshold_m3s: f64) -> f64 {
+        self.flows_m3s.iter().filter(|(flow, _)| *flow > threshold_m3s).map(|(_, weight)| weight).sum()
+    }
+
+    fn quantile(&self, none: f64, probability: f64) -> f64 {
+        let there: f64 = self.flows_m3s.iter().map(|(_, weight)| weight).sum();
+        let mut below = none;
+        let wanted = probability * (none + there);
+        if below >= wanted {
+            return 0.0;
+        }
+        for (flow, weight) in &self.flows_m3s {
+            below += weight;
+            if below >= wanted {
+                return *flow;
+            }
+        }
+        self.flows_m3s.last().map_or(0.0, |(flow, _)| *flow)
+    }
+
+    fn quantile_if_there(&self, probability: f64) -> f64 {
+        self.quantile(0.0, probability)
+    }
+
+    fn belief(&self) -> Belief {
+        let moment =
+            |power: i32| self.flows_m3s.iter().map(|(flow, weight)| weight * flow.powi(power)).sum::<f64>();
+        let mean = moment(1);
+        let std = (moment(2) - mean * mean).max(0.0).sqrt();
+        Belief {
+            mean_lpm: LPM_PER_M3S * mean,
+            std_lpm: LPM_PER_M3S * std,
+            quantiles_lpm: [0.025, 0.5, 0.975].map(|q| LPM_PER_M3S * self.quantile(self.none, q)),
+            below_lpm: LPM_PER_M3S * self.quantile_if_there(0.975),
+        }
+    }
+}
+
+/// What an explanation is made of: leaks, their courses, state, wiring.
+fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
+    let mut out: Vec<Explained> = Vec::new();
+    for one in weighed {
+        let id = id(one);
+        let at = |leak: usize| {
+            let mean = one
+                .leaks_m3s
+                .iter()
+                .zip(&one.weights)
+                .map(|(flows, weight)| flows[leak] * weight)
+                .sum::<f64>();
+            LPM_PER_M3S * mean
+        };
+        let leakage = PerLeak { internal: at(0), external_a: at(1), external_b: at(2) };
+        match out.iter_mut().find(|known| known.id == id) {
+            Some(known) => {
+                let sum = known.probability + one.probability;
+                known.leakage = known
+                    .leakage
+                    .zip(leakage)
+                    .map(|(old, new)| (old * known.probability + new * one.probability) / sum);
+                known.probability = sum;
+            }
+            None => out.push(explained(id, one, leakage)),
+        }
+    }
+    out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    out.retain(|one| one.probability >= LEAST_LISTED);
+    for one in &mut out {
+        one.text = with_leaks(&one.text, &one.leakage);
+    }
+    out
+}
+
+fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained {
+    let hypothesis = &one.hypothesis;
+    let parts = [hypothesis.wiring, Some(hypothesis.state.zeros), Some(hypothesis.state.departure)];
+    let unusual = || parts.iter().flatten().filter(|entry| !is_usual(entry.id));
+    let mut words: Vec<String> = unusual().map(|entry| entry.text.to_owned()).collect();
+    if hypothesis.state.wander.0 > 0.0 {
+        words.push("the flow meters' zeros wander".to_owned());
+    }
+    let remedies: Vec<&str> = unusual().map(|entry| entry.remedy).filter(|text| !text.is_empty()).collect();
+    Explained {
+        id,
+        probability: one.probability,
+        text: words.join(", and "),
+        remedy: (!remedies.is_empty()).then(|| remedies.join(" ")),
+        columns: hypothesis
+            .wiring
+            .and_then(|entry| entry.mends)
+            .into_iter()
+            .flat_map(str::lines)
+            .map(str::to_owned)
+            .collect(),
+        cannot_be_told_from: unusual().flat_map(|entry| entry.alike).copied().collect(),
+        leakage,
+    }
+}
+
+fn with_leaks(rest: &str, leakage: &PerLeak<f64>) -> String {
+    let mut parts: Vec<String> = leakage
+        .iter()
+        .filter(|(_, lpm)| **lpm > 0.0)
+        .map(|(leak, lpm)| format!("{} leak of {lpm:.3} L/min", leak.label()))
+        .collect();
+    if parts.is_empty() {
+        parts.push("no leak".to_owned());
+    }
+    if !rest.is_empty() {
+        parts.push(rest.to_owned());
+    }
+    parts.join(", and ")
+}
+
+fn is_usual(id: &str) -> bool {
+    matches!(id, "zeros_usual" | "as_declared")
+}
+
+fn id(one: &Weighed<'_>) -> String {
+    let hypothesis = &one.hypothesis;
+    let mut parts: Vec<String> = Vec::new();
+    for (leak, course) in Leak::ALL.iter().zip(hypothesis.leaks) {
+        let name = match course {
+            None => continue,
+            Some(LeakCourse::Constant) => leak.id().to_owned(),
+            Some(LeakCourse::Orifice) => format!("{}:orifice", leak.id()),
+            Some(LeakCourse::Growing) => format!("{}:growing", leak.id()),
+            Some(LeakCourse::Sudden(_)) => format!("{}:sudden", leak.id()),
+            Some(LeakCourse::Wandering) => format!("{}:wandering", leak.id()),
+        };
+        parts.push(name);
+    }
+    let state = [hypothesis.wiring, Some(hypothesis.state.zeros), Some(hypothesis.state.departure)];
+    parts.extend(state.iter().flatten().map(|entry| entry.id).filter(|id| !is_usual(id)).map(str::to_owned));
+    if hypothesis.state.wander.0 > 0.0 {
+        parts.push("wandering_zeros".to_owned());
+    }
+    if parts.is_empty() { "sound".to_owned() } else { parts.join("+") }
+}

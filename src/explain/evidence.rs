@@ -1,0 +1,209 @@
+//! Marginal likelihood of a linear model in closed form, its noise scale inferred.
+//!
+//! For columns X with prior standard deviations τ, T = diag τ, and one noise scale s_c² for each of two equations:
+//!
+//!   M = I + T Σ_c (X'X_c / s_c² − N_c) T,   b = T Σ_c (X'y_c / s_c² − N_yc),   χ² = Σ_c y'y_c / s_c² − b'M⁻¹b,
+//!   ln p(y) = −½χ² − ½ ln|M| − ½ Σ_c n_c ln s_c² − ½ν Σ_c (ln s_c² + 1/s_c² − 1)
+//!
+//! (Bishop 2006, Pattern Recognition and Machine Learning, §3.5; −½ ln|M| is Occam's factor). N is what the columns' own
+//! noise adds to the products, in units of the noise: without it a column of noise explains noise (errors in variables;
+//! Fuller 1987, Measurement Error Models, §2.2). The scales are those of largest posterior density; an inverse-gamma
+//! prior of ν degrees of freedom makes the likelihood Student's.
+
+use super::equations::NormalEquations;
+
+/// Degrees of freedom of the noise scales' prior: the declared noise is worth so many blocks. A guess.
+const NU: f64 = 4.0;
+/// Steps towards the scales' best values: each only changes the noise by what the fit before left over.
+const STEPS: usize = 2;
+/// Least variance, in the declared noise's: sensors without noise are quantised all the same.
+const LEAST_SCALE: f64 = 0.02;
+/// Least square of a pivot, where noise products taken off leave less than the prior alone.
+const LEAST_PIVOT: f64 = 0.2;
+/// χ² further below zero than this is no sum of squares: more noise was taken off than there is.
+const LEAST_CHI_SQUARE: f64 = -50.0;
+
+/// A column set free, and the standard deviation of its prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Free {
+    pub column: usize,
+    pub std: f64,
+}
+
+/// What the data say of one linear model.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// ln p(y | model), up to what all models share.
+    pub ln_evidence: f64,
+    /// Noise scales s² of the balance and of the position's equation.
+    pub scales: [f64; 2],
+    /// Posterior means, in the columns' units.
+    pub means: Vec<f64>,
+    stds: Vec<f64>,
+    /// Cholesky factor of M, row by row, behind a row and a column of the left side.
+    factor: Vec<f64>,
+}
+
+impl Fit {
+    /// Posterior covariance of some of the parameters: rows of T M⁻¹ T.
+    pub fn covariance(&self, of: &[usize]) -> Vec<Vec<f64>> {
+        let columns: Vec<Vec<f64>> = of.iter().map(|&i| self.half_solved(i)).collect();
+        let entry = |i: usize, j: usize| {
+            let dot: f64 = columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum();
+            dot * self.stds[of[i]] * self.stds[of[j]]
+        };
+        (0..of.len()).map(|i| (0..of.len()).map(|j| entry(i, j)).collect()).collect()
+    }
+
+    /// L⁻¹ e_i.
+    fn half_solved(&self, i: usize) -> Vec<f64> {
+        let p = self.stds.len();
+        let mut out = vec![0.0; p];
+        for row in i..p {
+            let target = if row == i { 1.0 } else { 0.0 };
+            let factor = &self.factor[(row + 1) * (p + 1) + 1..(row + 2) * (p + 1)];
+            let known: f64 = (i..row).map(|k| factor[k] * out[k]).sum();
+            out[row] = (target - known) / factor[row];
+        }
+        out
+    }
+}
+
+/// Products of the columns set free, scaled by their priors, the left side first.
+struct Products {
+    size: usize,
+    gram: [Vec<f64>; 2],
+    noise: [Vec<f64>; 2],
+}
+
+impl Products {
+    fn of(equations: &NormalEquations, free: &[Free]) -> Self {
+        let size = free.len() + 1;
+        let mut out =
+            Self { size, gram: [vec![0.0; size * size], vec![0.0; size * size]], noise: Default::default() };
+        out.noise = out.gram.clone();
+        let key = |i: usize| match i.checked_sub(1).and_then(|i| free.get(i)) {
+            Some(free) => (free.column, free.std),
+            None => (0, 1.0),
+        };
+        for c in 0..2 {
+            let (gram, noise) = (equations.gram(c), equations.noise(c));
+            for i in 0..size {
+                let (row, of_row) = key(i);
+                let (gram, noise) = (gram.row(row), noise.row(row));
+                for j in 0..=i {
+                    let (column, of_column) = key(j);
+                    out.gram[c][i * size + j] = of_row * of_column * gram[column];
+                    out.noise[c][i * size + j] = of_row * of_column * noise[column];
+                }
+            }
+        }
+        out
+    }
+
+    /// How much of each column's noise is taken off: all, or so much that three standard deviations of the noise's own
+    /// power are left of the column's.
+    fn kept(&self, c: usize, rows: f64, scale: f64) -> Vec<f64> {
+        let most = (1.0 - 3.0 * (2.0 / rows.max(1.0)).sqrt()).max(0.1);
+        let share = |i: usize| {
+            let place = i * self.size + i;
+            let (noise, power) = (scale * self.noise[c][place], self.gram[c][place].max(0.0));
+            if noise > most * power { (most * power / noise).sqrt() } else { 1.0 }
+        };
+        (0..self.size).map(share).collect()
+    }
+
+    /// Products less those of the noise, over the scale.
+    fn clean(&self, c: usize, rows: f64, scale: f64, sum: &mut [f64]) {
+        let kept = self.kept(c, rows, scale);
+        let over = 1.0 / scale;
+        for i in 0..self.size {
+            let span = i * self.size..i * self.size + i + 1;
+            let products = self.gram[c][span.clone()].iter().zip(&self.noise[c][span.clone()]);
+            for ((out, (gram, noise)), kept_j) in sum[span].iter_mut().zip(products).zip(&kept) {
+                *out += over * gram - kept[i] * kept_j * noise;
+            }
+        }
+    }
+}
+
+/// Fits `free` to the equations' left side, which is their column 0.
+pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
+    let n = equations.rows;
+    let products = Products::of(equations, free);
+    let size = products.size;
+    let mut scales = [1.0; 2];
+    let mut factor = vec![0.0; size * size];
+    let mut means = vec![0.0; free.len()];
+    let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
+    for step in 0..=STEPS {
+        let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
+        for c in 0..2 {
+            products.clean(c, n[c], scales[c], &mut each[c]);
+        }
+        for (out, (one, other)) in factor.iter_mut().zip(each[0].iter().zip(&each[1])) {
+            *out = one + other;
+        }
+        let left = factor[0];
+        (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
+        chi_square += left;
+        if step < STEPS {
+            for c in 0..2 {
+                let residual = scales[c] * residual(&each[c], size, &means).max(0.0);
+                scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
+            }
+        }
+    }
+    let scale_terms: f64 =
+        (0..2).map(|c| n[c] * scales[c].ln() + NU * (scales[c].ln() + 1.0 / scales[c] - 1.0)).sum();
+    let ln_evidence = -0.5 * (chi_square + ln_determinant + scale_terms);
+    let is_possible = ln_evidence.is_finite() && chi_square > LEAST_CHI_SQUARE;
+    Fit {
+        ln_evidence: if is_possible { ln_evidence } else { f64::NEG_INFINITY },
+        scales,
+        means: means.iter().zip(free).map(|(mean, free)| mean * free.std).collect(),
+        stds: free.iter().map(|free| free.std).collect(),
+        factor,
+    }
+}
+
+/// Solves (1 + X'X) θ = X'y for the scaled products, of which the first row and column are y's, and leaves Cholesky's factor
+/// in their place: ln of its determinant, and by how much the fit lowers y'y, below zero.
+fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
+    let mut ln_determinant = 0.0;
+    for i in 1..size {
+        let (above, rest) = products.split_at_mut(i * size);
+        let row = &mut rest[..size];
+        for j in 1..i {
+            let known = &above[j * size..j * size + j + 1];
+            let dot: f64 = row[1..j].iter().zip(&known[1..j]).map(|(a, b)| a * b).sum();
+            row[j] = (row[j] - dot) / known[j];
+        }
+        let dot: f64 = row[1..i].iter().map(|value| value * value).sum();
+        row[i] = (1.0 + row[i] - dot).max(LEAST_PIVOT).sqrt();
+        ln_determinant += 2.0 * row[i].ln();
+        let dot: f64 = row[1..i].iter().zip(means.iter()).map(|(l, half)| l * half).sum();
+        means[i - 1] = (row[0] - dot) / row[i];
+    }
+    let explained: f64 = means.iter().map(|half| half * half).sum();
+    for i in (1..size).rev() {
+        let row = &products[i * size..(i + 1) * size];
+        means[i - 1] /= row[i];
+        let mean = means[i - 1];
+        for (other, l) in means[..i - 1].iter_mut().zip(&row[1..i]) {
+            *other -= l * mean;
+        }
+    }
+    (ln_determinant, -explained)
+}
+
+/// Sum of squared residuals, from products that stand in the lower triangle.
+fn residual(products: &[f64], size: usize, means: &[f64]) -> f64 {
+    let mut sum = products[0];
+    for (i, mean) in (1..size).zip(means) {
+        let row = &products[i * size..i * size + i + 1];
+        let others: f64 = row[1..i].iter().zip(means).map(|(product, other)| product * other).sum();
+        sum += mean * (2.0 * others + mean * row[i] - 2.0 * row[0]);
+    }
+    sum
+}

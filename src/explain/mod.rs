@@ -1,0 +1,19 @@
+//! One posterior over explanations of a trace: leaks, sensors, rig and wiring weighed against each other.
+//!
+//! docs/explanations.md has the equations; the table of explanations is data.
+
+mod columns;
+mod decision;
+mod equations;
+mod evidence;
+mod hypothesis;
+mod orthant;
+mod posterior;
+mod readings;
+mod table;
+
+pub use columns::{Column, Course};
+pub use decision::{Belief, Decision, Explained, explain};
+pub use equations::{SEGMENTS, Statistic};
+pub use readings::{Mistake, Of};
+pub use table::{Entry, Kind};

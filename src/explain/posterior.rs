@@ -1,0 +1,472 @@
+//! The posterior over the table: which explanations of the readings are left, and how large each leak is under them.
+
+use super::columns::{Column, Course, Scales};
+use super::equations::{NormalEquations, Statistic};
+use super::evidence::{Fit, fit};
+use super::hypothesis::{Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, subsets};
+use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
+use super::readings::Readings;
+use super::table::{self, Entry, USUAL, USUAL_PRESSURE};
+use crate::rig::Rig;
+use pitchleak_core::continuity::CHANNELS;
+use pitchleak_core::{Leak, PerLeak};
+
+/// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
+const LEAST_LN: f64 = 9.0;
+/// States of sensors and rig beside which other courses of leaks are tried; numerical.
+const STATES_WITH_COURSES: usize = 5;
+/// Of those, beside which pairs of leaks have courses of their own; numerical.
+const STATES_WITH_PAIRS: usize = 3;
+/// Gains and areas that are off by more are units.
+const MOST_GAIN: f64 = 0.3;
+/// Leaks below this share of their threshold say nothing of the pressure sensors; a guess.
+const LEAST_LEAK: f64 = 0.5;
+/// A mistake of wiring must bring the noise to the declared: within so many times. A guess.
+const WIRED_MISFIT: f64 = 1.3;
+/// A noise scale above this square widens the leaks' spread: by √(1 + 10 (m² − 1.15)). Guesses.
+const WIDENED_MISFIT2: f64 = 1.15;
+const WIDENING: f64 = 10.0;
+/// Rows of an equation below which nothing can be said.
+const LEAST_ROWS: f64 = 8.0;
+
+/// A weighed explanation.
+#[derive(Clone, Debug)]
+pub(super) struct Weighed<'a> {
+    pub hypothesis: Hypothesis<'a>,
+    pub probability: f64,
+    /// Noise scale over what the readings scatter.
+    pub misfit: f64,
+    /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
+    pub leaks_m3s: Vec<[f64; 3]>,
+    pub weights: Vec<f64>,
+}
+
+/// The table as it is weighed.
+pub(super) struct Tables {
+    zeros: Vec<Entry>,
+    departures: Vec<Entry>,
+    pressures: Vec<Entry>,
+    wanders: Vec<(f64, f64)>,
+    mistakes: Vec<Entry>,
+    courses: Vec<Entry>,
+}
+
+impl Tables {
+    pub fn new() -> Self {
+        Self {
+            zeros: table::zeros(),
+            departures: table::departures(),
+            pressures: table::pressures(),
+            wanders: table::wanders(),
+            mistakes: table::mistakes(),
+            courses: table::courses(),
+        }
+    }
+
+    fn ln_course(&self, id: &str) -> f64 {
+        self.courses
+            .iter()
+            .find(|course| course.id == id)
+            .map_or(f64::NEG_INFINITY, |course| course.share.ln())
+    }
+}
+
+/// Weighs the whole table; `None` where there is too little to weigh.
+pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) -> Option<Vec<Weighed<'a>>> {
+    let rows: f64 =
+        (0..2).map(|c| statistic.segments().iter().map(|s| s.rows(c)).sum::<f64>()).fold(0.0, f64::max);
+    if rows < LEAST_ROWS {
+        return None;
+    }
+    let first = Pass::new(statistic, rig, tables, PerLeak::default()).weigh();
+    let mean_m3s = PerLeak::from_fn(|leak| mean_leak(&first, leak as usize));
+    let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
+    if mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least) {
+        return Some(first);
+    }
+    Some(Pass::new(statistic, rig, tables, mean_m3s).weigh())
+}
+
+fn mean_leak(weighed: &[Weighed<'_>], leak: usize) -> f64 {
+    let mean =
+        |one: &Weighed<'_>| one.leaks_m3s.iter().zip(&one.weights).map(|(q, w)| q[leak] * w).sum::<f64>();
+    weighed.iter().map(|one| one.probability * mean(one)).sum()
+}
+
+/// All that one pass over the table needs.
+struct Pass<'a, 's> {
+    statistic: &'s Statistic,
+    rig: &'s Rig,
+    tables: &'a Tables,
+    found_m3s: PerLeak<f64>,
+    sizes: Sizes,
+    segments: usize,
+    full_scale_m3s: f64,
+    /// Scatter of the readings over the declared noise, at least 1: of flows, and of the position.
+    scatter: [f64; 2],
+}
+
+/// An explanation and its evidence before leaks are cut at zero.
+struct Scored<'a> {
+    hypothesis: Hypothesis<'a>,
+    ln_posterior: f64,
+    /// Among the equations of this mistake of wiring, or the declared.
+    wiring: usize,
+}
+
+impl<'a, 's> Pass<'a, 's> {
+    fn new(statistic: &'s Statistic, rig: &'s Rig, tables: &'a Tables, found_m3s: PerLeak<f64>) -> Self {
+        let flows = [rig.instruments.flow_a, rig.instruments.flow_b];
+        let full_scale_m3s = flows[0].full_scale.max(flows[1].full_scale);
+        Self {
+            statistic,
+            rig,
+            tables,
+            found_m3s,
+            sizes: Sizes {
+                compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
+                zeros: flows.map(|flow| flow.bias),
+                gains: flows.map(|flow| flow.gain),
+            },
+            segments: statistic.segments().len(),
+            full_scale_m3s,
+            scatter: scatter(statistic, rig),
+        }
+    }
+
+    fn weigh(&self) -> Vec<Weighed<'a>> {
+        let declared = self.equations(None, &self.columns());
+        let mut all = self.constant(&declared);
+        let states = best_states(&mut all);
+        self.with_courses(&declared, &states, &mut all);
+        let mistaken = self.with_mistakes(&declared, &mut all);
+        let mut equations = vec![declared];
+        equations.extend(mistaken);
+        all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        self.mix(&equations, all)
+    }
+
+    fn equations(&self, mistake: Option<&Entry>, columns: &[(Column, Course)]) -> NormalEquations {
+        let cylinder = &self.rig.cylinder;
+        let mut readings = Readings::declared(cylinder, 1e6 / self.rig.fluid.bulk_modulus_pa);
+        let mut pressures_mpa = self.statistic.mean_pressures_pa().map(|p| 1e-6 * p);
+        let mut roots = self.statistic.mean_roots();
+        if let Some(mistake) = mistake.and_then(|entry| entry.mistake) {
+            readings = readings.mended(mistake, cylinder);
+            pressures_mpa = mistake.mended_pressures(pressures_mpa);
+            roots = mistake.mended_pressures(roots);
+        }
+        let scales = Scales { rig: self.rig, readings, pressures_mpa, roots, leaks_m3s: self.found_m3s };
+        NormalEquations::new(self.statistic, &scales, columns)
+    }
+
+    /// Departures that are weighed: pressures through the leaks found, where there are any.
+    fn departures(&self) -> Vec<&'a Entry> {
+        let second = Leak::ALL.iter().any(|leak| self.found_m3s[*leak] > 0.0);
+        let pressures = if second { &self.tables.pressures[..] } else { &[] };
+        let known = |entry: &&Entry| !pressures.iter().any(|other| other.id == entry.id);
+        self.tables.departures.iter().filter(known).chain(pressures).collect()
+    }
+
+    fn columns(&self) -> Vec<(Column, Course)> {
+        let mut columns = vec![(Column::LeftSide, Course::Constant)];
+        columns.extend(USUAL.iter().map(|(column, course, _)| (*column, *course)));
+        let entries = self.tables.zeros.iter().chain(self.departures());
+        columns.extend(
+            entries.flat_map(|entry| entry.free.iter().map(|(column, course, _)| (*column, *course))),
+        );
+        for leak in LEAK_COLUMNS {
+            columns.extend([Course::Constant, Course::FromBegin, Course::ToEnd].map(|course| (leak, course)));
+            columns.extend(
+                (1..self.segments).flat_map(|k| [(leak, Course::Before(k)), (leak, Course::Since(k))]),
+            );
+        }
+        columns.extend(ORIFICE_COLUMNS.map(|orifice| (orifice, Course::Constant)));
+        for zero in [Column::ZeroA, Column::ZeroB] {
+            columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
+        }
+        let mut seen = std::collections::HashSet::new();
+        columns.retain(|key| seen.insert(*key));
+        columns
+    }
+
+    /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
+    fn constant(&self, equations: &NormalEquations) -> Vec<Scored<'a>> {
+        let mut all = Vec::new();
+        for (rank, zeros) in self.tables.zeros.iter().enumerate() {
+            for (place, departure) in self.departures().into_iter().enumerate() {
+                for wander in &self.tables.wanders {
+                    if wander.0 > 0.0 && (rank > 1 || place > 1) {
+                        continue;
+                    }
+                    let state = State { zeros, departure, wander: *wander };
+                    for subset in subsets() {
+                        let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
+                        let ln_course =
+                            if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
+                        all.push(self.score(equations, state, leaks, ln_course));
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    fn score(
+        &self,
+        equations: &NormalEquations,
+        state: State<'a>,
+        leaks: [Option<LeakCourse>; 3],
+        ln_course: f64,
+    ) -> Scored<'a> {
+        let hypothesis = Hypothesis::new(equations, &self.sizes, self.segments, state, leaks, ln_course);
+        self.scored(equations, hypothesis)
+    }
+
+    fn scored(&self, equations: &NormalEquations, hypothesis: Hypothesis<'a>) -> Scored<'a> {
+        let fit = fit(equations, &hypothesis.free);
+        let ln_posterior = if self.has_impossible_gain(equations, &hypothesis, &fit) {
+            f64::NEG_INFINITY
+        } else {
+            fit.ln_evidence + hypothesis.ln_prior
+        };
+        Scored { hypothesis, ln_posterior, wiring: 0 }
+    }
+
+    fn has_impossible_gain(
+        &self,
+        equations: &NormalEquations,
+        hypothesis: &Hypothesis<'_>,
+        fit: &Fit,
+    ) -> bool {
+        let gains =
+            [Column::GainA, Column::GainB, Column::Gains, Column::AreaA, Column::AreaB, Column::PositionGain];
+        let places = gains.map(|gain| equations.place(gain, Course::Constant));
+        hypothesis
+            .free
+            .iter()
+            .zip(&fit.means)
+            .any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
+    }
+
+    /// Other courses of the leaks, beside the best states.
+    fn with_courses(&self, equations: &NormalEquations, states: &[State<'a>], all: &mut Vec<Scored<'a>>) {
+        let borders = self.segments.saturating_sub(1);
+        let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
+        let mut courses = vec![
+            (LeakCourse::Orifice, self.tables.ln_course("orifice")),
+            (LeakCourse::Growing, self.tables.ln_course("growing")),
+            (LeakCourse::Wandering, self.tables.ln_course("wandering")),
+        ];
+        courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
+        for state in states {
+            for subset in subsets().skip(1) {
+                for (course, ln_course) in &courses {
+                    let leaks = subset.map(|there| there.then_some(*course));
+                    all.push(self.score(equations, *state, leaks, *ln_course));
+                }
+            }
+        }
+        courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
+        courses.push((LeakCourse::Constant, self.tables.ln_course("constant")));
+        for state in states.iter().filter(|state| state.wander.0 <= 0.0).take(STATES_WITH_PAIRS) {
+            for [one, other] in [[0, 1], [0, 2], [1, 2]] {
+                for (course, ln_one) in &courses {
+                    for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
+                        let mut leaks = [None; 3];
+                        (leaks[one], leaks[other]) = (Some(*course), Some(*another));
+                        all.push(self.score(equations, *state, leaks, ln_one + ln_other));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Mistakes of wiring, beside slightly wrong zeros and constant leaks.
+    fn with_mistakes(&self, declared: &NormalEquations, all: &mut Vec<Scored<'a>>) -> Vec<NormalEquations> {
+        let mut columns = vec![(Column::LeftSide, Course::Constant)];
+        columns.extend(USUAL.iter().map(|(column, course, _)| (*column, *course)));
+        columns.extend(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)));
+        let (Some(zeros), Some(departure), Some(wander)) =
+            (self.tables.zeros.get(1), self.tables.departures.first(), self.tables.wanders.first())
+        else {
+            return Vec::new();
+        };
+        let state = State { zeros, departure, wander: *wander };
+        let mut kept = Vec::new();
+        for entry in &self.tables.mistakes {
+            let mut equations = self.equations(Some(entry), &columns);
+            let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
+            if ln_measure.iter().all(|ln| ln.abs() <= 0.0) {
+                equations = equations.with_noise_of(declared);
+            }
+            let ln_prior = entry.share.ln() - table::ln_wired()
+                + (0..2).map(|c| ln_measure[c] * equations.rows[c]).sum::<f64>();
+            for subset in subsets() {
+                let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
+                let ln_course = if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
+                let mut hypothesis = Hypothesis::new(
+                    &equations,
+                    &self.sizes,
+                    self.segments,
+                    state,
+                    leaks,
+                    ln_course + ln_prior,
+                );
+                hypothesis.wiring = Some(entry);
+                let mut scored = self.scored(&equations, hypothesis);
+                scored.wiring = kept.len() + 1;
+                all.push(scored);
+            }
+            kept.push(equations);
+        }
+        kept
+    }
+
+    /// Cuts leaks at zero, best first, until what follows cannot matter.
+    fn mix(&self, equations: &[NormalEquations], all: Vec<Scored<'a>>) -> Vec<Weighed<'a>> {
+        let mut best = f64::NEG_INFINITY;
+        let mut kept: Vec<(f64, Weighed<'a>)> = Vec::new();
+        for scored in all {
+            if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - LEAST_LN {
+                break;
+            }
+            let Some(equations) = equations.get(scored.wiring) else { continue };
+            let Some((ln, weighed)) = self.cut(equations, scored, best) else { continue };
+            best = best.max(ln);
+            kept.push((ln, weighed));
+        }
+        kept.retain(|(ln, _)| *ln > best - LEAST_LN);
+        let sum: f64 = kept.iter().map(|(ln, _)| (ln - best).exp()).sum();
+        kept.sort_by(|a, b| b.0.total_cmp(&a.0));
+        kept.into_iter().map(|(ln, one)| Weighed { probability: (ln - best).exp() / sum, ..one }).collect()
+    }
+
+    /// An explanation with its leaks at least zero, its evidence and a sample of the leaks.
+    fn cut(&self, equations: &NormalEquations, scored: Scored<'a>, best: f64) -> Option<(f64, Weighed<'a>)> {
+        let Scored { hypothesis, ln_posterior, .. } = scored;
+        let fit = fit(equations, &hypothesis.free);
+        let misfit = self.misfit(&fit);
+        if hypothesis.wiring.is_some() && misfit > WIRED_MISFIT {
+            return None;
+        }
+        let mut ln = ln_posterior;
+        let (leaks_m3s, weights) = if hypothesis.positive.is_empty() {
+            (vec![[0.0; 3]], vec![1.0])
+        } else {
+            let means: Vec<f64> = hypothesis.positive.iter().map(|&i| fit.means[i]).collect();
+            let covariance = fit.covariance(&hypothesis.positive);
+            let most_negative =
+                means.iter().enumerate().map(|(i, mean)| (mean / covariance[i][i].sqrt()).min(0.0));
+            if ln - 0.5 * most_negative.fold(0.0, f64::min).powi(2) < best - LEAST_LN {
+                return None;
+            }
+            let orthant = positive_orthant(&means, &covariance);
+            ln += orthant.ln_probability;
+            (
+                self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points, &orthant.weights, misfit),
+                orthant.weights,
+            )
+        };
+        Some((ln, Weighed { hypothesis, probability: 0.0, misfit, leaks_m3s, weights }))
+    }
+
+    /// Noise scales over the scatter of the readings themselves: louder sensors are no doubt about the model.
+    fn misfit(&self, fit: &Fit) -> f64 {
+        (0..2).map(|c| fit.scales[c].sqrt() / self.scatter[c]).fold(0.0, f64::max)
+    }
+
+    /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of a model that does not fit
+    /// and of pressure sensors.
+    fn leaks_m3s(
+        &self,
+        equations: &NormalEquations,
+        hypothesis: &Hypothesis<'_>,
+        fit: &Fit,
+        points: &[Vec<f64>],
+        weights: &[f64],
+        misfit: f64,
+    ) -> Vec<[f64; 3]> {
+        let widening = (1.0 + WIDENING * (misfit * misfit - WIDENED_MISFIT2).max(0.0)).sqrt();
+        let pressures_pa = self.statistic.mean_pressures_pa();
+        let mut out = vec![[0.0; 3]; points.len()];
+        for (leak, ends) in hypothesis.ends.iter().enumerate().filter(|(_, ends)| !ends.is_empty()) {
+            let places: Vec<usize> =
+                ends.iter().filter_map(|end| hypothesis.positive.iter().position(|one| one == end)).collect();
+            let flow = |point: &Vec<f64>| places.iter().map(|place| point[*place]).sum::<f64>();
+            let mean: f64 = points.iter().zip(weights).map(|(point, weight)| weight * flow(point)).sum();
+            let pressure_pa = pressures_pa[Leak::ALL[leak]].max(1.0);
+            let sheet = USUAL_PRESSURE * self.rig.instruments.pressure.full_scale / pressure_pa;
+            let zero = self.pressure_zero_share(equations, hypothesis, fit, leak) / pressure_pa;
+            for (index, (out, point)) in out.iter_mut().zip(points).enumerate() {
+                let spread = mean + widening * (flow(point) - mean);
+                let pressure =
+                    1.0 + zero + sheet * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
+                out[leak] = (spread * pressure).max(0.0) * self.full_scale_m3s;
+            }
+        }
+        out
+    }
+
+    /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero of a pressure sensor.
+    fn pressure_zero_share(
+        &self,
+        equations: &NormalEquations,
+        hypothesis: &Hypothesis<'_>,
+        fit: &Fit,
+        leak: usize,
+    ) -> f64 {
+        let signs = match leak {
+            0 => [-1.0, 1.0],
+            1 => [-1.0, 0.0],
+            _ => [0.0, -1.0],
+        };
+        let zeros = [Column::PressureZeroA, Column::PressureZeroB];
+        let full_scale = self.rig.instruments.pressure.full_scale;
+        zeros
+            .iter()
+            .zip(signs)
+            .map(|(zero, sign)| {
+                let place = equations.place(*zero, Course::Constant);
+                let at = hypothesis.free.iter().position(|free| Some(free.column) == place);
+                at.map_or(0.0, |at| sign * fit.means[at] * full_scale)
+            })
+            .sum()
+    }
+}
+
+/// The states of best evidence, each once, and as-declared with usual and slight zeros.
+fn best_states<'a>(all: &mut [Scored<'a>]) -> Vec<State<'a>> {
+    all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let mut states: Vec<State<'a>> = Vec::new();
+    for scored in all.iter() {
+        if states.len() < STATES_WITH_COURSES && !states.contains(&scored.hypothesis.state) {
+            states.push(scored.hypothesis.state);
+        }
+    }
+    let plain = all.iter().map(|scored| scored.hypothesis.state).filter(|state| {
+        state.wander.0 <= 0.0
+            && state.departure.id == "as_declared"
+            && ["zeros_usual", "flow_zeros"].contains(&state.zeros.id)
+    });
+    for state in plain {
+        if !states.contains(&state) {
+            states.push(state);
+        }
+    }
+    states
+}
+
+/// Scatter of flows and of the position over the declared noise.
+fn scatter(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
+    let sensors = rig.sensors();
+    let found: [Option<f64>; CHANNELS] = statistic.scatter();
+    let over = |found: Option<f64>, declared: f64| match found {
+        Some(found) if declared > 0.0 => (found / declared).max(1.0),
+        _ => 1.0,
+    };
+    [
+        over(found[3], sensors.flow_a.noise_std).max(over(found[4], sensors.flow_b.noise_std)),
+        over(found[0], sensors.position.noise_std),
+    ]
+}

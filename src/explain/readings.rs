@@ -1,0 +1,250 @@
+//! What the readings of a mistaken wiring, unit or rig truly are: linear maps of the raw sums.
+
+use pitchleak_core::continuity::{RAW_SUMS, RawSum};
+use pitchleak_core::{ATMOSPHERE_PA, Cylinder, PerLeak};
+
+/// Which readings a mistake concerns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// Q_A.
+    FlowA,
+    /// Q_B.
+    FlowB,
+    /// Q_A and Q_B.
+    Flows,
+    /// P_A.
+    PressureA,
+    /// P_B.
+    PressureB,
+    /// P_A and P_B.
+    Pressures,
+    /// x.
+    Position,
+}
+
+/// A mistake of wiring, sign, unit or geometry, which no small error is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mistake {
+    /// Q_A and Q_B are exchanged.
+    FlowsExchanged,
+    /// P_A and P_B are exchanged.
+    PressuresExchanged,
+    /// Both.
+    ChambersExchanged,
+    /// A flow has the other sign.
+    Sign(Of),
+    /// Exchanged flows of the other sign: they are counted out of the other chamber.
+    FlowsExchangedAndTurned,
+    /// x counts from the B end.
+    OtherEnd,
+    /// Readings are so many times too large.
+    Factor(Of, f64),
+    /// Pressures are absolute.
+    Absolute(Of),
+    /// The declared areas are exchanged.
+    AreasExchanged,
+    /// The declared area of chamber A (0) or B (1) is so many times too large.
+    Area(usize, f64),
+}
+
+/// A linear combination of raw sums.
+pub(super) type Combination = [f64; RAW_SUMS];
+
+/// What each raw sum would be without the mistake, as combinations of those recorded. In the places of the residuals
+/// stand the integrals of the flows.
+#[derive(Clone, Debug)]
+pub(super) struct Readings {
+    sums: [Combination; RAW_SUMS],
+    /// True areas, m².
+    pub area_m2: [f64; 2],
+}
+
+const FLOW_A: [RawSum; 2] = [RawSum::ResidualA, RawSum::FlowChangeA];
+const FLOW_B: [RawSum; 2] = [RawSum::ResidualB, RawSum::FlowChangeB];
+const PRESSURE_A: [RawSum; 5] = [
+    RawSum::PressureA,
+    RawSum::AgedPressureA,
+    RawSum::PressureChangeA,
+    RawSum::StorageA,
+    RawSum::StorageBOfA,
+];
+const PRESSURE_B: [RawSum; 5] = [
+    RawSum::PressureB,
+    RawSum::AgedPressureB,
+    RawSum::PressureChangeB,
+    RawSum::StorageAOfB,
+    RawSum::StorageB,
+];
+/// Volume times change of pressure, and that change: of V_A, then of V_B.
+const STORAGE: [[(RawSum, RawSum); 2]; 2] = [
+    [(RawSum::StorageA, RawSum::PressureChangeA), (RawSum::StorageAOfB, RawSum::PressureChangeB)],
+    [(RawSum::StorageBOfA, RawSum::PressureChangeA), (RawSum::StorageB, RawSum::PressureChangeB)],
+];
+
+impl Readings {
+    /// As recorded; κ₀ in 1/MPa.
+    pub fn declared(cylinder: &Cylinder<f64>, compressibility: f64) -> Self {
+        let mut sums = [[0.0; RAW_SUMS]; RAW_SUMS];
+        for (raw, own) in sums.iter_mut().enumerate() {
+            own[raw] = 1.0;
+        }
+        let (a, b) = (RawSum::ResidualA as usize, RawSum::ResidualB as usize);
+        sums[a][RawSum::Travel as usize] = cylinder.area_a_m2;
+        sums[a][RawSum::StorageA as usize] = compressibility;
+        sums[b][RawSum::Travel as usize] = -cylinder.area_b_m2;
+        sums[b][RawSum::StorageB as usize] = compressibility;
+        Self { sums, area_m2: [cylinder.area_a_m2, cylinder.area_b_m2] }
+    }
+
+    /// With a mistake undone.
+    pub fn mended(mut self, mistake: Mistake, cylinder: &Cylinder<f64>) -> Self {
+        let dead_m3 = [cylinder.dead_volume_a_m3, cylinder.dead_volume_b_m3];
+        match mistake {
+            Mistake::FlowsExchanged => self.exchange(&FLOW_A, &FLOW_B),
+            Mistake::PressuresExchanged => self.exchange_pressures(),
+            Mistake::ChambersExchanged => {
+                self.exchange(&FLOW_A, &FLOW_B);
+                self.exchange_pressures();
+            }
+            Mistake::FlowsExchangedAndTurned => {
+                self.exchange(&FLOW_A, &FLOW_B);
+                self.scale(Of::Flows, -1.0, dead_m3);
+            }
+            Mistake::Sign(of) => self.scale(of, -1.0, dead_m3),
+            Mistake::Factor(of, factor) => self.scale(of, 1.0 / factor, dead_m3),
+            Mistake::Absolute(of) => self.subtract_atmosphere(of),
+            Mistake::OtherEnd => self.turn_position(dead_m3),
+            Mistake::AreasExchanged => {
+                let [a, b] = self.area_m2;
+                self.set_area(0, b, dead_m3);
+                self.set_area(1, a, dead_m3);
+            }
+            Mistake::Area(side, factor) => self.set_area(side, self.area_m2[side] / factor, dead_m3),
+        }
+        self
+    }
+
+    /// A sum as it would be.
+    pub fn of(&self, raw: RawSum) -> &Combination {
+        &self.sums[raw as usize]
+    }
+
+    fn exchange(&mut self, one: &[RawSum], other: &[RawSum]) {
+        for (a, b) in one.iter().zip(other) {
+            self.sums.swap(*a as usize, *b as usize);
+        }
+    }
+
+    fn exchange_pressures(&mut self) {
+        // In the order of PRESSURE_A and PRESSURE_B storages of one volume stand opposite each other only where crossed.
+        use RawSum as R;
+        self.exchange(
+            &[R::PressureA, R::AgedPressureA, R::PressureChangeA, R::RootA, R::StorageA, R::StorageBOfA],
+            &[R::PressureB, R::AgedPressureB, R::PressureChangeB, R::RootB, R::StorageAOfB, R::StorageB],
+        );
+        self.multiply(&[R::RootInternal], -1.0);
+    }
+
+    fn multiply(&mut self, which: &[RawSum], by: f64) {
+        for raw in which {
+            for coefficient in &mut self.sums[*raw as usize] {
+                *coefficient *= by;
+            }
+        }
+    }
+
+    fn scale(&mut self, of: Of, by: f64, dead_m3: [f64; 2]) {
+        match of {
+            Of::FlowA => self.multiply(&FLOW_A, by),
+            Of::FlowB => self.multiply(&FLOW_B, by),
+            Of::Flows => {
+                self.multiply(&FLOW_A, by);
+                self.multiply(&FLOW_B, by);
+            }
+            Of::PressureA => self.multiply(&PRESSURE_A, by),
+            Of::PressureB => self.multiply(&PRESSURE_B, by),
+            Of::Pressures => {
+                self.multiply(&PRESSURE_A, by);
+                self.multiply(&PRESSURE_B, by);
+            }
+            Of::Position => {
+                self.multiply(&[RawSum::Travel], by);
+                self.scale_volume(0, by, dead_m3);
+                self.scale_volume(1, by, dead_m3);
+            }
+        }
+    }
+
+    /// The swept part of a volume is so many times what was recorded.
+    fn scale_volume(&mut self, side: usize, by: f64, dead_m3: [f64; 2]) {
+        for (storage, change) in STORAGE[side] {
+            let change = self.sums[change as usize];
+            for (coefficient, of_change) in self.sums[storage as usize].iter_mut().zip(change) {
+                *coefficient = by * (*coefficient - dead_m3[side] * of_change) + dead_m3[side] * of_change;
+            }
+        }
+    }
+
+    fn set_area(&mut self, side: usize, area_m2: f64, dead_m3: [f64; 2]) {
+        self.scale_volume(side, area_m2 / self.area_m2[side], dead_m3);
+        self.area_m2[side] = area_m2;
+    }
+
+    /// x = L − what was recorded: the swept volumes are each other's, by the areas.
+    fn turn_position(&mut self, dead_m3: [f64; 2]) {
+        self.multiply(&[RawSum::Travel], -1.0);
+        let [area_a, area_b] = self.area_m2;
+        for ((of_a, change), (of_b, _)) in STORAGE[0].into_iter().zip(STORAGE[1]) {
+            let (a, b) = (self.sums[of_a as usize], self.sums[of_b as usize]);
+            let change = self.sums[change as usize];
+            for raw in 0..RAW_SUMS {
+                let (swept_a, swept_b) =
+                    (a[raw] - dead_m3[0] * change[raw], b[raw] - dead_m3[1] * change[raw]);
+                self.sums[of_a as usize][raw] = swept_b * area_a / area_b + dead_m3[0] * change[raw];
+                self.sums[of_b as usize][raw] = swept_a * area_b / area_a + dead_m3[1] * change[raw];
+            }
+        }
+    }
+
+    fn subtract_atmosphere(&mut self, of: Of) {
+        let atmosphere_mpa = ATMOSPHERE_PA * 1e-6;
+        let mut subtract = |pressure: RawSum, aged: RawSum| {
+            self.sums[pressure as usize][RawSum::Time as usize] -= atmosphere_mpa;
+            self.sums[aged as usize][RawSum::AgedTime as usize] -= atmosphere_mpa;
+        };
+        if matches!(of, Of::PressureA | Of::Pressures) {
+            subtract(RawSum::PressureA, RawSum::AgedPressureA);
+        }
+        if matches!(of, Of::PressureB | Of::Pressures) {
+            subtract(RawSum::PressureB, RawSum::AgedPressureB);
+        }
+    }
+}
+
+impl Mistake {
+    /// ln of the change of measure per row of the balance and of the position's equation: the density is that of the
+    /// readings as recorded, so whoever shrinks them gains nothing by it.
+    pub(super) fn ln_measure(self) -> [f64; 2] {
+        match self {
+            Self::Factor(Of::Flows, factor) => [-factor.ln(), 0.0],
+            Self::Factor(Of::FlowA | Of::FlowB, factor) => [-0.5 * factor.ln(), 0.0],
+            Self::Factor(Of::Position, factor) => [0.0, -factor.ln()],
+            Self::Area(_, factor) => [0.5 * factor.ln(), 0.0],
+            _ => [0.0, 0.0],
+        }
+    }
+
+    /// Mean pressures across the leaks without the mistake; an internal one only where both factors are known.
+    pub(super) fn mended_pressures(self, read: PerLeak<f64>) -> PerLeak<f64> {
+        let PerLeak { internal, external_a, external_b } = read;
+        match self {
+            Self::PressuresExchanged | Self::ChambersExchanged => {
+                PerLeak { internal, external_a: external_b, external_b: external_a }
+            }
+            Self::Factor(Of::Pressures, factor) => read.map(|pressure| pressure / factor),
+            Self::Factor(Of::PressureA, factor) => PerLeak { external_a: external_a / factor, ..read },
+            Self::Factor(Of::PressureB, factor) => PerLeak { external_b: external_b / factor, ..read },
+            _ => read,
+        }
+    }
+}

@@ -1,0 +1,331 @@
+//! The table of explanations: what may be the matter with leaks, sensors, rig and wiring, one entry each.
+//!
+//! An explanation is a choice from each kind: ln prior odds add. Shares are guesses until fleets teach them, in four
+//! classes; sizes (1 σ of what is set free) are a data sheet's or guesses. What a choice between guesses changes is small
+//! (docs/explanations.md): a factor of five in the shares moves one or two verdicts in a hundred.
+
+use super::columns::{Column, Course};
+use super::readings::{Mistake, Of};
+
+/// Shares of explanations, by how often an engineer meets them. Guesses.
+mod share {
+    /// Clocks of different devices are seldom aligned; zeros drift a little beyond the sheet.
+    pub const COMMON: f64 = 0.06;
+    pub const UNCOMMON: f64 = 0.02;
+    pub const RARE: f64 = 0.01;
+    /// Two at once.
+    pub const VERY_RARE: f64 = 0.002;
+    /// All mistakes of wiring, sign, unit and geometry together.
+    pub const WIRING: f64 = 0.005;
+}
+
+/// Prior probability of each leak. A guess.
+pub(super) const LEAK_SHARE: f64 = 0.03;
+/// Size of a leak, share of the flow meters' full scale, half normal. A guess.
+pub(super) const LEAK_SIZE: f64 = 0.05;
+/// How far a leak that wanders steps at a segment's border, 1 σ in shares of full scale. A guess.
+pub(super) const LEAK_STEP: f64 = 0.02;
+/// Zero of a meter that declares none: a tenth of the usual accuracy of 1 % of full scale. A guess.
+const USUAL_ZERO: f64 = 0.001;
+/// Drift of that zero along a trace. A guess.
+const USUAL_DRIFT: f64 = 0.0005;
+/// Gain of a meter that declares none. A guess.
+const USUAL_GAIN: f64 = 0.005;
+/// Lag of a meter, s: one or two periods of its own averaging. A guess.
+const USUAL_LAG_S: f64 = 0.010;
+/// Hose and port, share of the swept volume: 20 cm³ of the paper's 250 cm³. A guess.
+const USUAL_DEAD_VOLUME: f64 = 0.08;
+/// Zero and gain of a pressure sensor that declares none, share of full scale each. A guess.
+pub(super) const USUAL_PRESSURE: f64 = 0.002;
+
+/// Which choice an entry belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// How a leak goes on.
+    Course,
+    /// Zeros of the flow meters.
+    Zeros,
+    /// One thing of sensors or rig that is not as declared.
+    Departure,
+    /// Zeros that wander.
+    Wander,
+    /// Mistakes of wiring, sign, unit or geometry.
+    Wiring,
+}
+
+/// An explanation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Its name, stable.
+    pub id: &'static str,
+    /// Which choice it is one of.
+    pub kind: Kind,
+    /// Its prior probability within its kind.
+    pub share: f64,
+    /// Columns set free, with the standard deviation of each in its own unit.
+    pub free: Vec<(Column, Course, f64)>,
+    /// What the readings are instead.
+    pub mistake: Option<Mistake>,
+    /// In words.
+    pub text: &'static str,
+    /// What to do.
+    pub remedy: &'static str,
+    /// Lines of the rig file that mend it; `{}` is the value found.
+    pub mends: Option<&'static str>,
+    /// Entries that no trace of these readings tells it from.
+    pub alike: &'static [&'static str],
+}
+
+impl Entry {
+    fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
+        Self { id, kind, share, free: Vec::new(), mistake: None, text, remedy: "", mends: None, alike: &[] }
+    }
+
+    fn free(mut self, column: Column, std: f64) -> Self {
+        self.free.push((column, Course::Constant, std));
+        self
+    }
+
+    fn drifting(mut self, column: Column, std: f64) -> Self {
+        self.free.push((column, Course::Drift, std));
+        self
+    }
+
+    fn remedy(mut self, remedy: &'static str, mends: Option<&'static str>) -> Self {
+        (self.remedy, self.mends) = (remedy, mends);
+        self
+    }
+
+    fn alike(mut self, alike: &'static [&'static str]) -> Self {
+        self.alike = alike;
+        self
+    }
+}
+
+/// What is free in every explanation: what no data sheet declares to the last digit.
+pub(super) const USUAL: [(Column, Course, f64); 11] = [
+    (Column::Compressibility, Course::Constant, 0.25),
+    (Column::ZeroA, Course::Constant, USUAL_ZERO),
+    (Column::ZeroB, Course::Constant, USUAL_ZERO),
+    (Column::ZeroA, Course::Drift, USUAL_DRIFT),
+    (Column::ZeroB, Course::Drift, USUAL_DRIFT),
+    (Column::GainA, Course::Constant, USUAL_GAIN),
+    (Column::GainB, Course::Constant, USUAL_GAIN),
+    (Column::LagA, Course::Constant, USUAL_LAG_S),
+    (Column::LagB, Course::Constant, USUAL_LAG_S),
+    (Column::DeadVolumeA, Course::Constant, USUAL_DEAD_VOLUME),
+    (Column::DeadVolumeB, Course::Constant, USUAL_DEAD_VOLUME),
+];
+
+/// Zeros of the flow meters, as shares of full scale.
+pub(super) fn zeros() -> Vec<Entry> {
+    const REZERO: &str = "Shut both ports and read the meters: what they show is their zero.";
+    let (slight, gross) = (0.004, 0.02);
+    let entry = |id, share, text, a, b| {
+        Entry::new(id, Kind::Zeros, share, text)
+            .free(Column::ZeroA, a)
+            .free(Column::ZeroB, b)
+            .remedy(REZERO, Some("qa = { name = \"qa\", offset = \"{} L/min\" }"))
+    };
+    vec![
+        entry("zeros_usual", 0.75, "both flow meters' zeros are as usual", USUAL_ZERO, USUAL_ZERO),
+        entry("flow_zeros", 0.20, "the flow meters' zeros are slightly off", slight, slight),
+        entry("flow_zero_a", share::UNCOMMON, "flow meter A's zero is off", gross, USUAL_ZERO),
+        entry("flow_zero_b", share::UNCOMMON, "flow meter B's zero is off", USUAL_ZERO, gross),
+        entry("flow_zeros_gross", share::RARE, "both flow meters' zeros are off", gross, gross),
+    ]
+}
+
+/// How a leak goes along the trace, beside being constant.
+pub(super) fn courses() -> Vec<Entry> {
+    vec![
+        Entry::new("constant", Kind::Course, 0.77, "is steady"),
+        Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
+        Entry::new("growing", Kind::Course, 0.06, "grows or shrinks steadily"),
+        Entry::new("sudden", Kind::Course, 0.06, "changed at once"),
+        Entry::new("wandering", Kind::Course, 0.03, "comes and goes"),
+    ]
+}
+
+/// Zeros that wander from segment to segment, share of full scale.
+pub(super) fn wanders() -> Vec<(f64, f64)> {
+    vec![(0.0, 0.94), (0.003, 0.03), (0.01, 0.02), (0.03, 0.01)]
+}
+
+/// One thing of sensors or rig that is not as declared.
+pub(super) fn departures() -> Vec<Entry> {
+    use Column as C;
+    use share::{COMMON, RARE, UNCOMMON, VERY_RARE};
+    const METER: &str = "Compare the meter with the piston's travel over a long stroke.";
+    const CLOCK: &str = "Compare the clocks and filters of flow meters and position.";
+    const AREA: &str = "Measure piston and rod, or compare the data sheet.";
+    const PRESSURE: &str = "Compare both pressure sensors with a gauge.";
+    let (late_s, very_late_s, gain, gross) = (0.1, 1.0, 0.05, 0.01);
+    let entry = |id, share, text| Entry::new(id, Kind::Departure, share, text);
+    let as_declared = entry("as_declared", 0.80, "sensors and rig are as declared");
+    let mut all = vec![
+        as_declared,
+        entry("flow_lag", COMMON, "both flow meters lag, or the position leads")
+            .free(C::Lags, late_s)
+            .remedy(CLOCK, None)
+            .alike(&["position_lag"]),
+        entry("flow_lag_a", UNCOMMON, "flow meter A lags").free(C::LagA, late_s).remedy(CLOCK, None),
+        entry("flow_lag_b", UNCOMMON, "flow meter B lags").free(C::LagB, late_s).remedy(CLOCK, None),
+        entry("flow_lag_gross", 0.5 * RARE, "both flow meters lag by seconds")
+            .free(C::Lags, very_late_s)
+            .remedy(CLOCK, None),
+        entry("flow_gain_a", UNCOMMON, "flow meter A's gain is off").free(C::GainA, gain).remedy(METER, None),
+        entry("flow_gain_b", UNCOMMON, "flow meter B's gain is off").free(C::GainB, gain).remedy(METER, None),
+        entry("flow_gain", UNCOMMON, "both flow meters' gain, or the position's, is off")
+            .free(C::Gains, gain)
+            .remedy(METER, None)
+            .alike(&["position_gain", "areas"]),
+        entry("flow_drift_a", RARE, "flow meter A's zero drifts").drifting(C::ZeroA, gross),
+        entry("flow_drift_b", RARE, "flow meter B's zero drifts").drifting(C::ZeroB, gross),
+        entry("area_a", RARE, "piston area A is not as declared")
+            .free(C::AreaA, gain)
+            .remedy(AREA, Some("area_a = \"{} cm^2\""))
+            .alike(&["flow_gain_a"]),
+        entry("area_b", RARE, "piston area B is not as declared")
+            .free(C::AreaB, gain)
+            .remedy(AREA, Some("area_b = \"{} cm^2\""))
+            .alike(&["flow_gain_b"]),
+        entry("position_gain", RARE, "the position sensor's gain is off")
+            .free(C::PositionGain, gain)
+            .remedy("Compare the position with the stroke's both ends.", None)
+            .alike(&["flow_gain", "areas"]),
+        entry("position_zero", RARE, "the position sensor's zero is off")
+            .free(C::PositionZero, 0.1)
+            .remedy("Compare the position with the stroke's both ends.", None)
+            .alike(&["dead_volume_a", "dead_volume_b"]),
+        entry("dead_volume_a", RARE, "chamber A holds more oil than declared")
+            .free(C::DeadVolumeA, 0.5)
+            .remedy("Declare hoses and ports.", Some("dead_volume_a = \"{} cm^3\"")),
+        entry("dead_volume_b", RARE, "chamber B holds more oil than declared, or the stroke is longer")
+            .free(C::DeadVolumeB, 0.5)
+            .remedy("Declare hoses and ports, and the stroke.", Some("dead_volume_b = \"{} cm^3\""))
+            .alike(&["stroke"]),
+        entry("bulk_modulus", RARE, "the oil is softer or stiffer than declared")
+            .free(C::Compressibility, 1.0)
+            .remedy("Declare the bulk modulus found, or look for air.", Some("bulk_modulus = \"{} GPa\"")),
+        entry("flow_lag_and_gains", VERY_RARE, "the flow meters lag and their gains are off")
+            .free(C::Lags, late_s)
+            .free(C::GainA, gain)
+            .free(C::GainB, gain),
+    ];
+    all.extend([
+        entry("pressure_gain_a", RARE, "the gain of pressure sensor A is off")
+            .free(C::ThroughSealA, 0.1 * gain)
+            .remedy(PRESSURE, None),
+        entry("pressure_gain_b", RARE, "the gain of pressure sensor B is off")
+            .free(C::ThroughSealB, 0.1 * gain)
+            .remedy(PRESSURE, None),
+    ]);
+    all
+}
+
+/// Pressure sensors seen through the leaks that a first pass found.
+pub(super) fn pressures() -> Vec<Entry> {
+    use Column as C;
+    const PRESSURE: &str = "Open the sensor to air: what it shows is its zero.";
+    let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(PRESSURE, None);
+    vec![
+        entry("pressure_zero_a", "the zero of pressure sensor A is off").free(C::PressureZeroA, 0.01),
+        entry("pressure_zero_b", "the zero of pressure sensor B is off").free(C::PressureZeroB, 0.01),
+        entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),
+        entry("pressure_gain_b", "the gain of pressure sensor B is off").free(C::PressureGainB, 0.05),
+    ]
+}
+
+/// Mistakes of wiring, sign, unit and geometry, of equal shares.
+pub(super) fn mistakes() -> Vec<Entry> {
+    const WIRES: &str = "Look at the wiring and the columns' names.";
+    let mut all: Vec<(&'static str, Mistake, &'static str, Option<&'static str>)> = vec![
+        (
+            "exchanged_flows",
+            Mistake::FlowsExchanged,
+            "qa and qb are exchanged",
+            Some("qa = \"qb\"\nqb = \"qa\""),
+        ),
+        (
+            "exchanged_pressures",
+            Mistake::PressuresExchanged,
+            "pa and pb are exchanged",
+            Some("pa = \"pb\"\npb = \"pa\""),
+        ),
+        (
+            "exchanged_chambers",
+            Mistake::ChambersExchanged,
+            "the chambers A and B are exchanged",
+            Some("qa = \"qb\"\nqb = \"qa\"\npa = \"pb\"\npb = \"pa\""),
+        ),
+        (
+            "exchanged_turned_flows",
+            Mistake::FlowsExchangedAndTurned,
+            "qa and qb are exchanged, and count the other way",
+            None,
+        ),
+        (
+            "sign_qa",
+            Mistake::Sign(Of::FlowA),
+            "qa counts the other way",
+            Some("qa = { name = \"qa\", scale = -1.0 }"),
+        ),
+        (
+            "sign_qb",
+            Mistake::Sign(Of::FlowB),
+            "qb counts the other way",
+            Some("qb = { name = \"qb\", scale = -1.0 }"),
+        ),
+        ("sign_flows", Mistake::Sign(Of::Flows), "qa and qb count the other way", None),
+        ("other_end", Mistake::OtherEnd, "x counts from the B end", None),
+        ("absolute_pressures", Mistake::Absolute(Of::Pressures), "the pressures are absolute", None),
+        ("areas_exchanged", Mistake::AreasExchanged, "the areas A and B are exchanged", None),
+    ];
+    for factor in FACTORS {
+        all.extend([
+            ("unit_flows", Mistake::Factor(Of::Flows, factor), "qa and qb are in another unit", None),
+            ("unit_pressures", Mistake::Factor(Of::Pressures, factor), "pa and pb are in another unit", None),
+        ]);
+    }
+    for factor in SLIPS {
+        all.extend([
+            ("unit_qa", Mistake::Factor(Of::FlowA, factor), "qa is in another unit", None),
+            ("unit_qb", Mistake::Factor(Of::FlowB, factor), "qb is in another unit", None),
+            ("unit_pa", Mistake::Factor(Of::PressureA, factor), "pa is in another unit", None),
+            ("unit_pb", Mistake::Factor(Of::PressureB, factor), "pb is in another unit", None),
+            ("unit_x", Mistake::Factor(Of::Position, factor), "x is in another unit", None),
+            ("unit_area_a", Mistake::Area(0, factor), "area A is in another unit", None),
+            ("unit_area_b", Mistake::Area(1, factor), "area B is in another unit", None),
+        ]);
+    }
+    let share = share::WIRING / all.len() as f64;
+    all.into_iter()
+        .map(|(id, mistake, text, mends)| Entry {
+            mistake: Some(mistake),
+            ..Entry::new(id, Kind::Wiring, share, text).remedy(WIRES, mends)
+        })
+        .collect()
+}
+
+/// Factors between units of flow and of pressure that people log: L/min, m³/h, gal/min, L/s; bar, psi, MPa; and a slipped
+/// decimal point.
+const FACTORS: [f64; 10] = [
+    10.0,
+    0.1,
+    60.0,
+    1.0 / 60.0,
+    3.785_411_784,
+    1.0 / 3.785_411_784,
+    50.0 / 3.0,
+    0.06,
+    14.503_77,
+    1.0 / 14.503_77,
+];
+/// A slipped decimal point, and a diameter for a radius.
+const SLIPS: [f64; 4] = [10.0, 0.1, 4.0, 0.25];
+
+/// ln prior probability of as declared wiring.
+pub(super) fn ln_wired() -> f64 {
+    (1.0 - share::WIRING).ln()
+}
