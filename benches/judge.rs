@@ -5,7 +5,7 @@
 //! version's commit), `accuracy=0.003`, `seconds=60`, `rows.csv` for a line per trace, `wrong` for a line per wrong verdict, `each` for all.
 
 use pitchleak_testkit::judge::Case;
-use pitchleak_testkit::judge::givers::{Replay, VerdictGiver};
+use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver};
 use pitchleak_testkit::judge::score::{Judgement, Scored, Sum};
 use pitchleak_testkit::judge::worlds::{WORLDS, Wires, World};
 use rayon::prelude::*;
@@ -73,7 +73,7 @@ fn main() {
         draws.clone().map(draw).collect::<Vec<_>>()
     };
     let cases: Vec<Case> = worlds.iter().flat_map(each).collect();
-    let givers: [&dyn VerdictGiver; 1] = [&Replay];
+    let givers: [&dyn VerdictGiver; 2] = [&Replay, &Explain];
     let scored = judged(&cases, &givers);
     println!("Seed {seed}, {} traces of {seconds} s.", cases.len());
     let rows_of = |place: usize| cases.iter().zip(scored.iter().map(|all| &all[place])).collect();

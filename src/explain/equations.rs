@@ -97,10 +97,11 @@ impl NormalEquations {
     }
 
     /// Measures the left side by the noise that it would have in `other` equations: else a mistake that multiplies the
-    /// readings' noise by less than those explains it.
+    /// readings' noise by less than those explains it. One that makes it louder is measured by its own: to take off what is
+    /// expected more would leave the chance by which a run's noise differs from it.
     pub fn with_noise_of(mut self, other: &Self) -> Self {
         for equation in 0..EQUATIONS {
-            let more = other.left_noise[equation] - self.left_noise[equation];
+            let more = (other.left_noise[equation] - self.left_noise[equation]).max(0.0);
             self.gram[equation][0] = (self.gram[equation][0] + more).max(0.0);
         }
         self

@@ -3,9 +3,10 @@
 use super::worlds::Part;
 use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak};
+use pitchleak::explain::{Decision, Statistic, explain};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{Leakage, ReasonId, ReplayReport};
-use pitchleak::trace::TraceReader;
+use pitchleak::trace::{Record, TraceError, TraceReader};
 use std::io::Cursor;
 
 /// Reads a trace and says what it makes of it.
@@ -98,6 +99,111 @@ impl VerdictGiver for Replay {
 fn replayed(trace: &[u8], rig: &Rig) -> Result<ReplayReport, ReplayError> {
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
     replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(()))
+}
+
+/// The posterior over explanations.
+pub struct Explain;
+
+/// From this probability on an explanation tells to mend something: it is likelier than all else together.
+const ACCUSES: f64 = 0.5;
+
+impl VerdictGiver for Explain {
+    fn name(&self) -> &'static str {
+        "explain"
+    }
+
+    fn judge(&self, trace: &[u8], rig: &Rig) -> Given {
+        match explained(trace, rig) {
+            Ok(Some(decision)) => of_decision(&decision),
+            Ok(None) => Given::refused("too little to explain".into()),
+            Err(error) => Given::refused(error.to_string()),
+        }
+    }
+}
+
+fn explained(trace: &[u8], rig: &Rig) -> Result<Option<Decision>, TraceError> {
+    let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+    let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
+    let mut record = Record::default();
+    while reader.next_record(&mut record)? {
+        statistic.push(record.step_s(), &record.sample);
+    }
+    Ok(explain(&statistic, rig))
+}
+
+fn of_decision(decision: &Decision) -> Given {
+    let sure = decision.status.is_sure();
+    let words = PerLeak::from_fn(|leak: Leak| match leak {
+        _ if !sure => Word::Perhaps,
+        _ if decision.faults.contains(&leak) => Word::Leaks,
+        _ if decision.ruled_out.contains(&leak) => Word::RuledOut,
+        _ => Word::Perhaps,
+    });
+    let best = decision.explanations.first();
+    Given {
+        sure,
+        words,
+        probability: decision.probability,
+        mean_lpm: decision.leakage.map(|belief| belief.mean_lpm),
+        std_lpm: decision.leakage.map(|belief| belief.std_lpm),
+        interval_lpm: decision.leakage.map(|belief| [belief.quantiles_lpm[0], belief.quantiles_lpm[2]]),
+        since_s: 0.0,
+        causes: accused(decision),
+        text: format!(
+            "{} {:?} {:?} misfit {:.2} wander {:.2}: {}",
+            decision.status.word(),
+            decision.probability,
+            decision.leakage.map(|belief| belief.quantiles_lpm),
+            decision.misfit,
+            decision.wander,
+            best.map_or(String::new(), |best| format!("{:.2} {} = {}", best.probability, best.id, best.text)),
+        ),
+    }
+}
+
+/// What explanations are made of, beside leaks, where they have most of the probability together.
+fn accused(decision: &Decision) -> Vec<Cause> {
+    let mut masses: Vec<(&str, f64)> = Vec::new();
+    for one in &decision.explanations {
+        for id in one.id.split('+').filter(|id| !parts_of(id).is_empty()) {
+            match masses.iter_mut().find(|(known, _)| *known == id) {
+                Some((_, mass)) => *mass += one.probability,
+                None => masses.push((id, one.probability)),
+            }
+        }
+    }
+    let alike = |id: &str| {
+        let own = decision.explanations.iter().filter(|one| one.id.split('+').any(|part| part == id));
+        own.flat_map(|one| one.cannot_be_told_from.iter().flat_map(|id| parts_of(id))).collect()
+    };
+    let cause = |(id, mass): &(&str, f64)| Cause {
+        text: format!("{id} {mass:.2}"),
+        accused: parts_of(id),
+        or: alike(id),
+    };
+    masses.iter().filter(|(_, mass)| *mass >= ACCUSES).map(cause).collect()
+}
+
+/// What an id of the table of explanations accuses.
+fn parts_of(id: &str) -> Vec<Part> {
+    use Part::{MeterA, MeterB, Position, PressureA, PressureB, Rig};
+    let both = |a: Part, b: Part| match id.rsplit('_').next() {
+        Some("a" | "qa" | "pa") => vec![a],
+        Some("b" | "qb" | "pb") => vec![b],
+        _ => vec![a, b],
+    };
+    match id {
+        _ if id.contains("external") || id.contains("internal") => vec![],
+        "exchanged_chambers" => vec![MeterA, MeterB, PressureA, PressureB],
+        "other_end" | "unit_x" => vec![Position],
+        _ if id.contains("pressure") || id.ends_with("_pa") || id.ends_with("_pb") => {
+            both(PressureA, PressureB)
+        }
+        _ if id.contains("position") => vec![Position],
+        _ if ["area", "volume", "bulk", "stroke"].iter().any(|word| id.contains(word)) => vec![Rig],
+        _ if ["flow", "zeros", "_qa", "_qb"].iter().any(|word| id.contains(word)) => both(MeterA, MeterB),
+        _ => vec![],
+    }
 }
 
 /// What a word of a program without probabilities is worth: its α is 5 %.
