@@ -59,7 +59,12 @@ def write(mutants):
     (WORK / "list.json").write_text(json.dumps(mutants))
     tool = ["cargo", "run", "--locked", "--quiet", "--manifest-path", ROOT / "ci/mutants/Cargo.toml", "--"]
     placeless = subprocess.run([*tool, COPY, WORK / "list.json"], capture_output=True, text=True, check=True).stdout
-    for library in ("crates/pitchleak-core/src/lib.rs", "crates/pitchleak-trace/src/lib.rs", "crates/pitchleak-view/src/lib.rs", "src/lib.rs"):
+    for library in (
+        "crates/pitchleak-core/src/lib.rs",
+        "crates/pitchleak-trace/src/lib.rs",
+        "crates/pitchleak-view/src/lib.rs",
+        "src/lib.rs",
+    ):
         with (COPY / library).open("a") as file:
             file.write(CHOOSE)
     return [entry for entry in mutants if str(entry["id"]) not in placeless.split()]
