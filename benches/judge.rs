@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench judge` prints the tables of `docs/bench/judge.md`. After `--`, in any order:
 //! `worlds=lag,zero` (parts of names; `held-out`, `known`), `draws=4` per world, `number=7` that draw alone, `seed=6c429f8` (else the
-//! version's commit), `accuracy=0.003`, `seconds=60`, `rows.csv` for a line per trace, `wrong` for a line per wrong verdict, `each` for all.
+//! version's commit), `accuracy=0.003`, `seconds=60`, `giver=explain` alone, `rows.csv` for a line per trace, `wrong` for a line per wrong verdict, `each` for all.
 
 use pitchleak_testkit::judge::Case;
 use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver};
@@ -73,7 +73,8 @@ fn main() {
         draws.clone().map(draw).collect::<Vec<_>>()
     };
     let cases: Vec<Case> = worlds.iter().flat_map(each).collect();
-    let givers: [&dyn VerdictGiver; 2] = [&Replay, &Explain];
+    let mut givers: Vec<&dyn VerdictGiver> = vec![&Replay, &Explain];
+    givers.retain(|giver| options.value("giver").is_none_or(|own| own == giver.name()));
     let scored = judged(&cases, &givers);
     println!("Seed {seed}, {} traces of {seconds} s.", cases.len());
     let rows_of = |place: usize| cases.iter().zip(scored.iter().map(|all| &all[place])).collect();

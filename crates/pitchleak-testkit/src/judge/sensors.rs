@@ -30,6 +30,7 @@ pub struct Recorder<'a> {
     /// The flows of the last second.
     past: VecDeque<[f64; 2]>,
     position: f64,
+    held: [f64; 2],
     coloured: Channels,
     /// So far, with a header.
     pub text: String,
@@ -58,6 +59,7 @@ impl<'a> Recorder<'a> {
             lagged: None,
             past: VecDeque::new(),
             position: 0.0,
+            held: [0.0; 2],
             text: "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s,force_n\n".to_owned(),
         }
     }
@@ -102,14 +104,21 @@ impl<'a> Recorder<'a> {
         self.past.push_front([shown[3], shown[4]]);
         self.past.truncate(STEPS_HZ as usize);
         let steps = |s: f64| ((s * STEPS_HZ) as usize).min(self.past.len() - 1);
+        let apart = ailment.clock * now.t / self.seconds;
         for (i, delay) in ailment.delays.into_iter().enumerate() {
-            shown[3 + i] = self.past[steps(delay)][i];
+            shown[3 + i] = self.past[steps(delay + apart)][i];
         }
         if ailment.averaged > 0.0 && self.steps.is_multiple_of((STEPS_HZ / ailment.rate_hz) as u64) {
             let count = steps(ailment.averaged) + 1;
             for i in 0..2 {
                 shown[3 + i] = self.past.iter().take(count).map(|q| q[i]).sum::<f64>() / count as f64;
             }
+        }
+        if let Some(hz) = ailment.held_hz {
+            if self.steps.is_multiple_of((STEPS_HZ / hz) as u64) {
+                self.held = [shown[3], shown[4]];
+            }
+            [shown[3], shown[4]] = self.held;
         }
         let play = ailment.backlash * self.scales[0];
         self.position = self.position.clamp(now.x - play, now.x + play);
@@ -122,6 +131,10 @@ impl<'a> Recorder<'a> {
         let (ailment, scales) = (self.ailment, self.scales);
         let share = t / self.seconds;
         shown[0] = shown[0] * (1.0 + ailment.position_gain) + ailment.position_zero * scales[0];
+        shown[0] += ailment.bent * scales[0] * (TAU * shown[0] / scales[0]).sin();
+        shown[3] *= 1.0 + ailment.by_direction.copysign(shown[3]);
+        shown[3] += scales[3] * if share > 0.4 { ailment.jump } else { 0.0 };
+        shown[3] += scales[3] * ailment.sway * (TAU * t / 20.0).sin();
         for i in 0..2 {
             let pressure = &mut shown[1 + i];
             *pressure *= 1.0 + ailment.pressure_gains[i];
@@ -141,6 +154,13 @@ impl<'a> Recorder<'a> {
             let fresh: f64 = StandardNormal.sample(&mut self.random);
             let kept = ailment.correlation;
             self.coloured[i] = kept * self.coloured[i] + (1.0 - kept * kept).sqrt() * fresh;
+            if i == 4 && ailment.common_noise {
+                self.coloured[4] = self.coloured[3];
+            }
+            if (3..=4).contains(&i) && ailment.turbulent > 0.0 {
+                let rough: f64 = StandardNormal.sample(&mut self.random);
+                *value *= 1.0 + ailment.turbulent * rough;
+            }
             let wild = if self.random.random::<f64>() < ailment.outliers { 10.0 } else { 1.0 };
             *value += scales[i] * self.accuracy / 3.0 * ailment.noise * wild * self.coloured[i];
             if (1..=4).contains(&i) {

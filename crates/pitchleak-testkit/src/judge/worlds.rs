@@ -90,6 +90,19 @@ pub struct Ailment {
     pub delays: [f64; 2],
     /// Mean over this time.
     pub averaged: f64,
+    /// Flows are repeated in between, as a controller does that asks the meters so often.
+    pub held_hz: Option<f64>,
+    /// How late both are at the end, if they are not at the begin.
+    pub clock: f64,
+    /// Meter A's zero jumps at 40 % of the trace, and sways in 20 s.
+    pub jump: f64,
+    pub sway: f64,
+    /// Meter A's gain is so much larger for flow in, and smaller for flow out.
+    pub by_direction: f64,
+    /// Noise of both meters, in shares of the flow.
+    pub turbulent: f64,
+    /// Both meters have the same noise.
+    pub common_noise: bool,
     pub dead_bands: [f64; 2],
     /// Counts of this many full scales; none where zero.
     pub cut: f64,
@@ -104,6 +117,8 @@ pub struct Ailment {
     // Position.
     pub position_gain: f64,
     pub position_zero: f64,
+    /// Off by as much at a quarter of the stroke, and the other way at three quarters; in strokes.
+    pub bent: f64,
     pub backlash: f64,
     // All channels.
     pub noise: f64,
@@ -151,6 +166,13 @@ impl Default for Ailment {
             lags: [0.0; 2],
             delays: [0.0; 2],
             averaged: 0.0,
+            held_hz: None,
+            clock: 0.0,
+            jump: 0.0,
+            sway: 0.0,
+            by_direction: 0.0,
+            turbulent: 0.0,
+            common_noise: false,
             dead_bands: [0.0; 2],
             cut: 0.0,
             pressure_zeros: [0.0; 2],
@@ -160,6 +182,7 @@ impl Default for Ailment {
             pressure_drift: 0.0,
             position_gain: 0.0,
             position_zero: 0.0,
+            bent: 0.0,
             backlash: 0.0,
             noise: 1.0,
             correlation: 0.0,
@@ -317,5 +340,15 @@ pub const WORLDS: &[World] = &[
     held_out("zero 0.3 %, A, and lag 50 ms", METERS, |a| (a.zeros[0], a.lags) = (3e-3, [0.05; 2])),
     held_out("zeros +0.3, -0.3 %, noise x 1.5", SENSORS, |a| (a.zeros, a.noise) = ([3e-3, -3e-3], 1.5)),
     held_out("areas both +2 %", &[Rig, MeterA, MeterB, Position], |a| a.areas = [1.02; 2]),
+    held_out("zero of A jumps 0.5 %", &[MeterA], |a| a.jump = 5e-3),
+    held_out("zero of A sways 0.5 %", &[MeterA], |a| a.sway = 5e-3),
+    held_out("gain of A by direction 2 %", &[MeterA], |a| a.by_direction = 2e-2),
+    held_out("x bent 0.5 %", &[Position], |a| a.bent = 5e-3),
+    held_out("flows held, 10 Hz", METERS, |a| a.held_hz = Some(10.0)),
+    held_out("clocks 100 ms apart at the end", METERS, |a| a.clock = 0.1),
+    held_out("noise 5 % of the flow", METERS, |a| a.turbulent = 5e-2),
+    held_out("both meters' noise the same", METERS, |a| a.common_noise = true),
+    held_out("lag 30 ms, A; 80 ms, B", METERS, |a| a.lags = [0.03, 0.08]),
+    held_out("P_A 30 ms late", &[PressureA], |a| a.pressure_lags[0] = 0.03),
     held_out("dead volumes 100 cm3", &[Rig], |a| a.dead = [1e-4; 2]),
 ];
