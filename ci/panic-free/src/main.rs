@@ -11,6 +11,7 @@ use pitchleak_core::{
     AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Estimates, Excitation, ExcitationSettings,
     Fluid, LeakDetector, LeakPressures, Linkage, LoadEstimator, Model, Signals, Momentum, PaperEstimator, PaperGains,
     PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
+    continuity::Readings,
     effects::EffectConstants,
     emulator::{Emulator, EmulatorParams},
     force_imbalance_n,
@@ -58,6 +59,7 @@ fn rls<T: Real, const N: usize>() {
     let mut detector = LeakDetector::new(any(AlarmSettings::default()));
     loop {
         let update: Update<T> = rls.update(any(T::lit(0.01)), &any_sample());
+        keep(rls.update_readings(any(T::lit(0.01)), &any(Readings::default())));
         let found: Estimates<T> = rls.estimates();
         let changed: PerLeak<Option<AlarmState>> =
             detector.update(any(T::lit(0.25)), &found.mean_leaks_m3s);

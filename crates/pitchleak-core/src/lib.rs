@@ -52,16 +52,21 @@ pub mod continuity;
 mod detector;
 pub mod effects;
 pub mod emulator;
+mod estimator;
 mod filter;
+mod linalg;
 mod model;
 mod number;
 mod paper;
 pub mod plant;
-mod rls;
 
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use effects::{Effect, EffectSet};
 pub use emulator::{Emulator, EmulatorParams, EmulatorReading};
+pub use estimator::{
+    Estimates, Excitation, ExcitationReport, ExcitationSettings, Innovation, Parameter, Rls, RlsError,
+    RlsSettings, Update,
+};
 pub use filter::{
     Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n,
     hydraulic_force_n,
@@ -73,7 +78,3 @@ pub use model::{
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;
-pub use rls::{
-    Estimates, Excitation, ExcitationReport, ExcitationSettings, Innovation, Parameter, Rls, RlsError,
-    RlsSettings, Update,
-};

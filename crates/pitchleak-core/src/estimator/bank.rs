@@ -1,11 +1,11 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::evidence::{Evidence, Foretold, Learnt};
-use super::information::{Information, Posterior, Prior, Solution};
+use super::evidence::Evidence;
+use super::hypothesis::Hypothesis;
+use super::information::{Information, Prior, Solution};
 use super::mixture::Mixture;
 use super::parameter::{LEAKS, Parameter, leak_column};
-use super::trend::Trend;
 use crate::Real;
 
 /// Hypotheses in which the leaks change.
@@ -15,7 +15,7 @@ const TRENDS: usize = 5;
 const MEMORIES_S: [f64; TRENDS] = [3600.0, 480.0, 90.0, 18.0, 4.0];
 /// All hypotheses: leaks that stay, and the trends.
 const HYPOTHESES: usize = TRENDS + 1;
-/// Calls of [`ModelBank::go_on`] that finish a renewal: one for each trend, and one to conclude.
+/// Calls of [`Bank::go_on`] that finish a renewal: one for each trend, and one to conclude.
 pub(super) const STEPS: usize = TRENDS + 1;
 /// Least ln of a weight beside the best one's. It bounds how long the past of a hypothesis counts for it: from
 /// here it needs seven nats of new evidence to be believed.
@@ -55,12 +55,9 @@ const RECENT_S: f64 = 20.0;
         deserialize = "T: Real + serde::Deserialize<'de>"
     ))
 )]
-pub(super) struct ModelBank<T, const N: usize> {
-    /// The hypothesis that the leaks stay as they are.
-    constant: Information<T, N>,
-    /// Its memory, s.
-    memory_s: T,
-    trends: [Trend<T, N>; TRENDS],
+pub(super) struct Bank<T, const N: usize> {
+    /// That the leaks stay as they are, then the trends.
+    hypotheses: [Hypothesis<T, N>; HYPOTHESES],
     /// ln of the weights; the best has zero.
     log_weights: [T; HYPOTHESES],
     /// The evidence of the last [`RECENT_S`]; the best has zero.
@@ -81,7 +78,7 @@ pub(super) struct ModelBank<T, const N: usize> {
 enum Pending<T, const N: usize> {
     Nothing,
     /// It looks as though the leaks had jumped; this is what is known since. The next block tells.
-    Jump(Information<T, N>),
+    Jump(Hypothesis<T, N>),
     Renewal(Renewal<T, N>),
 }
 
@@ -103,6 +100,8 @@ struct Renewal<T, const N: usize> {
     inflation: T,
     /// Hypotheses that were heard.
     heard: u8,
+    /// The trend that foretold the recent data best before.
+    best_trend: u8,
     /// ln of the block's probability by each.
     gained: [T; HYPOTHESES],
     /// The same by the jump that was suspected before.
@@ -126,13 +125,15 @@ pub(super) struct Outlook<T> {
     pub chi_square: (T, T),
 }
 
-impl<T: Real, const N: usize> ModelBank<T, N> {
+impl<T: Real, const N: usize> Bank<T, N> {
     /// Knows nothing, and will remember for `memory_s` at most.
     pub fn new(memory_s: T) -> Self {
+        let mut hypotheses = [Hypothesis::steady(memory_s); HYPOTHESES];
+        for (hypothesis, memory) in hypotheses.iter_mut().skip(1).zip(MEMORIES_S) {
+            *hypothesis = Hypothesis::trend(T::lit(memory).at_most(memory_s));
+        }
         Self {
-            constant: Information::new(),
-            memory_s,
-            trends: MEMORIES_S.map(|memory| Trend::new(T::lit(memory).at_most(memory_s))),
+            hypotheses,
             log_weights: unheard(),
             recent: [T::zero(); HYPOTHESES],
             pending: Pending::Nothing,
@@ -141,9 +142,8 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
 
     /// Knows nothing again.
     pub fn forget_all(&mut self) {
-        self.constant = Information::new();
-        for trend in &mut self.trends {
-            *trend = Trend::new(trend.memory_s);
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.forget_all();
         }
         self.log_weights = unheard();
         self.recent = [T::zero(); HYPOTHESES];
@@ -162,37 +162,29 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         known: &Solution<T, N>,
     ) {
         let by_jump = match &mut self.pending {
-            Pending::Jump(information) => {
-                let before = information.solve(prior);
-                information.add(&evidence.block);
-                let after = information.solve(prior);
-                Some(evidence.of_levels(known, &before.mean, before.pivots(), &after).0 / inflation)
+            Pending::Jump(hypothesis) => {
+                let before = hypothesis.solve(prior);
+                hypothesis.learn(&evidence.block);
+                let after = hypothesis.solve(prior);
+                Some(evidence.log_likelihood(&known.mean, &before, &after).0 / inflation)
             }
             _ => None,
         };
-        for (offset, variance) in moved::<T, N>(&drifted) {
-            self.constant.diffuse(offset, variance);
-        }
-        self.constant.forget(T::one() / (T::one() + evidence.block.time_s / self.memory_s));
-        let before = self.constant.solve(prior);
-        self.constant.add(&evidence.block);
-        let after = self.constant.solve(prior);
-        let (gain, growth) = evidence.of_levels(known, &before.mean, before.pivots(), &after);
-        self.pending = Pending::Renewal(Renewal {
+        let mut renewal = Renewal {
             evidence,
             drifted,
             inflation,
             heard: 0,
+            best_trend: best_trend(&self.recent),
             gained: [T::zero(); HYPOTHESES],
             by_jump,
-            // Before there is something to foretell with, all hypotheses say the same, up to rounding.
-            news: growth >= T::lit(NEWS),
+            news: false,
             slopes_ps: [(T::zero(), T::zero()); LEAKS],
             mixture: Mixture::new(),
-        });
-        if let Pending::Renewal(renewal) = &mut self.pending {
-            renewal.hear(&self.log_weights, gain, &after);
-        }
+        };
+        let [steady, ..] = &mut self.hypotheses;
+        renewal.hear(steady, &self.log_weights, prior, known);
+        self.pending = Pending::Renewal(renewal);
     }
 
     /// Whether a renewal is half done.
@@ -206,14 +198,10 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
     pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
         let Pending::Renewal(renewal) = &mut self.pending else { return None };
         let heard = usize::from(renewal.heard);
-        let Some(trend) = self.trends.get_mut(heard.wrapping_sub(1)) else {
+        let Some(hypothesis) = self.hypotheses.get_mut(heard) else {
             return self.conclude(prior, known);
         };
-        let is_best = is_best_trend(&self.recent, heard);
-        for (offset, variance) in moved::<T, N>(&renewal.drifted) {
-            trend.diffuse(offset, variance);
-        }
-        renewal.hear_trend(trend, is_best, &self.log_weights, prior, known);
+        renewal.hear(hypothesis, &self.log_weights, prior, known);
         None
     }
 
@@ -230,8 +218,8 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         };
         let chi_square = renewal.evidence.block.chi_square(&known.mean);
         self.pending = Pending::Nothing;
-        if let Some((information, _)) = suspected {
-            self.pending = Pending::Jump(information);
+        if let Some((hypothesis, _)) = suspected {
+            self.pending = Pending::Jump(hypothesis);
         }
         if !news {
             self.weigh(&gained, time_s);
@@ -249,7 +237,7 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
         renewal: &Renewal<T, N>,
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
-    ) -> Option<(Information<T, N>, Solution<T, N>)> {
+    ) -> Option<(Hypothesis<T, N>, Solution<T, N>)> {
         let mut variance = [T::zero(); N];
         for i in 0..N {
             variance[i] = known.covariance[i][i];
@@ -258,16 +246,18 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
             variance[leak_column(i)] += T::lit(USUAL_JUMP * USUAL_JUMP);
         }
         let pivots = variance.map(|variance| T::one() / variance);
-        let mut information = Information::of(&known.mean, &pivots, prior);
-        information.add(&renewal.evidence.block);
-        let after = information.solve(prior);
-        let (gain, _) = renewal.evidence.of_levels(known, &known.mean, &pivots, &after);
+        let mut jumped = Hypothesis::steady(T::infinity());
+        jumped.known = Information::of(&known.mean, &pivots, prior);
+        let before = jumped.solve(prior);
+        jumped.learn(&renewal.evidence.block);
+        let after = jumped.solve(prior);
+        let (gain, _) = renewal.evidence.log_likelihood(&known.mean, &before, &after);
         let mut foretold = T::neg_infinity();
         for k in 0..HYPOTHESES {
             foretold = (self.log_weights[k] + renewal.gained[k]).at_least(foretold);
         }
         let suspected = gain / renewal.inflation - foretold >= T::lit(JUMPED);
-        suspected.then(|| (information, after.solution()))
+        suspected.then(|| (jumped, after.solution()))
     }
 
     fn weigh(&mut self, gained: &[T; HYPOTHESES], time_s: T) {
@@ -300,18 +290,15 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn replace(&mut self, refuted: usize, best: usize) {
-        let source = best.checked_sub(1).and_then(|k| self.trends.get(k)).copied();
-        match (refuted.checked_sub(1).and_then(|k| self.trends.get_mut(k)), source) {
-            (Some(trend), None) if trend.memory_s > T::lit(RECENT_S) => {
-                *trend = Trend::from_levels(trend.memory_s, self.constant);
-            }
-            (Some(trend), Some(source)) if refuted < best => {
-                *trend = Trend::from_trend(trend.memory_s, &source);
-            }
-            (None, Some(source)) => self.constant = source.eliminate_slopes().levels,
-            _ => return,
+        let Some(source) = self.hypotheses.get(best).copied() else { return };
+        let Some(hypothesis) = self.hypotheses.get_mut(refuted) else { return };
+        // Only one whose own past holds it back longer: leaks that stay, or a longer memory; and none that is as quick as the
+        // evidence itself.
+        let longer = if best == 0 { hypothesis.memory_s > T::lit(RECENT_S) } else { refuted < best };
+        if longer {
+            hypothesis.take_over(&source);
+            self.restart(refuted);
         }
-        self.restart(refuted);
     }
 
     fn is_refuted(&self, hypothesis: usize) -> bool {
@@ -328,57 +315,52 @@ impl<T: Real, const N: usize> ModelBank<T, N> {
 }
 
 impl<T: Real, const N: usize> Renewal<T, N> {
-    /// Takes the block into a trend, and hears it; where it `is_best` its slopes are told.
-    fn hear_trend(
+    /// The next hypothesis takes the block in, and is heard: it weighs by what it was believed before, and not at all where that was the
+    /// least.
+    fn hear(
         &mut self,
-        trend: &mut Trend<T, N>,
-        is_best: bool,
+        hypothesis: &mut Hypothesis<T, N>,
         log_weights: &[T; HYPOTHESES],
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
     ) {
-        let rate_ps = trend.rate_ps();
-        trend.advance(self.evidence.block.time_s);
-        let slopes = trend.eliminate_slopes();
-        let levels = slopes.levels.solve(prior);
-        let before = Foretold {
-            levels: &levels.mean,
-            slopes_ps: slopes.slopes(&levels.mean).map(|slope| slope * rate_ps),
-            pivots: levels.pivots(),
-            slope_pivots: &slopes.pivots,
-        };
-        trend.add(&self.evidence.block);
-        let slopes = trend.eliminate_slopes();
-        let levels = slopes.levels.solve(prior);
-        let after = Learnt { levels: &levels, slopes: Some(&slopes), rate_ps };
-        let (gain, _) = self.evidence.log_likelihood(&known.mean, &before, &after);
-        if is_best {
-            self.slopes_ps = slopes.slopes_ps(&levels, rate_ps);
+        for (offset, variance) in moved::<T, N>(&self.drifted) {
+            hypothesis.known.diffuse(offset, variance);
         }
-        self.hear(log_weights, gain, &levels);
-    }
-
-    /// Hears the next hypothesis: ln of the block's probability by it, and what it knows since. It weighs by what it was
-    /// believed before, and not at all where that was the least.
-    fn hear(&mut self, log_weights: &[T; HYPOTHESES], gain: T, found: &Posterior<T, N>) {
+        hypothesis.advance(self.evidence.block.time_s);
+        let before = hypothesis.solve(prior);
+        hypothesis.learn(&self.evidence.block);
+        let after = hypothesis.solve(prior);
+        let (gain, growth) = self.evidence.log_likelihood(&known.mean, &before, &after);
+        if self.heard == self.best_trend {
+            self.slopes_ps = after.slopes();
+        }
+        if self.heard == 0 {
+            // Before there is something to foretell with, all hypotheses say the same, up to rounding.
+            self.news = growth >= T::lit(NEWS);
+        }
         let gained = if self.news { T::zero() } else { gain / self.inflation };
         let own = usize::from(self.heard);
         if let (Some(own), Some(before)) = (self.gained.get_mut(own), log_weights.get(own)) {
             *own = gained;
             if *before > T::lit(LEAST) {
                 let share = T::one() - (T::lit(LEAST) - *before).libm_exp();
-                self.mixture.add(share, *before + gained, found);
+                self.mixture.add(share, *before + gained, &after);
             }
         }
         self.heard += 1;
     }
 }
 
-/// Whether a trend foretold the recent data best, the first of those that did so alike.
-fn is_best_trend<T: Real>(recent: &[T; HYPOTHESES], hypothesis: usize) -> bool {
-    let Some(own) = recent.get(hypothesis) else { return false };
-    let mut others = recent.iter().enumerate().skip(1);
-    others.all(|(other, evidence)| evidence < own || (evidence <= own && other >= hypothesis))
+/// The trend that foretold the recent data best, the first of those that did so alike.
+fn best_trend<T: Real>(recent: &[T; HYPOTHESES]) -> u8 {
+    let mut best = (0, T::neg_infinity());
+    for (trend, evidence) in (0_u8..).zip(recent).skip(1) {
+        if *evidence > best.1 {
+            best = (trend, *evidence);
+        }
+    }
+    best.0
 }
 
 /// ln of the weights before any data.

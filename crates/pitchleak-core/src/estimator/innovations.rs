@@ -4,14 +4,14 @@ use crate::Real;
 /// Watches the innovations: are they as large as the declared noise says?
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct InnovationMonitor<T> {
+pub(super) struct Innovations<T> {
     balance_sum: T,
     balance_count: T,
-    odometer_sum: T,
-    odometer_count: T,
+    position_sum: T,
+    position_count: T,
 }
 
-impl<T: Real> InnovationMonitor<T> {
+impl<T: Real> Innovations<T> {
     /// Takes one innovation of the balance.
     pub fn balance(&mut self, innovation: &Innovation<T>) {
         let ratio = innovation.value * innovation.value / innovation.variance;
@@ -19,23 +19,23 @@ impl<T: Real> InnovationMonitor<T> {
         self.balance_count += T::one();
     }
 
-    /// Takes the χ² of `count` odometer innovations.
-    pub fn odometer(&mut self, chi_square: T, count: T) {
-        self.odometer_sum += chi_square;
-        self.odometer_count += count;
+    /// Takes the χ² of `count` innovations of the position equation.
+    pub fn position(&mut self, chi_square: T, count: T) {
+        self.position_sum += chi_square;
+        self.position_count += count;
     }
 
     pub fn forget(&mut self, keep: T) {
         self.balance_sum *= keep;
         self.balance_count *= keep;
-        self.odometer_sum *= keep;
-        self.odometer_count *= keep;
+        self.position_sum *= keep;
+        self.position_count *= keep;
     }
 
-    /// Mean ν²/S of balance and odometer.
+    /// Mean ν²/S of balance and position equation.
     pub fn ratios(&self) -> [T; 2] {
         let ratio = |sum: T, count: T| if count > T::zero() { sum / count } else { T::zero() };
-        [ratio(self.balance_sum, self.balance_count), ratio(self.odometer_sum, self.odometer_count)]
+        [ratio(self.balance_sum, self.balance_count), ratio(self.position_sum, self.position_count)]
     }
 
     /// Factor on the variances: where the residuals are larger than declared by more than two standard
@@ -44,7 +44,7 @@ impl<T: Real> InnovationMonitor<T> {
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn inflation(&self) -> T {
         let balance = significant_ratio(self.balance_sum, self.balance_count);
-        balance.at_least(significant_ratio(self.odometer_sum, self.odometer_count)).at_least(T::one())
+        balance.at_least(significant_ratio(self.position_sum, self.position_count)).at_least(T::one())
     }
 }
 
@@ -66,7 +66,7 @@ mod tests {
     #[test]
     fn intervals_grow_with_what_residuals_are_beyond_chance() {
         for (scale, expected) in [(1.0, 1.0), (2.0, 4.0)] {
-            let mut monitor = InnovationMonitor::default();
+            let mut monitor = Innovations::default();
             for unit in white_noise(2).take(20_000) {
                 monitor.balance(&Innovation { value: scale * unit, variance: 1.0 });
             }

@@ -1,9 +1,11 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
+use super::information::Information;
 use super::parameter::{LEAKS, leak_column};
 use crate::Real;
 use crate::continuity::Equation;
+use crate::linalg::symmetric;
 
 /// Sums of the position filter's whitened observations over one block.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +44,7 @@ impl<T: Real, const N: usize> BlockSums<T, N> {
     }
 
     /// Adds one observation y = fᵀθ + noise of variance 1/`weight`; `aged` holds Σ age · f of each leak, s.
-    #[inline]
+    #[inline(always)]
     pub fn add(&mut self, f: &[T; N], aged: &[T; LEAKS], y: T, weight: T) {
         for i in 0..N {
             let wf = weight * f[i];
@@ -90,10 +92,7 @@ pub(super) struct Balance<T, const N: usize> {
     pub age_s: T,
 }
 
-/// What one block tells: the odometer's sums and, where both chambers were fed, whitened balances.
-///
-/// A row f tells of each leak as it was some time ago: with slopes s it reads fᵀ(θ − age ∘ s), so its information of
-/// levels and slopes together is that of the row (f, −age ∘ f).
+/// What one block tells: the position equation's sums and, where both flows were measured, whitened balances.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -106,114 +105,68 @@ pub(super) struct Balance<T, const N: usize> {
 pub(super) struct Block<T, const N: usize> {
     /// Its length, s.
     pub time_s: T,
-    /// Σ f fᵀ, lower triangle; at [`of_slopes`] Σ age² f fᵀ for the leaks.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    pub matrix: [[T; N]; N],
-    /// Σ f y.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
-    pub vector: [T; N],
-    /// Σ age f fᵀ for the leaks.
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    pub aged: [[T; N]; LEAKS],
-    /// Σ age f y for the leaks.
-    pub aged_vector: [T; LEAKS],
+    /// What its rows tell, slopes in prior units per s.
+    pub information: Information<T, N>,
     /// Σ y².
     square: T,
     /// Number of rows.
     count: T,
-    /// What sensor noise in column 0 adds to Σ f₀² on average.
-    pub column_noise: T,
-}
-
-/// Place, above the diagonal of a matrix whose lower triangle is the parameters', of the symmetric matrix of the leaks'
-/// slopes; `i` >= `j`.
-#[inline]
-pub(super) const fn of_slopes(i: usize, j: usize) -> (usize, usize) {
-    (j, i + 1)
 }
 
 impl<T: Real, const N: usize> Block<T, N> {
+    /// Of the position equation's `sums` and the `balances`; `column_noise` is what sensor noise in column 0 adds to Σ f₀² on average.
     pub fn new(
         time_s: T,
         sums: &BlockSums<T, N>,
         balances: &[Option<Balance<T, N>>; BALANCES],
         column_noise: T,
     ) -> Self {
-        let mut block = Self::odometer(time_s, sums, column_noise);
+        let mut block = Self::of_position(time_s, sums, column_noise);
         for Balance { equation, age_s } in balances.iter().flatten() {
-            block.add(&equation.columns, equation.left, *age_s);
+            block.information.add_row(&equation.columns, equation.left, *age_s);
+            block.square += equation.left * equation.left;
+            block.count += T::one();
         }
         block
     }
 
-    fn odometer(time_s: T, sums: &BlockSums<T, N>, column_noise: T) -> Self {
+    /// All rows of a leak's column count as if as old as they are on average.
+    fn of_position(time_s: T, sums: &BlockSums<T, N>, column_noise: T) -> Self {
         let middle_s = T::lit(0.5) * time_s;
         let age_s = sums.ages_s().map(|age| age + middle_s);
-        let mut block = Self {
-            time_s,
-            matrix: sums.matrix,
-            vector: sums.vector,
-            aged: [[T::zero(); N]; LEAKS],
-            aged_vector: [T::zero(); LEAKS],
-            square: sums.square,
-            count: sums.count,
-            column_noise,
-        };
+        let mut information = Information { column_noise, levels: sums.vector, ..Information::new() };
+        for i in 0..N {
+            for j in 0..=i {
+                *information.matrix.level_mut(i, j) = sums.matrix[i][j];
+            }
+        }
         for i in 0..LEAKS {
             let own = leak_column(i);
             for j in 0..N {
-                block.aged[i][j] = age_s[i] * symmetric(&sums.matrix, own, j);
+                information.matrix.cross[i][j] = -age_s[i] * symmetric(&sums.matrix, own, j);
             }
             for j in 0..=i {
-                let (row, column) = of_slopes(i, j);
-                block.matrix[row][column] = age_s[j] * block.aged[i][leak_column(j)];
+                let entry = -age_s[j] * information.matrix.cross[i][leak_column(j)];
+                *information.matrix.slope_mut(i, j) = entry;
             }
-            block.aged_vector[i] = age_s[i] * sums.vector[own];
+            information.slopes[i] = -age_s[i] * sums.vector[own];
         }
-        block
-    }
-
-    /// Adds a row of unit variance that is `age_s` old.
-    fn add(&mut self, f: &[T; N], y: T, age_s: T) {
-        for i in 0..N {
-            for j in 0..=i {
-                self.matrix[i][j] += f[i] * f[j];
-            }
-            self.vector[i] += f[i] * y;
-        }
-        for i in 0..LEAKS {
-            let aged = age_s * f[leak_column(i)];
-            for j in 0..N {
-                self.aged[i][j] += aged * f[j];
-            }
-            for j in 0..=i {
-                let (row, column) = of_slopes(i, j);
-                self.matrix[row][column] += aged * age_s * f[leak_column(j)];
-            }
-            self.aged_vector[i] += aged * y;
-        }
-        self.square += y * y;
-        self.count += T::one();
+        Self { time_s, information, square: sums.square, count: sums.count }
     }
 
     /// Σ (y − fᵀθ)² at `theta`, and the number of rows.
     pub fn chi_square(&self, theta: &[T; N]) -> (T, T) {
+        let Information { matrix, levels, .. } = &self.information;
         let mut chi = self.square;
         for i in 0..N {
-            let mut told = T::lit(2.0) * self.vector[i] - theta[i] * self.matrix[i][i];
+            let mut told = T::lit(2.0) * levels[i] - theta[i] * matrix.level(i, i);
             for j in 0..i {
-                told -= T::lit(2.0) * theta[j] * self.matrix[i][j];
+                told -= T::lit(2.0) * theta[j] * matrix.level(i, j);
             }
             chi -= theta[i] * told;
         }
         (chi, self.count)
     }
-}
-
-/// Entry of a symmetric matrix kept in the lower triangle.
-#[inline]
-pub(super) fn symmetric<T: Copy, const N: usize>(matrix: &[[T; N]; N], i: usize, j: usize) -> T {
-    if i >= j { matrix[i][j] } else { matrix[j][i] }
 }
 
 #[cfg(test)]
@@ -250,20 +203,19 @@ mod tests {
     /// A row of this age tells of slopes what the row (f, −age ∘ f) tells.
     #[test]
     fn slopes_have_the_information_of_aged_rows() {
-        let block = block();
+        let Information { matrix, slopes, .. } = block().information;
         let sum = |term: &dyn Fn(usize) -> f64| AGE_S * (term(2) + term(3));
         for i in 0..LEAKS {
             let own = leak_column(i);
             for j in 0..4 {
-                let expected = sum(&|k| F[k][own] * F[k][j]);
-                assert!((block.aged[i][j] - expected).abs() < 1e-12);
+                let expected = -sum(&|k| F[k][own] * F[k][j]);
+                assert!((matrix.cross[i][j] - expected).abs() < 1e-12);
             }
             for j in 0..=i {
-                let (row, column) = of_slopes(i, j);
                 let expected = AGE_S * sum(&|k| F[k][own] * F[k][leak_column(j)]);
-                assert!((block.matrix[row][column] - expected).abs() < 1e-12);
+                assert!((matrix.slope(i, j) - expected).abs() < 1e-12);
             }
-            assert!((block.aged_vector[i] - sum(&|k| F[k][own] * Y[k])).abs() < 1e-12);
+            assert!((slopes[i] + sum(&|k| F[k][own] * Y[k])).abs() < 1e-12);
         }
     }
 }

@@ -1,0 +1,203 @@
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
+use super::block::Block;
+use super::information::{Information, Posterior};
+use super::parameter::LEAKS;
+use crate::Real;
+
+/// Measures how well a hypothesis foretold a block: ln of the block's probability, less what is the same for
+/// all hypotheses.
+///
+/// With the block's rows H, readings y and what a hypothesis foretold, θ⁻ of covariance P⁻, that is
+///
+/// ```text
+/// −½ |y − H θ⁻|² + ½ bᵀ P⁺ b − ½ ln det(1 + P⁻ HᵀH)        b = Hᵀ(y − H θ⁻)
+/// ```
+///
+/// (Kalman's likelihood by the matrix inversion lemma; Bar-Shalom, Li, Kirubarajan 2001, §5.2 and §11.6). The square is
+/// taken relative to a reference θ common to all, so that nothing cancels in f32.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub(super) struct Evidence<T, const N: usize> {
+    pub block: Block<T, N>,
+    /// Hᵀ(y − H θ) at the reference, of levels …
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
+    score: [T; N],
+    /// … and slopes.
+    slope_score: [T; LEAKS],
+}
+
+impl<T: Real, const N: usize> Evidence<T, N> {
+    pub fn new(block: Block<T, N>, mean_0: T, reference: &[T; N]) -> Self {
+        let Information { mut levels, slopes, column_noise, .. } = block.information;
+        levels[0] += column_noise * mean_0;
+        let (score, slope_score) =
+            block.information.residual((levels, slopes), reference, &[T::zero(); LEAKS]);
+        Self { block, score, slope_score }
+    }
+
+    /// ln of the block's probability by a hypothesis, from what it knew `before` and `after` the block, and ln of how much the determinant of
+    /// its information has grown.
+    pub fn log_likelihood(
+        &self,
+        reference: &[T; N],
+        before: &Posterior<T, N>,
+        after: &Posterior<T, N>,
+    ) -> (T, T) {
+        let mut apart = [T::zero(); N];
+        for i in 0..N {
+            apart[i] = before.mean[i] - reference[i];
+        }
+        let slopes_ps = before.slopes_ps();
+        let score = (self.score, self.slope_score);
+        let (levels, slopes) = self.block.information.residual(score, &apart, &slopes_ps);
+        // |y − H θ|² at the reference, less that at θ⁻.
+        let mut square = T::zero();
+        for i in 0..N {
+            square += apart[i] * (self.score[i] + levels[i]);
+        }
+        for i in 0..LEAKS {
+            square += slopes_ps[i] * (self.slope_score[i] + slopes[i]);
+        }
+        let learnt = after.variance(&levels, &slopes);
+        // Noise in column 0 makes its entry of b larger by chance.
+        let by_noise = self.block.information.column_noise * after.variance_0();
+        let growth = after.growth_since(before);
+        (T::lit(0.5) * (square + learnt - by_noise - growth), growth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::block::{Balance, BlockSums};
+    use super::super::hypothesis::Hypothesis;
+    use super::super::information::Prior;
+    use super::*;
+    use crate::continuity::Equation;
+    use nalgebra::{DMatrix, DVector};
+    use std::vec::Vec;
+
+    const OFFSETS: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
+    const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &OFFSETS };
+    const MEMORY_S: f64 = 0.02;
+    /// Age of the position equation within a block of 0.5 s, s.
+    const AGE_S: f64 = 0.3;
+
+    struct Row {
+        f: [f64; 4],
+        y: f64,
+        age_s: f64,
+    }
+
+    /// Seven rows of the position, then two balances: regressors that turn, readings at random.
+    fn rows(block: u32) -> Vec<Row> {
+        (0..9)
+            .map(|k| {
+                let t = f64::from(block * 9 + k);
+                let f = [t.sin(), (0.7 * t).cos(), (1.9 * t + 1.0).sin(), (0.3 * t).sin()].map(|f| 2.0 * f);
+                Row {
+                    f,
+                    y: 3.0 * (17.0 * t).sin(),
+                    age_s: [AGE_S + 0.25, 0.375, 0.125][k.saturating_sub(6) as usize],
+                }
+            })
+            .collect()
+    }
+
+    fn block(rows: &[Row]) -> Block<f64, 4> {
+        let (position, balances) = rows.split_at(7);
+        let mut sums = BlockSums::new();
+        for row in position {
+            sums.add(&row.f, &[1, 2, 3].map(|i| AGE_S * row.f[i]), row.y, 1.0);
+        }
+        let balance = |row: &Row| {
+            Some(Balance { equation: Equation { left: row.y, columns: row.f }, age_s: row.age_s })
+        };
+        Block::new(0.5, &sums, &[balance(&balances[0]), balance(&balances[1])], 0.0)
+    }
+
+    /// ln N(y; H m, 1 + H P Hᵀ) without the constant, and the posterior, by dense matrices.
+    fn dense(
+        rows: &[Row],
+        rate_ps: f64,
+        mean: &DVector<f64>,
+        cov: &DMatrix<f64>,
+    ) -> (f64, DVector<f64>, DMatrix<f64>) {
+        let h = DMatrix::from_fn(rows.len(), 7, |r, c| {
+            if c < 4 { rows[r].f[c] } else { -rate_ps * rows[r].age_s * rows[r].f[c - 3] }
+        });
+        let error = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.y)) - &h * mean;
+        let spread = DMatrix::identity(rows.len(), rows.len()) + &h * cov * h.transpose();
+        let inverse = spread.clone().try_inverse().unwrap();
+        let log = -0.5 * (error.dot(&(&inverse * &error)) + spread.determinant().ln());
+        let gain = cov * h.transpose() * inverse;
+        (log, mean + &gain * error, cov - &gain * h * cov)
+    }
+
+    fn shift(mean: &DVector<f64>, cov: &DMatrix<f64>, moved: f64, keep: f64) -> (DVector<f64>, DMatrix<f64>) {
+        let mut turn = DMatrix::identity(7, 7);
+        (0..3).for_each(|i| turn[(1 + i, 4 + i)] = moved);
+        let information = cov.clone().try_inverse().unwrap() - DMatrix::identity(7, 7);
+        let back = turn.clone().try_inverse().unwrap();
+        // The prior stands, what the data told fades and moves on.
+        let vector = cov.clone().try_inverse().unwrap() * mean;
+        let faded = back.transpose() * information * &back * keep + DMatrix::identity(7, 7);
+        let cov = faded.try_inverse().unwrap();
+        let mean = &cov * (back.transpose() * vector * keep);
+        (mean, cov)
+    }
+
+    #[test]
+    fn is_the_probability_of_the_block_by_dense_algebra() {
+        let mut constant = Hypothesis::<f64, 4>::steady(f64::INFINITY);
+        let mut trend = Hypothesis::<f64, 4>::trend(MEMORY_S);
+        let rate_ps = trend.rate_ps();
+        let (mut steady, mut moving) =
+            ((DVector::zeros(7), DMatrix::identity(7, 7)), (DVector::zeros(7), DMatrix::identity(7, 7)));
+        // Without slopes: their prior has no width.
+        (4..7).for_each(|i| steady.1[(i, i)] = 0.0);
+        for index in 0..5 {
+            let rows = rows(index);
+            let block = block(&rows);
+            let reference = [0.1, -0.2, 0.3, 0.05];
+            let evidence = Evidence::new(block, 0.0, &reference);
+            let before = constant.solve(&PRIOR);
+            constant.learn(&block);
+            let after = constant.solve(&PRIOR);
+            let (stays, _) = evidence.log_likelihood(&reference, &before, &after);
+            trend.advance(block.time_s);
+            let before = trend.solve(&PRIOR);
+            trend.learn(&block);
+            let after = trend.solve(&PRIOR);
+            let (changes, _) = evidence.log_likelihood(&reference, &before, &after);
+
+            let (log_steady, mean, cov) = dense(&rows, 0.0, &steady.0, &steady.1);
+            steady = (mean, cov);
+            let keep = 1.0 / (1.0 + block.time_s / MEMORY_S);
+            moving = shift(&moving.0, &moving.1, rate_ps * block.time_s, keep);
+            let (log_moving, mean, cov) = dense(&rows, rate_ps, &moving.0, &moving.1);
+            moving = (mean, cov);
+
+            let difference = log_moving - log_steady;
+            assert!((changes - stays - difference).abs() < 1e-9 * difference.abs().max(1.0), "block {index}");
+            for i in 0..4 {
+                assert!((after.mean[i] - moving.0[i]).abs() < 1e-9);
+                let mut one = [0.0; 4];
+                one[i] = 1.0;
+                assert!((after.variance(&one, &[0.0; 3]) - moving.1[(i, i)]).abs() < 1e-9);
+            }
+            for (i, (slope_ps, variance)) in after.slopes().into_iter().enumerate() {
+                assert!((slope_ps / rate_ps - moving.0[4 + i]).abs() < 1e-9);
+                assert!((variance / rate_ps.powi(2) - moving.1[(4 + i, 4 + i)]).abs() < 1e-9);
+            }
+        }
+    }
+}

@@ -1,0 +1,570 @@
+use super::bank::{Bank, STEPS};
+use super::block::{BALANCES, Balance, Block, BlockSums};
+use super::change::ChangeDetector;
+use super::evidence::Evidence;
+use super::information::{Prior, Solution};
+use super::innovations::Innovations;
+use super::parameter::{LEAKS, Parameter};
+use super::position::PositionFilter;
+use super::prior::{OffsetPrior, Zeros, offset_units, prior_spread};
+use super::settings::{self, RlsError, RlsSettings};
+use super::update::{Innovation, Update};
+use crate::continuity::{
+    BlockPressures, Clocks, Equation, Integrals, Measured, MovingAverage, Next, NoiseStd, PerChannel,
+    PressureMeans, PressureNoise, Readings, Row, Step, Weights, combine,
+};
+use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
+
+/// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
+const AVERAGING_S: f64 = 60.0;
+
+/// Least number of steps of a block, however slowly samples come: a renewal ends before the next block does.
+const LEAST_STEPS: f64 = 8.0;
+const _: () = assert!((STEPS as f64) < LEAST_STEPS);
+
+/// Share of its usual length that a block has after a sudden change: what it tells is then known as soon as the usual block
+/// would end, at the usual 25 samples a block.
+const FIRST_SHARE: f64 = 0.75;
+
+/// Rows that are taken in with one sample: more than come, so that those that waited are caught up with.
+///
+/// At most one of them ends a block or a renewal, as these are further apart.
+const ROWS_AT_ONCE: usize = 2;
+
+/// Recursive generalised least squares on both chambers, with N parameters:
+/// - N = 4: 1/β and the three leak coefficients;
+/// - N = 6: also the offsets of the two flow meters;
+/// - N = 9: also the gains of both flow meters and of the position sensor.
+///
+/// There is no estimator of any other size:
+///
+/// ```compile_fail
+/// # use pitchleak_core::{Cylinder, Fluid, Rls, RlsSettings, Sensors};
+/// Rls::<f64, 5>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub struct Rls<T, const N: usize> {
+    cylinder: Cylinder<T>,
+    noise: NoiseStd<T>,
+    settings: RlsSettings<T>,
+    pub(super) compressibility: T,
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
+    pub(super) scale: [T; N],
+    pub(super) offsets: OffsetPrior<T>,
+    pub(super) zeros: Zeros<T>,
+    /// Without the force, which tells nothing of leaks.
+    last: Option<Sample<T>>,
+    both: Weights<T>,
+    position_filter: Option<PositionFilter<T, N>>,
+    /// What the position filter has told since the estimates were renewed.
+    sums: BlockSums<T, N>,
+    /// The balances since then.
+    balances: [Option<Balance<T, N>>; BALANCES],
+    /// Time since then, s.
+    unlearnt_s: T,
+    /// Blocks of the balance since then; after a sudden change the first one counts at once.
+    unlearnt: usize,
+    block: BlockPressures<T>,
+    /// How long it will be, s.
+    block_time_s: T,
+    /// The part of the block in which both flows were measured.
+    fed: Integrals<T>,
+    pressure_noise: PressureNoise<T>,
+    /// The balance equation's moving-average noise filter: last whitened block.
+    memory: Option<MovingAverage<T, N>>,
+    /// Variance of the sensor noise in the compressibility's column, over the rows' own, summed over the block.
+    column_noise: T,
+    bank: Bank<T, N>,
+    pub(super) solution: Solution<T, N>,
+    /// Slopes of the leaks, mean and variance, prior units per s.
+    pub(super) slopes_ps: [(T, T); LEAKS],
+    change: ChangeDetector<T, N>,
+    pub(super) innovations: Innovations<T>,
+    pub(super) pressures: PressureMeans<T>,
+    clocks: Clocks<T>,
+    /// Step by which the last sample was taken in without a wait, s; zero where it waited.
+    step_s: T,
+}
+
+impl<T: Real, const N: usize> Rls<T, N> {
+    const HAS_A_KNOWN_SIZE: () = assert!(matches!(N, 4 | 6 | 9), "an estimator has 4, 6 or 9 parameters");
+
+    /// An estimator for a rig. `fluid` holds the prior of the bulk modulus; `sensors` the noise, and the
+    /// priors of the offsets and gains.
+    ///
+    /// # Errors
+    /// Where the cylinder, its oil, a sensor or a setting cannot be.
+    pub fn new(
+        cylinder: Cylinder<T>,
+        fluid: Fluid<T>,
+        sensors: &Sensors<T>,
+        settings: RlsSettings<T>,
+    ) -> Result<Self, RlsError> {
+        let () = Self::HAS_A_KNOWN_SIZE;
+        settings::check(&cylinder, &fluid, sensors, &settings)?;
+        let noise = NoiseStd::of(sensors, &cylinder);
+        let no_leak = PerLeak::default();
+        let zeros = Zeros::of(sensors);
+        let offsets = OffsetPrior::new(&cylinder, &zeros, offset_units(&cylinder, &zeros), &no_leak);
+        let solution = Solution::of_prior(&offsets.information);
+        Ok(Self {
+            cylinder,
+            noise,
+            settings,
+            compressibility: T::one() / fluid.bulk_modulus_pa,
+            scale: prior_spread(&cylinder, &fluid, sensors),
+            offsets,
+            zeros,
+            last: None,
+            both: Weights::both(&cylinder, &noise, &no_leak),
+            position_filter: None,
+            sums: BlockSums::new(),
+            balances: [None; BALANCES],
+            unlearnt_s: T::zero(),
+            unlearnt: 0,
+            block: BlockPressures::default(),
+            block_time_s: settings.block_time_s,
+            fed: Integrals::default(),
+            pressure_noise: PressureNoise::default(),
+            memory: None,
+            column_noise: T::zero(),
+            bank: Bank::new(settings.forgetting_time_s),
+            change: ChangeDetector::new(&solution),
+            solution,
+            slopes_ps: [(T::zero(), T::zero()); LEAKS],
+            innovations: Innovations::default(),
+            pressures: PressureMeans::default(),
+            clocks: Clocks::new(settings.max_step_s),
+            step_s: T::zero(),
+        })
+    }
+
+    /// Takes in the reading `sample`, `dt_s` after the one before.
+    #[inline]
+    pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
+        let () = Self::HAS_A_KNOWN_SIZE;
+        if !self.plausible(sample) {
+            return Update::Rejected;
+        }
+        if !self.clocks.is_empty() {
+            return self.update_on_clocks(dt_s, &Readings::from(sample));
+        }
+        let Some(last) = self.last.as_ref().filter(|_| self.is_integrable(dt_s)) else {
+            return self.restart(sample);
+        };
+        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, last, sample);
+        if measured != Measured::Both {
+            return self.update_without_a_flow(dt_s, sample);
+        }
+        self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
+        self.last = Some(Sample { force_n: None, ..*sample });
+        self.step_s = dt_s;
+        self.fed.add(&step);
+        let weights = self.both;
+        self.advance(&step, &weights, Some(sample.x_m));
+        self.finish(&step)
+    }
+
+    /// The step is taken in: what is due at its end.
+    #[inline(always)]
+    fn finish(&mut self, step: &Integrals<T>) -> Update<T> {
+        self.block.add(step);
+        let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
+        if full {
+            self.close_block()
+        } else if self.bank.is_renewing() {
+            self.go_on()
+        } else {
+            Update::Accepted
+        }
+    }
+
+    /// The position equation's step; none is compared with where the position was not read.
+    #[inline(always)]
+    fn advance(&mut self, step: &Integrals<T>, weights: &Weights<T>, x_m: Option<T>) {
+        let Some(position) = &mut self.position_filter else { return };
+        let sensor_variance = self.noise.position_m * self.noise.position_m;
+        let mut equation =
+            combine(step, weights.position_a, weights.position_b, self.compressibility, &self.scale);
+        let gain = Parameter::GainPosition as usize;
+        if N > gain {
+            // The gain acts on the piston's travel: what the flows say less what the leaks take.
+            equation.columns[gain] = -equation.residual(&self.solution.mean) * self.scale[gain];
+        }
+        let variance = weights.position_variance * step.time_square;
+        position.carry(step.time, &equation, variance);
+        if let Some(x_m) = x_m {
+            position.compare(x_m, sensor_variance, &mut self.sums);
+        }
+    }
+
+    /// Weights where not all flows are measured, or their noise is another.
+    #[cold]
+    fn weights_of(&self, measured: Measured, noise: &NoiseStd<T>) -> Weights<T> {
+        let weights = match measured {
+            Measured::OnlyA => Weights::only_a,
+            Measured::OnlyB => Weights::only_b,
+            Measured::Both | Measured::Neither => Weights::both,
+        };
+        weights(&self.cylinder, noise, &self.possible_leaks_m3spa())
+    }
+
+    /// The leaks found decide how much pressure noise the equations carry, and how much of the pressures'
+    /// bias.
+    fn reweigh(&mut self) {
+        let leaks = self.possible_leaks_m3spa();
+        self.both = Weights::both(&self.cylinder, &self.noise, &leaks);
+        if N > Parameter::OffsetB as usize {
+            self.offsets = OffsetPrior::new(
+                &self.cylinder,
+                &self.zeros.now(),
+                offset_units(&self.cylinder, &self.zeros),
+                &leaks,
+            );
+        }
+    }
+
+    /// The piston is where the sensor reads `x_m`; whatever was known of that counts for nothing.
+    #[cold]
+    fn anchor(&mut self, x_m: T) {
+        let variance = self.noise.position_m * self.noise.position_m;
+        match &mut self.position_filter {
+            Some(filter) => filter.anchor(x_m, variance),
+            None => self.position_filter = Some(PositionFilter::anchored(x_m, variance)),
+        }
+    }
+
+    #[cold]
+    fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
+        self.last = Some(Sample { force_n: None, ..*sample });
+        self.anchor(sample.x_m);
+        self.memory = None;
+        self.pressure_noise.interrupt();
+        Update::Started
+    }
+
+    #[inline]
+    fn is_integrable(&self, dt_s: T) -> bool {
+        dt_s > T::zero() && dt_s <= self.settings.max_step_s
+    }
+
+    /// Finite, and within ten times what any pitch cylinder meets.
+    #[inline]
+    fn plausible(&self, sample: &Sample<T>) -> bool {
+        let (x_limit, pressure_limit, flow_limit) = self.limits();
+        let flow_ok = |q: Option<T>| q.is_none_or(|q| q.abs() <= flow_limit);
+        sample.x_m.abs() <= x_limit
+            && sample.pa_pa.abs() <= pressure_limit
+            && sample.pb_pa.abs() <= pressure_limit
+            && flow_ok(sample.qa_m3s)
+            && flow_ok(sample.qb_m3s)
+    }
+
+    /// Largest position, m, pressure, Pa, and flow, m³/s, that are readings.
+    #[inline]
+    fn limits(&self) -> (T, T, T) {
+        let flow = T::lit(1e3) * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
+        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), flow)
+    }
+
+    /// Takes in what was read `dt_s` after the readings before, of channels that need not all come at once: between two of its
+    /// own readings a channel is the straight line, and its noise is that of its own readings ([`Clocks`](crate::continuity::Clocks)).
+    /// A channel without a reading is waited for, for a few steps of its own; then its chamber rests. Where the position or a pressure
+    /// is missing for longer, nothing is integrated.
+    ///
+    /// [`update`](Self::update) does so, too, where a flow has no reading.
+    #[cfg_attr(target_os = "none", inline(never))]
+    pub fn update_readings(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
+        if let Readings { x: Some(x_m), pa: Some(pa_pa), pb: Some(pb_pa), qa: qa_m3s, qb: qb_m3s } = *readings
+        {
+            return self.update(dt_s, &Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None });
+        }
+        let (x_limit, pressure_limit, flow_limit) = self.limits();
+        let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
+        let PerChannel { x, pa, pb, qa, qb } = *readings;
+        let plausible = ok(x, x_limit)
+            && ok(pa, pressure_limit)
+            && ok(pb, pressure_limit)
+            && ok(qa, flow_limit)
+            && ok(qb, flow_limit);
+        if plausible { self.update_on_clocks(dt_s, readings) } else { Update::Rejected }
+    }
+
+    /// A flow has no reading at one end of the step to `sample`: it rests, or is waited for if it was read before.
+    #[cold]
+    fn update_without_a_flow(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
+        let missing = |last: Option<T>, now: Option<T>| last.is_some() && now.is_none();
+        let waits =
+            |last: Sample<T>| missing(last.qa_m3s, sample.qa_m3s) || missing(last.qb_m3s, sample.qb_m3s);
+        if self.last.is_some_and(waits) {
+            self.update_on_clocks(dt_s, &Readings::from(sample))
+        } else {
+            self.take_row(&Row::read(dt_s, sample))
+        }
+    }
+
+    #[cold]
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn update_on_clocks(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
+        if !self.is_integrable(dt_s) {
+            self.last = None;
+            self.clocks = self.clocks.anew();
+        } else if let Some(last) = self.last.filter(|_| self.clocks.is_empty()) {
+            let step_s = Some(self.step_s).filter(|step_s| *step_s > T::zero());
+            self.clocks.go_on_after(&last, step_s);
+        }
+        self.step_s = T::zero();
+        self.clocks.push(dt_s, readings);
+        let mut update = Update::Accepted;
+        for _ in 0..ROWS_AT_ONCE {
+            update = match self.clocks.pop() {
+                Next::Waits => break,
+                Next::Gap => {
+                    self.last = None;
+                    continue;
+                }
+                Next::Row(row) => match self.take_row(&row) {
+                    Update::Accepted => update,
+                    news => news,
+                },
+            };
+        }
+        update
+    }
+
+    fn take_row(&mut self, row: &Row<T>) -> Update<T> {
+        let Some(last) = self.last.replace(row.sample) else { return self.restart(&row.sample) };
+        let Step { integrals: step, measured } = Step::between(&self.cylinder, row.dt_s, &last, &row.sample);
+        if row.read.pa && row.read.pb && !row.thinned {
+            self.pressure_noise.add([last.pa_pa, last.pb_pa], [row.sample.pa_pa, row.sample.pb_pa]);
+        } else {
+            self.pressure_noise.interrupt();
+        }
+        if measured == Measured::Neither {
+            self.anchor(row.sample.x_m);
+        } else {
+            let weights = self.weights_of(measured, &diluted(&self.noise, row));
+            if measured == Measured::Both {
+                self.feed(&step, &weights);
+            }
+            self.advance(&step, &weights, row.read.x.then_some(row.sample.x_m));
+        }
+        self.finish(&step)
+    }
+
+    /// Adds a step to the balance's, which counts its noise as if every channel had been read with every sample.
+    fn feed(&mut self, step: &Integrals<T>, weights: &Weights<T>) {
+        let mut step = *step;
+        step.time_square *= weights.balance_variance / self.both.balance_variance;
+        self.fed.add(&step);
+    }
+
+    /// Closes a block of the balance; after every second one the renewal of the estimates begins.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn close_block(&mut self) -> Update<T> {
+        self.compensate_position();
+        let balance = self.whitened_balance();
+        if balance.is_none() {
+            self.memory = None;
+        }
+        let innovation = balance.as_ref().map(|equation| self.watch_balance(equation));
+        let time_s = self.block.time_s;
+        let keep = T::one() / (T::one() + time_s / T::lit(AVERAGING_S));
+        self.pressures.add_block(&self.block, keep);
+        self.innovations.forget(keep);
+        let inflation = self.innovations.inflation();
+        let watched = balance.as_ref().zip(innovation);
+        let changed =
+            watched.is_some_and(|(equation, by_known)| self.has_changed(equation, by_known, inflation));
+        self.block = BlockPressures::default();
+        self.block_time_s = self.settings.block_time_s;
+        self.fed = Integrals::default();
+        if changed {
+            let elapsed_s = self.unlearnt_s + time_s;
+            self.begin_anew();
+            return Update::Renewed { elapsed_s, changed, innovation };
+        }
+        self.take_balance(balance, time_s);
+        if self.unlearnt >= BALANCES {
+            self.learn(inflation);
+        }
+        Update::Balanced { innovation }
+    }
+
+    fn has_changed(&mut self, balance: &Equation<T, N>, by_known: Innovation<T>, inflation: T) -> bool {
+        let slopes_ps = self.slopes_ps.map(|(mean, _)| mean);
+        self.change.update(balance, self.block.time_s, &self.solution, by_known, &slopes_ps, inflation)
+    }
+
+    /// Puts a balance to those that will be learnt from together.
+    fn take_balance(&mut self, balance: Option<Equation<T, N>>, time_s: T) {
+        for earlier in self.balances.iter_mut().flatten() {
+            earlier.age_s += time_s;
+        }
+        if let Some(place) = self.balances.get_mut(self.unlearnt) {
+            *place = balance.map(|equation| Balance { equation, age_s: T::lit(0.5) * time_s });
+        }
+        self.unlearnt += 1;
+        self.unlearnt_s += time_s;
+    }
+
+    /// Begins to learn what the blocks since the last time tell of the parameters.
+    fn learn(&mut self, inflation: T) {
+        let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
+        let drifted = self.drifted();
+        let prior = prior(self.compressibility, &self.scale, &self.offsets);
+        let evidence = Evidence::new(block, prior.mean_0, &self.solution.mean);
+        self.bank.begin(evidence, drifted, inflation, &prior, &self.solution);
+        self.empty_sums();
+    }
+
+    /// Goes on to learn, a sample's share of it.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn go_on(&mut self) -> Update<T> {
+        let prior = prior(self.compressibility, &self.scale, &self.offsets);
+        let Some(outlook) = self.bank.go_on(&prior, &mut self.solution) else { return Update::Accepted };
+        self.slopes_ps = outlook.slopes_ps;
+        let (mut chi_square, mut count) = outlook.chi_square;
+        for Balance { equation, .. } in self.balances.iter().flatten() {
+            let left = equation.residual(&self.solution.mean);
+            chi_square -= left * left;
+            count -= T::one();
+        }
+        self.innovations.position(chi_square.at_least(T::zero()), count);
+        self.balances = [None; BALANCES];
+        self.reweigh();
+        if outlook.jumped {
+            self.begin_anew();
+        }
+        Update::Renewed { elapsed_s: outlook.time_s, changed: outlook.jumped, innovation: None }
+    }
+
+    /// By how much zeros may have drifted since the estimates were renewed, variances in prior units.
+    fn drifted(&mut self) -> [T; 2] {
+        if N <= Parameter::OffsetB as usize {
+            return [T::zero(); 2];
+        }
+        let leaks = self.possible_leaks_m3spa();
+        self.zeros.advance(self.unlearnt_s, &self.cylinder, &leaks)
+    }
+
+    /// Of the position equation and the blocks' time nothing is to be learnt from.
+    fn empty_sums(&mut self) {
+        self.sums = BlockSums::new();
+        self.column_noise = T::zero();
+        self.unlearnt_s = T::zero();
+        self.unlearnt = 0;
+        if let Some(position) = &mut self.position_filter {
+            position.weight_sum = T::zero();
+        }
+    }
+
+    /// The leak has changed at once: what was learnt before it counts for nothing, and neither the piston's position
+    /// nor the block just closed may carry the old leak on. The next block is learnt from at once.
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn begin_anew(&mut self) {
+        self.bank.forget_all();
+        self.solution = Solution::of_prior(&self.offsets.information);
+        self.slopes_ps = [(T::zero(), T::zero()); LEAKS];
+        self.change = ChangeDetector::new(&self.solution);
+        self.innovations = Innovations::default();
+        self.pressures.forget(T::lit(1e-8));
+        self.memory = None;
+        if let Some(last) = self.last {
+            self.anchor(last.x_m);
+        }
+        self.empty_sums();
+        self.balances = [None; BALANCES];
+        self.unlearnt = BALANCES - 1;
+        self.block_time_s = T::lit(FIRST_SHARE) * self.settings.block_time_s;
+    }
+
+    /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
+    fn whitened_balance(&mut self) -> Option<Equation<T, N>> {
+        if self.fed.steps < T::lit(2.0) {
+            return None;
+        }
+        let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
+        let equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
+        let stored = self.stored_oil_variance(
+            weight_a,
+            weight_b,
+            [self.noise.pressure_pa * self.noise.pressure_pa; 2],
+        ) * self.compressibility
+            * self.compressibility;
+        let flows = self.both.balance_variance * self.fed.time_square;
+        let now = MovingAverage::after(self.memory.as_ref(), equation, flows, stored);
+        self.memory = Some(now);
+        Some(now.whitened())
+    }
+
+    fn watch_balance(&mut self, equation: &Equation<T, N>) -> Innovation<T> {
+        let innovation = self.solution.predict(equation);
+        self.innovations.balance(&innovation);
+        // Both ends of the block are noisy readings of the pressure.
+        if let Some(memory) = self.memory {
+            let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
+            let noise = T::lit(2.0)
+                * self.stored_oil_variance(weight_a, weight_b, self.pressure_noise.variance_pa2());
+            self.compensate(noise / memory.variance());
+        }
+        innovation
+    }
+
+    /// Pressure noise in the position equation's compressibility column: the last reading's only, as the
+    /// differences before it telescope.
+    fn compensate_position(&mut self) {
+        let Some(position) = &self.position_filter else { return };
+        let noise = self.stored_oil_variance(
+            self.both.position_a,
+            self.both.position_b,
+            self.pressure_noise.variance_pa2(),
+        );
+        self.compensate(noise * position.weight_sum);
+    }
+
+    /// Takes note of noise of `variance` (SI, over the equation's own variance) in the compressibility's
+    /// column.
+    fn compensate(&mut self, variance: T) {
+        let scale = self.scale[Parameter::Compressibility as usize];
+        self.column_noise += variance * scale * scale;
+    }
+
+    /// Variance of w_a V_A P_A + w_b V_B P_B for pressure noise of the given variances.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    fn stored_oil_variance(&self, weight_a: T, weight_b: T, [a_pa2, b_pa2]: [T; 2]) -> T {
+        let x = self.last.map_or(T::zero(), |s| s.x_m).at_least(T::zero()).at_most(self.cylinder.stroke_m);
+        let a = weight_a * self.cylinder.volume_a_m3(x);
+        let b = weight_b * self.cylinder.volume_b_m3(x);
+        a * a * a_pa2 + b * b * b_pa2
+    }
+}
+
+/// What is known beforehand of an estimator's parameters.
+fn prior<'a, T: Real, const N: usize>(
+    compressibility: T,
+    scale: &[T; N],
+    offsets: &'a OffsetPrior<T>,
+) -> Prior<'a, T> {
+    let mean_0 = compressibility / scale[Parameter::Compressibility as usize];
+    Prior { mean_0, offsets: &offsets.information }
+}
+
+/// Noise whose integral over the step at a row's end is that of the channels' own readings.
+fn diluted<T: Real>(noise: &NoiseStd<T>, row: &Row<T>) -> NoiseStd<T> {
+    let PerChannel { pa, pb, qa, qb, .. } = row.dilution();
+    NoiseStd {
+        flow_a_m3s: noise.flow_a_m3s * qa.sqrt(),
+        flow_b_m3s: noise.flow_b_m3s * qb.sqrt(),
+        pressure_pa: noise.pressure_pa * pa.at_least(pb).sqrt(),
+        ..*noise
+    }
+}
