@@ -7,7 +7,7 @@ memory of a replay of ten million samples.
 
 The rivals run recursive least squares with forgetting on the two chamber equations, four parameters, both
 equations at every sample. That is less than what the engine does per sample (it integrates, whitens, follows
-an odometer and watches for changes), so it is a bound in the rivals' favour. The engine's own time includes
+the position equation and watches for changes), so it is a bound in the rivals' favour. The engine's own time includes
 reading the columns, their checks and the alarms.
 """
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 const LARGEST: f64 = 16.0;
 /// Innovations of a window of which the worst is kept: a quarter of a minute.
 const WINDOW: u32 = 60;
-/// The odometer's ratio counts once it is the mean of so many renewals, 10 s.
+/// The position equation's ratio counts once it is the mean of so many renewals, 10 s.
 const SETTLED: u32 = 20;
 /// Renewals of a stretch: ten minutes, or longer where samples come so slowly that a renewal does.
 const STRETCH_RENEWALS: u32 = 1200;
@@ -37,9 +37,9 @@ struct Stretch {
     balance_sum: f64,
     balance_count: u64,
     worst_window: f64,
-    odometer_sum: f64,
-    odometer_count: u64,
-    worst_odometer: f64,
+    position_sum: f64,
+    position_count: u64,
+    worst_position: f64,
     renewals: u32,
     restarts: u64,
     span_s: Option<[f64; 2]>,
@@ -78,15 +78,15 @@ impl Consistency {
         is_full
     }
 
-    /// Takes the odometer's ν²/S as the estimator has it after a renewal.
-    pub fn odometer(&mut self, ratio: f64) {
+    /// Takes the position equation's ν²/S as the estimator has it after a renewal.
+    pub fn position(&mut self, ratio: f64) {
         let ratio = ratio.min(LARGEST);
         self.renewals = self.renewals.saturating_add(1);
         for stretch in [&mut self.whole, &mut self.now] {
-            stretch.odometer_sum += ratio;
-            stretch.odometer_count += 1;
+            stretch.position_sum += ratio;
+            stretch.position_count += 1;
             if self.renewals >= SETTLED {
-                stretch.worst_odometer = stretch.worst_odometer.max(ratio);
+                stretch.worst_position = stretch.worst_position.max(ratio);
             }
         }
     }
@@ -124,9 +124,9 @@ impl Stretch {
             balance_sum: self.balance_sum + next.balance_sum,
             balance_count: self.balance_count.saturating_add(next.balance_count),
             worst_window: self.worst_window.max(next.worst_window),
-            odometer_sum: self.odometer_sum + next.odometer_sum,
-            odometer_count: self.odometer_count.saturating_add(next.odometer_count),
-            worst_odometer: self.worst_odometer.max(next.worst_odometer),
+            position_sum: self.position_sum + next.position_sum,
+            position_count: self.position_count.saturating_add(next.position_count),
+            worst_position: self.worst_position.max(next.worst_position),
             renewals: self.renewals.saturating_add(next.renewals),
             restarts: self.restarts.saturating_add(next.restarts),
             span_s: self.span_s.zip(next.span_s).map(|([from_s, _], [_, to_s])| [from_s, to_s]),
@@ -139,8 +139,8 @@ impl Stretch {
             balance: mean(self.balance_sum, self.balance_count),
             balances: self.balance_count,
             worst_window: self.worst_window,
-            odometer: mean(self.odometer_sum, self.odometer_count),
-            worst_odometer: self.worst_odometer,
+            position: mean(self.position_sum, self.position_count),
+            worst_position: self.worst_position,
             restarts: self.restarts,
             since_s: f64::NEG_INFINITY,
             unexplained_s: None,

@@ -119,7 +119,7 @@ impl<'a> Draft<'a> {
                 .and_then(|found| found.flow_offsets_m3s)
                 .filter(|offsets| offsets.iter().all(|one| one.value.is_finite() && one.std.is_finite()))
                 .map(FlowMeterOffsets::new),
-            normalised_innovation: whole.map(|misfit| [misfit.balance, misfit.odometer]),
+            normalised_innovation: whole.map(|misfit| [misfit.balance, misfit.position]),
             changed_at_s: self.changed_at_s,
             alarms: replay.alarms.clone(),
             score: replay.scoring.scores(),

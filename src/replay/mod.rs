@@ -222,8 +222,8 @@ impl Replay {
         }
         if changed {
             self.consistency.restarted();
-        } else if let Some([_, odometer]) = self.estimator.normalised_innovation() {
-            self.consistency.odometer(odometer);
+        } else if let Some([_, position]) = self.estimator.normalised_innovation() {
+            self.consistency.position(position);
         }
     }
 

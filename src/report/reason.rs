@@ -94,7 +94,7 @@ const CHANCE_SIGMAS: f64 = 5.0;
 /// … and in the worst quarter of a minute: leaks that open and are mended surprise a few blocks.
 const WORST_MISFIT: f64 = 3.0;
 /// The position's worst mean: friction and edges of the motion leave more than in the balance.
-const ODOMETER_MISFIT: f64 = 2.0;
+const POSITION_MISFIT: f64 = 2.0;
 /// Restarts without an alarm that was raised or cleared: a leak below its threshold may jump now and then.
 const RESTARTS: u64 = 2;
 /// A bulk modulus off by so many of its prior's standard deviations, in the compressibility: the prior is in the estimate
@@ -247,7 +247,7 @@ impl Misfit {
     /// Whether model and declared noise do not explain it.
     pub fn contradicts(&self) -> bool {
         let balance = self.balance > self.chance().max(MISFIT) || self.worst_window > WORST_MISFIT;
-        balance || self.worst_odometer > ODOMETER_MISFIT
+        balance || self.worst_position > POSITION_MISFIT
     }
 }
 
@@ -271,7 +271,7 @@ fn several_leaks(findings: &Findings<'_>) -> Option<Reason> {
 fn model_does_not_fit(findings: &Findings<'_>) -> Option<Reason> {
     let misfit = findings.misfit?;
     misfit.contradicts().then(|| {
-        let times = misfit.worst_window.max(misfit.balance).max(misfit.worst_odometer).sqrt();
+        let times = misfit.worst_window.max(misfit.balance).max(misfit.worst_position).sqrt();
         let at_least = if times > 3.5 { "at least " } else { "" };
         Reason::new(
             ReasonId::ModelDoesNotFit,

@@ -12,8 +12,8 @@ const SOUND: Misfit = Misfit {
     balance: 1.0,
     balances: 240,
     worst_window: 1.2,
-    odometer: 1.0,
-    worst_odometer: 1.1,
+    position: 1.0,
+    worst_position: 1.1,
     restarts: 0,
     since_s: f64::NEG_INFINITY,
     unexplained_s: None,
@@ -195,7 +195,7 @@ fn a_misfit_anywhere_in_the_trace_is_a_doubt() {
     for misfit in [
         Misfit { balance: 3.0, ..SOUND },
         Misfit { worst_window: 6.0, ..SOUND },
-        Misfit { worst_odometer: 4.0, ..SOUND },
+        Misfit { worst_position: 4.0, ..SOUND },
     ] {
         let found = Found { misfit: Some(misfit), ..found(INTERNAL) };
         assert_eq!(found.judged(), (Status::Doubtful, vec!["model_does_not_fit"]), "{misfit:?}");

@@ -73,9 +73,9 @@ pub struct Misfit {
     /// Of the flow balance in the worst quarter of a minute.
     pub worst_window: f64,
     /// Of the position carried by the flows.
-    pub odometer: f64,
+    pub position: f64,
     /// Its largest mean over a minute or what there is.
-    pub worst_odometer: f64,
+    pub worst_position: f64,
     /// How often the estimates began anew.
     pub restarts: u64,
     /// Since when, s; −∞ over the whole trace.

@@ -23,7 +23,7 @@ enum Quantity {
     /// The flow balance's innovation, in its own standard deviations.
     Balance,
     /// The position's squared innovation over its variance, a running mean.
-    Odometer,
+    PositionResidual,
     Leak(Leak),
     Reference(Leak),
 }
@@ -41,7 +41,7 @@ impl Quantity {
             Self::Force => 5,
             Self::Temperature => 6,
             Self::Balance => 7,
-            Self::Odometer => 8,
+            Self::PositionResidual => 8,
             Self::Leak(leak) => 9 + leak as usize,
             Self::Reference(leak) => 12 + leak as usize,
         }
@@ -53,7 +53,7 @@ impl Quantity {
 pub struct History {
     envelopes: Envelopes<QUANTITIES>,
     leaks_lpm: PerLeak<Option<Spot>>,
-    odometer: Option<Spot>,
+    position_residual: Option<Spot>,
 }
 
 impl History {
@@ -61,8 +61,8 @@ impl History {
     pub fn add(&mut self, replay: &Replay, record: &Record, renewed: bool) {
         if renewed {
             self.leaks_lpm = replay.watched_flows_m3s().map(|flow| Some(spot(flow.scaled(LPM_PER_M3S))));
-            self.odometer =
-                replay.estimator().normalised_innovation().map(|[_, odometer]| Spot::at(odometer));
+            self.position_residual =
+                replay.estimator().normalised_innovation().map(|[_, position]| Spot::at(position));
         }
         let spots = self.spots(replay, record);
         if record.after_gap {
@@ -88,7 +88,7 @@ impl History {
         put(Quantity::Force, scaled(s.force_n, 1e-3));
         put(Quantity::Temperature, record.temperature_k.map(|kelvin| Spot::at(kelvin - KELVIN)));
         put(Quantity::Balance, replay.innovation().map(Spot::at));
-        put(Quantity::Odometer, self.odometer);
+        put(Quantity::PositionResidual, self.position_residual);
         for leak in Leak::ALL {
             put(Quantity::Leak(leak), self.leaks_lpm[leak]);
             put(Quantity::Reference(leak), scaled(record.leak_m3s[leak], LPM_PER_M3S));
@@ -173,14 +173,14 @@ impl Drawn {
             limits: [2.0, -2.0].map(|value| Limit { value, label: format!("{value:+.0} σ") }).to_vec(),
             ..Chart::default()
         };
-        let odometer = Chart {
+        let position = Chart {
             title: "Position against the flows".to_owned(),
             unit: "",
             note: "Square of the residual over its variance, running mean. About 1 where position and flows agree, far above where they do not.",
-            lines: vec![self.line("position residual", Ink::Vermilion, Quantity::Odometer)],
+            lines: vec![self.line("position residual", Ink::Vermilion, Quantity::PositionResidual)],
             limits: vec![Limit { value: 1.0, label: "expected".to_owned() }],
             ..Chart::default()
         };
-        html! { (charts.place(balance)) (charts.place(odometer)) }
+        html! { (charts.place(balance)) (charts.place(position)) }
     }
 }

@@ -334,9 +334,9 @@ fn residuals(report: &ReplayReport, drawn: &Drawn, charts: &mut Charts) -> Marku
             or follows a signal above, means that model or sensors are not as declared: " code { "pitchleak diagnose" }
             " looks for the effect that is missing." }
         (drawn.residuals(charts))
-        @if let Some([balance, odometer]) = report.normalised_innovation {
+        @if let Some([balance, position]) = report.normalised_innovation {
             p { "Over the whole trace, mean square over its variance (1 where all is as declared): flow balance " (short(balance))
-                ", position " (short(odometer)) "." }
+                ", position " (short(position)) "." }
         }
     }
 }
