@@ -6,9 +6,9 @@ use super::history::History;
 use super::notices::Notices;
 use super::order::{Order, Turn};
 use crate::Rig;
-use crate::replay::Stream;
+use crate::replay::{Stream, Taken};
 use crate::report::ReplayReport;
-use crate::trace::{BadRows, LineLayout, Taken};
+use crate::trace::{BadRows, LineLayout};
 use pitchleak_core::RlsError;
 use serde::{Deserialize, Serialize};
 

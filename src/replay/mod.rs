@@ -21,7 +21,7 @@ pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
 pub use state::RestoreError;
 pub(crate) use state::every_number;
-pub use stream::Stream;
+pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
 use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};

@@ -4,11 +4,23 @@ use crate::report::{ReplayReport, Suspicions, TraceSummary, Verdict};
 use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
 use crate::trace::{
-    BadRows, LineLayout, LineRead, Record, RowValidator, Taken, TraceError, TraceFault, TraceReader,
+    BadRow, BadRows, LineLayout, LineRead, Record, RowValidator, TraceError, TraceFault, TraceReader,
     read_line,
 };
 use crate::wiring::{Refused, Running, Wiring};
 use pitchleak_core::RlsError;
+
+/// What became of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Taken {
+    /// It is in the estimates; says whether they are new.
+    Good {
+        /// Whether the estimates are new.
+        renewed: bool,
+    },
+    /// It was counted and left out.
+    Bad(BadRow),
+}
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
 /// would, to the last bit.

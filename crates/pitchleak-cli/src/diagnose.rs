@@ -95,7 +95,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
     bar.finish_and_clear();
     if let Some(mut file) = saved {
-        let written = file.write_all(diagnosis.rig(&rig).to_toml().as_bytes());
+        let before = rig.file().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+        let written = file.write_all(diagnosis.rig(&rig).to_toml_over(&before).as_bytes());
         written.map_err(|source| file.error(source))?;
         file.finish()?;
     }

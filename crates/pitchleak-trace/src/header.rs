@@ -179,6 +179,14 @@ pub fn shorten(text: &str, most: usize) -> String {
     if text.chars().nth(most).is_some() { clean + "…" } else { clean }
 }
 
+/// The name among `names` that `name` may be a slip of.
+pub fn near<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let likeness =
+        |other: &&str| strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase());
+    let best = names.filter(|other| !other.is_empty()).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
+    (likeness(&best) >= 0.7).then_some(best)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,5 +224,12 @@ mod tests {
         for unit in ["mPa", "atm", "kgf/cm²", "", "V"] {
             assert_eq!(HeaderUnit::by_name(unit, Dimension::Pressure), None, "{unit}");
         }
+    }
+
+    #[test]
+    fn a_slip_has_a_near_name() {
+        let names = ["Head pressure", "Rod pressure", "Flow"];
+        assert_eq!(near("Head presure", names.into_iter()), Some("Head pressure"));
+        assert_eq!(near("Temperature", names.into_iter()), None);
     }
 }

@@ -1,12 +1,12 @@
-//! Which column of a header row holds which signal, and in which unit.
+//! Which column of a file holds which signal, and in which unit: by the names of the contract, those of `[columns]`, and
+//! foreign ones that name signal and unit.
 
+use super::error::Counted;
 use super::error::TraceFault;
-use super::proposal::near;
-use super::quality::Counted;
-use crate::header::shorten;
+use crate::header::{self, HeaderUnit, near, shorten};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
-use crate::times::TimeFormat;
+use crate::times::{self, TimeFault, TimeFormat, Zone};
 use crate::units::Unit;
 
 /// What one column of the file is read as.
@@ -52,7 +52,7 @@ pub(super) struct Layout {
 impl Layout {
     /// Reads a header row.
     pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
-        let mut columns: Vec<_> = headers.iter().map(|header| bind(header.trim(), map)).collect();
+        let mut columns: Vec<_> = headers.iter().map(|header| column_of(header.trim(), map)).collect();
         prefer_time(&mut columns);
         let layout = Self {
             columns,
@@ -176,10 +176,10 @@ pub(super) const REQUIRED: [(Signal, &str); 4] = [
 
 /// What the headers say one by one, where they do not make a trace together.
 pub(super) fn partly(headers: &[String], rig: &Rig) -> Vec<Content> {
-    headers.iter().map(|header| bind(header.trim(), &rig.columns).content).collect()
+    headers.iter().map(|header| column_of(header.trim(), &rig.columns).content).collect()
 }
 
-fn bind(header: &str, map: &ColumnMap) -> Column {
+fn column_of(header: &str, map: &ColumnMap) -> Column {
     let mapped = map.iter().find(|(_, column)| column.name.trim() == header);
     let content = match mapped {
         Some((Signal::Timestamp, _)) => Content::Timestamp,
@@ -259,4 +259,128 @@ fn accepted(signal: Signal, map: &ColumnMap) -> String {
     }
     names.extend(map.get(&signal).map(|column| format!("`{}` of [columns]", shorten(&column.name, 40))));
     names.join(" or ")
+}
+
+/// What the columns of a file hold.
+pub(super) struct Bound {
+    pub(super) layout: Layout,
+    /// Signals that were found by a foreign header, and the headers.
+    pub(super) foreign: ColumnMap,
+}
+
+/// Binds `headers`; `units` is the row below them, and `rows` are the first ones.
+pub(super) fn bind(
+    headers: &[String],
+    units: Option<&[String]>,
+    rows: &[TextRow],
+    rig: &Rig,
+) -> Result<Bound, TraceFault> {
+    let mut foreign = ColumnMap::new();
+    for (index, header) in headers.iter().enumerate() {
+        let unit = units.and_then(|units| units.get(index)).map(|unit| bare_unit(unit)).unwrap_or_default();
+        if let Some((signal, bound)) = known(header, rig) {
+            check_unit(header, signal, bound, unit)?;
+            continue;
+        }
+        let Some((signal, found)) = plain(header, unit, &column(rows, index)) else { continue };
+        let is_given = rig.columns.contains_key(&signal)
+            || headers.iter().any(|header| known(header, rig).is_some_and(|(known, _)| known == signal));
+        if is_given {
+            continue;
+        }
+        if let Some(first) = foreign.insert(signal, found) {
+            return Err(TraceFault::DoubledColumn {
+                signal: signal.name(),
+                first: shorten(&first.name, 40),
+                second: shorten(header, 40),
+            });
+        }
+    }
+    let mut map = rig.columns.clone();
+    map.extend(foreign.clone());
+    let layout = Layout::new(headers, &map)?;
+    Ok(Bound { layout, foreign })
+}
+
+/// The signal of a header that the contract or the rig file names.
+fn known(header: &str, rig: &Rig) -> Option<(Signal, Option<crate::units::Unit>)> {
+    let mapped = rig.columns.iter().find(|(_, column)| column.name.trim() == header);
+    mapped.map(|(signal, column)| (*signal, column.unit)).or_else(|| standard(header))
+}
+
+/// The row of units and the header must say the same.
+fn check_unit(
+    header: &str,
+    signal: Signal,
+    bound: Option<crate::units::Unit>,
+    unit: &str,
+) -> Result<(), TraceFault> {
+    let found = signal.dimension().and_then(|dimension| HeaderUnit::by_name(unit, dimension));
+    let (Some(bound), Some(found)) = (bound, found) else { return Ok(()) };
+    if (found.unit.over(&bound) - 1.0).abs() < 1e-9 && found.offset_si.abs() < 1e-9 {
+        return Ok(());
+    }
+    let header = shorten(header, 40);
+    Err(TraceFault::Ambiguous {
+        what: format!(
+            "column `{header}` is read in {}, and the row of units says {}",
+            bound.text,
+            shorten(unit, 20)
+        ),
+        settle: "take that row out, or correct it or the name".to_owned(),
+    })
+}
+
+/// What a foreign header says without a doubt, together with the unit below it.
+fn plain(header: &str, unit: &str, cells: &[&str]) -> Option<(Signal, ForeignColumn)> {
+    let name_and_unit = |name: &str, unit: &str| {
+        let signal = header::signal(name)?;
+        let found = HeaderUnit::by_name(unit, signal.dimension()?)?;
+        let column =
+            ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(header, Some(found.unit)) };
+        Some((signal, column))
+    };
+    name_and_unit(header, unit)
+        .or_else(|| header::parts(header).find_map(|(name, unit)| name_and_unit(name, unit)))
+        .or_else(|| plain_time(header, cells))
+}
+
+/// A column called time whose cells are times of day, dates or epochs; its header may name the zone.
+fn plain_time(header: &str, cells: &[&str]) -> Option<(Signal, ForeignColumn)> {
+    let is_time = |name: &str| matches!(header::signal(name), Some(Signal::Time | Signal::Timestamp));
+    let behind = header::parts(header).find(|(name, _)| is_time(name)).map(|(_, behind)| behind);
+    if behind.is_none() && !is_time(header) {
+        return None;
+    }
+    match times::guess(cells) {
+        Err(TimeFault::BareNumber(_) | TimeFault::Unknown(_)) => None,
+        Ok(_) | Err(_) => {
+            let zone = behind.and_then(Zone::by_name);
+            Some((Signal::Timestamp, ForeignColumn { zone, ..ForeignColumn::new(header, None) }))
+        }
+    }
+}
+
+/// One record, its cells without blanks around them.
+#[derive(Clone, Debug)]
+pub(super) struct TextRow {
+    /// From 1.
+    pub(super) line: u64,
+    pub(super) cells: Vec<String>,
+}
+
+/// What stands in a column of `rows`, empty cells left out.
+pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
+    rows.iter()
+        .filter_map(|row| row.cells.get(index))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
+        .collect()
+}
+
+/// Without brackets and dashes around it.
+pub(super) fn bare_unit(cell: &str) -> &str {
+    let cell = cell.trim_matches(['-', ' ']);
+    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
 }

@@ -3,12 +3,12 @@
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
 use super::error::TraceFault;
+use super::error::{BadReason, BadRow, Counted};
 use super::format::{Format, Reading, Stream};
 use super::number::plain_number;
-use super::quality::{BadReason, BadRow, Counted};
-use super::records::{Record, Records, Stop, Text};
+use super::records::{Record, Records, Stop, Text, stopped_early};
 use super::row::{Fault, Next, Row, RowSource, check_present};
-use super::stamp::Epoch;
+use super::stamps::Epoch;
 use crate::header::shorten;
 use crate::rig::{Decimal, Rig};
 use crate::signal::Signal;
@@ -85,15 +85,6 @@ impl RowSource for CsvRows {
             },
             Err(stop) => self.stopped(stop),
         }
-    }
-}
-
-/// Before the first row.
-pub(super) fn stopped_early(stop: Stop) -> TraceFault {
-    match stop {
-        Stop::End => TraceFault::Empty,
-        Stop::TooLong => TraceFault::TooLong(1),
-        Stop::Failed(source) => TraceFault::Read { line: 0, source },
     }
 }
 

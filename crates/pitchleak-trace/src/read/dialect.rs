@@ -2,21 +2,19 @@
 //! refused where it can be read in two ways.
 
 use super::columns::{Content, Layout, REQUIRED, partly};
-use super::csv::stopped_early;
-use super::decimal::decimal;
-use super::encoding::Encoding;
 use super::error::TraceFault;
 use super::format::Stream;
-use super::inspect::proposals;
-use super::mistaken::mistaken;
-use super::proposal::Proposal;
-use super::records::{Records, Stop};
-use super::stamp::Epoch;
+use super::format::mistaken;
+use super::number::decimal;
+use super::proposal::{Proposal, proposals};
+use super::records::Encoding;
+use super::records::{Records, Stop, stopped_early};
+use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Decimal, Delimiter, Rig};
 use crate::signal::Signal;
-use crate::times::{self, TimeFault, TimeFormat, TimeKind};
+use crate::times::TimeFormat;
 
 /// So much of a file says how it is written, bytes.
 const AHEAD: usize = 64 * 1024;
@@ -151,58 +149,6 @@ fn numbers<'a>(table: &'a TextTable, layout: &Layout) -> Vec<Vec<&'a str>> {
     let columns = layout.columns.iter().enumerate();
     let numbers = columns.filter(|(_, column)| matches!(column.content, Content::Number(..)));
     numbers.map(|(index, _)| table.column(index)).collect()
-}
-
-/// As the rig file or the command line says it, else as the cells themselves do.
-pub(super) fn time_format(
-    cells: &[&str],
-    layout: &Layout,
-    foreign: &ColumnMap,
-    rig: &Rig,
-) -> Result<TimeFormat, TraceFault> {
-    let entry = rig.columns.get(&Signal::Timestamp).or_else(|| foreign.get(&Signal::Timestamp));
-    let zone = entry.and_then(|entry| entry.zone.clone());
-    let zone = zone.or_else(|| rig.csv.time.as_ref().and_then(|time| time.zone.clone()));
-    let kind = entry.and_then(|entry| entry.format.clone());
-    let kind = kind.or_else(|| rig.csv.time.as_ref().map(|time| time.kind.clone()));
-    if let Some(kind) = kind {
-        return Ok(TimeFormat { kind, zone });
-    }
-    if cells.is_empty() {
-        return Ok(TimeFormat { zone, ..TimeFormat::default() });
-    }
-    match times::guess(cells) {
-        Ok(format) => Ok(TimeFormat { zone, ..format }),
-        // Row by row it says which cells are bad.
-        Err(TimeFault::Unknown(_)) if cells.iter().any(|cell| TimeKind::Iso.read(cell).is_some()) => {
-            Ok(TimeFormat { zone, ..TimeFormat::default() })
-        }
-        Err(fault) => Err(unclear_time(&fault, layout)),
-    }
-}
-
-fn unclear_time(fault: &TimeFault, layout: &Layout) -> TraceFault {
-    let name = shorten(layout.header_of(Signal::Timestamp).unwrap_or_default(), 40);
-    let line = |format: &str| format!("timestamp = {{ name = \"{name}\", format = \"{format}\" }}");
-    let settle = match fault {
-        TimeFault::DayOrMonth(_) | TimeFault::BothOrders { .. } => {
-            format!(
-                "--time-format dmy or mdy says which, or under [columns] of the rig file: {}",
-                line("dmy")
-            )
-        }
-        TimeFault::BareNumber(_) => format!(
-            "under [columns] of the rig file say t = {{ name = \"{name}\", unit = \"s\" }}, or {}",
-            line("excel")
-        ),
-        TimeFault::Unknown(_) => {
-            format!(
-                "--time-format says how it is written, or under [columns] of the rig file: {}",
-                line("%d.%m.%Y %H:%M:%S%.f")
-            )
-        }
-    };
-    TraceFault::Ambiguous { what: format!("column `{name}`: {fault}"), settle }
 }
 
 /// A clock that shows whole seconds only leaves one row of a second.

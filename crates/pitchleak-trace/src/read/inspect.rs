@@ -1,18 +1,19 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::bind::Bound;
+use super::columns::Bound;
 use super::columns::{Content, Layout, partly};
-use super::decimal::decimal;
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::file;
 use super::format::Format;
-use super::proposal::{Proposal, Unread, near, propose};
-use super::table_text::{TextTable, bare_unit};
-use crate::header::shorten;
+use super::number::decimal;
+use super::proposal::{Proposal, proposals};
+use super::table_text::TextTable;
+use crate::header::{near, shorten};
 use crate::rig::{ColumnMap, Decimal, Rig};
 use crate::signal::Signal;
 use serde::Serialize;
+use std::fmt::Write;
 use std::fs::File;
 use std::path::Path;
 
@@ -143,7 +144,7 @@ impl FileReading {
         let columns = columns.collect();
         let proposals = proposals(&table, &found, rig).iter().map(line).collect();
         let misspelt = misspelt(&table.headers, &rig.columns);
-        let dialect = Dialect::of(table, super::encoding::Encoding::Utf8, rig);
+        let dialect = Dialect::of(table, super::records::Encoding::Utf8, rig);
         let time_format =
             dialect.as_ref().ok().filter(|dialect| dialect.layout.has(Signal::Timestamp)).map(|dialect| {
                 let time = &dialect.layout.time;
@@ -175,32 +176,6 @@ fn read_column(header: &str, content: Content, first: Vec<String>) -> ColumnRead
     ColumnReading { header: shorten(header, 60), signal, unit, first }
 }
 
-/// What the columns that are not read may be.
-pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<Proposal> {
-    let has = |signal: Signal| found.iter().any(|content| content.signal() == Some(signal));
-    let has_time = has(Signal::Time) || has(Signal::Timestamp);
-    let is_time = |signal: &Signal| matches!(signal, Signal::Time | Signal::Timestamp);
-    let wanted: Vec<Signal> =
-        Signal::ALL.into_iter().filter(|signal| !(has(*signal) || has_time && is_time(signal))).collect();
-    let unit = |index: usize| {
-        let cell = table.units.as_ref().and_then(|row| row.cells.get(index));
-        cell.map(|cell| bare_unit(cell)).unwrap_or_default()
-    };
-    let unread: Vec<Unread<'_>> = (0..)
-        .zip(&table.headers)
-        .zip(found)
-        .filter(|(_, content)| **content == Content::Ignored)
-        .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
-        .collect();
-    let cells: Vec<Vec<&str>> = unread.iter().map(|column| column.cells.clone()).collect();
-    let decimal = rig.csv.decimal.or_else(|| decimal(&cells).ok()).unwrap_or_default();
-    let mut proposals = propose(&unread, &wanted, decimal, rig);
-    if proposals.iter().any(|proposal| proposal.signal == Signal::Time) {
-        proposals.retain(|proposal| proposal.signal != Signal::Timestamp);
-    }
-    proposals
-}
-
 fn line(proposal: &Proposal) -> ProposedLine {
     let line = format!("{} = {}", proposal.signal.name(), proposal.column.to_toml(proposal.signal));
     ProposedLine { line, why: proposal.why.text() }
@@ -214,4 +189,55 @@ fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {
         format!("{}: the file has no column `{}`{near}", signal.name(), shorten(&column.name, 40))
     };
     absent.map(text).collect()
+}
+
+impl FileReading {
+    /// For people, on a terminal.
+    pub fn to_text(&self) -> String {
+        let mut out = format!("file     {}\n", self.path);
+        if let Some(text) = &self.text {
+            let decimal = text.decimal.unwrap_or("not clear");
+            let _ = writeln!(out, "cells    {} between them, decimal {decimal}", text.delimiter);
+            let units = text.units_line.map(|line| format!(", units in line {line}")).unwrap_or_default();
+            let _ = writeln!(out, "header   in line {}{units}", text.header_line);
+        }
+        if let Some(format) = &self.time_format {
+            let _ = writeln!(out, "times    {format}");
+        }
+        self.write_columns(&mut out);
+        if let Some(problem) = &self.problem {
+            let _ = writeln!(out, "\nNot read as it is: {problem}");
+        }
+        if !self.misspelt.is_empty() {
+            let _ = writeln!(out, "\nNamed under [columns], and not in the file:");
+            self.misspelt.iter().for_each(|line| _ = writeln!(out, "    {line}"));
+        }
+        if !self.proposals.is_empty() {
+            let _ =
+                writeln!(out, "\nWhere that is so, this in the rig file names the columns:\n    [columns]");
+            let width =
+                self.proposals.iter().map(|proposal| proposal.line.chars().count()).max().unwrap_or(0);
+            for proposal in &self.proposals {
+                let _ = writeln!(out, "    {:<width$}  # {}", proposal.line, proposal.why);
+            }
+        }
+        if self.problem.is_none() {
+            let _ = writeln!(out, "\nIt is read as it is.");
+        }
+        out
+    }
+
+    fn write_columns(&self, out: &mut String) {
+        let width = |text: fn(&ColumnReading) -> &str, least: usize| {
+            self.columns.iter().map(|column| text(column).chars().count()).max().unwrap_or(0).max(least)
+        };
+        let name = width(|column| &column.header, 6);
+        let _ = writeln!(out, "\n{:<name$}  {:<9}  {:<6}  first rows", "column", "signal", "unit");
+        for column in &self.columns {
+            let (signal, unit) = (column.signal.unwrap_or("-"), column.unit.unwrap_or_default());
+            let line =
+                format!("{:<name$}  {signal:<9}  {unit:<6}  {}", column.header, column.first.join("  "));
+            let _ = writeln!(out, "{}", line.trim_end());
+        }
+    }
 }

@@ -3,11 +3,11 @@
 use super::columns::{Column, Content, Layout};
 use super::csv::{Cells, describe, read_cells};
 use super::error::TraceFault;
-use super::quality::{BadRow, Counted};
+use super::error::{BadRow, Counted};
 use super::row::Row;
-use super::row_validator::RowValidator;
-use super::stamp::Epoch;
-use super::{BadRows, Record};
+use super::row::{BadRows, Record};
+use super::stamps::Epoch;
+use super::validator::RowValidator;
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 
@@ -52,18 +52,6 @@ impl LineLayout {
         validator.set_bad_rows(bad_rows);
         validator
     }
-}
-
-/// What became of a line.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Taken {
-    /// It is in the estimates; says whether they are new.
-    Good {
-        /// Whether the estimates are new.
-        renewed: bool,
-    },
-    /// It was counted and left out.
-    Bad(BadRow),
 }
 
 /// What was read of a line.

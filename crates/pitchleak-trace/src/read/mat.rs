@@ -5,11 +5,11 @@
 mod hdf5;
 mod vector;
 
-use super::bind::bind;
+use super::columns::bind;
+use super::error::Counted;
 use super::error::TraceFault;
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
-use super::quality::Counted;
-use super::stamped::{Stamped, sample};
+use super::stamps::{Stamped, sample};
 use super::table::TableRows;
 use crate::header::shorten;
 use crate::rig::Rig;

@@ -1,92 +1,43 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
-mod bind;
 mod clock;
 mod columns;
 mod csv;
-mod decimal;
 mod dialect;
-mod encoding;
 mod error;
 mod file;
 mod format;
 mod inspect;
-mod inspect_text;
 mod line;
 mod mat;
-mod mistaken;
 mod number;
 mod parquet;
 mod proposal;
 mod quality;
-mod range;
 mod records;
 mod row;
-mod row_validator;
-mod stamp;
-mod stamped;
+mod stamps;
 mod table;
 mod table_text;
+mod validator;
 
-pub use error::{TraceError, TraceFault};
+pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
-pub use line::{LineLayout, Taken};
-pub use line::{LineRead, read as read_line};
-pub use quality::{BadReason, BadRow, Counted, TraceQuality};
-pub use range::OVERRANGE;
-pub use row_validator::RowValidator;
-pub use stamp::seconds_between;
+pub use line::{LineLayout, LineRead, read as read_line};
+pub use quality::TraceQuality;
+pub use row::{BadRows, Record};
+pub use stamps::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
+pub use validator::{OVERRANGE, RowValidator};
 
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::Clock;
-use pitchleak_core::{PerLeak, Sample};
 use row::{Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use table::TableRows;
-
-/// One good row of a trace, in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Record {
-    /// Line of the file, from 1; of columns in memory the row, from 0.
-    pub line: u64,
-    /// Time as in the file, s; since the first row where the file has time stamps.
-    pub t_s: f64,
-    /// Time since the record before, s: positive, and 0 for the first record.
-    pub dt_s: f64,
-    /// The trace pauses before this record, or its clock begins anew: nothing is known of the time
-    /// between.
-    pub after_gap: bool,
-    /// The readings.
-    pub sample: Sample<f64>,
-    /// Piston speed, m/s.
-    pub speed_mps: Option<f64>,
-    /// Oil temperature, K.
-    pub temperature_k: Option<f64>,
-    /// Reference flows of the internal, external A and external B leak, m³/s.
-    pub leak_m3s: PerLeak<Option<f64>>,
-}
-
-impl Record {
-    /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
-    #[inline]
-    pub fn step_s(&self) -> f64 {
-        if self.after_gap { 0.0 } else { self.dt_s }
-    }
-}
-
-/// What becomes of a bad row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub enum BadRows {
-    /// Counted, the first few kept with their place, and skipped.
-    #[default]
-    Skip,
-    /// The end of the reading, as an error. So is a compressed stream that breaks off.
-    Fatal,
-}
 
 /// Reads a trace row by row: a file, a stream, or columns in memory.
 pub struct TraceReader<'a> {

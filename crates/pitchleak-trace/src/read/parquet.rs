@@ -5,15 +5,7 @@ use super::format::Format;
 #[cfg(feature = "parquet")]
 mod codec;
 #[cfg(feature = "parquet")]
-mod columns;
-#[cfg(feature = "parquet")]
-mod deltas;
-#[cfg(feature = "parquet")]
 mod footer;
-#[cfg(feature = "parquet")]
-mod guard;
-#[cfg(feature = "parquet")]
-mod leaf;
 #[cfg(feature = "parquet")]
 mod pages;
 #[cfg(feature = "parquet")]

@@ -1,5 +1,8 @@
 //! What foreign columns may be, by their names and by their values: proposed to a person, never read.
 
+use super::columns::{Content, bare_unit};
+use super::number::decimal;
+use super::table_text::TextTable;
 use crate::header::{self, HeaderUnit};
 use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
@@ -126,6 +129,32 @@ pub(super) fn propose(
         proposals.extend(proposal);
     }
     proposals.sort_by_key(|proposal| proposal.signal);
+    proposals
+}
+
+/// What the columns that are not read may be.
+pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<Proposal> {
+    let has = |signal: Signal| found.iter().any(|content| content.signal() == Some(signal));
+    let has_time = has(Signal::Time) || has(Signal::Timestamp);
+    let is_time = |signal: &Signal| matches!(signal, Signal::Time | Signal::Timestamp);
+    let wanted: Vec<Signal> =
+        Signal::ALL.into_iter().filter(|signal| !(has(*signal) || has_time && is_time(signal))).collect();
+    let unit = |index: usize| {
+        let cell = table.units.as_ref().and_then(|row| row.cells.get(index));
+        cell.map(|cell| bare_unit(cell)).unwrap_or_default()
+    };
+    let unread: Vec<Unread<'_>> = (0..)
+        .zip(&table.headers)
+        .zip(found)
+        .filter(|(_, content)| **content == Content::Ignored)
+        .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
+        .collect();
+    let cells: Vec<Vec<&str>> = unread.iter().map(|column| column.cells.clone()).collect();
+    let decimal = rig.csv.decimal.or_else(|| decimal(&cells).ok()).unwrap_or_default();
+    let mut proposals = propose(&unread, &wanted, decimal, rig);
+    if proposals.iter().any(|proposal| proposal.signal == Signal::Time) {
+        proposals.retain(|proposal| proposal.signal != Signal::Timestamp);
+    }
     proposals
 }
 
@@ -257,14 +286,6 @@ fn words(header: &str) -> Vec<String> {
     words
 }
 
-/// The name among `names` that `name` may be a slip of.
-pub(super) fn near<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let likeness =
-        |other: &&str| strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase());
-    let best = names.filter(|other| !other.is_empty()).max_by(|a, b| likeness(a).total_cmp(&likeness(b)))?;
-    (likeness(&best) >= 0.7).then_some(best)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,12 +371,5 @@ mod tests {
                 (Signal::FlowA, "AI4", Some("L/min"), Why::Unit),
             ]
         );
-    }
-
-    #[test]
-    fn a_slip_has_a_near_name() {
-        let names = ["Head pressure", "Rod pressure", "Flow"];
-        assert_eq!(near("Head presure", names.into_iter()), Some("Head pressure"));
-        assert_eq!(near("Temperature", names.into_iter()), None);
     }
 }

@@ -1,86 +1,12 @@
 //! What a reader noticed about a trace.
 
-use super::Record;
+use super::error::{BadReason, BadRow};
+use super::row::Record;
 use crate::units::duration;
 use pitchleak_core::Sample;
-use std::fmt;
 
 /// How many bad rows are kept with their place.
 const KEPT: usize = 5;
-
-/// Why a row is of no use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BadReason {
-    /// A cell is not a finite number.
-    NotANumber,
-    /// A time stamp is not in the format of its column.
-    NotATime,
-    /// A cell that every row must have is empty.
-    Missing,
-    /// Fewer cells than the header.
-    ShortRow,
-    /// More cells than the header.
-    LongRow,
-    /// Not possible on this rig.
-    OutOfRange,
-    /// Time stands still or goes back.
-    TimeBack,
-}
-
-impl BadReason {
-    /// In the plural, as a count of rows.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::NotANumber => "not a number",
-            Self::NotATime => "not a time",
-            Self::Missing => "missing value",
-            Self::ShortRow => "too few cells",
-            Self::LongRow => "too many cells",
-            Self::OutOfRange => "out of physical range",
-            Self::TimeBack => "time not rising",
-        }
-    }
-}
-
-/// How the rows of a trace are numbered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Counted {
-    /// A file: lines, from 1.
-    #[default]
-    Lines,
-    /// Columns in memory: rows, from 0.
-    Rows,
-}
-
-/// One bad row.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct BadRow {
-    /// Number of the line or row.
-    pub line: u64,
-    /// Which of the two it is.
-    pub counted: Counted,
-    /// Header of the column, where one cell is to blame.
-    pub column: Option<String>,
-    /// Why.
-    pub reason: BadReason,
-    /// What was found and what was expected.
-    pub detail: String,
-}
-
-impl fmt::Display for BadRow {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.counted {
-            Counted::Lines => write!(f, "line {}", self.line)?,
-            Counted::Rows => write!(f, "row {}", self.line)?,
-        }
-        if let Some(column) = &self.column {
-            write!(f, ", column `{column}`")?;
-        }
-        write!(f, ": {}", self.detail)
-    }
-}
 
 /// What a reader noticed so far; whole once [`next_record`](super::TraceReader::next_record) has
 /// given its last.

@@ -2,8 +2,9 @@
 
 use super::columns::{Column, Layout};
 use super::error::TraceFault;
-use super::quality::{BadReason, BadRow};
+use super::error::{BadReason, BadRow};
 use crate::signal::Signal;
+use pitchleak_core::{PerLeak, Sample};
 
 /// A source of rows. A new one is an implementation of this trait; a file format is also one
 /// line of registration in `file.rs`.
@@ -46,6 +47,46 @@ impl Row {
             *cell = value;
         }
     }
+}
+
+/// One good row of a trace, in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Record {
+    /// Line of the file, from 1; of columns in memory the row, from 0.
+    pub line: u64,
+    /// Time as in the file, s; since the first row where the file has time stamps.
+    pub t_s: f64,
+    /// Time since the record before, s: positive, and 0 for the first record.
+    pub dt_s: f64,
+    /// The trace pauses before this record, or its clock begins anew: nothing is known of the time
+    /// between.
+    pub after_gap: bool,
+    /// The readings.
+    pub sample: Sample<f64>,
+    /// Piston speed, m/s.
+    pub speed_mps: Option<f64>,
+    /// Oil temperature, K.
+    pub temperature_k: Option<f64>,
+    /// Reference flows of the internal, external A and external B leak, m³/s.
+    pub leak_m3s: PerLeak<Option<f64>>,
+}
+
+impl Record {
+    /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
+    #[inline]
+    pub fn step_s(&self) -> f64 {
+        if self.after_gap { 0.0 } else { self.dt_s }
+    }
+}
+
+/// What becomes of a bad row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub enum BadRows {
+    /// Counted, the first few kept with their place, and skipped.
+    #[default]
+    Skip,
+    /// The end of the reading, as an error. So is a compressed stream that breaks off.
+    Fatal,
 }
 
 /// What comes next.

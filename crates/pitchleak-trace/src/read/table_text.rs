@@ -1,9 +1,9 @@
 //! The first lines of a text file as a table: where its header is, and what its first rows say.
 
-use super::bind::{Bound, bind};
-use super::encoding::text;
+use super::columns::{Bound, TextRow, bare_unit, bind, column};
 use super::error::TraceFault;
 use super::records::Records;
+use super::records::text;
 use crate::header::HeaderUnit;
 use crate::rig::{Delimiter, Rig};
 use std::io::Cursor;
@@ -14,14 +14,6 @@ const LONGEST_PREAMBLE: usize = 100;
 const ROWS: usize = 1000;
 /// A trace has this many columns at least: time, position, two pressures.
 const LEAST_CELLS: usize = 4;
-
-/// One record, its cells without blanks around them.
-#[derive(Clone, Debug)]
-pub(super) struct TextRow {
-    /// From 1.
-    pub(super) line: u64,
-    pub(super) cells: Vec<String>,
-}
 
 /// A header, and rows below it.
 pub(super) struct TextTable {
@@ -130,15 +122,6 @@ impl Head {
     }
 }
 
-/// What stands in a column of `rows`, empty cells left out.
-pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
-    rows.iter()
-        .filter_map(|row| row.cells.get(index))
-        .map(String::as_str)
-        .filter(|cell| !cell.is_empty())
-        .collect()
-}
-
 fn rows(ahead: &[u8], whole: bool, delimiter: Delimiter) -> Vec<TextRow> {
     let mut records = Records::new(Box::new(Cursor::new(ahead.to_vec())));
     records.split_at(delimiter.byte());
@@ -188,11 +171,4 @@ fn is_units(row: &TextRow) -> bool {
     let filled = || row.cells.iter().filter(|cell| !bare_unit(cell).is_empty());
     let units = filled().filter(|cell| HeaderUnit::is_known(bare_unit(cell))).count();
     units >= 2 && 2 * units >= filled().count()
-}
-
-/// Without brackets and dashes around it.
-pub(super) fn bare_unit(cell: &str) -> &str {
-    let cell = cell.trim_matches(['-', ' ']);
-    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
-    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
 }

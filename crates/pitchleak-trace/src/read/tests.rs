@@ -1,4 +1,5 @@
 use super::*;
+use pitchleak_core::{PerLeak, Sample};
 use proptest::prelude::*;
 use std::io::Write;
 

@@ -1,8 +1,8 @@
 //! `[effects]`: what a diagnosis found and the declared model lacks.
 
 use super::bound::{self, Bound};
+use super::document::RigError;
 use super::document::Section;
-use super::error::RigError;
 use crate::units::Dimension;
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Effect, EffectSet};

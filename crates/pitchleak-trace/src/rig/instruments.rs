@@ -1,6 +1,6 @@
 use super::bound::{self, Bound};
+use super::document::RigError;
 use super::document::Section;
-use super::error::RigError;
 use crate::units::{Dimension, LPM_PER_M3S};
 use pitchleak_core::{Cylinder, SensorSpread, Sensors};
 

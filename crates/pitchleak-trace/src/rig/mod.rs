@@ -3,13 +3,12 @@
 mod bound;
 mod document;
 mod effects;
-mod error;
 mod instruments;
 mod settings;
 mod write;
 
+pub use document::{Fault, Place, RigError};
 pub use effects::{EffectMap, EffectValue};
-pub use error::{Fault, Place, RigError};
 pub use instruments::{Instrument, Instruments};
 pub use settings::{
     ColumnMap, CsvSettings, Decimal, Delimiter, EstimatorKind, EstimatorSettings, ForeignColumn,

@@ -2,7 +2,7 @@
 
 use super::bound;
 use super::document::Section;
-use super::error::RigError;
+use super::document::{Fault, RigError};
 use super::instruments::Instruments;
 use crate::header;
 use crate::signal::Signal;
@@ -323,6 +323,6 @@ fn read_unit(entry: &Section<'_>, signal: Signal) -> Result<Option<Unit>, RigErr
         (Some(dimension), None) => Err(entry.missing("unit", &format!("one of {}", dimension.suffixes()))),
         (Some(dimension), Some(name)) => units::unit(name, dimension)
             .map(Some)
-            .map_err(|source| entry.fail("unit", super::Fault::Quantity { key: entry.path("unit"), source })),
+            .map_err(|source| entry.fail("unit", Fault::Quantity { key: entry.path("unit"), source })),
     }
 }

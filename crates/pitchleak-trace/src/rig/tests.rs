@@ -13,6 +13,26 @@ fn message(text: &str) -> String {
     Rig::parse(text, "rig.toml").unwrap_err().to_string()
 }
 
+/// A diagnosis changes a few numbers: what people wrote around them is theirs.
+#[test]
+fn comments_and_units_stay_where_a_rig_file_is_written_over() {
+    let text = "# Turbine 7\n[cylinder]\narea_a = \"12.6 cm^2\"   # data sheet\narea_b = \"9.4 cm^2\"\nstroke = \"200 mm\"\nmoving_mass = \"20 kg\"\n\
+                \n[fluid] # HLP 46\nbulk_modulus = \"0.8 GPa\" # guessed\n\n[columns]\npa = \"Head [bar]\" # rewired in May\n";
+    let mut rig = Rig::parse(text, "rig.toml").expect("a rig");
+    assert_eq!(rig.to_toml_over(text), text);
+    rig.fluid.bulk_modulus_pa = 9e8;
+    rig.effects.insert(pitchleak_core::Effect::ALL[0], EffectValue::new(1e-6, None));
+    let written = rig.to_toml_over(text);
+    let expected = text.replace("\"0.8 GPa\"", "\"900000000 Pa\"");
+    let expected = expected.split("\n\n[columns]").next().expect("a part");
+    assert!(written.starts_with(expected), "{written}");
+    assert!(written.contains("bulk_modulus_std = \"200000000 Pa\"\n"), "{written}");
+    assert!(written.contains("# rewired in May\n") && written.contains("[effects]\n"), "{written}");
+    assert_eq!(Rig::parse(&written, "rig.toml").expect("a rig"), rig);
+    // A text that is no rig file is replaced.
+    assert_eq!(rig.to_toml_over("nothing"), rig.to_toml());
+}
+
 #[test]
 fn the_contracts_file_is_the_papers_rig() {
     let mut rig = Rig::parse(&declared(), Rig::PAPER_NAME).unwrap();

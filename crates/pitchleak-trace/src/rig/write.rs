@@ -4,7 +4,9 @@ use super::{CsvSettings, ForeignColumn, Instrument, Rig};
 use crate::signal::Signal;
 use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;
+use std::collections::BTreeSet;
 use std::fmt::Write;
+use toml_edit::{DocumentMut, Item, TableLike};
 
 /// A quantity that reads back to the same number.
 fn quantity(value: f64, dimension: Dimension) -> String {
@@ -42,8 +44,27 @@ fn instrument(key: &str, sheet: &Instrument, dimension: Dimension, scale: Bound)
 }
 
 impl Rig {
+    /// The rig file `text` with this rig's numbers: what differs is written anew, and all else stays as somebody wrote it,
+    /// with comments, units and order. A text that can't be brought to say the same is replaced as a whole.
+    pub fn to_toml_over(&self, text: &str) -> String {
+        let fresh = self.to_toml();
+        let mut text = text.trim_start_matches('\u{feff}').to_owned();
+        // What the text leaves out may follow from what was changed: the spread of the bulk modulus is a share of it.
+        for _ in 0..3 {
+            let said = Self::parse(&text, &self.name).ok().map(|rig| rig.to_toml());
+            if said.as_ref() == Some(&fresh) {
+                return text;
+            }
+            match said.and_then(|said| changed(&text, &said, &fresh)) {
+                Some(changed) => text = changed,
+                None => break,
+            }
+        }
+        fresh
+    }
+
     /// The rig as a file that reads back to the same numbers; of a rig made by hand, to the nearest that a file may
-    /// have. Comments of the file it came from are not kept.
+    /// have.
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
         self.write_machine(&mut out);
@@ -193,6 +214,38 @@ impl ForeignColumn {
         }
         out + " }"
     }
+}
+
+/// `text` with what differs between two rigs as this program writes them.
+fn changed(text: &str, before: &str, after: &str) -> Option<String> {
+    let mut document: DocumentMut = text.parse().ok()?;
+    let (before, after): (DocumentMut, DocumentMut) = (before.parse().ok()?, after.parse().ok()?);
+    let sections: BTreeSet<&str> = before.iter().chain(after.iter()).map(|(name, _)| name).collect();
+    for name in sections {
+        let [was, is] = [&before, &after].map(|rig| rig.get(name).and_then(Item::as_table_like));
+        let keys = [was, is].into_iter().flatten().flat_map(|table| table.iter().map(|(key, _)| key));
+        for key in keys.collect::<BTreeSet<_>>() {
+            let [was, is] = [was, is].map(|table| table.and_then(|table| table.get(key)));
+            if was.map(Item::to_string) != is.map(Item::to_string) {
+                let section = document.entry(name).or_insert(toml_edit::table()).as_table_like_mut()?;
+                set(section, key, is);
+            }
+        }
+    }
+    Some(document.to_string())
+}
+
+/// Sets or takes out a key; the comment behind it stays.
+fn set(section: &mut dyn TableLike, key: &str, item: Option<&Item>) {
+    let Some(item) = item else {
+        section.remove(key);
+        return;
+    };
+    let mut item = item.clone();
+    if let (Some(new), Some(old)) = (item.as_value_mut(), section.get(key).and_then(Item::as_value)) {
+        *new.decor_mut() = old.decor().clone();
+    }
+    section.insert(key, item);
 }
 
 fn put(out: &mut String, keys: &[(&str, Option<String>)]) {

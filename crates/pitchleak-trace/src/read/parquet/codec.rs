@@ -15,27 +15,32 @@ pub(super) enum Codec {
     Plain,
     Snappy,
     Gzip,
-    /// Blocks of LZ4 with their lengths before them, as Hadoop writes them; also what was written under this name by others.
-    Lz4,
     Zstd,
-    /// One block of LZ4.
+    /// One block of LZ4: `LZ4_RAW`.
     Lz4Raw,
 }
 
-/// What the error of a codec that is not read begins with; its name follows.
-pub(super) const UNREAD: &str = "codec ";
+/// What the error of what is sound, and not read, begins with: what it is follows, and in the next line what to do.
+pub(super) const UNREAD: &str = "not read: ";
+
+pub(super) fn unread(what: &str, settle: &str) -> ParquetError {
+    ParquetError::NYI(format!("{UNREAD}{what}\n{settle}"))
+}
 
 impl Codec {
     /// That of a number in the footer.
     pub(super) fn of(number: i64) -> Result<Self> {
-        let unread = |name: &str| Err(ParquetError::NYI(format!("{UNREAD}{name}")));
+        let unread = |name: &str| {
+            let what = format!("compressed by {name}");
+            Err(unread(&what, "write it with compression=\"zstd\", \"snappy\", \"gzip\" or none"))
+        };
         Ok(match number {
             0 => Self::Plain,
             1 => Self::Snappy,
             2 => Self::Gzip,
             3 => return unread("LZO"),
             4 => return unread("brotli"),
-            5 => Self::Lz4,
+            5 => return unread("LZ4 as Hadoop frames it"),
             6 => Self::Zstd,
             7 => Self::Lz4Raw,
             _ => return unread("an unknown codec"),
@@ -56,7 +61,6 @@ impl Codec {
             _ if room == 0 => Vec::new(),
             Self::Snappy => snappy(packed, room)?,
             Self::Gzip => stream(MultiGzDecoder::new(packed), room)?,
-            Self::Lz4 => lz4(packed, room)?,
             Self::Zstd => zstd(packed, room)?,
             Self::Lz4Raw => lz4_block(packed, room)?,
         };
@@ -102,28 +106,6 @@ fn lz4_block(packed: &[u8], room: usize) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn lz4(packed: &[u8], room: usize) -> Result<Vec<u8>> {
-    let fits = |bytes: &Vec<u8>| bytes.len() == room;
-    let hadoop = lz4_hadoop(packed, room).filter(fits);
-    let frame = || stream(lz4_flex::frame::FrameDecoder::new(packed), room).ok().filter(fits);
-    hadoop.or_else(frame).map_or_else(|| lz4_block(packed, room), Ok)
-}
-
-/// Blocks, each behind its length unpacked and packed; nothing where they are not such.
-fn lz4_hadoop(mut packed: &[u8], room: usize) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
-    while !packed.is_empty() {
-        let (length, rest) = packed.split_first_chunk()?;
-        let (held, rest) = rest.split_first_chunk()?;
-        let (block, rest) = rest.split_at_checked(u32::from_be_bytes(*held) as usize)?;
-        let length = u32::from_be_bytes(*length) as usize;
-        let left = room.checked_sub(bytes.len())?;
-        bytes.append(&mut lz4_block(block, length.min(left)).ok()?);
-        packed = rest;
-    }
-    Some(bytes)
-}
-
 fn damaged(what: &dyn Display) -> ParquetError {
     ParquetError::General(format!("a page can't be unpacked: {what}"))
 }
@@ -132,7 +114,7 @@ fn damaged(what: &dyn Display) -> ParquetError {
 mod tests {
     use super::*;
 
-    const PACKED: [Codec; 5] = [Codec::Snappy, Codec::Gzip, Codec::Lz4, Codec::Zstd, Codec::Lz4Raw];
+    const PACKED: [Codec; 4] = [Codec::Snappy, Codec::Gzip, Codec::Zstd, Codec::Lz4Raw];
 
     /// It would take all memory otherwise.
     #[test]
@@ -155,12 +137,10 @@ mod tests {
         let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
         std::io::Write::write_all(&mut gzip, &zeros).unwrap();
         let block = lz4_flex::block::compress(&zeros);
-        let lengths = [zeros.len() as u32, block.len() as u32].map(u32::to_be_bytes).concat();
         let packed = [
             (Codec::Gzip, gzip.finish().unwrap()),
             (Codec::Snappy, snap::raw::Encoder::new().compress_vec(&zeros).unwrap()),
-            (Codec::Lz4Raw, block.clone()),
-            (Codec::Lz4, [lengths, block].concat()),
+            (Codec::Lz4Raw, block),
             (
                 Codec::Zstd,
                 ruzstd::encoding::compress_to_vec(
@@ -178,17 +158,6 @@ mod tests {
             for size in [1, 240, (1 << 20) - 1, (1 << 20) + 1, MOST_HELD] {
                 assert!(codec.unpacked(&[], packed, size).is_err(), "{codec:?}, {size}");
             }
-        }
-    }
-
-    /// Not only as Hadoop writes it.
-    #[test]
-    fn lz4_is_read_in_each_of_its_forms() {
-        let text = b"what is written, what is written".repeat(9);
-        let mut frame = lz4_flex::frame::FrameEncoder::new(Vec::new());
-        std::io::Write::write_all(&mut frame, &text).unwrap();
-        for packed in [frame.finish().unwrap(), lz4_flex::block::compress(&text)] {
-            assert_eq!(Codec::Lz4.unpacked(&[], &packed, text.len() as u64).unwrap(), text);
         }
     }
 }

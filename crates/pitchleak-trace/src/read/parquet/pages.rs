@@ -1,14 +1,15 @@
 //! The pages of a column, one after the other. The crate `parquet` unpacks what a page holds before anyone can ask how much
 //! it is, and makes room for as many values as the page says that it has.
 
-use super::codec::Codec;
-use super::deltas::{from_differences, from_lengths};
-use super::footer::{Chunk, damaged};
+use super::codec::{Codec, unread};
+use super::footer::Leaf;
+use super::footer::{Chunk, Footer, damaged};
 use super::thrift::{Fields, structure};
 use crate::read::format::MOST_HELD;
 use bytes::Bytes;
 use parquet::basic::Encoding;
 use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::column::reader::{ColumnReader, get_column_reader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::reader::ChunkReader;
 use std::sync::Arc;
@@ -25,16 +26,14 @@ const DATA_2: i64 = 3;
 pub(super) struct Pages<R> {
     file: Arc<R>,
     codec: Codec,
-    /// Whether cells may be missing: then levels stand before the values.
-    optional: bool,
     /// Where the next one begins, and the bytes from there to the column's end.
     at: u64,
     left: u64,
 }
 
 impl<R: ChunkReader> Pages<R> {
-    pub(super) fn of(file: Arc<R>, chunk: Chunk, optional: bool) -> Result<Self> {
-        Ok(Self { file, codec: Codec::of(chunk.codec)?, optional, at: chunk.start, left: chunk.length })
+    pub(super) fn of(file: Arc<R>, chunk: Chunk) -> Result<Self> {
+        Ok(Self { file, codec: Codec::of(chunk.codec)?, at: chunk.start, left: chunk.length })
     }
 
     fn take(&mut self, length: u64) -> Result<Bytes> {
@@ -177,8 +176,7 @@ impl<R: ChunkReader> PageReader for Pages<R> {
             let head = self.head(Head::of)?;
             let bytes = self.take(head.packed)?;
             if let Some(content) = head.content {
-                let page = content.page(&bytes, head.size, self.codec)?;
-                return plain_texts(page, self.optional).map(Some);
+                return content.page(&bytes, head.size, self.codec).map(Some);
             }
         }
         Ok(None)
@@ -202,39 +200,6 @@ impl<R: ChunkReader> Iterator for Pages<R> {
     }
 }
 
-/// The page with texts as they are, where they are written as differences.
-fn plain_texts(mut page: Page, optional: bool) -> Result<Page> {
-    let levels = match &page {
-        Page::DataPage { buf, num_values, def_level_encoding, .. } if optional => {
-            levels(buf, *num_values, *def_level_encoding)?
-        }
-        Page::DataPageV2 { def_levels_byte_len, rep_levels_byte_len, .. } => {
-            *def_levels_byte_len as usize + *rep_levels_byte_len as usize
-        }
-        _ => 0,
-    };
-    if let Page::DataPage { buf, encoding, .. } | Page::DataPageV2 { buf, encoding, .. } = &mut page {
-        let plain = match encoding {
-            Encoding::DELTA_LENGTH_BYTE_ARRAY => from_lengths,
-            Encoding::DELTA_BYTE_ARRAY => from_differences,
-            _ => return Ok(page),
-        };
-        let split = buf.split_at_checked(levels).ok_or_else(|| damaged("levels longer than their page"))?;
-        let (levels, values) = split;
-        (*buf, *encoding) = ([levels, &plain(values)?].concat().into(), Encoding::PLAIN);
-    }
-    Ok(page)
-}
-
-/// The bytes of the levels of a page of version 1: one bit a value, or as many as they say.
-fn levels(page: &[u8], num_values: u32, encoding: Encoding) -> Result<usize> {
-    if encoding != Encoding::RLE {
-        return Ok(num_values.div_ceil(8) as usize);
-    }
-    let length = page.first_chunk().map(|length| u32::from_le_bytes(*length) as usize);
-    length.and_then(|length| length.checked_add(4)).ok_or_else(|| damaged("a page without its levels"))
-}
-
 fn count(fields: &Fields<'_>, id: usize) -> Result<u32> {
     Ok(u32::try_from(fields.needed(id)?.whole()?)?)
 }
@@ -248,10 +213,55 @@ fn encoded(number: u32) -> Result<Encoding> {
         3 => Encoding::RLE,
         4 => bit_packed,
         5 => Encoding::DELTA_BINARY_PACKED,
-        6 => Encoding::DELTA_LENGTH_BYTE_ARRAY,
-        7 => Encoding::DELTA_BYTE_ARRAY,
+        // The crate `parquet` makes room for as many texts as such a page says.
+        6 | 7 => {
+            return Err(unread(
+                "texts written as differences",
+                "write the column as times or numbers, or with use_dictionary=True",
+            ));
+        }
         8 => Encoding::RLE_DICTIONARY,
         9 => Encoding::BYTE_STREAM_SPLIT,
         _ => return Err(damaged("a page in an unknown encoding")),
     })
+}
+
+/// A file of columns, on a disk or in memory.
+pub(super) trait Columns: Send + Sync {
+    fn leaves(&self) -> &[Leaf];
+
+    /// How many groups of rows there are.
+    fn groups(&self) -> usize;
+
+    /// The column at `place` of a group of rows.
+    fn read(&self, group: usize, place: usize) -> Result<ColumnReader>;
+}
+
+pub(super) fn open(bytes: impl ChunkReader + 'static) -> Result<Arc<dyn Columns>> {
+    let footer = Footer::of(&bytes)?;
+    Ok(Arc::new(InFile { bytes: Arc::new(bytes), footer }))
+}
+
+struct InFile<R> {
+    bytes: Arc<R>,
+    footer: Footer,
+}
+
+impl<R: ChunkReader + 'static> Columns for InFile<R> {
+    fn leaves(&self) -> &[Leaf] {
+        &self.footer.leaves
+    }
+
+    fn groups(&self) -> usize {
+        self.footer.groups.len()
+    }
+
+    fn read(&self, group: usize, place: usize) -> Result<ColumnReader> {
+        let chunk = self.footer.groups.get(group).and_then(|chunks| chunks.get(place));
+        let (Some(chunk), Some(leaf)) = (chunk, self.footer.leaves.get(place)) else {
+            return Err(ParquetError::General("a column that is not there".to_owned()));
+        };
+        let pages = Pages::of(Arc::clone(&self.bytes), *chunk)?;
+        Ok(get_column_reader(leaf.descriptor()?, Box::new(pages)))
+    }
 }

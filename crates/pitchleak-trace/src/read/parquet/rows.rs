@@ -1,18 +1,14 @@
+//! The rows of a Parquet file, row group after row group.
+
 use super::codec::UNREAD;
-use super::columns::{self, Columns};
-use super::guard::guarded;
-use super::leaf::Kind;
+use super::footer::Kind;
+use super::pages::{self, Columns};
 use crate::header::shorten;
-use crate::read::bind::bind;
-use crate::read::columns::{Content, Layout, standard};
-use crate::read::dialect::time_format;
-use crate::read::error::TraceFault;
-use crate::read::format::{Rows, Stream};
-use crate::read::mistaken::mistaken;
-use crate::read::quality::Counted;
-use crate::read::stamp::{Epoch, seconds_between};
+use crate::read::columns::{Content, Layout, TextRow, bind, column, standard};
+use crate::read::error::{Counted, TraceFault};
+use crate::read::format::{Rows, Stream, mistaken};
+use crate::read::stamps::{Epoch, seconds_between, time_format};
 use crate::read::table::{Cells, TableRows};
-use crate::read::table_text::{TextRow, column};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::times::TimeFormat;
@@ -21,7 +17,9 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use std::borrow::Cow;
-use std::sync::{Arc, OnceLock};
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::{Arc, Once, OnceLock};
 
 /// Rows read at a time: their columns stay in the cache.
 const BATCH: usize = 4096;
@@ -53,8 +51,8 @@ pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
 
 fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let file = match stream.file.take() {
-        Some(file) => columns::open(file).map_err(damaged)?,
-        None => columns::open(Bytes::from(stream.hold()?)).map_err(damaged)?,
+        Some(file) => pages::open(file).map_err(damaged)?,
+        None => pages::open(Bytes::from(stream.hold()?)).map_err(damaged)?,
     };
     let fields = fields(file.as_ref());
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
@@ -67,8 +65,20 @@ fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         let fits = match bound_column.content {
             Content::Ignored => continue,
             Content::Number(..) => field.kind == Kind::Number,
-            Content::Timestamp => field.kind != Kind::Other,
+            Content::Timestamp => !matches!(field.kind, Kind::Other | Kind::Int96),
         };
+        if field.kind == Kind::Int96 {
+            return Err(TraceFault::Ambiguous {
+                what: format!(
+                    "column `{}` holds times of 96 bits (INT96), which are not read",
+                    shorten(&field.name, 40)
+                ),
+                settle:
+                    "write it with spark.sql.parquet.outputTimestampType=TIMESTAMP_MICROS, in Python without \
+                         use_deprecated_int96_timestamps"
+                        .to_owned(),
+            });
+        }
         if !fits {
             return Err(TraceFault::Ambiguous {
                 what: format!("column `{}` does not hold numbers", shorten(&field.name, 40)),
@@ -104,11 +114,10 @@ fn damaged(error: ParquetError) -> TraceFault {
         ParquetError::NYI(what) | ParquetError::General(what) | ParquetError::EOF(what) => what,
         other => other.to_string(),
     };
-    match what.strip_prefix(UNREAD) {
-        Some(codec) => TraceFault::Ambiguous {
-            what: format!("compressed by {codec}, which is not read"),
-            settle: "write it with compression=\"zstd\", \"snappy\", \"gzip\", \"lz4\" or none".to_owned(),
-        },
+    match what.strip_prefix(UNREAD).and_then(|what| what.split_once('\n')) {
+        Some((what, settle)) => {
+            TraceFault::Ambiguous { what: format!("not read: {what}"), settle: settle.to_owned() }
+        }
         None => TraceFault::Damaged(what.replace('\n', " ")),
     }
 }
@@ -141,7 +150,7 @@ fn sample(file: &dyn Columns, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow
         let cells: Vec<String> = match field.kind {
             Kind::Other => continue,
             Kind::Number if is_plain(field, rig) => continue,
-            Kind::Stamp(_) => vec!["2000-01-01T00:00:00".to_owned()],
+            Kind::Stamp(_) | Kind::Int96 => vec!["2000-01-01T00:00:00".to_owned()],
             Kind::Text => {
                 let mut reader = file.read(0, field.place).map_err(damaged)?;
                 let texts = texts(&mut reader, field.optional, SAMPLE)?;
@@ -279,9 +288,6 @@ fn numbers(reader: &mut ColumnReader, optional: bool, rows: usize) -> Result<Vec
 fn stamps(reader: &mut ColumnReader, optional: bool) -> Result<Vec<Option<i64>>, TraceFault> {
     match reader {
         ColumnReader::Int64ColumnReader(reader) => read(reader, optional, BATCH, None, Some),
-        ColumnReader::Int96ColumnReader(reader) => {
-            read(reader, optional, BATCH, None, |stamp| Some(stamp.to_nanos()))
-        }
         _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
     }
 }
@@ -293,4 +299,28 @@ fn texts(reader: &mut ColumnReader, optional: bool, rows: usize) -> Result<Vec<B
         }
         _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
     }
+}
+
+thread_local! {
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `read`; a panic within is damage of the file, and nobody hears of it but by the error. What `read` leaves half-done
+/// must not be used after an error.
+pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, TraceFault>) -> Result<T, TraceFault> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            if !GUARDED.get() {
+                before(panic);
+            }
+        }));
+    });
+    GUARDED.set(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(read));
+    GUARDED.set(false);
+    result.unwrap_or_else(|_| {
+        Err(TraceFault::Damaged("a page of the Parquet file contradicts itself".to_owned()))
+    })
 }

@@ -1,0 +1,194 @@
+//! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
+
+use super::columns::TextRow;
+use super::columns::{Content, Layout};
+use super::error::BadReason;
+use super::error::TraceFault;
+use super::table::Cells;
+use crate::header::shorten;
+use crate::rig::{ColumnMap, Rig};
+use crate::signal::Signal;
+use crate::times::{self, TimeFault, TimeFormat, TimeKind};
+use std::borrow::Cow;
+
+/// The first time stamp of a trace, from which its seconds count.
+#[derive(Default)]
+pub(super) struct Epoch {
+    format: TimeFormat,
+    first_ns: Option<i128>,
+    last_ns: Option<i128>,
+}
+
+impl Epoch {
+    /// Stamps in this format.
+    pub(super) fn new(format: TimeFormat) -> Self {
+        Self { format, first_ns: None, last_ns: None }
+    }
+
+    /// Goes on counting from a first stamp, ns since 1970.
+    pub(super) fn since(first_ns: Option<i64>, format: TimeFormat) -> Self {
+        Self { first_ns: first_ns.map(i128::from), ..Self::new(format) }
+    }
+
+    /// The first stamp, ns since 1970.
+    pub(super) fn first_ns(&self) -> Option<i64> {
+        self.first_ns.and_then(|first_ns| i64::try_from(first_ns).ok())
+    }
+
+    /// Seconds since the first stamp read; NaN for an empty cell. A stamp without an offset is read
+    /// as UTC where no zone is known, so that a day of 24 h has 24 h.
+    pub(super) fn seconds(&mut self, cell: &[u8]) -> Result<f64, BadReason> {
+        let cell = cell.trim_ascii();
+        if cell.is_empty() {
+            return Ok(f64::NAN);
+        }
+        let text = std::str::from_utf8(cell).map_err(|_| BadReason::NotATime)?;
+        let reading = self.format.kind.read(text).ok_or(BadReason::NotATime)?;
+        let stamp_ns = self.format.instant_ns(reading, self.last_ns).ok_or(BadReason::NotATime)?;
+        self.last_ns = Some(stamp_ns);
+        let first_ns = *self.first_ns.get_or_insert(stamp_ns);
+        Ok(seconds_between(first_ns, stamp_ns))
+    }
+}
+
+/// Seconds from one time to another, both in ns since any one instant.
+pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
+    let nanoseconds = to_ns - from_ns;
+    // Whole seconds apart, so that a trace of a year still has its nanoseconds.
+    let (whole, rest) = (nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+    whole as f64 + rest as f64 / 1e9
+}
+
+/// So many rows say how times are written.
+const ROWS: usize = 100;
+
+/// The first rows as text, as those of a file of text are looked at.
+pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
+    let rows = columns.iter().map(Vec::len).max().unwrap_or(0).min(ROWS);
+    let text = |row: usize, column: &Vec<f64>| {
+        column.get(row).filter(|value| !value.is_nan()).map_or_else(String::new, f64::to_string)
+    };
+    let row = |row: usize| TextRow {
+        line: row as u64,
+        cells: columns.iter().map(|column| text(row, column)).collect(),
+    };
+    (0..rows).map(row).collect()
+}
+
+/// How the column of time stamps, if there is one, becomes seconds.
+pub(super) struct Stamped {
+    pub(super) format: TimeFormat,
+    epoch: Epoch,
+}
+
+impl Stamped {
+    pub(super) fn new(
+        layout: &Layout,
+        foreign: &ColumnMap,
+        rig: &Rig,
+        columns: &[Vec<f64>],
+    ) -> Result<Self, TraceFault> {
+        let stamps = layout.columns.iter().position(|column| column.content == Content::Timestamp);
+        let format = match stamps.and_then(|index| columns.get(index)) {
+            None => TimeFormat::default(),
+            Some(values) => {
+                let cells: Vec<String> =
+                    values.iter().take(ROWS).filter(|value| !value.is_nan()).map(f64::to_string).collect();
+                time_format(&cells.iter().map(String::as_str).collect::<Vec<_>>(), layout, foreign, rig)?
+            }
+        };
+        Ok(Self { epoch: Epoch::new(format.clone()), format })
+    }
+
+    /// The columns that are read.
+    pub(super) fn cells(mut self, layout: &Layout, columns: Vec<Vec<f64>>) -> Vec<Cells<'static>> {
+        let mut cells = Vec::new();
+        for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
+            let (signal, unit, values) = match column.content {
+                Content::Number(signal, unit) => (signal, unit, values),
+                Content::Timestamp => {
+                    let seconds =
+                        |value: &f64| self.epoch.seconds(value.to_string().as_bytes()).unwrap_or(f64::NAN);
+                    (Signal::Time, None, values.iter().map(seconds).collect())
+                }
+                Content::Ignored => continue,
+            };
+            cells.push(Cells { signal, unit, values: Cow::Owned(values), index });
+        }
+        cells
+    }
+}
+
+/// As the rig file or the command line says it, else as the cells themselves do.
+pub(super) fn time_format(
+    cells: &[&str],
+    layout: &Layout,
+    foreign: &ColumnMap,
+    rig: &Rig,
+) -> Result<TimeFormat, TraceFault> {
+    let entry = rig.columns.get(&Signal::Timestamp).or_else(|| foreign.get(&Signal::Timestamp));
+    let zone = entry.and_then(|entry| entry.zone.clone());
+    let zone = zone.or_else(|| rig.csv.time.as_ref().and_then(|time| time.zone.clone()));
+    let kind = entry.and_then(|entry| entry.format.clone());
+    let kind = kind.or_else(|| rig.csv.time.as_ref().map(|time| time.kind.clone()));
+    if let Some(kind) = kind {
+        return Ok(TimeFormat { kind, zone });
+    }
+    if cells.is_empty() {
+        return Ok(TimeFormat { zone, ..TimeFormat::default() });
+    }
+    match times::guess(cells) {
+        Ok(format) => Ok(TimeFormat { zone, ..format }),
+        // Row by row it says which cells are bad.
+        Err(TimeFault::Unknown(_)) if cells.iter().any(|cell| TimeKind::Iso.read(cell).is_some()) => {
+            Ok(TimeFormat { zone, ..TimeFormat::default() })
+        }
+        Err(fault) => Err(unclear_time(&fault, layout)),
+    }
+}
+
+fn unclear_time(fault: &TimeFault, layout: &Layout) -> TraceFault {
+    let name = shorten(layout.header_of(Signal::Timestamp).unwrap_or_default(), 40);
+    let line = |format: &str| format!("timestamp = {{ name = \"{name}\", format = \"{format}\" }}");
+    let settle = match fault {
+        TimeFault::DayOrMonth(_) | TimeFault::BothOrders { .. } => {
+            format!(
+                "--time-format dmy or mdy says which, or under [columns] of the rig file: {}",
+                line("dmy")
+            )
+        }
+        TimeFault::BareNumber(_) => format!(
+            "under [columns] of the rig file say t = {{ name = \"{name}\", unit = \"s\" }}, or {}",
+            line("excel")
+        ),
+        TimeFault::Unknown(_) => {
+            format!(
+                "--time-format says how it is written, or under [columns] of the rig file: {}",
+                line("%d.%m.%Y %H:%M:%S%.f")
+            )
+        }
+    };
+    TraceFault::Ambiguous { what: format!("column `{name}`: {fault}"), settle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn seconds_count_from_the_first_stamp() {
+        let mut epoch = Epoch::default();
+        let stamps = [
+            ("2026-11-20T22:10:31.5Z", 0.0),
+            ("2026-11-20 22:10:31.51", 0.01),
+            ("2026-11-20T23:10:32+01:00", 0.5),
+            ("2026-11-21T22:10:31.5Z", 86_400.0),
+        ];
+        for (text, seconds) in stamps {
+            assert_eq!(epoch.seconds(text.as_bytes()), Ok(seconds), "{text}");
+        }
+        for text in ["yesterday", "12", "2026-13-01T00:00:00Z", "\u{0}"] {
+            assert_eq!(epoch.seconds(text.as_bytes()), Err(BadReason::NotATime), "{text}");
+        }
+        assert!(epoch.seconds(b"  ").is_ok_and(f64::is_nan));
+    }
+}
