@@ -44,4 +44,4 @@ pub mod viscosity;
 pub mod wind;
 pub mod wiring;
 
-pub use pitchleak_trace::{Rig, header, openfast, read as trace, rig, signal, times, units};
+pub use pitchleak_trace::{Rig, header, openfast, read as trace, rig, signal, template, times, units};

@@ -10,6 +10,7 @@ use pitchleak_reproduce::ReproduceError;
 use pitchleak_view::figure::FigureError;
 use pitchleak_view::page::PageError;
 use std::io;
+use std::path::PathBuf;
 
 /// Why a command ended early; one line for people each.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +46,9 @@ pub enum Failure {
         /// Traces given.
         traces: usize,
     },
+    /// `init` writes over nothing.
+    #[error("{path} is there already, and stays: name another by --out, or take it away", path = .0.display())]
+    RigIsThere(PathBuf),
     /// A manual page of no command.
     #[error("no command `{0}`; pitchleak --help names them")]
     NoCommand(String),

@@ -91,7 +91,7 @@ impl Trace {
         let size = std::fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
         let bar = progress(size);
         let reader = TraceReader::open_through(&self.path, &self.rig, |file| Box::new(bar.wrap_read(file)))?;
-        Ok((reader.with_bad_rows(self.bad_rows), bar))
+        Ok((reader.with_bad_rows(self.bad_rows).ahead(), bar))
     }
 
     /// Prints a report: as a line of JSON, else as text, with an empty line behind it where others follow.

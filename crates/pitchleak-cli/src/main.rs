@@ -6,6 +6,7 @@ mod completions;
 mod diagnose;
 mod failure;
 mod fleet;
+mod init;
 mod input;
 mod interrupt;
 mod man;
@@ -39,6 +40,7 @@ enum Command {
     Diagnose(diagnose::Arguments),
     Check(check::Arguments),
     Columns(columns::Arguments),
+    Init(init::Arguments),
     Fleet(fleet::Arguments),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
@@ -77,6 +79,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Diagnose(arguments) => diagnose::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Columns(arguments) => columns::run(arguments),
+        Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),
         Command::Watch(arguments) => watch::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),

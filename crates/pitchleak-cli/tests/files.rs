@@ -202,3 +202,61 @@ fn a_trace_is_read_whatever_stands_above_it() {
     let output = pitchleak(&["replay", "a.csv"], folder.path());
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
 }
+
+/// From an unknown logger's file to a verdict: `init`, then the number that `replay` names, until none is left.
+#[test]
+fn init_names_the_columns_and_replay_the_first_blank() {
+    let folder = tempfile::tempdir().unwrap();
+    let header =
+        "Elapsed (s),Stroke [mm],Head pressure [bar],Rod pressure [bar],Flow head [l/min],Flow rod [l/min]";
+    write(folder.path(), "x.csv", header, plain);
+    let begun = pitchleak(&["init", "x.csv"], folder.path());
+    assert_eq!(begun.status.code(), Some(0), "{}", text(&begun.stderr));
+    assert!(text(&begun.stdout).starts_with("rig.toml written: 6 columns named."), "{}", text(&begun.stdout));
+    let again = pitchleak(&["init", "x.csv"], folder.path());
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("rig.toml is there already"), "{}", text(&again.stderr));
+    let path = folder.path().join("rig.toml");
+    for key in [
+        "cylinder.area_a",
+        "cylinder.area_b",
+        "cylinder.stroke",
+        "cylinder.moving_mass",
+        "fluid.bulk_modulus",
+    ] {
+        let refused = pitchleak(&["replay", "x.csv"], folder.path());
+        let said = text(&refused.stderr);
+        let rig = std::fs::read_to_string(&path).unwrap();
+        let name = key.rsplit('.').next().unwrap();
+        let (index, line) =
+            rig.lines().enumerate().find(|(_, line)| line.starts_with(&format!("# {name} ="))).unwrap();
+        assert!(
+            said.starts_with(&format!("error: rig.toml:{}: `{key}` is still blank", index + 1)),
+            "{said}"
+        );
+        assert_eq!((refused.status.code(), said.lines().count()), (Some(2), 1), "{said}");
+        std::fs::write(&path, rig.replace(line, &line[2..])).unwrap();
+    }
+    let read = pitchleak(&["replay", "x.csv", "--json"], folder.path());
+    assert_eq!(read.status.code(), Some(0), "{}", text(&read.stderr));
+    // Every other blank is one that a rig file may have.
+    let rig = std::fs::read_to_string(&path).unwrap().replace("\n# ", "\n");
+    let rig = rig.split_once("[cylinder]").unwrap().1;
+    assert!(rig.contains("\nforce = {"), "{rig}");
+    std::fs::write(&path, format!("[cylinder]{rig}")).unwrap();
+    let read = pitchleak(&["replay", "x.csv", "--json"], folder.path());
+    assert_eq!(read.status.code(), Some(0), "{}", text(&read.stderr));
+}
+
+/// Parquet files have names that nobody of the program chose, too.
+#[test]
+fn init_looks_at_parquet() {
+    let folder = tempfile::tempdir().unwrap();
+    let parquet = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/parquet/polars.parquet");
+    let out = folder.path().join("new.toml");
+    let begun = pitchleak(&["init", parquet.to_str().unwrap(), "-o", out.to_str().unwrap()], folder.path());
+    assert_eq!(begun.status.code(), Some(0), "{}", text(&begun.stderr));
+    let rig = std::fs::read_to_string(out).unwrap();
+    assert!(rig.contains("pb = { name = \"Pressure B [bar]\", unit = \"bar\" }   # by its name"), "{rig}");
+    assert!(rig.contains("# qb = {") && !rig.contains("# pa = {"), "{rig}");
+}

@@ -14,7 +14,7 @@ pub struct HeaderUnit {
 }
 
 /// Other spellings of units.
-const SPELLINGS: [(&str, &str); 26] = [
+const SPELLINGS: [(&str, &str); 30] = [
     ("sec", "s"),
     ("secs", "s"),
     ("second", "s"),
@@ -24,6 +24,10 @@ const SPELLINGS: [(&str, &str); 26] = [
     ("msec", "ms"),
     ("millis", "ms"),
     ("milliseconds", "ms"),
+    ("µs", "us"),
+    ("μs", "us"),
+    ("usec", "us"),
+    ("microseconds", "us"),
     ("meter", "m"),
     ("metre", "m"),
     ("millimeter", "mm"),

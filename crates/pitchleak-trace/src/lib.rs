@@ -6,6 +6,7 @@
 //! - [`rig`]: the rig file: cylinder, oil, sensors, and `[columns]` where a file's names are foreign.
 //! - [`read`]: rows of CSV, Parquet, MAT, or columns in memory as [`read::Record`]s, one by one in constant memory. A row that
 //!   can't be is counted with its place, never lost in silence.
+//! - [`template`]: a rig file to fill in, of what a trace says of itself.
 //! - [`openfast`]: loads and pitch angles that OpenFAST wrote.
 //!
 //! ```
@@ -27,6 +28,7 @@ pub mod openfast;
 pub mod read;
 pub mod rig;
 pub mod signal;
+pub mod template;
 pub mod times;
 pub mod units;
 

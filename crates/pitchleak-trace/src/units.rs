@@ -182,6 +182,7 @@ const SPEED: &[Unit] = &[times("m/s", Some("mps"), 1.0), over("mm/s", Some("mmps
 const TIME: &[Unit] = &[
     times("s", Some("s"), 1.0),
     over("ms", Some("ms"), 1e3),
+    over("us", Some("us"), 1e6),
     times("min", None, 60.0),
     times("h", None, 3600.0),
 ];

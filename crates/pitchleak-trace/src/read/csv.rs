@@ -17,7 +17,10 @@ use crate::times::TimeKind;
 /// Text is whatever no other format knows as its own.
 pub(super) const FORMAT: Format = Format {
     starts_with: b"",
-    reading: Reading::Rows(|stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?))),
+    reading: Reading::Rows {
+        open: |stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?)),
+        look: |stream, rig| Dialect::first_lines(stream, rig).map(|(_, _, table)| table),
+    },
 };
 
 struct CsvRows {

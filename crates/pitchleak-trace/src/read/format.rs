@@ -4,6 +4,7 @@
 use super::error::TraceFault;
 use super::records::text;
 use super::row::RowSource;
+use super::table_text::TextTable;
 use crate::rig::Rig;
 use std::fs::File;
 use std::io::Read;
@@ -17,8 +18,11 @@ pub(super) struct Format {
 
 /// How the rows of a format are read.
 pub(super) enum Reading {
-    /// In this way.
-    Rows(fn(Stream, &Rig) -> Result<Rows, TraceFault>),
+    /// In this way; `look` gives the names of its columns and their first cells, also where they make no trace yet.
+    Rows {
+        open: fn(Stream, &Rig) -> Result<Rows, TraceFault>,
+        look: fn(Stream, &Rig) -> Result<TextTable, TraceFault>,
+    },
     /// Not at all: what to do instead.
     Refused(&'static str),
 }
@@ -31,7 +35,14 @@ impl Format {
 
     pub(super) fn open(&self, stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         match self.reading {
-            Reading::Rows(open) => open(stream, rig),
+            Reading::Rows { open, .. } => open(stream, rig),
+            Reading::Refused(instead) => Err(TraceFault::Format(instead)),
+        }
+    }
+
+    pub(super) fn look(&self, stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+        match self.reading {
+            Reading::Rows { look, .. } => look(stream, rig),
             Reading::Refused(instead) => Err(TraceFault::Format(instead)),
         }
     }

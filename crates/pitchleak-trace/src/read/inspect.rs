@@ -1,16 +1,15 @@
 //! How a file would be read, for a person to look at before it is.
 
 use super::columns::Bound;
-use super::columns::{Content, Layout, partly};
+use super::columns::{Content, partly};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::file;
-use super::format::Format;
 use super::number::decimal;
-use super::proposal::{Proposal, proposals};
+use super::proposal::{Proposal, Why, proposals};
 use super::table_text::TextTable;
 use crate::header::{near, shorten};
-use crate::rig::{ColumnMap, Decimal, Rig};
+use crate::rig::{ColumnMap, Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
 use serde::Serialize;
 use std::fmt::Write;
@@ -30,6 +29,8 @@ pub struct FileReading {
     pub time_format: Option<String>,
     /// Its columns in their order.
     pub columns: Vec<ColumnReading>,
+    /// Lines of `[columns]` that say what is read of foreign names without them.
+    pub named: Vec<ProposedLine>,
     /// Why it is not read as it is.
     pub problem: Option<String>,
     /// Lines of `[columns]` that would name what is missing, each with what speaks for it.
@@ -97,11 +98,7 @@ impl FileReading {
             let file = File::open(path).map_err(TraceFault::Open)?;
             file::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
         };
-        if let Format { starts_with: b"", .. } = format {
-            let (_, _, table) = Dialect::first_lines(stream, rig)?;
-            return Ok(Self::of_table(table, rig));
-        }
-        Ok(Self::of_layout(format.open(stream, rig)?.layout()))
+        Ok(Self::of_table(format.look(stream, rig)?, rig))
     }
 
     fn empty() -> Self {
@@ -111,27 +108,23 @@ impl FileReading {
             text: None,
             time_format: None,
             columns: Vec::new(),
+            named: Vec::new(),
             problem: None,
             proposals: Vec::new(),
             misspelt: Vec::new(),
         }
     }
 
-    fn of_layout(layout: &Layout) -> Self {
-        let columns =
-            layout.columns.iter().map(|column| read_column(&column.header, column.content, Vec::new()));
-        Self { columns: columns.collect(), ..Self::empty() }
-    }
-
     fn of_table(table: TextTable, rig: &Rig) -> Self {
         let everything: Vec<Vec<&str>> = (0..table.headers.len()).map(|index| table.column(index)).collect();
         let marks = rig.csv.decimal.or_else(|| decimal(&everything).ok());
-        let text = TextReading {
+        let text = (table.header_line > 0).then(|| TextReading {
             delimiter: table.delimiter.name(),
             decimal: marks.map(Decimal::name),
             header_line: table.header_line,
             units_line: table.units.as_ref().map(|row| row.line),
-        };
+        });
+        let named = table.bound.as_ref().map(|bound| named(&bound.foreign)).unwrap_or_default();
         let found = match &table.bound {
             Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
             Err(_) => partly(&table.headers, rig),
@@ -144,6 +137,10 @@ impl FileReading {
         let columns = columns.collect();
         let proposals = proposals(&table, &found, rig).iter().map(line).collect();
         let misspelt = misspelt(&table.headers, &rig.columns);
+        if text.is_none() {
+            let problem = table.bound.err().map(|fault| fault.to_string());
+            return Self { columns, named, problem, proposals, misspelt, ..Self::empty() };
+        }
         let dialect = Dialect::of(table, super::records::Encoding::Utf8, rig);
         let time_format =
             dialect.as_ref().ok().filter(|dialect| dialect.layout.has(Signal::Timestamp)).map(|dialect| {
@@ -152,7 +149,7 @@ impl FileReading {
                 format!("{}{zone}", time.kind)
             });
         let problem = dialect.err().map(|fault| fault.to_string());
-        Self { text: Some(text), time_format, columns, problem, proposals, misspelt, ..Self::empty() }
+        Self { text, time_format, columns, named, problem, proposals, misspelt, ..Self::empty() }
     }
 
     /// One line of JSON.
@@ -181,9 +178,17 @@ fn line(proposal: &Proposal) -> ProposedLine {
     ProposedLine { line, why: proposal.why.text() }
 }
 
+fn named(foreign: &ColumnMap) -> Vec<ProposedLine> {
+    let line = |(signal, column): (&Signal, &ForeignColumn)| ProposedLine {
+        line: format!("{} = {}", signal.name(), column.to_toml(*signal)),
+        why: Why::Name.text(),
+    };
+    foreign.iter().map(line).collect()
+}
+
 fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {
     let absent = map.iter().filter(|(_, column)| !headers.iter().any(|header| header == column.name.trim()));
-    let text = |(signal, column): (&Signal, &crate::rig::ForeignColumn)| {
+    let text = |(signal, column): (&Signal, &ForeignColumn)| {
         let near = near(&column.name, headers.iter().map(String::as_str));
         let near = near.map_or_else(String::new, |near| format!("; `{}` is near", shorten(near, 40)));
         format!("{}: the file has no column `{}`{near}", signal.name(), shorten(&column.name, 40))

@@ -11,13 +11,14 @@ use super::error::TraceFault;
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
 use super::stamps::{Stamped, sample};
 use super::table::TableRows;
+use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::Rig;
 use flate2::read::ZlibDecoder;
 use std::io::{self, Read};
 use std::sync::Arc;
 
-pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows(open) };
+pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows { open, look } };
 
 /// Types of data elements.
 const INT8: u32 = 1;
@@ -52,12 +53,7 @@ enum Values {
 }
 
 fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
-    let (variables, others) = read(stream)?;
-    let longest = variables.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
-    let (columns, short): (Vec<_>, Vec<_>) =
-        variables.into_iter().partition(|(_, values)| values.len() == longest);
-    let names: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
-    let values: Vec<Vec<f64>> = columns.into_iter().map(|(_, values)| values).collect();
+    let Vectors { names, values, short, others } = vectors(stream)?;
     let bound =
         bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
@@ -68,6 +64,28 @@ fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let cells = stamps.cells(&layout, values);
     let mut once = Some(cells);
     Ok(Box::new(TableRows::over(layout, Box::new(move || Ok(once.take())))))
+}
+
+fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+    let Vectors { names, values, .. } = vectors(stream)?;
+    Ok(TextTable::of_columns(names, sample(&values), rig))
+}
+
+/// The vectors of a file that are as long as its longest, and what else is in it.
+struct Vectors {
+    names: Vec<String>,
+    values: Vec<Vec<f64>>,
+    short: Named<Vec<f64>>,
+    others: Named<&'static str>,
+}
+
+fn vectors(stream: Stream) -> Result<Vectors, TraceFault> {
+    let (variables, others) = read(stream)?;
+    let longest = variables.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+    let (columns, short): (Vec<_>, Vec<_>) =
+        variables.into_iter().partition(|(_, values)| values.len() == longest);
+    let (names, values) = columns.into_iter().unzip();
+    Ok(Vectors { names, values, short, others })
 }
 
 /// Where a signal is missing, what else the file holds may be why.

@@ -14,8 +14,10 @@ mod rows;
 mod thrift;
 
 #[cfg(feature = "parquet")]
-pub(super) const FORMAT: Format =
-    Format { starts_with: b"PAR1", reading: super::format::Reading::Rows(rows::open) };
+pub(super) const FORMAT: Format = Format {
+    starts_with: b"PAR1",
+    reading: super::format::Reading::Rows { open: rows::open, look: rows::look },
+};
 
 #[cfg(not(feature = "parquet"))]
 pub(super) const FORMAT: Format = Format::refused(

@@ -100,6 +100,41 @@ const WORDS: [(Signal, &[&str]); 5] = [
 const SIDE_A: &[&str] = &["a", "1", "head", "cap", "bore", "piston", "kolben", "blind"];
 const SIDE_B: &[&str] = &["b", "2", "rod", "annulus", "ring", "stange"];
 
+/// Words of a column that holds no reading of a sensor: what a reading is worth, what was wanted, what counts or scales.
+const NO_READINGS: &[&str] = &[
+    "validity",
+    "valid",
+    "quality",
+    "status",
+    "state",
+    "value",
+    "scalefactor",
+    "scale",
+    "factor",
+    "spool",
+    "valve",
+    "ventil",
+    "command",
+    "cmd",
+    "setpoint",
+    "soll",
+    "sollwert",
+    "target",
+    "demand",
+    "ref",
+    "reference",
+    "index",
+    "id",
+    "no",
+    "nr",
+];
+
+/// Whether a column may be proposed for what a sensor reads.
+fn may_be_a_reading(words: &[String]) -> bool {
+    let joined = words.concat();
+    !words.iter().any(|word| NO_READINGS.contains(&word.as_str())) && joined != "scalefactor"
+}
+
 /// Proposals for the signals that `wanted` names, of columns that are not read.
 pub(super) fn propose(
     unread: &[Unread<'_>],
@@ -119,6 +154,13 @@ pub(super) fn propose(
         }
     }
     for column in left {
+        let words = words(column.header);
+        let is_time = WORDS.iter().any(|(signal, known)| {
+            *signal == Signal::Time && words.iter().any(|word| known.contains(&word.as_str()))
+        });
+        if !may_be_a_reading(&words) || is_time {
+            continue;
+        }
         let open = |signal: &Signal| {
             wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
         };
@@ -160,6 +202,9 @@ pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<
 
 fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal> {
     let words = words(column.header);
+    if !may_be_a_reading(&words) {
+        return None;
+    }
     let says = |known: &[&str]| {
         words
             .iter()
@@ -181,7 +226,9 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
         let foreign = ForeignColumn::new(column.header, None);
         return Some(Proposal { signal: Signal::Timestamp, column: foreign, why: Why::Name });
     }
-    let unit = possible_unit(signal, &values(column, decimal), rig)?;
+    let values = values(column, decimal);
+    // What is called time may be the time of another channel, or of day: this one must at least go on.
+    let unit = possible_unit(signal, &values, rig).filter(|_| signal != Signal::Time || rises(&values))?;
     Some(Proposal { signal, column: ForeignColumn::new(column.header, Some(unit)), why: Why::NameAndValues })
 }
 
@@ -206,7 +253,7 @@ fn by_values(
     if values.len() < 10 {
         return None;
     }
-    let rising = values.windows(2).all(|pair| pair.first() < pair.last());
+    let rising = rises(&values);
     let (least, _) = extremes(&values);
     let tried: &[Signal] = match (rising, least < 0.0) {
         (true, _) => &[Signal::Time],
@@ -260,6 +307,10 @@ fn values(column: &Unread<'_>, decimal: Decimal) -> Vec<f64> {
         Decimal::Comma => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
     };
     column.cells.iter().filter_map(read).filter(|value| value.is_finite()).collect()
+}
+
+fn rises(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair.first() < pair.last())
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {
@@ -348,6 +399,29 @@ mod tests {
             "t = { name = \"CH0\", unit = \"ms\" }; x = { name = \"CH1\", unit = \"mm\" }; pa = { name = \"CH2\", unit = \"bar\" }; \
              pb = { name = \"CH3\", unit = \"bar\" }; qa = { name = \"CH4\", unit = \"L/min\" }"
         );
+    }
+
+    /// As the layouts of loggers name what is no reading: each has once been taken for one by its values.
+    #[test]
+    fn what_is_no_reading_is_no_signal() {
+        let cells =
+            |f: fn(f64) -> f64| (0..20).map(|i| format!("{:.3}", f(f64::from(i)))).collect::<Vec<_>>();
+        let (steady, both_ways) = (cells(|i| 50.0 + i.sin()), cells(|i| 2.0 * i.sin()));
+        for cells in [&steady, &both_ways] {
+            let cells: Vec<&str> = cells.iter().map(String::as_str).collect();
+            for header in [
+                "Validity",
+                "Value",
+                "time",
+                "ScaleFactor",
+                "X_Value",
+                "Spool position [mm]",
+                "x_setpoint",
+                "Valve cmd",
+            ] {
+                assert_eq!(proposed(&[header], &[&cells]), [""; 0], "{header}");
+            }
+        }
     }
 
     #[test]

@@ -18,6 +18,7 @@ const LEAST_CELLS: usize = 4;
 /// A header, and rows below it.
 pub(super) struct TextTable {
     pub(super) delimiter: Delimiter,
+    /// From 1; 0 in a file that is no text.
     pub(super) header_line: u64,
     pub(super) headers: Vec<String>,
     /// The row of units below the header.
@@ -58,6 +59,20 @@ impl TextTable {
         let Head { line, headers, units, bound, first } = head;
         let rows = rows.split_off(first);
         Some(Self { delimiter, header_line: line, headers, units, rows, bound, headless })
+    }
+
+    /// Columns of a file that is no text, with their first cells.
+    pub(super) fn of_columns(headers: Vec<String>, rows: Vec<TextRow>, rig: &Rig) -> Self {
+        let bound = bind(&headers, None, &rows, rig);
+        Self {
+            delimiter: Delimiter::Comma,
+            header_line: 0,
+            headers,
+            units: None,
+            rows,
+            bound,
+            headless: false,
+        }
     }
 
     /// The last line before the rows.

@@ -74,7 +74,7 @@ fn a_row_is_a_record_in_si() {
 fn header_errors_say_what_is_expected() {
     let cases = [
         ("", "the trace is empty"),
-        ("\u{feff}", "no column for time: t_s or t_ms or timestamp expected"),
+        ("\u{feff}", "no column for time: t_s or t_ms or t_us or timestamp expected"),
         (HEADER, "no usable row: the trace has only a header"),
         (
             "t_s,x_m,pa_pa\n",
@@ -490,5 +490,60 @@ fn times_and_references_that_cannot_be_are_bad_rows() {
         let mut record = Record::default();
         while reader.next_record(&mut record).unwrap() {}
         assert_eq!((reader.quality().rows, reader.quality().skipped), (1, 1), "{time} {reference}");
+    }
+}
+
+/// Whatever comes, and wherever in a batch: the thread gives what the reader alone gives.
+#[test]
+fn reading_ahead_changes_nothing() {
+    let stamped = |i: u32| format!("2026-11-20T22:{:02}:{:02}.{:02}Z", i / 6000, i / 100 % 60, i % 100);
+    let row = |i: u32| match i {
+        // One in a batch of its own, one behind a whole batch, and many in a row.
+        4096 | 4352 | 5000..5300 => format!("{},0.1,broken,4000000\n", stamped(i)),
+        i => format!("{},{},5000000,4000000\n", stamped(i), 0.1 + 1e-6 * f64::from(i)),
+    };
+    for rows in [0, 1, 4095, 4096, 4097, 4351, 4352, 4353, 20_000] {
+        let mut text = "timestamp,x_m,pa_pa,pb_pa\n".to_owned() + &(0..rows).map(row).collect::<String>();
+        for end in ["", "2026-11-20T23:00:00Z,0"] {
+            text.push_str(end);
+            let alone = open(text.as_str(), &Rig::paper()).unwrap();
+            let ahead = ahead::RowsAhead::of(open(text.as_str(), &Rig::paper()).unwrap().rows);
+            let ahead = TraceReader::over("trace.csv", Box::new(ahead), &Rig::paper());
+            match (read_all(ahead), read_all(alone)) {
+                (Ok(ahead), Ok(alone)) => assert_eq!(ahead, alone, "{rows} rows"),
+                (Err(ahead), Err(alone)) => assert_eq!(ahead.to_string(), alone.to_string(), "{rows} rows"),
+                (ahead, alone) => panic!("{rows} rows: {ahead:?}, alone {alone:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_reader_that_is_dropped_ends_its_thread() {
+    struct Endless {
+        _alive: std::sync::Arc<()>,
+        row: u64,
+    }
+    impl Read for Endless {
+        fn read(&mut self, mut into: &mut [u8]) -> std::io::Result<usize> {
+            let room = into.len();
+            self.row += 1;
+            writeln!(into, "{},0.1,5000000,4000000", self.row)?;
+            Ok(room - into.len())
+        }
+    }
+    let alive = std::sync::Arc::new(());
+    let text = std::io::Cursor::new("t_s,x_m,pa_pa,pb_pa\n").chain(Endless { _alive: alive.clone(), row: 0 });
+    let mut reader = TraceReader::from_stream("-", Box::new(text), &Rig::paper()).unwrap();
+    reader.rows = Box::new(ahead::RowsAhead::of(reader.rows));
+    let mut row = Row::empty();
+    for _ in 0..10_000 {
+        assert!(matches!(reader.rows.next_row(&mut row), Ok(Next::Row)));
+    }
+    drop(reader);
+    let waited = std::time::Instant::now();
+    while std::sync::Arc::strong_count(&alive) > 1 {
+        assert!(waited.elapsed().as_secs() < 10, "the thread reads on");
+        std::thread::yield_now();
     }
 }

@@ -91,9 +91,34 @@ impl<'a> Section<'a> {
     /// As [`quantity`](Self::quantity), where the key must be there.
     pub(super) fn required(&self, key: &str, dimension: Dimension, bound: Bound) -> Result<f64, RigError> {
         self.quantity(key, dimension, bound)?.ok_or_else(|| {
+            if let Some((offset, note)) = self.blank(key) {
+                return self.document.fail(Some(offset), Fault::Blank { key: self.path(key), note });
+            }
             let wanted = bound.text(dimension);
             self.document.fail(self.offset, Fault::MissingKey { key: self.path(key), wanted })
         })
+    }
+
+    /// Where a key stands as a blank to fill in, `# area_a = "…"   # where it is found`, and that note.
+    fn blank(&self, key: &str) -> Option<(usize, String)> {
+        let start = self.offset?;
+        let mut at = start;
+        for line in self.document.text.get(start..)?.split_inclusive('\n') {
+            if at > start && line.trim_start().starts_with('[') {
+                return None;
+            }
+            let value = line
+                .trim_start()
+                .strip_prefix('#')
+                .map(str::trim_start)
+                .and_then(|line| line.strip_prefix(key));
+            if let Some(value) = value.and_then(|value| value.trim_start().strip_prefix('=')) {
+                let note = value.split_once('#').map_or("", |(_, note)| note);
+                return Some((at, note.trim().to_owned()));
+            }
+            at += line.len();
+        }
+        None
     }
 
     /// The string under `key`.
@@ -187,6 +212,14 @@ pub enum Fault {
         key: String,
         /// What belongs there.
         wanted: String,
+    },
+    /// A key of a file that `init` began, which nobody has filled in.
+    #[error("`{key}` is still blank: take its `#` away and write the number there; {note}")]
+    Blank {
+        /// With its section.
+        key: String,
+        /// Where the number is found.
+        note: String,
     },
     /// The value is of another kind, e.g. a list.
     #[error("`{key}` must be {wanted}")]

@@ -148,7 +148,7 @@ impl Rig {
         }
     }
 
-    fn write_csv(&self, out: &mut String) {
+    pub(crate) fn write_csv(&self, out: &mut String) {
         if self.csv == CsvSettings::default() {
             return;
         }

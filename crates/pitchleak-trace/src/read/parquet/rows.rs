@@ -9,6 +9,7 @@ use crate::read::error::{Counted, TraceFault};
 use crate::read::format::{Rows, Stream, mistaken};
 use crate::read::stamps::{Epoch, seconds_between, time_format};
 use crate::read::table::{Cells, TableRows};
+use crate::read::table_text::TextTable;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::times::TimeFormat;
@@ -49,11 +50,24 @@ pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     guarded(|| open_unguarded(stream, rig))
 }
 
-fn open_unguarded(mut stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
-    let file = match stream.file.take() {
-        Some(file) => pages::open(file).map_err(damaged)?,
-        None => pages::open(Bytes::from(stream.hold()?)).map_err(damaged)?,
-    };
+pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+    guarded(|| {
+        let file = columns_of(stream)?;
+        let fields = fields(file.as_ref());
+        let names = fields.iter().map(|field| field.name.clone()).collect();
+        Ok(TextTable::of_columns(names, sample(file.as_ref(), &fields, rig)?, rig))
+    })
+}
+
+fn columns_of(mut stream: Stream) -> Result<Arc<dyn Columns>, TraceFault> {
+    match stream.file.take() {
+        Some(file) => pages::open(file).map_err(damaged),
+        None => pages::open(Bytes::from(stream.hold()?)).map_err(damaged),
+    }
+}
+
+fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    let file = columns_of(stream)?;
     let fields = fields(file.as_ref());
     let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
     let sample = sample(file.as_ref(), &fields, rig)?;
