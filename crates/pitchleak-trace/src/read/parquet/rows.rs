@@ -54,8 +54,10 @@ pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
     guarded(|| {
         let file = columns_of(stream)?;
         let fields = fields(file.as_ref());
-        let names = fields.iter().map(|field| field.name.clone()).collect();
-        Ok(TextTable::of_columns(names, sample(file.as_ref(), &fields, rig)?, rig))
+        let names: Vec<String> = fields.iter().map(|field| field.name.clone()).collect();
+        let mistaken = mistaken(names.join(",").as_bytes());
+        let table = TextTable::of_columns(names, sample(file.as_ref(), &fields, rig)?, rig);
+        if table.bound.is_err() { mistaken.map_or(Ok(table), Err) } else { Ok(table) }
     })
 }
 
