@@ -282,8 +282,10 @@ impl RunningRig {
 
     fn step(&mut self, step_s: f64, position_m: f64, load_n: f64) -> Result<(), PlantError> {
         self.emulator.step(step_s, position_m, load_n)?;
-        let mut signals = self.emulator.reading().signals;
-        self.remembering.iter_mut().for_each(|one| one.show(step_s, &mut signals));
+        if !self.remembering.is_empty() {
+            let mut signals = self.emulator.reading().signals;
+            self.remembering.iter_mut().for_each(|one| one.show(step_s, &mut signals));
+        }
         Ok(())
     }
 

@@ -349,3 +349,21 @@ fn a_leak_that_depends_on_direction_turns_with_the_flows() {
         assert!((leak - way * 3e6).abs() < 1.0, "{leak}");
     }
 }
+
+#[test]
+fn an_effect_that_is_switched_off_leaves_the_others_on() {
+    let all = [Effect::ViscousFriction, Effect::PositionGain, Effect::CoulombFriction];
+    let on = |set: &EffectSet<f64>| set.iter().map(|active| active.effect).collect::<Vec<_>>();
+    for off in all {
+        let mut set = EffectSet::default();
+        for effect in all {
+            set.set(effect, 0.01, EffectConstants::default()).unwrap();
+        }
+        set.set(off, 0.0, EffectConstants::default()).unwrap();
+        assert_eq!(on(&set), all.into_iter().filter(|effect| *effect != off).collect::<Vec<_>>());
+        set.set(off, 0.02, EffectConstants::default()).unwrap();
+        assert_eq!(set.iter().count(), 3);
+        all.into_iter().for_each(|effect| set.set(effect, 0.0, EffectConstants::default()).unwrap());
+        assert!(set.is_empty() && on(&set).is_empty());
+    }
+}

@@ -77,17 +77,35 @@ impl<T: Real> EffectSet<T> {
         if !constants.is_physical() {
             return Err(EffectError::Constants(effect));
         }
-        let entry = (value != T::zero()).then_some(ActiveEffect { effect, value, constants });
+        if value == T::zero() {
+            self.switch_off(effect);
+            return Ok(());
+        }
         let own = |slot: &Option<ActiveEffect<T>>| slot.is_some_and(|active| active.effect == effect);
         let place = self.active.iter().position(own).or(self.active.iter().position(Option::is_none));
         let slot = place.and_then(|i| self.active.get_mut(i)).ok_or(EffectError::Full)?;
-        *slot = entry;
+        *slot = Some(ActiveEffect { effect, value, constants });
         Ok(())
+    }
+
+    /// Those that stay on stand first: who looks for them stops at the first free place.
+    fn switch_off(&mut self, effect: Effect) {
+        let before = core::mem::take(self);
+        let on = before.active.iter().flatten().filter(|active| active.effect != effect);
+        for (slot, active) in self.active.iter_mut().zip(on) {
+            *slot = Some(*active);
+        }
+    }
+
+    /// Whether none is on.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.active.first().is_none_or(Option::is_none)
     }
 
     /// The effects that are on.
     pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect<T>> {
-        self.active.iter().flatten()
+        self.active.iter().map_while(Option::as_ref)
     }
 
     /// The terms of all physical effects whose kind passes `counts`.

@@ -6,9 +6,9 @@ mod state;
 
 pub use controller::Gains;
 
-use crate::plant::{CylinderPlant, CylinderState, PlantError, Supply, Valve, number_or_zero, substeps};
+use crate::plant::{CylinderPlant, PlantError, Supply, Valve, number_or_zero, substeps};
 use crate::{Cylinder, EffectSet, Model, PerLeak, Real, Signals, rk4_step};
-use state::State;
+use state::{Pressures, State};
 
 /// One hydraulic axis: a cylinder, its valve and its controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -221,8 +221,9 @@ impl<T: Real> Emulator<T> {
         for _ in 0..count {
             self.position_reference_m += speed_reference * tick;
             self.load_reference_n = number_or_zero(self.load_reference_n + load_slope * tick);
-            self.control(tick, speed_reference);
-            self.integrate(tick);
+            let pressures = self.state.pressures(&self.params);
+            self.control(tick, speed_reference, &pressures);
+            self.integrate(tick, pressures);
         }
         self.position_reference_m = position_goal;
         self.load_reference_n = load_goal;
@@ -231,7 +232,7 @@ impl<T: Real> Emulator<T> {
 
     /// True signals now.
     pub fn reading(&self) -> EmulatorReading<T> {
-        let (pitch, _, _) = self.state.rates(&self.params);
+        let (pitch, _, _) = self.state.rates(&self.params, self.state.pressures(&self.params));
         let [pitch_command, load_command] = self.commands;
         EmulatorReading {
             signals: pitch.signals,
@@ -244,33 +245,37 @@ impl<T: Real> Emulator<T> {
 
     /// One tick of both controllers. Either valve is fed forward the opening that the reference's
     /// speed takes; the load cylinder gives way with the piston.
-    fn control(&mut self, tick: T, speed_reference: T) {
+    fn control(&mut self, tick: T, speed_reference: T, pressures: &Pressures<T>) {
         let EmulatorParams { pitch, load, .. } = &self.params;
         let position_error = self.position_reference_m - self.state.pitch.x_m;
-        let load_error = self.load_reference_n - self.state.load_force_n(&self.params);
+        let load_error = self.load_reference_n - pressures.load_force_n(&self.params);
         let pitch_command = pitch.gains.command(
             &mut self.position_integral,
             tick,
             position_error,
             speed_reference - self.state.pitch.v_mps,
-            pitch.opening(&self.state.pitch, self.state.supply_pa, speed_reference),
+            pitch.opening(pressures.pitch_pa, self.state.supply_pa, speed_reference),
         );
         let load_command = load.gains.command(
             &mut self.load_integral,
             tick,
             load_error,
             T::zero(),
-            load.opening(&self.state.load(&self.params), self.state.supply_pa, -speed_reference),
+            load.opening(pressures.load_pa, self.state.supply_pa, -speed_reference),
         );
         self.commands = [pitch_command, load_command];
     }
 
-    fn integrate(&mut self, tick: T) {
+    fn integrate(&mut self, tick: T, pressures: Pressures<T>) {
         let (params, commands) = (&self.params, self.commands);
-        let (count, step) = substeps(tick, self.state.fastest_rate_ps(params));
+        let (count, step) = substeps(tick, self.state.fastest_rate_ps(params, &pressures));
+        // Of the first look at the first state; of all others they are worked out.
+        let mut known = Some(pressures);
         for _ in 0..count {
             let raw = rk4_step(&self.state.to_array(), step, |_, y| {
-                State::from_array(*y).derivative(params, commands)
+                let state = State::from_array(*y);
+                let pressures = known.take().unwrap_or_else(|| state.pressures(params));
+                state.derivative(params, commands, pressures)
             });
             self.state = State::from_array(raw).limited(params, self.state);
         }
@@ -280,8 +285,7 @@ impl<T: Real> Emulator<T> {
 impl<T: Real> Axis<T> {
     /// Valve command for a piston speed at the pressures of the moment, half of what supply and
     /// load leave over each edge.
-    fn opening(&self, cylinder: &CylinderState<T>, supply_pa: T, speed_mps: T) -> T {
-        let (pa_pa, pb_pa) = self.plant.pressures_pa(cylinder);
+    fn opening(&self, (pa_pa, pb_pa): (T, T), supply_pa: T, speed_mps: T) -> T {
         let load_pa = if speed_mps >= T::zero() { pa_pa - pb_pa } else { pb_pa - pa_pa };
         let drop = ((supply_pa - load_pa) / T::lit(2.0)).max(self.valve.laminar_drop_pa);
         speed_mps / speed_gain_mps(&self.plant.model.cylinder, &self.valve, drop)
@@ -308,7 +312,7 @@ mod tests {
         for pa_pa in [2e6, 5e6, 7e6] {
             let state = axis.plant.state_at(0.1, 0.0, pa_pa, supply_pa - pa_pa);
             for speed_mps in [0.02, -0.02] {
-                let spool = axis.opening(&state, supply_pa, speed_mps);
+                let spool = axis.opening(axis.plant.pressures_pa(&state), supply_pa, speed_mps);
                 let flows = axis.valve.flows(spool, supply_pa, pa_pa, supply_pa - pa_pa);
                 let expected = [cylinder.area_a_m2 * speed_mps, -cylinder.area_b_m2 * speed_mps];
                 for (flow, expected) in [flows.a_m3s, flows.b_m3s].into_iter().zip(expected) {

@@ -18,6 +18,20 @@ pub(super) struct State<T> {
 
 const STATES: usize = 11;
 
+/// Pressures of a state, P_A and P_B of each cylinder, Pa: four logarithms that controllers, step size and rates share.
+#[derive(Clone, Copy)]
+pub(super) struct Pressures<T> {
+    pub pitch_pa: (T, T),
+    pub load_pa: (T, T),
+}
+
+impl<T: Real> Pressures<T> {
+    /// Force of the load cylinder against extension, N.
+    pub fn load_force_n(&self, params: &EmulatorParams<T>) -> T {
+        push_n(&params.load, self.load_pa)
+    }
+}
+
 impl<T: Real> State<T> {
     /// Valves centred, chambers B at a quarter of the supply pressure, chambers A in balance.
     pub fn at_rest(params: &EmulatorParams<T>, x_m: T, load_n: T) -> Self {
@@ -38,17 +52,24 @@ impl<T: Real> State<T> {
         }
     }
 
-    /// Force of the load cylinder against extension, N.
-    pub fn load_force_n(&self, params: &EmulatorParams<T>) -> T {
-        push_n(&params.load, params.load.plant.pressures_pa(&self.load(params)))
+    /// Pressures in both cylinders.
+    #[inline]
+    pub fn pressures(&self, params: &EmulatorParams<T>) -> Pressures<T> {
+        Pressures {
+            pitch_pa: params.pitch.plant.pressures_pa(&self.pitch),
+            load_pa: params.load.plant.pressures_pa(&self.load(params)),
+        }
     }
 
-    /// Rates of the pitching and the load cylinder, and the flow drawn from the supply, m³/s.
-    pub fn rates(&self, params: &EmulatorParams<T>) -> (CylinderRates<T>, CylinderRates<T>, T) {
+    /// Rates of the pitching and the load cylinder, and the flow drawn from the supply, m³/s, at the state's pressures.
+    #[inline(always)] // else hundreds of bytes are copied that nobody reads
+    pub fn rates(
+        &self,
+        params: &EmulatorParams<T>,
+        Pressures { pitch_pa, load_pa }: Pressures<T>,
+    ) -> (CylinderRates<T>, CylinderRates<T>, T) {
         let [pitch_spool, load_spool] = self.spools;
         let load_state = self.load(params);
-        let load_pa = params.load.plant.pressures_pa(&load_state);
-        let pitch_pa = params.pitch.plant.pressures_pa(&self.pitch);
         let load_flows = self.flows(&params.load, load_pa, load_spool);
         let pitch_flows = self.flows(&params.pitch, pitch_pa, pitch_spool);
         let load = rates(&params.load, &load_state, load_pa, &load_flows, T::zero());
@@ -56,9 +77,15 @@ impl<T: Real> State<T> {
         (pitch, load, pitch_flows.supply_m3s + load_flows.supply_m3s)
     }
 
-    /// The right side of the differential equation.
-    pub fn derivative(&self, params: &EmulatorParams<T>, commands: [T; 2]) -> [T; STATES] {
-        let (pitch, load, drawn_m3s) = self.rates(params);
+    /// The right side of the differential equation, at the state's pressures.
+    #[inline(always)]
+    pub fn derivative(
+        &self,
+        params: &EmulatorParams<T>,
+        commands: [T; 2],
+        pressures: Pressures<T>,
+    ) -> [T; STATES] {
+        let (pitch, load, drawn_m3s) = self.rates(params, pressures);
         let ([pitch_spool, load_spool], [pitch_speed, load_speed]) = (self.spools, self.spool_speeds_ps);
         let [pitch_command, load_command] = commands;
         let [dy_pitch, ddy_pitch] = params.pitch.valve.spool_rates(pitch_spool, pitch_speed, pitch_command);
@@ -78,17 +105,19 @@ impl<T: Real> State<T> {
         ]
     }
 
-    /// Rate of the fastest motion, 1/s.
-    pub fn fastest_rate_ps(&self, params: &EmulatorParams<T>) -> T {
+    /// Rate of the fastest motion at the state's pressures, 1/s.
+    pub fn fastest_rate_ps(&self, params: &EmulatorParams<T>, pressures: &Pressures<T>) -> T {
         let [pitch_spool, load_spool] = self.spools;
-        let axes = [(&params.pitch, self.pitch, pitch_spool), (&params.load, self.load(params), load_spool)];
+        let axes = [
+            (&params.pitch, self.pitch, pitch_spool, pressures.pitch_pa),
+            (&params.load, self.load(params), load_spool, pressures.load_pa),
+        ];
         let mut conductance = params.supply.relief_slope_m3spa;
         let mut rate = T::zero();
-        for (axis, cylinder, spool) in axes {
-            let (pa_pa, pb_pa) = axis.plant.pressures_pa(&cylinder);
+        for (axis, cylinder, spool, (pa_pa, pb_pa)) in axes {
             let (at_a, at_b) = axis.valve.conductances_m3spa(spool, self.supply_pa, pa_pa, pb_pa);
             conductance += at_a + at_b;
-            rate += axis.plant.fastest_rate_ps(&cylinder) + axis.plant.filling_ps(&cylinder, at_a, at_b);
+            rate += axis.plant.fastest_rate_under(&cylinder, (pa_pa, pb_pa)) + axis.plant.filling_ps(&cylinder, at_a, at_b);
         }
         rate + conductance / params.supply.compliance_m3pa
     }
@@ -161,6 +190,7 @@ impl<T: Real> State<T> {
     }
 }
 
+#[inline(always)]
 fn rates<T: Real>(
     axis: &Axis<T>,
     cylinder: &CylinderState<T>,

@@ -142,6 +142,7 @@ impl<T: Real> CylinderPlant<T> {
     }
 
     /// [`rates`](Self::rates) where the pressures P_A, P_B of the state are known already.
+    #[inline(always)]
     pub(crate) fn rates_under(
         &self,
         state: &CylinderState<T>,
@@ -218,6 +219,11 @@ impl<T: Real> CylinderPlant<T> {
 
     /// Rate of the fastest motion near a state, 1/s.
     pub(crate) fn fastest_rate_ps(&self, state: &CylinderState<T>) -> T {
+        self.fastest_rate_under(state, self.pressures_pa(state))
+    }
+
+    /// [`fastest_rate_ps`](Self::fastest_rate_ps) where the pressures P_A, P_B of the state are known already.
+    pub(crate) fn fastest_rate_under(&self, state: &CylinderState<T>, (pa_pa, pb_pa): (T, T)) -> T {
         let cylinder = &self.model.cylinder;
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let bulk = self.model.fluid.bulk_modulus_pa;
@@ -225,7 +231,6 @@ impl<T: Real> CylinderPlant<T> {
         let oil_spring = bulk * (area_a * area_a / volume_a + area_b * area_b / volume_b);
         let mass = cylinder.moving_mass_kg;
         let slow = T::lit(1e-4);
-        let (pa_pa, pb_pa) = self.pressures_pa(state);
         let friction = |v_mps: T| {
             let signals = Signals { v_mps, pa_pa, pb_pa, x_m: state.x_m, ..Signals::default() };
             self.effects.terms(&signals, &self.model, |kind| kind == EffectKind::Force).force_n
@@ -275,7 +280,11 @@ impl<T: Real> CylinderPlant<T> {
     }
 
     /// What the storage effects take per unit of Ṗ_A, Ṗ_B and ẍ.
+    #[inline]
     fn storage(&self, at: &Signals<T>) -> Terms<T> {
+        if self.effects.is_empty() {
+            return Terms::default();
+        }
         let unit = Signals { dpa_pas: T::one(), dpb_pas: T::one(), a_mps2: T::one(), ..*at };
         self.effects.terms(&unit, &self.model, |kind| kind == EffectKind::Storage)
     }
