@@ -117,7 +117,8 @@ impl<T: Real> State<T> {
         for (axis, cylinder, spool, (pa_pa, pb_pa)) in axes {
             let (at_a, at_b) = axis.valve.conductances_m3spa(spool, self.supply_pa, pa_pa, pb_pa);
             conductance += at_a + at_b;
-            rate += axis.plant.fastest_rate_under(&cylinder, (pa_pa, pb_pa)) + axis.plant.filling_ps(&cylinder, at_a, at_b);
+            rate += axis.plant.fastest_rate_under(&cylinder, (pa_pa, pb_pa))
+                + axis.plant.filling_ps(&cylinder, at_a, at_b);
         }
         rate + conductance / params.supply.compliance_m3pa
     }

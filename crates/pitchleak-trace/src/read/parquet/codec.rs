@@ -73,7 +73,7 @@ impl Codec {
 
 /// All of a stream, but not much more than fits.
 fn stream(from: impl Read, room: usize) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(room + 1);
     from.take(room as u64 + 1).read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
     Ok(bytes)
 }
@@ -90,7 +90,8 @@ fn snappy(packed: &[u8], room: usize) -> Result<Vec<u8>> {
 }
 
 fn zstd(mut frames: &[u8], room: usize) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
+    // One byte more, by which the last read learns that there is no more. What is not written takes no memory.
+    let mut bytes = Vec::with_capacity(room + 1);
     while !frames.is_empty() && bytes.len() <= room {
         let frame = StreamingDecoder::new(&mut frames).map_err(|error| damaged(&error))?;
         let left = (room - bytes.len()) as u64;
