@@ -45,7 +45,9 @@ fn doubtful_neighbour(selection: &Selection<'_>, one: &Selected, judgement: &Jud
     let id = fit.problem.terms[other.term].effect()?.spec().id;
     Some(doubt(
         DoubtId::DoubtfulNeighbour,
-        format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"),
+        format!(
+            "the residual is more than noise where {id}, which is doubtful, may have taken some of its share"
+        ),
     ))
 }
 
@@ -119,7 +121,7 @@ fn residual(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doub
         + adequacy::unlisted_excess(fit)
         + judgement.mended_by_products(fit, named);
     let mended = search::loss(fit, &[one.term]);
-    let text = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
+    let text = "it explains part of the residual, but the rest is more than the sensors' noise: something else may be behind it, not to be \
                 believed without a measurement of its own";
     (left > UNMENDED_SHARE * (mended + left)).then(|| doubt(DoubtId::Residual, text))
 }
@@ -138,7 +140,10 @@ fn weak_rival(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Do
     };
     let rival = search::open(fit).into_iter().find(is_rival)?;
     let id = fit.problem.terms[rival].effect()?.spec().id;
-    Some(doubt(DoubtId::WeakRival, format!("more than noise is left where it acts, and {id} goes with that")))
+    Some(doubt(
+        DoubtId::WeakRival,
+        format!("the residual where it acts is more than noise, and {id} goes with that"),
+    ))
 }
 
 /// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that
