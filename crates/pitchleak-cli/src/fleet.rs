@@ -27,7 +27,7 @@ pub struct Arguments {
     rig: Option<PathBuf>,
 
     /// Write the table: .parquet, .csv or .csv.gz
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
     /// Write the result as a page for a browser: .html, complete in itself

@@ -17,8 +17,10 @@ mod simulate;
 mod text_format;
 mod watch;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Says how much oil leaks where in a hydraulic pitch cylinder.
@@ -27,12 +29,16 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+
+    /// Say nothing but results and errors: no notes, no warnings
+    #[arg(long, short, global = true)]
+    quiet: bool,
 }
 
 const EXIT_STATUS: &str = "\
 Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
 2 bad input or usage, or traces that could not be judged; 130 Ctrl-C or the signal to end.
-Every command explains itself: pitchleak replay --help";
+`pitchleak TRACE` alone is `pitchleak replay TRACE`. Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
 enum Command {
@@ -57,7 +63,9 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    match run(&Cli::parse().command) {
+    let cli = Cli::parse_from(with_command(std::env::args_os().collect()));
+    output::be_quiet(cli.quiet);
+    match run(&cli.command) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
         // Whoever read our output has had enough: not an error of ours.
@@ -67,6 +75,19 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status())
         }
     }
+}
+
+/// A trace alone is replayed: `pitchleak logger.csv`.
+fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_trace = arguments.get(1).is_some_and(|first| {
+        let name = first.to_string_lossy();
+        let is_file = *name == *"-" || (!name.starts_with('-') && Path::new(first).is_file());
+        is_file && Cli::command().find_subcommand(&*name).is_none()
+    });
+    if is_trace {
+        arguments.insert(1, "replay".into());
+    }
+    arguments
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {
