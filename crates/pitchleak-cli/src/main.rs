@@ -31,7 +31,8 @@ struct Cli {
 
 const EXIT_STATUS: &str = "\
 Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
-2 bad input or usage, or traces that could not be judged; 130 Ctrl-C or the signal to end.
+2 bad input or usage, or traces that could not be judged;
+129, 130, 143 ended by SIGHUP, Ctrl-C, SIGTERM.
 Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
@@ -57,7 +58,11 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    match run(&Cli::parse().command) {
+    let outcome = match Cli::try_parse() {
+        Ok(cli) => run(&cli.command),
+        Err(answer) => tell(&answer),
+    };
+    match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
         // Whoever read our output has had enough: not an error of ours.
@@ -67,6 +72,15 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status())
         }
     }
+}
+
+/// Help and version, which were asked for, or what is wrong with the command line.
+fn tell(answer: &clap::Error) -> Result<Outcome, Failure> {
+    if answer.use_stderr() {
+        answer.exit();
+    }
+    answer.print()?;
+    Ok(Outcome::Done)
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {
