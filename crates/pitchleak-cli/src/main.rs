@@ -37,7 +37,8 @@ struct Cli {
 
 const EXIT_STATUS: &str = "\
 Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
-2 bad input or usage, or traces that could not be judged; 130 Ctrl-C or the signal to end.
+2 bad input or usage, or traces that could not be judged;
+129, 130, 143 ended by SIGHUP, Ctrl-C, SIGTERM.
 `pitchleak TRACE` alone is `pitchleak replay TRACE`. Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
@@ -63,9 +64,14 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse_from(with_command(std::env::args_os().collect()));
-    output::be_quiet(cli.quiet);
-    match run(&cli.command) {
+    let outcome = match Cli::try_parse_from(with_command(std::env::args_os().collect())) {
+        Ok(cli) => {
+            output::be_quiet(cli.quiet);
+            run(&cli.command)
+        }
+        Err(answer) => tell(&answer),
+    };
+    match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
         // Whoever read our output has had enough: not an error of ours.
@@ -88,6 +94,15 @@ fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
         arguments.insert(1, "replay".into());
     }
     arguments
+}
+
+/// Help and version, which were asked for, or what is wrong with the command line.
+fn tell(answer: &clap::Error) -> Result<Outcome, Failure> {
+    if answer.use_stderr() {
+        answer.exit();
+    }
+    answer.print()?;
+    Ok(Outcome::Done)
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {

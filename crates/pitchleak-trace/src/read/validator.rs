@@ -185,6 +185,8 @@ fn bad_cell(row: &Row, layout: &Layout, signal: Signal, reason: BadReason, detai
 
 /// A vacuum, Pa gauge.
 const VACUUM_PA: f64 = -101_325.0;
+/// Three thousand years either way; where seconds are still told apart to 20 µs.
+pub(crate) const MOST_TIME_S: f64 = 1e11;
 /// Noise and offset may carry a sound reading this share of full scale past what is possible.
 const SLACK: f64 = 0.05;
 /// No sensor reads more than this many times its full scale.
@@ -253,8 +255,7 @@ impl Ranges {
             // Absolute zero, and where oil burns.
             Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
             both_ways(Signal::Speed, 100.0),
-            // Three thousand years either way; where seconds are still told apart to 20 µs.
-            Range { signal: Signal::Time, least: -1e11, most: 1e11 },
+            Range { signal: Signal::Time, least: -MOST_TIME_S, most: MOST_TIME_S },
             // As much as the largest meter that a rig may have.
             both_ways(Signal::LeakInternal, 10.0),
             both_ways(Signal::LeakExternalA, 10.0),
