@@ -31,8 +31,8 @@ pub use data::{Declared, FittedAndJudged, Roles, SameFile, Series, Traces};
 pub use equation::{Equation, PerEquation};
 pub use fit::Progress;
 pub use outcome::{
-    BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
-    Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
+    BinnedResidual, Calibration, Correlation, Diagnosis, Doubt, DoubtId, EquationResidual, FoundEffect,
+    HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
 pub use search::{Candidate, Collinearity};
 
@@ -60,17 +60,23 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let judgement = assess::judge(&selection, excited, assess::failures(&checks, &faults), [&before, &after]);
-    let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
+    let judgement = assess::judge(&selection, assess::failures(&checks, &faults), [&before, &after]);
+    let found = assess::found(&selection, &judgement);
+    let verdict = match assess::verdict(&judgement, &found, &after.leaks) {
+        _ if beyond_effects => Verdict::Unexplained,
+        _ if !excited => Verdict::InsufficientExcitation,
+        verdict => verdict,
+    };
+    let wiring = miswired.filter(|_| beyond_effects || verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
     let Selection { fit, effects } = &selection;
     Diagnosis {
         samples: Samples::of(&train),
-        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &judgement)).collect(),
+        effects: found,
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
-        verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },
+        verdict,
         wiring: wiring.map(|found| found.wiring),
         notes: assess::notes(
             &selection,

@@ -6,8 +6,8 @@ use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::EquationResidual;
-use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, RESIDUAL_TESTS, SHAPE_BINS};
-use crate::diagnose::weak_form::Nameless;
+use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, SHAPE_BINS};
+use crate::diagnose::weak_form::{Nameless, RESIDUAL_TESTS};
 use crate::diagnose::{search, statistics};
 
 fn name(equation: Equation) -> &'static str {

@@ -1,19 +1,26 @@
 //! What is said of each effect.
 
 use super::confidence;
+use super::leaks::std_with_oil;
 use super::verdict::Judgement;
 use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::{Calibration, FoundEffect};
+use crate::diagnose::outcome::{Calibration, Doubt, FoundEffect};
 use crate::diagnose::search::{self, Selected, Selection};
 use pitchleak_core::{Effect, Estimate};
 
-/// An effect of the answer.
-pub(crate) fn found(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<FoundEffect> {
-    let fit = &selection.fit;
-    let doubt = confidence::doubts(selection, one, judgement);
+/// The effects of the answer.
+pub(crate) fn found(selection: &Selection<'_>, judgement: &Judgement) -> Vec<FoundEffect> {
+    let told = |one: &Selected| {
+        let doubts = confidence::doubts(selection, one, judgement);
+        found_one(&selection.fit, one, doubts)
+    };
+    selection.effects.iter().filter_map(told).collect()
+}
+
+fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundEffect> {
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
-    let std = confidence::std_with_oil(fit, one.term).unwrap_or(std);
+    let std = std_with_oil(fit, one.term).unwrap_or(std);
     let std = std.hypot(search::std_of_constants(fit, one.term));
     let spec = effect.spec();
     let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
@@ -24,8 +31,10 @@ pub(crate) fn found(selection: &Selection<'_>, one: &Selected, judgement: &Judge
         value,
         std: (std * fit.dispersion(fit.bounded.chi2).sqrt()).hypot(confidence::unnamed_shift(fit, one.term)),
         unit: spec.unit,
-        confident: doubt.is_none(),
-        doubt,
+        probability: confidence::probability(one, &doubts),
+        confident: doubts.is_empty(),
+        doubt: doubts.first().map(|doubt| doubt.text.clone()),
+        doubts,
         rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
         p_value: one.p_value,
         separated_by: separation(effect, &one.confusable_with),

@@ -1,14 +1,11 @@
 //! What is left of samples that were not fitted: its size, its course, its shape.
 
-use super::residual::VARIABLES;
 use crate::diagnose::data::Series;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::BinnedResidual;
-use crate::diagnose::weak_form::{Entry, Row, Rows};
-
-/// Bins of equal count against each variable.
-const BINS: usize = 12;
+use crate::diagnose::thresholds::DRAWN_BINS;
+use crate::diagnose::weak_form::{Entry, Row, Rows, VARIABLES};
 
 /// What is left of each hat, in m³/s or N.
 pub(crate) struct HeldOut {
@@ -66,7 +63,7 @@ impl HeldOut {
 
     /// What is left against each variable, in bins of equal count.
     pub(crate) fn binned(&self) -> Vec<BinnedResidual> {
-        let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * BINS;
+        let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * DRAWN_BINS;
         let pairs = Equation::ALL.into_iter().filter(has_enough);
         let pairs = pairs.flat_map(|equation| VARIABLES.iter().map(move |variable| (equation, variable)));
         pairs
@@ -87,7 +84,7 @@ fn binned(equation: Equation, against: &'static str, mut pairs: Vec<(f64, f64)>)
     let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));
     let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
     let scale = (xx * yy).sqrt();
-    let bins = pairs.chunks(pairs.len().div_ceil(BINS)).map(Bin::of);
+    let bins = pairs.chunks(pairs.len().div_ceil(DRAWN_BINS)).map(Bin::of);
     let (mut at, mut mean, mut std_error) = (vec![], vec![], vec![]);
     for bin in bins {
         at.push(bin.at);

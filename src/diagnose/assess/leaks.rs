@@ -1,10 +1,14 @@
-//! The declared model's own constants, as a fit has them.
+//! The declared model's own constants, as a fit has them, and what is known over one of them, the bulk modulus, only.
 
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{LeakEstimate, LeakEstimates};
-use crate::diagnose::thresholds::{CI95_SIGMA, IDENTIFIED_M3S, LEARNT_SHARE, NEGATIVE_SIGMA};
+use crate::diagnose::search::Selected;
+use crate::diagnose::thresholds::{
+    CI95_SIGMA, IDENTIFIED_M3S, LEARNT_SHARE, NEGATIVE_SIGMA, RATIO_KNOWN_SHARE,
+};
 use crate::diagnose::weak_form::{Row, Term};
 use pitchleak_core::Estimate;
+use pitchleak_core::effects::EffectKind;
 
 fn estimate(fit: &Fit<'_>, term: Term) -> Estimate<f64> {
     let unknown = Estimate { value: 0.0, std: f64::INFINITY };
@@ -61,4 +65,26 @@ pub(crate) fn negative_leaks(leaks: &LeakEstimates, model: &str) -> Vec<String> 
         format!("{model} needs a negative {name} ({sigma:.0} sigma below zero): evidence of a missing effect")
     })
     .collect()
+}
+
+/// Standard deviation of an effect's value where it is only known over the bulk modulus, as a dead volume is; else none.
+pub(crate) fn std_with_oil(fit: &Fit<'_>, term: usize) -> Option<f64> {
+    let spec = fit.problem.terms[term].effect()?.spec();
+    let is_volume = spec.kind == EffectKind::Storage && spec.constants.is_empty() && spec.unit == "m3";
+    let own = fit.estimate(term).filter(|_| is_volume)?;
+    Some(own.std.hypot(own.value * fit.oil_share()))
+}
+
+/// A sentence where only the ratio of a volume to the bulk modulus is known.
+pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let id = fit.problem.terms[one.term].effect()?.spec().id;
+    let (own, std) = (fit.estimate(one.term)?, std_with_oil(fit, one.term)?);
+    let percent = |std: f64| 100.0 * std / own.value;
+    (own.std < RATIO_KNOWN_SHARE * std && own.value > 0.0).then(|| {
+        format!(
+            "{id}: only its ratio to the bulk modulus is well known (to {:.1} %); the volume itself no better than the oil ({:.0} %)",
+            percent(own.std),
+            percent(std)
+        )
+    })
 }

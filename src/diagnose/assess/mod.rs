@@ -17,4 +17,4 @@ pub(crate) use excitation::{detection_limits, is_excited};
 pub(crate) use held_out::HeldOut;
 pub(crate) use holds::check as check_holds;
 pub(crate) use model_fit::model_fit;
-pub(crate) use verdict::{judge, notes};
+pub(crate) use verdict::{judge, notes, verdict};

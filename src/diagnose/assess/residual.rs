@@ -5,32 +5,9 @@ use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Correlation, EquationResidual};
 use crate::diagnose::statistics;
-use crate::diagnose::weak_form::Row;
+use crate::diagnose::thresholds::FEWEST_FOR_MOMENTS;
+use crate::diagnose::weak_form::{Row, VARIABLES};
 use std::collections::BTreeMap;
-
-/// Fewer numbers than this have no distribution.
-const FEWEST: usize = 80;
-
-/// A variable that what is left may go with.
-pub(super) struct Variable {
-    pub(super) name: &'static str,
-    pub(super) of: fn(&Row) -> f64,
-}
-
-/// P_L, P_A, P_B, x, ẋ, its sign, flows, force, temperature, time.
-pub(super) const VARIABLES: [Variable; 11] = [
-    Variable { name: "load_pressure_pa", of: |row| row.mean.pa_pa - row.mean.pb_pa },
-    Variable { name: "pa_pa", of: |row| row.mean.pa_pa },
-    Variable { name: "pb_pa", of: |row| row.mean.pb_pa },
-    Variable { name: "x_m", of: |row| row.mean.x_m },
-    Variable { name: "v_mps", of: |row| row.mean.v_mps },
-    Variable { name: "direction", of: |row| row.mean.v_mps.signum() },
-    Variable { name: "qa_m3s", of: |row| row.mean.qa_m3s },
-    Variable { name: "qb_m3s", of: |row| row.mean.qb_m3s },
-    Variable { name: "force_n", of: |row| row.mean.force_n },
-    Variable { name: "temp_k", of: |row| row.mean.temp_k },
-    Variable { name: "t_s", of: |row| row.t_s },
-];
 
 /// What a fit leaves over of one equation; none where the traces lack it.
 pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<EquationResidual> {
@@ -53,7 +30,8 @@ pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<Equ
         count: white.len(),
         noise_ratio: fit.noise_ratio()[equation],
         whiteness_p: fit.whiteness_p(equation),
-        normality_p: (white.len() >= FEWEST).then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
+        normality_p: (white.len() >= FEWEST_FOR_MOMENTS)
+            .then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
         skewness,
         excess_kurtosis,
         correlations,

@@ -1,17 +1,15 @@
 //! The answer in a word, and the sentences that speak for it.
 
 use super::adequacy::{Inadequacy, inadequacy};
-use super::confidence::ratio_note;
-use super::leaks::negative_leaks;
+use super::leaks::{negative_leaks, ratio_note};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::{Interaction, ModelFit, Verdict};
+use crate::diagnose::outcome::{FoundEffect, Interaction, LeakEstimates, ModelFit, Verdict};
 use crate::diagnose::search::{self, Selection};
 use crate::diagnose::thresholds::MOST_ROUNDS;
 
-/// What the search makes of the traces.
+/// What speaks for and against the model with the effects.
 pub(crate) struct Judgement {
-    pub(crate) verdict: Verdict,
     /// What speaks against the model with the effects.
     pub(crate) complaints: Vec<String>,
     /// The complaints among them of sensors that fail by themselves.
@@ -37,7 +35,6 @@ impl Judgement {
 /// left, beside what is wrong with the sensors.
 pub(crate) fn judge(
     selection: &Selection<'_>,
-    excited: bool,
     failures: Vec<String>,
     [before, after]: [&ModelFit; 2],
 ) -> Judgement {
@@ -52,15 +49,21 @@ pub(crate) fn judge(
     if !effects.is_empty() && Equation::ALL.into_iter().all(|equation| !fell[equation]) {
         complaints.push("samples that were not fitted are met no better than without the effects".to_owned());
     }
-    let verdict = match (excited, effects.is_empty(), complaints.is_empty()) {
-        (false, ..) => Verdict::InsufficientExcitation,
-        (true, true, true) => Verdict::NoMissingEffect,
-        (true, true, false) => Verdict::Unexplained,
-        (true, false, true) => Verdict::Explained,
-        (true, false, false) => Verdict::PartlyExplained,
-    };
     let interactions = search::interactions(fit, effects);
-    Judgement { verdict, complaints, failures, left, fell, interactions }
+    Judgement { complaints, failures, left, fell, interactions }
+}
+
+/// The answer in a word. Effects explain the traces where each can be believed, nothing speaks against the model with them,
+/// and no leak is impossible.
+pub(crate) fn verdict(judgement: &Judgement, effects: &[FoundEffect], leaks: &LeakEstimates) -> Verdict {
+    let is_adequate = judgement.complaints.is_empty();
+    let is_believed = effects.iter().all(|effect| effect.confident) && leaks.are_physical();
+    match (effects.is_empty(), is_adequate) {
+        (true, true) => Verdict::NoMissingEffect,
+        (true, false) => Verdict::Unexplained,
+        (false, true) if is_believed => Verdict::Explained,
+        (false, _) => Verdict::PartlyExplained,
+    }
 }
 
 /// All sentences for people: `after` is none where no effect was named.

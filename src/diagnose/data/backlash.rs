@@ -2,7 +2,7 @@
 //! sensor with play saturates, so that a slow drift of that way is forgotten at each turn.
 
 use super::side::{ANYWHERE, Sides};
-use crate::diagnose::thresholds::BLOCK_S;
+use crate::diagnose::thresholds::{AT_END, BLOCK_S, EVIDENT_CHI2, NEXT_PLAY, PLAY_REFINEMENTS};
 use pitchleak_core::effects::Play;
 use std::ops::Range;
 
@@ -15,13 +15,6 @@ pub(super) struct Followed<'a> {
     /// Of one reading.
     pub(super) noise_std_m: f64,
 }
-
-/// χ² by which a play must explain the reading better than none does: six standard deviations, for the best of many plays is taken.
-const EVIDENT_CHI2: f64 = 36.0;
-/// Ratio of two plays that are tried one after the other.
-const NEXT_PLAY: f64 = 1.2;
-/// Steps of the last search between two of them.
-const REFINEMENTS: usize = 6;
 
 impl<'a> Followed<'a> {
     pub(super) fn new(
@@ -45,7 +38,7 @@ impl<'a> Followed<'a> {
             let (mut play, mut is_known) = (Play::new(*first), false);
             for at in stretch.clone() {
                 let side = play.side(play_m, self.way_m[at]);
-                is_known |= side.abs() > 0.999;
+                is_known |= side.abs() > AT_END;
                 (own.side[at], own.side_std[at]) = (side, if is_known { 0.0 } else { ANYWHERE });
             }
         }
@@ -75,7 +68,7 @@ impl<'a> Followed<'a> {
             let beside = [best.1 * share, best.1 / share].map(|play_m| (left(play_m), play_m));
             (beside.into_iter().fold(best, |best, one| if one.0 < best.0 { one } else { best }), share.sqrt())
         };
-        Some((0..REFINEMENTS).fold((best, NEXT_PLAY.sqrt()), refine).0.1)
+        Some((0..PLAY_REFINEMENTS).fold((best, NEXT_PLAY.sqrt()), refine).0.1)
     }
 
     /// Differences of the means of neighbouring blocks.

@@ -1,6 +1,7 @@
 //! The traces and what is declared of them.
 
 mod backlash;
+mod channel;
 mod channels;
 mod dead_band;
 mod declared;
@@ -13,6 +14,7 @@ mod traces;
 mod unresolved;
 mod wiring;
 
+pub(crate) use channel::Channel;
 pub(crate) use channels::channel_faults;
 pub use declared::Declared;
 pub(crate) use declared::thinned;

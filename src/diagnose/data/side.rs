@@ -1,7 +1,7 @@
 //! On which side of its play a sensor lies, read from what it shows: behind a pressure that rises or falls, or on its way from one side to the
 //! other, while its reading stands. How far on that way it is nothing shows of a pressure; of a position the flows do (`backlash.rs`).
 
-use crate::diagnose::thresholds::{BLOCK_S, TURNED_SIGMA};
+use crate::diagnose::thresholds::{LONGEST_STILL_S, OF_STRAIGHT_WAY, TURNED_SIGMA};
 use pitchleak_core::effects::Play;
 use std::ops::Range;
 
@@ -16,11 +16,6 @@ pub(crate) struct Sides {
 
 /// Standard deviation of a side anywhere between −1 and 1.
 pub(super) const ANYWHERE: f64 = 0.577_350_269_189_625_8;
-/// A reading stands when it has not moved for so long, s: noise alone hides slow motion for less.
-const LONGEST_STILL_S: f64 = BLOCK_S / 2.0;
-/// Of a reading that stands, what its sensor's side is on average, of the straight way from the last motion to the next.
-/// Measured on pressures in wind of 5 to 30 m/s under plays of 0.3 and 2 bar: 0.5 to 0.9 where it turns, 0 to 0.9 where it goes on as before.
-const OF_STRAIGHT_WAY: f64 = 0.5;
 
 /// The last motion of a reading before a sample, or its next one after it.
 #[derive(Clone, Copy, Default)]

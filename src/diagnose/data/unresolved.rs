@@ -3,7 +3,7 @@
 
 use super::sensor_noise::{difference_order, differences};
 use super::series::Series;
-use crate::diagnose::thresholds::{LEAST_STEP_S, LOUD_SIGMA};
+use crate::diagnose::thresholds::{LEAST_STEP_S, LONG_STEP, LOUD_SIGMA};
 use pitchleak_core::Sensors;
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ impl Unresolved {
             let unit = of_white * noise_std.max(f64::MIN_POSITIVE);
             fast.into_iter().map(|d| (d / unit).powi(2)).collect()
         };
-        let is_slow = series.step_s() > 1.5 * LEAST_STEP_S;
+        let is_slow = series.step_s() > LONG_STEP * LEAST_STEP_S;
         let squares = is_slow.then(|| {
             [
                 squares(&series.x_m, sensors.position.noise_std),

@@ -7,7 +7,7 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{BLOCK_S, FOLDS};
 use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, WeakForm, residual_rows};
 use pitchleak_core::effects::EffectKind;
-use pitchleak_core::{Effect, Estimate, Signals};
+use pitchleak_core::{Estimate, Signals};
 
 /// Flow that leaves a chamber, averaged over a hat.
 pub(crate) struct MeanFlow {
@@ -94,16 +94,23 @@ impl Fit<'_> {
         PerEquation::from(solved.effects.terms(at, &solved.model, EffectKind::is_leak))[chamber]
     }
 
+    /// The force with which the dry friction that was named can hold a piston that stands, N.
+    fn stiction_n(&self, at: &Signals<f64>) -> f64 {
+        let of = |term: &usize| {
+            let unit_n = self.problem.terms[*term].effect()?.stiction(at)?;
+            Some(self.estimate(*term)?.value.max(0.0) * unit_n)
+        };
+        self.active().iter().filter_map(of).sum()
+    }
+
     /// From integrals over a hat to averages. While the piston stands, dry friction is whatever
     /// balances the forces up to its own size: only what is beyond counts.
     fn in_units(&self, rows: &Rows, mut residual: Vec<f64>) -> Vec<f64> {
-        let coulomb = self.problem.place(Term::Effect(Effect::CoulombFriction));
-        let friction = coulomb.and_then(|term| self.estimate(term)).map_or(0.0, |own| own.value.max(0.0));
         for (cell, entry) in residual.iter_mut().zip(&rows.entries) {
             let row = &rows.rows[entry.row];
             *cell /= row.block_s;
             if entry.equation == Equation::Force {
-                let free = (cell.abs() - friction * row.stuck).max(0.0);
+                let free = (cell.abs() - self.stiction_n(&row.mean) * row.stuck).max(0.0);
                 *cell = cell.signum() * free;
             }
         }

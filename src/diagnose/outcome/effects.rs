@@ -14,11 +14,15 @@ pub struct FoundEffect {
     pub std: f64,
     /// SI; 1 for a share.
     pub unit: &'static str,
-    /// Whether the name can be believed, by itself: no rival fits as well, little is left where it acts, no larger effect beside it could
-    /// pass for it, and neither its value nor a leak beside it is impossible.
+    /// Probability of the name among all that could stand in its place: every other effect of the table and the laws that it does not
+    /// list, each weighed by its likelihood and by the constants that were fitted to it. Halved where something else speaks against it.
+    pub probability: f64,
+    /// Whether the name can be believed, by itself: nothing speaks against it.
     pub confident: bool,
-    /// Why not.
+    /// The first of `doubts` in a sentence.
     pub doubt: Option<String>,
+    /// Why not, the reason that says most first.
+    pub doubts: Vec<Doubt>,
     /// By how much the held-out error of the balance it mends most falls when it is added.
     pub rmse_reduction_percent: f64,
     /// Chance of so large a score without the effect.
@@ -35,6 +39,56 @@ pub struct FoundEffect {
     pub cause: &'static str,
     /// What to do about it.
     pub remedy: &'static str,
+}
+
+impl FoundEffect {
+    /// All of its doubts in a sentence.
+    pub fn doubts_in_words(&self) -> Option<String> {
+        let texts: Vec<&str> = self.doubts.iter().map(|doubt| doubt.text.as_str()).collect();
+        (!texts.is_empty()).then(|| texts.join("; "))
+    }
+}
+
+/// A reason not to believe an effect's name or its value.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Doubt {
+    /// Which.
+    pub id: DoubtId,
+    /// For people.
+    pub text: String,
+}
+
+/// What speaks against an effect's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum DoubtId {
+    /// Other effects fit as well in its place.
+    Rivals,
+    /// A law that the table does not list fits as well or better.
+    UnlistedLaw,
+    /// The residual where it acts is not small beside what it explains.
+    Residual,
+    /// The residual where it acts goes with another effect, which is too weak for a name.
+    WeakRival,
+    /// It is as small as an error in the law of a larger effect of the same equation.
+    SmallBesideOther,
+    /// It is dry friction or a constant force, which together are dry friction that is larger one way.
+    OneWayFriction,
+    /// Its value is at the end of what is possible.
+    AtBound,
+    /// It would take away all that the rig file declares.
+    TakesAllDeclared,
+    /// Beside an effect too weak for a name it could be none.
+    MayBeNone,
+    /// With it a leak comes out below zero.
+    NegativeLeak,
+    /// The error on held-out samples did not fall where it acts.
+    HeldOut,
+    /// A sensor fails by itself.
+    SensorFault,
+    /// A doubtful effect of the same equation may have taken some of its share.
+    DoubtfulNeighbour,
 }
 
 /// Two effects that act on each other: the product of their terms explains more than chance would.

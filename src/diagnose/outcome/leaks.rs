@@ -32,6 +32,18 @@ pub struct LeakEstimates {
     pub bulk_modulus: LeakEstimate,
 }
 
+impl LeakEstimates {
+    /// Whether physics allows all three leaks.
+    pub fn are_physical(&self) -> bool {
+        let Self {
+            internal_leak_coefficient, external_leak_a_coefficient, external_leak_b_coefficient, ..
+        } = self;
+        [internal_leak_coefficient, external_leak_a_coefficient, external_leak_b_coefficient]
+            .iter()
+            .all(|leak| leak.physical)
+    }
+}
+
 /// Leak flows at rest and as predicted from motion; none for a chamber that was never held under pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Holds {

@@ -4,7 +4,7 @@ mod effects;
 mod leaks;
 mod residual;
 
-pub use effects::{Calibration, FoundEffect, Interaction, Size};
+pub use effects::{Calibration, Doubt, DoubtId, FoundEffect, Interaction, Size};
 pub use leaks::{HoldLeak, Holds, LeakEstimate, LeakEstimates};
 pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
@@ -18,9 +18,9 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// With the effects named, what is left is sensor noise.
+    /// With the effects named the residual is sensor noise, each of them can be believed, and no leak is impossible.
     Explained,
-    /// The effects named mend much, but more than sensor noise is left.
+    /// The effects named mend much, but more than sensor noise is left, one of them is doubtful, or a leak is impossible.
     PartlyExplained,
     /// What the declared model leaves over is sensor noise.
     NoMissingEffect,

@@ -2,7 +2,8 @@
 
 use crate::diagnose::equation::Equation;
 use crate::diagnose::statistics::bonferroni_sigma;
-use crate::diagnose::thresholds::{CHANCE_RATE, RESIDUAL_TESTS};
+use crate::diagnose::thresholds::CHANCE_RATE;
+use crate::diagnose::weak_form::RESIDUAL_TESTS;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -3,10 +3,9 @@
 use super::candidates::Candidates;
 use crate::diagnose::fit::{Fit, Score, Solution, UnknownConstant};
 use crate::diagnose::thresholds::{
-    FIRST_STEP, LAST_STEP, LEAST_CLIMB, MOST_CLIMBS, SEARCH_STARTS, WORTH_SEARCHING,
+    FIRST_STEP, LAST_STEP, LEAST_CLIMB, MOST_CLIMBS, OTHERS_SHARE, SEARCH_STARTS, WORTH_SEARCHING,
 };
-use crate::diagnose::weak_form::Row;
-use pitchleak_core::Effect;
+use pitchleak_core::Signals;
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 
 /// A constant and the values of it that these traces can tell apart.
@@ -23,10 +22,10 @@ impl Range {
     }
 }
 
-/// The constants of an effect that are fitted: not those that only fix a reference.
+/// The constants of an effect that are fitted.
 fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     let Some(effect) = fit.problem.terms[term].effect() else { return vec![] };
-    effect.constants().iter().filter_map(|parameter| range(fit, effect, *parameter)).collect()
+    effect.fitted_constants().filter_map(|parameter| range(fit, parameter)).collect()
 }
 
 /// What an effect's value has of spread because its constants are not known.
@@ -41,49 +40,22 @@ pub(super) fn are_fitted(fit: &Fit<'_>, term: usize) -> bool {
     !free(fit, term).is_empty()
 }
 
-fn range(fit: &Fit<'_>, effect: Effect, parameter: EffectConstant) -> Option<Range> {
-    let rows = &fit.rows().rows;
-    let span = |value: &dyn Fn(&Row) -> f64| {
+fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
+    let span = |value: fn(&Signals<f64>) -> f64| {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
-        rows.iter().map(value).fold(ends, |(low, high), v| (low.min(v), high.max(v)))
+        let values = fit.rows().rows.iter().map(|row| value(&row.mean));
+        values.fold(ends, |(low, high), v| (low.min(v), high.max(v)))
     };
-    let (low, high) = match parameter {
-        EffectConstant::SpotPosition => span(&|row| row.mean.x_m),
-        EffectConstant::SpotWidth => {
-            let (low, high) = span(&|row| row.mean.x_m);
-            (0.05 * (high - low), 0.7 * (high - low))
-        }
-        EffectConstant::StribeckSpeed => {
-            let (_, high) = span(&|row| row.mean.v_mps.abs());
-            (0.02 * high, 0.7 * high)
-        }
-        EffectConstant::Precharge => (0.0, span(&|row| row.mean.pa_pa.max(row.mean.pb_pa)).1),
-        EffectConstant::CrackingPressure => {
-            let (low, high) = span(&|row| (row.mean.pa_pa - row.mean.pb_pa).abs());
-            // What always or never opens can't be told from other leaks, or at all.
-            (low + 0.05 * (high - low), high - 0.05 * (high - low))
-        }
-        // Slow to fast.
-        EffectConstant::PolytropicExponent => (1.0, 1.4),
-        // A seal's lip turns at once.
-        EffectConstant::SlipSpeed if effect == Effect::InternalLeakDirection => return None,
-        EffectConstant::SlipSpeed => {
-            let (_, high) = span(&|row| row.mean.v_mps.abs());
-            (fit.problem.usual_constants.slip_speed_mps, 0.3 * high)
-        }
-        EffectConstant::ReferenceTemp => return None,
-    };
-    let spec = parameter.spec();
-    let (low, high) = (low.max(spec.lower), high.min(spec.upper));
-    (high > low).then_some(Range { parameter, low, high })
+    let (low, high) = parameter.range(fit.problem.usual_constants.get(parameter), span)?;
+    Some(Range { parameter, low, high })
 }
 
 /// The constants with which the search for a candidate's begins: the present ones and a few places of each range.
 fn starts(fit: &Fit<'_>, term: usize) -> Vec<EffectConstants<f64>> {
     let (ranges, usual) = (free(fit, term), fit.problem.usual(term));
-    let middle = ranges
-        .iter()
-        .fold(fit.constants(term), |constants, other| constants.with(other.parameter, other.at(0.3)));
+    let middle = ranges.iter().fold(fit.constants(term), |constants, other| {
+        constants.with(other.parameter, other.at(OTHERS_SHARE))
+    });
     let places = ranges.iter().flat_map(|range| SEARCH_STARTS.map(|share| (range, share)));
     (fit.constants(term) != usual)
         .then_some(usual)

@@ -3,7 +3,7 @@
 use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop, strongest_nameless};
 use super::selection::{Selected, Selection, loss, with};
 use super::trials::Trial;
-use crate::diagnose::fit::{Fit, Progress};
+use crate::diagnose::fit::{Fit, Progress, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{AGREED_SIGMA, CONFUSABLE_CHI2, LEAST_MENDED_SHARE, MOST_EFFECTS};
 use crate::diagnose::weak_form::Nameless;
@@ -36,6 +36,7 @@ impl Selection<'_> {
             p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
             mended_percent: None,
             confusable_with: vec![],
+            probability: 0.0,
             like_nameless: None,
             beaten_by_nameless: nameless_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
         });
@@ -83,7 +84,9 @@ impl Selection<'_> {
             let without = fit.solve_without(&[one.term]);
             let lost = without.chi2 - fit.free.chi2;
             let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            let rivals = candidates.trials(&without).into_iter().filter(is_close);
+            let trials = candidates.trials(&without);
+            one.probability = place_probability(fit, one.term, lost / dispersion, &trials, &without);
+            let rivals = trials.into_iter().filter(is_close);
             let is_near = |(_, chi2_drop): &(Nameless, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
             one.like_nameless = strongest_nameless(fit, &without).filter(is_near).map(|(product, _)| product);
             one.confusable_with =
@@ -91,6 +94,24 @@ impl Selection<'_> {
         }
         self.effects.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
     }
+}
+
+/// The probability of an effect among all that could stand in its place, beside the others: equal prior odds for each candidate and each
+/// law without a name, and by how much each passes what chance and its fitted constants could bring, twice a log likelihood.
+fn place_probability(
+    fit: &Fit<'_>,
+    term: usize,
+    chi2_drop: f64,
+    trials: &[Trial],
+    without: &Solution,
+) -> f64 {
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let own = chi2_drop - critical_sigma(fit, fit.constants(term)).powi(2);
+    let usual = critical_sigma(fit, fit.problem.usual_constants).powi(2);
+    let others = trials.iter().map(|trial| trial.beyond(dispersion));
+    let unlisted = strongest_nameless(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
+    let odds_against: f64 = others.chain(unlisted).map(|other| ((other - own) / 2.0).exp()).sum();
+    1.0 / (1.0 + odds_against)
 }
 
 /// Whether a candidate is significant, mends enough, and helps where it was not fitted.

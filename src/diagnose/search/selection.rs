@@ -17,6 +17,8 @@ pub(crate) struct Selected {
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
+    /// Probability of it among all that could stand in its place.
+    pub(crate) probability: f64,
     /// A product of signals without a name that fits nearly as well in its place.
     pub(crate) like_nameless: Option<Nameless>,
     /// A product of signals without a name would have fitted better.
@@ -32,6 +34,7 @@ impl Selected {
             p_value: 1.0,
             mended_percent: None,
             confusable_with: vec![],
+            probability: 0.0,
             like_nameless: None,
             beaten_by_nameless: false,
         }

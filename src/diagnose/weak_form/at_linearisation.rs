@@ -5,15 +5,15 @@ use super::hats::{ActiveTerm, Integrand};
 use super::linearisation::Linearisation;
 use super::noise_model::NoiseModel;
 use super::rows::Rows;
-use super::sensitivity::{Channel, Sensitivity};
+use super::sensitivity::Sensitivity;
 use super::shared_noise::{SharedNoise, Slopes};
-use super::terms::Term;
+use super::terms::{Columns, Term};
 use super::whitening::Whitening;
-use crate::diagnose::data::{Motion, Series, Unresolved};
+use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
-use pitchleak_core::{Effect, Sensors};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -31,24 +31,6 @@ pub(crate) struct WeakForm<'a> {
     pub(crate) whitening: Whitening,
 }
 
-/// Which columns are built.
-#[derive(Clone, Copy)]
-pub(crate) struct Columns<'a> {
-    pub(crate) terms: &'a [Term],
-    /// Of each term.
-    pub(crate) constants: &'a [EffectConstants<f64>],
-    /// Places of the terms that get a column; those of the others stay empty.
-    pub(crate) places: &'a [usize],
-}
-
-impl Columns<'_> {
-    fn integrand<'b>(&self, at: &'b Linearisation) -> Integrand<'b> {
-        let terms: Vec<Term> = self.places.iter().map(|place| self.terms[*place]).collect();
-        let constants: Vec<_> = self.places.iter().map(|place| self.constants[*place]).collect();
-        Integrand::new(at, &terms, &constants)
-    }
-}
-
 impl<'a> WeakForm<'a> {
     /// With the noise that the sensors bring at `noise_at`, and `equation_error` as in [`NoiseModel`].
     pub(crate) fn new(
@@ -59,7 +41,7 @@ impl<'a> WeakForm<'a> {
         equation_error: PerEquation<f64>,
     ) -> Self {
         let motions = motions(traces, sensors, &at);
-        let rows = Rows::build(traces, &motions, &columns.integrand(&at), BLOCK_S);
+        let rows = Rows::build(traces, &motions, &Integrand::of(&at, columns), BLOCK_S);
         let mut rows = rows.at_places(columns.places, columns.terms.len());
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
         add_unresolved(&mut sensitivities, &mut rows, (traces, &motions), (sensors, &noise_at));
@@ -98,7 +80,7 @@ impl<'a> WeakForm<'a> {
     /// The sensitivities, had the sensors their `declared` noise and a share of what they show beyond it.
     pub(crate) fn at_share(&self, declared: &Sensors<f64>, share: f64) -> Vec<PerEquation<Sensitivity>> {
         let times = Channel::ALL.map(|channel| {
-            let variance = |sensors| channel.noise_std(sensors, &self.noise_at).powi(2);
+            let variance = |sensors| channel.noise_std(sensors, &self.noise_at.model.cylinder).powi(2);
             let quiet = variance(declared) / variance(self.sensors);
             if quiet.is_finite() { (share + (1.0 - share) * quiet).sqrt() } else { 1.0 }
         });
@@ -148,25 +130,17 @@ fn add_unresolved(
     (traces, motions): (&[Series], &[Motion]),
     (sensors, at): (&Sensors<f64>, &Linearisation),
 ) {
-    // As loudness is listed: position, pressures, flows.
-    let plays = [
-        (Effect::PositionHysteresis, sensors.position),
-        (Effect::PressureHysteresisA, sensors.pressure),
-        (Effect::PressureHysteresisB, sensors.pressure),
-        (Effect::FlowMeterDeadBandA, sensors.flow_a),
-        (Effect::FlowMeterDeadBandB, sensors.flow_b),
-    ]
-    .map(|(effect, sensor)| at.value(Term::Effect(effect)) / sensor.noise_std);
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let samples = row.samples_in(&traces[row.trace()].t_s);
         let mut times = unresolved[row.trace()].loudness(samples.clone());
         let motion = &motions[row.trace()];
-        let sides = [&motion.x, &motion.pa, &motion.pb, &motion.qa, &motion.qb].into_iter().zip(plays);
-        let [x, pa, pb, qa, qb, _] = &mut times;
         let mut is_unseen = false;
-        for (times, (sides, play)) in [x, pa, pb, qa, qb].into_iter().zip(sides) {
+        for active in at.effects.iter() {
+            let Some((channel, sides)) = motion.sides_of(active.effect) else { continue };
+            let play = active.value / channel.noise_std(sensors, &at.model.cylinder);
             let somewhere = sides.loudness(samples.clone(), play);
+            let times = &mut times[channel as usize];
             *times = times.hypot(somewhere);
             is_unseen |= somewhere > 1.0;
         }

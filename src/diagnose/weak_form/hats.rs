@@ -1,10 +1,10 @@
 //! Integrals along a trace, weighted by hats over two neighbouring blocks of samples.
 
 use super::linearisation::{Linearisation, as_felt};
-use super::terms::Term;
+use super::terms::{Columns, Term};
 use crate::diagnose::data::{Motion, Series};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::LEAST_STEP_S;
+use crate::diagnose::thresholds::{EVEN_SHARE, LEAST_STEP_S, LONG_STEP};
 use pitchleak_core::Signals;
 use pitchleak_core::effects::EffectConstants;
 
@@ -142,7 +142,7 @@ impl Step {
             let seen = at.effects.correct(&reading);
             Instant { seen, felt: as_felt(&seen, &felt) }
         };
-        let is_long = dt_s > 1.5 * LEAST_STEP_S;
+        let is_long = dt_s > LONG_STEP * LEAST_STEP_S;
         let first = instant(if is_long { -GAUSS } else { 0.0 });
         (Self { dt_s, first, second: is_long.then(|| Box::new(instant(GAUSS))) }, means)
     }
@@ -165,6 +165,13 @@ impl Step {
 impl<'a> Integrand<'a> {
     pub(crate) fn new(at: &'a Linearisation, terms: &[Term], constants: &[EffectConstants<f64>]) -> Self {
         let terms = terms.iter().zip(constants).map(|(term, constants)| ActiveTerm::new(*term, *constants));
+        Self { at, terms: terms.collect() }
+    }
+
+    /// Of the columns that are built.
+    pub(super) fn of(at: &'a Linearisation, columns: Columns<'_>) -> Self {
+        let Columns { terms, constants, places } = columns;
+        let terms = places.iter().map(|place| ActiveTerm::new(terms[*place], constants[*place]));
         Self { at, terms: terms.collect() }
     }
 
@@ -270,6 +277,12 @@ fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
     }
 }
 
+/// Weights of the quintic through six even samples for its mean over the middle step, by their distance from it, in units of
+/// 1/[`QUINTIC_UNIT`]. Derived: exact for polynomials of fifth degree.
+pub(super) const QUINTIC: [f64; 3] = [802.0, -93.0, 11.0];
+/// See [`QUINTIC`].
+pub(super) const QUINTIC_UNIT: f64 = 1440.0;
+
 /// Mean over the step that ends at sample `at`, by the quintic through six samples where they stand evenly, else the cubic through
 /// four: the trapezoid's error, (ω dt)²/12 of a wave, would pass for a sensor's gain, and at 20 Hz the cubic's,
 /// 11 (ω dt)⁴/720, for gas in a port.
@@ -277,8 +290,9 @@ fn step_mean(values: &[f64], at: usize, even: Even) -> f64 {
     let pair = |reach: usize| values[at - 1 - reach] + values[at + reach];
     let inner = pair(0);
     let cubic = |next: f64| (13.0 * inner - next) / 24.0;
-    let six =
-        if even >= Even::Six { (802.0 * inner - 93.0 * pair(1) + 11.0 * pair(2)) / 1440.0 } else { f64::NAN };
+    let [first, second, third] = QUINTIC;
+    let quintic = || (first * inner + second * pair(1) + third * pair(2)) / QUINTIC_UNIT;
+    let six = if even >= Even::Six { quintic() } else { f64::NAN };
     let four = if even >= Even::Four { cubic(pair(1)) } else { f64::NAN };
     [six, four].into_iter().find(|mean| mean.is_finite()).unwrap_or(inner / 2.0)
 }
@@ -302,7 +316,7 @@ enum Even {
 impl Even {
     fn about(series: &Series, at: usize, dt: f64) -> Self {
         let t = &series.t_s;
-        let as_long = |step: f64| (step - dt).abs() < 0.1 * dt;
+        let as_long = |step: f64| (step - dt).abs() < EVEN_SHARE * dt;
         let is_even = |reach: usize| {
             at > reach
                 && at + reach < t.len()

@@ -12,11 +12,11 @@ mod shared_noise;
 mod terms;
 mod whitening;
 
-pub(crate) use at_linearisation::{Columns, WeakForm, residual_rows};
+pub(crate) use at_linearisation::{WeakForm, residual_rows};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use nameless::Nameless;
 pub(crate) use noise_model::NoiseModel;
-pub(crate) use rows::{Entry, Row, Rows};
+pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
 pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
-pub(crate) use terms::{DECLARED, Term, all_terms};
+pub(crate) use terms::{Columns, DECLARED, Term, all_terms};
 pub(crate) use whitening::Whitening;

@@ -4,9 +4,11 @@
 //! its rate does, by the hat's curvature where that does. How much of each, `sensitivity.rs` says. Rows that share a block are
 //! correlated, others are not.
 
+use super::hats::{QUINTIC, QUINTIC_UNIT};
 use super::linearisation::Linearisation;
 use super::rows::{Row, Rows};
-use super::sensitivity::{Channel, Sensitivity};
+use super::sensitivity::Sensitivity;
+use crate::diagnose::data::Channel;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::IGNORED;
 use pitchleak_core::Sensors;
@@ -29,8 +31,9 @@ pub(crate) fn hat_weights(samples: usize) -> HatWeights {
     let step = |j: isize| {
         if (0..2 * m - 1).contains(&j) { (m - (j - (m - 1)).abs()) as f64 / m as f64 } else { 0.0 }
     };
+    let [first, second, third] = QUINTIC;
     let patterns = [
-        [11.0, -93.0, 802.0, 802.0, -93.0, 11.0].map(|share| share / 1440.0),
+        [third, second, first, first, second, third].map(|share| share / QUINTIC_UNIT),
         [0.0, 0.0, -1.0, 1.0, 0.0, 0.0],
         [0.0, 0.5, -0.5, -0.5, 0.5, 0.0],
     ];
@@ -129,7 +132,7 @@ impl NoiseModel<'_> {
                 }
             }
             let loudness = first.loudness[place] * second.loudness[place];
-            sum += of_channel * loudness * channel.noise_std(self.sensors, self.at).powi(2);
+            sum += of_channel * loudness * channel.noise_std(self.sensors, &self.at.model.cylinder).powi(2);
         }
         let error = if a == b { self.equation_error[a] } else { 0.0 };
         sum + weights[0][0] * step_s * step_s * error

@@ -45,6 +45,30 @@ impl Row {
     }
 }
 
+/// A variable that a residual may go with.
+pub(crate) struct Variable {
+    pub(crate) name: &'static str,
+    pub(crate) of: fn(&Row) -> f64,
+}
+
+/// P_L, P_A, P_B, x, ẋ, its sign, flows, force, temperature, time.
+pub(crate) const VARIABLES: [Variable; 11] = [
+    Variable { name: "load_pressure_pa", of: |row| row.mean.pa_pa - row.mean.pb_pa },
+    Variable { name: "pa_pa", of: |row| row.mean.pa_pa },
+    Variable { name: "pb_pa", of: |row| row.mean.pb_pa },
+    Variable { name: "x_m", of: |row| row.mean.x_m },
+    Variable { name: "v_mps", of: |row| row.mean.v_mps },
+    Variable { name: "direction", of: |row| row.mean.v_mps.signum() },
+    Variable { name: "qa_m3s", of: |row| row.mean.qa_m3s },
+    Variable { name: "qb_m3s", of: |row| row.mean.qb_m3s },
+    Variable { name: "force_n", of: |row| row.mean.force_n },
+    Variable { name: "temp_k", of: |row| row.mean.temp_k },
+    Variable { name: "t_s", of: |row| row.t_s },
+];
+
+/// How many residuals are held against a variable each. Derived.
+pub(crate) const RESIDUAL_TESTS: usize = Equation::ALL.len() * VARIABLES.len();
+
 /// One equation of one row: an entry of the regression.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {

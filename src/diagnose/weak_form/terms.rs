@@ -2,8 +2,8 @@
 //! table, and a few products of signals without a name that only serve to say "something else is there".
 
 use super::nameless::Nameless;
-use super::sensitivity::Channel;
-use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
+use crate::diagnose::data::Channel;
+use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Model, Signals, Terms};
 
 /// One column of the regression.
@@ -23,6 +23,16 @@ pub(crate) enum Term {
     Nameless(Nameless),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
+}
+
+/// Which columns are built.
+#[derive(Clone, Copy)]
+pub(crate) struct Columns<'a> {
+    pub(crate) terms: &'a [Term],
+    /// Of each term.
+    pub(crate) constants: &'a [EffectConstants<f64>],
+    /// Places of the terms that get a column; those of the others stay empty.
+    pub(crate) places: &'a [usize],
 }
 
 /// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
@@ -52,6 +62,20 @@ const PROBE: Signals<f64> = Signals {
     temp_k: 300.0,
     t_s: 10.0,
 };
+
+/// Oil that is stored goes with the pressures' rates.
+const STORAGE: [(Channel, usize); 2] = [(Channel::PressureA, 1), (Channel::PressureB, 1)];
+/// Forces feel speed and acceleration.
+const FELT: [(Channel, usize); 2] = [(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
+
+/// The channel that measures a left side of the chambers' equations.
+fn left_side(side: LeftSide) -> (Channel, usize) {
+    match side {
+        LeftSide::Speed => (Channel::Position, 1),
+        LeftSide::FlowA => (Channel::FlowA, 0),
+        LeftSide::FlowB => (Channel::FlowB, 0),
+    }
+}
 
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
@@ -128,35 +152,41 @@ impl Term {
         }
     }
 
-    /// The signals whose noise the column carries beside what the model leaves over: the channel, and whether its value (0) or
+    /// The signals whose noise the column shares with the residual: the channel, and whether its value (0) or
     /// its rate (1). The others' columns are quiet against what they vary.
-    pub(crate) fn noisy_in(self) -> &'static [(Channel, usize)] {
-        const SPEED: &[(Channel, usize)] = &[(Channel::Position, 1)];
-        const STORAGE: &[(Channel, usize)] = &[(Channel::PressureA, 1), (Channel::PressureB, 1)];
-        const FLOWS: &[(Channel, usize)] = &[(Channel::FlowA, 0), (Channel::FlowB, 0)];
-        const FORCE: &[(Channel, usize)] = &[(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
-        let effect = match self {
-            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => return STORAGE,
-            Self::Nameless(Nameless::DirectionLeak) => return SPEED,
-            Self::Nameless(Nameless::BentPressureA) => {
-                return &[(Channel::PressureA, 0), (Channel::PressureA, 1)];
+    pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {
+        match self {
+            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => STORAGE.to_vec(),
+            Self::Nameless(Nameless::DirectionLeak) => vec![left_side(LeftSide::Speed)],
+            Self::Nameless(Nameless::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
+            Self::Nameless(Nameless::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
+            Self::Effect(effect) => {
+                let EffectSpec { carries, shares_noise_of, kind, .. } = effect.spec();
+                match *kind {
+                    _ if carries.is_some() || !shares_noise_of.is_empty() => {
+                        carries.iter().chain(*shares_noise_of).copied().map(left_side).collect()
+                    }
+                    EffectKind::Sensor => vec![],
+                    _ if self.in_force() => FELT.to_vec(),
+                    EffectKind::Storage => STORAGE.to_vec(),
+                    _ => vec![],
+                }
             }
-            Self::Nameless(Nameless::BentPressureB) => {
-                return &[(Channel::PressureB, 0), (Channel::PressureB, 1)];
-            }
-            // The direction turns with what both meters read.
-            Self::Effect(Effect::InternalLeakDirection) => return FLOWS,
-            Self::Effect(effect) => effect,
-            _ => return &[],
-        };
-        match (effect.spec().carries, effect.spec().kind) {
-            (Some(LeftSide::Speed), _) => SPEED,
-            (Some(LeftSide::FlowA), _) => &[(Channel::FlowA, 0)],
-            (Some(LeftSide::FlowB), _) => &[(Channel::FlowB, 0)],
-            (None, kind) if kind != EffectKind::Sensor && self.in_force() => FORCE,
-            (None, EffectKind::Storage) => STORAGE,
-            _ => &[],
+            _ => vec![],
         }
+    }
+
+    /// Whether it is a force that never changes.
+    pub(crate) fn is_constant_force(self) -> bool {
+        let Self::Effect(effect) = self else { return false };
+        let at = |signals| effect.unit_term(&signals, &Model::paper(), &EffectConstants::default()).force_n;
+        let (probe, zero) = (at(PROBE), at(Signals::default()));
+        effect.spec().kind == EffectKind::Force && probe.to_bits() == zero.to_bits()
+    }
+
+    /// Whether it is a friction that can hold a piston which stands.
+    pub(crate) fn is_dry_friction(self) -> bool {
+        self.effect().is_some_and(|effect| effect.stiction(&PROBE).is_some())
     }
 
     /// Whether the column is in proportion to what the equations have on their left side, Q or A ẋ.
