@@ -14,11 +14,9 @@
 //! The derivation is in `docs/closing-the-loop.md`.
 
 mod assess;
-mod calibrated_rig;
 mod data;
 mod equation;
 mod fit;
-mod json;
 mod outcome;
 mod search;
 mod statistics;

@@ -5,7 +5,8 @@ use crate::channels::ChannelFault;
 use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::EquationResidual;
+use crate::diagnose::outcome::{EquationResidual, Interaction, ModelFit};
+use crate::diagnose::search::Selection;
 use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, SHAPE_BINS};
 use crate::diagnose::weak_form::{Nameless, RESIDUAL_TESTS};
 use crate::diagnose::{search, statistics};
@@ -143,4 +144,49 @@ fn ripples(checks: &[SensorCheck]) -> Vec<String> {
     } else {
         vec![]
     }
+}
+
+/// What speaks for and against the model with the effects.
+pub(crate) struct Judgement {
+    /// What speaks against the model with the effects.
+    pub(crate) complaints: Vec<String>,
+    /// The complaints among them of sensors that fail by themselves.
+    pub(crate) failures: Vec<String>,
+    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    pub(crate) left: PerEquation<f64>,
+    /// Where the effects together made the error on held-out samples smaller.
+    pub(crate) fell: PerEquation<bool>,
+    /// Pairs of effects that act on each other.
+    pub(crate) interactions: Vec<Interaction>,
+}
+
+impl Judgement {
+    /// What the strongest product of two effects would mend of the sum of squares, `beside` being none of them: their laws are wrong by that.
+    pub(crate) fn mended_by_products(&self, fit: &Fit<'_>, beside: Option<&str>) -> f64 {
+        let is_beside = |found: &&Interaction| !found.effects.iter().any(|id| Some(*id) == beside);
+        let percents = self.interactions.iter().filter(is_beside).map(|found| found.mended_percent);
+        percents.fold(0.0, f64::max) / 100.0 * fit.free.chi2
+    }
+}
+
+/// Judges the model with the effects by its errors on held-out samples, `before` without them and `after`, and by what is
+/// left, beside what is wrong with the sensors.
+pub(crate) fn judge(
+    selection: &Selection<'_>,
+    failures: Vec<String>,
+    [before, after]: [&ModelFit; 2],
+) -> Judgement {
+    let Selection { fit, effects } = selection;
+    let Inadequacy { mut complaints, left } = inadequacy(fit);
+    complaints.extend_from_slice(&failures);
+    if effects.iter().any(|one| one.beaten_by_nameless) {
+        complaints.push("a product of signals without a name fits better than any known effect".to_owned());
+    }
+    let [before, after] = [before, after].map(|model| &model.quality.rmse);
+    let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);
+    if !effects.is_empty() && Equation::ALL.into_iter().all(|equation| !fell[equation]) {
+        complaints.push("samples that were not fitted are met no better than without the effects".to_owned());
+    }
+    let interactions = search::interactions(fit, effects);
+    Judgement { complaints, failures, left, fell, interactions }
 }

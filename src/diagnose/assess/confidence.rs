@@ -1,8 +1,7 @@
 //! Whether a named effect stands by itself: each is held against its rivals, against what is left, against the effects
 //! beside it, and against what physics allows.
 
-use super::adequacy;
-use super::verdict::Judgement;
+use super::adequacy::{self, Judgement};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Doubt, DoubtId};

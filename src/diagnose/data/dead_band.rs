@@ -1,7 +1,7 @@
 //! Where in its meter's dead band a flow lies while the meter shows nothing. The reading says when it enters and leaves the band, and by which
 //! edge; how it goes on in between another sensor shows, or nothing does.
 
-use super::side::{ANYWHERE, Sides};
+use super::play::{ANYWHERE, Sides};
 use crate::diagnose::thresholds::SHOWN_SIGMA;
 use std::ops::Range;
 

@@ -1,11 +1,10 @@
 //! What a trace says of the ways its signals go. The speed that friction feels: from the flows where they are measured, which know it ten times
 //! better than the position's difference does, else from the slope of the position.
 
-use super::backlash::Followed;
 use super::channel::Channel;
 use super::dead_band::{Beside, median_of_three, within_band};
+use super::play::{Followed, Sides};
 use super::series::Series;
-use super::side::Sides;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
 use pitchleak_core::{Effect, EffectSet, Model, Sensors, Signals};
 

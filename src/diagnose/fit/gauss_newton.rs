@@ -2,9 +2,8 @@
 //! with sensor effects undone on the readings. Columns that carry the residual's own noise are corrected
 //! for it (errors in variables: Söderström 2018, "Errors-in-Variables Methods in System Identification").
 
-use super::equation_error;
 use super::problem::Problem;
-use super::regression::{Prior, Regression, Solution};
+use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
@@ -144,7 +143,7 @@ impl<'a> Fit<'a> {
             let pieces = regression.jackknife(&structure.active, &priors);
             bounded.std.iter_mut().zip(pieces).for_each(|(std, wide)| *std = std.max(wide));
         }
-        let equation_error = equation_error::estimate(&weak_form, &regression, &bounded);
+        let equation_error = regression::equation_error(&weak_form, &regression, &bounded);
         Self {
             problem,
             structure,

@@ -1,18 +1,23 @@
-//! What a diagnosis says.
-
-mod effects;
-mod leaks;
-mod residual;
-
-pub use effects::{Calibration, Doubt, DoubtId, FoundEffect, Interaction, Size};
-pub use leaks::{HoldLeak, Holds, LeakEstimate, LeakEstimates};
-pub use residual::{BinnedResidual, Correlation, EquationResidual};
+//! What a diagnosis says, in JSON too, and as a rig file.
 
 use super::data::Series;
 use super::equation::PerEquation;
+use crate::Rig;
+use crate::rig::EffectValue;
 use crate::wiring::Wiring;
+use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::{Effect, Fluid};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+mod effects;
+mod json;
+mod residual;
+
+pub use effects::{
+    Calibration, Doubt, DoubtId, FoundEffect, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, Size,
+};
+pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
 /// The answer in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -99,4 +104,30 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Leaks while the piston stands, against those found in motion; none without such holds.
     pub holds: Option<Holds>,
+}
+
+impl Diagnosis {
+    /// The rig file with the effects in it, so that replay and simulation use them. The bulk modulus is that of
+    /// the fit too: volumes and hoses are measured only as V/β.
+    pub fn rig(&self, rig: &Rig) -> Rig {
+        let mut with = rig.clone();
+        if !self.effects.is_empty() {
+            let bulk = &self.after.leaks.bulk_modulus;
+            let relative = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+            let std = bulk.std.min(relative * bulk.value);
+            with.fluid = Fluid { bulk_modulus_pa: bulk.value, bulk_modulus_std_pa: std };
+        }
+        let sizes = self.calibration.iter().map(|c| (c.id, c.value, c.std, None));
+        let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.constants))));
+        for (id, value, std, found) in sizes {
+            let Ok(effect) = id.parse::<Effect>() else { continue };
+            let mut constants = EffectConstants::default();
+            for own in effect.constants() {
+                let value = found.and_then(|found| found.get(own.spec().id));
+                constants = value.map_or(constants, |value| constants.with(*own, *value));
+            }
+            with.effects.insert(effect, EffectValue { value, std: Some(std), constants });
+        }
+        with
+    }
 }

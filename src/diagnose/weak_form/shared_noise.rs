@@ -1,6 +1,6 @@
 //! What columns share with what the model leaves over, drawn again and again: noise of the same sensors.
 
-use super::noise_model::{HatWeights, NoiseModel, hat_weights};
+use super::noise::{HatWeights, NoiseModel, hat_weights};
 use super::rows::{Entry, Row, Rows};
 use super::terms::{Columns, Term};
 use crate::diagnose::data::Channel;

@@ -1,4 +1,6 @@
-//! Integrals along a trace, weighted by hats over two neighbouring blocks of samples.
+//! Integrals along a trace, weighted by test functions: hats over two neighbouring blocks of samples. Of all columns at once, or of
+//! single terms at one linearisation: the search for an effect's constants tries many, and each costs the term alone, because the
+//! corrected signals are kept.
 
 use super::linearisation::{Linearisation, as_felt};
 use super::terms::{Columns, Term};
