@@ -1,4 +1,4 @@
-//! Whether what is left can be the sensors' noise, and if not, where it shows.
+//! Whether the residual can be the sensors' noise, and if not, where it shows.
 
 use super::residual::whitened_residual;
 use crate::channels::ChannelFault;
@@ -8,7 +8,7 @@ use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{EquationResidual, Interaction, ModelFit};
 use crate::diagnose::search::Selection;
 use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, SHAPE_BINS};
-use crate::diagnose::weak_form::{Nameless, RESIDUAL_TESTS};
+use crate::diagnose::weak_form::{RESIDUAL_TESTS, Unlisted};
 use crate::diagnose::{search, statistics};
 
 fn name(equation: Equation) -> &'static str {
@@ -19,7 +19,7 @@ fn name(equation: Equation) -> &'static str {
     }
 }
 
-/// What is left of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
+/// The residual of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
 /// all that is left.
 struct Leftover {
     /// Size in that of the sensors' noise.
@@ -54,7 +54,7 @@ impl Leftover {
 pub(crate) struct Inadequacy {
     /// In sentences; none when the model is complete.
     pub(crate) complaints: Vec<String>,
-    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
     pub(crate) left: PerEquation<f64>,
 }
 
@@ -65,36 +65,36 @@ pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
     for (equation, left) in left.iter() {
         let (name, ratio) = (name(equation), left.noise_ratio);
         if ratio > 1.0 {
-            complaints.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
+            complaints.push(format!("the residual of {name} is {ratio:.2} times the sensors' noise"));
         } else if left.by_colour > 0.0 {
-            complaints.push(format!("what is left in {name} is as small as noise but not white"));
+            complaints.push(format!("the residual of {name} is as small as noise but not white"));
         }
     }
     for (equation, left) in left.iter().filter(|(_, left)| !left.by_variable.is_empty()) {
         let names: Vec<_> = left.by_variable.iter().map(|(name, _)| *name).collect();
-        complaints.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
+        complaints.push(format!("the residual of {} goes with {}", name(equation), names.join(", ")));
     }
     if let Some((product, chi2_drop)) = beyond_chance(fit) {
         let (sigma, words) = (chi2_drop.sqrt(), product.words());
         complaints.push(format!(
-            "what is left follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
+            "the residual follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
         ));
     }
     Inadequacy { complaints, left: PerEquation::from_fn(|equation| left[equation].most()) }
 }
 
-/// The product of signals that no known effect makes which what is left follows beyond chance.
-fn beyond_chance(fit: &Fit<'_>) -> Option<(Nameless, f64)> {
-    let by_chance = statistics::bonferroni_sigma(LEAST_P, Nameless::ALL.len()).powi(2);
-    search::strongest_nameless(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
+/// The product of signals that no known effect makes which the residual follows beyond chance.
+fn beyond_chance(fit: &Fit<'_>) -> Option<(Unlisted, f64)> {
+    let by_chance = statistics::bonferroni_sigma(LEAST_P, Unlisted::ALL.len()).powi(2);
+    search::strongest_unlisted(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
 }
 
 /// What such a product would mend.
-pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
+pub(crate) fn unlisted_excess(fit: &Fit<'_>) -> f64 {
     beyond_chance(fit).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
-/// Variables on which what is left depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
+/// Variables on which the residual depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
 /// against each.
 fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = (&'static str, f64)> {
     let residual = whitened_residual(fit, equation);
@@ -152,7 +152,7 @@ pub(crate) struct Judgement {
     pub(crate) complaints: Vec<String>,
     /// The complaints among them of sensors that fail by themselves.
     pub(crate) failures: Vec<String>,
-    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
     pub(crate) left: PerEquation<f64>,
     /// Where the effects together made the error on held-out samples smaller.
     pub(crate) fell: PerEquation<bool>,
@@ -179,8 +179,10 @@ pub(crate) fn judge(
     let Selection { fit, effects } = selection;
     let Inadequacy { mut complaints, left } = inadequacy(fit);
     complaints.extend_from_slice(&failures);
-    if effects.iter().any(|one| one.beaten_by_nameless) {
-        complaints.push("a product of signals without a name fits better than any known effect".to_owned());
+    if effects.iter().any(|one| one.is_below_unlisted) {
+        complaints.push(
+            "a product of signals that the table does not list fits better than any known effect".to_owned(),
+        );
     }
     let [before, after] = [before, after].map(|model| &model.quality.rmse);
     let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);

@@ -1,4 +1,4 @@
-//! Whether a named effect stands by itself: each is held against its rivals, against what is left, against the effects
+//! Whether a named effect stands by itself: each is held against its rivals, against the residual, against the effects
 //! beside it, and against what physics allows.
 
 use super::adequacy::{self, Judgement};
@@ -10,7 +10,7 @@ use crate::diagnose::thresholds::{
     ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS, LEAST_SHARE_BESIDE,
     UNMENDED_SHARE,
 };
-use crate::diagnose::weak_form::{Nameless, Term};
+use crate::diagnose::weak_form::{Term, Unlisted};
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
 pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Vec<Doubt> {
@@ -100,9 +100,9 @@ fn rivals(one: &Selected) -> Option<Doubt> {
 /// A law that the table does not list fits as well, or better.
 fn unlisted(one: &Selected) -> Option<Doubt> {
     let as_well =
-        |product: Nameless| format!("what no effect of the table makes fits as well: {}", product.words());
-    let better = "a product of signals without a name fits better".to_owned();
-    let text = if one.beaten_by_nameless { Some(better) } else { one.like_nameless.map(as_well) };
+        |product: Unlisted| format!("what no effect of the table makes fits as well: {}", product.words());
+    let better = "a product of signals that the table does not list fits better".to_owned();
+    let text = if one.is_below_unlisted { Some(better) } else { one.unlisted_rival.map(as_well) };
     text.map(|text| doubt(DoubtId::UnlistedLaw, text))
 }
 
@@ -116,7 +116,7 @@ fn residual(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doub
     let there = |equation: Equation| if acts[equation] { judgement.left[equation] } else { 0.0 };
     let named = fit.problem.terms[one.term].effect().map(|effect| effect.spec().id);
     let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>()
-        + adequacy::nameless_excess(fit)
+        + adequacy::unlisted_excess(fit)
         + judgement.mended_by_products(fit, named);
     let mended = search::loss(fit, &[one.term]);
     let text = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \

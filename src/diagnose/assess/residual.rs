@@ -11,7 +11,7 @@ use crate::diagnose::thresholds::{DRAWN_BINS, FEWEST_FOR_MOMENTS};
 use crate::diagnose::weak_form::{Entry, Row, Rows, VARIABLES};
 use std::collections::BTreeMap;
 
-/// What a fit leaves over of one equation; none where the traces lack it.
+/// The residual of one equation; none where the traces lack it.
 pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<EquationResidual> {
     let (rows, white): (Vec<Option<&Row>>, Vec<f64>) = fit
         .regression
@@ -71,12 +71,12 @@ fn jarque_bera_p(count: usize, skewness: f64, excess_kurtosis: f64) -> f64 {
     statistics::chi2_p(statistic, 2.0)
 }
 
-/// What is left of each hat, in m³/s or N.
+/// The residual of each test function, in m³/s or N.
 pub(crate) struct HeldOut {
     samples: Vec<ResidualSample>,
 }
 
-/// What is left of one hat.
+/// The residual of one test function.
 struct ResidualSample {
     equation: Equation,
     t_s: f64,
@@ -125,7 +125,7 @@ impl HeldOut {
         PerEquation::from_fn(points)
     }
 
-    /// What is left against each variable, in bins of equal count.
+    /// The residual against each variable, in bins of equal count.
     pub(crate) fn binned(&self) -> Vec<BinnedResidual> {
         let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * DRAWN_BINS;
         let pairs = Equation::ALL.into_iter().filter(has_enough);

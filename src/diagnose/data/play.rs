@@ -49,9 +49,9 @@ impl Sides {
     }
 
     /// Standard deviation of what a sensor with this play reads beside what its side says through a row, as if white from sample to sample; the
-    /// play and this in standard deviations of its noise. A row is a hat over two blocks of m samples: white noise has a variance of 2/3 m
+    /// play and this in standard deviations of its noise. A row is a test function over two blocks of m samples: white noise has a variance of 2/3 m
     /// there, what stays the same has m².
-    pub(crate) fn loudness(&self, samples: Range<usize>, play: f64) -> f64 {
+    pub(crate) fn noise_factor(&self, samples: Range<usize>, play: f64) -> f64 {
         let own = self.side_std.get(samples).unwrap_or_default();
         let sum: f64 = own.iter().map(|std| std * std).sum();
         play * (0.75 * sum).sqrt()
@@ -130,7 +130,7 @@ impl<'a> Followed<'a> {
         own
     }
 
-    /// The play with the least squares of what is left of the difference between way and reading, block by block; none where it is
+    /// The play with the least squares of the rest of the difference between way and reading, block by block; none where it is
     /// hardly less than without any.
     fn likely_play(&self) -> Option<f64> {
         let gone = without_mean(self.steps(|at| self.way_m[at] - self.x_m[at]));
@@ -220,7 +220,7 @@ mod side_tests {
         let own = Sides::of(&t, &read, NOISE_PA);
         let moving = own.side_std.iter().filter(|std| **std <= 0.0).count();
         assert!(moving < 30, "{moving} of 6000");
-        assert!(own.loudness(1000..1020, 0.0) == 0.0 && own.loudness(1000..1020, 40.0) > 50.0);
+        assert!(own.noise_factor(1000..1020, 0.0) == 0.0 && own.noise_factor(1000..1020, 40.0) > 50.0);
     }
 }
 

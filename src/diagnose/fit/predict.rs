@@ -13,7 +13,7 @@ use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, WeakForm, Whitenin
 use pitchleak_core::effects::EffectKind;
 use pitchleak_core::{Estimate, Signals};
 
-/// Flow that leaves a chamber, averaged over a hat.
+/// Flow that leaves a chamber, averaged over a test function.
 pub(crate) struct MeanFlow {
     pub(crate) chamber: Equation,
     pub(crate) row: Row,
@@ -32,7 +32,7 @@ impl Fit<'_> {
         self.regression.innovations(self.rows(), &self.bounded, equation)
     }
 
-    /// What is left of each entry when its fold is not fitted, in the equation's unit.
+    /// The residual of each entry when its fold is not fitted, in the equation's unit.
     pub(crate) fn held_out_residual(&self) -> Vec<f64> {
         let priors = self.held_priors();
         let mut residual = vec![0.0; self.rows().y.len()];
@@ -47,14 +47,14 @@ impl Fit<'_> {
         self.in_units(self.rows(), residual)
     }
 
-    /// What is left of traces that were not fitted, in the equations' units.
+    /// The residual of traces that were not fitted, in the equations' units.
     pub(crate) fn residual_on(&self, traces: &[Series]) -> (Rows, Vec<f64>) {
         let rows = residual_rows(traces, &self.problem.sensors, &self.solved(), BLOCK_S);
         let residual = self.in_units(&rows, rows.y.clone());
         (rows, residual)
     }
 
-    /// What leaves each chamber along `traces`, in hats over blocks of `block_s`: the model without its leaks leaves
+    /// What leaves each chamber along `traces`, in test functions over blocks of `block_s`: the model without its leaks leaves
     /// that over.
     pub(crate) fn leak_flows(&self, traces: &[Series], block_s: f64) -> Vec<MeanFlow> {
         let solved = self.solved();
@@ -107,14 +107,14 @@ impl Fit<'_> {
         self.active().iter().filter_map(of).sum()
     }
 
-    /// From integrals over a hat to averages. While the piston stands, dry friction is whatever
+    /// From integrals over a test function to averages. While the piston stands, dry friction is whatever
     /// balances the forces up to its own size: only what is beyond counts.
     fn in_units(&self, rows: &Rows, mut residual: Vec<f64>) -> Vec<f64> {
         for (cell, entry) in residual.iter_mut().zip(&rows.entries) {
             let row = &rows.rows[entry.row];
             *cell /= row.block_s;
             if entry.equation == Equation::Force {
-                let free = (cell.abs() - self.stiction_n(&row.mean) * row.stuck).max(0.0);
+                let free = (cell.abs() - self.stiction_n(&row.mean) * row.unsure_share).max(0.0);
                 *cell = cell.signum() * free;
             }
         }
@@ -123,7 +123,7 @@ impl Fit<'_> {
 }
 
 impl Fit<'_> {
-    /// Probability that white noise shows correlations as large as what is left of an equation, whitened at its own noise, where
+    /// Probability that white noise shows correlations as large as the residual of an equation, whitened at its own noise, where
     /// the samples are fast enough to see the motion.
     pub(crate) fn whiteness_p(&self, equation: Equation) -> Option<f64> {
         self.colour(equation).map(statistics::colour_p)
@@ -162,7 +162,7 @@ impl Fit<'_> {
         let white = Whitening::new(rows, &noise).whiten(&residual(rows, &self.bounded));
         let own = rows.entries.iter().zip(white);
         own.filter(|(entry, _)| entry.equation == equation && rows.counts(entry))
-            .map(|(entry, v)| if sensitivities[entry.row][equation].is_loud() { f64::NAN } else { v })
+            .map(|(entry, v)| if sensitivities[entry.row][equation].is_unresolved() { f64::NAN } else { v })
             .collect()
     }
 }

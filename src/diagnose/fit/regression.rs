@@ -161,7 +161,7 @@ impl Regression {
         shares
     }
 
-    /// Of columns that are the left side itself all products. Of the others that with what is left, which holds at the solution and
+    /// Of columns that are the left side itself all products. Of the others that with the residual, which holds at the solution and
     /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
     fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
         let y = self.columns.len();
@@ -211,7 +211,7 @@ impl Regression {
     }
 
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
-    /// where what is left is neither white nor of known size.
+    /// where the residual is neither white nor of known size.
     pub(crate) fn jackknife(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
         let fits = self.leave_one_out(terms, priors);
         let of = |i: usize| jackknife_std(fits.iter().map(|fit| fit.value[i]));
@@ -326,7 +326,7 @@ fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     )
 }
 
-/// What the fit leaves over of each entry, in the equation's own unit times seconds.
+/// The residual of each entry, in the equation's own unit times seconds.
 pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
     let mut residual = rows.y.clone();
     for (term, value) in solution.terms.iter().zip(&solution.value) {
@@ -337,8 +337,8 @@ pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
     residual
 }
 
-/// Equation error with which what is left would be as large as the noise says, so that neither priors nor weak effects
-/// are overrun by it; zero where what is left can be the sensors' noise. By bisection.
+/// Equation error with which the residual would be as large as the noise says, so that neither priors nor weak effects
+/// are overrun by it; zero where the residual can be the sensors' noise. By bisection.
 pub(super) fn equation_error(
     weak_form: &WeakForm<'_>,
     regression: &Regression,

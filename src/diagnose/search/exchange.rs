@@ -147,7 +147,7 @@ fn parts<'a>(all: &Selection<'a>, at: usize, progress: Progress<'_>) -> Option<S
     let is_part = |fit: &Fit<'_>, term: usize| force_share(fit, term) >= FORCE_ONLY_SHARE;
     let are_named = parts.add_best(is_part, progress) && parts.add_next(progress);
     // While its partner was missing, a product of signals did the work of that.
-    parts.effects.iter_mut().skip(all.effects.len() - 1).for_each(|one| one.beaten_by_nameless = false);
+    parts.effects.iter_mut().skip(all.effects.len() - 1).for_each(|one| one.is_below_unlisted = false);
     (are_named && !parts.fit.is_incomplete()).then_some(parts)
 }
 

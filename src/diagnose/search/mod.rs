@@ -5,7 +5,7 @@ mod exchange;
 mod selection;
 mod trials;
 
-pub(crate) use candidates::{critical_sigma, open, strongest_nameless};
+pub(crate) use candidates::{critical_sigma, open, strongest_unlisted};
 pub(crate) use selection::{Selected, Selection, interactions, loss};
 pub(crate) use trials::std_of_constants;
 pub use trials::{Candidate, Collinearity};

@@ -1,7 +1,7 @@
 //! The effects named so far: forward selection by the score test, with backward elimination, each step confirmed on data that it did
 //! not fit; and whether two effects that were found act on each other.
 
-use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop, strongest_nameless};
+use super::candidates::{Candidates, critical_sigma, strongest_unlisted, unlisted_chi2_drop};
 use super::trials::{self, Trial};
 use crate::diagnose::fit::{Fit, Progress, Solution};
 use crate::diagnose::outcome::Interaction;
@@ -9,7 +9,7 @@ use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
     AGREED_SIGMA, CONFUSABLE_CHI2, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE, MOST_EFFECTS,
 };
-use crate::diagnose::weak_form::{Nameless, Term};
+use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Effect;
 
 /// One effect of the answer, by its place among the problem's terms.
@@ -23,10 +23,10 @@ pub(crate) struct Selected {
     pub(crate) confusable_with: Vec<Effect>,
     /// Probability of it among all that could stand in its place.
     pub(crate) probability: f64,
-    /// A product of signals without a name that fits nearly as well in its place.
-    pub(crate) like_nameless: Option<Nameless>,
-    /// A product of signals without a name would have fitted better.
-    pub(crate) beaten_by_nameless: bool,
+    /// A product of signals that the table does not list and that fits nearly as well in its place.
+    pub(crate) unlisted_rival: Option<Unlisted>,
+    /// A product of signals that the table does not list would have fitted better.
+    pub(crate) is_below_unlisted: bool,
 }
 
 #[cfg(test)]
@@ -39,8 +39,8 @@ impl Selected {
             mended_percent: None,
             confusable_with: vec![],
             probability: 0.0,
-            like_nameless: None,
-            beaten_by_nameless: false,
+            unlisted_rival: None,
+            is_below_unlisted: false,
         }
     }
 }
@@ -132,8 +132,8 @@ impl Selection<'_> {
             mended_percent: None,
             confusable_with: vec![],
             probability: 0.0,
-            like_nameless: None,
-            beaten_by_nameless: nameless_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
+            unlisted_rival: None,
+            is_below_unlisted: unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
         });
         self.fit = with(fit, &[], &trial, progress);
         true
@@ -182,8 +182,9 @@ impl Selection<'_> {
             let trials = candidates.trials(&without);
             one.probability = place_probability(fit, one.term, lost / dispersion, &trials, &without);
             let rivals = trials.into_iter().filter(is_close);
-            let is_near = |(_, chi2_drop): &(Nameless, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            one.like_nameless = strongest_nameless(fit, &without).filter(is_near).map(|(product, _)| product);
+            let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
+            one.unlisted_rival =
+                strongest_unlisted(fit, &without).filter(is_near).map(|(product, _)| product);
             one.confusable_with =
                 rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
         }
@@ -192,7 +193,7 @@ impl Selection<'_> {
 }
 
 /// The probability of an effect among all that could stand in its place, beside the others: equal prior odds for each candidate and each
-/// law without a name, and by how much each passes what chance and its fitted constants could bring, twice a log likelihood.
+/// unlisted law, and by how much each passes what chance and its fitted constants could bring, twice a log likelihood.
 fn place_probability(
     fit: &Fit<'_>,
     term: usize,
@@ -204,7 +205,7 @@ fn place_probability(
     let own = chi2_drop - critical_sigma(fit, fit.constants(term)).powi(2);
     let usual = critical_sigma(fit, fit.problem.usual_constants).powi(2);
     let others = trials.iter().map(|trial| trial.beyond(dispersion));
-    let unlisted = strongest_nameless(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
+    let unlisted = strongest_unlisted(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
     let odds_against: f64 = others.chain(unlisted).map(|other| ((other - own) / 2.0).exp()).sum();
     1.0 / (1.0 + odds_against)
 }
@@ -214,7 +215,7 @@ fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
     let chi2_drop = trial.score.chi2_drop;
     let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
     let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= LEAST_MENDED_SHARE;
-    is_significant && mends_enough && fit.holds_out(trial.score.term, trial.constants)
+    is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
 }
 
 /// The pairs whose product explains more than chance would.

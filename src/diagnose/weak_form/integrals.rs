@@ -10,12 +10,12 @@ use crate::diagnose::thresholds::{EVEN_SHARE, LEAST_STEP_S, LONG_STEP};
 use pitchleak_core::Signals;
 use pitchleak_core::effects::EffectConstants;
 
-/// What is integrated along a trace: over a step, up to a sample, over a block or a hat.
+/// What is integrated along a trace: over a step, up to a sample, over a block or a test function.
 #[derive(Clone)]
 pub(crate) struct Integrals {
-    /// What the model leaves over, m³ and N·s.
+    /// The residual, m³ and N·s.
     pub(crate) residual: PerEquation<f64>,
-    /// What one unit of each term leaves over.
+    /// One unit of each term in the residual.
     pub(crate) columns: Vec<PerEquation<f64>>,
     pub(crate) time_s: f64,
     /// Time during which the direction of motion is unknown.
@@ -57,14 +57,14 @@ impl Integrals {
 }
 
 /// Running integrals and their means, block by block: the difference of two neighbouring means is the integrand
-/// weighted by a hat over both blocks.
-pub(crate) struct Hats {
+/// weighted by a test function over both blocks.
+pub(crate) struct TestFunctions {
     integral: Integrals,
     block: Integrals,
     previous: Option<Integrals>,
 }
 
-impl Hats {
+impl TestFunctions {
     pub(crate) fn new(terms: usize) -> Self {
         Self { integral: Integrals::zero(terms), block: Integrals::zero(terms), previous: None }
     }
@@ -77,18 +77,18 @@ impl Hats {
         self.block.add(&self.integral);
     }
 
-    /// Ends a block of `samples`; the hat over it and the block before, once there is one.
+    /// Ends a block of `samples`; the test function over it and the block before, once there is one.
     pub(crate) fn end_block(&mut self, samples: usize) -> Option<Integrals> {
         let terms = self.block.columns.len();
         let mut mean = std::mem::replace(&mut self.block, Integrals::zero(terms));
         mean.combine(&Integrals::zero(terms), |sum, _| sum / samples as f64);
-        let hat = self.previous.as_ref().map(|before| {
-            let mut hat = mean.clone();
-            hat.combine(before, |now, before| now - before);
-            hat
+        let weighted = self.previous.as_ref().map(|before| {
+            let mut weighted = mean.clone();
+            weighted.combine(before, |now, before| now - before);
+            weighted
         });
         self.previous = Some(mean);
-        hat
+        weighted
     }
 }
 
@@ -157,7 +157,7 @@ impl Step {
         mean.map(|value| if (value * self.dt_s).is_finite() { value * self.dt_s } else { 0.0 })
     }
 
-    /// What one unit of a term leaves over, integrated.
+    /// One unit of a term in the residual, integrated.
     pub(super) fn column(&self, active: &ActiveTerm, at: &Linearisation) -> PerEquation<f64> {
         let ActiveTerm { term, in_force, constants } = active;
         self.integral(|seen, felt| at.both_unit_terms((*term, *in_force), constants, seen, felt))

@@ -12,7 +12,7 @@ pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
 pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
-pub(crate) use terms::{Columns, DECLARED, Nameless, Term, all_terms};
+pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
 
 use self::integrals::{ActiveTerm, Integrand};
 use self::rows::Steps;
@@ -122,7 +122,7 @@ impl<'a> WeakForm<'a> {
     }
 }
 
-/// What a model leaves over along traces, in hats over blocks of `block_s`, without any column.
+/// The residual of a model along traces, in test functions over blocks of `block_s`, without any column.
 pub(crate) fn residual_rows(
     traces: &[Series],
     sensors: &Sensors<f64>,
@@ -142,19 +142,19 @@ fn add_unresolved(
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let samples = row.samples_in(&traces[row.trace()].t_s);
-        let mut times = unresolved[row.trace()].loudness(samples.clone());
+        let mut times = unresolved[row.trace()].noise_factor(samples.clone());
         let motion = &motions[row.trace()];
-        let mut is_unseen = false;
+        let mut has_unseen_force = false;
         for active in at.effects.iter() {
             let Some((channel, sides)) = motion.sides_of(active.effect) else { continue };
             let play = active.value / channel.noise_std(sensors, &at.model.cylinder);
-            let somewhere = sides.loudness(samples.clone(), play);
+            let somewhere = sides.noise_factor(samples.clone(), play);
             let times = &mut times[channel as usize];
             *times = times.hypot(somewhere);
-            is_unseen |= somewhere > 1.0;
+            has_unseen_force |= somewhere > 1.0;
         }
-        *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
-        row.is_unseen = own.force.is_speed_loud() || is_unseen;
+        *own = PerEquation::from_fn(|equation| own[equation].with_noise_factors(times));
+        row.has_unseen_force = own.force.is_speed_unresolved() || has_unseen_force;
     }
 }
 

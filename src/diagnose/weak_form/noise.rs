@@ -14,20 +14,20 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{IGNORED, LEAST_PIVOT};
 use pitchleak_core::Sensors;
 
-/// Sums of products of the weights of samples in two rows: by hats (0), differences (1) and curvatures (2).
+/// Sums of products of the weights of samples in two rows: by test functions (0), differences (1) and curvatures (2).
 type Products = [[f64; 3]; 3];
 
 /// How samples of white noise weigh in rows, with steps of one.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct HatWeights {
+pub(crate) struct TestFunctionWeights {
     /// Within a row.
     pub(crate) own: Products,
     /// With the next row.
     pub(crate) next: Products,
 }
 
-/// The weights of a hat over two blocks of `samples`, as `hats.rs` takes mean, rate and curvature over a step.
-pub(crate) fn hat_weights(samples: usize) -> HatWeights {
+/// The weights of a test function over two blocks of `samples`, as `integrals.rs` takes mean, rate and curvature over a step.
+pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
     let m = samples as isize;
     let step = |j: isize| {
         if (0..2 * m - 1).contains(&j) { (m - (j - (m - 1)).abs()) as f64 / m as f64 } else { 0.0 }
@@ -46,7 +46,7 @@ pub(crate) fn hat_weights(samples: usize) -> HatWeights {
         patterns
             .map(|a| patterns.map(|b| (-3..3 * m + 3).map(|i| weight(&a, i) * weight(&b, i - shift)).sum()))
     };
-    HatWeights { own: products(0), next: products(m) }
+    TestFunctionWeights { own: products(0), next: products(m) }
 }
 
 /// What the covariance needs of the rows.
@@ -91,19 +91,23 @@ impl NoiseModel<'_> {
     /// Variance of one row of an equation, as if all of it were white in the flow or force.
     pub(crate) fn white_variance(&self, row: usize, equation: Equation) -> f64 {
         let own = &self.rows.rows[row];
-        self.as_white(own, self.covariance((row, equation), (row, equation), hat_weights(own.samples)))
+        self.as_white(
+            own,
+            self.covariance((row, equation), (row, equation), test_function_weights(own.samples)),
+        )
     }
 
     /// The white flow or force whose variance makes this variance of a row.
     pub(crate) fn as_white(&self, row: &Row, variance: f64) -> f64 {
         let step_s = row.block_s / row.samples as f64;
-        variance / (hat_weights(row.samples).own[0][0] * step_s * step_s)
+        variance / (test_function_weights(row.samples).own[0][0] * step_s * step_s)
     }
 
     /// Standard deviation of a chamber's row as a mean flow, m³/s.
     pub(crate) fn mean_flow_std(&self, row: usize, equation: Equation) -> f64 {
         let own = &self.rows.rows[row];
-        self.covariance((row, equation), (row, equation), hat_weights(own.samples)).sqrt() / own.block_s
+        self.covariance((row, equation), (row, equation), test_function_weights(own.samples)).sqrt()
+            / own.block_s
     }
 
     /// Covariance of two entries of the same row, or of neighbours.
@@ -111,14 +115,14 @@ impl NoiseModel<'_> {
         &self,
         (row_a, a): (usize, Equation),
         (row_b, b): (usize, Equation),
-        hats: HatWeights,
+        functions: TestFunctionWeights,
     ) -> f64 {
         if (a == Equation::Force) != (b == Equation::Force) {
             return 0.0;
         }
         let row = &self.rows.rows[row_a];
         let step_s = row.block_s / row.samples as f64;
-        let weights = if row_a == row_b { hats.own } else { hats.next };
+        let weights = if row_a == row_b { functions.own } else { functions.next };
         // `weights` are of a row and the next.
         let (first, second) = if row_a < row_b { ((row_a, a), (row_b, b)) } else { ((row_b, b), (row_a, a)) };
         let (first, second) = (self.sensitivity(first.0, first.1), self.sensitivity(second.0, second.1));
@@ -132,21 +136,22 @@ impl NoiseModel<'_> {
                     of_channel += one * other * weights[k][l] * steps[k] * steps[l];
                 }
             }
-            let loudness = first.loudness[place] * second.loudness[place];
-            sum += of_channel * loudness * channel.noise_std(self.sensors, &self.at.model.cylinder).powi(2);
+            let noise_factor = first.noise_factor[place] * second.noise_factor[place];
+            sum +=
+                of_channel * noise_factor * channel.noise_std(self.sensors, &self.at.model.cylinder).powi(2);
         }
         let error = if a == b { self.equation_error[a] } else { 0.0 };
         sum + weights[0][0] * step_s * step_s * error
     }
 
     /// Covariance of the `i`th entry and the `j`th, which stands before it or is the same.
-    pub(crate) fn between(&self, i: usize, j: usize, hats: HatWeights) -> f64 {
+    pub(crate) fn between(&self, i: usize, j: usize, functions: TestFunctionWeights) -> f64 {
         let rows = self.rows;
         let (a, b) = (rows.entries[i], rows.entries[j]);
         if rows.rows[a.row].stretch != rows.rows[b.row].stretch || a.row - b.row > 1 {
             return 0.0;
         }
-        let value = self.covariance((a.row, a.equation), (b.row, b.equation), hats);
+        let value = self.covariance((a.row, a.equation), (b.row, b.equation), functions);
         if i == j && !rows.counts(&a) { value * IGNORED } else { value }
     }
 }
@@ -162,11 +167,11 @@ pub(crate) struct Whitening {
 impl Whitening {
     pub(crate) fn new(rows: &Rows, noise: &NoiseModel<'_>) -> Self {
         let mut factor: Vec<[f64; BAND + 1]> = Vec::with_capacity(rows.entries.len());
-        let mut known = (0, HatWeights::default());
+        let mut known = (0, TestFunctionWeights::default());
         for (i, entry) in rows.entries.iter().enumerate() {
             let samples = rows.rows[entry.row].samples;
             if known.0 != samples {
-                known = (samples, hat_weights(samples));
+                known = (samples, test_function_weights(samples));
             }
             let mut line = [0.0; BAND + 1];
             for d in (0..=BAND.min(i)).rev() {
@@ -204,7 +209,7 @@ mod noise_model_tests {
 
     #[test]
     fn hat_weights_tend_to_two_thirds_and_one_sixth() {
-        let HatWeights { own, next } = hat_weights(200);
+        let TestFunctionWeights { own, next } = test_function_weights(200);
         assert!(
             (own[0][0] / 200.0 - 2.0 / 3.0).abs() < 1e-3 && (next[0][0] / 200.0 - 1.0 / 6.0).abs() < 1e-3
         );
@@ -232,8 +237,8 @@ mod whitening_tests {
         let (sensors, sensitivities) = (&declared.sensors, sensitivities.as_slice());
         let noise = NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities };
         let n = rows.entries.len();
-        let hats = hat_weights(rows.rows[0].samples);
-        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(i.max(j), i.min(j), hats));
+        let functions = test_function_weights(rows.rows[0].samples);
+        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(i.max(j), i.min(j), functions));
         let factor = dense.cholesky().expect("a covariance");
         let v: Vec<f64> = white_noise(1).take(n).collect();
         let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");

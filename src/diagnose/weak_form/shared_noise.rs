@@ -1,6 +1,6 @@
-//! What columns share with what the model leaves over, drawn again and again: noise of the same sensors.
+//! What columns share with the residual, drawn again and again: noise of the same sensors.
 
-use super::noise::{HatWeights, NoiseModel, hat_weights};
+use super::noise::{NoiseModel, TestFunctionWeights, test_function_weights};
 use super::rows::{Entry, Row, Rows};
 use super::terms::{Columns, Term};
 use crate::diagnose::data::Channel;
@@ -37,29 +37,29 @@ impl Rademacher {
     }
 }
 
-/// Noise of one sensor in each row: through hats (0), and through differences of block means (1).
+/// Noise of one sensor in each row: through test functions (0), and through differences of block means (1).
 type InRows = [Vec<f64>; 2];
 
-/// Unit white noise seen by each row. A hat's noise is that of its two blocks, which it shares with its
+/// Unit white noise seen by each row. A test function's noise is that of its two blocks, which it shares with its
 /// neighbours, and its own, in the shares that give the known covariances.
 fn draw(rows: &[Row], signs: &mut Rademacher) -> InRows {
-    let (mut difference, mut hat) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
+    let (mut difference, mut weighted) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
     let mut last = (usize::MAX, 0.0);
-    let mut known = (0, HatWeights::default());
+    let mut known = (0, TestFunctionWeights::default());
     for row in rows {
         let left = if last.0 == row.stretch { last.1 } else { signs.next() };
         let right = signs.next();
         last = (row.stretch, right);
         if known.0 != row.samples {
-            known = (row.samples, hat_weights(row.samples));
+            known = (row.samples, test_function_weights(row.samples));
         }
         let (own, next) = (known.1.own[0][0], known.1.next[0][0]);
         let step_s = row.block_s / row.samples as f64;
         difference.push((right - left) / (row.samples as f64).sqrt());
         let shared = next.max(0.0).sqrt() * (left + right);
-        hat.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
+        weighted.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
     }
-    [hat, difference]
+    [weighted, difference]
 }
 
 impl SharedNoise {
@@ -73,10 +73,10 @@ impl SharedNoise {
         let drawn: [InRows; Channel::ALL.len()] = Channel::ALL.map(of_channel);
         let in_row = |entry: &Entry| {
             let sensitivity = &noise.sensitivities[entry.row][entry.equation];
-            let of_one = |((gains, loudness), drawn): ((&[f64; 3], &f64), &InRows)| {
-                loudness * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
+            let of_one = |((gains, noise_factor), drawn): ((&[f64; 3], &f64), &InRows)| {
+                noise_factor * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
             };
-            sensitivity.gains.iter().zip(&sensitivity.loudness).zip(&drawn).map(of_one).sum()
+            sensitivity.gains.iter().zip(&sensitivity.noise_factor).zip(&drawn).map(of_one).sum()
         };
         let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, signals, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];

@@ -19,7 +19,7 @@ pub(crate) enum Term {
     /// A candidate of the core's table.
     Effect(Effect),
     /// A product of signals that no known effect makes.
-    Nameless(Nameless),
+    Unlisted(Unlisted),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
 }
@@ -79,10 +79,10 @@ fn left_side(side: LeftSide) -> (Channel, usize) {
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
 
-/// Every column: the declared model's, the candidates', the nameless ones.
+/// Every column: the declared model's, the candidates', the unlisted ones.
 pub(crate) fn all_terms() -> Vec<Term> {
     let known = Effect::ALL.iter().copied().map(Term::Effect);
-    DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
+    DECLARED.into_iter().chain(known).chain(Unlisted::ALL.map(Term::Unlisted)).collect()
 }
 
 impl Term {
@@ -104,7 +104,7 @@ impl Term {
             Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
             Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
             Self::Effect(effect) => effect.unit_term(at, model, constants),
-            Self::Nameless(product) => product.unit_term(at, model),
+            Self::Unlisted(product) => product.unit_term(at, model),
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
@@ -117,14 +117,14 @@ impl Term {
             Self::Effect(effect) if effect.spec().kind == EffectKind::Sensor => {
                 Some(effect.read(value, truth))
             }
-            Self::Nameless(product) => product.read(value, truth),
+            Self::Unlisted(product) => product.read(value, truth),
             _ => None,
         }
     }
 
     /// A size that shows clearly.
     pub(super) fn usual_size(self) -> f64 {
-        self.effect().map_or(Nameless::USUAL_BEND, |effect| effect.spec().default_size)
+        self.effect().map_or(Unlisted::USUAL_BEND, |effect| effect.spec().default_size)
     }
 
     /// Whether it is a leak.
@@ -132,7 +132,7 @@ impl Term {
         match self {
             Self::Internal | Self::ExternalA | Self::ExternalB => true,
             Self::Effect(effect) => effect.spec().kind.is_leak(),
-            Self::InverseBulk | Self::Nameless(_) | Self::Product(..) => false,
+            Self::InverseBulk | Self::Unlisted(_) | Self::Product(..) => false,
         }
     }
 
@@ -145,7 +145,7 @@ impl Term {
                 let at = Signals { a_mps2: if is_sensor { 0.0 } else { PROBE.a_mps2 }, ..PROBE };
                 effect.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n != 0.0
             }
-            Self::Nameless(product) => product.in_force(),
+            Self::Unlisted(product) => product.in_force(),
             Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
             _ => false,
         }
@@ -155,10 +155,10 @@ impl Term {
     /// its rate (1). The others' columns are quiet against what they vary.
     pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {
         match self {
-            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => STORAGE.to_vec(),
-            Self::Nameless(Nameless::DirectionLeak) => vec![left_side(LeftSide::Speed)],
-            Self::Nameless(Nameless::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
-            Self::Nameless(Nameless::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
+            Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => STORAGE.to_vec(),
+            Self::Unlisted(Unlisted::DirectionLeak) => vec![left_side(LeftSide::Speed)],
+            Self::Unlisted(Unlisted::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
+            Self::Unlisted(Unlisted::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
             Self::Effect(effect) => {
                 let EffectSpec { carries, shares_noise_of, kind, .. } = effect.spec();
                 match *kind {
@@ -192,7 +192,7 @@ impl Term {
     pub(crate) fn is_left_side(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().carries.is_some(),
-            Self::Nameless(product) => product == Nameless::DirectionLeak,
+            Self::Unlisted(product) => product == Unlisted::DirectionLeak,
             _ => false,
         }
     }
@@ -213,7 +213,7 @@ impl Term {
 
 /// Products of signals that stand for effects nobody listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Nameless {
+pub(crate) enum Unlisted {
     /// Leak past the piston in proportion to |ẋ| P_L.
     SpeedLeak,
     /// Leak past the piston in proportion to ẋ P_L.
@@ -238,7 +238,7 @@ pub(crate) enum Nameless {
     StiffeningOil,
 }
 
-impl Nameless {
+impl Unlisted {
     pub(crate) const ALL: [Self; 11] = [
         Self::SpeedLeak,
         Self::DirectionLeak,

@@ -30,7 +30,7 @@ impl Text for Diagnosis {
 /// What a verdict says, in a sentence.
 pub fn sentence(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Explained => "explained: with the effects below, what is left is sensor noise",
+        Verdict::Explained => "explained: with the effects below, the residual is sensor noise",
         Verdict::PartlyExplained => {
             "partly explained: the effects below mend much, but not all of it is explained for sure"
         }
