@@ -177,7 +177,7 @@ fn without_mean(mut values: Vec<f64>) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod side_tests {
+mod pressure_tests {
     use super::*;
     use pitchleak_testkit::white_noise;
 
@@ -225,7 +225,7 @@ mod side_tests {
 }
 
 #[cfg(test)]
-mod backlash_tests {
+mod position_tests {
     use super::*;
     use pitchleak_testkit::white_noise;
 

@@ -260,7 +260,7 @@ mod tests {
 }
 
 #[cfg(test)]
-mod files_tests {
+mod role_tests {
     use super::*;
 
     #[test]

@@ -204,7 +204,7 @@ impl Whitening {
 }
 
 #[cfg(test)]
-mod noise_model_tests {
+mod covariance_tests {
     use super::*;
 
     #[test]

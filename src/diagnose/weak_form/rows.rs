@@ -2,7 +2,7 @@
 //!
 //! For blocks of m samples, the difference of two neighbouring block means of any running integral
 //! is that integrand weighted by a test function over both blocks. So ∫ φ ẋ dt is x̄_{k+1} − x̄_k, the difference
-//! of two averages: no signal is differentiated, and the noise of a row is known exactly (`noise_model.rs`).
+//! of two averages: no signal is differentiated, and the noise of a row is known exactly (`noise.rs`).
 //! Weak forms for identification: Messenger and Bortz (2021), "Weak SINDy", Multiscale Model. Simul. 19.
 
 use super::integrals::{ActiveTerm, Integrals, Integrand, Step, TestFunctions};
