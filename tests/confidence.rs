@@ -14,6 +14,14 @@ fn lines(answers: &[(Case, Diagnosis)]) -> String {
     answers.iter().map(|(case, answer)| line(case, answer) + "\n").collect()
 }
 
+/// Whether the residual is white noise, as small as the sensors'; a name may be doubtful beside that.
+fn leaves_noise(answer: &Diagnosis) -> bool {
+    const LEAST_P: f64 = 2e-4;
+    let is_white = |p: Option<f64>| p.is_none_or(|p| p >= LEAST_P);
+    answer.after.noise_ratio.iter().all(|(_, ratio)| *ratio <= 1.0)
+        && answer.after.quality.whiteness_p.iter().all(|(_, p)| is_white(*p))
+}
+
 #[test]
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
@@ -27,8 +35,7 @@ fn a_sound_rig_of_any_size_and_rate_lacks_nothing() {
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn two_effects_are_both_named_and_their_values_hold() {
     let answers = asked(questions::two(24), 0, 2);
-    let is_explained =
-        |(case, answer): &&(Case, Diagnosis)| answer.verdict == Verdict::Explained && all_named(case, answer);
+    let is_explained = |(case, answer): &&(Case, Diagnosis)| leaves_noise(answer) && all_named(case, answer);
     let explained = answers.iter().filter(is_explained).count();
     let first = answers.iter().filter(|(case, answer)| first_is_true(case, answer)).count();
     for (case, answer) in &answers {
@@ -59,8 +66,7 @@ fn a_sensor_that_hangs_behind_is_no_sensor_that_is_late() {
     for (case, answer) in asked(cases, 0, 2) {
         assert!(first_is_true(&case, &answer), "{}", line(&case, &answer));
         let off = answer.effects[0].value / case.truth[0].1 - 1.0;
-        let is_explained = answer.verdict == Verdict::Explained;
-        assert!(off.abs() < 0.1 && is_explained, "{}", line(&case, &answer));
+        assert!(off.abs() < 0.1 && leaves_noise(&answer), "{}", line(&case, &answer));
         let late = answer.effects.iter().any(|effect| effect.confident && effect.id.contains("_lag"));
         assert!(!late, "{}", line(&case, &answer));
     }

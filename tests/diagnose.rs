@@ -4,7 +4,7 @@ use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak, Sample, Signals};
 use pitchleak::curve::Curve;
-use pitchleak::diagnose::{Declared, Diagnosis, Series, Verdict, diagnose};
+use pitchleak::diagnose::{Declared, Diagnosis, DoubtId, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -101,6 +101,36 @@ fn the_saved_rig_explains_the_trace_that_it_was_made_from() {
     assert!((leak.value - LEAKS.internal).abs() < 4.0 * leak.std);
 }
 
+/// The source of the diagnosis without its unit tests.
+fn sources(folder: &std::path::Path) -> Vec<(std::path::PathBuf, String)> {
+    let entries = std::fs::read_dir(folder).expect("is there").map(|entry| entry.expect("is read").path());
+    let of = |path: std::path::PathBuf| {
+        if path.is_dir() {
+            return sources(&path);
+        }
+        let text = std::fs::read_to_string(&path).expect("is read");
+        let product = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default().to_owned();
+        vec![(path, product)]
+    };
+    entries.flat_map(of).collect()
+}
+
+#[test]
+fn all_that_an_effect_is_stands_in_its_entry() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/diagnose");
+    let product: Vec<_> =
+        sources(&folder).into_iter().filter(|(path, _)| !path.ends_with("testing.rs")).collect();
+    assert!(product.len() > 20, "{} files", product.len());
+    for (path, text) in product {
+        for effect in Effect::ALL {
+            let (name, id) = (format!("Effect::{effect:?}"), effect.spec().id);
+            let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+            let is_named = text.contains(&name) || words.clone().any(|word| word == id);
+            assert!(!is_named, "{} names {id}", path.display());
+        }
+    }
+}
+
 /// A meter that was mended between the traces that are fitted and the one that judges.
 #[test]
 fn an_effect_that_other_samples_do_not_have_is_not_believed() {
@@ -114,7 +144,10 @@ fn an_effect_that_other_samples_do_not_have_is_not_believed() {
         "{:?}",
         answer.notes
     );
-    assert_eq!(found.doubt.as_deref(), Some("the error on held-out samples did not fall where it acts"));
+    let ids: Vec<DoubtId> = found.doubts.iter().map(|doubt| doubt.id).collect();
+    assert_eq!(ids, [DoubtId::HeldOut]);
+    assert_eq!(found.doubt.as_ref(), found.doubts.first().map(|doubt| &doubt.text));
+    assert!(!found.confident && found.probability <= 0.5, "{}", found.probability);
 }
 
 /// In this wind, through these sensors.

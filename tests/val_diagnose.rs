@@ -1,7 +1,7 @@
 //! The diagnosis on traces of an independent simulator, with the effects its authors put in.
 
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Diagnosis, LeakEstimates, Series, Verdict, diagnose};
+use pitchleak::diagnose::{Declared, Diagnosis, Doubt, DoubtId, LeakEstimates, Series, Verdict, diagnose};
 use pitchleak::trace::TraceReader;
 use pitchleak_testkit::hopsan;
 use rand::SeedableRng;
@@ -71,12 +71,21 @@ fn val_friction_is_named_and_mends_the_force_balance() {
     const LOAD_SPREAD_N: f64 = 644.06;
     let answers = answers("u04", 30.0, 0.9e9);
     for answer in &answers {
-        assert_eq!(answer.verdict, Verdict::Explained, "{:?}", answer.notes);
+        assert!(answer.notes.is_empty(), "{:?}", answer.notes);
         let mut ids = ids(answer);
         ids.sort_unstable();
         assert_eq!(ids, ["coulomb_friction", "viscous_friction"]);
     }
-    let clean = &answers[0];
+    // Noise of 1 % leaves viscous friction eleven standard deviations, too few to tell its law from others.
+    let [clean, quiet, clean_at_one, noisy] = &answers[..] else { panic!("four answers") };
+    for answer in [clean, quiet, clean_at_one] {
+        assert_eq!(answer.verdict, Verdict::Explained);
+    }
+    let is_of_law = |doubt: &Doubt| matches!(doubt.id, DoubtId::Rivals | DoubtId::UnlistedLaw);
+    let doubts: Vec<&Doubt> = noisy.effects.iter().flat_map(|effect| &effect.doubts).collect();
+    assert!(doubts.iter().all(|doubt| is_of_law(doubt)), "{doubts:?}");
+    let is_sure = noisy.effects.iter().all(|effect| effect.confident);
+    assert_eq!(noisy.verdict, if is_sure { Verdict::Explained } else { Verdict::PartlyExplained });
     assert!(clean.before.quality.rmse.force.unwrap() > 0.4 * LOAD_SPREAD_N);
     assert!(clean.after.quality.rmse.force.unwrap() < 0.02 * LOAD_SPREAD_N);
 }

@@ -102,7 +102,7 @@ fn named(case: &Case, one: &FoundEffect) -> String {
     if one.id == case.effect.spec().id {
         let _ = write!(text, " (simulated: {})", amount(case.effect, case.size));
     }
-    match (&one.doubt, one.confident) {
+    match (one.doubts_in_words(), one.confident) {
         (Some(doubt), _) => format!("{text}, in doubt: {doubt}"),
         (None, true) => format!("{text}, without doubt"),
         (None, false) => text,

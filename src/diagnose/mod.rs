@@ -1,24 +1,22 @@
-//! From what the model leaves over to the physical effect that it lacks.
+//! From the residual to the physical effect that it lacks.
 //!
 //! 1. `data`: the traces, what is declared of the rig, the noise that the sensors really carry, and mistakes of wiring,
 //!    beside which no effect is worth a word.
-//! 2. `weak_form`: the equations integrated against hat functions around a linearisation, so that nothing is
+//! 2. `weak_form`: the equations integrated against test functions around a linearisation, so that nothing is
 //!    differentiated and the noise of every row follows from the rig file.
 //! 3. `fit`: the declared model by generalised least squares with its priors. A fit is a value; with one more effect
 //!    or without one it gives another fit.
 //! 4. `search`: every known effect is a column; a score test says what it would bring, and forward selection
 //!    confirmed on held-out samples names the missing ones.
-//! 5. `assess`: what is left, held against the declared noise, which decides the verdict.
-//! 6. `present`: text, figures, JSON, a rig file.
+//! 5. `assess`: the residual, held against the declared noise, which decides the verdict.
+//! 6. `outcome`: what is said, in JSON too, and as a rig file.
 //!
-//! The derivation is in `docs/closing-the-loop.md`.
+//! The derivation is in `docs/diagnosis.md`.
 
 mod assess;
-mod calibrated_rig;
 mod data;
 mod equation;
 mod fit;
-mod json;
 mod outcome;
 mod search;
 mod statistics;
@@ -31,8 +29,8 @@ pub use data::{Declared, FittedAndJudged, Roles, SameFile, Series, Traces};
 pub use equation::{Equation, PerEquation};
 pub use fit::Progress;
 pub use outcome::{
-    BinnedResidual, Calibration, Correlation, Diagnosis, EquationResidual, FoundEffect, HoldLeak, Holds,
-    Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
+    BinnedResidual, Calibration, Correlation, Diagnosis, Doubt, DoubtId, EquationResidual, FoundEffect,
+    HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
 };
 pub use search::{Candidate, Collinearity};
 
@@ -60,17 +58,23 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         Selection::none(plain)
     };
     let after = model_fit(&selection.fit, &test);
-    let judgement = assess::judge(&selection, excited, assess::failures(&checks, &faults), [&before, &after]);
-    let wiring = miswired.filter(|_| beyond_effects || judgement.verdict != Verdict::Explained);
+    let judgement = assess::judge(&selection, assess::failures(&checks, &faults), [&before, &after]);
+    let found = assess::found(&selection, &judgement);
+    let verdict = match assess::verdict(&judgement, &found, &after.leaks) {
+        _ if beyond_effects => Verdict::Unexplained,
+        _ if !excited => Verdict::InsufficientExcitation,
+        verdict => verdict,
+    };
+    let wiring = miswired.filter(|_| beyond_effects || verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
     let Selection { fit, effects } = &selection;
     Diagnosis {
         samples: Samples::of(&train),
-        effects: effects.iter().filter_map(|one| assess::found(&selection, one, &judgement)).collect(),
+        effects: found,
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
-        verdict: if beyond_effects { Verdict::Unexplained } else { judgement.verdict },
+        verdict,
         wiring: wiring.map(|found| found.wiring),
         notes: assess::notes(
             &selection,

@@ -7,20 +7,18 @@
 
 /// Share of sound rigs on which the search may name anything, shared out over all candidates (Bonferroni). Chosen.
 pub(crate) const FALSE_EFFECT_RATE: f64 = 1e-3;
-/// A sound rig fails any one test of what is left this rarely. Derived: size and whiteness of three equations and one
-/// test for nameless products make seven, so that 1.4 in a thousand sound rigs are complained about, as many as are
+/// A sound rig fails any one test of the residual this rarely. Derived: size and whiteness of three equations and one
+/// test for unlisted products make seven, so that 1.4 in a thousand sound rigs are complained about, as many as are
 /// named an effect.
 pub(crate) const LEAST_P: f64 = 2e-4;
-/// What is left counts as noise unless its variance is this many standard deviations too large. Derived: the normal
+/// The residual counts as noise unless its variance is this many standard deviations too large. Derived: the normal
 /// law's two-sided bound of [`LEAST_P`].
 pub(crate) const CHANCE_SIGMA: f64 = 3.7;
 /// Share of diagnoses in which a product of two effects may be reported by chance. Derived: as [`FALSE_EFFECT_RATE`].
 pub(crate) const FALSE_PRODUCT_RATE: f64 = FALSE_EFFECT_RATE;
 /// A variable that the residual goes with is named where chance does so once in a hundred diagnoses. Chosen.
 pub(crate) const CHANCE_RATE: f64 = 0.01;
-/// Derived: three equations, eleven variables.
-pub(crate) const RESIDUAL_TESTS: usize = 33;
-/// Lags of the portmanteau test. Chosen: two seconds of hats.
+/// Lags of the portmanteau test. Chosen: two seconds of test functions.
 pub(crate) const PORTMANTEAU_LAGS: usize = 20;
 /// Half width of the 95 % interval of a normal law, in standard deviations. Derived.
 pub(crate) const CI95_SIGMA: f64 = 1.96;
@@ -35,7 +33,7 @@ pub(crate) const LEAST_STEP_S: f64 = 0.01;
 /// seconds of two cores where many effects are tried.
 pub(crate) const MOST_SAMPLES: usize = 80_000;
 /// Samples of that length in a piece of a trace too long to be fitted whole. Chosen: 20 s at 100 Hz, so that ends of
-/// pieces cost one hat in a hundred.
+/// pieces cost one test function in a hundred.
 pub(crate) const PIECE_SAMPLES: usize = 2000;
 /// The machine moves no faster than that, Hz. Chosen: wind and pitch control stay below.
 pub(crate) const FASTEST_MOTION_HZ: f64 = 1.4;
@@ -50,7 +48,7 @@ pub(crate) const MEDIAN_EFFICIENCY: f64 = 0.37;
 /// Regular noise this many times the declared one is a ripple. Chosen: less harms nothing.
 pub(crate) const RIPPLE: f64 = 1.25;
 /// A row's samples are louder than noise where their differences' root mean square is so many standard deviations. Chosen: three.
-pub(crate) const LOUD_SIGMA: f64 = 3.0;
+pub(crate) const UNRESOLVED_SIGMA: f64 = 3.0;
 /// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
 /// samples of white noise has a standard deviation of √(2.3/600) = 0.06 (Bartlett 1946); this is four of them.
 pub(crate) const RIPPLE_COLOUR: f64 = 0.25;
@@ -68,11 +66,35 @@ pub(crate) const LEAST_SURE_SHARE: f64 = 5e-3;
 /// time in ten, and real turns are seen soon.
 pub(crate) const TURNED_SIGMA: f64 = 3.0;
 
+// Play and dead bands.
+
+/// A reading stands when it has not moved for so long, s: noise alone hides slow motion for less. Derived: half of [`BLOCK_S`].
+pub(crate) const LONGEST_STILL_S: f64 = BLOCK_S / 2.0;
+/// Of a reading that stands, what its sensor's side is on average, of the straight way from the last motion to the next. Sourced: measured
+/// on pressures in wind of 5 to 30 m/s under plays of 0.3 and 2 bar, 0.5 to 0.9 where it turns, 0 to 0.9 where it goes on as before.
+pub(crate) const OF_STRAIGHT_WAY: f64 = 0.5;
+/// What moves a sensor is at an end of its play from this share of it on. Derived: one less rounding.
+pub(crate) const AT_END: f64 = 0.999;
+/// χ² by which a play must explain the position better than none does. Derived: six standard deviations, for the best of many plays is taken.
+pub(crate) const EVIDENT_CHI2: f64 = 36.0;
+/// Ratio of two plays that are tried one after the other. Chosen for cost.
+pub(crate) const NEXT_PLAY: f64 = 1.2;
+/// Steps of the last search between two of them. Derived: to a 64th of their ratio.
+pub(crate) const PLAY_REFINEMENTS: usize = 6;
+/// A meter shows nothing below so many standard deviations of its noise. Chosen: the median of three leaves that by noise once in a
+/// hundred thousand samples.
+pub(crate) const SHOWN_SIGMA: f64 = 3.0;
+
 // Weak form.
 
 /// Length of a block, s. Chosen: short against the machine's motion, long against a sample.
 pub(crate) const BLOCK_S: f64 = 0.1;
-/// Share of a hat that is rounding, not time. Derived: far above the rounding of a sum of samples, far below one.
+/// Steps longer than this many [`LEAST_STEP_S`] are integrated at two points, and what moves within them is looked for. Chosen: samples
+/// of 100 Hz are fast, those of 50 Hz are not.
+pub(crate) const LONG_STEP: f64 = 1.5;
+/// Steps are even that differ by less than this share. Chosen: the jitter of a recorder's clock.
+pub(crate) const EVEN_SHARE: f64 = 0.1;
+/// Share of a test function that is rounding, not time. Derived: far above the rounding of a sum of samples, far below one.
 pub(crate) const SLIVER: f64 = 1e-6;
 /// Variance of an entry that must not count, times its own. Derived: its weight is then below rounding of the rest.
 pub(crate) const IGNORED: f64 = 1e8;
@@ -111,7 +133,7 @@ pub(crate) const HELD: f64 = 1e-4;
 /// Added to the diagonal of the scaled normal equations, so that collinear columns can be solved. Derived: as a prior
 /// it is a billion times too wide to matter.
 pub(crate) const COLLINEAR_RIDGE: f64 = 1e-11;
-/// What is left of a column after the others explain it, below which it tells nothing new. Derived: the root of
+/// The part of a column that is left after the others explain it, below which it tells nothing new. Derived: the root of
 /// rounding.
 pub(crate) const LEAST_NEW_SHARE: f64 = 1e-8;
 /// Held-out parts of the data. Chosen: the usual five (Hastie, Tibshirani and Friedman 2009, section 7.10).
@@ -156,12 +178,24 @@ pub(crate) const FIRST_STEP: f64 = 0.2;
 pub(crate) const LAST_STEP: f64 = 0.002;
 /// What a step must gain. Derived: half of what chance brings to one fitted constant.
 pub(crate) const LEAST_CLIMB: f64 = 0.5;
+/// Where the other constants of a range stand meanwhile. Chosen: bells and bends are narrow.
+pub(crate) const OTHERS_SHARE: f64 = 0.3;
+/// Half the step of a derivative by a constant, as a share of its range. Derived: central differences err by its square.
+pub(crate) const CONSTANT_STEP: f64 = 0.01;
 /// Places along the range of each constant from which the search starts. Chosen: ends and middle.
 pub(crate) const SEARCH_STARTS: [f64; 3] = [0.15, 0.5, 0.85];
 
 // The verdict.
 
-/// Fewer hats than this tell nothing. Chosen: the law of large numbers' usual thirty.
+/// Fewer numbers than this have no distribution. Chosen: below, skewness and kurtosis are far from normal.
+pub(crate) const FEWEST_FOR_MOMENTS: usize = 80;
+/// Bins of equal count in which a residual is drawn against a variable. Chosen for the eye.
+pub(crate) const DRAWN_BINS: usize = 12;
+/// An effect acts in an equation that has more than this share of its column. Chosen: a hundredth.
+pub(crate) const ACTS_SHARE: f64 = 0.01;
+/// A volume's ratio to the bulk modulus is well known where its standard deviation is this share of the volume's own. Chosen: half.
+pub(crate) const RATIO_KNOWN_SHARE: f64 = 0.5;
+/// Fewer test functions than this tell nothing. Chosen: the law of large numbers' usual thirty.
 pub(crate) const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
 /// by nearly one, so that four of five are found.
@@ -169,7 +203,9 @@ pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
 /// An effect is not to be believed where more is left in its equations than this share of what it and they have together. Chosen:
 /// nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
-/// Bins of equal count in which what is left is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
+/// What the probability of a name is multiplied by where something speaks against it that is no rival in its place. Chosen: even odds.
+pub(crate) const DOUBTED_ODDS: f64 = 0.5;
+/// Bins of equal count in which the residual is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
 /// [`FEWEST_ROWS`] each in 20 s.
 pub(crate) const SHAPE_BINS: usize = 6;
 /// An effect that mends less than this share of what another of the same equation does may be that one's error. Chosen: a law that

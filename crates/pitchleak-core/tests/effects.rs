@@ -300,6 +300,79 @@ fn entrained_air_follows_the_polytropic_law() {
 
 /// Dry friction turns within its slip speed: tanh 1 of it is there at that speed.
 #[test]
+fn dry_friction_holds_a_piston_with_what_it_resists_at_creeping_speed() {
+    let constants = EffectConstants { stribeck_speed_mps: 1.0, ..EffectConstants::default() };
+    let at =
+        Signals { v_mps: 20.0 * constants.slip_speed_mps, pa_pa: 4e6, pb_pa: -1e6, ..Signals::default() };
+    let dry: Vec<Effect> = Effect::ALL.iter().copied().filter(|one| one.stiction(&at).is_some()).collect();
+    assert_eq!(dry, [Effect::CoulombFriction, Effect::StribeckFriction, Effect::SealFriction]);
+    for effect in dry {
+        let creeping: f64 = effect.unit_term(&at, &Model::paper(), &constants).force_n;
+        let holds = effect.stiction(&at).expect("is dry");
+        assert!((creeping / holds - 1.0).abs() < 1e-3, "{effect}: {creeping} {holds}");
+    }
+}
+
+#[test]
+fn what_adds_to_a_declared_number_is_that_number() {
+    let with = |effect: Effect, cylinder: &mut pitchleak_core::Cylinder<f64>, by: f64| match effect {
+        Effect::DeadVolumeA => cylinder.dead_volume_a_m3 += by,
+        Effect::DeadVolumeB => cylinder.dead_volume_b_m3 += by,
+        Effect::AddedMass => cylinder.moving_mass_kg += by,
+        _ => panic!("{effect} adds to nothing"),
+    };
+    let at = Signals { a_mps2: 0.3, dpa_pas: 1e6, dpb_pas: -2e6, ..Signals::default() };
+    let model = Model::paper();
+    for effect in Effect::ALL.iter().filter(|effect| effect.adds_to(&model.cylinder).is_some()) {
+        let mut more = model;
+        let size = effect.spec().default_size;
+        with(*effect, &mut more.cylinder, size);
+        let grown = effect.adds_to(&more.cylinder).zip(effect.adds_to(&model.cylinder));
+        assert!(grown.is_some_and(|(more, less)| (more - less - size).abs() < 1e-12));
+        let moved = model.residual(&at).plus(-1.0, more.residual(&at));
+        let term = effect.unit_term(&at, &model, &EffectConstants::default());
+        let left = moved.plus(-size, term);
+        for (left, moved) in [
+            (left.chamber_a_m3s, moved.chamber_a_m3s),
+            (left.chamber_b_m3s, moved.chamber_b_m3s),
+            (left.force_n, moved.force_n),
+        ] {
+            assert!(left.abs() <= 1e-9 * moved.abs(), "{effect}");
+        }
+    }
+}
+
+#[test]
+fn given_constants_are_not_fitted_and_fitted_ones_have_a_range_in_a_lively_trace() {
+    let span = |of: fn(&Signals<f64>) -> f64| {
+        let ends = [-1.0, 1.0].map(|way| {
+            of(&Signals {
+                x_m: 0.1 + 0.05 * way,
+                v_mps: 0.05 * way,
+                pa_pa: 5e6 + 2e6 * way,
+                pb_pa: 3e6,
+                ..Signals::default()
+            })
+        });
+        (ends[0].min(ends[1]), ends[0].max(ends[1]))
+    };
+    for effect in Effect::ALL {
+        for constant in effect.constants() {
+            let is_given = effect.spec().given.contains(constant);
+            assert_eq!(effect.fitted_constants().any(|own| own == *constant), !is_given, "{effect}");
+            let range = constant.range(1e-4, span);
+            let bounds = constant.spec();
+            assert!(
+                is_given
+                    || range
+                        .is_some_and(|(low, high)| low < high && low >= bounds.lower && high <= bounds.upper),
+                "{effect} {range:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn dry_friction_turns_at_its_slip_speed() {
     let (model, constants) = (Model::<f64>::paper(), EffectConstants::default());
     for (share, expected) in [(1.0, 0.761_594), (-1.0, -0.761_594), (10.0, 1.0)] {

@@ -249,11 +249,18 @@ pub fn summary(answers: &[(Case, Diagnosis)]) -> String {
     let count = |of: &dyn Fn(&Case, &Diagnosis) -> bool| {
         answers.iter().filter(|(case, answer)| of(case, answer)).count()
     };
+    let named = |is: &dyn Fn(&FoundEffect) -> bool, right: bool| {
+        let of = |(case, answer): &(Case, Diagnosis)| {
+            answer.effects.iter().filter(|one| is(one) && (!right || is_true(case, one))).count()
+        };
+        answers.iter().map(of).sum::<usize>()
+    };
     let deviations: Vec<f64> = answers.iter().flat_map(|(case, answer)| deviations(case, answer)).collect();
     let within = deviations.iter().filter(|sigma| **sigma <= 4.0).count();
     format!(
         "{} runs, {} no missing effect, {} explained, {} partly, {} unexplained; {} name something, {} something wrong surely, \
-         {} explained with a sure name; first right {}, all named {}, all named and explained {}, all sure {}; {within} of {} sure values within 4 σ",
+         {} explained with a sure name; first right {}, all named {}, all named and explained {}, all sure {}; {within} of {} sure values within 4 σ; \
+         of {} names of at least 95 % {} are right, of {} others {}",
         answers.len(),
         count(&|_, a| a.verdict == Verdict::NoMissingEffect),
         count(&|_, a| a.verdict == Verdict::Explained),
@@ -267,5 +274,9 @@ pub fn summary(answers: &[(Case, Diagnosis)]) -> String {
         count(&|c, a| all_named(c, a) && a.verdict == Verdict::Explained),
         count(&|c, a| all_named(c, a) && a.effects.iter().all(|e| e.confident)),
         deviations.len(),
+        named(&|one| one.probability >= 0.95, false),
+        named(&|one| one.probability >= 0.95, true),
+        named(&|one| one.probability < 0.95, false),
+        named(&|one| one.probability < 0.95, true),
     )
 }

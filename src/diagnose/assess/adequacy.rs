@@ -1,13 +1,14 @@
-//! Whether what is left can be the sensors' noise, and if not, where it shows.
+//! Whether the residual can be the sensors' noise, and if not, where it shows.
 
 use super::residual::whitened_residual;
 use crate::channels::ChannelFault;
 use crate::diagnose::data::SensorCheck;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::EquationResidual;
-use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, RESIDUAL_TESTS, SHAPE_BINS};
-use crate::diagnose::weak_form::Nameless;
+use crate::diagnose::outcome::{EquationResidual, Interaction, ModelFit};
+use crate::diagnose::search::Selection;
+use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, SHAPE_BINS};
+use crate::diagnose::weak_form::{RESIDUAL_TESTS, Unlisted};
 use crate::diagnose::{search, statistics};
 
 fn name(equation: Equation) -> &'static str {
@@ -18,7 +19,7 @@ fn name(equation: Equation) -> &'static str {
     }
 }
 
-/// What is left of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
+/// The residual of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
 /// all that is left.
 struct Leftover {
     /// Size in that of the sensors' noise.
@@ -53,7 +54,7 @@ impl Leftover {
 pub(crate) struct Inadequacy {
     /// In sentences; none when the model is complete.
     pub(crate) complaints: Vec<String>,
-    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
     pub(crate) left: PerEquation<f64>,
 }
 
@@ -64,36 +65,36 @@ pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
     for (equation, left) in left.iter() {
         let (name, ratio) = (name(equation), left.noise_ratio);
         if ratio > 1.0 {
-            complaints.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
+            complaints.push(format!("the residual of {name} is {ratio:.2} times the sensors' noise"));
         } else if left.by_colour > 0.0 {
-            complaints.push(format!("what is left in {name} is as small as noise but not white"));
+            complaints.push(format!("the residual of {name} is as small as noise but not white"));
         }
     }
     for (equation, left) in left.iter().filter(|(_, left)| !left.by_variable.is_empty()) {
         let names: Vec<_> = left.by_variable.iter().map(|(name, _)| *name).collect();
-        complaints.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
+        complaints.push(format!("the residual of {} goes with {}", name(equation), names.join(", ")));
     }
     if let Some((product, chi2_drop)) = beyond_chance(fit) {
         let (sigma, words) = (chi2_drop.sqrt(), product.words());
         complaints.push(format!(
-            "what is left follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
+            "the residual follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
         ));
     }
     Inadequacy { complaints, left: PerEquation::from_fn(|equation| left[equation].most()) }
 }
 
-/// The product of signals that no known effect makes which what is left follows beyond chance.
-fn beyond_chance(fit: &Fit<'_>) -> Option<(Nameless, f64)> {
-    let by_chance = statistics::bonferroni_sigma(LEAST_P, Nameless::ALL.len()).powi(2);
-    search::strongest_nameless(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
+/// The product of signals that no known effect makes which the residual follows beyond chance.
+fn beyond_chance(fit: &Fit<'_>) -> Option<(Unlisted, f64)> {
+    let by_chance = statistics::bonferroni_sigma(LEAST_P, Unlisted::ALL.len()).powi(2);
+    search::strongest_unlisted(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
 }
 
 /// What such a product would mend.
-pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
+pub(crate) fn unlisted_excess(fit: &Fit<'_>) -> f64 {
     beyond_chance(fit).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
-/// Variables on which what is left depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
+/// Variables on which the residual depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
 /// against each.
 fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = (&'static str, f64)> {
     let residual = whitened_residual(fit, equation);
@@ -143,4 +144,51 @@ fn ripples(checks: &[SensorCheck]) -> Vec<String> {
     } else {
         vec![]
     }
+}
+
+/// What speaks for and against the model with the effects.
+pub(crate) struct Judgement {
+    /// What speaks against the model with the effects.
+    pub(crate) complaints: Vec<String>,
+    /// The complaints among them of sensors that fail by themselves.
+    pub(crate) failures: Vec<String>,
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
+    pub(crate) left: PerEquation<f64>,
+    /// Where the effects together made the error on held-out samples smaller.
+    pub(crate) fell: PerEquation<bool>,
+    /// Pairs of effects that act on each other.
+    pub(crate) interactions: Vec<Interaction>,
+}
+
+impl Judgement {
+    /// What the strongest product of two effects would mend of the sum of squares, `beside` being none of them: their laws are wrong by that.
+    pub(crate) fn mended_by_products(&self, fit: &Fit<'_>, beside: Option<&str>) -> f64 {
+        let is_beside = |found: &&Interaction| !found.effects.iter().any(|id| Some(*id) == beside);
+        let percents = self.interactions.iter().filter(is_beside).map(|found| found.mended_percent);
+        percents.fold(0.0, f64::max) / 100.0 * fit.free.chi2
+    }
+}
+
+/// Judges the model with the effects by its errors on held-out samples, `before` without them and `after`, and by what is
+/// left, beside what is wrong with the sensors.
+pub(crate) fn judge(
+    selection: &Selection<'_>,
+    failures: Vec<String>,
+    [before, after]: [&ModelFit; 2],
+) -> Judgement {
+    let Selection { fit, effects } = selection;
+    let Inadequacy { mut complaints, left } = inadequacy(fit);
+    complaints.extend_from_slice(&failures);
+    if effects.iter().any(|one| one.is_below_unlisted) {
+        complaints.push(
+            "a product of signals that the table does not list fits better than any known effect".to_owned(),
+        );
+    }
+    let [before, after] = [before, after].map(|model| &model.quality.rmse);
+    let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);
+    if !effects.is_empty() && Equation::ALL.into_iter().all(|equation| !fell[equation]) {
+        complaints.push("samples that were not fitted are met no better than without the effects".to_owned());
+    }
+    let interactions = search::interactions(fit, effects);
+    Judgement { complaints, failures, left, fell, interactions }
 }

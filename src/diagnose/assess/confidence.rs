@@ -1,25 +1,36 @@
-//! Whether a named effect stands by itself: each is held against its rivals, against what is left, against the effects
+//! Whether a named effect stands by itself: each is held against its rivals, against the residual, against the effects
 //! beside it, and against what physics allows.
 
-use super::adequacy;
-use super::verdict::Judgement;
+use super::adequacy::{self, Judgement};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
+use crate::diagnose::outcome::{Doubt, DoubtId};
 use crate::diagnose::search::{self, Selected, Selection};
 use crate::diagnose::thresholds::{
-    AGREED_SIGMA, CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, LEAST_SHARE_BESIDE, UNMENDED_SHARE,
+    ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS, LEAST_SHARE_BESIDE,
+    UNMENDED_SHARE,
 };
-use crate::diagnose::weak_form::Term;
-use pitchleak_core::Effect;
-use pitchleak_core::effects::EffectKind;
+use crate::diagnose::weak_form::{Term, Unlisted};
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
-pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
-    own_doubts(selection, one, judgement).or_else(|| doubtful_company(selection, one, judgement))
+pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Vec<Doubt> {
+    let own = own_doubts(selection, one, judgement);
+    if own.is_empty() { doubtful_neighbour(selection, one, judgement).into_iter().collect() } else { own }
+}
+
+/// The probability of an effect's name, with what speaks against it.
+pub(crate) fn probability(one: &Selected, doubts: &[Doubt]) -> f64 {
+    let is_weighed = |doubt: &Doubt| matches!(doubt.id, DoubtId::Rivals | DoubtId::UnlistedLaw);
+    let share = if doubts.iter().all(is_weighed) { 1.0 } else { DOUBTED_ODDS };
+    share * one.probability
+}
+
+fn doubt(id: DoubtId, text: impl Into<String>) -> Doubt {
+    Doubt { id, text: text.into() }
 }
 
 /// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
-fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn doubtful_neighbour(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let fit = &selection.fit;
     let acts = acts_in(fit, one.term);
     let is_doubtful = |other: &&Selected| {
@@ -28,67 +39,75 @@ fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judge
             |equation: Equation| acts[equation] && also[equation] && judgement.left[equation] > 0.0;
         other.term != one.term
             && Equation::ALL.into_iter().any(is_shared)
-            && own_doubts(selection, other, judgement).is_some()
+            && !own_doubts(selection, other, judgement).is_empty()
     };
     let other = selection.effects.iter().find(is_doubtful)?;
     let id = fit.problem.terms[other.term].effect()?.spec().id;
-    Some(format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"))
+    Some(doubt(
+        DoubtId::DoubtfulNeighbour,
+        format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"),
+    ))
 }
 
-fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Vec<Doubt> {
     let fit = &selection.fit;
-    let reasons: Vec<String> = [
+    [
         rivals(one),
-        remainder(fit, one, judgement),
-        unnamed(fit, one, judgement),
-        company(selection, one, judgement),
-        lopsided(selection, one),
-        bounds(fit, one),
-        negative_mass(fit, one),
-        replaceable(fit, one),
-        leaks(fit, one),
+        unlisted(one).or_else(|| residual(fit, one, judgement)),
+        weak_rival(fit, one, judgement),
+        small_beside_other(selection, one, judgement),
+        one_way_friction(selection, one),
+        at_bound(fit, one),
+        takes_all_declared(fit, one),
+        may_be_none(fit, one),
+        negative_leak(fit, one),
         held_out(fit, one, judgement),
-        sensors(&judgement.failures),
+        sensor_fault(&judgement.failures),
     ]
     .into_iter()
     .flatten()
-    .collect();
-    (!reasons.is_empty()).then(|| reasons.join("; "))
+    .collect()
 }
 
 /// Wherever it acts, samples that were not fitted are met no better with all the effects than without any.
-fn held_out(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn held_out(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let acts = acts_in(fit, one.term);
     let is_met_better = Equation::ALL.into_iter().any(|equation| acts[equation] && judgement.fell[equation]);
-    (!is_met_better).then(|| "the error on held-out samples did not fall where it acts".to_owned())
+    let text = "the error on held-out samples did not fall where it acts";
+    (!is_met_better).then(|| doubt(DoubtId::HeldOut, text))
 }
 
 /// A sensor fails by itself.
-fn sensors(failures: &[String]) -> Option<String> {
-    (!failures.is_empty()).then(|| "a sensor fails by itself, which may pass for an effect".to_owned())
+fn sensor_fault(failures: &[String]) -> Option<Doubt> {
+    let text = "a sensor fails by itself, which may pass for an effect";
+    (!failures.is_empty()).then(|| doubt(DoubtId::SensorFault, text))
 }
 
 /// In which equations an effect shows.
 fn acts_in(fit: &Fit<'_>, term: usize) -> PerEquation<bool> {
     let squares = fit.squares(term);
     let all: f64 = squares.iter().map(|(_, square)| square).sum();
-    PerEquation::from_fn(|equation| squares[equation] > 0.01 * all)
+    PerEquation::from_fn(|equation| squares[equation] > ACTS_SHARE * all)
 }
 
 /// Others fit as well in its place.
-fn rivals(one: &Selected) -> Option<String> {
+fn rivals(one: &Selected) -> Option<Doubt> {
     let ids: Vec<&str> = one.confusable_with.iter().map(|rival| rival.spec().id).collect();
-    (!ids.is_empty()).then(|| format!("these traces do not tell it from {}", ids.join(", ")))
+    let text = || format!("these traces do not tell it from {}", ids.join(", "));
+    (!ids.is_empty()).then(|| doubt(DoubtId::Rivals, text()))
 }
 
-/// What is left where it acts is not small beside what it mends.
-fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
-    if one.beaten_by_nameless {
-        return Some("a product of signals without a name fits better".to_owned());
-    }
-    if let Some(product) = one.like_nameless {
-        return Some(format!("what no effect of the table makes fits as well: {}", product.words()));
-    }
+/// A law that the table does not list fits as well, or better.
+fn unlisted(one: &Selected) -> Option<Doubt> {
+    let as_well =
+        |product: Unlisted| format!("what no effect of the table makes fits as well: {}", product.words());
+    let better = "a product of signals that the table does not list fits better".to_owned();
+    let text = if one.is_below_unlisted { Some(better) } else { one.unlisted_rival.map(as_well) };
+    text.map(|text| doubt(DoubtId::UnlistedLaw, text))
+}
+
+/// The residual where it acts is not small beside what it explains.
+fn residual(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let mut acts = acts_in(fit, one.term);
     if acts.force {
         // Forces feel a speed that comes from the flows: where those do not balance, it may be wrong.
@@ -97,19 +116,17 @@ fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Str
     let there = |equation: Equation| if acts[equation] { judgement.left[equation] } else { 0.0 };
     let named = fit.problem.terms[one.term].effect().map(|effect| effect.spec().id);
     let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>()
-        + adequacy::nameless_excess(fit)
+        + adequacy::unlisted_excess(fit)
         + judgement.mended_by_products(fit, named);
     let mended = search::loss(fit, &[one.term]);
-    (left > UNMENDED_SHARE * (mended + left)).then(|| {
-        "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
-         believed without a measurement of its own"
-            .to_owned()
-    })
+    let text = "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
+                believed without a measurement of its own";
+    (left > UNMENDED_SHARE * (mended + left)).then(|| doubt(DoubtId::Residual, text))
 }
 
 /// Where it acts something else is left, of which a candidate beyond chance mends too little for a name of its own: the rest of what that
 /// does may stand under this one's name.
-fn unnamed(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn weak_rival(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let dispersion = fit.dispersion(fit.free.chi2);
     let acts = acts_in(fit, one.term);
     let is_rival = |candidate: &usize| {
@@ -121,12 +138,12 @@ fn unnamed(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Strin
     };
     let rival = search::open(fit).into_iter().find(is_rival)?;
     let id = fit.problem.terms[rival].effect()?.spec().id;
-    Some(format!("more than noise is left where it acts, and {id} goes with that"))
+    Some(doubt(DoubtId::WeakRival, format!("more than noise is left where it acts, and {id} goes with that")))
 }
 
 /// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that
 /// no effect explains, that error is of unknown size: only the strongest effect of an equation is believed.
-fn company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn small_beside_other(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let fit = &selection.fit;
     let acts = acts_in(fit, one.term);
     let shares_equation = |other: &&Selected| {
@@ -139,63 +156,69 @@ fn company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> 
     let (large, mended) = of_others.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let id = fit.problem.terms[large.term].effect()?.spec().id;
     if own < LEAST_SHARE_BESIDE * mended {
-        return Some(format!(
-            "it is so small beside {id} that a small error in the law of that would pass for it"
-        ));
+        let text =
+            format!("it is so small beside {id} that a small error in the law of that would pass for it");
+        return Some(doubt(DoubtId::SmallBesideOther, text));
     }
-    (own < mended && !judgement.complaints.is_empty())
-        .then(|| format!("something else is there, too, and it mends less than {id}: an error in the law of that may pass for it"))
+    let text = || {
+        format!(
+            "something else is there, too, and it mends less than {id}: an error in the law of that may pass for it"
+        )
+    };
+    (own < mended && !judgement.complaints.is_empty()).then(|| doubt(DoubtId::SmallBesideOther, text()))
 }
 
 /// Dry friction that is larger one way is, as long as the piston moves, dry friction and an offset of the load.
-fn lopsided(selection: &Selection<'_>, one: &Selected) -> Option<String> {
-    let effect = |one: &Selected| selection.fit.problem.terms[one.term].effect();
-    let is_dry = |effect: Effect| {
-        matches!(effect, Effect::CoulombFriction | Effect::StribeckFriction | Effect::SealFriction)
+fn one_way_friction(selection: &Selection<'_>, one: &Selected) -> Option<Doubt> {
+    let terms = &selection.fit.problem.terms;
+    let named = |is: fn(Term) -> bool| {
+        let mut all = selection.effects.iter().map(|other| terms[other.term]);
+        all.find(|term| is(*term)).and_then(Term::effect)
     };
-    let beside = |wanted: &dyn Fn(Effect) -> bool| selection.effects.iter().filter_map(effect).any(wanted);
-    let own = effect(one)?;
-    let both = if own == Effect::LoadOffset {
-        beside(&is_dry)
-    } else {
-        is_dry(own) && beside(&|other| other == Effect::LoadOffset)
-    };
-    both.then(|| "a dry friction that is larger one way passes for dry friction and load_offset".to_owned())
+    let (offset, _) = named(Term::is_constant_force).zip(named(Term::is_dry_friction))?;
+    let own = terms[one.term];
+    let text =
+        || format!("a dry friction that is larger one way passes for dry friction and {}", offset.spec().id);
+    (own.is_constant_force() || own.is_dry_friction()).then(|| doubt(DoubtId::OneWayFriction, text()))
 }
 
 /// Its value is at an end of what physics allows.
-fn bounds(fit: &Fit<'_>, one: &Selected) -> Option<String> {
-    fit.is_at_bound(one.term).then(|| "its value is at the end of what is possible".to_owned())
+fn at_bound(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
+    fit.is_at_bound(one.term).then(|| doubt(DoubtId::AtBound, "its value is at the end of what is possible"))
 }
 
-/// With it nothing would have a mass, or less.
-fn negative_mass(fit: &Fit<'_>, one: &Selected) -> Option<String> {
-    let own =
-        fit.estimate(one.term).filter(|_| fit.problem.terms[one.term] == Term::Effect(Effect::AddedMass))?;
-    let declared_kg = fit.problem.declared_cylinder().moving_mass_kg;
-    (own.value - own.std < -declared_kg)
-        .then(|| format!("with it hardly anything would move of the {declared_kg:.1} kg that are declared"))
+/// It would take away all that the rig file declares, such as the mass that moves.
+fn takes_all_declared(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
+    let effect = fit.problem.terms[one.term].effect()?;
+    let declared = effect.adds_to(fit.problem.declared_cylinder())?;
+    let own = fit.estimate(one.term)?;
+    let is_small = own.value - own.std < -declared;
+    let text = || {
+        format!(
+            "with it hardly anything is left of the {declared:.1} {} that are declared",
+            effect.spec().unit
+        )
+    };
+    is_small.then(|| doubt(DoubtId::TakesAllDeclared, text()))
 }
 
 /// A candidate too weak for a name, which these traces do not rule out either, would take most of it away.
-fn replaceable(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+fn may_be_none(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let own = fit.estimate(one.term)?;
     let spread = own.std.hypot(unnamed_shift(fit, one.term));
-    (own.value.abs() < AGREED_SIGMA * spread).then(|| {
-        "beside an effect too weak for a name, which these traces do not rule out, it could be none"
-            .to_owned()
-    })
+    let text = "beside an effect too weak for a name, which these traces do not rule out, it could be none";
+    (own.value.abs() < AGREED_SIGMA * spread).then(|| doubt(DoubtId::MayBeNone, text))
 }
 
 /// With it a leak comes out below zero.
-fn leaks(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let acts = acts_in(fit, one.term);
     let impossible = |(term, name, equations): (Term, &str, &[Equation])| {
         let own = fit.estimate(fit.problem.place(term)?)?;
         let is_negative = own.value < -DOUBTED_LEAK_SIGMA * own.std;
         let is_near = equations.iter().any(|equation| acts[*equation]);
-        (is_negative && is_near)
-            .then(|| format!("with it the {name} is {:.1} sigma below zero", -own.value / own.std))
+        let text = || format!("with it the {name} is {:.1} sigma below zero", -own.value / own.std);
+        (is_negative && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
     };
     let (a, b) = (Equation::ChamberA, Equation::ChamberB);
     [
@@ -217,26 +240,4 @@ pub(crate) fn unnamed_shift(fit: &Fit<'_>, term: usize) -> f64 {
     };
     let possible = search::open(fit).into_iter().filter(is_possible);
     possible.filter_map(|candidate| fit.shift_by(candidate, term)).map(f64::abs).fold(0.0, f64::max)
-}
-
-/// Standard deviation of an effect's value where it is only known over the bulk modulus, as a dead volume is; else none.
-pub(crate) fn std_with_oil(fit: &Fit<'_>, term: usize) -> Option<f64> {
-    let spec = fit.problem.terms[term].effect()?.spec();
-    let is_volume = spec.kind == EffectKind::Storage && spec.constants.is_empty() && spec.unit == "m3";
-    let own = fit.estimate(term).filter(|_| is_volume)?;
-    Some(own.std.hypot(own.value * fit.oil_share()))
-}
-
-/// A sentence where only the ratio of a volume to the bulk modulus is known.
-pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
-    let id = fit.problem.terms[one.term].effect()?.spec().id;
-    let (own, std) = (fit.estimate(one.term)?, std_with_oil(fit, one.term)?);
-    let percent = |std: f64| 100.0 * std / own.value;
-    (own.std < 0.5 * std && own.value > 0.0).then(|| {
-        format!(
-            "{id}: only its ratio to the bulk modulus is well known (to {:.1} %); the volume itself no better than the oil ({:.0} %)",
-            percent(own.std),
-            percent(std)
-        )
-    })
 }

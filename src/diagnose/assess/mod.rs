@@ -1,20 +1,54 @@
-//! What is left once a model is fitted, and what it says about the model.
+//! The residual once a model is fitted, and what it says about the model: the answer in a word, and the sentences that speak for it.
 
 mod adequacy;
 mod confidence;
-mod effects;
-mod excitation;
-mod held_out;
+mod estimates;
 mod holds;
-mod leaks;
-mod model_fit;
 mod residual;
-mod verdict;
 
-pub(crate) use adequacy::failures;
-pub(crate) use effects::{calibration, found};
-pub(crate) use excitation::{detection_limits, is_excited};
-pub(crate) use held_out::HeldOut;
+pub(crate) use adequacy::{failures, judge};
+pub(crate) use estimates::{calibration, detection_limits, found, is_excited};
 pub(crate) use holds::check as check_holds;
-pub(crate) use model_fit::model_fit;
-pub(crate) use verdict::{judge, notes};
+pub(crate) use residual::{HeldOut, model_fit};
+
+use self::adequacy::Judgement;
+use self::estimates::{negative_leaks, ratio_note};
+use crate::diagnose::outcome::{FoundEffect, Interaction, LeakEstimates, ModelFit, Verdict};
+use crate::diagnose::search::Selection;
+use crate::diagnose::thresholds::MOST_ROUNDS;
+
+/// The answer in a word. Effects explain the traces where each can be believed, nothing speaks against the model with them,
+/// and no leak is impossible.
+pub(crate) fn verdict(judgement: &Judgement, effects: &[FoundEffect], leaks: &LeakEstimates) -> Verdict {
+    let is_adequate = judgement.complaints.is_empty();
+    let is_believed = effects.iter().all(|effect| effect.confident) && leaks.are_physical();
+    match (effects.is_empty(), is_adequate) {
+        (true, true) => Verdict::NoMissingEffect,
+        (true, false) => Verdict::Unexplained,
+        (false, true) if is_believed => Verdict::Explained,
+        (false, _) => Verdict::PartlyExplained,
+    }
+}
+
+/// All sentences for people: `after` is none where no effect was named.
+pub(crate) fn notes(
+    Selection { fit, effects }: &Selection<'_>,
+    complaints: Vec<String>,
+    before: &ModelFit,
+    after: Option<&ModelFit>,
+    interactions: &[Interaction],
+) -> Vec<String> {
+    let mut notes = complaints;
+    notes.extend(negative_leaks(&before.leaks, "the declared model"));
+    notes.extend(interactions.iter().map(|found| {
+        let Interaction { effects: [one, other], sigma, mended_percent } = found;
+        format!("{one} and {other} act on each other: the product of their terms shows at {sigma:.1} sigma and would mend {mended_percent:.1} %")
+    }));
+    let after = after.map(|after| negative_leaks(&after.leaks, "the model with the effects"));
+    notes.extend(after.into_iter().flatten());
+    notes.extend(effects.iter().filter_map(|one| ratio_note(fit, one)));
+    if !fit.has_converged() {
+        notes.push(format!("the fit still moved after {MOST_ROUNDS} linearisations: estimates may be off by more than they say"));
+    }
+    notes
+}

@@ -1,38 +1,17 @@
-//! What a model leaves over, as numbers that should be white noise: whitened by the sensors' noise, tested,
-//! and held against every variable.
+//! The residual of a model: whitened by the sensors' noise it should be white, and is tested and held against every variable; of samples
+//! that were not fitted, its size, its course, its shape. Both are reported alike of the declared model and of that with the effects found.
 
-use crate::diagnose::equation::Equation;
+use super::estimates::leaks;
+use crate::diagnose::data::Series;
+use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::{Correlation, EquationResidual};
+use crate::diagnose::outcome::{BinnedResidual, Correlation, EquationResidual, ModelFit, Quality};
 use crate::diagnose::statistics;
-use crate::diagnose::weak_form::Row;
+use crate::diagnose::thresholds::{DRAWN_BINS, FEWEST_FOR_MOMENTS};
+use crate::diagnose::weak_form::{Entry, Row, Rows, VARIABLES};
 use std::collections::BTreeMap;
 
-/// Fewer numbers than this have no distribution.
-const FEWEST: usize = 80;
-
-/// A variable that what is left may go with.
-pub(super) struct Variable {
-    pub(super) name: &'static str,
-    pub(super) of: fn(&Row) -> f64,
-}
-
-/// P_L, P_A, P_B, x, ẋ, its sign, flows, force, temperature, time.
-pub(super) const VARIABLES: [Variable; 11] = [
-    Variable { name: "load_pressure_pa", of: |row| row.mean.pa_pa - row.mean.pb_pa },
-    Variable { name: "pa_pa", of: |row| row.mean.pa_pa },
-    Variable { name: "pb_pa", of: |row| row.mean.pb_pa },
-    Variable { name: "x_m", of: |row| row.mean.x_m },
-    Variable { name: "v_mps", of: |row| row.mean.v_mps },
-    Variable { name: "direction", of: |row| row.mean.v_mps.signum() },
-    Variable { name: "qa_m3s", of: |row| row.mean.qa_m3s },
-    Variable { name: "qb_m3s", of: |row| row.mean.qb_m3s },
-    Variable { name: "force_n", of: |row| row.mean.force_n },
-    Variable { name: "temp_k", of: |row| row.mean.temp_k },
-    Variable { name: "t_s", of: |row| row.t_s },
-];
-
-/// What a fit leaves over of one equation; none where the traces lack it.
+/// The residual of one equation; none where the traces lack it.
 pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<EquationResidual> {
     let (rows, white): (Vec<Option<&Row>>, Vec<f64>) = fit
         .regression
@@ -53,7 +32,8 @@ pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<Equ
         count: white.len(),
         noise_ratio: fit.noise_ratio()[equation],
         whiteness_p: fit.whiteness_p(equation),
-        normality_p: (white.len() >= FEWEST).then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
+        normality_p: (white.len() >= FEWEST_FOR_MOMENTS)
+            .then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
         skewness,
         excess_kurtosis,
         correlations,
@@ -89,6 +69,133 @@ fn moments(values: &[f64]) -> [f64; 2] {
 fn jarque_bera_p(count: usize, skewness: f64, excess_kurtosis: f64) -> f64 {
     let statistic = count as f64 / 6.0 * (skewness.powi(2) + excess_kurtosis.powi(2) / 4.0);
     statistics::chi2_p(statistic, 2.0)
+}
+
+/// The residual of each test function, in m³/s or N.
+pub(crate) struct HeldOut {
+    samples: Vec<ResidualSample>,
+}
+
+/// The residual of one test function.
+struct ResidualSample {
+    equation: Equation,
+    t_s: f64,
+    /// What the machine did then, from other samples.
+    beside: Option<Row>,
+    residual: f64,
+}
+
+impl HeldOut {
+    /// On `test`, or, where that is empty, on blocks that the fit left out.
+    pub(crate) fn of(fit: &Fit<'_>, test: &[Series]) -> Self {
+        if test.is_empty() {
+            return Self::collect(fit.rows(), fit.held_out_residual());
+        }
+        let (rows, residual) = fit.residual_on(test);
+        Self::collect(&rows, residual)
+    }
+
+    fn collect(rows: &Rows, residual: Vec<f64>) -> Self {
+        let sample = |(entry, residual): (&Entry, f64)| ResidualSample {
+            equation: entry.equation,
+            t_s: rows.rows[entry.row].t_s,
+            beside: rows.beside(entry.row).copied(),
+            residual,
+        };
+        Self { samples: rows.entries.iter().zip(residual).map(sample).collect() }
+    }
+
+    fn of_equation(&self, equation: Equation) -> impl Iterator<Item = &ResidualSample> {
+        self.samples.iter().filter(move |sample| sample.equation == equation)
+    }
+
+    /// Root mean square.
+    pub(crate) fn rmse(&self) -> PerEquation<Option<f64>> {
+        PerEquation::from_fn(|equation| {
+            let squares = self.of_equation(equation).map(|sample| sample.residual * sample.residual);
+            let (sum, count) = squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
+            (count > 0).then(|| (sum / f64::from(count)).sqrt())
+        })
+    }
+
+    /// Time and residual.
+    pub(crate) fn over_time(&self) -> PerEquation<Vec<(f64, f64)>> {
+        let points =
+            |equation| self.of_equation(equation).map(|sample| (sample.t_s, sample.residual)).collect();
+        PerEquation::from_fn(points)
+    }
+
+    /// The residual against each variable, in bins of equal count.
+    pub(crate) fn binned(&self) -> Vec<BinnedResidual> {
+        let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * DRAWN_BINS;
+        let pairs = Equation::ALL.into_iter().filter(has_enough);
+        let pairs = pairs.flat_map(|equation| VARIABLES.iter().map(move |variable| (equation, variable)));
+        pairs
+            .map(|(equation, variable)| {
+                let pair =
+                    |sample: &ResidualSample| Some(((variable.of)(sample.beside.as_ref()?), sample.residual));
+                binned(equation, variable.name, self.of_equation(equation).filter_map(pair).collect())
+            })
+            .collect()
+    }
+}
+
+fn binned(equation: Equation, against: &'static str, mut pairs: Vec<(f64, f64)>) -> BinnedResidual {
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let n = pairs.len() as f64;
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+    let (mx, my) = (mean(&|p| p.0), mean(&|p| p.1));
+    let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));
+    let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
+    let scale = (xx * yy).sqrt();
+    let bins = pairs.chunks(pairs.len().div_ceil(DRAWN_BINS)).map(Bin::of);
+    let (mut at, mut mean, mut std_error) = (vec![], vec![], vec![]);
+    for bin in bins {
+        at.push(bin.at);
+        mean.push(bin.mean);
+        std_error.push(bin.std_error);
+    }
+    BinnedResidual {
+        equation,
+        against,
+        at,
+        mean,
+        std_error,
+        correlation: if scale > 0.0 { xy / scale } else { 0.0 },
+    }
+}
+
+/// Means of one bin.
+struct Bin {
+    at: f64,
+    mean: f64,
+    std_error: f64,
+}
+
+impl Bin {
+    fn of(pairs: &[(f64, f64)]) -> Self {
+        let n = pairs.len() as f64;
+        let sum = pairs.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        let (at, mean) = (sum.0 / n, sum.1 / n);
+        let variance = pairs.iter().map(|p| (p.1 - mean).powi(2)).sum::<f64>() / n;
+        Self { at, mean, std_error: (variance / n).sqrt() }
+    }
+}
+
+/// How well a model fits: on `test`, or, where that is empty, on blocks that the fit left out.
+pub(crate) fn model_fit(fit: &Fit<'_>, test: &[Series]) -> ModelFit {
+    let held_out = HeldOut::of(fit, test);
+    ModelFit {
+        quality: Quality {
+            rmse: held_out.rmse(),
+            whiteness_p: PerEquation::from_fn(|equation| fit.whiteness_p(equation)),
+        },
+        leaks: leaks(fit),
+        noise_ratio: fit.noise_ratio(),
+        residuals: PerEquation::from_fn(|equation| whitened_residual(fit, equation)),
+        binned_residuals: held_out.binned(),
+        residual_over_time: held_out.over_time(),
+    }
 }
 
 #[cfg(test)]

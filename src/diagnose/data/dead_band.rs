@@ -1,7 +1,8 @@
 //! Where in its meter's dead band a flow lies while the meter shows nothing. The reading says when it enters and leaves the band, and by which
 //! edge; how it goes on in between another sensor shows, or nothing does.
 
-use super::side::{ANYWHERE, Sides};
+use super::play::{ANYWHERE, Sides};
+use crate::diagnose::thresholds::SHOWN_SIGMA;
 use std::ops::Range;
 
 /// A flow that goes as the one in question does, but for leaks and storage, which are small or slow.
@@ -10,10 +11,6 @@ pub(super) struct Beside {
     /// Standard deviation of its noise.
     pub(super) std_m3s: f64,
 }
-
-/// A reading shows nothing below so many standard deviations of its noise. Chosen: the median of three
-/// leaves that by noise once in a hundred thousand samples.
-const SHOWN_SIGMA: f64 = 3.0;
 
 /// Where a flow lies between the edges of its band, −1 to 1: by the straight way from the edge by which it entered to the one by which it
 /// left, and what another flow `beside` departs from its own straight way meanwhile. Zero while the reading shows something. Flows are without

@@ -1,25 +1,20 @@
 //! The traces and what is declared of them.
 
-mod backlash;
-mod channels;
+mod channel;
 mod dead_band;
 mod declared;
-mod files;
+mod mistakes;
 mod motion;
-mod sensor_noise;
+mod noise;
+mod play;
 mod series;
-mod side;
 mod traces;
-mod unresolved;
-mod wiring;
 
-pub(crate) use channels::channel_faults;
+pub(crate) use channel::Channel;
 pub use declared::Declared;
 pub(crate) use declared::thinned;
-pub use files::{FittedAndJudged, Roles, SameFile};
+pub(crate) use mistakes::{channel_faults, miswired};
 pub(crate) use motion::Motion;
-pub(crate) use sensor_noise::{SensorCheck, check_sensors, effective, white};
+pub(crate) use noise::{SensorCheck, Unresolved, check_sensors, effective, white};
 pub use series::Series;
-pub use traces::Traces;
-pub(crate) use unresolved::Unresolved;
-pub(crate) use wiring::miswired;
+pub use traces::{FittedAndJudged, Roles, SameFile, Traces};

@@ -1,12 +1,12 @@
 //! What a trace says of the ways its signals go. The speed that friction feels: from the flows where they are measured, which know it ten times
 //! better than the position's difference does, else from the slope of the position.
 
-use super::backlash::Followed;
+use super::channel::Channel;
 use super::dead_band::{Beside, median_of_three, within_band};
+use super::play::{Followed, Sides};
 use super::series::Series;
-use super::side::Sides;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
-use pitchleak_core::{EffectSet, Model, Sensors, Signals};
+use pitchleak_core::{Effect, EffectSet, Model, Sensors, Signals};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
 #[derive(Default)]
@@ -53,6 +53,20 @@ impl Motion {
         let x = Followed::new(stretches, (&series.x_m, &way_m), sensors.position.noise_std).sides();
         let (pa, pb) = (sides(&series.pa_pa), sides(&series.pb_pa));
         Self { pa, pb, x, ..own }
+    }
+
+    /// The reading in whose play or dead band an effect lies, and where in it; none for an effect without a past.
+    pub(crate) fn sides_of(&self, effect: Effect) -> Option<(Channel, &Sides)> {
+        let mut all = Signals {
+            x_m: Some((Channel::Position, &self.x)),
+            pa_pa: Some((Channel::PressureA, &self.pa)),
+            pb_pa: Some((Channel::PressureB, &self.pb)),
+            qa_m3s: Some((Channel::FlowA, &self.qa)),
+            qb_m3s: Some((Channel::FlowB, &self.qb)),
+            ..Signals::default()
+        };
+        let hanging = effect.hanging(&mut all).copied().flatten();
+        hanging.or_else(|| effect.deaf(&mut all).copied().flatten())
     }
 
     /// Where the piston would be by its speed, m.

@@ -2,9 +2,8 @@
 //! with sensor effects undone on the readings. Columns that carry the residual's own noise are corrected
 //! for it (errors in variables: Söderström 2018, "Errors-in-Variables Methods in System Identification").
 
-use super::equation_error;
 use super::problem::Problem;
-use super::regression::{Prior, Regression, Solution};
+use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
@@ -52,7 +51,7 @@ pub(crate) struct Fit<'a> {
     pub(crate) held_compressibility: Option<f64>,
     /// Variance of each equation's error that the regression was weighted with.
     assumed_error: PerEquation<f64>,
-    /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
+    /// The same as it shows in this fit's residual, m⁶/s² and N²: zero while that can be the sensors' noise.
     pub(super) equation_error: PerEquation<f64>,
     /// Filled when it is asked for.
     pub(super) colour: PerEquation<OnceLock<Option<f64>>>,
@@ -144,7 +143,7 @@ impl<'a> Fit<'a> {
             let pieces = regression.jackknife(&structure.active, &priors);
             bounded.std.iter_mut().zip(pieces).for_each(|(std, wide)| *std = std.max(wide));
         }
-        let equation_error = equation_error::estimate(&weak_form, &regression, &bounded);
+        let equation_error = regression::equation_error(&weak_form, &regression, &bounded);
         Self {
             problem,
             structure,
@@ -245,7 +244,7 @@ impl<'a> Fit<'a> {
         self.equation_error.iter().any(|(_, error)| *error > 0.0)
     }
 
-    /// Size of what is left as a multiple of the noise that the sensors bring.
+    /// Size of the residual as a multiple of the noise that the sensors bring.
     pub(crate) fn noise_ratio(&self) -> PerEquation<f64> {
         self.noise_ratios(self.equation_error)
     }
@@ -327,7 +326,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Whether a further term with these constants also helps where it was not fitted.
-    pub(crate) fn holds_out(&self, term: usize, constants: EffectConstants<f64>) -> bool {
+    pub(crate) fn helps_held_out(&self, term: usize, constants: EffectConstants<f64>) -> bool {
         let priors = self.problem.increments(&self.weak_form.at);
         let column = || self.white_column(self.problem.terms[term], constants);
         let other = (constants != self.constants(term)).then(|| self.regression.with_column(term, column()));

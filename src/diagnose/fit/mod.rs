@@ -1,8 +1,6 @@
 //! The declared model and effects beside it, fitted to all traces at once.
 
-mod equation_error;
 mod gauss_newton;
-mod own_noise;
 mod predict;
 mod problem;
 mod regression;

@@ -20,10 +20,10 @@ pub(crate) struct Problem<'a> {
     pub(crate) priors: Vec<Option<Prior>>,
     /// No shorter lag is named.
     least_lag_s: f64,
-    /// The constants that effects start from …
+    /// The constants from which a fit of them starts.
     pub(crate) usual_constants: EffectConstants<f64>,
-    /// … but for these: a valve opens half of the time, and a direction turns at once.
-    usual_own: [(Effect, EffectConstant, f64); 2],
+    /// Those of effects whose constants are given.
+    given_constants: EffectConstants<f64>,
     /// The declared model, from which the fit sets out.
     pub(super) start: Linearisation,
 }
@@ -31,6 +31,7 @@ pub(crate) struct Problem<'a> {
 impl<'a> Problem<'a> {
     pub(crate) fn new(traces: &'a [Series], declared: &Declared, checks: &[SensorCheck]) -> Self {
         let terms = all_terms();
+        let usual_constants = usual_constants(traces, declared);
         Self {
             traces,
             declared: declared.sensors,
@@ -39,8 +40,8 @@ impl<'a> Problem<'a> {
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,
             least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
-            usual_constants: friction_constants(traces, declared),
-            usual_own: [cracking_pressure(traces), turning_speed(declared)],
+            given_constants: EffectConstants { slip_speed_mps: turning_speed(declared), ..usual_constants },
+            usual_constants,
             start: Linearisation::declared(declared),
         }
     }
@@ -63,12 +64,10 @@ impl<'a> Problem<'a> {
 
     /// The constants that a term starts from.
     pub(crate) fn usual(&self, term: usize) -> EffectConstants<f64> {
-        let is_own =
-            |(effect, ..): &&(Effect, EffectConstant, f64)| self.terms[term] == Term::Effect(*effect);
-        let own = self.usual_own.iter().find(is_own);
-        own.map_or(self.usual_constants, |(_, parameter, value)| {
-            self.usual_constants.with(*parameter, *value)
-        })
+        let given = self.terms[term].effect().map_or(&[][..], |effect| effect.spec().given);
+        let take =
+            |all: EffectConstants<f64>, own: &EffectConstant| all.with(*own, self.given_constants.get(*own));
+        given.iter().fold(self.usual_constants, take)
     }
 
     /// Whether some term starts from these.
@@ -87,48 +86,50 @@ impl<'a> Problem<'a> {
     /// Values of a term that physics allows and samples can show.
     pub(crate) fn allows(&self, term: usize, value: f64) -> bool {
         let (lower, upper) = self.terms[term].bounds();
-        let is_lag = self.terms[term].effect().is_some_and(|effect| effect.spec().unit == "s");
+        let is_lag = self.terms[term].effect().is_some_and(Effect::is_lag);
         (lower..=upper).contains(&value) && !(is_lag && value < self.least_lag_s)
     }
 }
 
-/// Friction turns within the speed that these traces can resolve.
-fn friction_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
+/// Friction turns within the speed that these traces can resolve, and a valve opens at the mean load pressure.
+fn usual_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
     let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: PerLeak::default() };
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
     let speeds: Vec<(f64, f64)> = traces
         .iter()
         .map(|series| least(&Motion::of(series, &model, &declared.effects, &declared.sensors)))
         .collect();
-    let within = |parameter: EffectConstant, speed: f64| {
-        let spec = parameter.spec();
-        speed.clamp(spec.lower, spec.upper)
-    };
     let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
     let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);
     EffectConstants {
         slip_speed_mps: within(EffectConstant::SlipSpeed, slip),
         stribeck_speed_mps: within(EffectConstant::StribeckSpeed, usual / 2.0),
+        cracking_pa: mean_load_pressure(traces).map_or(EffectConstant::CrackingPressure.spec().upper, |pa| {
+            within(EffectConstant::CrackingPressure, pa)
+        }),
         ..EffectConstants::default()
     }
 }
 
-/// The mean load pressure.
-fn cracking_pressure(traces: &[Series]) -> (Effect, EffectConstant, f64) {
-    let loads = traces.iter().flat_map(|series| series.pa_pa.iter().zip(&series.pb_pa));
-    let (sum, count) = loads.fold((0.0, 0.0), |(sum, count), (pa, pb)| (sum + (pa - pb).abs(), count + 1.0));
-    let spec = EffectConstant::CrackingPressure.spec();
-    let mean_pa = if count > 0.0 { (sum / count).clamp(spec.lower, spec.upper) } else { spec.upper };
-    (Effect::InternalLeakCracking, EffectConstant::CrackingPressure, mean_pa)
+fn within(parameter: EffectConstant, value: f64) -> f64 {
+    let spec = parameter.spec();
+    value.clamp(spec.lower, spec.upper)
 }
 
-/// The speed below which the meters' noise hides the direction of motion.
-fn turning_speed(declared: &Declared) -> (Effect, EffectConstant, f64) {
+/// Mean size of the load pressure, Pa.
+fn mean_load_pressure(traces: &[Series]) -> Option<f64> {
+    let loads = traces.iter().flat_map(|series| series.pa_pa.iter().zip(&series.pb_pa));
+    let known = loads.map(|(pa, pb)| (pa - pb).abs()).filter(|load| load.is_finite());
+    let (sum, count) = known.fold((0.0, 0.0), |(sum, count), load| (sum + load, count + 1.0));
+    (count > 0.0).then(|| sum / count)
+}
+
+/// The speed below which the meters' noise hides the direction of motion, m/s: what turns with the direction turns within it.
+fn turning_speed(declared: &Declared) -> f64 {
     let (sensors, cylinder) = (&declared.sensors, &declared.cylinder);
     let swept_m3s = sensors.flow_a.noise_std.hypot(sensors.flow_b.noise_std);
     let speed_mps = LEAST_SURE_SIGMA * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
-    let spec = EffectConstant::SlipSpeed.spec();
-    (Effect::InternalLeakDirection, EffectConstant::SlipSpeed, speed_mps.clamp(spec.lower, spec.upper))
+    within(EffectConstant::SlipSpeed, speed_mps)
 }
 
 fn prior(term: Term, declared: &Declared) -> Option<Prior> {

@@ -1,9 +1,12 @@
 //! Generalised least squares on the whitened rows. All fits, tests and held-out errors come from one
-//! Gram matrix per fold, so that trying a candidate costs a small solve, not a pass over the data.
+//! Gram matrix per fold, so that trying a candidate costs a small solve, not a pass over the data. With it the variance component of an
+//! incomplete model: how far its equations are wrong.
 
-use crate::diagnose::equation::Equation;
-use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FOLDS, MOST_NOISE_SHARE, PIECES};
-use crate::diagnose::weak_form::{NoisyColumn, Rows, SharedNoise, Whitening};
+use crate::diagnose::equation::{Equation, PerEquation};
+use crate::diagnose::thresholds::{
+    BISECTIONS, CHANCE_SIGMA, COLLINEAR_RIDGE, FOLDS, MOST_NOISE_SHARE, PIECES,
+};
+use crate::diagnose::weak_form::{NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
@@ -158,7 +161,7 @@ impl Regression {
         shares
     }
 
-    /// Of columns that are the left side itself all products. Of the others that with what is left, which holds at the solution and
+    /// Of columns that are the left side itself all products. Of the others that with the residual, which holds at the solution and
     /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
     fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
         let y = self.columns.len();
@@ -208,7 +211,7 @@ impl Regression {
     }
 
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
-    /// where what is left is neither white nor of known size.
+    /// where the residual is neither white nor of known size.
     pub(crate) fn jackknife(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
         let fits = self.leave_one_out(terms, priors);
         let of = |i: usize| jackknife_std(fits.iter().map(|fit| fit.value[i]));
@@ -323,7 +326,7 @@ fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     )
 }
 
-/// What the fit leaves over of each entry, in the equation's own unit times seconds.
+/// The residual of each entry, in the equation's own unit times seconds.
 pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
     let mut residual = rows.y.clone();
     for (term, value) in solution.terms.iter().zip(&solution.value) {
@@ -332,4 +335,50 @@ pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
         }
     }
     residual
+}
+
+/// Equation error with which the residual would be as large as the noise says, so that neither priors nor weak effects
+/// are overrun by it; zero where the residual can be the sensors' noise. By bisection.
+pub(super) fn equation_error(
+    weak_form: &WeakForm<'_>,
+    regression: &Regression,
+    solution: &Solution,
+) -> PerEquation<f64> {
+    let rows = &weak_form.rows;
+    let residual = residual(rows, solution);
+    let counts =
+        PerEquation::from_fn(|equation| regression.innovations(rows, solution, equation).len().max(1) as f64);
+    let levels = |equation_error: PerEquation<f64>| {
+        let white = Whitening::new(rows, &weak_form.noise(equation_error)).whiten(&residual);
+        let mut squares = PerEquation::<f64>::default();
+        for (entry, e) in rows.entries.iter().zip(&white).filter(|(entry, _)| rows.counts(entry)) {
+            squares[entry.equation] += e * e;
+        }
+        squares.zip(counts, |sum, count| sum / count)
+    };
+    let sensors_only = levels(PerEquation::default());
+    let mut high = PerEquation::from_fn(|equation| {
+        let by_chance = CHANCE_SIGMA * (2.0 / counts[equation]).sqrt();
+        if sensors_only[equation] <= 1.0 + by_chance {
+            return 0.0;
+        }
+        let own = rows.entries.iter().zip(&residual);
+        let own = own.filter(|(entry, _)| entry.equation == equation && rows.counts(entry));
+        let noise = weak_form.noise(PerEquation::default());
+        4.0 * own.map(|(entry, v)| noise.as_white(&rows.rows[entry.row], v * v)).sum::<f64>()
+            / counts[equation]
+    });
+    if high.iter().all(|(_, error)| *error <= 0.0) {
+        return high;
+    }
+    let mut low = PerEquation::<f64>::default();
+    for _ in 0..BISECTIONS {
+        let middle = low.zip(high, |low, high| (low + high) / 2.0);
+        let level = levels(middle);
+        for equation in Equation::ALL {
+            let end = if level[equation] > 1.0 { &mut low } else { &mut high };
+            end[equation] = middle[equation];
+        }
+    }
+    high
 }

@@ -2,6 +2,7 @@
 
 use super::gauss_newton::Fit;
 use super::regression::normalised;
+use crate::diagnose::thresholds::CONSTANT_STEP;
 use nalgebra::{DMatrix, DVector};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 
@@ -11,9 +12,6 @@ pub(crate) struct UnknownConstant {
     /// The least and the largest value that it can have.
     pub(crate) range: (f64, f64),
 }
-
-/// Half the step of a derivative as a share of a constant's range.
-const STEP_SHARE: f64 = 0.01;
 
 impl Fit<'_> {
     /// Standard deviation that a fitted term's value has because of constants which were fitted, or taken, beside it: to first order, each
@@ -55,7 +53,7 @@ impl Fit<'_> {
         let constants = self.constants(term);
         let (low, high) = one.range;
         let at = constants.get(one.parameter).clamp(low, high);
-        let step = STEP_SHARE * (high - low);
+        let step = CONSTANT_STEP * (high - low);
         let (below, above) = ((at - step).max(low), (at + step).min(high));
         let column = |at: f64| {
             let constants: EffectConstants<f64> = constants.with(one.parameter, at);

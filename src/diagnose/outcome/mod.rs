@@ -1,28 +1,33 @@
-//! What a diagnosis says.
-
-mod effects;
-mod leaks;
-mod residual;
-
-pub use effects::{Calibration, FoundEffect, Interaction, Size};
-pub use leaks::{HoldLeak, Holds, LeakEstimate, LeakEstimates};
-pub use residual::{BinnedResidual, Correlation, EquationResidual};
+//! What a diagnosis says, in JSON too, and as a rig file.
 
 use super::data::Series;
 use super::equation::PerEquation;
+use crate::Rig;
+use crate::rig::EffectValue;
 use crate::wiring::Wiring;
+use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::{Effect, Fluid};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+mod effects;
+mod json;
+mod residual;
+
+pub use effects::{
+    Calibration, Doubt, DoubtId, FoundEffect, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, Size,
+};
+pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
 /// The answer in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// With the effects named, what is left is sensor noise.
+    /// With the effects named the residual is sensor noise, each of them can be believed, and no leak is impossible.
     Explained,
-    /// The effects named mend much, but more than sensor noise is left.
+    /// The effects named mend much, but more than sensor noise is left, one of them is doubtful, or a leak is impossible.
     PartlyExplained,
-    /// What the declared model leaves over is sensor noise.
+    /// The residual of the declared model is sensor noise.
     NoMissingEffect,
     /// Something is missing, and no known effect fits.
     Unexplained,
@@ -33,10 +38,10 @@ pub enum Verdict {
 /// How well a model fits: on samples it did not see (`rmse`), and as noise (`whiteness_p`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quality {
-    /// Root mean square of what is left, averaged over hats of 0.2 s, on held-out samples, m³/s and N; none
+    /// Root mean square of the residual, averaged over test functions of 0.2 s, on held-out samples, m³/s and N; none
     /// where the traces lack the equation.
     pub rmse: PerEquation<Option<f64>>,
-    /// Probability that what is left is white noise of the declared size (portmanteau test).
+    /// Probability that the residual is white noise of the declared size (portmanteau test).
     pub whiteness_p: PerEquation<Option<f64>>,
 }
 
@@ -47,13 +52,13 @@ pub struct ModelFit {
     pub quality: Quality,
     /// Leaks and bulk modulus.
     pub leaks: LeakEstimates,
-    /// Size of what is left as a multiple of the sensors' noise.
+    /// Size of the residual as a multiple of the sensors' noise.
     pub noise_ratio: PerEquation<f64>,
-    /// What is left of the fitted samples, whitened and tested; none where the traces lack the equation.
+    /// The residual of the fitted samples, whitened and tested; none where the traces lack the equation.
     pub residuals: PerEquation<Option<EquationResidual>>,
-    /// What is left of held-out samples against each variable.
+    /// The residual of held-out samples against each variable.
     pub binned_residuals: Vec<BinnedResidual>,
-    /// The same over time: s, and m³/s or N, averaged over hats of 0.2 s.
+    /// The same over time: s, and m³/s or N, averaged over test functions of 0.2 s.
     pub residual_over_time: PerEquation<Vec<(f64, f64)>>,
 }
 
@@ -99,4 +104,30 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// Leaks while the piston stands, against those found in motion; none without such holds.
     pub holds: Option<Holds>,
+}
+
+impl Diagnosis {
+    /// The rig file with the effects in it, so that replay and simulation use them. The bulk modulus is that of
+    /// the fit too: volumes and hoses are measured only as V/β.
+    pub fn rig(&self, rig: &Rig) -> Rig {
+        let mut with = rig.clone();
+        if !self.effects.is_empty() {
+            let bulk = &self.after.leaks.bulk_modulus;
+            let relative = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+            let std = bulk.std.min(relative * bulk.value);
+            with.fluid = Fluid { bulk_modulus_pa: bulk.value, bulk_modulus_std_pa: std };
+        }
+        let sizes = self.calibration.iter().map(|c| (c.id, c.value, c.std, None));
+        let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.constants))));
+        for (id, value, std, found) in sizes {
+            let Ok(effect) = id.parse::<Effect>() else { continue };
+            let mut constants = EffectConstants::default();
+            for own in effect.constants() {
+                let value = found.and_then(|found| found.get(own.spec().id));
+                constants = value.map_or(constants, |value| constants.with(*own, *value));
+            }
+            with.effects.insert(effect, EffectValue { value, std: Some(std), constants });
+        }
+        with
+    }
 }

@@ -3,7 +3,7 @@
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE};
-use crate::diagnose::weak_form::{Nameless, Term};
+use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::effects::EffectConstants;
 
 /// Places of the terms that could be named.
@@ -22,19 +22,19 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
     statistics::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
 }
 
-/// The product of signals without a name that would bring most to a model, and by how much the sum of squares would fall.
-pub(crate) fn strongest_nameless(fit: &Fit<'_>, model: &Solution) -> Option<(Nameless, f64)> {
+/// The product of signals that the table does not list and that would bring most to a model, and by how much the sum of squares would fall.
+pub(crate) fn strongest_unlisted(fit: &Fit<'_>, model: &Solution) -> Option<(Unlisted, f64)> {
     let terms = fit.problem.terms.iter().enumerate();
     let scored = terms.filter_map(|(place, term)| {
-        let Term::Nameless(product) = term else { return None };
+        let Term::Unlisted(product) = term else { return None };
         Some((*product, fit.score(model, place)?.chi2_drop))
     });
     scored.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// By how much it would fall.
-pub(super) fn nameless_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
-    strongest_nameless(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
+pub(super) fn unlisted_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
+    strongest_unlisted(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
 /// A whitened column of a term with constants that are not its present ones.

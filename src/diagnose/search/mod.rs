@@ -1,20 +1,14 @@
 //! Which effects are missing.
 
 mod candidates;
-mod collinearity;
-mod constants;
 mod exchange;
-mod interaction;
-mod select;
 mod selection;
-mod split;
 mod trials;
 
-pub(crate) use candidates::{critical_sigma, open, strongest_nameless};
-pub use collinearity::{Candidate, Collinearity};
-pub(crate) use constants::std_of_constants;
-pub(crate) use interaction::interactions;
-pub(crate) use selection::{Selected, Selection, loss};
+pub(crate) use candidates::{critical_sigma, open, strongest_unlisted};
+pub(crate) use selection::{Selected, Selection, interactions, loss};
+pub(crate) use trials::std_of_constants;
+pub use trials::{Candidate, Collinearity};
 
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::{Fit, Progress};
@@ -29,7 +23,7 @@ pub(crate) fn search<'a>(
     let mut last = error(&declared);
     let mut all = Selection::none(declared);
     for _ in 0..MOST_STEPS {
-        if !all.add_next(progress) && !split::split_one(&mut all, progress) {
+        if !all.add_next(progress) && !exchange::split_one(&mut all, progress) {
             break;
         }
         all.refine_friction(progress);

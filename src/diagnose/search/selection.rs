@@ -1,11 +1,15 @@
-//! The effects named so far, and how one takes its place in the fit.
+//! The effects named so far: forward selection by the score test, with backward elimination, each step confirmed on data that it did
+//! not fit; and whether two effects that were found act on each other.
 
-use super::candidates::Candidates;
-use super::constants;
-use super::trials::Trial;
-use crate::diagnose::fit::{Fit, Progress};
-use crate::diagnose::thresholds::{CONFUSABLE_CHI2, LEAST_CLIMB};
-use crate::diagnose::weak_form::Nameless;
+use super::candidates::{Candidates, critical_sigma, strongest_unlisted, unlisted_chi2_drop};
+use super::trials::{self, Trial};
+use crate::diagnose::fit::{Fit, Progress, Solution};
+use crate::diagnose::outcome::Interaction;
+use crate::diagnose::statistics;
+use crate::diagnose::thresholds::{
+    AGREED_SIGMA, CONFUSABLE_CHI2, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE, MOST_EFFECTS,
+};
+use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Effect;
 
 /// One effect of the answer, by its place among the problem's terms.
@@ -17,10 +21,12 @@ pub(crate) struct Selected {
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
-    /// A product of signals without a name that fits nearly as well in its place.
-    pub(crate) like_nameless: Option<Nameless>,
-    /// A product of signals without a name would have fitted better.
-    pub(crate) beaten_by_nameless: bool,
+    /// Probability of it among all that could stand in its place.
+    pub(crate) probability: f64,
+    /// A product of signals that the table does not list and that fits nearly as well in its place.
+    pub(crate) unlisted_rival: Option<Unlisted>,
+    /// A product of signals that the table does not list would have fitted better.
+    pub(crate) is_below_unlisted: bool,
 }
 
 #[cfg(test)]
@@ -32,8 +38,9 @@ impl Selected {
             p_value: 1.0,
             mended_percent: None,
             confusable_with: vec![],
-            like_nameless: None,
-            beaten_by_nameless: false,
+            probability: 0.0,
+            unlisted_rival: None,
+            is_below_unlisted: false,
         }
     }
 }
@@ -81,17 +88,155 @@ pub(super) fn with<'a>(fit: &Fit<'a>, old: &[usize], trial: &Trial, progress: Pr
 /// The fit with an effect's constants fitted again, now that what it leaves is no longer in the way; none where they stay. The usual
 /// ones are kept unless the traces speak against them.
 fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>) -> Option<Fit<'a>> {
-    if !constants::are_fitted(fit, term) {
+    if !trials::are_fitted(fit, term) {
         return None;
     }
     let vacated = fit.vacated(term);
     let mut candidates = Candidates::of(&vacated);
     let present = vacated.score(&vacated.free, term).map_or(0.0, |own| own.chi2_drop);
-    let starts = constants::first_scores(&mut candidates, &vacated.free, term);
+    let starts = trials::first_scores(&mut candidates, &vacated.free, term);
     let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop))?;
-    let (best, found) = constants::best_score(&mut candidates, &vacated.free, first);
+    let (best, found) = trials::best_score(&mut candidates, &vacated.free, first);
     let is_usual = fit.constants(term) == fit.problem.usual(term);
     let needed = if is_usual { CONFUSABLE_CHI2 } else { LEAST_CLIMB };
     let is_better = best.chi2_drop > present + needed * vacated.dispersion(fit.free.chi2);
     is_better.then(|| vacated.with(term, found, progress))
+}
+
+impl Selection<'_> {
+    /// Adds the next effect; false when nothing further is significant.
+    pub(super) fn add_next(&mut self, progress: Progress<'_>) -> bool {
+        self.add_best(|_, _| true, progress)
+    }
+
+    /// The same among some terms alone.
+    pub(super) fn add_best(
+        &mut self,
+        is_wanted: impl Fn(&Fit<'_>, usize) -> bool,
+        progress: Progress<'_>,
+    ) -> bool {
+        let fit = &self.fit;
+        let is_added =
+            |i: &&usize| fit.problem.priors[**i].is_none() && fit.problem.terms[**i].effect().is_some();
+        if fit.active().iter().filter(is_added).count() >= MOST_EFFECTS {
+            return false;
+        }
+        let trials = Candidates::of(fit).trials(&fit.free);
+        let is_next = |trial: &Trial| is_wanted(fit, trial.score.term) && deserves_a_name(fit, trial);
+        let Some(trial) = trials.into_iter().find(is_next) else { return false };
+        let chi2_drop = trial.score.chi2_drop;
+        let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
+        self.effects.push(Selected {
+            term: trial.score.term,
+            p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
+            mended_percent: None,
+            confusable_with: vec![],
+            probability: 0.0,
+            unlisted_rival: None,
+            is_below_unlisted: unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
+        });
+        self.fit = with(fit, &[], &trial, progress);
+        true
+    }
+
+    /// Drops effects that those added later have made needless.
+    pub(super) fn drop_needless(&mut self, progress: Progress<'_>) {
+        while let Some(at) = self.first_needless() {
+            self.drop_at(at, progress);
+        }
+    }
+
+    fn first_needless(&self) -> Option<usize> {
+        let fit = &self.fit;
+        let dispersion = fit.dispersion(fit.free.chi2);
+        let is_needless = |one: &Selected| {
+            let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
+            loss(fit, &[one.term]) / dispersion < needed
+        };
+        self.effects.iter().position(is_needless)
+    }
+
+    /// Drops effects that the pieces of the data do not agree upon: where the model stays incomplete, a good score
+    /// alone may be the work of something else.
+    pub(super) fn drop_doubtful(&mut self, progress: Progress<'_>) {
+        while self.fit.is_incomplete() {
+            let ratio =
+                |one: &Selected| self.fit.estimate(one.term).map_or(0.0, |own| own.value.abs() / own.std);
+            let ratios = self.effects.iter().map(ratio).enumerate();
+            let weakest = ratios.min_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((at, _)) = weakest.filter(|(_, ratio)| *ratio < AGREED_SIGMA) else { return };
+            self.drop_at(at, progress);
+        }
+    }
+
+    /// Names for each effect those candidates that would explain the data nearly as well in its place, and
+    /// orders the effects by what the fit loses without them.
+    pub(super) fn find_confusable(&mut self) {
+        let fit = &self.fit;
+        let dispersion = fit.dispersion(fit.free.chi2);
+        let mut candidates = Candidates::of(fit);
+        for one in &mut self.effects {
+            let without = fit.solve_without(&[one.term]);
+            let lost = without.chi2 - fit.free.chi2;
+            let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
+            let trials = candidates.trials(&without);
+            one.probability = place_probability(fit, one.term, lost / dispersion, &trials, &without);
+            let rivals = trials.into_iter().filter(is_close);
+            let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
+            one.unlisted_rival =
+                strongest_unlisted(fit, &without).filter(is_near).map(|(product, _)| product);
+            one.confusable_with =
+                rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
+        }
+        self.effects.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
+    }
+}
+
+/// The probability of an effect among all that could stand in its place, beside the others: equal prior odds for each candidate and each
+/// unlisted law, and by how much each passes what chance and its fitted constants could bring, twice a log likelihood.
+fn place_probability(
+    fit: &Fit<'_>,
+    term: usize,
+    chi2_drop: f64,
+    trials: &[Trial],
+    without: &Solution,
+) -> f64 {
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let own = chi2_drop - critical_sigma(fit, fit.constants(term)).powi(2);
+    let usual = critical_sigma(fit, fit.problem.usual_constants).powi(2);
+    let others = trials.iter().map(|trial| trial.beyond(dispersion));
+    let unlisted = strongest_unlisted(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
+    let odds_against: f64 = others.chain(unlisted).map(|other| ((other - own) / 2.0).exp()).sum();
+    1.0 / (1.0 + odds_against)
+}
+
+/// Whether a candidate is significant, mends enough, and helps where it was not fitted.
+fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
+    let chi2_drop = trial.score.chi2_drop;
+    let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
+    let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= LEAST_MENDED_SHARE;
+    is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
+}
+
+/// The pairs whose product explains more than chance would.
+pub(crate) fn interactions(fit: &Fit<'_>, selected: &[Selected]) -> Vec<Interaction> {
+    let pairs: Vec<(usize, usize)> = (0..selected.len())
+        .flat_map(|a| (a + 1..selected.len()).map(move |b| (a, b)))
+        .map(|(a, b)| (selected[a].term, selected[b].term))
+        .collect();
+    let needed = statistics::bonferroni_sigma(FALSE_PRODUCT_RATE, pairs.len());
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let test = |(a, b): &(usize, usize)| {
+        let (one, other) = (fit.problem.terms[*a].effect()?, fit.problem.terms[*b].effect()?);
+        // Constants that both have are alike in friction, the only ones that are shared.
+        let of_one = fit.constants(*a);
+        let constants =
+            one.constants().iter().fold(fit.constants(*b), |all, own| all.with(*own, of_one.get(*own)));
+        let chi2_drop = fit.chi2_drop(Term::Product(one, other), constants)?;
+        let sigma = (chi2_drop / dispersion).sqrt();
+        let mended = 100.0 * chi2_drop / fit.free.chi2;
+        let effects = [one.spec().id, other.spec().id];
+        (sigma > needed).then_some(Interaction { effects, sigma, mended_percent: mended })
+    };
+    pairs.iter().filter_map(test).collect()
 }

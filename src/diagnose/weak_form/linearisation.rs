@@ -46,13 +46,13 @@ impl Linearisation {
         }
     }
 
-    /// What is left of the three equations at corrected readings.
+    /// The residual of the three equations at corrected readings.
     pub(crate) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         self.model.residual(at).plus(-1.0, known)
     }
 
-    /// What is left of the equations at readings as the sensors show them: the chambers by the position's own speed,
+    /// The residual of the equations at readings as the sensors show them: the chambers by the position's own speed,
     /// the forces by speed and acceleration of `felt`.
     pub(crate) fn both_residuals(&self, reading: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
         let seen = self.effects.correct(reading);
@@ -109,7 +109,7 @@ impl Linearisation {
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
             }
-            Term::Nameless(_) | Term::Product(..) => 0.0,
+            Term::Unlisted(_) | Term::Product(..) => 0.0,
         }
     }
 
@@ -131,7 +131,7 @@ impl Linearisation {
             Term::ExternalA => leaks.external_a = value,
             Term::ExternalB => leaks.external_b = value,
             Term::Effect(effect) => self.set_effect(effect, value, constants),
-            Term::Nameless(_) | Term::Product(..) => {}
+            Term::Unlisted(_) | Term::Product(..) => {}
         }
     }
 

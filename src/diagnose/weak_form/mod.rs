@@ -1,22 +1,163 @@
-//! The equations integrated against hats at a linearisation, and the known noise of what they leave over.
+//! The equations integrated against test functions at a linearisation, and the known noise of their residual.
 
-mod at_linearisation;
-mod column;
-mod hats;
+mod integrals;
 mod linearisation;
-mod nameless;
-mod noise_model;
+mod noise;
 mod rows;
 mod sensitivity;
 mod shared_noise;
 mod terms;
-mod whitening;
 
-pub(crate) use at_linearisation::{Columns, WeakForm, residual_rows};
 pub(crate) use linearisation::Linearisation;
-pub(crate) use nameless::Nameless;
-pub(crate) use noise_model::NoiseModel;
-pub(crate) use rows::{Entry, Row, Rows};
+pub(crate) use noise::{NoiseModel, Whitening};
+pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
 pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
-pub(crate) use terms::{DECLARED, Term, all_terms};
-pub(crate) use whitening::Whitening;
+pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
+
+use self::integrals::{ActiveTerm, Integrand};
+use self::rows::Steps;
+use self::sensitivity::Sensitivity;
+use self::shared_noise::Slopes;
+use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
+use crate::diagnose::equation::PerEquation;
+use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use pitchleak_core::Sensors;
+use pitchleak_core::effects::EffectConstants;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+
+/// The weak form of traces at a linearisation; never changed.
+pub(crate) struct WeakForm<'a> {
+    traces: &'a [Series],
+    sensors: &'a Sensors<f64>,
+    pub(crate) at: Linearisation,
+    motions: Vec<Motion>,
+    steps: OnceLock<Steps>,
+    pub(crate) rows: Rows,
+    /// Where the noise is taken.
+    noise_at: Linearisation,
+    sensitivities: Vec<PerEquation<Sensitivity>>,
+    pub(crate) whitening: Whitening,
+}
+
+impl<'a> WeakForm<'a> {
+    /// With the noise that the sensors bring at `noise_at`, and `equation_error` as in [`NoiseModel`].
+    pub(crate) fn new(
+        traces: &'a [Series],
+        sensors: &'a Sensors<f64>,
+        (at, noise_at): (Linearisation, Linearisation),
+        columns: Columns<'_>,
+        equation_error: PerEquation<f64>,
+    ) -> Self {
+        let motions = motions(traces, sensors, &at);
+        let rows = Rows::build(traces, &motions, &Integrand::of(&at, columns), BLOCK_S);
+        let mut rows = rows.at_places(columns.places, columns.terms.len());
+        let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
+        add_unresolved(&mut sensitivities, &mut rows, (traces, &motions), (sensors, &noise_at));
+        let (of_rows, of_noise) = (&rows, &sensitivities);
+        let noise =
+            NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
+        let whitening = Whitening::new(&rows, &noise);
+        Self {
+            traces,
+            sensors,
+            at,
+            motions,
+            steps: OnceLock::new(),
+            rows,
+            noise_at,
+            sensitivities,
+            whitening,
+        }
+    }
+
+    /// The noise of these rows, had the equations this error.
+    pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
+        self.noise_with(&self.sensitivities, equation_error)
+    }
+
+    /// The same with other sensitivities.
+    pub(crate) fn noise_with<'b>(
+        &'b self,
+        sensitivities: &'b [PerEquation<Sensitivity>],
+        equation_error: PerEquation<f64>,
+    ) -> NoiseModel<'b> {
+        let Self { noise_at: at, rows, sensors, .. } = self;
+        NoiseModel { at, sensors, equation_error, rows, sensitivities }
+    }
+
+    /// The sensitivities, had the sensors their `declared` noise and a share of what they show beyond it.
+    pub(crate) fn at_share(&self, declared: &Sensors<f64>, share: f64) -> Vec<PerEquation<Sensitivity>> {
+        let times = Channel::ALL.map(|channel| {
+            let variance = |sensors| channel.noise_std(sensors, &self.noise_at.model.cylinder).powi(2);
+            let quiet = variance(declared) / variance(self.sensors);
+            if quiet.is_finite() { (share + (1.0 - share) * quiet).sqrt() } else { 1.0 }
+        });
+        let of_row =
+            |row: &PerEquation<Sensitivity>| PerEquation::from_fn(|equation| row[equation].at_noise(&times));
+        self.sensitivities.iter().map(of_row).collect()
+    }
+
+    /// How the sensors' noise enters each of the rows.
+    pub(crate) fn sensitivities(
+        rows: &Rows,
+        sensors: &Sensors<f64>,
+        at: &Linearisation,
+    ) -> Vec<PerEquation<Sensitivity>> {
+        rows.rows.par_iter().map(|row| Sensitivity::of(at, sensors, row)).collect()
+    }
+
+    /// Realisations of the noise of `sensors` that the columns share with the residual.
+    pub(crate) fn shared_noise(&self, sensors: &Sensors<f64>, columns: Columns<'_>) -> Vec<SharedNoise> {
+        let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
+        let slopes = Slopes::of(&self.rows, &noise, columns);
+        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, &slopes, number)).collect()
+    }
+
+    /// The column of one term, whitened.
+    pub(crate) fn white_column(&self, term: Term, constants: EffectConstants<f64>) -> Vec<f64> {
+        let steps = self.steps.get_or_init(|| Steps::of(self.traces, &self.motions, &self.at, BLOCK_S));
+        let column = steps.column(&ActiveTerm::new(term, constants), &self.at, &self.rows);
+        self.whitening.whiten(&column)
+    }
+}
+
+/// The residual of a model along traces, in test functions over blocks of `block_s`, without any column.
+pub(crate) fn residual_rows(
+    traces: &[Series],
+    sensors: &Sensors<f64>,
+    at: &Linearisation,
+    block_s: f64,
+) -> Rows {
+    Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
+}
+
+/// More noise where a trace moves faster than its samples tell, and where a sensor is somewhere in its play or dead band.
+fn add_unresolved(
+    sensitivities: &mut [PerEquation<Sensitivity>],
+    rows: &mut Rows,
+    (traces, motions): (&[Series], &[Motion]),
+    (sensors, at): (&Sensors<f64>, &Linearisation),
+) {
+    let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
+    for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
+        let samples = row.samples_in(&traces[row.trace()].t_s);
+        let mut times = unresolved[row.trace()].noise_factor(samples.clone());
+        let motion = &motions[row.trace()];
+        let mut has_unseen_force = false;
+        for active in at.effects.iter() {
+            let Some((channel, sides)) = motion.sides_of(active.effect) else { continue };
+            let play = active.value / channel.noise_std(sensors, &at.model.cylinder);
+            let somewhere = sides.noise_factor(samples.clone(), play);
+            let times = &mut times[channel as usize];
+            *times = times.hypot(somewhere);
+            has_unseen_force |= somewhere > 1.0;
+        }
+        *own = PerEquation::from_fn(|equation| own[equation].with_noise_factors(times));
+        row.has_unseen_force = own.force.is_speed_unresolved() || has_unseen_force;
+    }
+}
+
+fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
+    traces.iter().map(|series| Motion::of(series, &at.model, &at.effects, sensors)).collect()
+}

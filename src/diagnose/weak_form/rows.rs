@@ -1,13 +1,14 @@
-//! The weak form: each equation of the cylinder integrated against hat functions.
+//! The weak form: each equation of the cylinder integrated against test functions.
 //!
 //! For blocks of m samples, the difference of two neighbouring block means of any running integral
-//! is that integrand weighted by a hat over both blocks. So ∫ hat·ẋ dt is x̄_{k+1} − x̄_k, the difference
-//! of two averages: no signal is differentiated, and the noise of a row is known exactly (`noise_model.rs`).
+//! is that integrand weighted by a test function over both blocks. So ∫ φ ẋ dt is x̄_{k+1} − x̄_k, the difference
+//! of two averages: no signal is differentiated, and the noise of a row is known exactly (`noise.rs`).
 //! Weak forms for identification: Messenger and Bortz (2021), "Weak SINDy", Multiscale Model. Simul. 19.
 
-use super::hats::{Hats, Integrals, Integrand};
+use super::integrals::{ActiveTerm, Integrals, Integrand, Step, TestFunctions};
+use super::linearisation::Linearisation;
 use crate::diagnose::data::{Motion, Series};
-use crate::diagnose::equation::Equation;
+use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::SLIVER;
 use pitchleak_core::Signals;
 use rayon::prelude::*;
@@ -18,18 +19,18 @@ use std::ops::Range;
 pub(crate) struct Row {
     /// Consecutive rows with the same number share a block.
     pub(crate) stretch: usize,
-    /// Time at the hat's peak, s.
+    /// Time at the test function's peak, s.
     pub(crate) t_s: f64,
     /// Length of a block, s, and its samples.
     pub(crate) block_s: f64,
     pub(crate) samples: usize,
     /// Averages over both blocks.
     pub(crate) mean: Signals<f64>,
-    /// Share of the hat during which the direction of motion is unknown.
-    pub(crate) stuck: f64,
+    /// Share of the test function during which the direction of motion is unknown.
+    pub(crate) unsure_share: f64,
     /// Whether its balance of forces is not seen: the speed jumps between samples, and neither pressures nor load show the impulse that it
     /// takes; or a pressure sensor lies somewhere in a play that is larger than its noise.
-    pub(crate) is_unseen: bool,
+    pub(crate) has_unseen_force: bool,
 }
 
 impl Row {
@@ -45,6 +46,30 @@ impl Row {
     }
 }
 
+/// A variable that a residual may go with.
+pub(crate) struct Variable {
+    pub(crate) name: &'static str,
+    pub(crate) of: fn(&Row) -> f64,
+}
+
+/// P_L, P_A, P_B, x, ẋ, its sign, flows, force, temperature, time.
+pub(crate) const VARIABLES: [Variable; 11] = [
+    Variable { name: "load_pressure_pa", of: |row| row.mean.pa_pa - row.mean.pb_pa },
+    Variable { name: "pa_pa", of: |row| row.mean.pa_pa },
+    Variable { name: "pb_pa", of: |row| row.mean.pb_pa },
+    Variable { name: "x_m", of: |row| row.mean.x_m },
+    Variable { name: "v_mps", of: |row| row.mean.v_mps },
+    Variable { name: "direction", of: |row| row.mean.v_mps.signum() },
+    Variable { name: "qa_m3s", of: |row| row.mean.qa_m3s },
+    Variable { name: "qb_m3s", of: |row| row.mean.qb_m3s },
+    Variable { name: "force_n", of: |row| row.mean.force_n },
+    Variable { name: "temp_k", of: |row| row.mean.temp_k },
+    Variable { name: "t_s", of: |row| row.t_s },
+];
+
+/// How many residuals are held against a variable each. Derived.
+pub(crate) const RESIDUAL_TESTS: usize = Equation::ALL.len() * VARIABLES.len();
+
 /// One equation of one row: an entry of the regression.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
@@ -56,7 +81,7 @@ pub(crate) struct Entry {
 pub(crate) struct Rows {
     pub(crate) rows: Vec<Row>,
     pub(crate) entries: Vec<Entry>,
-    /// What the model leaves over at the linearisation.
+    /// The residual at the linearisation.
     pub(crate) y: Vec<f64>,
     /// One column per term; empty where it was not asked for.
     pub(crate) columns: Vec<Vec<f64>>,
@@ -68,7 +93,7 @@ const MOST_STRETCHES: usize = 1 << 32;
 /// few enough for all cores to have work.
 const PART_BLOCKS: usize = 512;
 
-/// Some samples of a stretch, of which all blocks but the first end a hat.
+/// Some samples of a stretch, of which all blocks but the first end a test function.
 pub(super) struct Part {
     pub(super) trace: usize,
     stretch: usize,
@@ -134,30 +159,30 @@ impl Rows {
     }
 
     fn add_part(&mut self, series: &Series, motion: &Motion, part: &Part, integrand: &Integrand<'_>) {
-        let mut hats = Hats::new(integrand.width());
+        let mut functions = TestFunctions::new(integrand.width());
         let mut step = Integrals::zero(integrand.width());
         let (samples, range) = (part.samples_per_block, part.samples.clone());
         let mut in_block = 0;
         for at in range.clone() {
             if at > range.start {
                 integrand.step(series, motion, at, &mut step);
-                hats.add_step(&step);
+                functions.add_step(&step);
             }
-            hats.end_sample();
+            functions.end_sample();
             in_block += 1;
             if in_block < samples {
                 continue;
             }
             in_block = 0;
-            if let Some(hat) = hats.end_block(samples) {
-                self.add_row(part.stretch, series.t_s[at + 1 - samples], samples, &hat);
+            if let Some(weighted) = functions.end_block(samples) {
+                self.add_row(part.stretch, series.t_s[at + 1 - samples], samples, &weighted);
             }
         }
     }
 
-    fn add_row(&mut self, stretch: usize, t_s: f64, samples: usize, hat: &Integrals) {
-        let block_s = hat.time_s;
-        let mean = hat.signals.zip(Signals::default(), |sum, _| sum / block_s);
+    fn add_row(&mut self, stretch: usize, t_s: f64, samples: usize, weighted: &Integrals) {
+        let block_s = weighted.time_s;
+        let mean = weighted.signals.zip(Signals::default(), |sum, _| sum / block_s);
         let row = self.rows.len();
         self.rows.push(Row {
             stretch,
@@ -165,23 +190,23 @@ impl Rows {
             block_s,
             samples,
             mean,
-            stuck: hat.unsure_s / block_s,
-            is_unseen: false,
+            unsure_share: weighted.unsure_s / block_s,
+            has_unseen_force: false,
         });
         for equation in Equation::ALL {
-            if hat.missing_s[equation] > SLIVER * block_s {
+            if weighted.missing_s[equation] > SLIVER * block_s {
                 continue;
             }
             self.entries.push(Entry { row, equation });
-            self.y.push(hat.residual[equation]);
-            for (column, integral) in self.columns.iter_mut().zip(&hat.columns) {
+            self.y.push(weighted.residual[equation]);
+            for (column, integral) in self.columns.iter_mut().zip(&weighted.columns) {
                 column.push(integral[equation]);
             }
         }
     }
 
-    /// What the machine does at `row`, read from the second hat after it: that shares no sample with it, so
-    /// that the noise of what is left at `row` does not show in what it is held against.
+    /// What the machine does at `row`, read from the second test function after it: that shares no sample with it, so
+    /// that the noise of the residual at `row` does not show in what it is held against.
     pub(crate) fn beside(&self, row: usize) -> Option<&Row> {
         let (own, later) = (self.rows.get(row)?, self.rows.get(row + 2)?);
         (own.stretch == later.stretch).then_some(later)
@@ -190,7 +215,56 @@ impl Rows {
     /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where its forces are unseen.
     pub(crate) fn counts(&self, entry: &Entry) -> bool {
         let row = &self.rows[entry.row];
-        entry.equation != Equation::Force || row.stuck <= SLIVER && !row.is_unseen
+        entry.equation != Equation::Force || row.unsure_share <= SLIVER && !row.has_unseen_force
+    }
+}
+
+/// The corrected signals of all traces, in the order of their rows.
+pub(super) struct Steps(Vec<StepsOfPart>);
+
+struct StepsOfPart {
+    /// From its first sample to its last.
+    steps: Vec<Step>,
+    samples_per_block: usize,
+}
+
+impl Steps {
+    pub(super) fn of(traces: &[Series], motions: &[Motion], at: &Linearisation, block_s: f64) -> Self {
+        let parts = parts(traces, block_s);
+        let steps = parts.par_iter().map(|part| {
+            let (series, motion) = (&traces[part.trace], &motions[part.trace]);
+            let steps =
+                part.samples.clone().skip(1).map(|number| Step::ending_at(number, series, motion, at).0);
+            StepsOfPart { steps: steps.collect(), samples_per_block: part.samples_per_block }
+        });
+        Self(steps.collect())
+    }
+
+    /// The column of one term in `rows`.
+    pub(super) fn column(&self, term: &ActiveTerm, at: &Linearisation, rows: &Rows) -> Vec<f64> {
+        let functions: Vec<PerEquation<f64>> =
+            self.0.par_iter().flat_map_iter(|part| part.functions(term, at)).collect();
+        rows.entries.iter().map(|entry| functions[entry.row][entry.equation]).collect()
+    }
+}
+
+impl StepsOfPart {
+    /// The term's integrals weighted by test functions, as in [`super::integrals`].
+    fn functions(&self, term: &ActiveTerm, at: &Linearisation) -> Vec<PerEquation<f64>> {
+        let none = PerEquation::<f64>::default();
+        let (mut integral, mut block, mut before) = (none, none, None);
+        let mut functions = Vec::with_capacity(self.steps.len() / self.samples_per_block);
+        let steps = std::iter::once(none).chain(self.steps.iter().map(|step| step.column(term, at)));
+        for (number, step) in (1..).zip(steps) {
+            integral = integral.zip(step, |sum, more| sum + more);
+            block = block.zip(integral, |sum, more| sum + more);
+            if number % self.samples_per_block == 0 {
+                let mean = std::mem::take(&mut block).map(|sum| sum / self.samples_per_block as f64);
+                functions.extend(before.map(|before| mean.zip(before, |now, before| now - before)));
+                before = Some(mean);
+            }
+        }
+        functions
     }
 }
 

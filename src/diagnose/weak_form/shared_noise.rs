@@ -1,10 +1,9 @@
-//! What columns share with what the model leaves over, drawn again and again: noise of the same sensors.
+//! What columns share with the residual, drawn again and again: noise of the same sensors.
 
-use super::at_linearisation::Columns;
-use super::noise_model::{HatWeights, NoiseModel, hat_weights};
+use super::noise::{NoiseModel, TestFunctionWeights, test_function_weights};
 use super::rows::{Entry, Row, Rows};
-use super::sensitivity::Channel;
-use super::terms::Term;
+use super::terms::{Columns, Term};
+use crate::diagnose::data::Channel;
 use crate::diagnose::equation::PerEquation;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
@@ -38,29 +37,29 @@ impl Rademacher {
     }
 }
 
-/// Noise of one sensor in each row: through hats (0), and through differences of block means (1).
+/// Noise of one sensor in each row: through test functions (0), and through differences of block means (1).
 type InRows = [Vec<f64>; 2];
 
-/// Unit white noise seen by each row. A hat's noise is that of its two blocks, which it shares with its
+/// Unit white noise seen by each row. A test function's noise is that of its two blocks, which it shares with its
 /// neighbours, and its own, in the shares that give the known covariances.
 fn draw(rows: &[Row], signs: &mut Rademacher) -> InRows {
-    let (mut difference, mut hat) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
+    let (mut difference, mut weighted) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
     let mut last = (usize::MAX, 0.0);
-    let mut known = (0, HatWeights::default());
+    let mut known = (0, TestFunctionWeights::default());
     for row in rows {
         let left = if last.0 == row.stretch { last.1 } else { signs.next() };
         let right = signs.next();
         last = (row.stretch, right);
         if known.0 != row.samples {
-            known = (row.samples, hat_weights(row.samples));
+            known = (row.samples, test_function_weights(row.samples));
         }
         let (own, next) = (known.1.own[0][0], known.1.next[0][0]);
         let step_s = row.block_s / row.samples as f64;
         difference.push((right - left) / (row.samples as f64).sqrt());
         let shared = next.max(0.0).sqrt() * (left + right);
-        hat.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
+        weighted.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
     }
-    [hat, difference]
+    [weighted, difference]
 }
 
 impl SharedNoise {
@@ -68,21 +67,21 @@ impl SharedNoise {
     pub(crate) fn draw(rows: &Rows, noise: &NoiseModel<'_>, slopes: &Slopes, number: u64) -> Self {
         let mut signs = Rademacher(number);
         let of_channel = |channel: Channel| {
-            let std = channel.noise_std(noise.sensors, noise.at);
+            let std = channel.noise_std(noise.sensors, &noise.at.model.cylinder);
             draw(&rows.rows, &mut signs).map(|drawn| drawn.into_iter().map(|v| std * v).collect())
         };
         let drawn: [InRows; Channel::ALL.len()] = Channel::ALL.map(of_channel);
         let in_row = |entry: &Entry| {
             let sensitivity = &noise.sensitivities[entry.row][entry.equation];
-            let of_one = |((gains, loudness), drawn): ((&[f64; 3], &f64), &InRows)| {
-                loudness * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
+            let of_one = |((gains, noise_factor), drawn): ((&[f64; 3], &f64), &InRows)| {
+                noise_factor * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
             };
-            sensitivity.gains.iter().zip(&sensitivity.loudness).zip(&drawn).map(of_one).sum()
+            sensitivity.gains.iter().zip(&sensitivity.noise_factor).zip(&drawn).map(of_one).sum()
         };
-        let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, by_row }| {
+        let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, signals, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];
             let in_column = |entry: &Entry| {
-                let signals = term.noisy_in().iter().zip(&by_row[entry.row]);
+                let signals = signals.iter().zip(&by_row[entry.row]);
                 let of_one = |((channel, order), slope): (&(Channel, usize), &PerEquation<f64>)| {
                     slope[entry.equation] * noise_of(*channel, *order)[entry.row]
                 };
@@ -101,19 +100,21 @@ pub(crate) struct Slopes(Vec<SlopesOfTerm>);
 struct SlopesOfTerm {
     place: usize,
     term: Term,
-    /// By row, in the order of [`Term::noisy_in`].
+    /// As in [`Term::noisy_in`].
+    signals: Vec<(Channel, usize)>,
+    /// By row, in their order.
     by_row: Vec<Vec<PerEquation<f64>>>,
 }
 
 impl Slopes {
     pub(crate) fn of(rows: &Rows, noise: &NoiseModel<'_>, columns: Columns<'_>) -> Self {
-        let carrying = columns.places.iter().filter(|place| !columns.terms[**place].noisy_in().is_empty());
         let of_term = |place: &usize| {
             let (term, constants) = (columns.terms[*place], &columns.constants[*place]);
-            SlopesOfTerm { place: *place, term, by_row: slopes(rows, noise, term, constants) }
+            let signals = term.noisy_in();
+            let by_row = slopes(rows, noise, (term, &signals), constants);
+            (!signals.is_empty()).then_some(SlopesOfTerm { place: *place, term, signals, by_row })
         };
-        let carrying: Vec<&usize> = carrying.collect();
-        Self(carrying.into_par_iter().map(of_term).collect())
+        Self(columns.places.par_iter().filter_map(of_term).collect())
     }
 }
 
@@ -121,14 +122,17 @@ impl Slopes {
 fn slopes(
     rows: &Rows,
     noise: &NoiseModel<'_>,
-    term: Term,
+    (term, signals): (Term, &[(Channel, usize)]),
     constants: &EffectConstants<f64>,
 ) -> Vec<Vec<PerEquation<f64>>> {
+    if signals.is_empty() {
+        return vec![];
+    }
     let term = (term, term.in_force());
     let of_row = |row: &Row| {
         let seen = noise.at.effects.correct(&row.mean);
         let slope = |(channel, order): &(Channel, usize)| {
-            let std = channel.noise_std(noise.sensors, noise.at);
+            let std = channel.noise_std(noise.sensors, &noise.at.model.cylinder);
             channel.slope(*order, &seen, (std, row.block_s), |at| {
                 let mut unit = noise.at.both_unit_terms(term, constants, at, at);
                 // Forces feel another speed than the position's.
@@ -140,7 +144,7 @@ fn slopes(
                 unit
             })
         };
-        term.0.noisy_in().iter().map(slope).collect()
+        signals.iter().map(slope).collect()
     };
     rows.rows.iter().map(of_row).collect()
 }

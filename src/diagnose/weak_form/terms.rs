@@ -1,9 +1,8 @@
-//! The unknowns of the fit: the declared model's own four constants, every effect of the core's
-//! table, and a few products of signals without a name that only serve to say "something else is there".
+//! The unknowns of the fit: the declared model's own four constants, every effect of the core's table, and a few products of signals
+//! that the table does not list, which only serve to say "something else is there", or "that would do as well".
 
-use super::nameless::Nameless;
-use super::sensitivity::Channel;
-use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
+use crate::diagnose::data::Channel;
+use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Model, Signals, Terms};
 
 /// One column of the regression.
@@ -20,9 +19,19 @@ pub(crate) enum Term {
     /// A candidate of the core's table.
     Effect(Effect),
     /// A product of signals that no known effect makes.
-    Nameless(Nameless),
+    Unlisted(Unlisted),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
+}
+
+/// Which columns are built.
+#[derive(Clone, Copy)]
+pub(crate) struct Columns<'a> {
+    pub(crate) terms: &'a [Term],
+    /// Of each term.
+    pub(crate) constants: &'a [EffectConstants<f64>],
+    /// Places of the terms that get a column; those of the others stay empty.
+    pub(crate) places: &'a [usize],
 }
 
 /// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
@@ -53,13 +62,27 @@ const PROBE: Signals<f64> = Signals {
     t_s: 10.0,
 };
 
+/// Oil that is stored goes with the pressures' rates.
+const STORAGE: [(Channel, usize); 2] = [(Channel::PressureA, 1), (Channel::PressureB, 1)];
+/// Forces feel speed and acceleration.
+const FELT: [(Channel, usize); 2] = [(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
+
+/// The channel that measures a left side of the chambers' equations.
+fn left_side(side: LeftSide) -> (Channel, usize) {
+    match side {
+        LeftSide::Speed => (Channel::Position, 1),
+        LeftSide::FlowA => (Channel::FlowA, 0),
+        LeftSide::FlowB => (Channel::FlowB, 0),
+    }
+}
+
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
 
-/// Every column: the declared model's, the candidates', the nameless ones.
+/// Every column: the declared model's, the candidates', the unlisted ones.
 pub(crate) fn all_terms() -> Vec<Term> {
     let known = Effect::ALL.iter().copied().map(Term::Effect);
-    DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
+    DECLARED.into_iter().chain(known).chain(Unlisted::ALL.map(Term::Unlisted)).collect()
 }
 
 impl Term {
@@ -81,7 +104,7 @@ impl Term {
             Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
             Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
             Self::Effect(effect) => effect.unit_term(at, model, constants),
-            Self::Nameless(product) => product.unit_term(at, model),
+            Self::Unlisted(product) => product.unit_term(at, model),
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
@@ -94,14 +117,14 @@ impl Term {
             Self::Effect(effect) if effect.spec().kind == EffectKind::Sensor => {
                 Some(effect.read(value, truth))
             }
-            Self::Nameless(product) => product.read(value, truth),
+            Self::Unlisted(product) => product.read(value, truth),
             _ => None,
         }
     }
 
     /// A size that shows clearly.
     pub(super) fn usual_size(self) -> f64 {
-        self.effect().map_or(Nameless::USUAL_BEND, |effect| effect.spec().default_size)
+        self.effect().map_or(Unlisted::USUAL_BEND, |effect| effect.spec().default_size)
     }
 
     /// Whether it is a leak.
@@ -109,7 +132,7 @@ impl Term {
         match self {
             Self::Internal | Self::ExternalA | Self::ExternalB => true,
             Self::Effect(effect) => effect.spec().kind.is_leak(),
-            Self::InverseBulk | Self::Nameless(_) | Self::Product(..) => false,
+            Self::InverseBulk | Self::Unlisted(_) | Self::Product(..) => false,
         }
     }
 
@@ -122,48 +145,54 @@ impl Term {
                 let at = Signals { a_mps2: if is_sensor { 0.0 } else { PROBE.a_mps2 }, ..PROBE };
                 effect.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n != 0.0
             }
-            Self::Nameless(product) => product.in_force(),
+            Self::Unlisted(product) => product.in_force(),
             Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
             _ => false,
         }
     }
 
-    /// The signals whose noise the column carries beside what the model leaves over: the channel, and whether its value (0) or
+    /// The signals whose noise the column shares with the residual: the channel, and whether its value (0) or
     /// its rate (1). The others' columns are quiet against what they vary.
-    pub(crate) fn noisy_in(self) -> &'static [(Channel, usize)] {
-        const SPEED: &[(Channel, usize)] = &[(Channel::Position, 1)];
-        const STORAGE: &[(Channel, usize)] = &[(Channel::PressureA, 1), (Channel::PressureB, 1)];
-        const FLOWS: &[(Channel, usize)] = &[(Channel::FlowA, 0), (Channel::FlowB, 0)];
-        const FORCE: &[(Channel, usize)] = &[(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
-        let effect = match self {
-            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => return STORAGE,
-            Self::Nameless(Nameless::DirectionLeak) => return SPEED,
-            Self::Nameless(Nameless::BentPressureA) => {
-                return &[(Channel::PressureA, 0), (Channel::PressureA, 1)];
+    pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {
+        match self {
+            Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => STORAGE.to_vec(),
+            Self::Unlisted(Unlisted::DirectionLeak) => vec![left_side(LeftSide::Speed)],
+            Self::Unlisted(Unlisted::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
+            Self::Unlisted(Unlisted::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
+            Self::Effect(effect) => {
+                let EffectSpec { carries, shares_noise_of, kind, .. } = effect.spec();
+                match *kind {
+                    _ if carries.is_some() || !shares_noise_of.is_empty() => {
+                        carries.iter().chain(*shares_noise_of).copied().map(left_side).collect()
+                    }
+                    EffectKind::Sensor => vec![],
+                    _ if self.in_force() => FELT.to_vec(),
+                    EffectKind::Storage => STORAGE.to_vec(),
+                    _ => vec![],
+                }
             }
-            Self::Nameless(Nameless::BentPressureB) => {
-                return &[(Channel::PressureB, 0), (Channel::PressureB, 1)];
-            }
-            // The direction turns with what both meters read.
-            Self::Effect(Effect::InternalLeakDirection) => return FLOWS,
-            Self::Effect(effect) => effect,
-            _ => return &[],
-        };
-        match (effect.spec().carries, effect.spec().kind) {
-            (Some(LeftSide::Speed), _) => SPEED,
-            (Some(LeftSide::FlowA), _) => &[(Channel::FlowA, 0)],
-            (Some(LeftSide::FlowB), _) => &[(Channel::FlowB, 0)],
-            (None, kind) if kind != EffectKind::Sensor && self.in_force() => FORCE,
-            (None, EffectKind::Storage) => STORAGE,
-            _ => &[],
+            _ => vec![],
         }
+    }
+
+    /// Whether it is a force that never changes.
+    pub(crate) fn is_constant_force(self) -> bool {
+        let Self::Effect(effect) = self else { return false };
+        let at = |signals| effect.unit_term(&signals, &Model::paper(), &EffectConstants::default()).force_n;
+        let (probe, zero) = (at(PROBE), at(Signals::default()));
+        effect.spec().kind == EffectKind::Force && probe.to_bits() == zero.to_bits()
+    }
+
+    /// Whether it is a friction that can hold a piston which stands.
+    pub(crate) fn is_dry_friction(self) -> bool {
+        self.effect().is_some_and(|effect| effect.stiction(&PROBE).is_some())
     }
 
     /// Whether the column is in proportion to what the equations have on their left side, Q or A ẋ.
     pub(crate) fn is_left_side(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().carries.is_some(),
-            Self::Nameless(product) => product == Nameless::DirectionLeak,
+            Self::Unlisted(product) => product == Unlisted::DirectionLeak,
             _ => false,
         }
     }
@@ -179,5 +208,120 @@ impl Term {
             Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
+    }
+}
+
+/// Products of signals that stand for effects nobody listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unlisted {
+    /// Leak past the piston in proportion to |ẋ| P_L.
+    SpeedLeak,
+    /// Leak past the piston in proportion to ẋ P_L.
+    DirectionLeak,
+    /// Leak past the piston in proportion to P_L √|P_L|.
+    SteepLeak,
+    /// Leak past the piston in proportion to P_L |P_L|.
+    SquareLeak,
+    /// Leak past the piston in proportion to the spool's opening |ẋ|/√P times P_L.
+    SpoolLeak,
+    /// Flow of meter A in proportion to |Q_A|.
+    BentMeterA,
+    /// Flow of meter B in proportion to |Q_B|.
+    BentMeterB,
+    /// Reading of pressure sensor A in proportion to P_A².
+    BentPressureA,
+    /// Reading of pressure sensor B in proportion to P_B².
+    BentPressureB,
+    /// Force in proportion to ẋ |ẋ|.
+    SquareFriction,
+    /// Storage in proportion to the pressure: V P Ṗ.
+    StiffeningOil,
+}
+
+impl Unlisted {
+    pub(crate) const ALL: [Self; 11] = [
+        Self::SpeedLeak,
+        Self::DirectionLeak,
+        Self::SteepLeak,
+        Self::SquareLeak,
+        Self::SpoolLeak,
+        Self::BentMeterA,
+        Self::BentMeterB,
+        Self::BentPressureA,
+        Self::BentPressureB,
+        Self::SquareFriction,
+        Self::StiffeningOil,
+    ];
+
+    /// A bend of a pressure's scale that shows clearly, per Pa: 1 % at 10 bar.
+    pub(super) const USUAL_BEND: f64 = 1e-8;
+
+    /// For people.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::SpeedLeak => "a leak past the piston that grows with speed times load pressure",
+            Self::DirectionLeak => "a leak past the piston that turns with speed times load pressure",
+            Self::SteepLeak => "a leak past the piston that grows with the power 1.5 of the load pressure",
+            Self::SquareLeak => "a leak past the piston that grows with the square of the load pressure",
+            Self::SpoolLeak => "a leak past the piston that follows the valve's opening",
+            Self::BentMeterA => "a meter A whose scale differs between both ways",
+            Self::BentMeterB => "a meter B whose scale differs between both ways",
+            Self::BentPressureA => "a pressure sensor A whose scale bends",
+            Self::BentPressureB => "a pressure sensor B whose scale bends",
+            Self::SquareFriction => "a friction that grows with the square of the speed",
+            Self::StiffeningOil => "an oil that stiffens as the pressure rises",
+        }
+    }
+
+    pub(super) fn unit_term(self, at: &Signals<f64>, model: &Model<f64>) -> Terms<f64> {
+        let load = at.pa_pa - at.pb_pa;
+        let past = |flow: f64| Terms { chamber_a_m3s: flow, chamber_b_m3s: -flow, force_n: 0.0 };
+        match self {
+            Self::SpeedLeak => past(at.v_mps.abs() * load),
+            Self::DirectionLeak => past(at.v_mps * load),
+            Self::SteepLeak => past(load * load.abs().sqrt()),
+            Self::SquareLeak => past(load * load.abs()),
+            Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
+            Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
+            Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
+            Self::BentPressureA | Self::BentPressureB => {
+                model.misread(Self::USUAL_BEND, |value| self.read(value, at).unwrap_or(*at))
+            }
+            Self::SquareFriction => Terms { force_n: at.v_mps * at.v_mps.abs(), ..Terms::default() },
+            Self::StiffeningOil => Terms {
+                chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.pa_pa * at.dpa_pas,
+                chamber_b_m3s: model.cylinder.volume_b_m3(at.x_m) * at.pb_pa * at.dpb_pas,
+                force_n: 0.0,
+            },
+        }
+    }
+
+    /// What the sensors show of the truth; none where no sensor is at fault.
+    pub(super) fn read(self, value: f64, truth: &Signals<f64>) -> Option<Signals<f64>> {
+        let Signals { pa_pa, dpa_pas, d2pa_pas2, pb_pa, dpb_pas, d2pb_pas2, .. } = *truth;
+        // P + c P² and its derivatives.
+        let bent = |p: f64, dp: f64, d2p: f64| {
+            (
+                p + value * p * p,
+                dp * (1.0 + 2.0 * value * p),
+                d2p * (1.0 + 2.0 * value * p) + 2.0 * value * dp * dp,
+            )
+        };
+        match self {
+            Self::BentPressureA => {
+                let (pa_pa, dpa_pas, d2pa_pas2) = bent(pa_pa, dpa_pas, d2pa_pas2);
+                Some(Signals { pa_pa, dpa_pas, d2pa_pas2, ..*truth })
+            }
+            Self::BentPressureB => {
+                let (pb_pa, dpb_pas, d2pb_pas2) = bent(pb_pa, dpb_pas, d2pb_pas2);
+                Some(Signals { pb_pa, dpb_pas, d2pb_pas2, ..*truth })
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it shows in the balance of forces.
+    pub(super) fn in_force(self) -> bool {
+        matches!(self, Self::SquareFriction | Self::BentPressureA | Self::BentPressureB)
     }
 }

@@ -1,4 +1,4 @@
-use crate::Real;
+use crate::{Real, Signals};
 
 /// The constants in which some effects are not linear. Every effect is linear in its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +85,38 @@ impl EffectConstant {
             Self::CrackingPressure => ("cracking_pressure", "Pa", 0.0, 1e8),
         };
         EffectConstantSpec { id, unit, lower, upper }
+    }
+
+    /// The values that a trace can tell apart: `span` gives the least and the largest value of a quantity in it, `finest` is the
+    /// smallest value of this constant that it resolves. None where it tells nothing. The shares are chosen: a bell, a bend or a
+    /// threshold shows only well within what the trace covers.
+    pub fn range(
+        self,
+        finest: f64,
+        span: impl Fn(fn(&Signals<f64>) -> f64) -> (f64, f64),
+    ) -> Option<(f64, f64)> {
+        let fastest_mps = || span(|at| at.v_mps.abs()).1;
+        let (low, high) = match self {
+            Self::SpotPosition => span(|at| at.x_m),
+            Self::SpotWidth => {
+                let (low, high) = span(|at| at.x_m);
+                (0.05 * (high - low), 0.7 * (high - low))
+            }
+            Self::StribeckSpeed => (0.02 * fastest_mps(), 0.7 * fastest_mps()),
+            Self::SlipSpeed => (finest, 0.3 * fastest_mps()),
+            Self::Precharge => (0.0, span(|at| at.pa_pa.max(at.pb_pa)).1),
+            Self::CrackingPressure => {
+                let (low, high) = span(|at| (at.pa_pa - at.pb_pa).abs());
+                // What always or never opens can't be told from other leaks, or at all.
+                (low + 0.05 * (high - low), high - 0.05 * (high - low))
+            }
+            // Slow to fast.
+            Self::PolytropicExponent => (1.0, 1.4),
+            Self::ReferenceTemp => return None,
+        };
+        let spec = self.spec();
+        let (low, high) = (low.max(spec.lower), high.min(spec.upper));
+        (high > low).then_some((low, high))
     }
 }
 

@@ -55,9 +55,13 @@ pub struct EffectSpec {
     pub default_size: f64,
     /// The constants on which its term depends.
     pub constants: &'static [EffectConstant],
+    /// Those among them that are taken as they are, never fitted: they fix a reference, or hardly matter.
+    pub given: &'static [EffectConstant],
     /// The measured quantity to which its term is in proportion, so that the regressor carries the very noise of
     /// what the model leaves over; none where it does not. Even terms (|ẋ|, |Q|) carry none on average.
     pub carries: Option<LeftSide>,
+    /// The measured quantities whose noise its term shares with the residual though it is not in proportion to them.
+    pub shares_noise_of: &'static [LeftSide],
     /// When it is the cause.
     pub cause: &'static str,
     /// What to do about it.
@@ -86,14 +90,18 @@ macro_rules! effects {
         $(hangs [$hangs:ident];)?
         $(deaf [$deaf:ident];)?
         $(constants [$($constant:ident),*];)?
+        $(given [$($given:ident),*];)?
         $(prior $sensor:ident.$spread:ident;)?
         $(carries $left_side:ident;)?
+        $(shares [$($shared:ident),*];)?
+        $(dry $dry:expr;)?
+        $(adds $declared:ident;)?
         $cause:literal $remedy:literal $measurement:literal
     )*) => {
         use $crate::effects::entry::given_or;
         use $crate::effects::sensor::Distortion;
         use $crate::effects::{EffectConstant, EffectConstants, EffectKind, EffectSpec, LeftSide};
-        use $crate::{Model, Real, Sensors, Signals, Terms};
+        use $crate::{Cylinder, Model, Real, Sensors, Signals, Terms};
 
         /// A physical or sensor effect that the plain model lacks.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -112,8 +120,10 @@ macro_rules! effects {
                     $(Self::$variant => &EffectSpec {
                         id: $id, unit: $unit, kind: EffectKind::$kind,
                         lower: $lower, upper: $upper, default_size: $size,
-                        constants: &[$($(EffectConstant::$constant),*)?],
+                        constants: &[$($(EffectConstant::$constant,)*)? $($(EffectConstant::$given,)*)?],
+                        given: &[$($(EffectConstant::$given,)*)?],
                         carries: given_or!([$(Some(LeftSide::$left_side))?] None),
+                        shares_noise_of: &[$($(LeftSide::$shared,)*)?],
                         cause: $cause, remedy: $remedy, measurement: $measurement,
                     },)*
                 }
@@ -155,6 +165,27 @@ macro_rules! effects {
             pub fn deaf<T>(self, signals: &mut Signals<T>) -> Option<&mut T> {
                 match self {
                     $($(Self::$variant => Some(&mut signals.$deaf),)?)*
+                    _ => None,
+                }
+            }
+
+            /// The force, N, with which one unit of a dry friction can hold a piston that stands: there it is whatever balances the
+            /// other forces, up to that. None for all other effects.
+            pub fn stiction<T: Real>(self, at: &Signals<T>) -> Option<T> {
+                fn of<T>(dry: impl Fn(&Signals<T>) -> T) -> impl Fn(&Signals<T>) -> T {
+                    dry
+                }
+                match self {
+                    $($(Self::$variant => Some(of::<T>($dry)(at)),)?)*
+                    _ => None,
+                }
+            }
+
+            /// The declared number of the cylinder to which the effect's value adds, in the effect's unit. None for what the rig
+            /// file has no number for.
+            pub fn adds_to<T: Real>(self, cylinder: &Cylinder<T>) -> Option<T> {
+                match self {
+                    $($(Self::$variant => Some(cylinder.$declared),)?)*
                     _ => None,
                 }
             }

@@ -37,6 +37,17 @@ impl Effect {
         self.spec().constants
     }
 
+    /// Those of them that a fit may vary.
+    pub fn fitted_constants(self) -> impl Iterator<Item = EffectConstant> {
+        let EffectSpec { constants, given, .. } = self.spec();
+        constants.iter().copied().filter(|own| !given.contains(own))
+    }
+
+    /// Whether it is a sensor that answers late.
+    pub fn is_lag(self) -> bool {
+        self.late(&mut Signals::<()>::default()).iter().any(Option::is_some)
+    }
+
     /// What the sensors show when this effect has size `value`; physical effects change nothing.
     pub fn read<T: Real>(self, value: T, truth: &Signals<T>) -> Signals<T> {
         sensor::read(self, value, truth)

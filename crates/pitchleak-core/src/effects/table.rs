@@ -7,9 +7,13 @@
 //!     late [signals];                   sensors that answer late: the signals that the value delays, s
 //!     hangs [signal];                   sensors with play: the signal that hangs behind by the value, either way
 //!     deaf [signal];                    meters with a dead band: the signal that reads zero while it is smaller than the value
-//!     constants [names];                in which the term is not linear
+//!     constants [names];                in which the term is not linear, and which a fit may vary
+//!     given [names];                    the same, but taken as they are
 //!     prior sensor.spread;              the declared error of the sensor that the effect is
 //!     carries LeftSide;                 the measured left side of eq. (1) to which the term is in proportion
+//!     shares [LeftSide];                further ones whose noise the term shares with the residual
+//!     dry |at| …;                       dry friction: the force with which one unit can hold a piston that stands, N
+//!     adds field;                       the declared number of the cylinder to which the value adds
 //!     "cause" "remedy" "measurement"
 //! ```
 
@@ -24,11 +28,13 @@ use crate::signed_root;
 effects! {
     DeadVolumeA "dead_volume_a" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
         term |at, model, _| chamber_a(at.dpa_pas / model.fluid.bulk_modulus_pa);
+        adds dead_volume_a_m3;
         "Hose, port or manifold volume at chamber A, or a hose that swells, takes oil in step with the pressure slope."
         "Measure hose length and bore and declare dead_volume_a in the rig file."
         "Pressure steps on side A with the piston at the A end, at low and at high pressure: a volume takes the same oil at both."
     DeadVolumeB "dead_volume_b" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
         term |at, model, _| chamber_b(at.dpb_pas / model.fluid.bulk_modulus_pa);
+        adds dead_volume_b_m3;
         "Hose, port or manifold volume at chamber B, or a hose that swells, takes oil in step with the pressure slope."
         "Measure hose length and bore and declare dead_volume_b in the rig file."
         "Pressure steps on side B with the piston at the B end, at low and at high pressure: a volume takes the same oil at both."
@@ -183,7 +189,7 @@ effects! {
         "Holds under load at several positions: only at the worn spot the leak is larger."
     InternalLeakTemperature "internal_leak_temperature" ["m3/(s*Pa*K)"] InternalLeak -1e-11 .. 1e-11, 3e-13;
         term |at, _, constants| past_piston((at.temp_k - constants.reference_temp_k) * (at.pa_pa - at.pb_pa));
-        constants [ReferenceTemp];
+        given [ReferenceTemp];
         "Warm oil is thinner, so the laminar leak past the piston grows with temperature."
         "Compare leak estimates at equal oil temperature, or let the model carry the slope."
         "The same hold with cold and with warm oil."
@@ -194,7 +200,8 @@ effects! {
         "The same hold at the beginning and at the end, and the meters' zeros before and after."
     InternalLeakDirection "internal_leak_direction" ["m3/(s*Pa)"] InternalLeak -1e-9 .. 1e-9, 5e-12;
         term |at, model, constants| past_piston(flow_direction(at, &model.cylinder, constants) * (at.pa_pa - at.pb_pa));
-        constants [SlipSpeed];
+        given [SlipSpeed];
+        shares [FlowA, FlowB];
         "The piston seal is tighter one way than the other (a lip seal in one direction, a check valve in the piston): positive, the leak is larger while extending."
         "Check that the seal is mounted the right way round and its lip is whole."
         "Strokes both ways at constant speed and load: the leak differs by twice the value named."
@@ -206,18 +213,21 @@ effects! {
     CoulombFriction "coulomb_friction" ["N"] Force 0.0 .. 1e5, 3e2;
         term |at, _, constants| force(direction(at, constants));
         constants [SlipSpeed];
+        dry |_| T::one();
         "Seals and guides resist with a constant force that turns with the direction of motion."
         "Declare it; a rise over months points to a tight or dry seal, or to misalignment."
         "Strokes at constant speed, slow to fast, both ways: dry friction stays."
     StribeckFriction "stribeck_friction" ["N"] Force 0.0 .. 1e5, 1e2;
         term |at, _, constants| force(direction(at, constants) * stribeck(at, constants));
         constants [StribeckSpeed, SlipSpeed];
+        dry |_| T::one();
         "Friction is higher near standstill than in motion, so the piston tends to stick and slip."
         "Check seal material and oil; keep the position loop from hunting."
         "Strokes at constant speed, from creeping to fast: Stribeck friction is there while creeping and gone when fast."
     SealFriction "seal_friction" ["m2"] Force 0.0 .. 1e-2, 5e-5;
         term |at, _, constants| force(direction(at, constants) * (at.pa_pa.abs() + at.pb_pa.abs()));
         constants [SlipSpeed];
+        dry |at| at.pa_pa.abs() + at.pb_pa.abs();
         "Pressure pushes the seals on the wall, so friction grows with the sum of both pressures."
         "Declare it; a rise points to an extruded seal."
         "Strokes at constant speed at low and at high pressure in both chambers: seal friction grows with pressure."
@@ -234,6 +244,7 @@ effects! {
         "Holds without pressure change at several positions: the force of a spring follows the position."
     AddedMass "added_mass" ["kg"] Storage -1e4 .. 1e4, 1e1;
         term |at, _, _| force(at.a_mps2);
+        adds moving_mass_kg;
         "More (or less) mass moves with the piston than declared, such as the oil of a long hose between a pressure sensor and its port."
         "Declare the moving mass as fitted."
         "Fast reversals without load: force in step with acceleration."

@@ -49,6 +49,16 @@ class Quality:
 
 
 @dataclass(frozen=True, slots=True)
+class Doubt:
+    """A reason not to believe an effect's name or its value."""
+
+    id: str
+    """Which: ``rivals``, ``unlisted_law``, ``residual``, ``negative_leak``, …"""
+    text: str
+    """In a sentence."""
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """An effect that the declared model lacks."""
 
@@ -63,7 +73,11 @@ class Effect:
     confident: bool = False
     """Whether the name can be believed."""
     doubt: str | None = None
-    """Why not."""
+    """The first of ``doubts`` in a sentence."""
+    doubts: tuple[Doubt, ...] = ()
+    """Why not, the reason that says most first."""
+    probability: float | None = None
+    """Probability of the name among all that could stand in its place."""
     rmse_reduction_percent: float | None = None
     """By how much the held-out error of the balance it mends most falls, %."""
     p_value: float | None = None

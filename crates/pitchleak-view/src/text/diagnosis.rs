@@ -30,8 +30,10 @@ impl Text for Diagnosis {
 /// What a verdict says, in a sentence.
 pub fn sentence(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Explained => "explained: with the effects below, what is left is sensor noise",
-        Verdict::PartlyExplained => "partly explained: the effects below mend much, but not all",
+        Verdict::Explained => "explained: with the effects below, the residual is sensor noise",
+        Verdict::PartlyExplained => {
+            "partly explained: the effects below mend much, but not all of it is explained for sure"
+        }
         Verdict::NoMissingEffect => "no missing effect: what the declared model leaves over is sensor noise",
         Verdict::Unexplained => "unexplained: something is missing, and no known effect fits",
         Verdict::InsufficientExcitation => {
@@ -220,7 +222,7 @@ fn write_effect(out: &mut String, effect: &FoundEffect) {
         writeln!(out, "\n{}: {} (95 %)", effect.id, quantity(effect.value, Some(effect.std), effect.unit));
     let _ = writeln!(out, "  {}", effect.cause);
     let _ = writeln!(out, "  To do: {}", effect.remedy);
-    if let Some(doubt) = &effect.doubt {
+    if let Some(doubt) = effect.doubts_in_words() {
         let _ = writeln!(out, "  Doubtful: {doubt}.");
     }
     if let Some(separation) = &effect.separated_by {

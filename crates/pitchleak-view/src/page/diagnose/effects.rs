@@ -14,7 +14,7 @@ pub(super) fn body(diagnosis: &Diagnosis) -> Markup {
             h3 { (capital(&spoken(effect.id))) ": " (size(effect)) " "
                 @if effect.confident { span .tag .is-sound { "sure of the name" } } @else { span .tag .is-caution { "doubtful" } } }
             p { (prose(effect.cause)) " " strong { (prose(effect.remedy)) } }
-            @if let Some(doubt) = &effect.doubt { p { "Doubtful: " (doubt) "." } }
+            @if let Some(doubt) = effect.doubts_in_words() { p { "Doubtful: " (doubt) "." } }
             (rivals(effect))
             p .note { "With it the error on samples that were not fitted falls by " (format!("{:.1}", effect.rmse_reduction_percent)) " % in the balance it \
                 mends most; chance would show as much with a probability of " (chance(effect.p_value)) "."

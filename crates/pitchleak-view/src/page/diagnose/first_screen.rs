@@ -90,7 +90,7 @@ fn open(diagnosis: &Diagnosis) -> Markup {
         } @else {
             ul {
                 @for effect in doubtful {
-                    li { strong { (capital(&spoken(effect.id))) } @if let Some(doubt) = &effect.doubt { ": " (doubt) } "." }
+                    li { strong { (capital(&spoken(effect.id))) } @if let Some(doubt) = effect.doubts_in_words() { ": " (doubt) } "." }
                 }
                 @for name in unknown { li { strong { (capital(name)) } ": these traces tell no more than the rig file does." } }
             }

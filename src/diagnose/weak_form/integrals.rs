@@ -1,19 +1,21 @@
-//! Integrals along a trace, weighted by hats over two neighbouring blocks of samples.
+//! Integrals along a trace, weighted by test functions: hats over two neighbouring blocks of samples. Of all columns at once, or of
+//! single terms at one linearisation: the search for an effect's constants tries many, and each costs the term alone, because the
+//! corrected signals are kept.
 
 use super::linearisation::{Linearisation, as_felt};
-use super::terms::Term;
+use super::terms::{Columns, Term};
 use crate::diagnose::data::{Motion, Series};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::LEAST_STEP_S;
+use crate::diagnose::thresholds::{EVEN_SHARE, LEAST_STEP_S, LONG_STEP};
 use pitchleak_core::Signals;
 use pitchleak_core::effects::EffectConstants;
 
-/// What is integrated along a trace: over a step, up to a sample, over a block or a hat.
+/// What is integrated along a trace: over a step, up to a sample, over a block or a test function.
 #[derive(Clone)]
 pub(crate) struct Integrals {
-    /// What the model leaves over, m³ and N·s.
+    /// The residual, m³ and N·s.
     pub(crate) residual: PerEquation<f64>,
-    /// What one unit of each term leaves over.
+    /// One unit of each term in the residual.
     pub(crate) columns: Vec<PerEquation<f64>>,
     pub(crate) time_s: f64,
     /// Time during which the direction of motion is unknown.
@@ -55,14 +57,14 @@ impl Integrals {
 }
 
 /// Running integrals and their means, block by block: the difference of two neighbouring means is the integrand
-/// weighted by a hat over both blocks.
-pub(crate) struct Hats {
+/// weighted by a test function over both blocks.
+pub(crate) struct TestFunctions {
     integral: Integrals,
     block: Integrals,
     previous: Option<Integrals>,
 }
 
-impl Hats {
+impl TestFunctions {
     pub(crate) fn new(terms: usize) -> Self {
         Self { integral: Integrals::zero(terms), block: Integrals::zero(terms), previous: None }
     }
@@ -75,18 +77,18 @@ impl Hats {
         self.block.add(&self.integral);
     }
 
-    /// Ends a block of `samples`; the hat over it and the block before, once there is one.
+    /// Ends a block of `samples`; the test function over it and the block before, once there is one.
     pub(crate) fn end_block(&mut self, samples: usize) -> Option<Integrals> {
         let terms = self.block.columns.len();
         let mut mean = std::mem::replace(&mut self.block, Integrals::zero(terms));
         mean.combine(&Integrals::zero(terms), |sum, _| sum / samples as f64);
-        let hat = self.previous.as_ref().map(|before| {
-            let mut hat = mean.clone();
-            hat.combine(before, |now, before| now - before);
-            hat
+        let weighted = self.previous.as_ref().map(|before| {
+            let mut weighted = mean.clone();
+            weighted.combine(before, |now, before| now - before);
+            weighted
         });
         self.previous = Some(mean);
-        hat
+        weighted
     }
 }
 
@@ -142,7 +144,7 @@ impl Step {
             let seen = at.effects.correct(&reading);
             Instant { seen, felt: as_felt(&seen, &felt) }
         };
-        let is_long = dt_s > 1.5 * LEAST_STEP_S;
+        let is_long = dt_s > LONG_STEP * LEAST_STEP_S;
         let first = instant(if is_long { -GAUSS } else { 0.0 });
         (Self { dt_s, first, second: is_long.then(|| Box::new(instant(GAUSS))) }, means)
     }
@@ -155,7 +157,7 @@ impl Step {
         mean.map(|value| if (value * self.dt_s).is_finite() { value * self.dt_s } else { 0.0 })
     }
 
-    /// What one unit of a term leaves over, integrated.
+    /// One unit of a term in the residual, integrated.
     pub(super) fn column(&self, active: &ActiveTerm, at: &Linearisation) -> PerEquation<f64> {
         let ActiveTerm { term, in_force, constants } = active;
         self.integral(|seen, felt| at.both_unit_terms((*term, *in_force), constants, seen, felt))
@@ -165,6 +167,13 @@ impl Step {
 impl<'a> Integrand<'a> {
     pub(crate) fn new(at: &'a Linearisation, terms: &[Term], constants: &[EffectConstants<f64>]) -> Self {
         let terms = terms.iter().zip(constants).map(|(term, constants)| ActiveTerm::new(*term, *constants));
+        Self { at, terms: terms.collect() }
+    }
+
+    /// Of the columns that are built.
+    pub(super) fn of(at: &'a Linearisation, columns: Columns<'_>) -> Self {
+        let Columns { terms, constants, places } = columns;
+        let terms = places.iter().map(|place| ActiveTerm::new(terms[*place], constants[*place]));
         Self { at, terms: terms.collect() }
     }
 
@@ -270,6 +279,12 @@ fn mean_signals(series: &Series, motion: &Motion, at: usize, dt: f64) -> Means {
     }
 }
 
+/// Weights of the quintic through six even samples for its mean over the middle step, by their distance from it, in units of
+/// 1/[`QUINTIC_UNIT`]. Derived: exact for polynomials of fifth degree.
+pub(super) const QUINTIC: [f64; 3] = [802.0, -93.0, 11.0];
+/// See [`QUINTIC`].
+pub(super) const QUINTIC_UNIT: f64 = 1440.0;
+
 /// Mean over the step that ends at sample `at`, by the quintic through six samples where they stand evenly, else the cubic through
 /// four: the trapezoid's error, (ω dt)²/12 of a wave, would pass for a sensor's gain, and at 20 Hz the cubic's,
 /// 11 (ω dt)⁴/720, for gas in a port.
@@ -277,8 +292,9 @@ fn step_mean(values: &[f64], at: usize, even: Even) -> f64 {
     let pair = |reach: usize| values[at - 1 - reach] + values[at + reach];
     let inner = pair(0);
     let cubic = |next: f64| (13.0 * inner - next) / 24.0;
-    let six =
-        if even >= Even::Six { (802.0 * inner - 93.0 * pair(1) + 11.0 * pair(2)) / 1440.0 } else { f64::NAN };
+    let [first, second, third] = QUINTIC;
+    let quintic = || (first * inner + second * pair(1) + third * pair(2)) / QUINTIC_UNIT;
+    let six = if even >= Even::Six { quintic() } else { f64::NAN };
     let four = if even >= Even::Four { cubic(pair(1)) } else { f64::NAN };
     [six, four].into_iter().find(|mean| mean.is_finite()).unwrap_or(inner / 2.0)
 }
@@ -302,7 +318,7 @@ enum Even {
 impl Even {
     fn about(series: &Series, at: usize, dt: f64) -> Self {
         let t = &series.t_s;
-        let as_long = |step: f64| (step - dt).abs() < 0.1 * dt;
+        let as_long = |step: f64| (step - dt).abs() < EVEN_SHARE * dt;
         let is_even = |reach: usize| {
             at > reach
                 && at + reach < t.len()

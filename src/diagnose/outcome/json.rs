@@ -1,10 +1,10 @@
 //! A diagnosis as `diagnose --json` prints it, field by field: schema `pitchleak.diagnose/1`.
 
-use crate::diagnose::equation::PerEquation;
-use crate::diagnose::outcome::{
+use super::{
     BinnedResidual, Calibration, Diagnosis, EquationResidual, FoundEffect, Holds, Interaction, LeakEstimates,
     Quality, Samples, Size, Verdict,
 };
+use crate::diagnose::equation::PerEquation;
 use crate::wiring::Wiring;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;

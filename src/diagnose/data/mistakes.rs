@@ -1,9 +1,10 @@
-//! Channels that fail by themselves: beside one that is clipped, stuck or coarse no effect is to be believed.
+//! Mistakes beside which no effect is worth a word: channels that are clipped, stuck or coarse, exchanged wires, signs and units.
 
 use super::declared::Declared;
 use super::series::Series;
 use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::signal::Signal;
+use crate::wiring::{Excerpt, Mistake, Recorded, Wiring, explain};
 
 /// The faults that the channels of these traces show, each kind once per channel.
 pub(crate) fn channel_faults(traces: &[Series], declared: &Declared) -> Vec<ChannelFault> {
@@ -28,6 +29,32 @@ fn is_no_flow(series: &Series, fault: &ChannelFault) -> bool {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         least == 0.0 || most == 0.0
+    })
+}
+
+/// A mistake that explains the traces.
+pub(crate) struct Miswired {
+    pub(crate) wiring: Wiring,
+    /// No effect could do the same: not so for a delay or a pressure's zero, which sensors have too.
+    pub(crate) is_beyond_effects: bool,
+}
+
+/// The mistake that explains all of the traces together. None is looked for beside effects that the rig file declares:
+/// the plain model, by which mistakes are judged, lacks them.
+pub(crate) fn miswired(traces: &[Series], declared: &Declared) -> Option<Miswired> {
+    if declared.effects.iter().next().is_some() {
+        return None;
+    }
+    let rig = declared.rig();
+    let mut excerpt = Excerpt::default();
+    traces.iter().flat_map(Series::records).for_each(|record| excerpt.add(&record));
+    let records = excerpt.records();
+    let found = explain(&Recorded::new(&records, &rig)?)?;
+    let is_like_an_effect = |one: &Mistake| matches!(one, Mistake::Late(..) | Mistake::Absolute(_));
+    let columns = traces.first().map(|series| series.columns.clone()).unwrap_or_default();
+    Some(Miswired {
+        wiring: found.wiring(&columns, &rig),
+        is_beyond_effects: !found.mistakes.iter().any(is_like_an_effect),
     })
 }
 

@@ -1,36 +1,40 @@
-//! The noise of the weak form's rows, known from the sensors' own noise.
+//! The noise of the weak form's rows, known from the sensors' own noise, and its inverse square root.
 //!
-//! A row weighs a sensor's samples by a hat where its signal enters the residual, by a difference of two block means where
-//! its rate does, by the hat's curvature where that does. How much of each, `sensitivity.rs` says. Rows that share a block are
-//! correlated, others are not.
+//! A row weighs a sensor's samples by its test function where its signal enters the residual, by a difference of two block means where
+//! its rate does, by the test function's curvature where that does. How much of each, `sensitivity.rs` says. Rows that share a block are
+//! correlated, others are not: the covariance is a narrow band, and whitening by its Cholesky factor takes linear time. It is the Kalman
+//! filter's innovation form of the same regression.
 
+use super::integrals::{QUINTIC, QUINTIC_UNIT};
 use super::linearisation::Linearisation;
 use super::rows::{Row, Rows};
-use super::sensitivity::{Channel, Sensitivity};
+use super::sensitivity::Sensitivity;
+use crate::diagnose::data::Channel;
 use crate::diagnose::equation::{Equation, PerEquation};
-use crate::diagnose::thresholds::IGNORED;
+use crate::diagnose::thresholds::{IGNORED, LEAST_PIVOT};
 use pitchleak_core::Sensors;
 
-/// Sums of products of the weights of samples in two rows: by hats (0), differences (1) and curvatures (2).
+/// Sums of products of the weights of samples in two rows: by test functions (0), differences (1) and curvatures (2).
 type Products = [[f64; 3]; 3];
 
 /// How samples of white noise weigh in rows, with steps of one.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct HatWeights {
+pub(crate) struct TestFunctionWeights {
     /// Within a row.
     pub(crate) own: Products,
     /// With the next row.
     pub(crate) next: Products,
 }
 
-/// The weights of a hat over two blocks of `samples`, as `hats.rs` takes mean, rate and curvature over a step.
-pub(crate) fn hat_weights(samples: usize) -> HatWeights {
+/// The weights of a test function over two blocks of `samples`, as `integrals.rs` takes mean, rate and curvature over a step.
+pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
     let m = samples as isize;
     let step = |j: isize| {
         if (0..2 * m - 1).contains(&j) { (m - (j - (m - 1)).abs()) as f64 / m as f64 } else { 0.0 }
     };
+    let [first, second, third] = QUINTIC;
     let patterns = [
-        [11.0, -93.0, 802.0, 802.0, -93.0, 11.0].map(|share| share / 1440.0),
+        [third, second, first, first, second, third].map(|share| share / QUINTIC_UNIT),
         [0.0, 0.0, -1.0, 1.0, 0.0, 0.0],
         [0.0, 0.5, -0.5, -0.5, 0.5, 0.0],
     ];
@@ -42,7 +46,7 @@ pub(crate) fn hat_weights(samples: usize) -> HatWeights {
         patterns
             .map(|a| patterns.map(|b| (-3..3 * m + 3).map(|i| weight(&a, i) * weight(&b, i - shift)).sum()))
     };
-    HatWeights { own: products(0), next: products(m) }
+    TestFunctionWeights { own: products(0), next: products(m) }
 }
 
 /// What the covariance needs of the rows.
@@ -87,19 +91,23 @@ impl NoiseModel<'_> {
     /// Variance of one row of an equation, as if all of it were white in the flow or force.
     pub(crate) fn white_variance(&self, row: usize, equation: Equation) -> f64 {
         let own = &self.rows.rows[row];
-        self.as_white(own, self.covariance((row, equation), (row, equation), hat_weights(own.samples)))
+        self.as_white(
+            own,
+            self.covariance((row, equation), (row, equation), test_function_weights(own.samples)),
+        )
     }
 
     /// The white flow or force whose variance makes this variance of a row.
     pub(crate) fn as_white(&self, row: &Row, variance: f64) -> f64 {
         let step_s = row.block_s / row.samples as f64;
-        variance / (hat_weights(row.samples).own[0][0] * step_s * step_s)
+        variance / (test_function_weights(row.samples).own[0][0] * step_s * step_s)
     }
 
     /// Standard deviation of a chamber's row as a mean flow, m³/s.
     pub(crate) fn mean_flow_std(&self, row: usize, equation: Equation) -> f64 {
         let own = &self.rows.rows[row];
-        self.covariance((row, equation), (row, equation), hat_weights(own.samples)).sqrt() / own.block_s
+        self.covariance((row, equation), (row, equation), test_function_weights(own.samples)).sqrt()
+            / own.block_s
     }
 
     /// Covariance of two entries of the same row, or of neighbours.
@@ -107,14 +115,14 @@ impl NoiseModel<'_> {
         &self,
         (row_a, a): (usize, Equation),
         (row_b, b): (usize, Equation),
-        hats: HatWeights,
+        functions: TestFunctionWeights,
     ) -> f64 {
         if (a == Equation::Force) != (b == Equation::Force) {
             return 0.0;
         }
         let row = &self.rows.rows[row_a];
         let step_s = row.block_s / row.samples as f64;
-        let weights = if row_a == row_b { hats.own } else { hats.next };
+        let weights = if row_a == row_b { functions.own } else { functions.next };
         // `weights` are of a row and the next.
         let (first, second) = if row_a < row_b { ((row_a, a), (row_b, b)) } else { ((row_b, b), (row_a, a)) };
         let (first, second) = (self.sensitivity(first.0, first.1), self.sensitivity(second.0, second.1));
@@ -128,36 +136,114 @@ impl NoiseModel<'_> {
                     of_channel += one * other * weights[k][l] * steps[k] * steps[l];
                 }
             }
-            let loudness = first.loudness[place] * second.loudness[place];
-            sum += of_channel * loudness * channel.noise_std(self.sensors, self.at).powi(2);
+            let noise_factor = first.noise_factor[place] * second.noise_factor[place];
+            sum +=
+                of_channel * noise_factor * channel.noise_std(self.sensors, &self.at.model.cylinder).powi(2);
         }
         let error = if a == b { self.equation_error[a] } else { 0.0 };
         sum + weights[0][0] * step_s * step_s * error
     }
 
     /// Covariance of the `i`th entry and the `j`th, which stands before it or is the same.
-    pub(crate) fn between(&self, i: usize, j: usize, hats: HatWeights) -> f64 {
+    pub(crate) fn between(&self, i: usize, j: usize, functions: TestFunctionWeights) -> f64 {
         let rows = self.rows;
         let (a, b) = (rows.entries[i], rows.entries[j]);
         if rows.rows[a.row].stretch != rows.rows[b.row].stretch || a.row - b.row > 1 {
             return 0.0;
         }
-        let value = self.covariance((a.row, a.equation), (b.row, b.equation), hats);
+        let value = self.covariance((a.row, a.equation), (b.row, b.equation), functions);
         if i == j && !rows.counts(&a) { value * IGNORED } else { value }
     }
 }
 
+/// Entries to the left of the diagonal that can be correlated: three of the row before, two of the own.
+const BAND: usize = 5;
+
+/// Σ = L Lᵀ, banded; `factor[i][d]` is L_{i,i−d}.
+pub(crate) struct Whitening {
+    factor: Vec<[f64; BAND + 1]>,
+}
+
+impl Whitening {
+    pub(crate) fn new(rows: &Rows, noise: &NoiseModel<'_>) -> Self {
+        let mut factor: Vec<[f64; BAND + 1]> = Vec::with_capacity(rows.entries.len());
+        let mut known = (0, TestFunctionWeights::default());
+        for (i, entry) in rows.entries.iter().enumerate() {
+            let samples = rows.rows[entry.row].samples;
+            if known.0 != samples {
+                known = (samples, test_function_weights(samples));
+            }
+            let mut line = [0.0; BAND + 1];
+            for d in (0..=BAND.min(i)).rev() {
+                let covariance = noise.between(i, i - d, known.1);
+                // L_{i,j} = (Σ_{i,j} − Σ_{l<j} L_{i,l} L_{j,l}) / L_{j,j}
+                let done: f64 = (1..=BAND - d)
+                    .filter(|e| i >= d + e)
+                    .map(|e| line[d + e] * if d == 0 { line[e] } else { factor[i - d][e] })
+                    .sum();
+                let rest = covariance - done;
+                line[d] = match d {
+                    0 => rest.max(LEAST_PIVOT * covariance).sqrt(),
+                    _ => rest / factor[i - d][0],
+                };
+            }
+            factor.push(line);
+        }
+        Self { factor }
+    }
+
+    /// L⁻¹ v.
+    pub(crate) fn whiten(&self, v: &[f64]) -> Vec<f64> {
+        let mut out: Vec<f64> = Vec::with_capacity(v.len());
+        for (i, (line, value)) in self.factor.iter().zip(v).enumerate() {
+            let before: f64 = (1..=BAND.min(i)).map(|d| line[d] * out[i - d]).sum();
+            out.push((value - before) / line[0]);
+        }
+        out
+    }
+}
+
 #[cfg(test)]
-mod tests {
+mod covariance_tests {
     use super::*;
 
     #[test]
     fn hat_weights_tend_to_two_thirds_and_one_sixth() {
-        let HatWeights { own, next } = hat_weights(200);
+        let TestFunctionWeights { own, next } = test_function_weights(200);
         assert!(
             (own[0][0] / 200.0 - 2.0 / 3.0).abs() < 1e-3 && (next[0][0] / 200.0 - 1.0 / 6.0).abs() < 1e-3
         );
         assert!((own[1][1] * 200.0 - 2.0).abs() < 1e-9 && (next[1][1] * 200.0 + 1.0).abs() < 1e-9);
         assert!(own[0][1].abs() < 1e-9 && own[0][2] < 0.0);
+    }
+}
+
+#[cfg(test)]
+mod whitening_tests {
+    use super::*;
+    use crate::diagnose::equation::PerEquation;
+    use crate::diagnose::testing::{declared, sound};
+    use crate::diagnose::weak_form::{Linearisation, WeakForm, residual_rows};
+    use nalgebra::{DMatrix, DVector};
+    use pitchleak_testkit::white_noise;
+
+    #[test]
+    fn whitening_is_that_of_a_dense_cholesky_factor() {
+        let declared = declared();
+        let at = Linearisation::declared(&declared);
+        let rows = residual_rows(&[sound(5), sound(3)], &declared.sensors, &at, 0.1);
+        let equation_error = PerEquation { chamber_a: 1e-14, chamber_b: 0.0, force: 0.0 };
+        let sensitivities = WeakForm::sensitivities(&rows, &declared.sensors, &at);
+        let (sensors, sensitivities) = (&declared.sensors, sensitivities.as_slice());
+        let noise = NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities };
+        let n = rows.entries.len();
+        let functions = test_function_weights(rows.rows[0].samples);
+        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(i.max(j), i.min(j), functions));
+        let factor = dense.cholesky().expect("a covariance");
+        let v: Vec<f64> = white_noise(1).take(n).collect();
+        let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");
+        let white = Whitening::new(&rows, &noise).whiten(&v);
+        let worst = white.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(n > 100 && worst < 1e-9 * expected.amax(), "{worst} of {}", expected.amax());
     }
 }

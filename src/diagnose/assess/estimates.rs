@@ -1,0 +1,181 @@
+//! What is said of leaks, of the bulk modulus and of each effect, as a fit has them, and what these traces can tell at all.
+
+use super::adequacy::Judgement;
+use super::confidence;
+use crate::diagnose::fit::Fit;
+use crate::diagnose::outcome::{Calibration, Doubt, FoundEffect, LeakEstimate, LeakEstimates, Size};
+use crate::diagnose::search::{self, Selected, Selection};
+use crate::diagnose::thresholds::{
+    CI95_SIGMA, DETECTABLE_SIGMA, FEWEST_ROWS, IDENTIFIED_M3S, LEARNT_SHARE, NEGATIVE_SIGMA,
+    RATIO_KNOWN_SHARE,
+};
+use crate::diagnose::weak_form::{Row, Term};
+use pitchleak_core::effects::EffectKind;
+use pitchleak_core::{Effect, Estimate};
+use std::collections::BTreeMap;
+
+fn estimate(fit: &Fit<'_>, term: Term) -> Estimate<f64> {
+    let unknown = Estimate { value: 0.0, std: f64::INFINITY };
+    fit.problem.place(term).and_then(|place| fit.estimate(place)).unwrap_or(unknown)
+}
+
+/// Leaks and bulk modulus, their standard deviations widened where more than the sensors' noise is left.
+pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
+    let widening = fit.dispersion(fit.bounded.chi2).sqrt();
+    let rows = &fit.rows().rows;
+    let mean = |value: &dyn Fn(&Row) -> f64| {
+        (rows.iter().map(|row| value(row).abs()).sum::<f64>() / rows.len().max(1) as f64).max(1.0)
+    };
+    let leak = |term, pressure_pa: f64| {
+        let Estimate { value, std } = estimate(fit, term);
+        let std = std * widening;
+        estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S)
+    };
+    let Estimate { value: compressibility, std } = estimate(fit, Term::InverseBulk);
+    let bulk = 1.0 / compressibility;
+    let prior = fit.problem.place(Term::InverseBulk).and_then(|place| fit.problem.priors[place]);
+    let prior = prior.map_or(f64::INFINITY, |prior| prior.std);
+    let std = if fit.held_compressibility.is_some() { prior } else { std };
+    LeakEstimates {
+        internal_leak_coefficient: leak(Term::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
+        external_leak_a_coefficient: leak(Term::ExternalA, mean(&|row| row.mean.pa_pa)),
+        external_leak_b_coefficient: leak(Term::ExternalB, mean(&|row| row.mean.pb_pa)),
+        bulk_modulus: estimated(
+            bulk,
+            std * widening * bulk * bulk,
+            "Pa",
+            std * widening < LEARNT_SHARE * prior,
+        ),
+    }
+}
+
+fn estimated(value: f64, std: f64, unit: &'static str, identifiable: bool) -> LeakEstimate {
+    let half = CI95_SIGMA * std;
+    let ci95 = [value - half, value + half];
+    LeakEstimate { value, std, ci95, unit, identifiable, physical: value >= -NEGATIVE_SIGMA * std }
+}
+
+/// Sentences about leaks that physics forbids.
+pub(crate) fn negative_leaks(leaks: &LeakEstimates, model: &str) -> Vec<String> {
+    [
+        ("internal leak", leaks.internal_leak_coefficient),
+        ("external leak A", leaks.external_leak_a_coefficient),
+        ("external leak B", leaks.external_leak_b_coefficient),
+    ]
+    .iter()
+    .filter(|(_, leak)| !leak.physical)
+    .map(|(name, leak)| {
+        let sigma = -leak.value / leak.std;
+        format!("{model} needs a negative {name} ({sigma:.0} sigma below zero): evidence of a missing effect")
+    })
+    .collect()
+}
+
+/// Standard deviation of an effect's value where it is only known over the bulk modulus, as a dead volume is; else none.
+pub(crate) fn std_with_oil(fit: &Fit<'_>, term: usize) -> Option<f64> {
+    let spec = fit.problem.terms[term].effect()?.spec();
+    let is_volume = spec.kind == EffectKind::Storage && spec.constants.is_empty() && spec.unit == "m3";
+    let own = fit.estimate(term).filter(|_| is_volume)?;
+    Some(own.std.hypot(own.value * fit.oil_share()))
+}
+
+/// A sentence where only the ratio of a volume to the bulk modulus is known.
+pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
+    let id = fit.problem.terms[one.term].effect()?.spec().id;
+    let (own, std) = (fit.estimate(one.term)?, std_with_oil(fit, one.term)?);
+    let percent = |std: f64| 100.0 * std / own.value;
+    (own.std < RATIO_KNOWN_SHARE * std && own.value > 0.0).then(|| {
+        format!(
+            "{id}: only its ratio to the bulk modulus is well known (to {:.1} %); the volume itself no better than the oil ({:.0} %)",
+            percent(own.std),
+            percent(std)
+        )
+    })
+}
+
+/// The effects of the answer.
+pub(crate) fn found(selection: &Selection<'_>, judgement: &Judgement) -> Vec<FoundEffect> {
+    let told = |one: &Selected| {
+        let doubts = confidence::doubts(selection, one, judgement);
+        found_one(&selection.fit, one, doubts)
+    };
+    selection.effects.iter().filter_map(told).collect()
+}
+
+fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundEffect> {
+    let effect = fit.problem.terms[one.term].effect()?;
+    let Estimate { value, std } = fit.estimate(one.term)?;
+    let std = std_with_oil(fit, one.term).unwrap_or(std);
+    let std = std.hypot(search::std_of_constants(fit, one.term));
+    let spec = effect.spec();
+    let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
+    let constants = fit.constants(one.term);
+    let constants = effect.constants().iter().map(|own| (own.spec().id, constants.get(*own))).collect();
+    Some(FoundEffect {
+        id: spec.id,
+        value,
+        std: (std * fit.dispersion(fit.bounded.chi2).sqrt()).hypot(confidence::unnamed_shift(fit, one.term)),
+        unit: spec.unit,
+        probability: confidence::probability(one, &doubts),
+        confident: doubts.is_empty(),
+        doubt: doubts.first().map(|doubt| doubt.text.clone()),
+        doubts,
+        rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
+        p_value: one.p_value,
+        separated_by: separation(effect, &one.confusable_with),
+        confusable_with,
+        constants,
+        cause: spec.cause,
+        remedy: spec.remedy,
+    })
+}
+
+/// The measurements that tell an effect from its rivals: what shows each of them alone.
+fn separation(effect: Effect, rivals: &[Effect]) -> Option<String> {
+    let group = std::iter::once(&effect).chain(rivals);
+    let measurements: Vec<_> = group.map(|one| one.spec().measurement).collect();
+    (!rivals.is_empty()).then(|| measurements.join(" "))
+}
+
+/// The sensors' errors that the rig file declares possible, as the fit has them.
+pub(crate) fn calibration(fit: &Fit<'_>) -> Vec<Calibration> {
+    let known = |term: &usize| {
+        fit.problem.priors[*term]?;
+        let (spec, own) = (fit.problem.terms[*term].effect()?.spec(), fit.estimate(*term)?);
+        Some(Calibration { id: spec.id, value: own.value, std: own.std, unit: spec.unit })
+    };
+    fit.active().iter().filter_map(known).collect()
+}
+
+/// Whether position or pressure do more than their noise.
+pub(crate) fn is_excited(fit: &Fit<'_>) -> bool {
+    let rows = &fit.rows().rows;
+    if rows.len() < FEWEST_ROWS || fit.regression.count() < FEWEST_ROWS {
+        return false;
+    }
+    let spread = |value: &dyn Fn(&Row) -> f64| {
+        let mean = rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+        (rows.iter().map(|row| (value(row) - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
+    };
+    let samples = rows.iter().map(|row| row.samples).min().unwrap_or(1) as f64;
+    let noise = |std: f64| DETECTABLE_SIGMA * std / samples.sqrt();
+    spread(&|row| row.mean.x_m) > noise(fit.problem.sensors.position.noise_std)
+        || spread(&|row| row.mean.pa_pa) > noise(fit.problem.sensors.pressure.noise_std)
+        || spread(&|row| row.mean.pb_pa) > noise(fit.problem.sensors.pressure.noise_std)
+}
+
+/// Smallest size of each further effect that these traces would have shown.
+pub(crate) fn detection_limits(fit: &Fit<'_>) -> BTreeMap<&'static str, Size> {
+    let widening = fit.dispersion(fit.bounded.chi2).sqrt();
+    let mut sizes = BTreeMap::new();
+    for term in search::open(fit) {
+        let (Some(effect), Some(score)) =
+            (fit.problem.terms[term].effect(), fit.regression.score(&fit.free, term))
+        else {
+            continue;
+        };
+        let value = DETECTABLE_SIGMA * score.std * widening;
+        sizes.insert(effect.spec().id, Size { value, unit: effect.spec().unit });
+    }
+    sizes
+}
