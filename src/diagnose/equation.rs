@@ -29,7 +29,7 @@ impl Equation {
         }
     }
 
-    /// The same with the unit of what it leaves over.
+    /// Its id with the unit of its residual.
     pub fn id_with_unit(self) -> &'static str {
         match self {
             Self::ChamberA => "chamber_a_m3s",

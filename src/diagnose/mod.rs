@@ -1,17 +1,17 @@
-//! From what the model leaves over to the physical effect that it lacks.
+//! From the residual of the model to the physical effect that it lacks.
 //!
 //! 1. `data`: the traces, what is declared of the rig, the noise that the sensors really carry, and mistakes of wiring,
 //!    beside which no effect is worth a word.
-//! 2. `weak_form`: the equations integrated against hat functions around a linearisation, so that nothing is
+//! 2. `weak_form`: the equations integrated against test functions around a linearisation, so that nothing is
 //!    differentiated and the noise of every row follows from the rig file.
 //! 3. `fit`: the declared model by generalised least squares with its priors. A fit is a value; with one more effect
 //!    or without one it gives another fit.
 //! 4. `search`: every known effect is a column; a score test says what it would bring, and forward selection
 //!    confirmed on held-out samples names the missing ones.
-//! 5. `assess`: what is left, held against the declared noise, which decides the verdict.
+//! 5. `assess`: the residual, held against the declared noise, which decides the verdict.
 //! 6. `present`: text, figures, JSON, a rig file.
 //!
-//! The derivation is in `docs/closing-the-loop.md`.
+//! The derivation is in `docs/diagnosis.md`.
 
 mod assess;
 mod calibrated_rig;

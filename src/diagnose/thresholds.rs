@@ -7,11 +7,11 @@
 
 /// Share of sound rigs on which the search may name anything, shared out over all candidates (Bonferroni). Chosen.
 pub(crate) const FALSE_EFFECT_RATE: f64 = 1e-3;
-/// A sound rig fails any one test of what is left this rarely. Derived: size and whiteness of three equations and one
-/// test for nameless products make seven, so that 1.4 in a thousand sound rigs are complained about, as many as are
+/// A sound rig fails any one test of the residual this rarely. Derived: size and whiteness of three equations and one
+/// test for products of signals make seven, so that 1.4 in a thousand sound rigs are complained about, as many as are
 /// named an effect.
 pub(crate) const LEAST_P: f64 = 2e-4;
-/// What is left counts as noise unless its variance is this many standard deviations too large. Derived: the normal
+/// The residual counts as noise unless its variance is this many standard deviations too large. Derived: the normal
 /// law's two-sided bound of [`LEAST_P`].
 pub(crate) const CHANCE_SIGMA: f64 = 3.7;
 /// Share of diagnoses in which a product of two effects may be reported by chance. Derived: as [`FALSE_EFFECT_RATE`].
@@ -20,7 +20,7 @@ pub(crate) const FALSE_PRODUCT_RATE: f64 = FALSE_EFFECT_RATE;
 pub(crate) const CHANCE_RATE: f64 = 0.01;
 /// Derived: three equations, eleven variables.
 pub(crate) const RESIDUAL_TESTS: usize = 33;
-/// Lags of the portmanteau test. Chosen: two seconds of hats.
+/// Lags of the portmanteau test. Chosen: two seconds of rows.
 pub(crate) const PORTMANTEAU_LAGS: usize = 20;
 /// Half width of the 95 % interval of a normal law, in standard deviations. Derived.
 pub(crate) const CI95_SIGMA: f64 = 1.96;
@@ -35,7 +35,7 @@ pub(crate) const LEAST_STEP_S: f64 = 0.01;
 /// seconds of two cores where many effects are tried.
 pub(crate) const MOST_SAMPLES: usize = 80_000;
 /// Samples of that length in a piece of a trace too long to be fitted whole. Chosen: 20 s at 100 Hz, so that ends of
-/// pieces cost one hat in a hundred.
+/// pieces cost one row in a hundred.
 pub(crate) const PIECE_SAMPLES: usize = 2000;
 /// The machine moves no faster than that, Hz. Chosen: wind and pitch control stay below.
 pub(crate) const FASTEST_MOTION_HZ: f64 = 1.4;
@@ -49,8 +49,9 @@ pub(crate) const NOISIER_SIGMA: f64 = 3.5;
 pub(crate) const MEDIAN_EFFICIENCY: f64 = 0.37;
 /// Regular noise this many times the declared one is a ripple. Chosen: less harms nothing.
 pub(crate) const RIPPLE: f64 = 1.25;
-/// A row's samples are louder than noise where their differences' root mean square is so many standard deviations. Chosen: three.
-pub(crate) const LOUD_SIGMA: f64 = 3.0;
+/// A row's samples show more than noise where their differences' root mean square is so many standard deviations.
+/// Chosen: three.
+pub(crate) const UNRESOLVED_SIGMA: f64 = 3.0;
 /// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
 /// samples of white noise has a standard deviation of √(2.3/600) = 0.06 (Bartlett 1946); this is four of them.
 pub(crate) const RIPPLE_COLOUR: f64 = 0.25;
@@ -161,16 +162,16 @@ pub(crate) const SEARCH_STARTS: [f64; 3] = [0.15, 0.5, 0.85];
 
 // The verdict.
 
-/// Fewer hats than this tell nothing. Chosen: the law of large numbers' usual thirty.
+/// Fewer rows than this tell nothing. Chosen: the law of large numbers' usual thirty.
 pub(crate) const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
 /// by nearly one, so that four of five are found.
 pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
-/// An effect is not to be believed where more is left in its equations than this share of what it and they have together. Chosen:
-/// nine tenths mended.
+/// An effect is doubtful where the residual of its equations beyond noise is more than this share of that and what it
+/// explains together. Chosen: nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
-/// Bins of equal count in which what is left is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
-/// [`FEWEST_ROWS`] each in 20 s.
+/// Bins of equal count in which the residual is averaged against a variable. Chosen: six see a slope, a bend and a
+/// step, and hold [`FEWEST_ROWS`] each in 20 s.
 pub(crate) const SHAPE_BINS: usize = 6;
 /// An effect that mends less than this share of what another of the same equation does may be that one's error. Chosen: a law that
 /// is wrong by 3 % leaves that much.

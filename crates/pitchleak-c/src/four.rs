@@ -77,7 +77,7 @@ pub unsafe extern "C" fn pitchleak4_save(
     unsafe { running::save(estimator, bytes, length) }
 }
 
-/// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; where it is none the
+/// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; where it is damaged or another's the
 /// estimator stays as it was.
 ///
 /// # Safety

@@ -1,4 +1,4 @@
-//! Whether what is left can be the sensors' noise, and if not, where it shows.
+//! Whether the residual can be the sensors' noise, and if not, where it shows.
 
 use super::residual::whitened_residual;
 use crate::channels::ChannelFault;
@@ -7,7 +7,7 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::EquationResidual;
 use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, RESIDUAL_TESTS, SHAPE_BINS};
-use crate::diagnose::weak_form::Nameless;
+use crate::diagnose::weak_form::SignalProduct;
 use crate::diagnose::{search, statistics};
 
 fn name(equation: Equation) -> &'static str {
@@ -18,9 +18,9 @@ fn name(equation: Equation) -> &'static str {
     }
 }
 
-/// What is left of an equation beyond noise, by what of the sum of squares a model that knew of it would mend: zero where noise may be
-/// all that is left.
-struct Leftover {
+/// The residual of an equation beyond noise, as the part of its sum of squares that a complete model would take away:
+/// zero where it may be noise.
+struct Excess {
     /// Size in that of the sensors' noise.
     noise_ratio: f64,
     by_size: f64,
@@ -29,7 +29,7 @@ struct Leftover {
     by_variable: Vec<(&'static str, f64)>,
 }
 
-impl Leftover {
+impl Excess {
     fn of(fit: &Fit<'_>, equation: Equation) -> Self {
         let noise_ratio = fit.noise_ratio()[equation];
         let count = fit.innovations(equation).len() as f64;
@@ -43,7 +43,7 @@ impl Leftover {
         }
     }
 
-    /// They see the same from three sides: the largest counts.
+    /// Three views of one thing: the largest counts.
     fn most(&self) -> f64 {
         self.by_variable.iter().map(|(_, chi2)| *chi2).fold(self.by_size.max(self.by_colour), f64::max)
     }
@@ -53,48 +53,48 @@ impl Leftover {
 pub(crate) struct Inadequacy {
     /// In sentences; none when the model is complete.
     pub(crate) complaints: Vec<String>,
-    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
     pub(crate) left: PerEquation<f64>,
 }
 
-/// Reasons to believe that more than noise is left.
+/// Reasons to believe that the residual is more than noise.
 pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
-    let left = PerEquation::from_fn(|equation| Leftover::of(fit, equation));
+    let left = PerEquation::from_fn(|equation| Excess::of(fit, equation));
     let mut complaints = Vec::new();
     for (equation, left) in left.iter() {
         let (name, ratio) = (name(equation), left.noise_ratio);
         if ratio > 1.0 {
-            complaints.push(format!("what is left in {name} is {ratio:.2} times the sensors' noise"));
+            complaints.push(format!("the residual of {name} is {ratio:.2} times the sensors' noise"));
         } else if left.by_colour > 0.0 {
-            complaints.push(format!("what is left in {name} is as small as noise but not white"));
+            complaints.push(format!("the residual of {name} is as small as noise but not white"));
         }
     }
     for (equation, left) in left.iter().filter(|(_, left)| !left.by_variable.is_empty()) {
         let names: Vec<_> = left.by_variable.iter().map(|(name, _)| *name).collect();
-        complaints.push(format!("what is left in {} goes with {}", name(equation), names.join(", ")));
+        complaints.push(format!("the residual of {} goes with {}", name(equation), names.join(", ")));
     }
     if let Some((product, chi2_drop)) = beyond_chance(fit) {
         let (sigma, words) = (chi2_drop.sqrt(), product.words());
         complaints.push(format!(
-            "what is left follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
+            "the residual follows a product of signals that no known effect makes ({sigma:.1} sigma): {words}"
         ));
     }
     Inadequacy { complaints, left: PerEquation::from_fn(|equation| left[equation].most()) }
 }
 
-/// The product of signals that no known effect makes which what is left follows beyond chance.
-fn beyond_chance(fit: &Fit<'_>) -> Option<(Nameless, f64)> {
-    let by_chance = statistics::bonferroni_sigma(LEAST_P, Nameless::ALL.len()).powi(2);
-    search::strongest_nameless(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
+/// The product of signals, made by no known effect, that the residual follows beyond chance.
+fn beyond_chance(fit: &Fit<'_>) -> Option<(SignalProduct, f64)> {
+    let by_chance = statistics::bonferroni_sigma(LEAST_P, SignalProduct::ALL.len()).powi(2);
+    search::strongest_product(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
 }
 
 /// What such a product would mend.
-pub(crate) fn nameless_excess(fit: &Fit<'_>) -> f64 {
+pub(crate) fn product_excess(fit: &Fit<'_>) -> f64 {
     beyond_chance(fit).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
-/// Variables on which what is left depends, in whatever shape, and what their shape would mend: by its means in bins of equal count
-/// against each.
+/// Variables on which the residual depends, in whatever shape, with the part of the sum of squares that the shape
+/// explains: its means in bins of equal count.
 fn dependences(fit: &Fit<'_>, equation: Equation) -> impl Iterator<Item = (&'static str, f64)> {
     let residual = whitened_residual(fit, equation);
     residual.into_iter().flat_map(|residual| {

@@ -1,4 +1,4 @@
-//! Whether a named effect stands by itself: each is held against its rivals, against what is left, against the effects
+//! Whether a named effect stands by itself: each is held against its rivals, against the residual, against the effects
 //! beside it, and against what physics allows.
 
 use super::adequacy;
@@ -15,11 +15,11 @@ use pitchleak_core::effects::EffectKind;
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
 pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
-    own_doubts(selection, one, judgement).or_else(|| doubtful_company(selection, one, judgement))
+    own_doubts(selection, one, judgement).or_else(|| doubtful_beside(selection, one, judgement))
 }
 
 /// In an equation that stays incomplete a doubtful effect may have taken some of this one's share.
-fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn doubtful_beside(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
     let acts = acts_in(fit, one.term);
     let is_doubtful = |other: &&Selected| {
@@ -32,7 +32,9 @@ fn doubtful_company(selection: &Selection<'_>, one: &Selected, judgement: &Judge
     };
     let other = selection.effects.iter().find(is_doubtful)?;
     let id = fit.problem.terms[other.term].effect()?.spec().id;
-    Some(format!("more than noise is left where {id}, which is doubtful, may have taken some of its share"))
+    Some(format!(
+        "the residual is more than noise where {id}, which is doubtful, may have taken some of its share"
+    ))
 }
 
 fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
@@ -41,8 +43,8 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
         rivals(one),
         remainder(fit, one, judgement),
         unnamed(fit, one, judgement),
-        company(selection, one, judgement),
-        lopsided(selection, one),
+        law_error(selection, one, judgement),
+        one_sided_friction(selection, one),
         bounds(fit, one),
         negative_mass(fit, one),
         replaceable(fit, one),
@@ -81,12 +83,12 @@ fn rivals(one: &Selected) -> Option<String> {
     (!ids.is_empty()).then(|| format!("these traces do not tell it from {}", ids.join(", ")))
 }
 
-/// What is left where it acts is not small beside what it mends.
+/// The residual where it acts is not small beside what it explains.
 fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
-    if one.beaten_by_nameless {
+    if one.worse_than_product {
         return Some("a product of signals without a name fits better".to_owned());
     }
-    if let Some(product) = one.like_nameless {
+    if let Some(product) = one.like_product {
         return Some(format!("what no effect of the table makes fits as well: {}", product.words()));
     }
     let mut acts = acts_in(fit, one.term);
@@ -97,18 +99,18 @@ fn remainder(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Str
     let there = |equation: Equation| if acts[equation] { judgement.left[equation] } else { 0.0 };
     let named = fit.problem.terms[one.term].effect().map(|effect| effect.spec().id);
     let left: f64 = Equation::ALL.into_iter().map(there).sum::<f64>()
-        + adequacy::nameless_excess(fit)
+        + adequacy::product_excess(fit)
         + judgement.mended_by_products(fit, named);
     let mended = search::loss(fit, &[one.term]);
     (left > UNMENDED_SHARE * (mended + left)).then(|| {
-        "it mends part of what is missing, but more than the sensors' noise is left: something else may be behind it, not to be \
+        "it explains part of the residual, but the rest is more than the sensors' noise: something else may be behind it, not to be \
          believed without a measurement of its own"
             .to_owned()
     })
 }
 
-/// Where it acts something else is left, of which a candidate beyond chance mends too little for a name of its own: the rest of what that
-/// does may stand under this one's name.
+/// The residual where it acts is more than noise, and a candidate too weak for a name explains some of it: the rest of
+/// that one's share may stand under this one's name.
 fn unnamed(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let dispersion = fit.dispersion(fit.free.chi2);
     let acts = acts_in(fit, one.term);
@@ -121,12 +123,12 @@ fn unnamed(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Strin
     };
     let rival = search::open(fit).into_iter().find(is_rival)?;
     let id = fit.problem.terms[rival].effect()?.spec().id;
-    Some(format!("more than noise is left where it acts, and {id} goes with that"))
+    Some(format!("the residual where it acts is more than noise, and {id} goes with that"))
 }
 
 /// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that
 /// no effect explains, that error is of unknown size: only the strongest effect of an equation is believed.
-fn company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
+fn law_error(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<String> {
     let fit = &selection.fit;
     let acts = acts_in(fit, one.term);
     let shares_equation = |other: &&Selected| {
@@ -148,7 +150,7 @@ fn company(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> 
 }
 
 /// Dry friction that is larger one way is, as long as the piston moves, dry friction and an offset of the load.
-fn lopsided(selection: &Selection<'_>, one: &Selected) -> Option<String> {
+fn one_sided_friction(selection: &Selection<'_>, one: &Selected) -> Option<String> {
     let effect = |one: &Selected| selection.fit.problem.terms[one.term].effect();
     let is_dry = |effect: Effect| {
         matches!(effect, Effect::CoulombFriction | Effect::StribeckFriction | Effect::SealFriction)

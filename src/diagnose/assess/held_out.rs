@@ -1,4 +1,4 @@
-//! What is left of samples that were not fitted: its size, its course, its shape.
+//! The residual of samples that were not fitted: its size, its course, its shape.
 
 use super::residual::VARIABLES;
 use crate::diagnose::data::Series;
@@ -10,12 +10,12 @@ use crate::diagnose::weak_form::{Entry, Row, Rows};
 /// Bins of equal count against each variable.
 const BINS: usize = 12;
 
-/// What is left of each hat, in m³/s or N.
+/// The residual of each row, in m³/s or N.
 pub(crate) struct HeldOut {
     samples: Vec<ResidualSample>,
 }
 
-/// What is left of one hat.
+/// The residual of one row.
 struct ResidualSample {
     equation: Equation,
     t_s: f64,
@@ -64,7 +64,7 @@ impl HeldOut {
         PerEquation::from_fn(points)
     }
 
-    /// What is left against each variable, in bins of equal count.
+    /// The residual against each variable, in bins of equal count.
     pub(crate) fn binned(&self) -> Vec<BinnedResidual> {
         let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * BINS;
         let pairs = Equation::ALL.into_iter().filter(has_enough);

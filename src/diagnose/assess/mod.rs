@@ -1,4 +1,4 @@
-//! What is left once a model is fitted, and what it says about the model.
+//! The residual once a model is fitted, and what it says about the model.
 
 mod adequacy;
 mod confidence;

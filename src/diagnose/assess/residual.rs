@@ -1,4 +1,4 @@
-//! What a model leaves over, as numbers that should be white noise: whitened by the sensors' noise, tested,
+//! The residual of a model, as numbers that should be white noise: whitened by the sensors' noise, tested,
 //! and held against every variable.
 
 use crate::diagnose::equation::Equation;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// Fewer numbers than this have no distribution.
 const FEWEST: usize = 80;
 
-/// A variable that what is left may go with.
+/// A variable that the residual may go with.
 pub(super) struct Variable {
     pub(super) name: &'static str,
     pub(super) of: fn(&Row) -> f64,
@@ -32,7 +32,7 @@ pub(super) const VARIABLES: [Variable; 11] = [
     Variable { name: "t_s", of: |row| row.t_s },
 ];
 
-/// What a fit leaves over of one equation; none where the traces lack it.
+/// The residual of a fit in one equation; none where the traces lack it.
 pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<EquationResidual> {
     let (rows, white): (Vec<Option<&Row>>, Vec<f64>) = fit
         .regression

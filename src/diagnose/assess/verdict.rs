@@ -16,7 +16,7 @@ pub(crate) struct Judgement {
     pub(crate) complaints: Vec<String>,
     /// The complaints among them of sensors that fail by themselves.
     pub(crate) failures: Vec<String>,
-    /// What is left of each equation beyond noise, as a part of the sum of squares.
+    /// The residual of each equation beyond noise, as a part of the sum of squares.
     pub(crate) left: PerEquation<f64>,
     /// Where the effects together made the error on held-out samples smaller.
     pub(crate) fell: PerEquation<bool>,
@@ -44,7 +44,7 @@ pub(crate) fn judge(
     let Selection { fit, effects } = selection;
     let Inadequacy { mut complaints, left } = inadequacy(fit);
     complaints.extend_from_slice(&failures);
-    if effects.iter().any(|one| one.beaten_by_nameless) {
+    if effects.iter().any(|one| one.worse_than_product) {
         complaints.push("a product of signals without a name fits better than any known effect".to_owned());
     }
     let [before, after] = [before, after].map(|model| &model.quality.rmse);

@@ -52,8 +52,8 @@ impl<'a> Followed<'a> {
         own
     }
 
-    /// The play with the least squares of what is left of the difference between way and reading, block by block; none where it is
-    /// hardly less than without any.
+    /// The play with the least sum of squares of the difference between way and reading, block by block; none where it
+    /// is hardly less than without any.
     fn likely_play(&self) -> Option<f64> {
         let gone = without_mean(self.steps(|at| self.way_m[at] - self.x_m[at]));
         let left = |play_m: f64| {
@@ -91,7 +91,7 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// A drift that stays the same is none of a play.
+/// A steady drift is no sign of a play.
 fn without_mean(mut values: Vec<f64>) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter_mut().for_each(|value| *value -= mean);

@@ -51,7 +51,7 @@ impl Sides {
     /// Standard deviation of what a sensor with this play reads beside what its side says through a row, as if white from sample to sample; the
     /// play and this in standard deviations of its noise. A row is a hat over two blocks of m samples: white noise has a variance of 2/3 m
     /// there, what stays the same has m².
-    pub(crate) fn loudness(&self, samples: Range<usize>, play: f64) -> f64 {
+    pub(crate) fn noise_times(&self, samples: Range<usize>, play: f64) -> f64 {
         let own = self.side_std.get(samples).unwrap_or_default();
         let sum: f64 = own.iter().map(|std| std * std).sum();
         play * (0.75 * sum).sqrt()
@@ -135,6 +135,6 @@ mod tests {
         let own = Sides::of(&t, &read, NOISE_PA);
         let moving = own.side_std.iter().filter(|std| **std <= 0.0).count();
         assert!(moving < 30, "{moving} of 6000");
-        assert!(own.loudness(1000..1020, 0.0) == 0.0 && own.loudness(1000..1020, 40.0) > 50.0);
+        assert!(own.noise_times(1000..1020, 0.0) == 0.0 && own.noise_times(1000..1020, 40.0) > 50.0);
     }
 }

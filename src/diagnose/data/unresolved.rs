@@ -3,7 +3,7 @@
 
 use super::sensor_noise::{difference_order, differences};
 use super::series::Series;
-use crate::diagnose::thresholds::{LEAST_STEP_S, LOUD_SIGMA};
+use crate::diagnose::thresholds::{LEAST_STEP_S, UNRESOLVED_SIGMA};
 use pitchleak_core::Sensors;
 use std::ops::Range;
 
@@ -37,14 +37,14 @@ impl Unresolved {
     }
 
     /// Standard deviation of what is read in some samples, in those of the sensors' noise: one where noise explains it.
-    pub(crate) fn loudness(&self, samples: Range<usize>) -> [f64; 6] {
+    pub(crate) fn noise_times(&self, samples: Range<usize>) -> [f64; 6] {
         let of = |squares: &Vec<f64>| {
             // Differences count where their middle lies.
             let place = |sample: usize| sample.saturating_sub(self.order / 2).min(squares.len());
             let near =
                 squares[place(samples.start)..place(samples.end)].iter().filter(|square| square.is_finite());
             let (sum, count) = near.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
-            if sum > LOUD_SIGMA.powi(2) * count { (sum / count).sqrt() } else { 1.0 }
+            if sum > UNRESOLVED_SIGMA.powi(2) * count { (sum / count).sqrt() } else { 1.0 }
         };
         self.squares.as_ref().map_or([1.0; 6], |squares| squares.each_ref().map(of))
     }
@@ -74,16 +74,16 @@ mod tests {
     }
 
     #[test]
-    fn a_jolt_is_loud_where_it_is_and_noise_is_not() {
+    fn a_jolt_is_unresolved_where_it_is_and_noise_is_not() {
         let sensors = declared().sensors;
         let jolt = 30.0 * sensors.pressure.noise_std;
         let (quiet, jolted) = (Unresolved::of(&slow(0.0), &sensors), Unresolved::of(&slow(jolt), &sensors));
         let is_one = |times: &[f64; 6]| times.iter().all(|one| (one - 1.0).abs() < 1e-12);
-        let loud = (0..1190).step_by(2).filter(|at| !is_one(&quiet.loudness(*at..at + 4))).count();
+        let loud = (0..1190).step_by(2).filter(|at| !is_one(&quiet.noise_times(*at..at + 4))).count();
         assert!(loud < 5, "{loud} of 595 by chance");
-        let there = jolted.loudness(298..302);
+        let there = jolted.noise_times(298..302);
         assert!(there[1] > 5.0 && there[2] < 2.0, "{there:?}");
-        let beside = (jolted.loudness(320..324)[1], quiet.loudness(320..324)[1]);
+        let beside = (jolted.noise_times(320..324)[1], quiet.noise_times(320..324)[1]);
         assert!((beside.0 - beside.1).abs() < 1e-12, "{beside:?}");
     }
 }

@@ -5,8 +5,8 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{BISECTIONS, CHANCE_SIGMA};
 use crate::diagnose::weak_form::{WeakForm, Whitening};
 
-/// Equation error with which what is left would be as large as the noise says, so that neither priors nor weak effects
-/// are overrun by it; zero where what is left can be the sensors' noise. By bisection.
+/// Equation error with which the residual would be as large as the noise says, so that neither priors nor weak effects
+/// are overrun by it; zero where the residual can be the sensors' noise. By bisection.
 pub(super) fn estimate(
     weak_form: &WeakForm<'_>,
     regression: &Regression,

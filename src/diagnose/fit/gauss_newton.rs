@@ -52,7 +52,7 @@ pub(crate) struct Fit<'a> {
     pub(crate) held_compressibility: Option<f64>,
     /// Variance of each equation's error that the regression was weighted with.
     assumed_error: PerEquation<f64>,
-    /// The same as it shows in what this fit leaves over, m⁶/s² and N²: zero while that can be the sensors' noise.
+    /// The equation error that shows in this fit's residual, m⁶/s² and N²: zero while that can be the sensors' noise.
     pub(super) equation_error: PerEquation<f64>,
     /// Filled when it is asked for.
     pub(super) colour: PerEquation<OnceLock<Option<f64>>>,
@@ -117,7 +117,8 @@ impl<'a> Fit<'a> {
         Self::with_columns(&every, problem, structure, (at.clone(), at), assumed_error)
     }
 
-    /// The same with the columns of some terms alone, all that are fitted among them, and the noise taken elsewhere.
+    /// As [`around`](Self::around), with the columns of some terms alone, all that are fitted among them, and the noise
+    /// taken elsewhere.
     fn with_columns(
         places: &[usize],
         problem: &'a Problem<'a>,
@@ -240,12 +241,12 @@ impl<'a> Fit<'a> {
         self.estimate(term).is_some_and(|own| ends.iter().any(|end| (own.value - end).abs() <= own.std))
     }
 
-    /// Whether more is left than the sensors' noise.
+    /// Whether the residual is more than the sensors' noise.
     pub(crate) fn is_incomplete(&self) -> bool {
         self.equation_error.iter().any(|(_, error)| *error > 0.0)
     }
 
-    /// Size of what is left as a multiple of the noise that the sensors bring.
+    /// Size of the residual as a multiple of the noise that the sensors bring.
     pub(crate) fn noise_ratio(&self) -> PerEquation<f64> {
         self.noise_ratios(self.equation_error)
     }

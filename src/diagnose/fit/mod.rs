@@ -1,12 +1,12 @@
-//! The declared model and effects beside it, fitted to all traces at once.
+//! The declared model and its effects, fitted to all traces together.
 
 mod equation_error;
 mod gauss_newton;
-mod own_noise;
 mod predict;
 mod problem;
 mod regression;
 mod score;
+mod whiteness;
 mod widening;
 
 pub(crate) use gauss_newton::Fit;

@@ -9,7 +9,7 @@ use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, WeakForm, residual
 use pitchleak_core::effects::EffectKind;
 use pitchleak_core::{Effect, Estimate, Signals};
 
-/// Flow that leaves a chamber, averaged over a hat.
+/// Flow that leaves a chamber, averaged over a test function.
 pub(crate) struct MeanFlow {
     pub(crate) chamber: Equation,
     pub(crate) row: Row,
@@ -28,7 +28,7 @@ impl Fit<'_> {
         self.regression.innovations(self.rows(), &self.bounded, equation)
     }
 
-    /// What is left of each entry when its fold is not fitted, in the equation's unit.
+    /// The residual of each entry when its fold is not fitted, in the equation's unit.
     pub(crate) fn held_out_residual(&self) -> Vec<f64> {
         let priors = self.held_priors();
         let mut residual = vec![0.0; self.rows().y.len()];
@@ -43,7 +43,7 @@ impl Fit<'_> {
         self.in_units(self.rows(), residual)
     }
 
-    /// What is left of traces that were not fitted, in the equations' units.
+    /// The residual of traces that were not fitted, in the equations' units.
     pub(crate) fn residual_on(&self, traces: &[Series]) -> (Rows, Vec<f64>) {
         let rows = residual_rows(traces, &self.problem.sensors, &self.solved(), BLOCK_S);
         let residual = self.in_units(&rows, rows.y.clone());

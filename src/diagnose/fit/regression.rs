@@ -158,8 +158,9 @@ impl Regression {
         shares
     }
 
-    /// Of columns that are the left side itself all products. Of the others that with what is left, which holds at the solution and
-    /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
+    /// Of columns that are the left side itself all products. Of the others that with the residual, which holds at the
+    /// solution and lets the linearisations find it; their own squares stay, so that no column is left with less than
+    /// nothing.
     fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
         let y = self.columns.len();
         for a in &noise.columns {
@@ -208,7 +209,7 @@ impl Regression {
     }
 
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
-    /// where what is left is neither white nor of known size.
+    /// where the residual is neither white nor of known size.
     pub(crate) fn jackknife(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
         let fits = self.leave_one_out(terms, priors);
         let of = |i: usize| jackknife_std(fits.iter().map(|fit| fit.value[i]));
@@ -277,7 +278,7 @@ impl Regression {
         self.innovations_by_entry(rows, solution, equation).map(|(_, value)| value).collect()
     }
 
-    /// The same with the entry that each belongs to.
+    /// Innovations with the entry that each belongs to.
     pub(crate) fn innovations_by_entry<'a>(
         &'a self,
         rows: &'a Rows,
@@ -323,7 +324,7 @@ fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     )
 }
 
-/// What the fit leaves over of each entry, in the equation's own unit times seconds.
+/// The fit's residual of each entry, in the equation's own unit times seconds.
 pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
     let mut residual = rows.y.clone();
     for (term, value) in solution.terms.iter().zip(&solution.value) {

@@ -14,8 +14,8 @@ pub struct FoundEffect {
     pub std: f64,
     /// SI; 1 for a share.
     pub unit: &'static str,
-    /// Whether the name can be believed, by itself: no rival fits as well, little is left where it acts, no larger effect beside it could
-    /// pass for it, and neither its value nor a leak beside it is impossible.
+    /// Whether the name can be believed, by itself: no rival fits as well, the residual is small where it acts, no
+    /// larger effect beside it could pass for it, and neither its value nor a leak beside it is impossible.
     pub confident: bool,
     /// Why not.
     pub doubt: Option<String>,

@@ -18,11 +18,11 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// With the effects named, what is left is sensor noise.
+    /// With the effects named, the residual is sensor noise.
     Explained,
-    /// The effects named mend much, but more than sensor noise is left.
+    /// The effects named explain much, but the residual is more than sensor noise.
     PartlyExplained,
-    /// What the declared model leaves over is sensor noise.
+    /// The residual of the declared model is sensor noise.
     NoMissingEffect,
     /// Something is missing, and no known effect fits.
     Unexplained,
@@ -33,10 +33,10 @@ pub enum Verdict {
 /// How well a model fits: on samples it did not see (`rmse`), and as noise (`whiteness_p`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quality {
-    /// Root mean square of what is left, averaged over hats of 0.2 s, on held-out samples, m³/s and N; none
+    /// Root mean square of the residual, averaged over 0.2 s, on held-out samples, m³/s and N; none
     /// where the traces lack the equation.
     pub rmse: PerEquation<Option<f64>>,
-    /// Probability that what is left is white noise of the declared size (portmanteau test).
+    /// Probability that the residual is white noise of the declared size (portmanteau test).
     pub whiteness_p: PerEquation<Option<f64>>,
 }
 
@@ -47,13 +47,13 @@ pub struct ModelFit {
     pub quality: Quality,
     /// Leaks and bulk modulus.
     pub leaks: LeakEstimates,
-    /// Size of what is left as a multiple of the sensors' noise.
+    /// Size of the residual as a multiple of the sensors' noise.
     pub noise_ratio: PerEquation<f64>,
-    /// What is left of the fitted samples, whitened and tested; none where the traces lack the equation.
+    /// The residual of the fitted samples, whitened and tested; none where the traces lack the equation.
     pub residuals: PerEquation<Option<EquationResidual>>,
-    /// What is left of held-out samples against each variable.
+    /// The residual of held-out samples against each variable.
     pub binned_residuals: Vec<BinnedResidual>,
-    /// The same over time: s, and m³/s or N, averaged over hats of 0.2 s.
+    /// The residual of held-out samples over time: s, and m³/s or N, averaged over 0.2 s.
     pub residual_over_time: PerEquation<Vec<(f64, f64)>>,
 }
 

@@ -1,4 +1,4 @@
-//! What a model leaves over.
+//! The residual of a model.
 
 use crate::diagnose::equation::Equation;
 use crate::diagnose::statistics::bonferroni_sigma;
@@ -6,12 +6,12 @@ use crate::diagnose::thresholds::{CHANCE_RATE, RESIDUAL_TESTS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a model leaves over of one equation: a number per hat of 0.2 s, whitened (docs/closing-the-loop.md). With the right model and the
-/// declared noise they are independent standard normal numbers.
+/// A model's residual in one equation: a number per row of 0.2 s, whitened (docs/diagnosis.md). With the right model
+/// and the declared noise they are independent standard normal numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct EquationResidual {
-    /// The whitened numbers, in the order of time. Where more than the sensors' noise is left, they are
-    /// whitened by what is left.
+    /// The whitened numbers, in the order of time. Where the residual is more than the sensors' noise, they are
+    /// whitened by its own size.
     #[serde(skip)]
     pub white: Vec<f64>,
     /// What the machine did then, by variable, SI: read from samples that the number does not contain, not a
@@ -20,11 +20,11 @@ pub struct EquationResidual {
     pub variables: BTreeMap<&'static str, Vec<f64>>,
     /// How many numbers.
     pub count: usize,
-    /// Size of what is left as a multiple of the sensors' noise.
+    /// Size of the residual as a multiple of the sensors' noise.
     #[serde(rename = "excess")]
     pub noise_ratio: f64,
-    /// Probability of autocorrelations this large in white noise (Box and Pierce 1970), whitened at the noise that is left
-    /// and where samples are fast enough to see the motion.
+    /// Probability of autocorrelations this large in white noise (Box and Pierce 1970), whitened at the residual's own
+    /// noise and where samples are fast enough to see the motion.
     pub whiteness_p: Option<f64>,
     /// Probability of skewness and kurtosis this far off in normal numbers (Jarque and Bera 1980, "Efficient tests
     /// for normality, homoscedasticity and serial independence of regression residuals", Econ. Lett. 6).
@@ -37,7 +37,7 @@ pub struct EquationResidual {
     pub correlations: BTreeMap<&'static str, Correlation>,
 }
 
-/// How what is left goes with a variable.
+/// How the residual goes with a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Correlation {
     /// Pearson's coefficient.
@@ -48,7 +48,7 @@ pub struct Correlation {
 }
 
 impl EquationResidual {
-    /// Autocorrelation at lags of 1 to `lags` hats; white noise stays within ± 1.96/√count.
+    /// Autocorrelation at lags of 1 to `lags` rows; white noise stays within ± 1.96/√count.
     pub fn autocorrelation(&self, lags: usize) -> Vec<f64> {
         let power: f64 = self.white.iter().map(|w| w * w).sum();
         let at = |lag: usize| {
@@ -58,7 +58,7 @@ impl EquationResidual {
         (1..=lags).map(at).collect()
     }
 
-    /// Variables that what is left goes with beyond chance (`sigma` standard deviations), strongest first.
+    /// Variables that the residual goes with beyond chance (`sigma` standard deviations), strongest first.
     pub fn goes_with(&self, sigma: f64) -> Vec<(&'static str, Correlation)> {
         let mut found: Vec<_> = self.correlations.iter().map(|(name, c)| (*name, *c)).collect();
         found.retain(|(_, c)| c.sigma.abs() > sigma);
@@ -72,7 +72,7 @@ impl EquationResidual {
     }
 }
 
-/// What is left against one variable: means in bins of equal count.
+/// The residual against one variable: means in bins of equal count.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BinnedResidual {
     /// Of which equation.
@@ -82,9 +82,9 @@ pub struct BinnedResidual {
     pub against: &'static str,
     /// Middle of each bin, SI.
     pub at: Vec<f64>,
-    /// Mean of what is left there, SI.
+    /// Mean of the residual there, SI.
     pub mean: Vec<f64>,
-    /// Standard error of each mean, as if the hats were independent, SI.
+    /// Standard error of each mean, as if the rows were independent, SI.
     pub std_error: Vec<f64>,
     /// Correlation of the two.
     pub correlation: f64,

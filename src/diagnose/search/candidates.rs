@@ -3,7 +3,7 @@
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE};
-use crate::diagnose::weak_form::{Nameless, Term};
+use crate::diagnose::weak_form::{SignalProduct, Term};
 use pitchleak_core::effects::EffectConstants;
 
 /// Places of the terms that could be named.
@@ -23,18 +23,18 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
 }
 
 /// The product of signals without a name that would bring most to a model, and by how much the sum of squares would fall.
-pub(crate) fn strongest_nameless(fit: &Fit<'_>, model: &Solution) -> Option<(Nameless, f64)> {
+pub(crate) fn strongest_product(fit: &Fit<'_>, model: &Solution) -> Option<(SignalProduct, f64)> {
     let terms = fit.problem.terms.iter().enumerate();
     let scored = terms.filter_map(|(place, term)| {
-        let Term::Nameless(product) = term else { return None };
+        let Term::SignalProduct(product) = term else { return None };
         Some((*product, fit.score(model, place)?.chi2_drop))
     });
     scored.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// By how much it would fall.
-pub(super) fn nameless_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
-    strongest_nameless(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
+pub(super) fn product_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
+    strongest_product(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
 /// A whitened column of a term with constants that are not its present ones.

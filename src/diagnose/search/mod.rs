@@ -10,7 +10,7 @@ mod selection;
 mod split;
 mod trials;
 
-pub(crate) use candidates::{critical_sigma, open, strongest_nameless};
+pub(crate) use candidates::{critical_sigma, open, strongest_product};
 pub use collinearity::{Candidate, Collinearity};
 pub(crate) use constants::std_of_constants;
 pub(crate) use interaction::interactions;

@@ -1,12 +1,12 @@
 //! Forward selection by the score test, with backward elimination, each step confirmed on data that it did not fit.
 
-use super::candidates::{Candidates, critical_sigma, nameless_chi2_drop, strongest_nameless};
+use super::candidates::{Candidates, critical_sigma, product_chi2_drop, strongest_product};
 use super::selection::{Selected, Selection, loss, with};
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{AGREED_SIGMA, CONFUSABLE_CHI2, LEAST_MENDED_SHARE, MOST_EFFECTS};
-use crate::diagnose::weak_form::Nameless;
+use crate::diagnose::weak_form::SignalProduct;
 
 impl Selection<'_> {
     /// Adds the next effect; false when nothing further is significant.
@@ -14,7 +14,7 @@ impl Selection<'_> {
         self.add_best(|_, _| true, progress)
     }
 
-    /// The same among some terms alone.
+    /// Adds the best of the wanted effects; false when none is significant.
     pub(super) fn add_best(
         &mut self,
         is_wanted: impl Fn(&Fit<'_>, usize) -> bool,
@@ -36,8 +36,8 @@ impl Selection<'_> {
             p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
             mended_percent: None,
             confusable_with: vec![],
-            like_nameless: None,
-            beaten_by_nameless: nameless_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
+            like_product: None,
+            worse_than_product: product_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
         });
         self.fit = with(fit, &[], &trial, progress);
         true
@@ -84,8 +84,9 @@ impl Selection<'_> {
             let lost = without.chi2 - fit.free.chi2;
             let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
             let rivals = candidates.trials(&without).into_iter().filter(is_close);
-            let is_near = |(_, chi2_drop): &(Nameless, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            one.like_nameless = strongest_nameless(fit, &without).filter(is_near).map(|(product, _)| product);
+            let is_near =
+                |(_, chi2_drop): &(SignalProduct, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
+            one.like_product = strongest_product(fit, &without).filter(is_near).map(|(product, _)| product);
             one.confusable_with =
                 rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
         }

@@ -5,7 +5,7 @@ use super::constants;
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::thresholds::{CONFUSABLE_CHI2, LEAST_CLIMB};
-use crate::diagnose::weak_form::Nameless;
+use crate::diagnose::weak_form::SignalProduct;
 use pitchleak_core::Effect;
 
 /// One effect of the answer, by its place among the problem's terms.
@@ -18,9 +18,9 @@ pub(crate) struct Selected {
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
     /// A product of signals without a name that fits nearly as well in its place.
-    pub(crate) like_nameless: Option<Nameless>,
+    pub(crate) like_product: Option<SignalProduct>,
     /// A product of signals without a name would have fitted better.
-    pub(crate) beaten_by_nameless: bool,
+    pub(crate) worse_than_product: bool,
 }
 
 #[cfg(test)]
@@ -32,8 +32,8 @@ impl Selected {
             p_value: 1.0,
             mended_percent: None,
             confusable_with: vec![],
-            like_nameless: None,
-            beaten_by_nameless: false,
+            like_product: None,
+            worse_than_product: false,
         }
     }
 }

@@ -5,7 +5,7 @@ use super::selection::Selection;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::thresholds::FORCE_ONLY_SHARE;
 
-/// Gives the place of such an effect to two beside which nothing is left unexplained; false where all keep theirs.
+/// Gives the place of such an effect to two beside which the residual is noise; false where all keep theirs.
 pub(super) fn split_one(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     if !all.fit.is_incomplete() {
         return false;
@@ -26,7 +26,7 @@ fn parts<'a>(all: &Selection<'a>, at: usize, progress: Progress<'_>) -> Option<S
     let is_part = |fit: &Fit<'_>, term: usize| force_share(fit, term) >= FORCE_ONLY_SHARE;
     let are_named = parts.add_best(is_part, progress) && parts.add_next(progress);
     // While its partner was missing, a product of signals did the work of that.
-    parts.effects.iter_mut().skip(all.effects.len() - 1).for_each(|one| one.beaten_by_nameless = false);
+    parts.effects.iter_mut().skip(all.effects.len() - 1).for_each(|one| one.worse_than_product = false);
     (are_named && !parts.fit.is_incomplete()).then_some(parts)
 }
 

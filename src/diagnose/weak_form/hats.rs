@@ -1,4 +1,4 @@
-//! Integrals along a trace, weighted by hats over two neighbouring blocks of samples.
+//! Integrals along a trace, weighted by triangular test functions (hats) over two neighbouring blocks of samples.
 
 use super::linearisation::{Linearisation, as_felt};
 use super::terms::Term;
@@ -11,9 +11,9 @@ use pitchleak_core::effects::EffectConstants;
 /// What is integrated along a trace: over a step, up to a sample, over a block or a hat.
 #[derive(Clone)]
 pub(crate) struct Integrals {
-    /// What the model leaves over, m³ and N·s.
+    /// The model's residual, m³ and N·s.
     pub(crate) residual: PerEquation<f64>,
-    /// What one unit of each term leaves over.
+    /// What one unit of each term adds to the residual.
     pub(crate) columns: Vec<PerEquation<f64>>,
     pub(crate) time_s: f64,
     /// Time during which the direction of motion is unknown.
@@ -155,7 +155,7 @@ impl Step {
         mean.map(|value| if (value * self.dt_s).is_finite() { value * self.dt_s } else { 0.0 })
     }
 
-    /// What one unit of a term leaves over, integrated.
+    /// What one unit of a term adds to the residual, integrated.
     pub(super) fn column(&self, active: &ActiveTerm, at: &Linearisation) -> PerEquation<f64> {
         let ActiveTerm { term, in_force, constants } = active;
         self.integral(|seen, felt| at.both_unit_terms((*term, *in_force), constants, seen, felt))

@@ -46,27 +46,27 @@ impl Linearisation {
         }
     }
 
-    /// What is left of the three equations at corrected readings.
+    /// Residuals of the three equations at corrected readings.
     pub(crate) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
         let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
         self.model.residual(at).plus(-1.0, known)
     }
 
-    /// What is left of the equations at readings as the sensors show them: the chambers by the position's own speed,
+    /// Residuals of the equations at readings as the sensors show them: the chambers by the position's own speed,
     /// the forces by speed and acceleration of `felt`.
     pub(crate) fn both_residuals(&self, reading: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
         let seen = self.effects.correct(reading);
         self.residual_of(&seen, &as_felt(&seen, felt))
     }
 
-    /// The same at corrected readings.
+    /// Residuals of the equations at corrected readings: those `seen`, and those that forces feel.
     pub(crate) fn residual_of(&self, seen: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
         let mut residual = PerEquation::from(self.residual(seen));
         residual.force = self.residual(felt).force_n;
         residual
     }
 
-    /// What one unit of a term leaves there.
+    /// What one unit of a term adds to them.
     pub(crate) fn both_unit_terms(
         &self,
         (term, in_force): (Term, bool),
@@ -79,7 +79,7 @@ impl Linearisation {
         unit
     }
 
-    /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what
+    /// What one unit of a term adds to [`Self::residual`] at corrected readings: a sensor's error also spoils what
     /// the physical effects found so far are computed from.
     pub(crate) fn unit_term(
         &self,
@@ -109,11 +109,11 @@ impl Linearisation {
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
             }
-            Term::Nameless(_) | Term::Product(..) => 0.0,
+            Term::SignalProduct(_) | Term::Product(..) => 0.0,
         }
     }
 
-    /// The same with one term at another value, held within what physics allows.
+    /// This linearisation with one term at another value, held within what physics allows.
     #[must_use]
     pub(crate) fn with(mut self, term: Term, value: f64, constants: &EffectConstants<f64>) -> Self {
         self.set(term, value, constants);
@@ -131,7 +131,7 @@ impl Linearisation {
             Term::ExternalA => leaks.external_a = value,
             Term::ExternalB => leaks.external_b = value,
             Term::Effect(effect) => self.set_effect(effect, value, constants),
-            Term::Nameless(_) | Term::Product(..) => {}
+            Term::SignalProduct(_) | Term::Product(..) => {}
         }
     }
 

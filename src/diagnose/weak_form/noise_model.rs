@@ -128,8 +128,8 @@ impl NoiseModel<'_> {
                     of_channel += one * other * weights[k][l] * steps[k] * steps[l];
                 }
             }
-            let loudness = first.loudness[place] * second.loudness[place];
-            sum += of_channel * loudness * channel.noise_std(self.sensors, self.at).powi(2);
+            let noise_times = first.noise_times[place] * second.noise_times[place];
+            sum += of_channel * noise_times * channel.noise_std(self.sensors, self.at).powi(2);
         }
         let error = if a == b { self.equation_error[a] } else { 0.0 };
         sum + weights[0][0] * step_s * step_s * error

@@ -1,4 +1,4 @@
-//! The weak form: each equation of the cylinder integrated against hat functions.
+//! The weak form: each equation of the cylinder integrated against triangular test functions (hats).
 //!
 //! For blocks of m samples, the difference of two neighbouring block means of any running integral
 //! is that integrand weighted by a hat over both blocks. So ∫ hat·ẋ dt is x̄_{k+1} − x̄_k, the difference
@@ -18,14 +18,14 @@ use std::ops::Range;
 pub(crate) struct Row {
     /// Consecutive rows with the same number share a block.
     pub(crate) stretch: usize,
-    /// Time at the hat's peak, s.
+    /// Time at the test function's peak, s.
     pub(crate) t_s: f64,
     /// Length of a block, s, and its samples.
     pub(crate) block_s: f64,
     pub(crate) samples: usize,
     /// Averages over both blocks.
     pub(crate) mean: Signals<f64>,
-    /// Share of the hat during which the direction of motion is unknown.
+    /// Share of the row's time in which the direction of motion is unknown.
     pub(crate) stuck: f64,
     /// Whether its balance of forces is not seen: the speed jumps between samples, and neither pressures nor load show the impulse that it
     /// takes; or a pressure sensor lies somewhere in a play that is larger than its noise.
@@ -56,7 +56,7 @@ pub(crate) struct Entry {
 pub(crate) struct Rows {
     pub(crate) rows: Vec<Row>,
     pub(crate) entries: Vec<Entry>,
-    /// What the model leaves over at the linearisation.
+    /// The model's residual at the linearisation.
     pub(crate) y: Vec<f64>,
     /// One column per term; empty where it was not asked for.
     pub(crate) columns: Vec<Vec<f64>>,
@@ -116,7 +116,7 @@ impl Rows {
         Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
     }
 
-    /// The same with its columns at these places among `count`.
+    /// The row with its columns at these places among `count`.
     pub(crate) fn at_places(self, places: &[usize], count: usize) -> Self {
         let mut columns = vec![vec![]; count];
         places.iter().zip(self.columns).for_each(|(place, column)| columns[*place] = column);
@@ -181,7 +181,7 @@ impl Rows {
     }
 
     /// What the machine does at `row`, read from the second hat after it: that shares no sample with it, so
-    /// that the noise of what is left at `row` does not show in what it is held against.
+    /// that the noise of the residual at `row` does not show in what it is held against.
     pub(crate) fn beside(&self, row: usize) -> Option<&Row> {
         let (own, later) = (self.rows.get(row)?, self.rows.get(row + 2)?);
         (own.stretch == later.stretch).then_some(later)

@@ -99,36 +99,37 @@ pub(crate) struct Sensitivity {
     /// By how much it grows with each channel's signal, rate and curvature.
     pub(crate) gains: [[f64; 3]; Channel::ALL.len()],
     /// The noise of each channel in that of its sensor: more where the trace moves faster than its samples tell.
-    pub(crate) loudness: [f64; Channel::ALL.len()],
+    pub(crate) noise_times: [f64; Channel::ALL.len()],
 }
 
 impl Default for Sensitivity {
     fn default() -> Self {
-        Self { gains: [[0.0; 3]; Channel::ALL.len()], loudness: [1.0; Channel::ALL.len()] }
+        Self { gains: [[0.0; 3]; Channel::ALL.len()], noise_times: [1.0; Channel::ALL.len()] }
     }
 }
 
 impl Sensitivity {
-    /// The same where position, pressures, flows and force are so loud.
+    /// These sensitivities where position, pressures, flows and force have so many times their noise.
     #[must_use]
-    pub(super) fn at_loudness(self, [x, pa, pb, qa, qb, force]: [f64; 6]) -> Self {
-        Self { loudness: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
+    pub(super) fn at_noise_times(self, [x, pa, pb, qa, qb, force]: [f64; 6]) -> Self {
+        Self { noise_times: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
     }
 
     /// Whether samples don't see all of the speed that forces feel.
-    pub(super) fn is_speed_loud(&self) -> bool {
-        self.loudness[Channel::FeltSpeed as usize] > 1.0
+    pub(super) fn is_speed_unresolved(&self) -> bool {
+        self.noise_times[Channel::FeltSpeed as usize] > 1.0
     }
 
     /// Whether samples don't see all that moves here.
-    pub(crate) fn is_loud(&self) -> bool {
-        self.loudness.iter().any(|times| *times > 1.0)
+    pub(crate) fn is_unresolved(&self) -> bool {
+        self.noise_times.iter().any(|times| *times > 1.0)
     }
 
-    /// The same where each channel has so many times the noise of its sensor; where it is loud, as it was.
+    /// These sensitivities where each channel has so many times the noise of its sensor; unchanged where samples miss
+    /// motion.
     #[must_use]
     pub(super) fn at_noise(mut self, times: &[f64; Channel::ALL.len()]) -> Self {
-        if !self.is_loud() {
+        if !self.is_unresolved() {
             let channels = self.gains.iter_mut().zip(times);
             channels.for_each(|(gains, times)| *gains = gains.map(|gain| gain * times));
         }

@@ -1,6 +1,6 @@
-//! What columns share with what the model leaves over, drawn again and again: noise of the same sensors.
+//! What columns share with the residual, drawn again and again: noise of the same sensors.
 
-use super::at_linearisation::Columns;
+use super::assembly::Columns;
 use super::noise_model::{HatWeights, NoiseModel, hat_weights};
 use super::rows::{Entry, Row, Rows};
 use super::sensitivity::Channel;
@@ -74,10 +74,10 @@ impl SharedNoise {
         let drawn: [InRows; Channel::ALL.len()] = Channel::ALL.map(of_channel);
         let in_row = |entry: &Entry| {
             let sensitivity = &noise.sensitivities[entry.row][entry.equation];
-            let of_one = |((gains, loudness), drawn): ((&[f64; 3], &f64), &InRows)| {
-                loudness * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
+            let of_one = |((gains, noise_times), drawn): ((&[f64; 3], &f64), &InRows)| {
+                noise_times * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
             };
-            sensitivity.gains.iter().zip(&sensitivity.loudness).zip(&drawn).map(of_one).sum()
+            sensitivity.gains.iter().zip(&sensitivity.noise_times).zip(&drawn).map(of_one).sum()
         };
         let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];

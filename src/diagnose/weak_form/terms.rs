@@ -1,8 +1,8 @@
 //! The unknowns of the fit: the declared model's own four constants, every effect of the core's
 //! table, and a few products of signals without a name that only serve to say "something else is there".
 
-use super::nameless::Nameless;
 use super::sensitivity::Channel;
+use super::signal_product::SignalProduct;
 use pitchleak_core::effects::{EffectConstants, EffectKind, LeftSide};
 use pitchleak_core::{Effect, Model, Signals, Terms};
 
@@ -20,7 +20,7 @@ pub(crate) enum Term {
     /// A candidate of the core's table.
     Effect(Effect),
     /// A product of signals that no known effect makes.
-    Nameless(Nameless),
+    SignalProduct(SignalProduct),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
 }
@@ -56,14 +56,14 @@ const PROBE: Signals<f64> = Signals {
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
 
-/// Every column: the declared model's, the candidates', the nameless ones.
+/// Every column: the declared model's, the candidates', the products of signals.
 pub(crate) fn all_terms() -> Vec<Term> {
     let known = Effect::ALL.iter().copied().map(Term::Effect);
-    DECLARED.into_iter().chain(known).chain(Nameless::ALL.map(Term::Nameless)).collect()
+    DECLARED.into_iter().chain(known).chain(SignalProduct::ALL.map(Term::SignalProduct)).collect()
 }
 
 impl Term {
-    /// What one unit leaves in the residual at an instant.
+    /// What one unit adds to the residual at an instant.
     pub(crate) fn unit_term(
         self,
         at: &Signals<f64>,
@@ -81,7 +81,7 @@ impl Term {
             Self::ExternalA => Terms { chamber_a_m3s: at.pa_pa, ..Terms::default() },
             Self::ExternalB => Terms { chamber_b_m3s: at.pb_pa, ..Terms::default() },
             Self::Effect(effect) => effect.unit_term(at, model, constants),
-            Self::Nameless(product) => product.unit_term(at, model),
+            Self::SignalProduct(product) => product.unit_term(at, model),
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
@@ -94,14 +94,14 @@ impl Term {
             Self::Effect(effect) if effect.spec().kind == EffectKind::Sensor => {
                 Some(effect.read(value, truth))
             }
-            Self::Nameless(product) => product.read(value, truth),
+            Self::SignalProduct(product) => product.read(value, truth),
             _ => None,
         }
     }
 
     /// A size that shows clearly.
     pub(super) fn usual_size(self) -> f64 {
-        self.effect().map_or(Nameless::USUAL_BEND, |effect| effect.spec().default_size)
+        self.effect().map_or(SignalProduct::USUAL_BEND, |effect| effect.spec().default_size)
     }
 
     /// Whether it is a leak.
@@ -109,7 +109,7 @@ impl Term {
         match self {
             Self::Internal | Self::ExternalA | Self::ExternalB => true,
             Self::Effect(effect) => effect.spec().kind.is_leak(),
-            Self::InverseBulk | Self::Nameless(_) | Self::Product(..) => false,
+            Self::InverseBulk | Self::SignalProduct(_) | Self::Product(..) => false,
         }
     }
 
@@ -122,26 +122,26 @@ impl Term {
                 let at = Signals { a_mps2: if is_sensor { 0.0 } else { PROBE.a_mps2 }, ..PROBE };
                 effect.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n != 0.0
             }
-            Self::Nameless(product) => product.in_force(),
+            Self::SignalProduct(product) => product.in_force(),
             Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
             _ => false,
         }
     }
 
-    /// The signals whose noise the column carries beside what the model leaves over: the channel, and whether its value (0) or
-    /// its rate (1). The others' columns are quiet against what they vary.
+    /// The signals whose noise the column carries beside that of the residual: the channel, and whether its value (0)
+    /// or its rate (1). The others' columns are quiet against what they vary.
     pub(crate) fn noisy_in(self) -> &'static [(Channel, usize)] {
         const SPEED: &[(Channel, usize)] = &[(Channel::Position, 1)];
         const STORAGE: &[(Channel, usize)] = &[(Channel::PressureA, 1), (Channel::PressureB, 1)];
         const FLOWS: &[(Channel, usize)] = &[(Channel::FlowA, 0), (Channel::FlowB, 0)];
         const FORCE: &[(Channel, usize)] = &[(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
         let effect = match self {
-            Self::InverseBulk | Self::Nameless(Nameless::StiffeningOil) => return STORAGE,
-            Self::Nameless(Nameless::DirectionLeak) => return SPEED,
-            Self::Nameless(Nameless::BentPressureA) => {
+            Self::InverseBulk | Self::SignalProduct(SignalProduct::StiffeningOil) => return STORAGE,
+            Self::SignalProduct(SignalProduct::DirectionLeak) => return SPEED,
+            Self::SignalProduct(SignalProduct::BentPressureA) => {
                 return &[(Channel::PressureA, 0), (Channel::PressureA, 1)];
             }
-            Self::Nameless(Nameless::BentPressureB) => {
+            Self::SignalProduct(SignalProduct::BentPressureB) => {
                 return &[(Channel::PressureB, 0), (Channel::PressureB, 1)];
             }
             // The direction turns with what both meters read.
@@ -163,7 +163,7 @@ impl Term {
     pub(crate) fn is_left_side(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().carries.is_some(),
-            Self::Nameless(product) => product == Nameless::DirectionLeak,
+            Self::SignalProduct(product) => product == SignalProduct::DirectionLeak,
             _ => false,
         }
     }

@@ -27,7 +27,7 @@ impl LineLayout {
         })
     }
 
-    /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); none where it cannot be read.
+    /// Time of a line, s since `epoch_ns` (or since its own stamp, if it is the first); none where it cannot be read.
     pub fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Option<f64> {
         let is_time =
             |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));

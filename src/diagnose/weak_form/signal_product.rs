@@ -2,9 +2,9 @@
 
 use pitchleak_core::{Model, Signals, Terms};
 
-/// Products of signals that stand for effects nobody listed.
+/// Products of signals: stand-ins for effects that the table lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Nameless {
+pub(crate) enum SignalProduct {
     /// Leak past the piston in proportion to |ẋ| P_L.
     SpeedLeak,
     /// Leak past the piston in proportion to ẋ P_L.
@@ -29,7 +29,7 @@ pub(crate) enum Nameless {
     StiffeningOil,
 }
 
-impl Nameless {
+impl SignalProduct {
     pub(crate) const ALL: [Self; 11] = [
         Self::SpeedLeak,
         Self::DirectionLeak,

@@ -85,7 +85,7 @@ impl<'a> WeakForm<'a> {
         self.noise_with(&self.sensitivities, equation_error)
     }
 
-    /// The same with other sensitivities.
+    /// The rows' noise at other sensitivities.
     pub(crate) fn noise_with<'b>(
         &'b self,
         sensitivities: &'b [PerEquation<Sensitivity>],
@@ -131,7 +131,7 @@ impl<'a> WeakForm<'a> {
     }
 }
 
-/// What a model leaves over along traces, in hats over blocks of `block_s`, without any column.
+/// The residual of a model along traces, in rows over blocks of `block_s`, without any column.
 pub(crate) fn residual_rows(
     traces: &[Series],
     sensors: &Sensors<f64>,
@@ -148,7 +148,7 @@ fn add_unresolved(
     (traces, motions): (&[Series], &[Motion]),
     (sensors, at): (&Sensors<f64>, &Linearisation),
 ) {
-    // As loudness is listed: position, pressures, flows.
+    // As noise_times is listed: position, pressures, flows.
     let plays = [
         (Effect::PositionHysteresis, sensors.position),
         (Effect::PressureHysteresisA, sensors.pressure),
@@ -160,18 +160,18 @@ fn add_unresolved(
     let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let samples = row.samples_in(&traces[row.trace()].t_s);
-        let mut times = unresolved[row.trace()].loudness(samples.clone());
+        let mut times = unresolved[row.trace()].noise_times(samples.clone());
         let motion = &motions[row.trace()];
         let sides = [&motion.x, &motion.pa, &motion.pb, &motion.qa, &motion.qb].into_iter().zip(plays);
         let [x, pa, pb, qa, qb, _] = &mut times;
         let mut is_unseen = false;
         for (times, (sides, play)) in [x, pa, pb, qa, qb].into_iter().zip(sides) {
-            let somewhere = sides.loudness(samples.clone(), play);
+            let somewhere = sides.noise_times(samples.clone(), play);
             *times = times.hypot(somewhere);
             is_unseen |= somewhere > 1.0;
         }
-        *own = PerEquation::from_fn(|equation| own[equation].at_loudness(times));
-        row.is_unseen = own.force.is_speed_loud() || is_unseen;
+        *own = PerEquation::from_fn(|equation| own[equation].at_noise_times(times));
+        row.is_unseen = own.force.is_speed_unresolved() || is_unseen;
     }
 }
 

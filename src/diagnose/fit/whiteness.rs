@@ -1,6 +1,7 @@
-//! What is left, whitened at the noise that it shows. What signals do from sample to sample beyond their sensors' declared
-//! noise is noise of a worse sensor, or motion of the machine, of which nothing is left once the equations hold. What they
-//! leave over tells: whitened by noise that isn't there, white numbers look coloured, and coloured ones look small.
+//! The residual, whitened at the noise that it shows. What signals do from sample to sample beyond their sensors'
+//! declared noise is noise of a worse sensor, or motion of the machine, which leaves no residual once the equations
+//! hold. What they leave over tells: whitened by noise that isn't there, white numbers look coloured, and coloured ones
+//! look small.
 
 use super::gauss_newton::Fit;
 use super::regression::residual;
@@ -10,20 +11,21 @@ use crate::diagnose::thresholds::{CHANCE_SIGMA, SHARE_BISECTIONS};
 use crate::diagnose::weak_form::Whitening;
 
 impl Fit<'_> {
-    /// Probability that white noise shows correlations as large as what is left of an equation, whitened at its own noise, where
-    /// the samples are fast enough to see the motion.
+    /// Probability that white noise shows correlations as large as an equation's residual, whitened at its own noise,
+    /// where the samples are fast enough to see the motion.
     pub(crate) fn whiteness_p(&self, equation: Equation) -> Option<f64> {
         self.colour(equation).map(statistics::colour_p)
     }
 
     /// The sum of squared correlations that tells so.
     pub(crate) fn colour(&self, equation: Equation) -> Option<f64> {
-        let of = |equation| statistics::portmanteau_chi2(&self.whitened_at_own_noise(equation), 1.0);
+        let of = |equation| statistics::portmanteau_chi2(&self.whitened_at_shown_noise(equation), 1.0);
         *self.colour[equation].get_or_init(|| of(equation))
     }
 
-    /// Where less is left than the noise should bring, by the share of it beyond the declared noise that brings as much (bisection).
-    fn whitened_at_own_noise(&self, equation: Equation) -> Vec<f64> {
+    /// Where the residual is less than the noise should bring, by the share of it beyond the declared noise that brings
+    /// as much (bisection).
+    fn whitened_at_shown_noise(&self, equation: Equation) -> Vec<f64> {
         let (mut low, mut high) = (0.0, 1.0);
         let mut white = self.whitened_at(high, equation);
         if !is_quieter(&white) {
@@ -49,7 +51,7 @@ impl Fit<'_> {
         let white = Whitening::new(rows, &noise).whiten(&residual(rows, &self.bounded));
         let own = rows.entries.iter().zip(white);
         own.filter(|(entry, _)| entry.equation == equation && rows.counts(entry))
-            .map(|(entry, v)| if sensitivities[entry.row][equation].is_loud() { f64::NAN } else { v })
+            .map(|(entry, v)| if sensitivities[entry.row][equation].is_unresolved() { f64::NAN } else { v })
             .collect()
     }
 }
