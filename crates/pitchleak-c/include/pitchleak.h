@@ -234,8 +234,8 @@ PitchleakResult pitchleak4_find(const struct Pitchleak4 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak4_save(const struct Pitchleak4 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; where it is damaged or another's the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.
@@ -268,8 +268,8 @@ PitchleakResult pitchleak6_find(const struct Pitchleak6 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak6_save(const struct Pitchleak6 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak6_save` wrote, on this machine or another; where it is damaged or another's the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak6_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.
@@ -302,8 +302,8 @@ PitchleakResult pitchleak9_find(const struct Pitchleak9 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak9_save(const struct Pitchleak9 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; where it is damaged or another's the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.
