@@ -1,7 +1,7 @@
 //! The blind bench of the diagnosis: effects drawn from the plant at 1 kHz, sampled at 100 Hz, seen
 //! through noisy sensors; the diagnosis gets the trace and the plain rig file, nothing else.
 //!
-//! `cargo bench --bench blind` prints the tables of `docs/blind-bench.md`. After `--`: seeds per cell, seeds
+//! `cargo bench --bench blind` prints the tables of `docs/bench/blind.md`. After `--`: seeds per cell, seeds
 //! for the sound rig, words to pick effects, and a file for every row, e.g. `-- 5 100 friction sound rows.csv`.
 
 use pitchleak_testkit::blind::{Ailment, Case, Excitation, cases, tables};

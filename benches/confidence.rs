@@ -1,7 +1,7 @@
 //! Whether the diagnosis is sure where it may be, and only there: sound rigs, two effects at once, and effects that no
 //! table has, by a plant of its own.
 //!
-//! `cargo bench --bench confidence` prints the figures of `docs/closing-the-loop.md`. After `--`: a kind (`sound`, `long`, `two`,
+//! `cargo bench --bench confidence` prints the figures of `docs/bench/diagnosis.md`. After `--`: a kind (`sound`, `long`, `two`,
 //! `further`, `outside`, `better`), a number that thins the cases out, `seeds=7000` for rigs drawn anew, `only=1007` for the case with that
 //! seed, and `each` for a line per case.
 

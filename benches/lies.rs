@@ -1,7 +1,7 @@
 //! The bench of lies: what `replay` and `watch` make of traces whose sensors, wires or recorder lie, of a cylinder that does
 //! what the estimator's model leaves out.
 //!
-//! `cargo bench --bench lies` prints the tables of `docs/bench-of-lies.md`. After `--`: seeds per row, and a file for
+//! `cargo bench --bench lies` prints the tables of `docs/bench/lies.md`. After `--`: seeds per row, and a file for
 //! every row, e.g. `-- 3 rows.csv`. `-- on-its-way 1 2 0.003` judges all that streams say where a
 //! meter's zero is off: seeds, and the sensors' accuracies.
 

@@ -1,4 +1,4 @@
-//! From a residual to the missing effect, with a figure of what is left before and after.
+//! From a residual to the missing effect, with a figure of the residual before and after.
 //!
 //! ```text
 //! cargo run --release --example closing_the_loop -- OUT.svg                    a worn spot, simulated
@@ -51,13 +51,13 @@ fn read(rig: &str, traces: &[String]) -> Result<(Rig, Vec<Series>), Box<dyn Erro
     Ok((rig, series))
 }
 
-/// What is left over time, before in grey and after in blue.
+/// The residual over time, before in grey and after in blue.
 fn panels(diagnosis: &Diagnosis) -> Vec<Panel> {
     let (before, after) = (&diagnosis.before.residual_over_time, &diagnosis.after.residual_over_time);
     let balances = [
-        ("Chamber A", "left over, L/min", &before.chamber_a, &after.chamber_a, LPM_PER_M3S),
-        ("Chamber B", "left over, L/min", &before.chamber_b, &after.chamber_b, LPM_PER_M3S),
-        ("Forces", "left over, N", &before.force, &after.force, 1.0),
+        ("Chamber A", "residual, L/min", &before.chamber_a, &after.chamber_a, LPM_PER_M3S),
+        ("Chamber B", "residual, L/min", &before.chamber_b, &after.chamber_b, LPM_PER_M3S),
+        ("Forces", "residual, N", &before.force, &after.force, 1.0),
     ];
     let line = |label, ink, points: &[(f64, f64)], factor: f64| Line {
         label,

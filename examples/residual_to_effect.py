@@ -41,7 +41,7 @@ def main(picture=None):
         top, bottom = figure.subfigures(2, 1, height_ratios=(3, 2))
         found.plot(top)
         effects = ", ".join(f"{effect.id} {effect.value:.3g} {effect.unit.strip('1')}" for effect in found.effects)
-        top.suptitle(f"what the model leaves over, before and after: {effects}")
+        top.suptitle(f"residuals before and after: {effects}")
         ax = bottom.subplots()
         for shift, (when, out) in ((-0.08, ("before", before)), (0.08, ("after", after))):
             flows = list(out.leakage.items())

@@ -94,7 +94,7 @@ impl Scorer {
         self.update_beside(t_s, leak_flow_m3s, coefficient, reference_m3s, pressure_pa, kept);
     }
 
-    /// The same beside other leaks, with what they share.
+    /// Adds a leak beside other leaks, with what they share.
     pub(crate) fn update_beside(
         &mut self,
         t_s: f64,

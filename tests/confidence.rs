@@ -146,7 +146,8 @@ fn a_leak_above_a_pressure_has_the_spread_of_the_pressure_in_its_own() {
     }
 }
 
-/// Stops of a heavy piston between two samples at 20 Hz: what is left of the forces there was noise to the fit, then friction.
+/// Stops of a heavy piston between two samples at 20 Hz: the residual of the forces there was noise to the fit, then
+/// friction.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_stop_that_samples_do_not_see_is_neither_noise_nor_friction() {

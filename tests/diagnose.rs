@@ -32,7 +32,7 @@ fn trace(effect: Option<(Effect, f64)>) -> Series {
     trace_with(effect, |_| 0.0)
 }
 
-/// The same with a further force on the piston, which the load cell does not feel.
+/// A trace with a further force on the piston, which the load cell does not feel.
 fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Signals<f64>) -> f64) -> Series {
     let mut effects = EffectSet::default();
     if let Some((effect, size)) = effect {

@@ -57,7 +57,7 @@ fn interrupted_anywhere_it_goes_on_to_the_last_bit() {
     }
 }
 
-/// A version is told as it is written; what is none is not printed.
+/// A version is told as it is written; other bytes are not printed.
 #[test]
 fn another_version_is_named_and_what_is_none_is_not() {
     let mut state = streams()[0].save().unwrap();

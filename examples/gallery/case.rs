@@ -1,4 +1,4 @@
-//! One effect on the paper's rig in some wind: what it leaves over, and what looks like it.
+//! One effect on the paper's rig in some wind: its residual, and what looks like it.
 
 use crate::Failure;
 use pitchleak::Rig;
@@ -17,7 +17,7 @@ pub const DURATION_S: f64 = 40.0;
 const MULTIPLE: f64 = 20.0;
 /// … but no larger than this share of what is worth believing.
 const LARGEST_SHARE: f64 = 0.5;
-/// Less alike (correlation of what both leave over), an effect is told apart as soon as it shows.
+/// Less alike (correlation of both residuals), an effect is told apart as soon as it shows.
 pub const ALIKE: f64 = 0.4;
 /// Rivals that a page names at most.
 const MOST_RIVALS: usize = 5;
@@ -40,7 +40,7 @@ pub struct Case {
     pub rivals: Vec<Rival>,
 }
 
-/// An effect that leaves over much the same.
+/// An effect with much the same residual.
 pub struct Rival {
     pub effect: Effect,
     /// Of what both leave over, under the sensors' noise.

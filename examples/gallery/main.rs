@@ -1,4 +1,4 @@
-//! The gallery of effects: a page for each entry of the table of effects, with what it leaves over in some wind.
+//! The gallery of effects: a page for each entry of the table of effects, with its residual in some wind.
 //!
 //! ```text
 //! cargo run --release --example gallery -- FOLDER

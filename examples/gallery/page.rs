@@ -20,11 +20,11 @@ pub fn title(effect: Effect) -> String {
 pub fn text(case: &Case) -> String {
     let spec = case.effect.spec();
     let mut out = format!("# {}\n\n`{}`: {}\n\n", title(case.effect), spec.id, spec.cause);
-    let _ = writeln!(out, "![What is left over, before and after]({}.svg)\n", spec.id);
+    let _ = writeln!(out, "![Residual before and after]({}.svg)\n", spec.id);
     let _ = writeln!(
         out,
-        "*{DURATION_S:.0} s of wind at 21 m/s, sensors of {} % of full scale, and {} of this effect. Grey: what the \
-         declared model leaves over. Blue: what is left with what `pitchleak diagnose` named.{}*\n",
+        "*{DURATION_S:.0} s of wind at 21 m/s, sensors of {} % of full scale, and {} of this effect. Grey: the \
+         residual of the declared model. Blue: the residual with what `pitchleak diagnose` named.{}*\n",
         100.0 * ACCURACY,
         amount(case.effect, case.size),
         strongest(case).map_or(String::new(), |bins| format!(
@@ -45,7 +45,7 @@ fn write_rivals(out: &mut String, effect: Effect, rivals: &[Rival]) {
     if rivals.is_empty() {
         let _ = writeln!(
             out,
-            "Nothing: in this trace no other effect of the table leaves over anything alike (correlation above {:.0} %).",
+            "Nothing: in this trace no other effect of the table has a residual like it (correlation above {:.0} %).",
             100.0 * ALIKE
         );
         return;
@@ -126,7 +126,7 @@ fn rounded(value: f64) -> String {
     }
 }
 
-/// What the declared model leaves over against the variable that shows best what the effects found mend.
+/// The residual of the declared model against the variable that shows best what the effects found mend.
 fn strongest(case: &Case) -> Option<&BinnedResidual> {
     let chi2 = |bins: &BinnedResidual| -> f64 {
         bins.mean.iter().zip(&bins.std_error).map(|(mean, error)| (mean / error).powi(2)).sum()
@@ -149,14 +149,14 @@ fn varies(values: &[f64]) -> bool {
     high - low > 1e-6 * high.abs().max(low.abs())
 }
 
-/// What is left over time, and against the variable with which it goes most.
+/// The residual over time, and against the variable with which it goes most.
 pub fn figure(case: &Case) -> Result<String, FigureError> {
     let Some(bins) = strongest(case) else { return svg(&[], 1) };
     let (before, after) = (&case.diagnosis.before, &case.diagnosis.after);
     let (name, unit, y_label) = match bins.equation {
-        Equation::ChamberA => ("chamber A", LPM_PER_M3S, "left over (L/min)"),
-        Equation::ChamberB => ("chamber B", LPM_PER_M3S, "left over (L/min)"),
-        Equation::Force => ("forces", 1.0, "left over (N)"),
+        Equation::ChamberA => ("chamber A", LPM_PER_M3S, "residual (L/min)"),
+        Equation::ChamberB => ("chamber B", LPM_PER_M3S, "residual (L/min)"),
+        Equation::Force => ("forces", 1.0, "residual (N)"),
     };
     let line = |label, ink, points| Line { label, ink, points };
     let over_time = |points: &[(f64, f64)]| points.iter().map(|(t, value)| (*t, value * unit)).collect();

@@ -1,4 +1,4 @@
-/// Runs of identical readings up to this long are counted by their length; a longer one may be a sensor that hangs.
+/// Runs of identical readings up to this long are counted by their length; a longer one may be a stuck sensor.
 pub(super) const SHORT_RUN: usize = 32;
 
 /// No trace has as many.

@@ -212,7 +212,7 @@ fn clipped(one: &Judged) -> Option<ChannelFault> {
         extreme.count >= CLIPPED_READINGS
             && extreme.count as f64 >= CLIPPED_SHARE * channel.readings as f64
             && extreme.repeats as f64 >= CLIPPED_REPEATS * extreme.count as f64
-            // One run alone is a sensor that hangs.
+            // One run alone is a stuck sensor.
             && extreme.count - extreme.repeats >= 3
     };
     if !one.scatters() {

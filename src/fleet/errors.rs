@@ -4,7 +4,7 @@ use crate::rig::RigError;
 /// Why a fleet is not judged at all; a trace that can't be read is a row instead.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
-    /// A pattern that is none.
+    /// A malformed pattern.
     #[error("{pattern}: {why}")]
     Pattern {
         /// As given.

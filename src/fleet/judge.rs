@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Nobody wants to know any more.
+/// The caller has stopped listening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stopped;
 

@@ -62,7 +62,7 @@ fn read(path: &Path) -> Result<Vec<RigRow>, String> {
     reader.records().map(row).collect()
 }
 
-/// A pattern that counts from a folder whose own name is none.
+/// A pattern that counts from a folder whose own name is no pattern.
 fn in_folder(folder: &Path, pattern: &str) -> String {
     let pattern = pattern.strip_prefix("./").unwrap_or(pattern);
     if Path::new(pattern).is_absolute() {

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
-/// What is known of a cylinder from one trace: the report of its replay in short, or why there is none.
+/// What one trace says of a cylinder: the report of its replay in short, or why it failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FleetRow {
     /// Which cylinder.

@@ -168,7 +168,7 @@ impl Sums {
         self.weight * self.tt - self.t * self.t
     }
 
-    /// Weighted sum of the squares of what the line leaves over.
+    /// Weighted sum of the squares of the line's residuals.
     fn residual(&self, points: &[(f64, Estimate<f64>)], weights: &[f64]) -> f64 {
         let square =
             |((t, y), w): (&(f64, Estimate<f64>), &f64)| w * (y.value - self.level - self.slope * t).powi(2);

@@ -23,7 +23,7 @@ pub struct FleetFile {
 }
 
 impl FleetFile {
-    /// Makes sure that the file can be written and is none of `inputs`.
+    /// Makes sure that the file can be written and is not one of `inputs`.
     ///
     /// # Errors
     /// Where its name says no format, or it cannot be written.

@@ -73,7 +73,7 @@ enum Sink {
 }
 
 impl OutputFile {
-    /// Makes sure that `path` can be written and is none of `inputs`.
+    /// Makes sure that `path` can be written and is not one of `inputs`.
     ///
     /// # Errors
     /// [`OutputError`].

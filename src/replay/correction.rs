@@ -9,7 +9,7 @@ use pitchleak_core::{EffectSet, FadingMemoryFilter, Model, PerLeak, Sample, Sign
 const MEMORY_S: f64 = 0.05;
 /// No pressure is read finer than this, Pa.
 const FINEST_PA: f64 = 1.0;
-/// Below this share of its dead band a reading is none but for noise: half way between both.
+/// Below this share of its dead band a reading is noise: half way between silence and the band's edge.
 const UNREAD_SHARE: f64 = 0.5;
 /// Where a trace has no temperature, K.
 const USUAL_TEMPERATURE_K: f64 = 313.15;

@@ -72,7 +72,7 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// The same where leaks pass an orifice: what looks like a change is then the pressure's.
+    /// This draft where leaks pass an orifice: what looks like a change is then the pressure's.
     pub fn through(self, orifice: &Orifice) -> Self {
         Self { leakage: leakage_through(orifice), trend: PerLeak::default(), changed_at_s: None, ..self }
     }

@@ -35,7 +35,7 @@ enum Form {
 }
 
 impl EstimateFile {
-    /// Begins the file, `.csv`, `.csv.gz` or `.parquet` by its name, which is none of `inputs`.
+    /// Begins the file, `.csv`, `.csv.gz` or `.parquet` by its name, which is not one of `inputs`.
     ///
     /// # Errors
     /// Where it has another name, or cannot be written.

@@ -17,9 +17,9 @@ const PAPER_CUTOFF_HZ: f64 = 5.0;
 pub enum Estimator {
     /// Leaks and compressibility.
     Plain(Box<Rls<f64, 4>>),
-    /// The same, and the flow meters' offsets.
+    /// Leaks, compressibility, and the flow meters' offsets.
     WithOffsets(Box<Rls<f64, 6>>),
-    /// The same, and the gains of flow meters and position sensor.
+    /// Those, and the gains of flow meters and position sensor.
     WithGains(Box<Rls<f64, 9>>),
     /// The paper's law; its filters are set up once the sample rate is known.
     Paper(Box<PaperChain>),
@@ -42,7 +42,7 @@ pub struct BulkModulus {
     pub spread: Option<(f64, [f64; 2])>,
 }
 
-/// The same of every size, and of the paper's law.
+/// One expression for every size, and for the paper's law.
 macro_rules! each {
     ($estimator:expr, $rls:ident => $known:expr, $paper:ident => $law:expr) => {
         match $estimator {

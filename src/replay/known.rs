@@ -1,4 +1,4 @@
-//! The last defence: whatever no check before foresaw, what is no number is not known.
+//! The last defence: an estimate that is not a finite number counts as unknown, whatever no check before foresaw.
 
 use pitchleak_core::{Estimate, PerLeak};
 

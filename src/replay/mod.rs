@@ -328,7 +328,7 @@ pub enum ReplayError {
     /// The trace cannot be read on, or has a bad row and none is allowed.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// The rig, built by hand, is none for which anything can be estimated.
+    /// The rig, built by hand, has values with which nothing can be estimated.
     #[error("nothing can be estimated for this rig: {0}")]
     Rig(#[from] RlsError),
 }

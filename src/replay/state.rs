@@ -31,7 +31,7 @@ pub enum RestoreError {
 const SCHEMA: &str = "pitchleak.state/7";
 /// … which begins every state as a text of CBOR.
 const HEAD: &[u8] = b"\x71pitchleak.state/7";
-/// The same without the version.
+/// The head of a saved state of any version.
 const ANY_HEAD: &[u8] = b"\x71pitchleak.state/";
 /// Bytes of the checksum at the end: CRC-32 of all before it, little-endian. It finds every single wrong bit and every
 /// burst of up to 32.

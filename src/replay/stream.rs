@@ -59,7 +59,7 @@ impl Stream {
         }
     }
 
-    /// The same, where the rig is this one, by whatever name.
+    /// Goes on from a saved state where its rig is this one, by whatever name.
     ///
     /// # Errors
     /// [`RestoreError`].

@@ -31,8 +31,8 @@ impl Replay {
         self.report_with(trace, &self.whole_trace(), |_| Suspicions::default())
     }
 
-    /// The same with a verdict held against `weighed`; `suspect` says what else than leaks may explain the trace where the
-    /// figures alone give this verdict.
+    /// The report with a verdict held against `weighed`; `suspect` says what else than leaks may explain the trace
+    /// where the figures alone give this verdict.
     pub(super) fn report_with(
         &self,
         trace: TraceSummary,

@@ -69,7 +69,7 @@ fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
     assert!((gapped / whole - 1.0).abs() < 1e-3, "{whole} {gapped}");
 }
 
-/// What hangs behind by a known play is brought back to the truth but for a moment after each turn.
+/// A reading with a known play is corrected to the truth but for a moment after each turn.
 #[test]
 fn a_declared_hysteresis_is_taken_out_of_the_readings() {
     use crate::rig::EffectValue;

@@ -51,7 +51,7 @@ pub struct ReplayReport {
     pub trend: PerLeak<Option<LeakTrend>>,
     /// Every leak that the trace showed, in the order of time.
     pub episodes: Vec<Episode>,
-    /// The same in short: episodes of a leak that follow one another closely are told as one.
+    /// The episodes in short: those of a leak that follow one another closely are told as one.
     pub spells: Vec<Spell>,
     /// When the leak last changed at once, s: the estimates then began anew.
     #[serde(skip_serializing_if = "Option::is_none")]

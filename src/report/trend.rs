@@ -64,7 +64,8 @@ impl LeakTrend {
         })
     }
 
-    /// The same, told apart where the oil thins by `thinning_ps` (share of its viscosity per second) and the leak is `flow_lpm`.
+    /// The trend, told apart where the oil thins by `thinning_ps` (share of its viscosity per second) and the leak is
+    /// `flow_lpm`.
     pub fn apart(self, flow_lpm: Estimate<f64>, thinning_ps: Estimate<f64>) -> Self {
         let per_h = thinning_ps.scaled(S_PER_H);
         let with = Estimate {

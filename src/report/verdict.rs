@@ -72,7 +72,7 @@ pub struct Misfit {
     pub balances: u64,
     /// Of the flow balance in the worst quarter of a minute.
     pub worst_window: f64,
-    /// Of the position carried by the flows.
+    /// Of the position equation.
     pub position: f64,
     /// Its largest mean over a minute or what there is.
     pub worst_position: f64,

@@ -17,7 +17,7 @@ const ZEROS_AT_MOST: f64 = 0.023;
 const ZERO_AT_MOST: f64 = 0.02;
 /// χ² by which one steady zero beside all leaks has to explain the trace better to be called so: five standard deviations.
 const ZERO_BEYOND_CHANCE: f64 = 25.0;
-/// The same for what it may change to count: three standard deviations.
+/// χ² by which such a zero counts for what it may change: three standard deviations.
 const ZERO_LIKELY: f64 = 9.0;
 /// A leak is known beside a zero that may be off where this many standard deviations are within its alarm's threshold …
 const KNOWN_SIGMAS: f64 = 2.0;

@@ -122,7 +122,7 @@ impl LeakCourse {
         Self { size, opening: Opening::During(Span { from_s: onset_s, ..Span::ALWAYS }) }
     }
 
-    /// The same, which opens `onset_s` into the trace; zero or less: before it begins.
+    /// This course, opening `onset_s` into the trace; zero or less: before it begins.
     ///
     /// # Errors
     /// [`LeakCourseError::Onset`] where it has times of its own.
@@ -134,7 +134,7 @@ impl LeakCourse {
         }
     }
 
-    /// The same, which changes within a trace of this length where nothing says when.
+    /// This course, changing within a trace of this length where nothing says when.
     #[must_use]
     pub fn within_trace(self, duration_s: f64) -> Self {
         let opening = match self.opening {

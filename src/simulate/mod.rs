@@ -175,7 +175,7 @@ impl Scenario {
         })
     }
 
-    /// The same until `each` has had enough.
+    /// Runs the simulation until `each` has had enough.
     ///
     /// # Errors
     /// [`SimulateError`].

@@ -137,7 +137,7 @@ pub enum PlanError {
     /// Leaks that cannot open when they should.
     #[error(transparent)]
     Leak(#[from] LeakCourseError),
-    /// Oil that cannot be.
+    /// Impossible oil.
     #[error(transparent)]
     OilTemperature(#[from] OilTemperatureError),
 }

@@ -15,7 +15,7 @@ pub(super) struct RememberingSensor {
 enum Memory {
     /// It answers late.
     Late([Option<LaggedReading<f64>>; 2]),
-    /// It hangs behind.
+    /// It has play.
     Hanging(Play<f64>),
     /// It shows nothing of what is smaller than the value, and remembers nothing.
     Deaf,

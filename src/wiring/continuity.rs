@@ -13,12 +13,12 @@ pub(crate) trait Continuity {
     /// number.
     fn fit_of_any_length(&self, priors: &Priors) -> Option<Fit>;
 
-    /// The same; `None` where the samples are too few to say anything.
+    /// Fits the model with these priors; `None` where the samples are too few to say anything.
     fn fit(&self, priors: &Priors) -> Option<Fit> {
         self.fit_of_any_length(priors).filter(|fit| fit.row_count() >= LEAST_ROWS)
     }
 
-    /// The same of any length where no leak is below zero: oil comes out, never in.
+    /// A fit of any length in which no leak is below zero: oil comes out, never in.
     fn fit_of_outflows(&self, priors: &Priors) -> Option<Fit> {
         self.without_inflows(self.fit_of_any_length(priors)?, *priors)
     }

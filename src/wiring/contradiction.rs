@@ -74,7 +74,7 @@ impl Declared {
         near && mended.is_possible() && enough_rows && wanted && enough
     }
 
-    /// Whether chance alone is left of both equations, and of neither more than before.
+    /// Whether the residuals of both equations are chance alone, and neither is larger than before.
     fn leaves_chance(&self, mended: &Fit) -> bool {
         let ratios = mended.ratios.iter().zip(self.fit.ratios).zip(mended.rows);
         ratios.into_iter().all(|((after, before), rows)| {

@@ -27,7 +27,7 @@ pub enum Evidence {
         /// … and with the mistake mended.
         after: f64,
     },
-    /// What the force balance leaves, root mean square, N.
+    /// Residual of the force balance, root mean square, N.
     Force {
         /// With the pressures as they are read …
         before: f64,
@@ -59,7 +59,7 @@ pub struct Wiring {
     /// Size of the residual in standard deviations of the declared noise, as the wiring is declared; none where
     /// something else speaks.
     pub residual_before: Option<f64>,
-    /// The same with the mistake mended.
+    /// Size of the residual with the mistake mended, in standard deviations of the declared noise.
     pub residual_after: Option<f64>,
     /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended.
     pub columns: Vec<String>,

@@ -7,7 +7,7 @@ use crate::rig::Rig;
 use nalgebra::{Cholesky, Const, SMatrix};
 use pitchleak_core::{Estimate, Leak, Parameter, PerLeak};
 
-/// What a fit leaves.
+/// A fit: its residuals and parameters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fit {
     /// Mean square of the normalised residual of the flow balance, and of position against flows; none without rows.

@@ -1,7 +1,7 @@
 //! The force balance, eq. (2): P_A A_A − P_B A_B = F + m ẍ + friction. Where the load force is recorded it tells which pressure
 //! is which, also at rest, where the flows do not.
 //!
-//! Mass, friction and the sensors' zeros are fitted, so neither the rig file's nor anybody's guess enters; what is left is the
+//! Mass, friction and the sensors' zeros are fitted, so neither the rig file's nor anybody's guess enters; the residual is the
 //! noise, whatever its size. Where P_A + P_B is steady, exchanged pressures look like a load force of the wrong sign but for
 //! the mean: (P_A + P_B)(A_A − A_B), which no sensor's zero is.
 
@@ -118,7 +118,7 @@ impl Scaled {
         ratio >= CONTRAST && self.deviance_of(ratio) >= LEAST_DROP && SLOPE.contains(&self.slope)
     }
 
-    /// Less twice the log-likelihood, where the noise is what is left.
+    /// Less twice the log-likelihood, where the noise is the residual.
     pub fn deviance(&self) -> f64 {
         self.deviance_of(self.as_read.max(f64::MIN_POSITIVE)) + self.zero * self.zero
     }
@@ -133,7 +133,7 @@ impl Scaled {
     }
 }
 
-/// What is left of one balance.
+/// The residual of one force balance.
 struct Left {
     /// Sum of squares with the load force as it is read, N², …
     as_read: f64,
@@ -159,8 +159,8 @@ impl Left {
     }
 
     /// Whether the load force, as it is read, explains these pressures, and the `other` ones not by any factor, as its sign or
-    /// unit may be wrong, too, unless with a zero that no sensor has. The noise is what is left: twice the log-likelihood
-    /// ratio is n ln of the sums' ratio.
+    /// unit may be wrong, too, unless with a zero that no sensor has. The noise is the residual: twice the
+    /// log-likelihood ratio is n ln of the sums' ratio.
     fn explains_better_than(&self, other: &Self, blocks: u32) -> bool {
         let exceeds = |square: f64| {
             let ratio = square / self.as_read.max(f64::MIN_POSITIVE);
@@ -205,8 +205,8 @@ impl ForceBalance {
         self.declared.explains_better_than(&self.exchanged, self.blocks)
     }
 
-    /// Whether it holds with the pressures exchanged alone: the root mean square of what is left as they are read and exchanged,
-    /// N.
+    /// Whether it holds with the pressures exchanged alone: the root mean square of the residual as they are read and
+    /// exchanged, N.
     pub fn holds_exchanged(&self) -> Option<[f64; 2]> {
         let rms = |square: f64| (square / f64::from(self.blocks)).sqrt();
         self.exchanged

@@ -96,7 +96,7 @@ fn exchanged_by(balance: &ForceBalance, stretch: &Recorded<'_>) -> Option<Explan
     Some(Explanation { mistakes, evidence: Evidence::Force { before, after } })
 }
 
-/// The same of a stream, which keeps no records to exchange the flows in.
+/// Exchanged pressures of a stream, which keeps no records to exchange the flows in.
 pub(crate) fn exchanged_so_far(stretch: &impl Continuity) -> Option<Explanation> {
     let [before, after] = stretch.force_balance()?.holds_exchanged()?;
     Some(Explanation { mistakes: EXCHANGED_PRESSURES.into(), evidence: Evidence::Force { before, after } })

@@ -113,7 +113,7 @@ fn scatter(records: &[Record], reading: Reading) -> Option<f64> {
     Some(*median / MEDIAN_SIZE)
 }
 
-/// The same of a stream, half a minute at a time, in constant memory.
+/// Scatter of a stream, half a minute at a time, in constant memory.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct RunningScatter {
     channels: [RunningChannel; CHANNELS],

@@ -65,7 +65,7 @@ impl Priors {
         ]))
     }
 
-    /// The same rig with meters whose zeros are off and drift, as undeclared ones are now and then.
+    /// This rig with meters whose zeros are off and drift, as undeclared ones are now and then.
     pub fn with_zeros_off(mut self, rig: &Rig, duration_s: f64) -> Self {
         let Self(spread) = &mut self;
         let full_scales = [rig.instruments.flow_a.full_scale, rig.instruments.flow_b.full_scale];
@@ -77,7 +77,7 @@ impl Priors {
         self
     }
 
-    /// The same rig with one meter whose zero is off and steady, as an undeclared one is now and then.
+    /// This rig with one meter whose zero is off and steady, as an undeclared one is now and then.
     pub fn with_zero_off(mut self, zero: Parameter, rig: &Rig) -> Self {
         let meter =
             if zero == Parameter::OffsetA { &rig.instruments.flow_a } else { &rig.instruments.flow_b };
@@ -86,7 +86,7 @@ impl Priors {
         self
     }
 
-    /// The same rig with leaks that change by anything from end to end.
+    /// This rig with leaks that change by anything from end to end.
     pub fn with_changing_leaks(mut self, duration_s: f64) -> Self {
         for leak in 0..3 {
             self.0[SLOPES + leak] = self.0[LEAKS + leak] / duration_s.max(1.0);
@@ -94,7 +94,7 @@ impl Priors {
         self
     }
 
-    /// The same rig with leaks part of which may pass an orifice: Q = C √|P|, of P's sign (Merritt 1967, section 3.3).
+    /// This rig with leaks part of which may pass an orifice: Q = C √|P|, of P's sign (Merritt 1967, section 3.3).
     pub fn with_orifices(mut self, leaks: impl IntoIterator<Item = Leak>, rig: &Rig) -> Self {
         let full_scale_pa = rig.instruments.pressure.full_scale;
         for leak in leaks {
@@ -103,7 +103,7 @@ impl Priors {
         self
     }
 
-    /// The same rig without this leak.
+    /// This rig without this leak.
     pub fn without(mut self, leak: Leak) -> Self {
         self.0[LEAKS + leak as usize] = 0.0;
         self.0[SLOPES + leak as usize] = 0.0;
@@ -111,7 +111,7 @@ impl Priors {
         self
     }
 
-    /// The same rig with one sensor whose gain or zero may be off by far.
+    /// This rig with one sensor whose gain or zero may be off by far.
     pub fn with_error(mut self, error: Parameter, rig: &Rig) -> Self {
         self.0[error as usize] = match error {
             Parameter::OffsetA => WILD_ZERO_SHARE * rig.instruments.flow_a.full_scale,
@@ -121,7 +121,7 @@ impl Priors {
         self
     }
 
-    /// The same rig with sensors that may be off as undeclared ones are now and then.
+    /// This rig with sensors that may be off as undeclared ones are now and then.
     pub fn with_sensor_errors(rig: &Rig) -> Self {
         let Self(mut spread) = Self::declared(rig);
         let sheets = &rig.instruments;

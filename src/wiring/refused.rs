@@ -117,7 +117,7 @@ impl Refused {
         self.explanation().map(|found| found.wiring(&self.rig.columns, &self.rig))
     }
 
-    /// The same, and others that the rows do not tell from it; `None` where none does, or too many.
+    /// That unit, and others that the rows do not tell from it; `None` where none does, or too many.
     fn explanation(&self) -> Option<Explanation> {
         if self.rows < LEAST_ROWS || 2 * self.refused <= self.rows {
             return None;

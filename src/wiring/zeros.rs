@@ -61,9 +61,9 @@ pub fn zero_check(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     changing_leaks_or_zeros(&Recorded::new(records, rig)?)
 }
 
-/// The same of the last of the records: a leak that grows and then stays goes in no straight line, and a steady zero would
-/// seem to explain the bend. As long as leaks that change their course explain the records better than zeros do, the later
-/// half is looked at.
+/// Holds leaks against zeros over the last of the records: a leak that grows and then stays goes in no straight line,
+/// and a steady zero would seem to explain the bend. As long as leaks that change their course explain the records
+/// better than zeros do, the later half is looked at.
 pub(crate) fn zero_check_lately(records: &[Record], rig: &Rig) -> Option<ZeroCheck> {
     let mut stretch = Recorded::new(records, rig)?;
     loop {
@@ -102,17 +102,17 @@ fn do_leaks_bend(whole: &Recorded<'_>, zeros: &Fit) -> bool {
     [2, 4, 8].into_iter().any(better)
 }
 
-/// The same of any stretch.
+/// Holds leaks against zeros over any stretch.
 pub(crate) fn changing_leaks_or_zeros(stretch: &impl Continuity) -> Option<ZeroCheck> {
     held_against_zeros(stretch, &straight(stretch))
 }
 
-/// The same of `leaks`. Zeros that explain a leak only beside another one that lets oil in don't explain it.
+/// Holds `leaks` against zeros. Zeros that explain a leak only beside another one that lets oil in don't explain it.
 pub(super) fn held_against_zeros(stretch: &impl Continuity, leaks: &Priors) -> Option<ZeroCheck> {
     against_zeros(stretch, leaks, with_free_zeros(stretch, leaks)?)
 }
 
-/// The same where the fit with free zeros is at hand.
+/// Holds leaks against zeros where the fit with free zeros is at hand.
 fn against_zeros(stretch: &impl Continuity, leaks: &Priors, free: Fit) -> Option<ZeroCheck> {
     let zeros = leaks.with_zeros_off(stretch.rig(), stretch.duration_s());
     let free = stretch.without_inflows(free, zeros)?;

@@ -37,7 +37,7 @@ enum PitchleakResult
   PITCHLEAK_RESULT_STARTED = 1,
   // The sample was taken in, and the estimates are new.
   PITCHLEAK_RESULT_RENEWED = 2,
-  // The same, and the leak has changed at once: what was learnt before counts for nothing any more.
+  // Renewed, after a sudden change of the leak: what was learnt before no longer counts.
   PITCHLEAK_RESULT_CHANGED = 3,
   // The sample was left out: not a number, or beyond what a cylinder can do.
   PITCHLEAK_RESULT_REJECTED = 4,
@@ -45,7 +45,7 @@ enum PitchleakResult
   PITCHLEAK_RESULT_NULL_POINTER = -1,
   // The estimator was not begun, or its memory was overwritten.
   PITCHLEAK_RESULT_NOT_BEGUN = -2,
-  // The cylinder or its oil cannot be.
+  // The cylinder or its oil is impossible.
   PITCHLEAK_RESULT_BAD_CYLINDER = -3,
   // A sensor's noise, bias or gain error is negative or not a number.
   PITCHLEAK_RESULT_BAD_SENSORS = -4,
@@ -183,7 +183,7 @@ typedef struct PitchleakFound {
   struct PitchleakEstimate compressibility_per_pa;
   // Normalised innovation squared of the balance: 1 where the model and the declared noise explain the readings.
   float innovation_balance;
-  // The same of the position.
+  // Normalised innovation squared of the position equation.
   float innovation_position;
   // Active alarms.
   struct PitchleakAlarms alarms;
@@ -234,8 +234,8 @@ PitchleakResult pitchleak4_find(const struct Pitchleak4 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak4_save(const struct Pitchleak4 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; where it is none the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak4_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.
@@ -268,8 +268,8 @@ PitchleakResult pitchleak6_find(const struct Pitchleak6 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak6_save(const struct Pitchleak6 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak6_save` wrote, on this machine or another; where it is none the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak6_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.
@@ -302,8 +302,8 @@ PitchleakResult pitchleak9_find(const struct Pitchleak9 *estimator, struct Pitch
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak9_save(const struct Pitchleak9 *estimator, uint8_t *bytes, size_t *length);
 
-// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; where it is none the
-// estimator stays as it was.
+// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
 //
 // # Safety
 // Each pointer is null, or what it says.

@@ -77,8 +77,8 @@ pub unsafe extern "C" fn pitchleak9_save(
     unsafe { running::save(estimator, bytes, length) }
 }
 
-/// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; where it is none the
-/// estimator stays as it was.
+/// Goes on from a state that `pitchleak9_save` wrote, on this machine or another; other bytes leave the
+/// estimator as it was.
 ///
 /// # Safety
 /// Each pointer is null, or what it says.

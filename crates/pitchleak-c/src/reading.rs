@@ -84,7 +84,7 @@ pub struct PitchleakFound {
     pub compressibility_per_pa: PitchleakEstimate,
     /// Normalised innovation squared of the balance: 1 where the model and the declared noise explain the readings.
     pub innovation_balance: f32,
-    /// The same of the position.
+    /// Normalised innovation squared of the position equation.
     pub innovation_position: f32,
     /// Active alarms.
     pub alarms: PitchleakAlarms,

@@ -8,7 +8,7 @@ pub enum PitchleakResult {
     Started = 1,
     /// The sample was taken in, and the estimates are new.
     Renewed = 2,
-    /// The same, and the leak has changed at once: what was learnt before counts for nothing any more.
+    /// Renewed, after a sudden change of the leak: what was learnt before no longer counts.
     Changed = 3,
     /// The sample was left out: not a number, or beyond what a cylinder can do.
     Rejected = 4,
@@ -16,7 +16,7 @@ pub enum PitchleakResult {
     NullPointer = -1,
     /// The estimator was not begun, or its memory was overwritten.
     NotBegun = -2,
-    /// The cylinder or its oil cannot be.
+    /// The cylinder or its oil is impossible.
     BadCylinder = -3,
     /// A sensor's noise, bias or gain error is negative or not a number.
     BadSensors = -4,

@@ -138,7 +138,7 @@ pub(crate) unsafe fn save<M: Memory<N>, const N: usize>(
     }
 }
 
-/// Goes on from a state that `save` wrote; where it is none the estimator stays as it was.
+/// Goes on from a state that `save` wrote; other bytes leave the estimator as it was.
 ///
 /// # Safety
 /// Each pointer is null, or what it says.

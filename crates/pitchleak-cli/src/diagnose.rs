@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Find the physical effect that the model lacks: traces of one rig, fitted together
 ///
-/// Tells what the declared model leaves unexplained, which known effect explains it, and the error
+/// Tells what the residual of the declared model shows, which known effect explains it, and the error
 /// before and after on samples that were not fitted.
 #[derive(Args)]
 #[command(after_help = "\
@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 
-    /// Write figures (SVG) of what is left of each balance before and after into this directory: over time, its
+    /// Write figures (SVG) of the residual of each equation before and after into this directory: over time, its
     /// autocorrelation and distribution, and against each variable
     #[arg(long = "out-dir", alias = "out", value_name = "DIR")]
     out: Option<PathBuf>,

@@ -12,8 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Judge the traces of many cylinders on all cores: a row per cylinder and trace
 ///
-/// A trace that can't be read is told, stands in the table with its error, and makes the exit status 2 once all others
-/// are judged.
+/// A trace that can't be read is reported and stands in the table with its error. The exit status is then 2, once all
+/// others are judged.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {

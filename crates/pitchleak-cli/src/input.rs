@@ -29,7 +29,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// Judges each trace. One that can't be is told, and makes the whole fail once all others are judged.
+    /// Judges each trace. One that can't be read is reported; the whole then fails, once all others are judged.
     pub fn for_each(
         &self,
         mut judge: impl FnMut(Trace) -> Result<Outcome, Failure>,

@@ -74,7 +74,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
-        // Whoever read our output has had enough: not an error of ours.
+        // The reader of our output has closed it: not an error of ours.
         Err(failure) if failure.is_broken_pipe() => ExitCode::SUCCESS,
         Err(failure) => {
             output::complain("error", &failure);

@@ -15,7 +15,7 @@ pub fn print(text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// One line on standard error; if that is gone too, so be it.
+/// One line on standard error, if that is still open.
 pub fn complain(kind: &str, message: &dyn Display) {
     let message = message.to_string().replace('\n', "\\n");
     let _ = writeln!(io::stderr().lock(), "{kind}: {}", harmless(&message));

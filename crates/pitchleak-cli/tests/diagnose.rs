@@ -55,7 +55,7 @@ fn it_names_the_effect_and_saves_a_rig_that_replay_uses() {
     assert_eq!(again["verdict"], "no_missing_effect");
 }
 
-/// What is left is white and normal once the effect is in, and follows the flow before.
+/// The residual is white and normal once the effect is in, and follows the flow before.
 #[test]
 fn residuals_are_tested_and_drawn() {
     let folder = folder(0.02);

@@ -29,7 +29,7 @@ pub struct Reading {
     pub position_gain: f64,
     /// Meter A reads nothing below this flow.
     pub dead_band: f64,
-    /// The position hangs behind by this much on each side.
+    /// Play of the position sensor, on each side.
     pub backlash: f64,
     // What no table has.
     /// Meter A reads Q + this × Q².
@@ -46,7 +46,7 @@ pub struct Reading {
     pub pulse_m3: f64,
     /// The meters are late by this at the end, s.
     pub slow_clock: f64,
-    /// The reading of P_A hangs behind by this much on each side.
+    /// Play of pressure sensor A, on each side.
     pub pressure_play: f64,
 }
 

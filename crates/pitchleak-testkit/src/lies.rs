@@ -180,7 +180,7 @@ pub fn truths(wind: WindCase, leaking: Leaking) -> Vec<Truth> {
     scenario.collect(beginning.leak_coefficients().expect("within reach")).expect("runs")
 }
 
-/// The same cylinder, of which a leak of this mean flow opens at once after half of the minute.
+/// This cylinder with a leak of this mean flow that opens suddenly after half of the minute.
 pub fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
     let size = |which| {
         let size = LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });

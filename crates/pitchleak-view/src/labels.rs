@@ -13,7 +13,7 @@ pub(crate) fn name(equation: Equation) -> &'static str {
     }
 }
 
-/// Factor from SI to people's unit of what an equation leaves over, and that unit.
+/// Factor from SI to people's unit of an equation's residual, and that unit.
 pub(crate) fn people_unit(equation: Equation) -> (f64, &'static str) {
     if equation == Equation::Force { (1.0, "N") } else { (LPM_PER_M3S, "L/min") }
 }

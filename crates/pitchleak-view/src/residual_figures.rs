@@ -1,11 +1,11 @@
-//! Figures of what is left: over time, its autocorrelation and distribution, and against each variable.
+//! Figures of the residual: over time, its autocorrelation and distribution, and against each variable.
 
 use crate::figure::{FigureError, Ink, Line, Panel, svg};
 use crate::in_a_row::in_a_row;
 use crate::labels::{name, people, people_unit, symbol};
 use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation, EquationResidual};
 
-/// Lags of the autocorrelation, in hats.
+/// Lags of the autocorrelation, in rows.
 const LAGS: usize = 30;
 /// Classes of the histogram, each half a standard deviation wide, from −4 to 4.
 const CLASSES: usize = 16;
@@ -52,9 +52,9 @@ fn over_time(diagnosis: &Diagnosis, equation: Equation) -> Panel {
     }
 }
 
-/// The label of what is left.
+/// The label of the residual.
 fn label(equation: Equation) -> &'static str {
-    if equation == Equation::Force { "left over (N)" } else { "left over (L/min)" }
+    if equation == Equation::Force { "residual (N)" } else { "residual (L/min)" }
 }
 
 fn line(label: &'static str, ink: Ink, points: Vec<(f64, f64)>) -> Line {
@@ -119,7 +119,7 @@ fn histogram(white: &[f64]) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Means in bins; thin lines: two standard errors about what is left with the effects.
+/// Means in bins; thin lines: two standard errors about the residual with the effects.
 fn against(before: &BinnedResidual, after: &BinnedResidual) -> Panel {
     let (factor, _) = people_unit(after.equation);
     let (scale, _) = people(after.against);

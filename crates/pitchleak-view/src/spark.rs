@@ -2,7 +2,7 @@
 
 const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// A mark for each value between `low` and `high`, a blank where there is none.
+/// A mark for each value between `low` and `high`, a blank for a missing one.
 pub(crate) fn course(values: &[Option<f64>], [low, high]: [f64; 2]) -> String {
     values.iter().map(|value| value.map_or(' ', |value| level((value - low) / (high - low)))).collect()
 }

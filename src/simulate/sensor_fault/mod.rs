@@ -1,4 +1,4 @@
-//! Sensors that lie: what dead meters, exchanged wires and wrong units make of honest readings.
+//! Sensor faults: what dead meters, exchanged wires and wrong units make of honest readings.
 
 mod apply;
 #[cfg(test)]

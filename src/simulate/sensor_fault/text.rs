@@ -48,7 +48,7 @@ pub enum SensorFaultError {
     Unfit {
         /// The channel.
         channel: &'static str,
-        /// What it cannot be.
+        /// The fault that this channel cannot have.
         way: String,
     },
     /// Channels of different kind exchanged.

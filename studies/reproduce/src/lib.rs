@@ -99,7 +99,7 @@ pub struct Report {
     pub seeds: u64,
     /// The table, sensors with white noise of 3σ = 1 % of full scale.
     pub rows: Vec<Row>,
-    /// The same with a constant bias of up to 1 % of full scale on every sensor as well.
+    /// The rows with a constant bias of up to 1 % of full scale on every sensor.
     pub rows_with_bias: Vec<Row>,
     /// How the rig followed.
     pub tracking: Vec<Tracking>,

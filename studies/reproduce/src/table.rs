@@ -29,7 +29,7 @@ pub struct Bound {
     /// Cramér–Rao bound on the coefficient's standard deviation at the end of a window, %: median
     /// over the windows.
     pub coefficient_std_percent: f64,
-    /// The same 2 s after the window's start.
+    /// Bound on the coefficient's standard deviation 2 s after the window's start, %.
     pub coefficient_std_after_2s_percent: f64,
     /// Root mean square of (error at the end of the window / bound of that window): 1 is as good as
     /// any unbiased estimator.
@@ -83,7 +83,7 @@ pub struct Scored {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub score: TrialScore,
-    /// The same of an efficient estimator.
+    /// Score of an efficient estimator.
     pub efficient: TrialScore,
     pub window: WindowBound,
 }
@@ -93,7 +93,7 @@ pub(super) struct Entry {
 pub(super) struct WindowBound {
     /// Standard deviation of the coefficient, share of the truth.
     pub coefficient: f64,
-    /// The same after the first 2 s.
+    /// Standard deviation of the coefficient after the first 2 s.
     pub coefficient_early: f64,
     /// Whether the leak is identifiable in it: 95 % within 0.1 L/min or a tenth of itself.
     pub identifiable: bool,

@@ -1,4 +1,4 @@
-"""Diagnose: from what the model leaves over to the effect that it lacks."""
+"""Diagnose: from the residual of the model to the effect that it lacks."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -45,7 +45,7 @@ class Quality:
     rmse: Rmse
     """On samples that were not fitted."""
     whiteness_p: dict[str, float | None]
-    """Probability per balance that what is left is white noise."""
+    """Probability per equation that the residual is white noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +257,7 @@ class Diagnosis(Raw, Paged, Tabular):
     rig: Rig = field(init=False)
     """The rig with the effects in it: what ``--save-rig`` writes."""
     residuals_before: dict[str, Course] = field(init=False, default_factory=dict)
-    """What the declared model leaves over: ``chamber_a_m3s``, ``chamber_b_m3s``, ``force_n``."""
+    """The residual of the declared model: ``chamber_a_m3s``, ``chamber_b_m3s``, ``force_n``."""
     residuals_after: dict[str, Course] = field(init=False, default_factory=dict)
     """What is left with the effects."""
     _text: str = field(init=False, default="")
@@ -278,7 +278,7 @@ class Diagnosis(Raw, Paged, Tabular):
         return columns | {"confusable_with": [", ".join(effect.confusable_with) for effect in self.effects]}
 
     def plot(self, figure: "Figure | None" = None) -> "Figure":
-        """Draws what is left of each balance over time, before and after, one trace after the other.
+        """Draws the residual of each equation over time, before and after, one trace after the other.
 
         Needs matplotlib.
         """

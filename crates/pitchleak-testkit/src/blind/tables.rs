@@ -1,4 +1,4 @@
-//! What came of the seeds of each case, and the tables of `docs/blind-bench.md`.
+//! What came of the seeds of each case, and the tables of `docs/bench/blind.md`.
 
 use super::{Ailment, Case, LEAKS, ask, truth};
 use pitchleak::core::effects::EffectKind;
@@ -17,7 +17,7 @@ pub struct Tally {
     pub in_group: usize,
     /// Some other effect is named, as well or instead.
     pub anything_else: usize,
-    /// The same, without a word of doubt and without the truth in its group.
+    /// Some other effect is named, is not doubtful, and has not the truth in its group.
     pub wrong_without_doubt: usize,
     pub explained: usize,
     pub partly: usize,

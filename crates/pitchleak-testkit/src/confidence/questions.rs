@@ -1,4 +1,4 @@
-//! What is asked: sound rigs of all sizes, rates and lengths, two effects at once, effects that no table has.
+//! The cases: sound rigs of all sizes, rates and lengths, two effects together, effects that no table has.
 
 use super::Case;
 use super::plant::Rest;

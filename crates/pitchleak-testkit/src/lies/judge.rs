@@ -1,4 +1,4 @@
-//! What an operator would believe at a door of the program, whether it is so, and the tables of `docs/bench-of-lies.md`.
+//! What an operator would believe at a door of the program, whether it is so, and the tables of `docs/bench/lies.md`.
 
 use super::{Family, LEAKING, LIES, Leaking, Lie, leak_name, rig, truths};
 use pitchleak::core::{Leak, PerLeak, Sample};
@@ -96,7 +96,7 @@ pub fn events(trace: &[u8], accuracy: f64) -> Vec<Event> {
     events
 }
 
-/// The last estimate, or the last notice where there is none.
+/// The last estimate, else the last notice.
 fn watched(trace: &[u8], accuracy: f64) -> Result<EstimateEvent, String> {
     let mut last = Err(String::new());
     for event in events(trace, accuracy) {
@@ -163,7 +163,7 @@ fn names(said: &Said, lie: &Lie) -> bool {
     said.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
 }
 
-/// The same of a trace that is refused.
+/// Whether the message that refuses a trace names the fault.
 fn has_words(said: &str, lie: &Lie) -> bool {
     lie.named.is_some_and(|[_, words]| said.contains(words))
 }

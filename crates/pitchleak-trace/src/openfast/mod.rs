@@ -68,7 +68,7 @@ pub enum Error {
 /// How the content of an OpenFAST file is wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
-    /// A binary file whose id is none of OpenFAST's.
+    /// A binary file with an id that OpenFAST does not have.
     #[error("file id {0} is not one of OpenFAST's (1, 2, 3 or 4)")]
     FileId(i16),
     /// A binary file ends before what its header promises.

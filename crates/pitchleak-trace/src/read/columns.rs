@@ -19,7 +19,7 @@ pub(super) struct Column {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// A number; the unit is none where it is SI already.
+    /// A number; without a unit it is SI already.
     Number(Signal, Option<Unit>),
     Timestamp,
     Ignored,

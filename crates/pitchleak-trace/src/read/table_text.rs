@@ -100,7 +100,8 @@ struct Head {
 }
 
 impl Head {
-    /// The header that makes a trace of the rows, or the likeliest one, and whether it is none but holds numbers.
+    /// The header that makes a trace of the rows, or the likeliest one, and whether that row holds numbers instead of
+    /// names.
     fn among(rows: &[TextRow], rig: &Rig) -> Option<(Self, bool)> {
         let wide = |row: &TextRow| row.cells.len() >= LEAST_CELLS;
         let may_name = |row: &TextRow| wide(row) && !is_data(&row.cells);

@@ -70,7 +70,7 @@ pub struct ForeignColumn {
     pub offset: f64,
     /// How a timestamp is written; none where its cells are to say it.
     pub format: Option<TimeKind>,
-    /// Where a timestamp's clock hangs.
+    /// The zone of a timestamp's clock.
     pub zone: Option<Zone>,
 }
 

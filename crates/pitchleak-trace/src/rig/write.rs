@@ -13,7 +13,7 @@ fn quantity(value: f64, dimension: Dimension) -> String {
     toml_text(format!("{value} {}", dimension.si()).trim_end())
 }
 
-/// The same, within what the reader takes.
+/// A quantity as text, within what the reader takes.
 fn within(value: f64, dimension: Dimension, bound: Bound) -> String {
     quantity(bound.nearest(value), dimension)
 }

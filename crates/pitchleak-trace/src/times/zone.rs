@@ -3,7 +3,7 @@ use jiff::civil::DateTime;
 use jiff::tz::{Offset, TimeZone};
 use std::fmt;
 
-/// Where a clock hangs: `Europe/Berlin`, `CET`, `+01:00`.
+/// The zone of a clock: `Europe/Berlin`, `CET`, `+01:00`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Zone {
     name: String,

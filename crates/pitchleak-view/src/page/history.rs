@@ -22,7 +22,7 @@ enum Quantity {
     Temperature,
     /// The flow balance's innovation, in its own standard deviations.
     Balance,
-    /// The position's squared innovation over its variance, a running mean.
+    /// The position equation's squared innovation over its variance, a running mean.
     PositionResidual,
     Leak(Leak),
     Reference(Leak),
@@ -163,7 +163,7 @@ impl Drawn {
         }
     }
 
-    /// What the estimates did not foretell.
+    /// Innovations: readings less what the estimates before them predicted.
     pub fn residuals(&self, charts: &mut Charts) -> Markup {
         let balance = Chart {
             title: "Residual of the flow balance".to_owned(),

@@ -1,4 +1,4 @@
-//! The page of a diagnosis: from what the model leaves over to the effect that explains it, and how sure that is.
+//! The page of a diagnosis: from the residual to the effect that explains it, and how sure that is.
 
 mod effects;
 mod first_screen;

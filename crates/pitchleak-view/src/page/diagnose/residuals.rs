@@ -1,4 +1,4 @@
-//! What each equation leaves over, before and after, over time and against the variables with which it goes.
+//! The residual of each equation, before and after, over time and against the variables with which it goes.
 
 use super::super::chart::{Chart, Charts, Ink, Line};
 use crate::envelope::{Envelopes, Range, Spot};
@@ -15,7 +15,7 @@ const AFTER: &str = "with the effects found";
 
 const COLUMNS: usize = 6;
 
-/// What is left over time of each equation, before and after, in people's units; trace after trace.
+/// The residual of each equation over time, before and after, in people's units; trace after trace.
 pub(super) fn over_time(diagnosis: &Diagnosis) -> Envelopes<COLUMNS> {
     let mut spots: Vec<(f64, usize, f64)> = Vec::new();
     for (side, fit) in [&diagnosis.before, &diagnosis.after].into_iter().enumerate() {
@@ -50,7 +50,7 @@ pub(super) fn body(diagnosis: &Diagnosis, rows: &Envelopes<COLUMNS>, charts: &mu
     };
     let found = !diagnosis.effects.is_empty();
     let mut body = html! {
-        p .note { "What each equation leaves over on samples that were not fitted, averaged over 0.2 s: first over time, then against the variables \
+        p .note { "The residual of each equation on samples that were not fitted, averaged over 0.2 s: first over time, then against the variables \
             with which it goes most, as means in bins with two standard errors. An effect that the model lacks bends the grey line; with the \
             effects found the blue line lies on zero where they explain it." }
         (quality(diagnosis))
@@ -61,7 +61,7 @@ pub(super) fn body(diagnosis: &Diagnosis, rows: &Envelopes<COLUMNS>, charts: &mu
             lines.push(Line::over_time(AFTER, Ink::Blue, &column(2 * number + 1)));
         }
         let (_, unit) = people_unit(equation);
-        let title = format!("{}: left over", capital(name(equation)));
+        let title = format!("{}: residual", capital(name(equation)));
         let chart = Chart { title, unit, lines, ..Chart::default() };
         body = html! { (body) (charts.place(chart)) div .pair { (against(diagnosis, equation, charts)) } };
     }
@@ -120,7 +120,7 @@ fn binned(label: &str, ink: Ink, bins: &BinnedResidual) -> Line {
     Line { x: Some(x), dots: true, ..Line::over_time(label, ink, &ranges) }
 }
 
-/// Size and nature of what is left.
+/// Size and nature of the residual.
 fn quality(diagnosis: &Diagnosis) -> Markup {
     let sides = [("before", &diagnosis.before.residuals), ("after", &diagnosis.after.residuals)];
     let shown = if diagnosis.effects.is_empty() { 1 } else { 2 };
