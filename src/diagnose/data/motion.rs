@@ -19,13 +19,13 @@ pub(crate) struct Motion {
     pub(crate) rms_mps: f64,
     /// On which side of its play sensor A would read.
     pub(crate) pa: Sides,
-    /// On which side of its play sensor B would read.
+    /// The same of sensor B.
     pub(crate) pb: Sides,
-    /// On which side of its play the position sensor would read.
+    /// The same of the position sensor.
     pub(crate) x: Sides,
     /// Where in its meter's dead band flow A would lie: zero while the meter shows something.
     pub(crate) qa: Sides,
-    /// Where in its meter's dead band flow B would lie.
+    /// The same of flow B.
     pub(crate) qb: Sides,
 }
 

@@ -1,11 +1,10 @@
-//! The declared model and its effects, fitted to all traces together.
+//! The declared model and effects beside it, fitted to all traces at once.
 
 mod gauss_newton;
 mod predict;
 mod problem;
 mod regression;
 mod score;
-mod whiteness;
 mod widening;
 
 pub(crate) use gauss_newton::Fit;
