@@ -266,12 +266,10 @@ impl Ranges {
     /// The first reading that is not possible; a missing one is.
     #[inline]
     pub(super) fn broken_by(&self, row: &Row) -> Option<Signal> {
-        let [least, most] = &self.bounds;
-        let mut broken = false;
-        for ((value, least), most) in row.cells.iter().zip(least).zip(most) {
-            // A missing reading, NaN, is neither.
-            broken |= (value < least) | (value > most);
-        }
+        let ([least, most], cells) = (&self.bounds, &row.cells);
+        // A missing reading, NaN, is neither. By place: zipped iterators are made by calls here, for every row.
+        let is_broken = |place: usize| (cells[place] < least[place]) | (cells[place] > most[place]);
+        let broken = (0..cells.len()).fold(false, |broken, place| broken | is_broken(place));
         if broken { self.first_broken_by(row) } else { None }
     }
 
