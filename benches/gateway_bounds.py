@@ -144,7 +144,7 @@ def months():
         time.sleep(11)
         files = sorted((folder / "state" / "summaries").iterdir())
         size = sum(file.stat().st_size for file in files)
-        state = sum(file.stat().st_size for file in (folder / "state").glob("watch.state*"))
+        state = sum(file.stat().st_size for file in (folder / "state/cylinders").iterdir())
         print(f"{len(files)} files of hours and days, {files[0].stem} to {files[-1].stem}, {size / 1e6:.2f} MB")
         print(f"state {state / 1e3:.0f} kB (two generations)")
         leak = running.day["leakage"]["internal"]

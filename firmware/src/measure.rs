@@ -35,6 +35,8 @@ struct Cost {
     ticks: u32,
     worst: u32,
     watch: u32,
+    /// Both in one sample.
+    sample: u32,
 }
 
 /// Runs the trace through `E` and tells the host.
@@ -47,7 +49,8 @@ pub fn run<E: Estimator>() -> ! {
         let top = paint_stack();
         let cost = replay(&mut estimator, &file);
         let stack = (top - deepest(top)) as u32;
-        print(b"cost\0", &[cost.updates, cost.ticks, cost.worst, cost.watch, size_of::<E>() as u32, stack]);
+        let Cost { updates, ticks, worst, watch, sample } = cost;
+        print(b"cost\0", &[updates, ticks, worst, watch, sample, size_of::<E>() as u32, stack]);
     }
     exit()
 }
@@ -69,11 +72,13 @@ fn replay<E: Estimator>(estimator: &mut E, file: &File) -> Cost {
         cost.updates += 1;
         cost.ticks += ticks;
         cost.worst = cost.worst.max(ticks);
+        cost.sample = cost.sample.max(ticks);
         if let Some(elapsed_s) = renewed {
-            let ((), ticks) = timed(|| estimator.watch(elapsed_s));
-            cost.watch = cost.watch.max(ticks);
-            let told = estimator.told();
-            print(b"told\0", &told.map(f32::to_bits));
+            let ((), watching) = timed(|| estimator.watch(elapsed_s));
+            cost.watch = cost.watch.max(watching);
+            cost.sample = cost.sample.max(ticks + watching);
+            let [kappa, kappa_std, c, c_std, a, a_std, b, b_std] = estimator.told().map(f32::to_bits);
+            print(b"told\0", &[cost.updates, kappa, kappa_std, c, c_std, a, a_std, b, b_std]);
         }
     }
     cost

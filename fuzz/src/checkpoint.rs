@@ -1,12 +1,18 @@
-//! Any bytes as the state of a watch, and a saved one with values changed and the checksum put right: refused, or a watch
-//! that goes on with numbers.
+//! Any bytes as the state of a cylinder, and a saved one with values changed and the checksum put right: put aside, or a
+//! watch that goes on with numbers.
 
 use super::{Dice, assert_told, scratch, trace_text};
 use ciborium::Value;
+use flate2::Compression;
+use flate2::read::{GzDecoder, GzEncoder};
 use pitchleak::Rig;
 use pitchleak::live::{Batch, BatchFormat, Checkpoint, Event, LiveConfig, Snapshot, Watch};
+use std::io::Read;
 use std::path::Path;
 use std::sync::LazyLock;
+
+/// In the folder.
+const STATE: &str = "cylinders/T7%2FB2.state";
 
 static SAVED: LazyLock<Value> = LazyLock::new(|| {
     let (mut watch, mut events) = (watch(), Vec::new());
@@ -15,11 +21,10 @@ static SAVED: LazyLock<Value> = LazyLock::new(|| {
         go_on(&mut watch, t_s, &mut events);
     }
     let folder = scratch::folder("checkpoint-saved");
-    let checkpoint = Checkpoint::new(&folder).expect("a folder");
-    checkpoint.save(&Snapshot::of(&watch).with_unsent(vec!["topic\npayload".to_owned()])).expect("saves");
-    let bytes = std::fs::read(folder.join("watch.state")).expect("reads");
+    save(&folder, &mut watch);
+    let bytes = std::fs::read(folder.join(STATE)).expect("reads");
     std::fs::remove_dir_all(folder).expect("removes");
-    ciborium::from_reader(&bytes[..bytes.len() - 4]).expect("CBOR")
+    ciborium::from_reader(GzDecoder::new(bytes.as_slice())).expect("CBOR")
 });
 
 pub fn enter(bytes: &[u8]) {
@@ -39,10 +44,26 @@ pub fn enter(bytes: &[u8]) {
     ciborium::into_writer(&tree, &mut forged).expect("writes");
     // Something behind the end, too.
     forged.extend((0..dice.byte() % 3).map(|_| 0));
-    let mut crc = flate2::Crc::new();
-    crc.update(&forged);
-    forged.extend(crc.sum().to_le_bytes());
-    restore_and_go_on(&folder, &forged);
+    let mut packed = Vec::new();
+    GzEncoder::new(forged.as_slice(), Compression::fast()).read_to_end(&mut packed).expect("packs");
+    restore_and_go_on(&folder, &packed);
+}
+
+fn save(folder: &Path, watch: &mut Watch) {
+    Checkpoint::new(folder).expect("a folder").save(&Snapshot::of(watch)).expect("saves");
+}
+
+/// Whatever was saved, restores: as it was, without a word.
+///
+/// # Panics
+/// Where it doesn't.
+pub fn assert_restores(watch: &mut Watch) {
+    let folder = scratch::folder("checkpoint-restores");
+    save(&folder, watch);
+    let mut next = Watch::new(watch.config().clone(), None);
+    let notices = Checkpoint::new(&folder).expect("a folder").restore(&mut next).expect("reads");
+    std::fs::remove_dir_all(folder).expect("removes");
+    assert!(notices.is_empty() && watch.names().eq(next.names()), "{notices:?}");
 }
 
 fn watch() -> Watch {
@@ -50,12 +71,10 @@ fn watch() -> Watch {
 }
 
 fn restore_and_go_on(folder: &Path, bytes: &[u8]) {
-    std::fs::write(folder.join("watch.state"), bytes).expect("writes");
     let (mut watch, mut events) = (watch(), Vec::new());
     let checkpoint = Checkpoint::new(folder).expect("a folder");
-    if checkpoint.restore(&mut watch).is_err() {
-        return;
-    }
+    std::fs::write(folder.join(STATE), bytes).expect("writes");
+    events.extend(checkpoint.restore(&mut watch).expect("reads").into_iter().map(Event::Notice));
     for t_s in [349_210.0, 352_800.0, 432_000.0] {
         go_on(&mut watch, t_s, &mut events);
     }

@@ -1,6 +1,6 @@
 //! Any messages of a broker, in each format of the gateway, on any topic: events with numbers, on topics that MQTT allows.
 
-use super::{assert_told, trace_text};
+use super::{assert_told, checkpoint, trace_text};
 use pitchleak::Rig;
 use pitchleak::live::{Batch, BatchFormat, Event, LiveConfig, Watch};
 
@@ -29,6 +29,7 @@ pub fn enter(bytes: &[u8]) {
         let batch = Batch { cylinder: &cylinder, format, payload, resent: choice & 16 != 0 };
         watch.take_batch(&batch, &mut events);
     }
+    checkpoint::assert_restores(&mut watch);
     watch.tell_counted(&mut events);
     watch.finish(&mut events);
     assert_told(&events);

@@ -91,7 +91,12 @@ fn each_file_is_read_once_and_what_is_none_is_told() {
     let farm = farm();
     let mut patterns = pattern(&farm, "T7/B1/*.csv");
     patterns.extend(pattern(&farm, "T7/../T7/B1/2026-05-01.csv"));
-    assert_eq!(FleetTrace::find(&patterns, &FleetRig::Beside).unwrap().len(), 2);
+    let other = farm.path().join("T7/B1/other.csv");
+    fs::hard_link(farm.path().join("T7/B1/2026-05-01.csv"), &other).unwrap();
+    patterns.push(other.display().to_string());
+    let traces = FleetTrace::find(&patterns, &FleetRig::Beside).unwrap();
+    assert_eq!(traces.len(), 2);
+    assert_eq!((traces[0].other_names.last(), traces[1].other_names.len()), (Some(&other), 0));
     let error = |name: &str| FleetTrace::find(&pattern(&farm, name), &FleetRig::Beside).unwrap_err();
     assert!(matches!(error("T8/*.csv"), FleetError::NoTrace(_)));
     assert!(matches!(error("T7"), FleetError::Folder(_)));

@@ -12,6 +12,8 @@ use std::sync::Arc;
 pub struct FleetTrace {
     /// The file.
     pub path: PathBuf,
+    /// Its other names among those given, by links: it is judged once.
+    pub other_names: Vec<PathBuf>,
     /// Whose it is, and from when.
     pub identity: TraceIdentity,
     /// The rig file; none for the built-in rig.
@@ -57,7 +59,7 @@ impl FleetTrace {
         if let FleetRig::One(file) = rigs {
             shelf.rigs.insert(file.clone(), Ok(Arc::new(Rig::load(file)?)));
         }
-        let trace = |path: PathBuf| {
+        let trace = |(path, other_names): (PathBuf, Vec<PathBuf>)| {
             let mut identity = TraceIdentity::of(&path);
             let rig_file = match (rigs, &table) {
                 (FleetRig::One(file), _) => Some(file.clone()),
@@ -72,7 +74,7 @@ impl FleetTrace {
                 Some(file) => shelf.load(file),
                 None => Ok(shelf.paper()),
             };
-            Ok(Self { path, identity, rig_file, rig })
+            Ok(Self { path, other_names, identity, rig_file, rig })
         };
         let found: Vec<Result<Self, PathBuf>> = paths.into_iter().map(trace).collect();
         let mut without = found.iter().filter_map(|found| found.as_ref().err());
@@ -94,17 +96,24 @@ impl FleetTrace {
     }
 }
 
-/// Files in the order of the patterns; one that has two names is read once.
-fn expand(patterns: &[String]) -> Result<Vec<PathBuf>, FleetError> {
-    let (mut paths, mut seen) = (Vec::new(), HashSet::new());
+/// Files in the order of the patterns, each with its other names.
+fn expand(patterns: &[String]) -> Result<Vec<(PathBuf, Vec<PathBuf>)>, FleetError> {
+    let (mut files, mut seen): (Vec<(PathBuf, Vec<PathBuf>)>, _) = (Vec::new(), HashMap::new());
     for pattern in patterns {
         let found = matches(pattern)?;
         if found.is_empty() {
             return Err(FleetError::NoTrace(pattern.clone()));
         }
-        paths.extend(found.into_iter().filter(|path| identity(path).is_none_or(|known| seen.insert(known))));
+        for path in found {
+            let at = identity(&path).map_or(files.len(), |known| *seen.entry(known).or_insert(files.len()));
+            match files.get_mut(at) {
+                None => files.push((path, Vec::new())),
+                Some((known, others)) if *known != path && !others.contains(&path) => others.push(path),
+                Some(_) => {}
+            }
+        }
     }
-    Ok(paths)
+    Ok(files)
 }
 
 /// A file that is there is itself, whatever characters its name has.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What to watch.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LiveConfig {
     /// Rig of each cylinder that is not named; none where only named ones are watched.
     pub rig: Option<Rig>,
@@ -17,7 +17,7 @@ pub struct LiveConfig {
     pub interval_s: f64,
     /// Cylinders at most; more are left out, so that a feed that invents names does not eat the memory.
     pub most_cylinders: usize,
-    /// Samples of a [`Batch`](super::Batch) that stay before the last one for so long are of a clock that was set back, s.
+    /// Samples that stay before the last one taken for so long are of a clock that was set back, s.
     pub set_back_after_s: f64,
 }
 
@@ -109,8 +109,8 @@ impl LiveDocument {
         let folder = path.parent().unwrap_or(Path::new(""));
         let load = |rig: &PathBuf| Rig::load(folder.join(rig));
         let seconds = |name: &str, value: Option<f64>, default: f64| match value.unwrap_or(default) {
-            value if value > 0.0 && value <= 86_400.0 => Ok(value),
-            value => Err(content(format!("{name} = {value}: above 0 and at most 86400 is allowed"))),
+            value if (1e-3..=86_400.0).contains(&value) => Ok(value),
+            value => Err(content(format!("{name} = {value}: 0.001 to 86400 is allowed"))),
         };
         let interval_s = seconds("interval_s", self.interval_s, 1.0)?;
         let set_back_after_s = seconds("set_back_after_s", self.set_back_after_s, SET_BACK_AFTER_S)?;

@@ -8,7 +8,7 @@ use super::order::{Order, Turn};
 use crate::Rig;
 use crate::replay::{Stream, Taken};
 use crate::report::ReplayReport;
-use crate::trace::{BadRows, LineLayout};
+use crate::trace::{BadReason, BadRows, LineLayout};
 use pitchleak_core::RlsError;
 use serde::{Deserialize, Serialize};
 
@@ -17,15 +17,15 @@ pub(super) struct Cylinder {
     /// Its alarms are those not yet said.
     #[serde(with = "stream_bytes")]
     stream: Stream,
-    /// Intervals that had begun at the last sample: a new one asks for an estimate.
-    intervals: Option<f64>,
     /// Time of the last estimate said, s.
     told_s: Option<f64>,
-    /// Of samples that come in messages.
     order: Order,
     history: History,
     #[serde(skip)]
     notices: Notices,
+    /// Something came since the last [`Snapshot`](super::Snapshot).
+    #[serde(skip)]
+    pub changed: bool,
 }
 
 /// A line, taken apart.
@@ -33,11 +33,25 @@ pub(super) struct Line<'a> {
     /// The cylinder's.
     pub name: &'a str,
     pub layout: &'a LineLayout,
-    pub number: u64,
+    /// In the input; none where samples are counted one by one for each cylinder, so that a restart changes no number.
+    pub number: Option<u64>,
     pub cells: &'a [&'a [u8]],
 }
 
-/// Kind of notice of [`BadReason::OutOfRange`](crate::trace::BadReason::OutOfRange).
+/// A reason's name in JSON is the kind of its notices.
+fn id(reason: BadReason) -> &'static str {
+    match reason {
+        BadReason::NotANumber => "not_a_number",
+        BadReason::NotATime => "not_a_time",
+        BadReason::Missing => "missing",
+        BadReason::ShortRow => "short_row",
+        BadReason::LongRow => "long_row",
+        BadReason::OutOfRange => OUT_OF_RANGE,
+        BadReason::TimeBack => "time_back",
+    }
+}
+
+/// Kind of notice of [`BadReason::OutOfRange`].
 const OUT_OF_RANGE: &str = "out_of_range";
 
 impl Cylinder {
@@ -45,11 +59,11 @@ impl Cylinder {
         let stream = Stream::new(rig, BadRows::Skip)?;
         Ok(Self {
             stream,
-            intervals: None,
             told_s: None,
             order: Order::default(),
             history: History::default(),
             notices: Notices::default(),
+            changed: true,
         })
     }
 
@@ -57,54 +71,65 @@ impl Cylinder {
         self.stream.rig()
     }
 
-    /// Whether samples can have led to it; its stream has been looked at as it was read.
-    pub(super) fn is_possible(&self) -> bool {
-        self.history.is_possible()
+    /// Whether it is watched by this rig, by whatever name.
+    pub(super) fn is_of(&self, rig: &Rig) -> bool {
+        self.rig().to_toml() == rig.to_toml()
     }
 
-    /// Takes in a line.
-    pub(super) fn take(&mut self, config: &LiveConfig, line: &Line<'_>, events: &mut Vec<Event>) {
-        match self.stream.take_line(line.layout, line.number, line.cells) {
-            Ok(Taken::Bad(bad)) => {
-                let kind = serde_json::to_value(bad.reason).unwrap_or_default();
-                let kind = kind.as_str().unwrap_or("bad");
-                self.notice(line.name, kind, bad.to_string(), events);
-            }
-            Ok(Taken::Good { renewed }) => {
-                if renewed && !self.stream.replay().alarms().is_empty() {
-                    self.tell_alarms(line.name, events);
-                }
-                self.tell_estimate_if_due(line.name, config.interval_s, events);
-            }
-            Err(fault) => self.notice(line.name, "unreadable", fault.to_string(), events),
-        }
+    /// Whether samples can have led to it; its stream has been looked at as it was read.
+    pub(super) fn is_possible(&self) -> bool {
+        self.history.is_possible() && self.order.is_possible()
     }
 
     /// Takes in a line if it is its turn: one that came before changes nothing, to the last bit.
-    pub(super) fn take_in_turn(
+    pub(super) fn take(
         &mut self,
         config: &LiveConfig,
         resent: bool,
         line: &Line<'_>,
         events: &mut Vec<Event>,
     ) {
-        let Some(t_s) = line.layout.time_s(self.stream.epoch_ns, line.cells) else {
-            return self.notice(line.name, "not_a_time", "no time can be read".to_owned(), events);
+        self.changed = true;
+        let t_s = match line.layout.time_s(self.stream.epoch_ns, line.cells) {
+            Ok(t_s) => t_s,
+            Err(reason) => {
+                let at = line.number.map(|number| format!("line {number}: ")).unwrap_or_default();
+                return self.notice(line.name, id(reason), format!("{at}time: {}", reason.text()), events);
+            }
         };
-        let turn = self.order.turn(t_s, resent, config.set_back_after_s);
-        // By its own count, which a restart does not begin anew.
-        let line = &Line { number: self.order.count(), ..*line };
-        match turn {
-            Turn::Next => self.take(config, line, events),
+        match self.order.turn(t_s, resent, config.set_back_after_s) {
+            Turn::Next => self.take_next(config, t_s, line, events),
             Turn::Late => {
                 let kind = if resent { "sent_again" } else { "late" };
                 self.notice(line.name, kind, format!("{t_s} s is not after the last sample"), events);
             }
             Turn::SetBack => {
+                self.tell_counted(line.name, events);
                 let text = format!("samples go on from {t_s} s: the clock was set back");
                 self.notice(line.name, "clock_set_back", text, events);
-                self.take(config, line, events);
+                self.take_next(config, t_s, line, events);
             }
+        }
+    }
+
+    fn take_next(&mut self, config: &LiveConfig, t_s: f64, line: &Line<'_>, events: &mut Vec<Event>) {
+        let before_s = self.stream.time_s();
+        let number = line.number.unwrap_or(self.order.count());
+        let taken = self.stream.take_line(line.layout, number, line.cells);
+        if matches!(taken, Ok(Taken::Good { .. })) {
+            self.order.took(t_s);
+        } else {
+            self.order.left_out(t_s);
+        }
+        match taken {
+            Ok(Taken::Bad(bad)) => self.notice(line.name, id(bad.reason), bad.to_string(), events),
+            Ok(Taken::Good { renewed }) => {
+                if renewed && !self.stream.replay().alarms().is_empty() {
+                    self.tell_alarms(line.name, events);
+                }
+                self.tell_estimate_if_due(line.name, before_s, config.interval_s, events);
+            }
+            Err(fault) => self.notice(line.name, "unreadable", fault.to_string(), events),
         }
     }
 
@@ -119,8 +144,22 @@ impl Cylinder {
         if self.stream.time_s() != self.told_s {
             events.extend(self.estimate(name).map(|told| Event::Estimate(Box::new(told))));
         }
+        self.tell_counted(name, events);
+    }
+
+    /// What was counted and not said.
+    pub(super) fn tell_counted(&mut self, name: &str, events: &mut Vec<Event>) {
         let rest = self.notices.rest(name, self.times_s());
         events.extend(rest.into_iter().map(|notice| Event::Notice(self.explained(notice))));
+    }
+
+    /// How many lines of each kind were left out.
+    pub(super) fn left_out(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.notices.totals()
+    }
+
+    pub(super) fn history(&self) -> &History {
+        &self.history
     }
 
     /// Of the last line, and of the last good one.
@@ -137,10 +176,16 @@ impl Cylinder {
         NoticeEvent { text: notice.text + &mistake.unwrap_or_default(), ..notice }
     }
 
-    fn tell_estimate_if_due(&mut self, name: &str, interval_s: f64, events: &mut Vec<Event>) {
-        let intervals = self.stream.time_s().map(|t_s| (t_s / interval_s).floor());
-        let before = std::mem::replace(&mut self.intervals, intervals);
-        if before.is_none() || before == intervals {
+    /// With the first sample of every interval but the first.
+    fn tell_estimate_if_due(
+        &mut self,
+        name: &str,
+        before_s: Option<f64>,
+        interval_s: f64,
+        events: &mut Vec<Event>,
+    ) {
+        let intervals = |t_s: Option<f64>| t_s.map(|t_s| (t_s / interval_s).floor());
+        if before_s.is_none() || intervals(before_s) == intervals(self.stream.time_s()) {
             return;
         }
         let Some(estimate) = self.estimate(name) else { return };

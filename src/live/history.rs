@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// Days that are kept for the trend.
 const DAYS: usize = 90;
+/// No cylinder leaks as much, L/min: an estimate beyond it is none, and adds up to nothing.
+const MOST_LPM: f64 = 1e6;
 /// Fewer tell no trend over days.
 const LEAST_DAYS: usize = 3;
 
@@ -126,6 +128,11 @@ impl History {
         sums(&self.hour) && sums(&self.day) && self.days.len() <= DAYS
     }
 
+    /// Mean flow of each leak on the days kept, L/min, by the number of the day since the axis' zero.
+    pub(super) fn days(&self) -> impl Iterator<Item = (f64, PerLeak<f64>)> {
+        self.days.iter().map(|day| (day.index, day.mean_lpm))
+    }
+
     /// Takes in an estimate of the time `at_s`, s since any one moment; gives the spans that ended before it.
     pub(super) fn add(&mut self, at_s: f64, estimate: &EstimateEvent) -> Vec<Summary> {
         let hour = self.hour.add(Span::Hour, at_s, estimate);
@@ -194,10 +201,12 @@ impl Sums {
 
 impl LeakSums {
     fn add(&mut self, leakage: LiveLeakage, alarm: bool, first: bool) {
-        self.mean_lpm += leakage.mean_lpm;
-        self.max_lpm = if first { leakage.mean_lpm } else { self.max_lpm.max(leakage.mean_lpm) };
+        let possible = |lpm: &f64| lpm.abs() <= MOST_LPM;
+        let mean_lpm = Some(leakage.mean_lpm).filter(possible).unwrap_or_default();
+        self.mean_lpm += mean_lpm;
+        self.max_lpm = if first { mean_lpm } else { self.max_lpm.max(mean_lpm) };
         self.alarms = self.alarms.saturating_add(u64::from(alarm));
-        self.std_lpm = leakage.std_lpm;
+        self.std_lpm = leakage.std_lpm.filter(possible);
     }
 }
 

@@ -21,7 +21,7 @@ mod plain_json;
 mod watch;
 
 pub use batch::{Batch, BatchFormat};
-pub use checkpoint::{Checkpoint, CheckpointError, Restored, Snapshot};
+pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};
 pub use config::{ConfigError, LiveConfig, LiveDocument};
 pub use event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent, OutputFormat, SummaryEvent};
 pub use format::LineFormat;

@@ -14,6 +14,8 @@ pub(super) struct Notices(BTreeMap<String, Kind>);
 struct Kind {
     told_s: Option<f64>,
     count: u64,
+    /// Also those that were told.
+    total: u64,
     text: String,
 }
 
@@ -28,7 +30,7 @@ impl Notices {
         text: String,
     ) -> Option<NoticeEvent> {
         let Some(entry) = self.0.get_mut(kind) else {
-            self.0.insert(kind.to_owned(), Kind { told_s: seen_s, count: 0, text: String::new() });
+            self.0.insert(kind.to_owned(), Kind { told_s: seen_s, count: 0, total: 1, text: String::new() });
             return Some(NoticeEvent {
                 cylinder: cylinder.to_owned(),
                 t_s,
@@ -41,7 +43,13 @@ impl Notices {
             entry.text = text;
         }
         entry.count += 1;
+        entry.total += 1;
         entry.due(seen_s).then(|| entry.tell(cylinder, [seen_s, t_s], kind))
+    }
+
+    /// How many of each kind there were, told or not.
+    pub(super) fn totals(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.0.iter().map(|(kind, entry)| (kind.as_str(), entry.total))
     }
 
     /// What was counted and not said.

@@ -5,6 +5,7 @@
 
 use crate::trace::Record;
 use pitchleak_core::Sensors;
+use std::array::from_fn;
 
 /// A step this many times the usual one, beyond so many standard deviations of the declared noise, is wild.
 const USUAL_STEPS: f64 = 10.0;
@@ -59,12 +60,10 @@ impl Spikes {
         let s = &record.sample;
         let [.., last_a, last_b] = self.last;
         let now = [s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap_or(last_a), s.qb_m3s.unwrap_or(last_b)];
-        let mut steps = now;
-        let mut wild = false;
-        for ((step, last), wild_step) in steps.iter_mut().zip(&self.last).zip(&self.wild_step) {
-            *step = (*step - last).abs();
-            wild |= *step > *wild_step;
-        }
+        // By place: zipped iterators are made by calls here, for every record.
+        let steps = from_fn(|channel| (now[channel] - self.last[channel]).abs());
+        let is_wild = |channel: usize| steps[channel] > self.wild_step[channel];
+        let wild = (0..CHANNELS).fold(false, |wild, channel| wild | is_wild(channel));
         if (wild || self.in_a_row > 0) && self.is_spike(wild, record) {
             return true;
         }
@@ -98,16 +97,16 @@ impl Spikes {
             return;
         }
         let share = 1.0 / self.seen.min(MEMORY) as f64;
-        let usual = self.usual_step.iter_mut().zip(&mut self.quantum).zip(steps);
-        for ((usual_step, quantum), step) in usual {
-            *usual_step += share * (step - *usual_step);
-            *quantum = if *step > 0.0 { quantum.min(*step) } else { *quantum };
-        }
+        let Self { usual_step: usual, quantum, least_wild: least, .. } = *self;
+        self.usual_step = from_fn(|channel| usual[channel] + share * (steps[channel] - usual[channel]));
+        let smaller = |step: f64, quantum: f64| if step > 0.0 { quantum.min(step) } else { quantum };
+        self.quantum = from_fn(|channel| smaller(steps[channel], quantum[channel]));
         if self.seen >= MEMORY {
-            let known = self.usual_step.iter().zip(&self.least_wild).zip(&self.quantum);
-            for (wild, ((usual, least), quantum)) in self.wild_step.iter_mut().zip(known) {
-                *wild = (USUAL_STEPS * usual + least).max(QUANTA * quantum);
-            }
+            let Self { usual_step: usual, quantum, .. } = *self;
+            let wild = |channel: usize| {
+                (USUAL_STEPS * usual[channel] + least[channel]).max(QUANTA * quantum[channel])
+            };
+            self.wild_step = from_fn(wild);
         }
     }
 

@@ -151,7 +151,7 @@ typedef struct PitchleakSample {
 typedef struct PitchleakEstimate {
   // Best value.
   float value;
-  // Standard deviation.
+  // Standard deviation; infinite where nothing is known.
   float std;
 } PitchleakEstimate;
 

@@ -30,13 +30,18 @@ impl From<PitchleakSample> for Sample<f32> {
 pub struct PitchleakEstimate {
     /// Best value.
     pub value: f32,
-    /// Standard deviation.
+    /// Standard deviation; infinite where nothing is known.
     pub std: f32,
 }
 
 impl From<Estimate<f32>> for PitchleakEstimate {
     fn from(estimate: Estimate<f32>) -> Self {
-        Self { value: estimate.value, std: estimate.std }
+        let known = estimate.value.is_finite() && !estimate.std.is_nan();
+        if known {
+            Self { value: estimate.value, std: estimate.std }
+        } else {
+            Self { value: 0.0, std: f32::INFINITY }
+        }
     }
 }
 

@@ -71,8 +71,74 @@ pub struct PitchleakRig {
     pub max_step_s: f32,
 }
 
+/// What a rig may be, SI: as wide as a rig file's bounds, so that any machine lies within and nothing overflows in `float`.
+mod bounds {
+    use core::ops::RangeInclusive;
+
+    /// m²: of a piston of 1 mm to one of 3.5 m.
+    pub(super) const AREA: RangeInclusive<f32> = 1e-6..=10.0;
+    /// m.
+    pub(super) const STROKE: RangeInclusive<f32> = 1e-3..=100.0;
+    /// kg; none in a cylinder whose force is not looked at.
+    pub(super) const MOVING_MASS: RangeInclusive<f32> = 0.0..=1e7;
+    /// m³.
+    pub(super) const DEAD_VOLUME: RangeInclusive<f32> = 0.0..=10.0;
+    /// Pa: from froth to steel.
+    pub(super) const BULK_MODULUS: RangeInclusive<f32> = 1e6..=1e11;
+    /// Pa.
+    pub(super) const BULK_MODULUS_STD: RangeInclusive<f32> = 0.0..=1e11;
+    /// Noise, offset and drift of a flow meter, m³/s.
+    pub(super) const FLOW: RangeInclusive<f32> = 0.0..=10.0;
+    /// Of a pressure sensor, Pa.
+    pub(super) const PRESSURE: RangeInclusive<f32> = 0.0..=1e9;
+    /// Of a position sensor, m.
+    pub(super) const POSITION: RangeInclusive<f32> = 0.0..=1e3;
+    /// Share of a reading.
+    pub(super) const GAIN: RangeInclusive<f32> = 0.0..=1.0;
+    /// m³/s.
+    pub(super) const THRESHOLD: RangeInclusive<f32> = 1e-15..=10.0;
+    /// s.
+    pub(super) const MAX_STEP: RangeInclusive<f32> = 1e-6..=1e7;
+}
+
+impl PitchleakSensor {
+    fn is_within(&self, unit: &core::ops::RangeInclusive<f32>) -> bool {
+        let Self { noise_std, bias_std, gain_std, drift_std_ph } = self;
+        [noise_std, bias_std, drift_std_ph].into_iter().all(|value| unit.contains(value))
+            && bounds::GAIN.contains(gain_std)
+    }
+}
+
 impl PitchleakRig {
+    /// Whether all that is declared is possible; no number that is none is.
+    fn check(&self) -> Result<(), PitchleakResult> {
+        let PitchleakCylinder { area_a_m2, area_b_m2, stroke_m, moving_mass_kg, .. } = &self.cylinder;
+        let cylinder = [
+            bounds::AREA.contains(area_a_m2),
+            bounds::AREA.contains(area_b_m2),
+            bounds::STROKE.contains(stroke_m),
+            bounds::MOVING_MASS.contains(moving_mass_kg),
+            bounds::DEAD_VOLUME.contains(&self.cylinder.dead_volume_a_m3),
+            bounds::DEAD_VOLUME.contains(&self.cylinder.dead_volume_b_m3),
+            bounds::BULK_MODULUS.contains(&self.fluid.bulk_modulus_pa),
+            bounds::BULK_MODULUS_STD.contains(&self.fluid.bulk_modulus_std_pa),
+            bounds::MAX_STEP.contains(&self.max_step_s),
+        ];
+        let sensors = [
+            self.flow_a.is_within(&bounds::FLOW),
+            self.flow_b.is_within(&bounds::FLOW),
+            self.pressure.is_within(&bounds::PRESSURE),
+            self.position.is_within(&bounds::POSITION),
+        ];
+        match (cylinder.contains(&false), sensors.contains(&false)) {
+            (true, _) => Err(PitchleakResult::BadCylinder),
+            (_, true) => Err(PitchleakResult::BadSensors),
+            _ => Ok(()),
+        }
+    }
+
     pub(crate) fn estimator<const N: usize>(&self) -> Result<Rls<f32, N>, PitchleakResult> {
+        self.check()?;
         let PitchleakCylinder {
             area_a_m2,
             area_b_m2,
@@ -112,9 +178,7 @@ impl PitchleakRig {
             external_a: self.threshold_external_a_m3s,
             external_b: self.threshold_external_b_m3s,
         };
-        let all =
-            threshold_m3s.internal > 0.0 && threshold_m3s.external_a > 0.0 && threshold_m3s.external_b > 0.0;
-        if !all {
+        if !threshold_m3s.iter().all(|(_, threshold)| bounds::THRESHOLD.contains(threshold)) {
             return Err(PitchleakResult::BadThreshold);
         }
         Ok(LeakDetector::new(AlarmSettings { threshold_m3s, ..AlarmSettings::default() }))

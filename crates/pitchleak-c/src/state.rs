@@ -41,6 +41,8 @@ pub(crate) fn restore<const N: usize>(bytes: &[u8]) -> Result<Estimator<N>, Pitc
     if form != Form::of(N) {
         return Err(PitchleakResult::OtherVersion);
     }
-    let state = postcard::from_bytes_crc32::<(Form, Estimator<N>)>(bytes, CRC.digest());
-    state.map(|(_, estimator)| estimator).map_err(|_| PitchleakResult::Damaged)
+    match postcard::take_from_bytes_crc32::<(Form, Estimator<N>)>(bytes, CRC.digest()) {
+        Ok(((_, estimator), [])) => Ok(estimator),
+        _ => Err(PitchleakResult::Damaged),
+    }
 }

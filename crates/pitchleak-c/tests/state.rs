@@ -4,6 +4,7 @@
 
 use pitchleak_c::*;
 use pitchleak_testkit::Motion;
+use rand::{RngExt, SeedableRng};
 use std::ptr::{null, null_mut};
 
 /// Another number after a change of what the estimator keeps: then raise `VERSION` in src/state.rs.
@@ -109,7 +110,65 @@ fn a_damaged_state_is_refused_and_changes_nothing() {
     for length in 0..good.len() {
         assert_eq!(restore(&mut estimator, &good[..length]), PitchleakResult::Damaged);
     }
+    let longer = [&good[..], &[0]].concat();
+    assert_eq!(restore(&mut estimator, &longer), PitchleakResult::Damaged, "something follows its end");
     assert!(saved(&estimator) == good);
+}
+
+/// Any number that a float can be, the likely and the absurd.
+fn any(dice: &mut Dice) -> f32 {
+    match dice.0.random_range(0..4_u32) {
+        0 => f32::from_bits(dice.0.random()),
+        1 => [0.0, -0.0, f32::MAX, f32::MIN_POSITIVE, 1e-45, f32::NAN, f32::INFINITY]
+            [dice.0.random_range(0..7_usize)],
+        _ => 10_f32.powf(dice.0.random_range(-12.0..12.0)),
+    }
+}
+
+struct Dice(rand_chacha::ChaCha8Rng);
+
+/// What `begin` takes gives no number that is none, whatever the sensors say.
+#[test]
+fn a_rig_that_is_taken_gives_numbers() {
+    let mut dice = Dice(rand_chacha::ChaCha8Rng::seed_from_u64(31));
+    let samples = samples();
+    let mut taken = 0;
+    for round in 0..3000 {
+        let mut rig = rig();
+        // One or two of its 28 numbers are others.
+        for _ in 0..1 + round % 2 {
+            let which = dice.0.random_range(0..28_usize);
+            let value = any(&mut dice);
+            // SAFETY: the rig is 28 floats in a row.
+            unsafe { (&raw mut rig).cast::<f32>().add(which).write(value) };
+        }
+        let mut estimator = Pitchleak4 { words: [0; PITCHLEAK4_WORDS] };
+        // SAFETY: both are what they say.
+        if unsafe { pitchleak4_begin(&mut estimator, &rig) } != PitchleakResult::Ok {
+            continue;
+        }
+        taken += 1;
+        for sample in &samples[..300] {
+            let mut sample = *sample;
+            if dice.0.random_range(0..50) == 0 {
+                sample.pa_pa = any(&mut dice);
+            }
+            if dice.0.random_range(0..50) == 0 {
+                sample.qb_m3s = any(&mut dice);
+            }
+            // SAFETY: both are what they say.
+            unsafe { pitchleak4_update(&mut estimator, 0.01, &sample) };
+        }
+        let mut found = PitchleakFound::default();
+        // SAFETY: both are what they say.
+        unsafe { pitchleak4_find(&estimator, &mut found) };
+        for found in
+            [found.internal_m3s, found.external_a_m3s, found.external_b_m3s, found.compressibility_per_pa]
+        {
+            assert!(!found.value.is_nan() && !found.std.is_nan(), "{rig:?}: {found:?}");
+        }
+    }
+    assert!(taken > 500, "{taken}");
 }
 
 #[test]
@@ -137,6 +196,8 @@ fn mistakes_have_their_codes() {
     bad_sensors.flow_b.noise_std = -1.0;
     let mut bad_threshold = rig();
     bad_threshold.threshold_internal_m3s = 0.0;
+    let mut huge = rig();
+    huge.cylinder.stroke_m = 3.4e38;
     // SAFETY: each pointer is null, or what it says.
     let results = unsafe {
         [
@@ -147,6 +208,7 @@ fn mistakes_have_their_codes() {
             pitchleak4_find(&estimator, null_mut()),
             pitchleak4_begin(&mut blank, null()),
             pitchleak4_begin(&mut blank, &bad_cylinder),
+            pitchleak4_begin(&mut blank, &huge),
             pitchleak4_begin(&mut blank, &bad_sensors),
             pitchleak4_begin(&mut blank, &bad_threshold),
             pitchleak4_save(&estimator, few.as_mut_ptr(), &mut length),
@@ -162,6 +224,7 @@ fn mistakes_have_their_codes() {
         NullPointer,
         NullPointer,
         NullPointer,
+        BadCylinder,
         BadCylinder,
         BadSensors,
         BadThreshold,

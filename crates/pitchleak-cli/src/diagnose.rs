@@ -52,7 +52,7 @@ pub struct Arguments {
 
     /// Write figures (SVG) of the residual of each equation before and after into this directory: over time, its
     /// autocorrelation and distribution, and against each variable
-    #[arg(long, value_name = "DIR")]
+    #[arg(long = "out-dir", alias = "out", value_name = "DIR")]
     out: Option<PathBuf>,
 
     /// Write the rig file with the effects found in it

@@ -94,7 +94,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The program's exit status: 130, as shells know it, after Ctrl-C.
+    /// The program's exit status; after Ctrl-C 130, as shells tell of it.
     pub fn status(&self) -> u8 {
         if matches!(self, Self::Interrupted) { 130 } else { 2 }
     }

@@ -27,7 +27,7 @@ pub struct Arguments {
     rig: Option<PathBuf>,
 
     /// Write the table: .parquet, .csv or .csv.gz
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
     /// Write the result as a page for a browser: .html, complete in itself
@@ -48,6 +48,12 @@ Examples:
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rigs = FleetRig::from_file(arguments.rig.clone());
     let traces = FleetTrace::find(&arguments.traces, &rigs)?;
+    for trace in &traces {
+        for other in &trace.other_names {
+            let (other, first) = (other.display(), trace.path.display());
+            output::complain("note", &format!("{other} is the same file as {first}: judged once"));
+        }
+    }
     let inputs = FleetTrace::inputs(&traces, &rigs);
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;

@@ -17,8 +17,10 @@ mod simulate;
 mod text_format;
 mod watch;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Says how much oil leaks where in a hydraulic pitch cylinder.
@@ -27,12 +29,17 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+
+    /// Say nothing but results and errors: no notes, no warnings
+    #[arg(long, short, global = true)]
+    quiet: bool,
 }
 
 const EXIT_STATUS: &str = "\
 Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
-2 bad input or usage, or traces that could not be judged; 130 Ctrl-C or the signal to end.
-Every command explains itself: pitchleak replay --help";
+2 bad input or usage, or traces that could not be judged;
+129, 130, 143 ended by SIGHUP, Ctrl-C, SIGTERM.
+`pitchleak TRACE` alone is `pitchleak replay TRACE`. Every command explains itself: pitchleak replay --help";
 
 #[derive(Subcommand)]
 enum Command {
@@ -57,7 +64,14 @@ enum Outcome {
 }
 
 fn main() -> ExitCode {
-    match run(&Cli::parse().command) {
+    let outcome = match Cli::try_parse_from(with_command(std::env::args_os().collect())) {
+        Ok(cli) => {
+            output::be_quiet(cli.quiet);
+            run(&cli.command)
+        }
+        Err(answer) => tell(&answer),
+    };
+    match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::FaultFound) => ExitCode::from(1),
         // The reader of our output has closed it: not an error of ours.
@@ -67,6 +81,28 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status())
         }
     }
+}
+
+/// A trace alone is replayed: `pitchleak logger.csv`.
+fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_trace = arguments.get(1).is_some_and(|first| {
+        let name = first.to_string_lossy();
+        let is_file = *name == *"-" || (!name.starts_with('-') && Path::new(first).is_file());
+        is_file && Cli::command().find_subcommand(&*name).is_none()
+    });
+    if is_trace {
+        arguments.insert(1, "replay".into());
+    }
+    arguments
+}
+
+/// Help and version, which were asked for, or what is wrong with the command line.
+fn tell(answer: &clap::Error) -> Result<Outcome, Failure> {
+    if answer.use_stderr() {
+        answer.exit();
+    }
+    answer.print()?;
+    Ok(Outcome::Done)
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {

@@ -6,6 +6,7 @@ use pitchleak_view::Palette;
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Writes `text` to standard output.
 pub fn print(text: &str) -> io::Result<()> {
@@ -20,8 +21,22 @@ pub fn complain(kind: &str, message: &dyn Display) {
     let _ = writeln!(io::stderr().lock(), "{kind}: {}", harmless(&message));
 }
 
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// No notes and no warnings from here on, where `quiet`.
+pub fn be_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
 /// How a trace was read.
 pub fn note(trace: &TraceSummary) {
+    if is_quiet() {
+        return;
+    }
     if let Some(reading) = &trace.reading {
         complain("note", &format!("{} read with {reading}", trace.path));
     }
@@ -29,7 +44,7 @@ pub fn note(trace: &TraceSummary) {
 
 /// A warning line each.
 pub fn warn(warnings: &[String]) {
-    for warning in warnings {
+    for warning in warnings.iter().filter(|_| !is_quiet()) {
         complain("warning", warning);
     }
 }

@@ -21,7 +21,7 @@ pub struct Arguments {
     estimator: Option<EstimatorKind>,
 
     /// Write the estimates over time of one trace, a row per sample: .csv, .csv.gz or .parquet
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
     /// Write the report on one trace as a page for a browser: .html, complete in itself

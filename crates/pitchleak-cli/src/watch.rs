@@ -1,6 +1,5 @@
-use crate::Outcome;
 use crate::failure::Failure;
-use crate::output;
+use crate::{Outcome, interrupt, output};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Snapshot, Watch};
@@ -72,13 +71,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let checkpoint = arguments.state.as_deref().map(Checkpoint::new).transpose()?;
     let format = if arguments.influx_out { OutputFormat::Influx } else { OutputFormat::Ndjson };
     let restored = checkpoint.as_ref().map(|checkpoint| checkpoint.restore(&mut watch)).transpose()?;
-    if let Some(notice) = restored.and_then(|restored| restored.notice) {
-        output::complain("warning", &notice.text);
-        print(&[Event::Notice(notice)], format)?;
-    }
+    let notices = restored.unwrap_or_default();
+    notices.iter().for_each(|notice| output::complain("warning", &notice.text));
+    print(&notices.into_iter().map(Event::Notice).collect::<Vec<_>>(), format)?;
     let outcome = serve(&mut watch, &inputs()?, checkpoint.as_ref(), format);
     if let Some(checkpoint) = &checkpoint {
-        checkpoint.save(&Snapshot::of(&watch))?;
+        checkpoint.save(&Snapshot::of(&mut watch))?;
     }
     outcome.map(|()| Outcome::Done)
 }
@@ -110,11 +108,13 @@ fn serve(
         events.clear();
         if let Some(checkpoint) = checkpoint.filter(|_| saved.elapsed() >= CHECKPOINT) {
             // A disk that is full now may have room later: the samples go on.
-            let written = checkpoint.save(&Snapshot::of(watch));
-            if let Err(error) = &written {
-                output::complain("warning", error);
-            }
+            let snapshot = Snapshot::of(watch);
+            let written = checkpoint.save(&snapshot);
             (saved, changed) = (Instant::now(), written.is_err());
+            if let Err(error) = written {
+                output::complain("warning", &error);
+                snapshot.give_back(watch);
+            }
         }
     }
 }
@@ -147,11 +147,8 @@ fn print(events: &[Event], format: OutputFormat) -> Result<(), Failure> {
 fn inputs() -> Result<Receiver<Input>, Failure> {
     let (sender, receiver) = sync_channel(WAITING);
     let at_signal = sender.clone();
-    let handler = move || {
-        // Whatever waits is taken in first.
-        let _ = at_signal.send(Input::End);
-    };
-    ctrlc::set_handler(handler).map_err(|error| Failure::Input(io::Error::other(error)))?;
+    // Whatever waits is taken in first.
+    interrupt::at_the_end(move |_| drop(at_signal.send(Input::End)))?;
     std::thread::spawn(move || read(&mut io::stdin().lock(), &sender));
     Ok(receiver)
 }

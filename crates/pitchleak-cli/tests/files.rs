@@ -260,3 +260,18 @@ fn init_looks_at_parquet() {
     assert!(rig.contains("pb = { name = \"Pressure B [bar]\", unit = \"bar\" }   # by its name"), "{rig}");
     assert!(rig.contains("# qb = {") && !rig.contains("# pa = {"), "{rig}");
 }
+
+/// `pitchleak logger.csv` is what a new user types first.
+#[test]
+fn a_trace_alone_is_replayed_and_quiet_says_results_only() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "a.csv", "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm,other", |i| plain(i) + ",1");
+    let alone = pitchleak(&["a.csv", "--json"], folder.path());
+    let named = pitchleak(&["replay", "a.csv", "--json"], folder.path());
+    assert_eq!((alone.status.code(), &alone.stdout), (Some(0), &named.stdout));
+    assert!(text(&alone.stderr).contains("columns ignored: other"), "{}", text(&alone.stderr));
+    let quiet = pitchleak(&["a.csv", "--json", "-q"], folder.path());
+    assert_eq!((&quiet.stdout, text(&quiet.stderr).as_str()), (&named.stdout, ""));
+    // What is neither a command nor a file is a mistake of usage.
+    assert_eq!(pitchleak(&["reply"], folder.path()).status.code(), Some(2));
+}

@@ -217,14 +217,52 @@ fn a_signal_ends_every_command_with_the_old_file_there_and_nothing_beside_it() {
             contents(at).len() > before.len()
         });
         assert!(began, "{arguments} writes nothing");
-        let signal = if number % 2 == 0 { "-INT" } else { "-TERM" };
+        let (signal, told) = [("-INT", 130), ("-TERM", 143), ("-HUP", 129)][number % 3];
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         let status = child.wait().unwrap();
         let mut error = String::new();
         child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
-        assert_eq!(status.code(), Some(130), "{arguments}: {error}");
+        assert_eq!(status.code(), Some(told), "{arguments}: {error}");
         assert!(error.contains("interrupted"), "{arguments}: {error}");
         assert!(contents(at) == before, "{arguments}");
         fs::remove_file(at.join(name)).unwrap();
+    }
+}
+
+/// As a shell starts a job in the background: what else ends it has to leave nothing behind, too.
+#[test]
+fn where_one_signal_is_ignored_the_others_leave_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut child = Command::new("sh")
+        .args(["-c", "trap '' INT; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_pitchleak")])
+        .args("simulate --wind 13 --duration 100000 --out out.csv".split(' '))
+        .current_dir(at)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let hidden = || contents(at).iter().any(|(name, _)| name.ends_with(".tmp"));
+    assert!((0..1000).any(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        hidden()
+    }));
+    let id = child.id().to_string();
+    let kill = |signal: &str| Command::new("kill").args([signal, id.as_str()]).status().unwrap();
+    kill("-INT");
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(hidden(), "it was ignored");
+    kill("-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+    assert!(contents(at).is_empty());
+}
+
+#[test]
+fn help_that_nobody_gets_is_no_success() {
+    for arguments in [&["--help"][..], &["--version"], &["replay", "--help"]] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_pitchleak"));
+        let output = command.args(arguments).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("standard output"), "{arguments:?}");
     }
 }

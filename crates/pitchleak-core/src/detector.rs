@@ -210,6 +210,25 @@ mod tests {
         }
     }
 
+    /// However low the threshold: an estimate that is surely above it, as sure as a tolerated leak deserves, but may yet be none raises
+    /// nothing. As soon as none is ruled out, too, it does.
+    #[test]
+    fn what_may_be_none_raises_nothing() {
+        let std = 0.1;
+        let settings = AlarmSettings::<f64>::default();
+        let threshold = settings.threshold_m3s.internal * LPM_PER_M3S;
+        let sure = confidence_half_width(std, threshold, settings.false_alarm_probability);
+        let above = threshold + confidence_half_width(std, threshold, settings.early_alarm_probability);
+        assert!(above < sure, "{above} {sure}");
+        for (level, raised) in [(0.5 * (above + sure), false), (1.001 * sure, true)] {
+            let mut detector = LeakDetector::new(settings);
+            for _ in 0..8 {
+                let _ = detector.update(0.25, &flows(level, std));
+            }
+            assert_eq!(detector.active().internal, raised, "{level} L/min");
+        }
+    }
+
     #[test]
     fn a_leak_below_its_threshold_is_tolerated() {
         let mut detector = LeakDetector::new(AlarmSettings::default());

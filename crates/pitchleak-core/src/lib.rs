@@ -43,6 +43,43 @@
 //! # }
 //! ```
 //!
+//! # Layers
+//!
+//! Each needs only those above it.
+//!
+//! - **Model**: [`Cylinder`], [`Fluid`], [`Sensors`], a [`Sample`] of readings, and [`Model`], the continuity equations and the force
+//!   balance term by term; [`Linkage`], the pitch mechanism. [`Real`] is `f32` or `f64`.
+//! - **Filters**: [`Butterworth`], [`Momentum`], [`LoadEstimator`]: what the paper's law needs of raw signals.
+//! - **[Effects](effects)**: what the plain model lacks, from dead volume to friction, each a term that [`EffectSet`] adds.
+//! - **[Plant](plant) and [emulator]**: a cylinder to simulate, and one whose readings come as from a logger.
+//! - **[Continuity](continuity)**: what a block of samples says of both chambers: integrals, their noise, rows; and channels that
+//!   each have a clock of their own. Whoever fits leaks starts here.
+//! - **Estimators**: [`Rls`], the default, and [`PaperLaw`] with its chain [`PaperEstimator`]. One sample in, at times an
+//!   [`Update`] out, [`Estimates`] with standard deviations whenever they are asked for.
+//! - **Detector**: [`LeakDetector`], alarms by a sequential test of those estimates.
+//!
+//! Between samples an estimator can be copied, and with the feature `serde` saved. Channels need not come together:
+//!
+//! ```
+//! use pitchleak_core::continuity::Readings;
+//! use pitchleak_core::{Cylinder, Fluid, Rls, RlsError, RlsSettings, Sensors, Update};
+//!
+//! # fn main() -> Result<(), RlsError> {
+//! // Flows come ten times as rarely as the rest: a row says what was read, and no more.
+//! let mut rls = Rls::<f64, 4>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default())?;
+//! let mut renewals = 0;
+//! for k in 0..1000_u16 {
+//!     let flow = (k % 10 == 0).then_some(0.0);
+//!     let row = Readings { x: Some(0.1), pa: Some(5e6), pb: Some(4e6), qa: flow, qb: flow };
+//!     renewals += u32::from(matches!(rls.update_readings(0.01, &row), Update::Renewed { .. }));
+//! }
+//! // A cylinder at rest under pressure into which nothing flows has no leak, give or take.
+//! let leak = rls.estimates().mean_leaks_m3s.external_a.scaled(60e3);
+//! assert!(renewals > 10 && leak.value.abs() < 2.0 * leak.std, "{leak:?} L/min");
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Equations are cited by their number in X. Wu, Y. Li, F. Li, Z. Yang, W. Teng (2011),
 //! "Adaptive Estimation-Based Leakage Detection for a Wind Turbine Hydraulic Pitching System",
 //! IEEE/ASME Trans. Mechatronics, doi 10.1109/TMECH.2011.2142400.

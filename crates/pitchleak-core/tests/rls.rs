@@ -4,7 +4,7 @@ use pitchleak_core::{
     Cylinder, CylinderError, ExcitationSettings, Fluid, LeakDetector, Parameter, PerLeak, Real, Rls,
     RlsError, RlsSettings, Sample, SensorSpread, Sensors, Update,
 };
-use pitchleak_testkit::Motion;
+use pitchleak_testkit::{Motion, Multisine};
 use proptest::prelude::*;
 
 const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
@@ -139,6 +139,30 @@ fn a_sudden_leak_is_found_within_a_second() {
     println!("found after {found_after_s:?} s");
     assert!(found_after_s.is_some_and(|t| t <= 1.0));
     assert!(changed_at_s.is_some_and(|t: f64| (60.0..61.0).contains(&t)), "{changed_at_s:?}");
+}
+
+/// Once a leak has changed at once, its flow is quoted at the pressures since, not at those of the minute before.
+#[test]
+fn after_a_sudden_change_pressures_are_those_since() {
+    let mut rls = estimate::<f64, 4>(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), exact(0));
+    let mut changed = false;
+    // The pressures fall to a third as a hose bursts.
+    let after = Motion { pressure_a_pa: lower(6e6), pressure_b_pa: lower(4e6), ..Motion::sines(LEAKS) };
+    for mut sample in exact(60).chain((6000..6500).map(|k| after.sample(f64::from(k) * 0.01))) {
+        if changed || sample.pa_pa < 4e6 {
+            sample.qa_m3s = sample.qa_m3s.map(|q| q + 2e-11 * sample.pa_pa);
+        }
+        changed |= matches!(rls.update(0.01, &sample), Update::Renewed { changed: true, .. });
+    }
+    let PerLeak { external_a, external_b, .. } = rls.estimates().mean_pressures_pa;
+    println!("P_A {external_a:.3e}, P_B {external_b:.3e}");
+    assert!(changed);
+    assert!(external_a < 2.5e6 && external_b < 1.7e6, "{external_a} {external_b}");
+}
+
+/// A third of a mean pressure, with a slow sine.
+fn lower(mean_pa: f64) -> Multisine {
+    Multisine { mean: mean_pa / 3.0, lines: vec![(0.1 * mean_pa, 0.2, 0.0)] }
 }
 
 /// A leak that grows has a slope, within four standard deviations, and one that stays has none.

@@ -1,6 +1,5 @@
 //! What the service needs of a message broker, whichever program or crate stands behind it.
 
-use crate::probe::Limits;
 use std::time::{Duration, Instant};
 
 /// A way to a broker. Nothing here waits.
@@ -32,6 +31,8 @@ pub struct Message {
 pub enum Keeping {
     /// A later one of the same topic takes its place; the broker keeps the last.
     Latest,
+    /// A later one of the same topic takes its place; whoever listens hears it, and nobody else.
+    Passing,
     /// Each is sent until the broker has it, which comes back as [`Inbound::Confirmed`].
     Each(u64),
 }
@@ -47,8 +48,6 @@ pub enum Inbound {
     Delivery(Delivery),
     /// The broker has a message of ours.
     Confirmed(u64),
-    /// What the broker keeps and sends; or why that is not known.
-    Limits(Result<Limits, String>),
 }
 
 /// A message for us.

@@ -1,6 +1,7 @@
 //! The configuration file.
 
 use crate::failure::Failure;
+use crate::secrets::{Files, Identity, Login, read};
 use crate::topics;
 use pitchleak::live::{BatchFormat, LiveConfig, LiveDocument};
 use serde::Deserialize;
@@ -9,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// All that the service runs by, files read.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     pub watch: LiveConfig,
     /// Folder of checkpoints and summaries.
@@ -20,12 +21,18 @@ pub struct Config {
     pub samples: Vec<Samples>,
     /// Topics of what is published begin with it.
     pub base: String,
-    /// Where metrics and health are told; nowhere, if none.
+    /// Where metrics, health and the page are told; nowhere, if none.
     pub listen: Option<SocketAddr>,
+    /// A cylinder of which nothing comes for so long is silent.
+    pub silent_after: Duration,
+    /// How often the file is looked at; none: when a signal asks for it.
+    pub reload_every: Option<Duration>,
+    /// What whoever set it up should know.
+    pub warnings: Vec<String>,
 }
 
 /// How to reach the broker.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BrokerConfig {
     pub host: String,
     pub port: u16,
@@ -34,34 +41,21 @@ pub struct BrokerConfig {
     pub tls: Option<Tls>,
     pub login: Option<Login>,
     pub keep_alive_s: u16,
-    /// Deliveries that the broker leaves unacknowledged at most before it waits.
-    pub in_flight: usize,
-    /// Messages that the broker shall keep while the gateway is away, which is found out at the start; 0: it is not.
-    pub queued: usize,
+    /// Deliveries after which the broker waits for us; none: as many as MQTT 5 allows.
+    pub in_flight: Option<u16>,
 }
 
-#[derive(Debug)]
-pub enum Tls {
-    /// The authority's certificate, PEM.
-    Authority(Vec<u8>),
-    /// The system's authorities.
-    System,
-}
-
-#[derive(Clone)]
-pub struct Login {
-    pub user: String,
-    pub password: String,
-}
-
-impl std::fmt::Debug for Login {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Login").field("user", &self.user).finish_non_exhaustive()
-    }
+/// How the connection is hidden from others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tls {
+    /// The authority's certificate, PEM; none: the system's authorities.
+    pub authority: Option<Vec<u8>>,
+    /// Who we are, to a broker that wants to know.
+    pub identity: Option<Identity>,
 }
 
 /// Where samples come from.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Samples {
     /// Topic filter; the levels of `+` and `#` name the cylinder.
@@ -74,6 +68,7 @@ pub struct Samples {
 struct Document {
     state: PathBuf,
     checkpoint_s: Option<f64>,
+    reload_every_s: Option<f64>,
     broker: BrokerDocument,
     samples: Vec<Samples>,
     #[serde(default)]
@@ -91,11 +86,12 @@ struct BrokerDocument {
     client_id: Option<String>,
     tls: Option<bool>,
     ca_file: Option<PathBuf>,
+    client_cert_file: Option<PathBuf>,
+    client_key_file: Option<PathBuf>,
     user: Option<String>,
     password_file: Option<PathBuf>,
     keep_alive_s: Option<u16>,
     in_flight: Option<u16>,
-    queued: Option<u32>,
 }
 
 #[derive(Default, Deserialize)]
@@ -108,12 +104,8 @@ struct Publish {
 #[serde(deny_unknown_fields)]
 struct Http {
     listen: Option<String>,
+    silent_after_s: Option<f64>,
 }
-
-/// Mosquitto's own limit, unless its configuration says otherwise.
-const IN_FLIGHT: u16 = 20;
-/// As many messages are sent to find out whether the broker keeps them.
-const MOST_QUEUED: u32 = 100_000;
 
 impl Config {
     /// Reads the file at `path`, and those that it names; paths in it are from its folder.
@@ -122,10 +114,17 @@ impl Config {
         let document: Document = toml::from_str(&text)
             .map_err(|error| Failure::content(path, error.to_string().trim().replace('\n', " ")))?;
         let bad = |why: String| Failure::content(path, why);
-        let checkpoint_s = document.checkpoint_s.unwrap_or(10.0);
-        if !(0.1..=3600.0).contains(&checkpoint_s) {
-            return Err(bad(format!("checkpoint_s = {checkpoint_s}: 0.1 to 3600 is allowed")));
-        }
+        let seconds = |name: &str, value: f64, least: f64, most: f64| match value {
+            value if (least..=most).contains(&value) => Ok(Duration::from_secs_f64(value)),
+            value => Err(bad(format!("{name} = {value}: {least} to {most} is allowed"))),
+        };
+        let checkpoint = seconds("checkpoint_s", document.checkpoint_s.unwrap_or(10.0), 0.1, 3600.0)?;
+        let silent_after =
+            seconds("http.silent_after_s", document.http.silent_after_s.unwrap_or(60.0), 1.0, 1e7)?;
+        let reload_every = document
+            .reload_every_s
+            .map(|value| seconds("reload_every_s", value, 1.0, 86_400.0))
+            .transpose()?;
         let base = document.publish.base.unwrap_or_else(|| "pitchleak".to_owned());
         if base.is_empty() || base.contains(['+', '#', '\0']) {
             return Err(bad(format!("publish.base = {base:?}: a topic without + and # is expected")));
@@ -148,29 +147,62 @@ impl Config {
             "" => None,
             address => Some(address.parse().map_err(|_| bad(format!("http.listen = {address:?}: an address and a port such as \"127.0.0.1:9465\" is expected, or \"\" for none")))?),
         };
+        let mut files = Files { config: path, warnings: Vec::new() };
+        if let Some(address) = listen.filter(|address: &SocketAddr| !address.ip().is_loopback()) {
+            files.warnings.push(format!(
+                "http.listen = \"{address}\": whoever reaches it reads the page and the metrics"
+            ));
+        }
         Ok(Self {
             watch: document.watch.load(path)?,
-            state: beside(path, &document.state),
-            checkpoint: Duration::from_secs_f64(checkpoint_s),
-            broker: document.broker.load(path)?,
+            state: files.path(&document.state)?,
+            checkpoint,
+            broker: document.broker.load(&mut files)?,
             samples: document.samples,
             base,
             listen,
+            silent_after,
+            reload_every,
+            warnings: files.warnings,
         })
+    }
+
+    /// What another configuration has otherwise and a running service cannot change.
+    pub fn needs_a_start(&self, other: &Self) -> Vec<&'static str> {
+        [
+            ("state", self.state == other.state),
+            ("broker", self.broker == other.broker),
+            ("samples", self.samples == other.samples),
+            ("publish", self.base == other.base),
+            ("http", (self.listen, self.silent_after) == (other.listen, other.silent_after)),
+        ]
+        .into_iter()
+        .filter_map(|(name, same)| (!same).then_some(name))
+        .collect()
     }
 }
 
 impl BrokerDocument {
-    fn load(self, path: &Path) -> Result<BrokerConfig, Failure> {
-        let bad = |why: &str| Failure::content(path, why);
-        let tls = match (self.tls.unwrap_or(true), self.ca_file) {
-            (false, Some(_)) => return Err(bad("broker.ca_file is of no use where tls = false")),
-            (false, None) => None,
-            (true, Some(file)) => Some(Tls::Authority(certificate(&beside(path, &file))?)),
-            (true, None) => Some(Tls::System),
+    fn load(self, files: &mut Files<'_>) -> Result<BrokerConfig, Failure> {
+        let config = files.config;
+        let bad = |why: &str| Failure::content(config, why);
+        let identity = match (&self.client_cert_file, &self.client_key_file) {
+            (Some(certificate), Some(key)) => {
+                Some(Identity { certificate: files.certificate(certificate)?, key: files.key(key)? })
+            }
+            (None, None) => None,
+            _ => return Err(bad("broker.client_cert_file and broker.client_key_file belong together")),
+        };
+        let authority = self.ca_file.as_ref().map(|file| files.certificate(file)).transpose()?;
+        let tls = match self.tls.unwrap_or(true) {
+            true => Some(Tls { authority, identity }),
+            false if authority.is_some() || identity.is_some() => {
+                return Err(bad("broker: certificates are of no use where tls = false"));
+            }
+            false => None,
         };
         let login = match (self.user, self.password_file) {
-            (Some(user), Some(file)) => Some(Login { user, password: secret(&beside(path, &file))? }),
+            (Some(user), Some(file)) => Some(Login { user, password: files.password(&file)? }),
             (None, None) => None,
             _ => return Err(bad("broker.user and broker.password_file belong together")),
         };
@@ -178,9 +210,10 @@ impl BrokerDocument {
         if client_id.is_empty() || self.host.is_empty() || self.in_flight == Some(0) {
             return Err(bad("broker: host and client_id must not be empty, nor in_flight 0"));
         }
-        let queued = self.queued.unwrap_or(0);
-        if queued > MOST_QUEUED {
-            return Err(bad(&format!("broker.queued = {queued}: at most {MOST_QUEUED} is allowed")));
+        if tls.is_none() && login.is_some() {
+            files
+                .warnings
+                .push("broker: the password goes over the network as it is: set tls = true".to_owned());
         }
         Ok(BrokerConfig {
             host: self.host,
@@ -189,33 +222,7 @@ impl BrokerDocument {
             tls,
             login,
             keep_alive_s: self.keep_alive_s.unwrap_or(30).max(1),
-            in_flight: self.in_flight.unwrap_or(IN_FLIGHT).into(),
-            queued: queued as usize,
+            in_flight: self.in_flight,
         })
-    }
-}
-
-fn beside(config: &Path, file: &Path) -> PathBuf {
-    config.parent().unwrap_or(Path::new("")).join(file)
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
-}
-
-fn certificate(path: &Path) -> Result<Vec<u8>, Failure> {
-    let bytes = read(path)?;
-    if String::from_utf8_lossy(&bytes).contains("-----BEGIN CERTIFICATE-----") {
-        return Ok(bytes);
-    }
-    Err(Failure::content(path, "no certificate in PEM"))
-}
-
-/// Its one line.
-fn secret(path: &Path) -> Result<String, Failure> {
-    let text = String::from_utf8(read(path)?).map_err(|_| Failure::content(path, "not UTF-8"))?;
-    match text.lines().next() {
-        Some(line) if !line.is_empty() => Ok(line.to_owned()),
-        _ => Err(Failure::content(path, "no password in its first line")),
     }
 }

@@ -13,12 +13,12 @@ pub enum Failure {
     Watch(#[from] ConfigError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    #[error("{path}: another gateway runs with this state", path = path.display())]
-    Taken { path: PathBuf },
     #[error("cannot listen on {address}: {source}")]
     Listen { address: String, source: io::Error },
-    #[error("cannot use the TLS of the system: {0}")]
+    #[error("TLS: {0}")]
     Tls(String),
+    #[error("cannot write to standard output: {0}")]
+    Output(io::Error),
     #[error("cannot {what}: {source}")]
     System { what: &'static str, source: io::Error },
 }

@@ -2,10 +2,11 @@ use crate::broker::Inbound;
 use crate::saver::Saved;
 
 /// What wakes the service.
-#[derive(Debug)]
 pub enum Input {
     Broker(Inbound),
-    Saved(Saved),
+    Saved(Box<Saved>),
     /// A signal to end.
     Stop,
+    /// A signal to read the configuration again.
+    Reload,
 }

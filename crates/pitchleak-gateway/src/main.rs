@@ -1,27 +1,32 @@
 //! The service `pitchleak-gateway`: watches hydraulic pitch cylinders whose samples come over MQTT. What it finds out is
 //! the engine's ([`pitchleak::live`]); here is what makes a service of it.
 
+mod alarms;
+mod board;
 mod broker;
 mod config;
+mod dead_letters;
 mod failure;
 mod http;
 mod input;
 mod log;
 mod metrics;
 mod mqtt;
-mod notify;
 mod outbox;
 mod pace;
-mod probe;
+mod reload;
 mod run;
 mod saver;
+mod secrets;
 mod service;
+mod session;
 mod summaries;
 mod topics;
 
 use clap::Parser;
 use config::Config;
 use failure::Failure;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -39,10 +44,16 @@ struct Arguments {
 }
 
 const AFTER: &str = "\
-Exit status: 0 ended by SIGTERM or SIGINT, state saved; 2 the configuration or the state cannot be used.";
+SIGHUP reads the configuration again.
+Exit status: 0 ended by SIGTERM or SIGINT, state saved; 2 the configuration or the folder of the state cannot be used.";
 
 fn main() -> ExitCode {
-    match start(&Arguments::parse()) {
+    let outcome = match Arguments::try_parse() {
+        Ok(arguments) => start(&arguments),
+        Err(error) if error.use_stderr() => error.exit(),
+        Err(answer) => answer.print().map_err(Failure::Output),
+    };
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("error: {}", failure.to_string().replace('\n', " "));
@@ -53,9 +64,9 @@ fn main() -> ExitCode {
 
 fn start(arguments: &Arguments) -> Result<(), Failure> {
     let config = Config::load(&arguments.config)?;
-    if arguments.check_config {
-        println!("{}", run::in_words(&config));
-        return Ok(());
+    if !arguments.check_config {
+        return run::run(&arguments.config, config);
     }
-    run::run(config)
+    config.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    writeln!(std::io::stdout(), "{}", run::in_words(&config)).map_err(Failure::Output)
 }

@@ -1,9 +1,15 @@
 //! What the service counts, as Prometheus reads it, and whether it is well.
 
+use crate::board::Board;
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::{Metric, Registry};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Upper bounds of the time from a message to the estimates that follow from it, s.
@@ -15,24 +21,27 @@ const FAILURES: u32 = 3;
 
 /// Counters and what there is of each.
 pub struct Metrics {
+    registry: Registry,
     begun: Instant,
-    pub connected: AtomicBool,
-    pub messages: AtomicU64,
-    pub bytes: AtomicU64,
-    pub estimates: AtomicU64,
-    pub alarms: AtomicU64,
-    pub cylinders: AtomicU64,
-    pub unacknowledged: AtomicU64,
-    pub unsent_alarms: AtomicU64,
-    pub broker_keeps: AtomicU64,
-    pub broker_sends: AtomicU64,
-    pub checkpoints: AtomicU64,
-    checkpoint_failures: AtomicU64,
-    pub checkpoint_bytes: AtomicU64,
-    pub checkpoint_us: AtomicU64,
-    latencies: [AtomicU64; LATENCIES_S.len() + 1],
-    latency_us: AtomicU64,
-    left_out: Mutex<BTreeMap<String, u64>>,
+    /// Of each cylinder.
+    pub board: Arc<Board>,
+    pub connected: Gauge,
+    pub messages: Counter,
+    pub bytes: Counter,
+    pub estimates: Counter,
+    pub alarms: Counter,
+    pub cylinders: Gauge,
+    pub unacknowledged: Gauge,
+    pub unsent_alarms: Gauge,
+    pub reload_failures: Counter,
+    checkpoints: Counter,
+    checkpoint_failures: Counter,
+    checkpoint_bytes: Gauge,
+    checkpoint_seconds: Gauge<f64, AtomicU64>,
+    checkpoint_age_seconds: Gauge<f64, AtomicU64>,
+    written_bytes: Counter,
+    pub latency: Histogram,
+    left_out: Family<[(&'static str, String); 1], Counter>,
     /// Checkpoints in a row that could not be written.
     failures_in_a_row: AtomicU64,
     /// ms since the begin.
@@ -41,30 +50,54 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    pub fn new() -> Self {
-        let zero = AtomicU64::default;
+    pub fn new(board: Arc<Board>) -> Self {
+        let mut registry = Registry::with_prefix("pitchleak");
+        let all = &mut registry;
+        let connected = registered(all, "connected", "1 while there is a connection to the broker");
+        let cylinders = registered(all, "cylinders", "Cylinders of which samples came");
+        let messages = registered(all, "messages", "Messages of samples");
+        let bytes = registered(all, "bytes", "Bytes in them");
+        let estimates = registered(all, "estimates", "Estimates made");
+        let alarms = registered(all, "alarms", "Alarms raised and cleared");
+        let unacknowledged = registered(all, "unacknowledged", "Messages that wait for a checkpoint");
+        let unsent_alarms = registered(all, "unsent_alarms", "Alarms that the broker does not have yet");
+        let reload_failures = registered(all, "reload_failures", "Configurations that could not be used");
+        let checkpoints = registered(all, "checkpoints", "Checkpoints written");
+        let checkpoint_failures =
+            registered(all, "checkpoint_failures", "Checkpoints that could not be written");
+        let checkpoint_bytes = registered(all, "checkpoint_bytes", "Size of the last checkpoint");
+        let checkpoint_seconds = registered(all, "checkpoint_seconds", "Time that it took, s");
+        let checkpoint_age_seconds =
+            registered(all, "checkpoint_age_seconds", "Time since it was written, s");
+        let written_bytes = registered(all, "written_bytes", "Bytes of all checkpoints");
+        let left_out = registered(all, "left_out", "Samples and messages that were left out");
+        let latency = Histogram::new(LATENCIES_S);
+        all.register("latency_seconds", "Time from a message to its estimates, s", latency.clone());
+        all.register_collector(Box::new(Arc::clone(&board)));
         Self {
             begun: Instant::now(),
-            connected: AtomicBool::default(),
-            messages: zero(),
-            bytes: zero(),
-            estimates: zero(),
-            alarms: zero(),
-            cylinders: zero(),
-            unacknowledged: zero(),
-            unsent_alarms: zero(),
-            broker_keeps: zero(),
-            broker_sends: zero(),
-            checkpoints: zero(),
-            checkpoint_failures: zero(),
-            checkpoint_bytes: zero(),
-            checkpoint_us: zero(),
-            latencies: Default::default(),
-            latency_us: zero(),
-            left_out: Mutex::default(),
-            failures_in_a_row: zero(),
-            turned: zero(),
-            saved: zero(),
+            board,
+            connected,
+            messages,
+            bytes,
+            estimates,
+            alarms,
+            cylinders,
+            unacknowledged,
+            unsent_alarms,
+            reload_failures,
+            checkpoints,
+            checkpoint_failures,
+            checkpoint_bytes,
+            checkpoint_seconds,
+            checkpoint_age_seconds,
+            written_bytes,
+            latency,
+            left_out,
+            failures_in_a_row: AtomicU64::default(),
+            turned: AtomicU64::default(),
+            saved: AtomicU64::default(),
+            registry,
         }
     }
 
@@ -72,167 +105,146 @@ impl Metrics {
         self.begun.elapsed().as_millis().try_into().unwrap_or(u64::MAX)
     }
 
+    fn since(&self, moment: &AtomicU64) -> Duration {
+        Duration::from_millis(self.now_ms().saturating_sub(moment.load(Ordering::Relaxed)))
+    }
+
     /// The service turned around.
     pub fn turn(&self) {
         self.turned.store(self.now_ms(), Ordering::Relaxed);
     }
 
-    /// A checkpoint is on the disk.
+    /// All that changed is on the disk, in so many bytes.
     pub fn saved(&self, bytes: usize, took: Duration) {
-        self.checkpoints.fetch_add(1, Ordering::Relaxed);
-        self.checkpoint_bytes.store(bytes as u64, Ordering::Relaxed);
-        self.checkpoint_us.store(took.as_micros().try_into().unwrap_or(u64::MAX), Ordering::Relaxed);
+        if bytes > 0 {
+            self.checkpoints.inc();
+            self.checkpoint_bytes.set(bytes.try_into().unwrap_or(i64::MAX));
+            self.written_bytes.inc_by(bytes as u64);
+            self.checkpoint_seconds.set(took.as_secs_f64());
+        }
         self.saved.store(self.now_ms(), Ordering::Relaxed);
         self.failures_in_a_row.store(0, Ordering::Relaxed);
     }
 
     /// The disk took none.
     pub fn not_saved(&self) {
-        self.checkpoint_failures.fetch_add(1, Ordering::Relaxed);
+        self.checkpoint_failures.inc();
         self.failures_in_a_row.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Time from a message to what follows from it.
-    pub fn latency(&self, time: Duration) {
-        let at =
-            LATENCIES_S.iter().position(|bound| time.as_secs_f64() <= *bound).unwrap_or(LATENCIES_S.len());
-        if let Some(count) = self.latencies.get(at) {
-            count.fetch_add(1, Ordering::Relaxed);
-        }
-        self.latency_us.fetch_add(time.as_micros().try_into().unwrap_or(0), Ordering::Relaxed);
+    /// Samples or messages that were left out; kinds are few.
+    pub fn left_out(&self, kind: &str, count: u64) {
+        self.left_out.get_or_create(&[("kind", kind.to_owned())]).inc_by(count);
     }
 
-    /// Samples or messages that were left out, by kind; kinds are few.
-    pub fn left_out(&self, kind: &str, count: u64) {
-        let mut left_out = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
-        *left_out.entry(kind.to_owned()).or_default() += count;
+    /// All that a watch left out since the begin.
+    pub fn left_out_in_all(&self, counts: BTreeMap<String, u64>) {
+        for (kind, count) in counts {
+            let counter = self.left_out.get_or_create_owned(&[("kind", kind)]);
+            counter.inc_by(count.saturating_sub(counter.get()));
+        }
     }
 
     /// What is wrong, if something is; checkpoints come `every` so often.
     pub fn trouble(&self, every: Duration) -> Option<String> {
-        let since = |moment: &AtomicU64| {
-            Duration::from_millis(self.now_ms().saturating_sub(moment.load(Ordering::Relaxed)))
-        };
-        if since(&self.turned) > HANGS {
-            return Some(format!("hangs for {} s", since(&self.turned).as_secs()));
+        let turned = self.since(&self.turned);
+        if turned > HANGS {
+            return Some(format!("hangs for {} s", turned.as_secs()));
         }
-        if !self.connected.load(Ordering::Relaxed) {
+        if self.connected.get() == 0 {
             return Some("no connection to the broker".to_owned());
         }
-        let without = since(&self.saved);
+        let without = self.since(&self.saved);
         let failed = self.failures_in_a_row.load(Ordering::Relaxed) >= u64::from(FAILURES);
         (failed || without > FAILURES * every + HANGS)
             .then(|| format!("no checkpoint for {} s", without.as_secs()))
     }
 
-    /// In Prometheus' text format.
+    /// In the text format of OpenMetrics.
     pub fn text(&self) -> String {
-        let of = |value: &AtomicU64| value.load(Ordering::Relaxed) as f64;
-        let age_s = self.now_ms().saturating_sub(self.saved.load(Ordering::Relaxed)) as f64 / 1e3;
-        let connected = f64::from(u8::from(self.connected.load(Ordering::Relaxed)));
-        let rows = [
-            ("connected", "gauge", "1 while there is a connection to the broker", connected),
-            ("cylinders", "gauge", "cylinders that are watched", of(&self.cylinders)),
-            ("messages_total", "counter", "messages of samples", of(&self.messages)),
-            ("bytes_total", "counter", "bytes in them", of(&self.bytes)),
-            ("estimates_total", "counter", "estimates made", of(&self.estimates)),
-            ("alarms_total", "counter", "alarms raised and cleared", of(&self.alarms)),
-            ("unacknowledged", "gauge", "messages that wait for a checkpoint", of(&self.unacknowledged)),
-            ("unsent_alarms", "gauge", "alarms that the broker does not have yet", of(&self.unsent_alarms)),
-            (
-                "broker_keeps",
-                "gauge",
-                "messages that the broker keeps while nobody takes them, at least; 0: not known",
-                of(&self.broker_keeps),
-            ),
-            (
-                "broker_sends",
-                "gauge",
-                "messages that the broker sends before it waits, at least; 0: not known",
-                of(&self.broker_sends),
-            ),
-            ("checkpoints_total", "counter", "checkpoints written", of(&self.checkpoints)),
-            (
-                "checkpoint_failures_total",
-                "counter",
-                "checkpoints that could not be written",
-                of(&self.checkpoint_failures),
-            ),
-            ("checkpoint_bytes", "gauge", "size of the last checkpoint", of(&self.checkpoint_bytes)),
-            ("checkpoint_seconds", "gauge", "time that it took", of(&self.checkpoint_us) / 1e6),
-            ("checkpoint_age_seconds", "gauge", "time since it was written", age_s),
-        ];
+        self.checkpoint_age_seconds.set(self.since(&self.saved).as_secs_f64());
         let mut text = String::new();
-        for (name, kind, help, value) in rows {
-            let _ = write!(
-                text,
-                "# HELP pitchleak_{name} {help}\n# TYPE pitchleak_{name} {kind}\npitchleak_{name} {value}\n"
-            );
-        }
-        self.write_left_out(&mut text);
-        self.write_latencies(&mut text);
+        // Writing to a string does not fail.
+        let _ = encode(&mut text, &self.registry);
         text
     }
+}
 
-    fn write_left_out(&self, text: &mut String) {
-        let name = "pitchleak_left_out_total";
-        let _ =
-            write!(text, "# HELP {name} samples and messages that were left out\n# TYPE {name} counter\n");
-        for (kind, count) in &*self.left_out.lock().unwrap_or_else(PoisonError::into_inner) {
-            let _ = writeln!(text, "{name}{{kind=\"{kind}\"}} {count}");
-        }
-    }
-
-    fn write_latencies(&self, text: &mut String) {
-        let name = "pitchleak_latency_seconds";
-        let _ = write!(text, "# HELP {name} from a message to its estimates\n# TYPE {name} histogram\n");
-        let mut count = 0;
-        let bounds = LATENCIES_S.iter().map(f64::to_string).chain(["+Inf".to_owned()]);
-        for (bound, more) in bounds.zip(&self.latencies) {
-            count += more.load(Ordering::Relaxed);
-            let _ = writeln!(text, "{name}_bucket{{le=\"{bound}\"}} {count}");
-        }
-        let sum_s = self.latency_us.load(Ordering::Relaxed) as f64 / 1e6;
-        let _ = write!(text, "{name}_sum {sum_s}\n{name}_count {count}\n");
-    }
+fn registered<M: Metric + Clone + Default>(registry: &mut Registry, name: &str, help: &str) -> M {
+    let metric = M::default();
+    registry.register(name, help, metric.clone());
+    metric
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn metrics() -> Metrics {
+        Metrics::new(Arc::new(Board::new(Duration::from_secs(60))))
+    }
+
     #[test]
     fn counts_are_told_as_prometheus_reads_them() {
-        let metrics = Metrics::new();
-        metrics.left_out("late", 3);
-        metrics.latency(Duration::from_millis(3));
-        metrics.latency(Duration::from_secs(30));
+        let metrics = metrics();
+        metrics.left_out_in_all(BTreeMap::from([("late".to_owned(), 3)]));
+        metrics.left_out_in_all(BTreeMap::from([("late".to_owned(), 2000)]));
+        metrics.latency.observe(0.003);
+        metrics.latency.observe(30.0);
         let text = metrics.text();
         for line in [
-            "pitchleak_left_out_total{kind=\"late\"} 3",
+            "pitchleak_left_out_total{kind=\"late\"} 2000",
             "pitchleak_latency_seconds_bucket{le=\"0.002\"} 0",
             "pitchleak_latency_seconds_bucket{le=\"0.005\"} 1",
             "pitchleak_latency_seconds_bucket{le=\"+Inf\"} 2",
             "pitchleak_latency_seconds_count 2",
+            "# EOF",
         ] {
             assert!(text.lines().any(|found| found == line), "{line} in {text}");
         }
     }
 
+    /// What a dashboard asks for and nobody tells stays empty without a word.
+    #[test]
+    fn rules_and_dashboard_ask_for_what_is_told() {
+        let metrics = metrics();
+        metrics.left_out("late", 1);
+        let text = metrics.text();
+        let types = text.lines().filter_map(|line| line.strip_prefix("# TYPE ")?.split_once(' '));
+        let told: Vec<_> = types
+            .flat_map(|(name, kind)| match kind {
+                "counter" => vec![format!("{name}_total")],
+                "histogram" => ["bucket", "sum", "count"].map(|part| format!("{name}_{part}")).to_vec(),
+                _ => vec![name.to_owned()],
+            })
+            .collect();
+        for file in [
+            include_str!("../../../packaging/prometheus/pitchleak.rules.yml"),
+            include_str!("../../../packaging/grafana/pitchleak.json"),
+        ] {
+            let asked = file.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+            let asked: Vec<_> = asked.filter(|word| word.starts_with("pitchleak_")).collect();
+            assert!(asked.len() > 5);
+            for name in asked {
+                assert!(told.iter().any(|told| told == name), "{name} is not told: {told:?}");
+            }
+        }
+    }
+
     #[test]
     fn a_service_without_a_broker_is_not_well() {
-        let metrics = Metrics::new();
+        let metrics = metrics();
         let every = Duration::from_secs(10);
         assert!(metrics.trouble(every).is_some());
-        metrics.connected.store(true, Ordering::Relaxed);
+        metrics.connected.set(1);
         assert_eq!(metrics.trouble(every), None);
     }
 
     #[test]
     fn nor_is_one_whose_disk_takes_no_checkpoint() {
-        let metrics = Metrics::new();
+        let metrics = metrics();
         let every = Duration::from_secs(10);
-        metrics.connected.store(true, Ordering::Relaxed);
+        metrics.connected.set(1);
         (0..2).for_each(|_| metrics.not_saved());
         assert_eq!(metrics.trouble(every), None);
         metrics.not_saved();

@@ -1,15 +1,18 @@
-//! MQTT 3.1.1 by the crate rumqttc, in a thread of its own that waits for the network alone.
+//! MQTT 5 by the crate rumqttc, in a thread of its own that waits for the network alone.
 
 use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{BrokerConfig, Tls};
 use crate::failure::Failure;
 use crate::input::Input;
 use crate::outbox::{Next, Outbox};
-use crate::probe::Probe;
-use crate::topics;
+use crate::session;
+use rumqttc::tokio_rustls::rustls::pki_types::pem::PemObject;
+use rumqttc::tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rumqttc::tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use rumqttc::{
     AckMode, AsyncClient, ConnectionError, Event, EventLoop, LastWill, ManualAck, MqttOptions, Packet,
-    PubAck, Publish, PublishOptions, QoS, SubscribeFilter, SubscribeReasonCode, TlsConfiguration, Transport,
+    PubAck, Publish, PublishOptions, QoS, SessionMode, SubscribeFilter, SubscribeReasonCode,
+    TlsConfiguration, Transport,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -20,7 +23,7 @@ use tokio::sync::Notify;
 /// A larger message is not looked at: a second of samples of one cylinder has a hundredth of it.
 pub const LARGEST_PAYLOAD: usize = 1024 * 1024;
 /// The largest packet of MQTT: refused, it would come again for ever.
-const LARGEST_PACKET: usize = 268_435_460;
+const LARGEST_PACKET: u32 = 268_435_460;
 /// Requests between our tasks and the connection, and in one writing to the network.
 const REQUESTS: usize = 64;
 /// Packets that are read before the first of them is handed over.
@@ -28,9 +31,8 @@ const READS: usize = 16;
 /// Between attempts to connect.
 const FIRST_PAUSE: Duration = Duration::from_millis(250);
 const LONGEST_PAUSE: Duration = Duration::from_secs(15);
-/// Attempts to find out the broker's limits, and between them.
-const PROBES: u32 = 5;
-const BETWEEN_PROBES: Duration = Duration::from_secs(60);
+/// Until an alarm that the broker did not take is sent again.
+const AGAIN: Duration = Duration::from_secs(1);
 /// Between attempts to hand something to a queue that is full.
 const BEAT: Duration = Duration::from_millis(1);
 
@@ -48,9 +50,7 @@ impl Mqtt {
         gone: Message,
         inbox: SyncSender<Input>,
     ) -> Result<Self, Failure> {
-        let reach = reach(config)?;
-        let probe = (config.queued > 0).then(|| probe(config, reach.clone()));
-        let options = options(config, gone, reach);
+        let options = options(config, gone, reach(config)?);
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
@@ -60,14 +60,11 @@ impl Mqtt {
         let its_outbox = Arc::clone(&outbox);
         let run = move || {
             runtime.block_on(async {
-                let (client, mut connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
-                let mut network = connection.network_options();
-                network.set_tcp_nodelay(true);
-                connection.set_network_options(network);
+                let (client, connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
                 let shared = Arc::new(Shared::default());
                 tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
                 tokio::spawn(send(client, its_outbox, Arc::clone(&shared), inbox.clone()));
-                listen(connection, &shared, &inbox, probe).await;
+                listen(connection, &shared, &inbox).await;
             });
             let _ = end.send(());
         };
@@ -98,22 +95,22 @@ impl Broker for Mqtt {
 
 /// Of the connection that lasts.
 fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> MqttOptions {
+    let mut network = reach.network_options();
+    network.set_tcp_nodelay(true);
     reach
+        .set_network_options(network)
         .set_keep_alive(config.keep_alive_s)
-        .set_clean_session(false)
+        .set_session_mode(SessionMode::Persistent)
+        .set_session_store(session::Empty)
+        .set_outgoing_inflight_upper_limit(session::OUTGOING)
+        // The broker sends so many before it waits for us.
+        .set_receive_maximum(Some(config.in_flight.unwrap_or(u16::MAX)))
         .set_ack_mode(AckMode::Manual)
         .set_max_request_batch(REQUESTS)
         .set_read_batch_size(READS)
-        .set_max_packet_size(LARGEST_PACKET, LARGEST_PAYLOAD)
-        .set_last_will(LastWill::new(gone.topic, gone.payload, QoS::AtLeastOnce, true));
+        .set_max_packet_size(Some(LARGEST_PACKET))
+        .set_last_will(LastWill::new(gone.topic, gone.payload, QoS::AtLeastOnce, true, None));
     reach
-}
-
-/// Beside it; nobody listens to its topic.
-fn probe(config: &BrokerConfig, mut reach: MqttOptions) -> Probe {
-    reach.set_client_id(format!("{}-probe", config.client_id)).set_clean_session(true);
-    let topic = topics::of_cylinder("pitchleak-probe", &config.client_id, "");
-    Probe { options: reach, topic, messages: config.queued }
 }
 
 /// The way to the broker.
@@ -122,17 +119,36 @@ fn reach(config: &BrokerConfig) -> Result<MqttOptions, Failure> {
     if let Some(login) = &config.login {
         options.set_credentials(&login.user, login.password.clone());
     }
-    let tls = match &config.tls {
-        None => return Ok(options),
-        Some(Tls::Authority(ca)) => {
-            TlsConfiguration::Simple { ca: ca.clone(), alpn: None, client_auth: None }
-        }
-        Some(Tls::System) => {
-            TlsConfiguration::try_default_rustls().map_err(|error| Failure::Tls(error.to_string()))?
-        }
-    };
-    options.set_transport(Transport::tls_with_config(tls));
+    if let Some(tls) = &config.tls {
+        let tls = TlsConfiguration::Rustls(Arc::new(client(tls)?));
+        options.set_transport(Transport::tls_with_config(tls));
+    }
     Ok(options)
+}
+
+/// Whom it trusts, and who it says it is.
+fn client(tls: &Tls) -> Result<ClientConfig, Failure> {
+    let failed = |error: &dyn std::fmt::Display| Failure::Tls(error.to_string());
+    let mut roots = RootCertStore::empty();
+    match &tls.authority {
+        Some(pem) => {
+            for certificate in CertificateDer::pem_slice_iter(pem) {
+                let certificate = certificate.map_err(|error| failed(&error))?;
+                roots.add(certificate).map_err(|error| failed(&error))?;
+            }
+        }
+        None => _ = roots.add_parsable_certificates(rustls_native_certs::load_native_certs().certs),
+    }
+    let builder = ClientConfig::builder_with_provider(Arc::new(
+        rumqttc::tokio_rustls::rustls::crypto::ring::default_provider(),
+    ));
+    let builder = builder.with_safe_default_protocol_versions().map_err(|error| failed(&error))?;
+    let builder = builder.with_root_certificates(roots);
+    let Some(identity) = &tls.identity else { return Ok(builder.with_no_client_auth()) };
+    let chain = CertificateDer::pem_slice_iter(&identity.certificate).collect::<Result<Vec<_>, _>>();
+    let key = PrivateKeyDer::from_pem_slice(&identity.key).map_err(|error| failed(&error))?;
+    let with = chain.map(|chain| builder.with_client_auth_cert(chain, key));
+    with.map_err(|error| failed(&error))?.map_err(|error| failed(&error))
 }
 
 /// Between the tasks of the network thread.
@@ -144,28 +160,20 @@ struct Shared {
 }
 
 /// Polls the connection, and does nothing else.
-async fn listen(
-    mut connection: EventLoop,
-    shared: &Shared,
-    inbox: &SyncSender<Input>,
-    mut probe: Option<Probe>,
-) {
+async fn listen(mut connection: EventLoop, shared: &Shared, inbox: &SyncSender<Input>) {
     let (mut pause, mut session_kept) = (FIRST_PAUSE, false);
     loop {
         let inbound = match connection.poll().await {
             Ok(Event::Incoming(Packet::ConnAck(ack))) => {
                 (pause, session_kept) = (FIRST_PAUSE, ack.session_present);
                 shared.up.notify_one();
-                if let Some(probe) = probe.take() {
-                    tokio::spawn(find_limits(probe, inbox.clone()));
-                }
                 continue;
             }
             Ok(Event::Incoming(Packet::Publish(publish))) => {
                 Inbound::Delivery(delivery(&publish, shared.connection.load(Ordering::Relaxed)))
             }
             Ok(Event::Incoming(Packet::SubAck(ack)))
-                if ack.return_codes.contains(&SubscribeReasonCode::Failure) =>
+                if !ack.return_codes.iter().all(|code| matches!(code, SubscribeReasonCode::Success(_))) =>
             {
                 Inbound::Down("the broker refuses a subscription".to_owned())
             }
@@ -192,19 +200,6 @@ fn delivery(publish: &Publish, connection: u64) -> Delivery {
         resent: publish.dup,
         ticket: (publish.qos == QoS::AtLeastOnce).then_some(Ticket { connection, id: publish.pkid }),
         received: Instant::now(),
-    }
-}
-
-/// Also where the broker goes away meanwhile.
-async fn find_limits(probe: Probe, inbox: SyncSender<Input>) {
-    for _ in 0..PROBES {
-        let limits = probe.limits().await;
-        let found = limits.is_ok();
-        hand_over(&inbox, Inbound::Limits(limits)).await;
-        if found {
-            return;
-        }
-        tokio::time::sleep(BETWEEN_PROBES).await;
     }
 }
 
@@ -236,7 +231,7 @@ async fn send(client: AsyncClient, outbox: Arc<Outbox>, shared: Arc<Shared>, inb
                 if ticket.connection != shared.connection.load(Ordering::Relaxed) {
                     continue;
                 }
-                let ack = ManualAck::PubAck(PubAck::new(ticket.id));
+                let ack = ManualAck::PubAck(PubAck::new(ticket.id, None));
                 if client.try_manual_ack(ack).is_err() {
                     outbox.put_back(Next::Acknowledge(ticket));
                     tokio::time::sleep(BEAT).await;
@@ -254,16 +249,20 @@ async fn send(client: AsyncClient, outbox: Arc<Outbox>, shared: Arc<Shared>, inb
 async fn publish(client: &AsyncClient, outbox: &Arc<Outbox>, message: Message, inbox: &SyncSender<Input>) {
     let options = PublishOptions::at_least_once();
     let Keeping::Each(number) = message.keeping else {
-        let _ = client.publish(message.topic, message.payload, options.retain(true)).await;
+        let options = options.retain(message.keeping == Keeping::Latest);
+        let _ = client.publish(message.topic, message.payload, options).await;
         return;
     };
     let (topic, payload) = (message.topic.clone(), message.payload.clone());
     let Ok(notice) = client.publish_tracked(topic, payload, options).await else { return };
     let (outbox, inbox) = (Arc::clone(outbox), inbox.clone());
     tokio::spawn(async move {
-        match notice.wait_async().await {
+        match notice.wait_completion_async().await {
             Ok(_) => hand_over(&inbox, Inbound::Confirmed(number)).await,
-            Err(_) => outbox.put_back(Next::Publish(message)),
+            Err(_) => {
+                tokio::time::sleep(AGAIN).await;
+                outbox.put_back(Next::Publish(message));
+            }
         }
     });
 }

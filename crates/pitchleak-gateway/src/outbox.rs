@@ -50,7 +50,7 @@ impl Outbox {
             Keeping::Each(_) if waiting.each.len() < MOST_EACH => waiting.each.push_back(message),
             // The service still has it, and hands it over again after a restart.
             Keeping::Each(_) => {}
-            Keeping::Latest => {
+            Keeping::Latest | Keeping::Passing => {
                 let topic = message.topic.clone();
                 let there_are = waiting.latest.len();
                 if let Some(older) = waiting.latest.get_mut(&topic) {
@@ -80,7 +80,9 @@ impl Outbox {
         let mut waiting = self.waiting();
         match next {
             Next::Acknowledge(ticket) => waiting.tickets.push_front(ticket),
-            Next::Publish(message) if message.keeping != Keeping::Latest => waiting.each.push_front(message),
+            Next::Publish(message) if matches!(message.keeping, Keeping::Each(_)) => {
+                waiting.each.push_front(message);
+            }
             Next::Publish(_) | Next::Close => {}
         }
         drop(waiting);

@@ -1,5 +1,7 @@
 //! Puts the service together, and ends it in order.
 
+use crate::alarms::Alarms;
+use crate::board::Board;
 use crate::broker::Broker;
 use crate::config::{Config, Tls};
 use crate::failure::Failure;
@@ -7,17 +9,19 @@ use crate::input::Input;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::mqtt::Mqtt;
-use crate::notify::Notify;
 use crate::pace::Pace;
+use crate::reload::Reloader;
+use crate::saver::Disk;
 use crate::service::{Service, Waiting, status};
 use crate::summaries::Summaries;
 use crate::{http, saver};
 use pitchleak::live::{Checkpoint, Watch};
-use std::fs::{File, TryLockError};
+use sd_notify::NotifyState;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Inputs that wait at most: with the largest payload, 64 MiB.
@@ -31,65 +35,107 @@ const GOODBYE: Duration = Duration::from_secs(3);
 /// For the last checkpoint.
 const LAST_CHECKPOINT: Duration = Duration::from_secs(20);
 
-/// Runs until a signal asks it to end.
-pub fn run(config: Config) -> Result<(), Failure> {
-    let mut notify = Notify::from_env();
+/// Runs by the file at `path` until a signal asks it to end.
+pub fn run(path: &Path, config: Config) -> Result<(), Failure> {
     let log = Arc::new(Log::default());
-    let checkpoint = Checkpoint::new(&config.state)?;
-    let _lock = lock(&config.state.join("lock"))?;
-    let mut watch = Watch::new(config.watch, None);
-    let restored = checkpoint.restore(&mut watch)?;
-    if let Some(notice) = &restored.notice {
-        log.say(Level::Warning, "checkpoint", &notice.text);
-    }
+    warn(&log, &config.warnings);
+    let checkpoint = Arc::new(Checkpoint::new(&config.state)?);
     let folder = config.state.join("summaries");
     let summaries =
         Summaries::new(folder.clone()).map_err(|source| Failure::Read { path: folder, source })?;
+    let alarms_file = config.state.join("alarms.json");
+    let alarms = known_alarms(&alarms_file, &log);
 
     let (inbox, inputs) = sync_channel(INPUTS);
-    let metrics = Arc::new(Metrics::new());
+    let metrics = Arc::new(Metrics::new(Arc::new(Board::new(config.silent_after))));
     if let Some(address) = config.listen {
         let bound = http::start(address, Arc::clone(&metrics), config.checkpoint)?;
-        log.say(Level::Info, "http", &format!("metrics and health on http://{bound}"));
+        log.say(Level::Info, "http", &format!("page, metrics and health on http://{bound}"));
     }
-    let at_signal = inbox.clone();
-    ctrlc::set_handler(move || drop(at_signal.send(Input::Stop))).map_err(|error| Failure::System {
-        what: "wait for signals",
-        source: std::io::Error::other(error),
-    })?;
+    listen_for_signals(inbox.clone())?;
     let filters = config.samples.iter().map(|samples| samples.topic.clone()).collect();
     let broker = Mqtt::connect(&config.broker, filters, status(&config.base, "offline"), inbox.clone())?;
-    let (jobs, saver) = saver::start(checkpoint, summaries, inbox)?;
+    let disk = Disk { checkpoint: Arc::clone(&checkpoint), summaries, alarms: alarms_file };
+    let (jobs, saver) = saver::start(disk, inbox)?;
 
     let pace = Pace::new(config.checkpoint, config.broker.in_flight, Instant::now());
+    let watch = Watch::new(config.watch.clone(), None);
+    let (samples, base) = (config.samples.clone(), config.base.clone());
     let waiting = Waiting::default();
-    let (samples, base) = (config.samples, config.base);
-    let mut service = Service { watch, broker, jobs, samples, base, pace, metrics, log, waiting };
-    service.resend(restored.unsent);
-    notify.tell("READY=1");
-    serve(&mut service, &inputs, &mut notify);
-    notify.tell("STOPPING=1");
+    let mut service =
+        Service { watch, broker, jobs, checkpoint, alarms, samples, base, pace, metrics, log, waiting };
+    service.begin()?;
+    let mut reloader = Reloader::new(path, config);
+    say(&[NotifyState::Ready]);
+    while serve(&mut service, &inputs, &mut reloader) {
+        let now = NotifyState::monotonic_usec_now().ok();
+        say(&[NotifyState::Reloading].into_iter().chain(now).collect::<Vec<_>>());
+        reloader.reload(&mut service);
+        say(&[NotifyState::Ready]);
+    }
+    say(&[NotifyState::Stopping]);
     end(service, inputs);
     let _ = saver.join();
     Ok(())
 }
 
-fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, notify: &mut Notify) {
-    let mut ticked = Instant::now();
-    let mut sent = ticked;
+/// Where nobody asks, nobody is told.
+fn say(state: &[NotifyState<'_>]) {
+    let _ = sd_notify::notify(state);
+}
+
+pub fn warn(log: &Log, warnings: &[String]) {
+    // Each is a kind of its own: they are few.
+    warnings.iter().for_each(|warning| log.say(Level::Warning, &format!("config {warning}"), warning));
+}
+
+fn listen_for_signals(inbox: SyncSender<Input>) -> Result<(), Failure> {
+    let failed = |source| Failure::System { what: "wait for signals", source };
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM]).map_err(failed)?;
+    let run = move || {
+        for signal in signals.forever() {
+            let input = if signal == SIGHUP { Input::Reload } else { Input::Stop };
+            if inbox.send(input).is_err() {
+                return;
+            }
+        }
+    };
+    let spawned = std::thread::Builder::new().name("signals".to_owned()).spawn(run);
+    spawned.map(drop).map_err(failed)
+}
+
+/// Those of a run before; one that is damaged is put aside.
+fn known_alarms(file: &Path, log: &Log) -> Alarms {
+    let Ok(text) = std::fs::read_to_string(file) else { return Alarms::default() };
+    Alarms::parse(&text).unwrap_or_else(|error| {
+        let _ = std::fs::rename(file, file.with_extension("json.aside"));
+        let text = format!(
+            "{}: {error}: alarms that were on their way may be missing or come twice",
+            file.display()
+        );
+        log.say(Level::Warning, "alarms", &text);
+        Alarms::default()
+    })
+}
+
+/// Until the service is to end, or, which it says, to be reloaded.
+fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, reloader: &mut Reloader) -> bool {
+    let watchdog = sd_notify::watchdog_enabled().map(|period| period / 2);
+    let (mut ticked, mut sent, mut told) = (Instant::now(), Instant::now(), Instant::now());
     loop {
         let input = inputs.try_recv().or_else(|_| {
             service.broker.send();
             inputs.recv_timeout(TICK)
         });
         match input {
+            Ok(Input::Reload) => return true,
             Ok(input) => {
                 if !service.take(input) {
-                    return;
+                    return false;
                 }
             }
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return,
+            Err(RecvTimeoutError::Disconnected) => return false,
         }
         let now = Instant::now();
         if now.duration_since(sent) >= TOGETHER {
@@ -100,7 +146,11 @@ fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, notify: 
         if now.duration_since(ticked) >= TICK / 10 {
             ticked = now;
             service.tick(now);
-            notify.alive();
+            reloader.look(service, now);
+        }
+        if watchdog.is_some_and(|period| now.duration_since(told) >= period) {
+            told = now;
+            say(&[NotifyState::Watchdog]);
         }
     }
 }
@@ -117,7 +167,7 @@ fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
             service.take(Input::Saved(saved));
         }
     }
-    let connected = service.metrics.connected.load(Relaxed);
+    let connected = service.metrics.connected.get() != 0;
     let Service { broker, base, jobs, .. } = service;
     // The network thread and the saver no longer wait for us.
     drop((jobs, inputs));
@@ -125,32 +175,23 @@ fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
     broker.close(if connected { GOODBYE } else { Duration::ZERO });
 }
 
-/// Two services with one state would spoil it.
-fn lock(path: &Path) -> Result<File, Failure> {
-    let failed = |source| Failure::Read { path: path.to_owned(), source };
-    let file = File::options().create(true).truncate(false).write(true).open(path).map_err(failed)?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Failure::Taken { path: path.to_owned() }),
-        Err(TryLockError::Error(source)) => Err(failed(source)),
-    }
-}
-
 /// What a configuration asks for.
 pub fn in_words(config: &Config) -> String {
     let broker = &config.broker;
     let tls = match &broker.tls {
         None => "without TLS: whoever listens reads along",
-        Some(Tls::Authority(_)) => "TLS by the given authority",
-        Some(Tls::System) => "TLS by the system's authorities",
+        Some(Tls { authority: Some(_), .. }) => "TLS by the given authority",
+        Some(Tls { authority: None, .. }) => "TLS by the system's authorities",
     };
+    let identity = broker.tls.as_ref().is_some_and(|tls| tls.identity.is_some());
+    let certificate = if identity { ", with a certificate" } else { "" };
     let login = broker.login.as_ref().map_or("nobody".to_owned(), |login| login.user.clone());
     let listen = config.listen.map_or("nowhere".to_owned(), |address| format!("on {address}"));
     let topics: Vec<_> = config.samples.iter().map(|samples| samples.topic.as_str()).collect();
     let others = if config.watch.rig.is_some() { "and any other cylinder" } else { "no other cylinder" };
     format!(
-        "broker {}:{}, {tls}, as {login}, session `{}`\nsamples from {}\n{} cylinders by name, {others}\nestimates and alarms to \
-         {}/…\nstate in {}, a checkpoint every {} s\nmetrics {listen}",
+        "broker {}:{}, {tls}, as {login}{certificate}, session `{}`\nsamples from {}\n{} cylinders by name, {others}\nestimates and alarms to \
+         {}/…\nstate in {}, a checkpoint every {} s\npage, metrics and health {listen}",
         broker.host,
         broker.port,
         broker.client_id,

@@ -388,3 +388,62 @@ fn below_the_best<T: Real, const K: usize>(values: &mut [T; K]) {
         *value -= best;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::block::{Block, BlockSums};
+    use super::*;
+
+    const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &[[1.0, 0.0], [0.0, 1.0]] };
+
+    /// Each hypothesis has seen another leak.
+    fn told() -> Bank<f64, 4> {
+        let mut bank = Bank::new(f64::INFINITY);
+        for (k, hypothesis) in bank.hypotheses.iter_mut().enumerate() {
+            let mut sums = BlockSums::new();
+            (0..9).for_each(|_| sums.add(&[0.0, 1.0, 0.0, 0.0], &[0.0; LEAKS], k as f64, 1e3));
+            hypothesis.learn(&Block::new(0.5, &sums, &[None; 2], 0.0));
+        }
+        bank
+    }
+
+    /// The leaks that the hypotheses know, by the number of the one that saw them.
+    fn known(bank: &Bank<f64, 4>) -> [i32; HYPOTHESES] {
+        bank.hypotheses.map(|hypothesis| hypothesis.solve(&PRIOR).mean[1].round() as i32)
+    }
+
+    /// Who is refuted takes over what the best knows, if its own past holds it back longer than the best's; the best stays as it is,
+    /// and who forgets sooner by itself does so.
+    #[test]
+    fn the_refuted_learn_from_the_best() {
+        for (best, expected) in [
+            (0, [0, 0, 0, 0, 4, 5]),
+            (3, [3, 3, 3, 3, 4, 5]),
+            (5, [5, 5, 5, 5, 5, 5]),
+            (1, [1, 1, 2, 3, 4, 5]),
+        ] {
+            let mut bank = told();
+            bank.recent = [REFUTED - 1.0; HYPOTHESES];
+            bank.recent[best] = 0.0;
+            bank.replace_refuted();
+            assert_eq!(known(&bank), expected, "{best} is best");
+            assert!(bank.log_weights[best] > ANEW || best > 0, "{:?}", bank.log_weights);
+        }
+        let mut bank = told();
+        bank.recent = [REFUTED + 1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        bank.replace_refuted();
+        assert_eq!(known(&bank), [0, 1, 2, 3, 4, 5], "nobody is refuted");
+    }
+
+    /// What spoke against a hypothesis counts for 1/e after twenty seconds, and its weight not less than the least.
+    #[test]
+    fn evidence_fades() {
+        let mut bank = Bank::<f64, 4>::new(f64::INFINITY);
+        bank.weigh(&[0.0, -10.0, 0.0, 0.0, 0.0, 0.0], 0.5);
+        assert!((bank.recent[1] + 10.0).abs() < 1e-12);
+        assert!((bank.log_weights[1] - LEAST).abs() < 1e-12, "{:?}", bank.log_weights);
+        (0..40).for_each(|_| bank.weigh(&[0.0; HYPOTHESES], 0.5));
+        let left = -bank.recent[1] / 10.0;
+        assert!((left - (-1.0_f64).exp()).abs() < 0.01, "{left}");
+    }
+}

@@ -200,4 +200,36 @@ mod tests {
             }
         }
     }
+
+    /// A column of nothing but noise, known in its variance, speaks for no hypothesis and against none: on average a block is as
+    /// probable as without it.
+    #[test]
+    fn noise_in_a_column_is_no_evidence() {
+        const NOISE: f64 = 0.3;
+        const ROWS: usize = 50;
+        const BLOCKS: usize = 4000;
+        let mut noise = pitchleak_testkit::white_noise(5);
+        let mut next = || noise.next().unwrap();
+        let mut differences = Vec::new();
+        for _ in 0..BLOCKS {
+            let rows: Vec<(f64, f64)> = (0..ROWS).map(|_| (NOISE * next(), next())).collect();
+            let told = |size: f64| {
+                let mut sums = BlockSums::new();
+                rows.iter().for_each(|(n, y)| sums.add(&[size * n, 1.0, 0.0, 0.0], &[0.0; LEAKS], *y, 1.0));
+                let column_noise = ROWS as f64 * (size * NOISE).powi(2);
+                let block = Block::new(0.5, &sums, &[None; 2], column_noise);
+                let mut hypothesis = Hypothesis::<f64, 4>::steady(f64::INFINITY);
+                let before = hypothesis.solve(&PRIOR);
+                hypothesis.learn(&block);
+                let after = hypothesis.solve(&PRIOR);
+                Evidence::new(block, 0.0, &[0.0; 4]).log_likelihood(&[0.0; 4], &before, &after).0
+            };
+            differences.push(told(1.0) - told(0.0));
+        }
+        let mean = differences.iter().sum::<f64>() / BLOCKS as f64;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / BLOCKS as f64;
+        let std = (variance / BLOCKS as f64).sqrt();
+        // Of the expected square of 4.5 nats, half would stay; what the pivot's own scatter leaves is a few hundredths.
+        assert!(mean.abs() < 0.1 + 3.0 * std, "{mean} ± {std} nats");
+    }
 }

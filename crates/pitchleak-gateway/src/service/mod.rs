@@ -1,32 +1,39 @@
 //! The service: samples in, estimates and alarms out, acknowledged once they are on the disk.
 
+use crate::alarms::Alarms;
 use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
-use crate::config::Samples;
+use crate::config::{Config, Samples};
+use crate::dead_letters::DeadLetters;
 use crate::input::Input;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::pace::{Due, Pace};
-use crate::probe::Limits;
 use crate::saver::{Job, Saved};
 use crate::topics;
-use pitchleak::live::{Batch, Event, OutputFormat, Snapshot, SummaryEvent, Watch};
-use std::collections::BTreeMap;
+use pitchleak::Rig;
+use pitchleak::live::{
+    Batch, Checkpoint, CheckpointError, Event, OutputFormat, Snapshot, Span, SummaryEvent, Watch,
+};
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
-/// Alarms that the broker does not have, at most.
-const MOST_UNSENT: usize = 10_000;
+/// L/min for each m³/s.
+const LPM_PER_M3S: f64 = 60_000.0;
 /// Hours and days that could not be written, at most.
 const MOST_UNWRITTEN: usize = 10_000;
-/// Between two accounts of what belongs to no cylinder.
+/// Between two counts for the metrics.
+const COUNT: Duration = Duration::from_millis(200);
+/// Between two accounts of what was left out and not said.
 const ACCOUNT: Duration = Duration::from_secs(60);
 
 pub struct Service<B> {
     pub watch: Watch,
     pub broker: B,
     pub jobs: SyncSender<Job>,
+    /// From which a cylinder that is watched again goes on.
+    pub checkpoint: Arc<Checkpoint>,
+    pub alarms: Alarms,
     pub samples: Vec<Samples>,
     pub base: String,
     pub pace: Pace,
@@ -40,27 +47,61 @@ pub struct Service<B> {
 pub struct Waiting {
     /// Deliveries, for a checkpoint.
     tickets: Vec<Ticket>,
-    /// Alarms, for the broker's word that it has them.
-    alarms: BTreeMap<u64, Message>,
-    /// Number of the next alarm.
-    next: u64,
     /// Hours and days, for the disk.
     summaries: Vec<SummaryEvent>,
     /// A checkpoint is being written.
     saving: bool,
     /// Something came since the last one.
     changed: bool,
+    /// A configuration, for the checkpoint that is being written.
+    config: Option<Box<Config>>,
+    counted: Option<Instant>,
     accounted: Option<Instant>,
+    dead_letters: DeadLetters,
 }
 
 impl<B: Broker> Service<B> {
-    /// Sends what a run before could not.
-    pub fn resend(&mut self, unsent: Vec<String>) {
-        for line in unsent {
-            if let Some((topic, payload)) = line.split_once('\n') {
-                self.publish_each(topic.to_owned(), payload.to_owned());
-            }
+    /// Goes on from the checkpoint, says what is wrong with it, and sends what a run before could not.
+    pub fn begin(&mut self) -> Result<(), CheckpointError> {
+        self.restore()?;
+        self.alarms.unsent().into_iter().for_each(|alarm| self.broker.publish(alarm));
+        Ok(())
+    }
+
+    /// Each cylinder that is watched and not known yet goes on from its state.
+    fn restore(&mut self) -> Result<(), CheckpointError> {
+        let notices = self.checkpoint.restore(&mut self.watch)?;
+        self.tell(notices.into_iter().map(Event::Notice).collect());
+        self.expect();
+        Ok(())
+    }
+
+    /// Who looks is told of all cylinders that there are or ought to be.
+    fn expect(&self) {
+        let config = self.watch.config();
+        let names = config.cylinders.keys().map(String::as_str).chain(self.watch.names());
+        let level = |name: &str| {
+            let level = |rig: &Rig| rig.alarms.threshold_m3s.map(|level_m3s| level_m3s * LPM_PER_M3S);
+            config.rig_of(name).map(level).unwrap_or_default()
+        };
+        self.metrics.board.expect(names.map(|name| (name, level(name), self.watch.days(name))));
+    }
+
+    /// Goes on by another configuration, as far as that can be done without a start, once no checkpoint is being written.
+    pub fn reload(&mut self, config: Box<Config>) {
+        if self.waiting.saving {
+            self.waiting.config = Some(config);
+            return;
         }
+        let mut events = Vec::new();
+        self.pace.set_every(config.checkpoint);
+        self.watch.reload(config.watch, &mut events);
+        self.tell(events);
+        if let Err(error) = self.restore() {
+            self.log.say(Level::Warning, "checkpoint", &error.to_string());
+        }
+        self.waiting.changed = true;
+        self.log.say(Level::Info, "reload", "goes on by the new configuration");
     }
 
     /// Takes in what came; says whether it goes on.
@@ -70,65 +111,39 @@ impl<B: Broker> Service<B> {
             Input::Broker(Inbound::Down(why)) => self.down(&why),
             Input::Broker(Inbound::Delivery(delivery)) => self.deliver(&delivery),
             Input::Broker(Inbound::Confirmed(number)) => {
-                self.waiting.alarms.remove(&number);
+                self.alarms.sent(number);
+                self.write_alarms();
             }
-            Input::Broker(Inbound::Limits(limits)) => self.limits(limits),
-            Input::Saved(saved) => self.saved(saved),
-            Input::Stop => return false,
+            Input::Saved(saved) => self.saved(*saved),
+            Input::Stop | Input::Reload => return false,
         }
         true
     }
 
     fn up(&mut self, session_kept: bool) {
-        self.metrics.connected.store(true, Relaxed);
+        self.metrics.connected.set(1);
         let session = if session_kept { "goes on" } else { "is new" };
         self.log.say(Level::Info, "broker", &format!("connected; the session {session}"));
         self.broker.publish(status(&self.base, "online"));
     }
 
     fn down(&mut self, why: &str) {
-        self.metrics.connected.store(false, Relaxed);
+        self.metrics.connected.set(0);
         self.log.say(Level::Warning, "no_broker", why);
         // They will come again.
         self.waiting.tickets.clear();
     }
 
-    fn limits(&mut self, limits: Result<Limits, String>) {
-        let Limits { given, kept, in_flight } = match limits {
-            Ok(limits) => limits,
-            Err(why) => {
-                self.log.say(Level::Warning, "broker_limits", &format!("cannot be found out: {why}"));
-                return;
-            }
-        };
-        self.metrics.broker_keeps.store(kept as u64, Relaxed);
-        self.metrics.broker_sends.store(in_flight as u64, Relaxed);
-        if kept < given {
-            let text = format!(
-                "the broker keeps {kept} messages while nobody takes them, and not {given} (broker.queued): what is beyond is \
-                 lost: raise its limit (Mosquitto: max_queued_messages)"
-            );
-            self.log.say(Level::Warning, "broker_limits", &text);
-        } else {
-            let text =
-                format!("the broker keeps {kept} messages or more, and sends {in_flight} before it waits");
-            self.log.say(Level::Info, "broker_limits", &text);
-        }
-        if in_flight < given && self.pace.learn(in_flight) {
-            self.broker_waits_after(in_flight);
-        }
-    }
-
     fn broker_waits_after(&self, count: usize) {
         let text = format!(
-            "the broker waits after {count} unacknowledged messages, so that each so many cost a checkpoint: raise its \
-             limit (Mosquitto: max_inflight_messages) and broker.in_flight"
+            "the broker waits after {count} unacknowledged messages, so that each so many cost a checkpoint, at most one a \
+             second: raise its limit"
         );
         self.log.say(Level::Warning, "in_flight", &text);
     }
 
     fn deliver(&mut self, delivery: &Delivery) {
-        self.metrics.messages.fetch_add(1, Relaxed);
+        self.metrics.messages.inc();
         self.pace.delivered(Instant::now());
         self.waiting.tickets.extend(delivery.ticket);
         self.waiting.changed = true;
@@ -136,31 +151,44 @@ impl<B: Broker> Service<B> {
         let found = self.samples.iter().find_map(|samples| {
             Some((topics::cylinder_of(&samples.topic, &delivery.topic)?, samples.format))
         });
-        match (&delivery.payload, found) {
+        let dead = match (&delivery.payload, found) {
             (Ok(payload), Some((cylinder, format))) => {
-                self.metrics.bytes.fetch_add(payload.len() as u64, Relaxed);
+                self.metrics.bytes.inc_by(payload.len() as u64);
                 let batch = Batch { cylinder: &cylinder, format, payload, resent: delivery.resent };
-                self.watch.take_batch(&batch, &mut events);
+                self.watch.take_batch(&batch, &mut events).map(|why| ("unreadable", why))
             }
-            (Ok(_), None) => self.watch.notice("unknown_topic", shown(&delivery.topic), &mut events),
+            (Ok(_), None) => {
+                self.watch.notice("unknown_topic", shown(&delivery.topic), &mut events);
+                Some(("unknown_topic", "no [[samples]] takes it in".to_owned()))
+            }
             (Err(size), _) => {
                 let text = format!("{size} bytes from {}", shown(&delivery.topic));
                 self.watch.notice("too_large", text, &mut events);
+                Some(("too_large", format!("{size} bytes")))
             }
+        };
+        if let Some((kind, why)) = dead {
+            let letter = self.waiting.dead_letters.letter(&self.base, delivery, kind, &why, Instant::now());
+            letter.into_iter().for_each(|letter| self.broker.publish(letter));
         }
         let told = events.iter().any(|event| matches!(event, Event::Estimate(_)));
         self.tell(events);
         if told {
-            self.metrics.latency(delivery.received.elapsed());
+            self.metrics.latency.observe(delivery.received.elapsed().as_secs_f64());
         }
     }
 
     /// What is to be done once in a while.
     pub fn tick(&mut self, now: Instant) {
         self.metrics.turn();
-        self.metrics.cylinders.store(self.watch.cylinders() as u64, Relaxed);
-        self.metrics.unacknowledged.store(self.waiting.tickets.len() as u64, Relaxed);
-        self.metrics.unsent_alarms.store(self.waiting.alarms.len() as u64, Relaxed);
+        if self.waiting.counted.is_none_or(|counted| now.duration_since(counted) >= COUNT) {
+            self.waiting.counted = Some(now);
+            let count = |count: usize| i64::try_from(count).unwrap_or(i64::MAX);
+            self.metrics.cylinders.set(count(self.watch.cylinders()));
+            self.metrics.unacknowledged.set(count(self.waiting.tickets.len()));
+            self.metrics.unsent_alarms.set(count(self.alarms.waiting()));
+            self.metrics.left_out_in_all(self.watch.left_out());
+        }
         let accounted = *self.waiting.accounted.get_or_insert(now);
         if now.duration_since(accounted) >= ACCOUNT {
             self.waiting.accounted = Some(now);
@@ -179,16 +207,32 @@ impl<B: Broker> Service<B> {
         self.save();
     }
 
-    /// Has a checkpoint written; without anything new, too: that the disk takes one is a sign of health.
+    /// Has a checkpoint written, of what changed.
     pub fn save(&mut self) {
-        let unsent = self.waiting.alarms.values().map(|alarm| format!("{}\n{}", alarm.topic, alarm.payload));
+        let raised = self.alarms.raised();
         let job = Job {
-            snapshot: Snapshot::of(&self.watch).with_unsent(unsent.collect()),
+            alarms: self.alarms.unwritten(),
+            snapshot: Some(Snapshot::of(&mut self.watch)),
             summaries: std::mem::take(&mut self.waiting.summaries),
             tickets: std::mem::take(&mut self.waiting.tickets),
+            raised,
         };
-        self.waiting.saving = true;
         self.waiting.changed = false;
+        self.hand_over(job);
+    }
+
+    /// Has what became of alarms written at once: after a kill they would be sent again.
+    fn write_alarms(&mut self) {
+        if self.waiting.saving {
+            return;
+        }
+        if let Some(alarms) = self.alarms.unwritten() {
+            self.hand_over(Job { alarms: Some(alarms), ..Job::default() });
+        }
+    }
+
+    fn hand_over(&mut self, job: Job) {
+        self.waiting.saving = true;
         // The saver is idle: it has room for one.
         let _ = self.jobs.send(job);
     }
@@ -200,24 +244,42 @@ impl<B: Broker> Service<B> {
 
     fn saved(&mut self, saved: Saved) {
         self.waiting.saving = false;
-        match saved.result {
-            Ok(bytes) => {
-                self.metrics.saved(bytes, saved.took);
-                self.broker.acknowledge(saved.tickets);
+        let Saved { result, took, job } = saved;
+        match result {
+            Ok(None) => self.write_alarms(),
+            Ok(Some(bytes)) => {
+                self.metrics.saved(bytes, took);
+                self.alarms.settle(&job.raised);
+                self.broker.acknowledge(job.tickets);
                 self.pace.acknowledged(Instant::now());
+                self.write_alarms();
             }
             Err(why) => {
                 self.metrics.not_saved();
                 self.pace.failed();
                 self.log.say(Level::Warning, "checkpoint", &why);
-                // In the order in which they came.
-                let later = std::mem::replace(&mut self.waiting.tickets, saved.tickets);
-                self.waiting.tickets.extend(later);
-                let later = std::mem::replace(&mut self.waiting.summaries, saved.summaries);
-                self.waiting.summaries.extend(later);
-                self.waiting.summaries.truncate(MOST_UNWRITTEN);
+                self.take_back(job);
             }
         }
+        if let Some(config) = self.waiting.config.take() {
+            self.reload(config);
+        }
+    }
+
+    /// What could not be written goes into the next job, in the order in which it came.
+    fn take_back(&mut self, job: Job) {
+        if job.alarms.is_some() {
+            self.alarms.not_written();
+        }
+        if let Some(snapshot) = job.snapshot {
+            self.waiting.changed = true;
+            snapshot.give_back(&mut self.watch);
+        }
+        let later = std::mem::replace(&mut self.waiting.tickets, job.tickets);
+        self.waiting.tickets.extend(later);
+        let later = std::mem::replace(&mut self.waiting.summaries, job.summaries);
+        self.waiting.summaries.extend(later);
+        self.waiting.summaries.truncate(MOST_UNWRITTEN);
     }
 
     fn tell(&mut self, events: Vec<Event>) {
@@ -226,25 +288,39 @@ impl<B: Broker> Service<B> {
             let topic = |cylinder: &str, kind: &str| topics::of_cylinder(&self.base, cylinder, kind);
             let (topic, keeping) = match event {
                 Event::Alarm(alarm) => {
-                    self.metrics.alarms.fetch_add(1, Relaxed);
+                    self.metrics.alarms.inc();
                     self.log.say(Level::Info, "alarm", &alarm.id);
                     let topic = topic(&alarm.cylinder, "alarm");
-                    self.publish_each(topic, payload);
+                    let (message, lost) = self.alarms.raise(&alarm.id, &alarm.cylinder, topic, payload);
+                    if lost {
+                        self.metrics.left_out("alarm", 1);
+                    }
+                    message.into_iter().for_each(|message| self.broker.publish(message));
                     continue;
                 }
                 Event::Estimate(estimate) => {
-                    self.metrics.estimates.fetch_add(1, Relaxed);
+                    self.metrics.estimates.inc();
+                    if !self.metrics.board.expects(&estimate.cylinder) {
+                        self.expect();
+                    }
+                    self.metrics.board.show(&estimate);
                     (topic(&estimate.cylinder, "estimate"), Keeping::Latest)
                 }
                 Event::Notice(notice) => {
-                    self.metrics.left_out(&notice.kind, notice.count);
                     let cylinder = &notice.cylinder;
+                    if notice.kind == "clock_set_back" {
+                        self.alarms.forget_sent(cylinder);
+                    }
                     let text = format!("{cylinder} {} times, the first: {}", notice.count, notice.text);
                     self.log.say(Level::Warning, &notice.kind, text.trim_start());
                     (topic(cylinder, &format!("notice/{}", notice.kind)), Keeping::Latest)
                 }
                 Event::Summary(summary) => {
                     let topic = topic(&summary.cylinder, summary.span.id());
+                    if summary.span == Span::Day {
+                        let days = self.watch.days(&summary.cylinder);
+                        self.metrics.board.show_days(&summary.cylinder, days);
+                    }
                     if self.waiting.summaries.len() < MOST_UNWRITTEN {
                         self.waiting.summaries.push(summary);
                     }
@@ -252,18 +328,6 @@ impl<B: Broker> Service<B> {
                 }
             };
             self.broker.publish(Message { topic, payload, keeping });
-        }
-    }
-
-    fn publish_each(&mut self, topic: String, payload: String) {
-        let number = self.waiting.next;
-        self.waiting.next += 1;
-        let alarm = Message { topic, payload, keeping: Keeping::Each(number) };
-        self.broker.publish(alarm.clone());
-        self.waiting.alarms.insert(number, alarm);
-        if self.waiting.alarms.len() > MOST_UNSENT {
-            self.waiting.alarms.pop_first();
-            self.metrics.left_out("alarm", 1);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The service without a network and without a disk of its own thread.
 
 use super::*;
-use pitchleak::Rig;
+use crate::board::Board;
 use pitchleak::live::{BatchFormat, LiveConfig};
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -11,6 +11,8 @@ use std::sync::mpsc::{Receiver, sync_channel};
 struct Fake {
     published: Arc<Mutex<Vec<Message>>>,
     acknowledged: Arc<Mutex<Vec<Ticket>>>,
+    /// Of the service's state: it goes with the last of both.
+    _folder: Option<Arc<tempfile::TempDir>>,
 }
 
 impl Broker for Fake {
@@ -28,16 +30,19 @@ impl Broker for Fake {
 }
 
 fn service() -> (Service<Fake>, Fake, Receiver<Job>) {
-    let broker = Fake::default();
+    let folder = Arc::new(tempfile::tempdir().expect("a folder"));
+    let broker = Fake { _folder: Some(Arc::clone(&folder)), ..Fake::default() };
     let (jobs, queue) = sync_channel(1);
     let service = Service {
         watch: Watch::new(LiveConfig::of(Rig::paper()), None),
         broker: broker.clone(),
         jobs,
+        checkpoint: Arc::new(Checkpoint::new(folder.path()).expect("a folder")),
+        alarms: Alarms::default(),
         samples: vec![Samples { topic: "pitch/+/samples".to_owned(), format: BatchFormat::Json }],
         base: "pitchleak".to_owned(),
-        pace: Pace::new(Duration::from_secs(10), 20, Instant::now()),
-        metrics: Arc::new(Metrics::new()),
+        pace: Pace::new(Duration::from_secs(10), Some(20), Instant::now()),
+        metrics: Arc::new(Metrics::new(Arc::new(Board::new(Duration::from_secs(60))))),
         log: Arc::default(),
         waiting: Waiting::default(),
     };
@@ -75,9 +80,17 @@ fn samples(from_s: u32) -> String {
     format!("[{}]", (0..100).map(sample).collect::<Vec<_>>().join(","))
 }
 
-fn saved(job: Job, result: Result<usize, String>) -> Input {
-    let Job { tickets, summaries, .. } = job;
-    Input::Saved(Saved { result, took: Duration::ZERO, tickets, summaries })
+/// As the saver does it, on a disk that takes it or not.
+fn saved(mut job: Job, takes_it: bool) -> Input {
+    let result = match (takes_it, job.snapshot.is_some()) {
+        (false, _) => Err("no room".to_owned()),
+        (true, is_checkpoint) => Ok(is_checkpoint.then_some(1000)),
+    };
+    if takes_it {
+        (job.snapshot, job.alarms) = (None, None);
+        job.summaries.clear();
+    }
+    Input::Saved(Box::new(Saved { result, took: Duration::ZERO, job }))
 }
 
 #[test]
@@ -89,11 +102,11 @@ fn a_message_is_acknowledged_once_a_checkpoint_holds_it_and_not_before() {
     let first = queue.recv().expect("a job");
     service.take(delivery("pitch/B1/samples", Ok(&samples(1)), 2));
     assert_eq!(acknowledged(), []);
-    service.take(saved(first, Err("disk full".to_owned())));
+    service.take(saved(first, false));
     assert_eq!(acknowledged(), []);
     service.save();
     service.take(delivery("pitch/B1/samples", Ok(&samples(2)), 3));
-    service.take(saved(queue.recv().expect("a job"), Ok(1000)));
+    service.take(saved(queue.recv().expect("a job"), true));
     assert_eq!(acknowledged(), [ticket(1), ticket(2)]);
 }
 
@@ -103,26 +116,82 @@ fn what_came_over_a_connection_that_is_gone_is_not_acknowledged_over_the_next() 
     service.take(delivery("pitch/B1/samples", Ok(&samples(0)), 1));
     service.take(Input::Broker(Inbound::Down("gone".to_owned())));
     service.save();
-    service.take(saved(queue.recv().expect("a job"), Ok(1000)));
+    service.take(saved(queue.recv().expect("a job"), true));
     assert!(broker.acknowledged.lock().expect("no panic").is_empty());
 }
 
+fn alarms(broker: &Fake) -> Vec<Message> {
+    let published = broker.published.lock().expect("no panic");
+    published.iter().filter(|message| message.topic == "pitchleak/B1/alarm").cloned().collect()
+}
+
 #[test]
-fn an_alarm_stays_in_the_checkpoints_until_the_broker_has_it() {
-    let (mut service, broker, _queue) = service();
+fn an_alarm_is_on_the_disk_until_the_broker_has_it_and_then_that_it_has() {
+    let (mut service, broker, queue) = service();
     (0..5).for_each(|s| _ = service.take(delivery("pitch/B1/samples", Ok(&samples(s)), 1)));
-    let published = broker.published.lock().expect("no panic").clone();
-    let alarms: Vec<_> = published.iter().filter(|message| message.topic == "pitchleak/B1/alarm").collect();
-    let [alarm, ..] = alarms.as_slice() else { panic!("{published:?}") };
-    assert_eq!(service.waiting.alarms.len(), alarms.len());
+    let [alarm] = alarms(&broker).try_into().expect("one alarm");
+    assert_eq!(service.alarms.waiting(), 1);
+    service.save();
+    let job = queue.recv().expect("a job");
+    let file = job.alarms.clone().expect("alarms");
+    service.take(saved(job, true));
     // The next run sends it again.
     let (mut next, its_broker, _) = self::service();
-    next.resend(vec![format!("{}\n{}", alarm.topic, alarm.payload)]);
-    let again = its_broker.published.lock().expect("no panic").clone();
-    assert_eq!((&again[0].topic, &again[0].payload), (&alarm.topic, &alarm.payload));
+    next.alarms = Alarms::parse(&file).expect("alarms");
+    next.begin().expect("a folder");
+    assert_eq!(alarms(&its_broker)[0].payload, alarm.payload);
+    // That a checkpoint holds its samples is written, too.
+    service.take(saved(queue.recv().expect("a job"), true));
+    // Once the broker has it, the disk knows at once.
     let Keeping::Each(number) = alarm.keeping else { panic!("{alarm:?}") };
     service.take(Input::Broker(Inbound::Confirmed(number)));
-    assert_eq!(service.waiting.alarms.len(), alarms.len() - 1);
+    let job = queue.try_recv().expect("a job");
+    assert_eq!((job.alarms.as_deref(), job.snapshot.is_none()), (Some("{}"), true));
+}
+
+/// Samples that no checkpoint holds come again after a kill; the alarm that they raised is with the broker.
+#[test]
+fn samples_that_come_again_send_no_alarm_twice() {
+    let (mut service, broker, queue) = service();
+    (0..5).for_each(|s| _ = service.take(delivery("pitch/B1/samples", Ok(&samples(s)), 1)));
+    let Keeping::Each(number) = alarms(&broker)[0].keeping else { panic!("an alarm") };
+    service.take(Input::Broker(Inbound::Confirmed(number)));
+    let file = queue.try_recv().expect("a job").alarms.expect("alarms");
+    let (mut next, its_broker, _) = self::service();
+    next.alarms = Alarms::parse(&file).expect("alarms");
+    next.begin().expect("a folder");
+    (0..5).for_each(|s| _ = next.take(delivery("pitch/B1/samples", Ok(&samples(s)), 1)));
+    assert_eq!(alarms(&its_broker), []);
+}
+
+#[test]
+fn late_samples_are_counted_one_by_one() {
+    let (mut service, _, _queue) = service();
+    (0..21).for_each(|_| _ = service.take(delivery("pitch/B1/samples", Ok(&samples(0)), 1)));
+    service.tick(Instant::now());
+    let text = service.metrics.text();
+    assert!(text.contains("pitchleak_left_out_total{kind=\"late\"} 2000\n"), "{text}");
+}
+
+#[test]
+fn a_reload_waits_for_the_checkpoint_that_is_being_written_and_keeps_what_is_the_same() {
+    let (mut service, broker, queue) = service();
+    service.take(delivery("pitch/B1/samples", Ok(&samples(0)), 1));
+    service.save();
+    let job = queue.recv().expect("a job");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("gateway.toml");
+    std::fs::write(folder.path().join("rig.toml"), Rig::paper().to_toml()).expect("a rig");
+    let text = "state = 'state'\n[broker]\nhost = 'x'\n[[samples]]\ntopic = 'pitch/+'\nformat = 'json'\n\
+                [watch.cylinders.B2]\nrig = 'rig.toml'\n";
+    std::fs::write(&path, text).expect("a file");
+    service.reload(Box::new(Config::load(&path).expect("a configuration")));
+    assert_eq!(service.watch.cylinders(), 1);
+    service.take(saved(job, true));
+    assert_eq!(service.watch.cylinders(), 0);
+    let published = broker.published.lock().expect("no panic");
+    assert!(published.iter().any(|message| message.topic == "pitchleak/B1/notice/reload"), "{published:?}");
+    assert!(service.metrics.text().contains("silent_seconds{cylinder=\"B2\"}"));
 }
 
 #[test]
@@ -132,11 +201,15 @@ fn what_is_of_no_use_is_acknowledged_too_or_it_would_come_for_ever() {
     service.take(delivery("elsewhere", Ok("[]"), 2));
     service.take(delivery("pitch/B1/samples", Ok("{{{"), 3));
     service.save();
-    service.take(saved(queue.recv().expect("a job"), Ok(1000)));
+    service.take(saved(queue.recv().expect("a job"), true));
     assert_eq!(broker.acknowledged.lock().expect("no panic").len(), 3);
+    service.tick(Instant::now());
     let text = service.metrics.text();
     for kind in ["too_large", "unknown_topic", "unreadable"] {
         assert!(text.contains(&format!("kind=\"{kind}\"")), "{kind} in {text}");
+        let letters = broker.published.lock().expect("no panic");
+        let topic = format!("pitchleak/dead_letter/{kind}");
+        assert!(letters.iter().any(|letter| letter.topic == topic), "{kind} in {letters:?}");
     }
 }
 
@@ -147,7 +220,8 @@ fn control_characters_of_a_topic_are_told_escaped() {
     service.take(delivery("else\nwhere\u{1b}[31m\u{2028}é", Ok("[]"), 1));
     service.take(delivery("pitch/a\rb/samples", Err(100_000_000), 2));
     let published = broker.published.lock().expect("no panic");
-    let texts = published.iter().map(|message| {
+    let notices = published.iter().filter(|message| message.topic.contains("/notice/"));
+    let texts = notices.map(|message| {
         let notice: serde_json::Value = serde_json::from_str(&message.payload).expect("JSON");
         notice["text"].as_str().expect("a text").to_owned()
     });
@@ -159,34 +233,16 @@ fn control_characters_of_a_topic_are_told_escaped() {
 }
 
 #[test]
-fn what_the_broker_keeps_and_sends_is_told_and_kept_to() {
+fn a_broker_that_waits_gets_its_checkpoint_within_a_second() {
     let (mut service, _, queue) = service();
-    service.take(Input::Broker(Inbound::Limits(Ok(Limits { given: 500, kept: 200, in_flight: 12 }))));
-    assert!(service.metrics.text().contains("\npitchleak_broker_keeps 200\n"));
-    (0..11).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
-    service.tick(Instant::now());
-    assert!(queue.try_recv().is_err());
-    service.take(delivery("pitch/B1/samples", Ok("[]"), 11));
-    service.tick(Instant::now());
-    assert!(queue.try_recv().is_ok());
-    // A broker that sends all that it keeps may send more.
-    let (mut service, _, queue) = self::service();
-    service.take(Input::Broker(Inbound::Limits(Ok(Limits { given: 5, kept: 5, in_flight: 5 }))));
-    (0..5).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
-    service.tick(Instant::now());
-    assert!(queue.try_recv().is_err());
-}
-
-#[test]
-fn a_broker_that_waits_gets_its_checkpoint_at_once() {
-    let (mut service, _, queue) = service();
-    service.tick(Instant::now());
-    assert!(queue.try_recv().is_err());
+    let begin = Instant::now();
     (0..20).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
-    service.tick(Instant::now());
-    assert_eq!(queue.try_recv().map(|job| job.tickets.len()), Ok(20));
+    service.tick(begin);
+    assert!(queue.try_recv().is_err());
+    service.tick(begin + Duration::from_secs(1));
+    assert_eq!(queue.try_recv().map(|job| job.tickets.len()).ok(), Some(20));
     // One at a time.
     (0..20).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
-    service.tick(Instant::now());
+    service.tick(begin + Duration::from_secs(2));
     assert!(queue.try_recv().is_err());
 }

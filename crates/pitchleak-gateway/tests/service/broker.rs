@@ -44,8 +44,12 @@ fn killed_at_random_moments_it_ends_as_an_undisturbed_run() {
     assert_eq!(gateway.end(), Some(0));
     assert_eq!(state(&gateway.state()), expected);
     assert_eq!(ids(&listener), alarms);
+    let sent = listener.heard("/alarm").len();
+    assert!(sent <= 2 * alarms.len(), "{sent} messages of {} alarms", alarms.len());
     assert!(killed >= kills && alarms.len() == 6, "{killed} kills, {alarms:?}");
-    assert!(listener.heard("pitchleak/status").last().unwrap().contains("offline"));
+    wait_until("it says goodbye", || {
+        listener.heard("pitchleak/status").last().is_some_and(|status| status.contains("offline"))
+    });
 }
 
 #[test]

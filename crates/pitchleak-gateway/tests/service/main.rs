@@ -5,5 +5,8 @@
 mod broker;
 mod disk;
 mod harness;
+mod page;
 mod refused;
+mod reload;
+mod secrets;
 mod systemd;

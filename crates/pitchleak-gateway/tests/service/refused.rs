@@ -45,7 +45,7 @@ fn what_it_cannot_use_is_counted_and_costs_no_memory() {
     }
     sender.flush();
     wait_until("all came", || gateway.metric("pitchleak_messages_total") >= 314.0);
-    assert!((gateway.metric("pitchleak_cylinders") - 50.0).abs() < 0.5);
+    wait_until("fifty are watched", || (gateway.metric("pitchleak_cylinders") - 50.0).abs() < 0.5);
     assert!(gateway.get("/health").contains("200 OK"));
     let metrics = gateway.get("/metrics");
     for kind in ["too_large", "too_many_cylinders", "unreadable", "late"] {
@@ -53,16 +53,5 @@ fn what_it_cannot_use_is_counted_and_costs_no_memory() {
     }
     assert!(gateway.peak_memory() < 400_000_000, "{} bytes", gateway.peak_memory());
     assert!(gateway.said.lock().unwrap().lines().count() < 40);
-    assert_eq!(gateway.end(), Some(0));
-}
-
-#[test]
-fn the_limits_of_the_broker_are_found_out_at_the_start() {
-    let Some(broker) = Mosquitto::start("max_inflight_messages 30\nmax_queued_messages 200") else { return };
-    let mut gateway =
-        Gateway::new(&broker, |text| text.replace("port =", "queued = 500\nin_flight = 300\nport ="));
-    gateway.start();
-    gateway.wait_for("in_flight: the broker waits after 30 ");
-    gateway.wait_for("broker_limits: the broker keeps 200 messages while nobody takes them, and not 500");
     assert_eq!(gateway.end(), Some(0));
 }

@@ -19,7 +19,7 @@ impl Systemd {
         let mut bytes = [0; 100];
         self.0.set_read_timeout(Some(3 * WATCHDOG)).unwrap();
         let length = self.0.recv(&mut bytes).ok()?;
-        Some(String::from_utf8_lossy(&bytes[..length]).into_owned())
+        Some(String::from_utf8_lossy(&bytes[..length]).trim_end().to_owned())
     }
 }
 

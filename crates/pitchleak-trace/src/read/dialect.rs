@@ -9,6 +9,7 @@ use super::number::decimal;
 use super::proposal::{Proposal, proposals};
 use super::records::Encoding;
 use super::records::{Records, Stop, stopped_early};
+use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;
 use crate::header::shorten;
@@ -45,6 +46,15 @@ impl Dialect {
             && let Some(fault) = mistaken(ahead)
         {
             return Err(fault);
+        }
+        if table.bound.is_err()
+            && let Some((shape, recast)) = shapes::told(&table, ahead)
+        {
+            let (delimiter, last_header_line) = (table.delimiter.byte(), table.last_header_line());
+            let mut records = Records::new(recast(Source { records, delimiter, last_header_line })?);
+            let (ahead, whole) = records.look_ahead(AHEAD).map_err(stopped_early)?;
+            let table = TextTable::find(ahead, whole, Some(Delimiter::Tab), rig).ok_or(TraceFault::Empty)?;
+            return Ok((records, encoding, TextTable { shape: Some(shape), ..table }));
         }
         if table.headers.iter().any(|header| header.contains('\0')) {
             return Err(TraceFault::Format("not a CSV file: the header row is binary"));
@@ -189,13 +199,14 @@ fn reading(
     if encoding != Encoding::Utf8 {
         parts.push("UTF-16".to_owned());
     }
-    if table.delimiter != Delimiter::Comma {
+    parts.extend(table.shape.map(str::to_owned));
+    if table.shape.is_none() && table.delimiter != Delimiter::Comma {
         parts.push(format!("{} between cells", table.delimiter.name()));
     }
     if decimal == Decimal::Comma {
         parts.push("decimal comma".to_owned());
     }
-    if table.header_line > 1 {
+    if table.shape.is_none() && table.header_line > 1 {
         parts.push(format!("header in line {}", table.header_line));
     }
     parts.extend(table.units.as_ref().map(|units| format!("units in line {}", units.line)));

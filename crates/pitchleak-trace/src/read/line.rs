@@ -3,11 +3,11 @@
 use super::columns::{Column, Content, Layout};
 use super::csv::{Cells, describe, read_cells};
 use super::error::TraceFault;
-use super::error::{BadRow, Counted};
+use super::error::{BadReason, BadRow, Counted};
 use super::row::Row;
 use super::row::{BadRows, Record};
 use super::stamps::Epoch;
-use super::validator::RowValidator;
+use super::validator::{MOST_TIME_S, RowValidator};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 
@@ -27,18 +27,23 @@ impl LineLayout {
         })
     }
 
-    /// Time of a line, s since `epoch_ns` (or since its own stamp, if it is the first); none where it cannot be read.
-    pub fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Option<f64> {
+    /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); or why it has none.
+    pub fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Result<f64, BadReason> {
         let is_time =
             |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));
-        let at = self.0.columns.iter().position(is_time)?;
+        let times = self.0.columns.iter().enumerate().find(|(_, column)| is_time(column));
+        let (at, column) = times.ok_or(BadReason::Missing)?;
         let mut cells = LineCells { cells, at };
-        let time_s = match self.0.columns.get(at)?.content {
+        let time_s = match column.content {
             Content::Timestamp => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell()),
             Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
-            Content::Ignored => return None,
-        };
-        time_s.ok().filter(|time_s| time_s.is_finite())
+            Content::Ignored => Ok(f64::NAN),
+        }?;
+        match time_s {
+            _ if time_s.is_nan() => Err(BadReason::Missing),
+            _ if time_s.abs() > MOST_TIME_S => Err(BadReason::OutOfRange),
+            _ => Ok(time_s),
+        }
     }
 
     /// The column of each signal, as a rig file's `[columns]` would name it; `map` is the one it was made with.

@@ -17,6 +17,7 @@ mod proposal;
 mod quality;
 mod records;
 mod row;
+mod shapes;
 mod stamps;
 mod table;
 mod table_text;

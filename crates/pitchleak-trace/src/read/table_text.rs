@@ -28,6 +28,8 @@ pub(super) struct TextTable {
     pub(super) bound: Result<Bound, TraceFault>,
     /// There is no header: the first line holds numbers.
     pub(super) headless: bool,
+    /// What the file was before its rows were made.
+    pub(super) shape: Option<&'static str>,
 }
 
 impl TextTable {
@@ -58,7 +60,7 @@ impl TextTable {
         let (head, headless) = Head::among(&rows, rig)?;
         let Head { line, headers, units, bound, first } = head;
         let rows = rows.split_off(first);
-        Some(Self { delimiter, header_line: line, headers, units, rows, bound, headless })
+        Some(Self { delimiter, header_line: line, headers, units, rows, bound, headless, shape: None })
     }
 
     /// Columns of a file that is no text, with their first cells.
@@ -72,6 +74,7 @@ impl TextTable {
             rows,
             bound,
             headless: false,
+            shape: None,
         }
     }
 

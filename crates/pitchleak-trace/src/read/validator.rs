@@ -185,6 +185,8 @@ fn bad_cell(row: &Row, layout: &Layout, signal: Signal, reason: BadReason, detai
 
 /// A vacuum, Pa gauge.
 const VACUUM_PA: f64 = -101_325.0;
+/// Three thousand years either way; where seconds are still told apart to 20 µs.
+pub(crate) const MOST_TIME_S: f64 = 1e11;
 /// Noise and offset may carry a sound reading this share of full scale past what is possible.
 const SLACK: f64 = 0.05;
 /// No sensor reads more than this many times its full scale.
@@ -253,8 +255,7 @@ impl Ranges {
             // Absolute zero, and where oil burns.
             Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
             both_ways(Signal::Speed, 100.0),
-            // Three thousand years either way; where seconds are still told apart to 20 µs.
-            Range { signal: Signal::Time, least: -1e11, most: 1e11 },
+            Range { signal: Signal::Time, least: -MOST_TIME_S, most: MOST_TIME_S },
             // As much as the largest meter that a rig may have.
             both_ways(Signal::LeakInternal, 10.0),
             both_ways(Signal::LeakExternalA, 10.0),
@@ -265,12 +266,10 @@ impl Ranges {
     /// The first reading that is not possible; a missing one is.
     #[inline]
     pub(super) fn broken_by(&self, row: &Row) -> Option<Signal> {
-        let [least, most] = &self.bounds;
-        let mut broken = false;
-        for ((value, least), most) in row.cells.iter().zip(least).zip(most) {
-            // A missing reading, NaN, is neither.
-            broken |= (value < least) | (value > most);
-        }
+        let ([least, most], cells) = (&self.bounds, &row.cells);
+        // A missing reading, NaN, is neither. By place: zipped iterators are made by calls here, for every row.
+        let is_broken = |place: usize| (cells[place] < least[place]) | (cells[place] > most[place]);
+        let broken = (0..cells.len()).fold(false, |broken, place| broken | is_broken(place));
         if broken { self.first_broken_by(row) } else { None }
     }
 

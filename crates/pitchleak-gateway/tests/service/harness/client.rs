@@ -1,4 +1,7 @@
-use rumqttc::{Client, ConnectionError, Event, MqttOptions, Packet, PublishOptions, QoS};
+use rumqttc::{
+    BrokerSessionResumePolicy, Client, ConnectionError, Event, MqttOptions, Packet, PublishOptions, QoS,
+    SessionMode,
+};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -13,7 +16,9 @@ pub struct Sender {
 
 fn options(name: &str, port: u16) -> MqttOptions {
     let mut options = MqttOptions::new(name, ("127.0.0.1", port));
-    options.set_clean_session(false).set_max_packet_size(256_000_000, 256_000_000).set_keep_alive(60);
+    options.set_session_mode(SessionMode::Persistent).set_keep_alive(60);
+    options.set_broker_session_resume_policy(BrokerSessionResumePolicy::AllowBrokerOnly);
+    options.set_max_packet_size(Some(256_000_000));
     options
 }
 

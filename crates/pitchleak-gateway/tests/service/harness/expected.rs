@@ -1,11 +1,14 @@
 use super::{Listener, data};
 use pitchleak::Rig;
 use pitchleak::live::{Batch, BatchFormat, Checkpoint, Event, LiveConfig, Snapshot, Watch};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// The state file and the alarms' ids of a run that nothing disturbs.
-pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (Vec<u8>, BTreeSet<String>) {
+/// Each cylinder's state by the name of its file.
+pub type States = BTreeMap<String, Vec<u8>>;
+
+/// The states and the alarms' ids of a run that nothing disturbs.
+pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (States, BTreeSet<String>) {
     let rig = Rig::load(data().join("traces/rig.toml")).unwrap();
     let mut watch = Watch::new(LiveConfig::of(rig), None);
     let mut events = Vec::new();
@@ -17,7 +20,7 @@ pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (Vec<u8>, BTreeS
         }
     }
     let folder = tempfile::tempdir().unwrap();
-    Checkpoint::new(folder.path()).unwrap().save(&Snapshot::of(&watch)).unwrap();
+    Checkpoint::new(folder.path()).unwrap().save(&Snapshot::of(&mut watch)).unwrap();
     let ids = events.into_iter().filter_map(|event| match event {
         Event::Alarm(alarm) => Some(alarm.id),
         _ => None,
@@ -27,9 +30,14 @@ pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (Vec<u8>, BTreeS
     (undisturbed, ids.collect())
 }
 
-/// Nothing in the moment in which the checkpoint before makes room for the next.
-pub fn state(folder: &Path) -> Vec<u8> {
-    std::fs::read(folder.join("watch.state")).unwrap_or_default()
+/// As they are now.
+pub fn state(folder: &Path) -> States {
+    let Ok(entries) = std::fs::read_dir(folder.join("cylinders")) else { return States::new() };
+    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    let states = names.filter(|name| name.ends_with(".state"));
+    states
+        .filter_map(|name| Some((name.clone(), std::fs::read(folder.join("cylinders").join(name)).ok()?)))
+        .collect()
 }
 
 /// Of the alarms that were heard.

@@ -1,6 +1,7 @@
 use super::{Mosquitto, certificates, data, wait_until};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
@@ -26,7 +27,7 @@ impl Gateway {
     /// With whatever broker is there.
     pub fn at(port: u16, change: impl FnOnce(String) -> String) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("password"), "correct\n").unwrap();
+        write_secret(&folder.path().join("password"), "correct\n");
         let text = format!(
             "state = \"state\"\ncheckpoint_s = 0.2\n\
              [broker]\nhost = \"localhost\"\nport = {port}\nca_file = \"{}/authority.pem\"\nuser = \"tester\"\npassword_file = \"password\"\n\
@@ -45,7 +46,14 @@ impl Gateway {
     }
 
     pub fn start(&mut self) {
-        let mut child = self.command().stderr(Stdio::piped()).spawn().unwrap();
+        self.start_with(|command| command);
+    }
+
+    /// In an environment of its own, in its folder.
+    pub fn start_with(&mut self, change: impl FnOnce(&mut Command) -> &mut Command) {
+        let mut command = self.command();
+        command.current_dir(self.folder.path()).stderr(Stdio::piped());
+        let mut child = change(&mut command).spawn().unwrap();
         let lines = BufReader::new(child.stderr.take().unwrap()).lines();
         let said = Arc::clone(&self.said);
         said.lock().unwrap().clear();
@@ -85,20 +93,29 @@ impl Gateway {
         self.listener.take().map(JoinHandle::join);
     }
 
+    pub fn signal(&self, signal: &str) {
+        Command::new("kill").args([signal, &self.id().to_string()]).status().unwrap();
+    }
+
     /// By SIGTERM; its exit status.
     pub fn end(&mut self) -> Option<i32> {
+        self.signal("-TERM");
         let mut child = self.child.take().unwrap();
-        Command::new("kill").arg(child.id().to_string()).status().unwrap();
         let status = child.wait().unwrap();
         self.listener.take().map(JoinHandle::join);
         status.code()
     }
 
+    /// Where its page is.
+    pub fn address(&self) -> String {
+        let said = self.said.lock().unwrap().clone();
+        format!("http://{}", said.split("http://").nth(1).unwrap().lines().next().unwrap())
+    }
+
     /// What it answers to a request.
     pub fn get(&self, path: &str) -> String {
-        let said = self.said.lock().unwrap().clone();
-        let address = said.split("http://").nth(1).unwrap().lines().next().unwrap().to_owned();
-        let mut connection = TcpStream::connect(address).unwrap();
+        let address = self.address();
+        let mut connection = TcpStream::connect(address.trim_start_matches("http://")).unwrap();
         connection.write_all(format!("GET {path} HTTP/1.1\r\n\r\n").as_bytes()).unwrap();
         let mut text = String::new();
         connection.read_to_string(&mut text).unwrap();
@@ -123,6 +140,12 @@ impl Gateway {
         let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
         1024 * line.trim().trim_end_matches(" kB").parse::<u64>().unwrap()
     }
+}
+
+/// That nobody else can read.
+pub fn write_secret(path: &Path, text: &str) {
+    std::fs::write(path, text).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).unwrap();
 }
 
 impl Drop for Gateway {

@@ -6,9 +6,9 @@ mod gateway;
 mod mosquitto;
 
 pub use client::{Listener, Sender};
-pub use expected::{ids, names, state, undisturbed};
-pub use gateway::Gateway;
-pub use mosquitto::Mosquitto;
+pub use expected::{States, ids, names, state, undisturbed};
+pub use gateway::{Gateway, write_secret};
+pub use mosquitto::{Mosquitto, free_port};
 
 use flate2::read::GzDecoder;
 use std::io::Read;

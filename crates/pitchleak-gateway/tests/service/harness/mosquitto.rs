@@ -19,8 +19,7 @@ impl Mosquitto {
             eprintln!("skipped: mosquitto is not installed");
             return None;
         }
-        let free = || TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let (tls_port, port) = (free(), free());
+        let (tls_port, port) = (free_port(), free_port());
         let folder = tempfile::tempdir().unwrap();
         let at = certificates().display().to_string();
         let store = folder.path().display();
@@ -67,6 +66,11 @@ impl Mosquitto {
     pub fn revive(&mut self) {
         self.child = spawn(self.folder.path(), self.port);
     }
+}
+
+/// That nobody listens on now.
+pub fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 fn spawn(folder: &Path, port: u16) -> Child {

@@ -1,0 +1,137 @@
+//! Tables whose rows are no samples: each shape is told by its first lines and recast as rows of samples, a text with tabs
+//! between its cells, which is then read as any other. Asked only where the table makes no trace as it is.
+//!
+//! A new shape is a file and an entry of [`SHAPES`].
+
+mod cells;
+mod labview;
+mod long;
+mod merged;
+mod own_times;
+
+use super::error::TraceFault;
+use super::records::{Records, Stop, stopped_early};
+use super::table_text::TextTable;
+use std::io::{self, Read};
+
+/// A shape of tables.
+struct Shape {
+    /// As a note says it.
+    name: &'static str,
+    /// How a table that begins so, at the start of this text, is recast; none where it has another shape.
+    told: fn(&TextTable, &[u8]) -> Option<Recast>,
+}
+
+type Recast = Box<dyn FnOnce(Source) -> Result<Text, TraceFault>>;
+
+/// Rows of samples, with tabs between their cells.
+pub(super) type Text = Box<dyn Read + Send>;
+
+/// Every shape; the first that fits is taken.
+const SHAPES: &[Shape] =
+    &[labview::SHAPE, long::SHAPE, own_times::SHAPE, cells::DATE_AND_TIME_APART, cells::UNITS_IN_CELLS];
+
+/// The shape of a table, and how it is recast.
+pub(super) fn told(table: &TextTable, ahead: &[u8]) -> Option<(&'static str, Recast)> {
+    SHAPES.iter().find_map(|shape| Some((shape.name, (shape.told)(table, ahead)?)))
+}
+
+/// A text from its begin on.
+pub(super) struct Source {
+    pub(super) records: Records,
+    pub(super) delimiter: u8,
+    pub(super) last_header_line: u64,
+}
+
+impl Source {
+    /// Passes over all that stands before the first row.
+    fn skip_header(&mut self) -> Result<(), TraceFault> {
+        self.records.split_at(self.delimiter);
+        while self.records.next_line() <= self.last_header_line {
+            self.records.next().map_err(stopped_early)?;
+        }
+        Ok(())
+    }
+
+    /// The rows one by one, each in the line that it had; `header` stands in the last line before them.
+    fn row_by_row(
+        mut self,
+        header: &[String],
+        mut recast: impl FnMut(&[&[u8]], &mut Vec<u8>) + Send + 'static,
+    ) -> Result<Text, TraceFault> {
+        self.skip_header()?;
+        let mut start = vec![b'\n'; self.last_header_line.saturating_sub(1) as usize];
+        start.extend(header.join("\t").bytes());
+        start.push(b'\n');
+        let mut line = self.last_header_line + 1;
+        let mut first = Some(start);
+        Ok(Box::new(Written::by(move |text| {
+            if let Some(start) = first.take() {
+                text.extend(start);
+            }
+            match self.records.next() {
+                Ok(record) => {
+                    text.extend((line..record.line).map(|_| b'\n'));
+                    line = record.line + 1;
+                    recast(&record.cells(self.delimiter), text);
+                    text.push(b'\n');
+                    Ok(true)
+                }
+                Err(Stop::End) => Ok(false),
+                Err(Stop::Failed(error)) => Err(error),
+                Err(Stop::TooLong) => Err(io::Error::other("a line is longer than a megabyte")),
+            }
+        })))
+    }
+}
+
+/// Text that is written as it is read, piece by piece.
+struct Written<F> {
+    /// Writes on; `false` at the end.
+    more: F,
+    text: Vec<u8>,
+    given: usize,
+    ended: bool,
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Written<F> {
+    fn by(more: F) -> Self {
+        Self { more, text: Vec::new(), given: 0, ended: false }
+    }
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Read for Written<F> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.given == self.text.len() {
+            self.text.clear();
+            self.given = 0;
+            while !self.ended && self.text.len() < into.len() {
+                self.ended = !(self.more)(&mut self.text)?;
+            }
+        }
+        let mut rest = self.text.get(self.given..).unwrap_or_default();
+        let count = rest.read(into)?;
+        self.given += count;
+        Ok(count)
+    }
+}
+
+/// Small letters and digits only.
+fn letters(header: &str) -> String {
+    header.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// The first column that is called so, letters and digits only.
+fn place(headers: &[String], names: &[&str]) -> Option<usize> {
+    headers.iter().position(|header| names.contains(&letters(header).as_str()))
+}
+
+/// A cell without blanks, and without what would part it.
+fn write_cell(cell: &[u8], text: &mut Vec<u8>) {
+    text.extend(
+        cell.trim_ascii().iter().map(|byte| if matches!(byte, b'\t' | b'\n' | b'\r') { b' ' } else { *byte }),
+    );
+}
+
+#[cfg(test)]
+mod tests;
