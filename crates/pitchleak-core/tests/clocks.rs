@@ -141,3 +141,19 @@ fn without_a_pressure_nothing_is_learnt() {
         assert!((found.value - LEAKS[leak]).abs() < 4.0 * found.std, "{leak:?}: {found:?}");
     }
 }
+
+/// A position between two readings is none: what the sensor reads is as far from what the flows say as its noise, ten times as
+/// rarely or not.
+#[test]
+fn a_position_between_readings_is_no_reading() {
+    for every in [1, 10] {
+        let mut rls = new();
+        for (k, sample) in noisy(3).iter().enumerate() {
+            let row = Readings::from(sample);
+            rls.update_readings(0.01, &Readings { x: row.x.filter(|_| k % every == 0), ..row });
+        }
+        let [_, position] = rls.normalised_innovation();
+        println!("position with every {every}. row: {position:.3}");
+        assert!((position - 1.0).abs() < 0.15, "{position}");
+    }
+}

@@ -408,6 +408,7 @@ mod tests {
             clocks.push(DT_S, &readings((k % 50 == 0).then_some(f64::from(k))));
             while let Next::Row(row) = clocks.pop() {
                 time_s += row.dt_s;
+                assert!(row.dt_s < 0.1, "rows are dropped evenly: {row:?}");
                 assert!((row.sample.qa_m3s.unwrap() - (time_s / DT_S - 1.0)).abs() < 1e-6, "{row:?}");
             }
         }
@@ -424,6 +425,19 @@ mod tests {
             rows(flows).iter().filter(|row| row.sample.qa_m3s.is_none()).count()
         };
         assert_eq!([hole(1), hole(3), hole(4), hole(5), hole(40)], [0, 0, 4, 5, 40]);
+        // Nobody waits longer for one that has stopped than a hole may be long.
+        let stopped = |missing: usize| {
+            rows([Some(1.0); 20].into_iter().chain(core::iter::repeat_n(None, missing))).len()
+        };
+        assert_eq!([stopped(3), stopped(6)], [20, 26]);
+        // A hole is no step: after it the next one is as long as any.
+        let twice = [Some(1.0); 20]
+            .into_iter()
+            .chain([None; 40])
+            .chain([Some(1.0)])
+            .chain([None; 10])
+            .chain([Some(1.0); 3]);
+        assert_eq!(rows(twice).iter().filter(|row| row.sample.qa_m3s.is_none()).count(), 50);
         let never = rows(core::iter::repeat_n(None, 50));
         assert!(never.len() == 50 && never.iter().all(|row| row.sample.qa_m3s.is_none()));
     }

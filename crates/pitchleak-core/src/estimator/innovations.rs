@@ -74,6 +74,16 @@ mod tests {
         }
     }
 
+    /// Positions that are farther off than declared widen the intervals as balances do; smaller ones never narrow them.
+    #[test]
+    fn positions_widen_intervals_too() {
+        for (ratio, expected) in [(4.0, 4.0), (0.25, 1.0)] {
+            let mut monitor = Innovations::<f64>::default();
+            monitor.position(ratio * 20_000.0, 20_000.0);
+            assert!((monitor.inflation() / expected - 1.0).abs() < 0.05, "{}", monitor.inflation());
+        }
+    }
+
     /// The mean of `count` χ²₁ terms has the variance 2/count: two of its standard deviations beyond 1 are the first that
     /// tell.
     #[test]

@@ -81,3 +81,18 @@ impl<T: Real, const N: usize> PositionFilter<T, N> {
         *self = Self { weight_sum: self.weight_sum, ..Self::anchored(x_m, sensor_variance_m2) };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A leak of one for n steps has moved the piston by n columns, of which each is as old as its middle: Σ = n² dt/2.
+    #[test]
+    fn what_a_leak_has_moved_is_as_old_as_it_is() {
+        let mut filter = PositionFilter::<f64, 4>::anchored(0.1, 1e-6);
+        let travel = Equation { left: 0.0, columns: [0.0, 2.0, 0.0, 0.0] };
+        (0..30).for_each(|_| filter.carry(0.01, &travel, 0.0));
+        assert!((filter.sensitivity[1] - 60.0).abs() < 1e-9);
+        assert!((filter.aged[0] - 2.0 * 0.5 * 900.0 * 0.01).abs() < 1e-9, "{:?}", filter.aged);
+    }
+}

@@ -568,3 +568,26 @@ fn diluted<T: Real>(noise: &NoiseStd<T>, row: &Row<T>) -> NoiseStd<T> {
         ..*noise
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Over the steps between two readings of a channel the integral's variance adds up to that of the readings: σ² own².
+    #[test]
+    fn noise_is_that_of_own_readings() {
+        let noise = NoiseStd { flow_a_m3s: 1e-6, flow_b_m3s: 2e-6, pressure_pa: 5e4, position_m: 1e-3 };
+        let sample =
+            Sample { x_m: 0.1, pa_pa: 5e6, pb_pa: 4e6, qa_m3s: Some(0.0), qb_m3s: Some(0.0), force_n: None };
+        let mut row = Row::read(0.01, &sample);
+        row.own_step_s = PerChannel { x: 0.05, pa: 0.02, pb: 0.04, qa: 0.1, qb: 0.2 };
+        let found = diluted(&noise, &row);
+        let channels: [(f64, f64, f64); 3] =
+            [(found.flow_a_m3s, 1e-6, 0.1), (found.flow_b_m3s, 2e-6, 0.2), (found.pressure_pa, 5e4, 0.04)];
+        for (std, declared, own_s) in channels {
+            let steps: f64 = own_s / 0.01;
+            let variance = steps * (std * 0.01).powi(2);
+            assert!((variance / (declared * own_s).powi(2) - 1.0).abs() < 1e-9, "{std} over {own_s} s");
+        }
+    }
+}
