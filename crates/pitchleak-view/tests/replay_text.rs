@@ -19,6 +19,8 @@ fn report(status: Status) -> ReplayReport {
         verdict: Verdict {
             status,
             faults: vec![Leak::Internal],
+            probability: None,
+            explanations: Vec::new(),
             text: "Oil passes the seal.".to_owned(),
             reasons: Vec::new(),
         },
