@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let begun = Instant::now();
     let decision = explain(&statistic, &rig).ok_or("too little to explain")?;
-    eprintln!("{:.1} ms, {} segments", begun.elapsed().as_secs_f64() * 1e3, statistic.segments().len());
+    eprintln!("{:.1} ms", begun.elapsed().as_secs_f64() * 1e3);
     println!("{}", serde_json::to_string_pretty(&decision)?);
     Ok(())
 }

@@ -58,6 +58,12 @@ pub enum Column {
     LeakA,
     /// Out of chamber B.
     LeakB,
+    /// What leaks that open at a pressure let through less than C P, share of full scale.
+    CrackingInternal,
+    /// Out of chamber A.
+    CrackingA,
+    /// Out of chamber B.
+    CrackingB,
     /// Leaks C √P, likewise.
     OrificeInternal,
     /// Out of chamber A.
@@ -182,6 +188,9 @@ impl Scales<'_> {
             }
             Column::LeakA => timed(&[(R::PressureA, per_mpa.external_a)], &[]),
             Column::LeakB => timed(&[], &[(R::PressureB, per_mpa.external_b)]),
+            Column::CrackingInternal => plain(&[(R::Time, -flow)], &[(R::Time, flow)]),
+            Column::CrackingA => plain(&[(R::Time, -flow)], &[]),
+            Column::CrackingB => plain(&[], &[(R::Time, -flow)]),
             Column::OrificeInternal => {
                 let by = per_root.internal;
                 plain(&[(R::RootInternal, by)], &[(R::RootInternal, -by)])

@@ -1,10 +1,12 @@
 //! What the posterior says of the leaks, and what an operator acts on.
 
-use super::equations::Statistic;
-use super::hypothesis::LeakCourse;
+use super::hypothesis::{LeakCourse, State};
 use super::posterior::{Tables, Weighed, weigh};
+use super::raw_products::Statistic;
+use super::table::Entry;
 use crate::report::Status;
 use crate::rig::Rig;
+use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Leak, PerLeak};
 use serde::Serialize;
@@ -52,6 +54,19 @@ pub struct Explained {
     pub leakage: PerLeak<f64>,
 }
 
+/// Something of sensors, rig or wiring that is not as declared, whatever the leaks are.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Note {
+    /// Of the likeliest entry.
+    pub id: &'static str,
+    /// That it or one of those that it cannot be told from is so.
+    pub probability: f64,
+    /// In words.
+    pub text: &'static str,
+    /// Others of its kind that this trace leaves, and entries that no trace tells it from.
+    pub cannot_be_told_from: Vec<&'static str>,
+}
+
 /// The verdict of the posterior.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Decision {
@@ -63,10 +78,14 @@ pub struct Decision {
     pub ruled_out: Vec<Leak>,
     /// That each leak is above its threshold at the trace's end.
     pub probability: PerLeak<f64>,
-    /// How large each leak is.
+    /// How large each leak is, since it changed last.
     pub leakage: PerLeak<Belief>,
+    /// When a leak last changed at once, s from the trace's begin; 0 where none did.
+    pub changed_s: f64,
     /// Best first.
     pub explanations: Vec<Explained>,
+    /// What is not as declared, for certain.
+    pub notes: Vec<Note>,
     /// Noise scale over the readings' own scatter.
     pub misfit: f64,
     /// Probability that zeros wander.
@@ -75,16 +94,53 @@ pub struct Decision {
     pub wiring: f64,
 }
 
+/// Gathers a trace's records, and explains them.
+#[derive(Clone, Debug)]
+pub struct Explainer {
+    rig: Rig,
+    statistic: Box<Statistic>,
+    /// Time of records left out since the last one, s.
+    left_out_s: f64,
+}
+
+impl Explainer {
+    /// Of a cylinder of this rig. What `[effects]` of the rig file correct is not corrected here.
+    pub fn new(rig: &Rig) -> Self {
+        let statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+        Self { rig: rig.clone(), statistic, left_out_s: 0.0 }
+    }
+
+    /// Takes in the next record.
+    pub fn push(&mut self, record: &Record) {
+        let step_s = record.step_s();
+        let since_s = if step_s > 0.0 { step_s + self.left_out_s } else { 0.0 };
+        self.left_out_s = 0.0;
+        self.statistic.push(since_s, &record.sample);
+    }
+
+    /// Leaves out the next record, a spike.
+    pub fn leave_out(&mut self, record: &Record) {
+        self.left_out_s += record.dt_s;
+    }
+
+    /// What the records so far say; `None` where they are too few.
+    pub fn decision(&self) -> Option<Decision> {
+        explain(&self.statistic, &self.rig)
+    }
+}
+
 /// Explains a trace; `None` where there is too little of it.
 pub fn explain(statistic: &Statistic, rig: &Rig) -> Option<Decision> {
     let tables = Tables::new();
-    let weighed = weigh(statistic, rig, &tables)?;
+    let mut statistic = Box::new(statistic.clone());
+    statistic.close();
+    let weighed = weigh(&statistic, rig, &tables)?;
     Some(decide(&weighed, rig))
 }
 
 fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let mass = |is: &dyn Fn(&Weighed<'_>) -> bool| {
-        weighed.iter().filter(|one| is(one)).map(|one| one.probability).sum::<f64>()
+        weighed.iter().filter(|one| is(one)).fold(0.0, |sum, one| sum + one.probability).min(1.0)
     };
     let threshold_m3s = rig.alarms.threshold_m3s;
     let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, leak));
@@ -114,11 +170,19 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         ruled_out,
         probability,
         leakage: beliefs.map(|marginal| marginal.belief()),
+        changed_s: changed_s(weighed),
         explanations: listed(weighed),
+        notes: notes(weighed),
         misfit,
         wander,
         wiring,
     }
+}
+
+/// When a leak changed at once, as the likeliest explanation has it.
+fn changed_s(weighed: &[Weighed<'_>]) -> f64 {
+    let best = weighed.iter().max_by(|a, b| a.probability.total_cmp(&b.probability));
+    best.map_or(0.0, |best| best.changed_s)
 }
 
 /// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
@@ -145,7 +209,8 @@ impl Marginal {
     }
 
     fn above(&self, threshold_m3s: f64) -> f64 {
-        self.flows_m3s.iter().filter(|(flow, _)| *flow > threshold_m3s).map(|(_, weight)| weight).sum()
+        let above = self.flows_m3s.iter().filter(|(flow, _)| *flow > threshold_m3s);
+        above.fold(0.0, |sum, (_, weight)| sum + weight).min(1.0)
     }
 
     fn quantile(&self, none: f64, probability: f64) -> f64 {
@@ -180,6 +245,28 @@ impl Marginal {
             below_lpm: LPM_PER_M3S * self.quantile_if_there(0.975),
         }
     }
+}
+
+/// What is not usual with probability 1 − α, of each kind.
+fn notes(weighed: &[Weighed<'_>]) -> Vec<Note> {
+    (0..3).filter_map(|kind| note(weighed, kind)).collect()
+}
+
+fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
+    let mut masses: Vec<(&Entry, f64)> = Vec::new();
+    for one in weighed {
+        let Some(entry) = found(one)[kind].filter(|entry| !is_usual(entry.id)) else { continue };
+        match masses.iter_mut().find(|(known, _)| known.id == entry.id) {
+            Some((_, mass)) => *mass += one.probability,
+            None => masses.push((entry, one.probability)),
+        }
+    }
+    masses.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let probability = masses.iter().map(|(_, mass)| mass).sum();
+    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
+    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > ALPHA).map(|(entry, _)| entry.id);
+    let cannot_be_told_from = others.chain(best.alike.iter().copied()).collect();
+    Some(Note { id: best.id, probability, text: best.text, cannot_be_told_from })
 }
 
 /// What an explanation is made of: leaks, their courses, state, wiring.
@@ -219,7 +306,7 @@ fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
 
 fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained {
     let hypothesis = &one.hypothesis;
-    let parts = [hypothesis.wiring, Some(hypothesis.state.zeros), Some(hypothesis.state.departure)];
+    let parts = found(one);
     let unusual = || parts.iter().flatten().filter(|entry| !is_usual(entry.id));
     let mut words: Vec<String> = unusual().map(|entry| entry.text.to_owned()).collect();
     if hypothesis.state.wander.0 > 0.0 {
@@ -240,6 +327,15 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
             .collect(),
         cannot_be_told_from: unusual().flat_map(|entry| entry.alike).copied().collect(),
         leakage,
+    }
+}
+
+/// What is found to be off. Mistakes of wiring are weighed beside zeros slightly off alone, which is no finding then.
+fn found<'a>(one: &Weighed<'a>) -> [Option<&'a Entry>; 3] {
+    let State { zeros, departure, .. } = one.hypothesis.state;
+    match one.hypothesis.wiring {
+        Some(wiring) => [Some(wiring), None, None],
+        None => [None, Some(zeros), Some(departure)],
     }
 }
 
@@ -270,14 +366,16 @@ fn id(one: &Weighed<'_>) -> String {
             None => continue,
             Some(LeakCourse::Constant) => leak.id().to_owned(),
             Some(LeakCourse::Orifice) => format!("{}:orifice", leak.id()),
+            Some(LeakCourse::Cracking) => format!("{}:cracking", leak.id()),
             Some(LeakCourse::Growing) => format!("{}:growing", leak.id()),
             Some(LeakCourse::Sudden(_)) => format!("{}:sudden", leak.id()),
             Some(LeakCourse::Wandering) => format!("{}:wandering", leak.id()),
         };
         parts.push(name);
     }
-    let state = [hypothesis.wiring, Some(hypothesis.state.zeros), Some(hypothesis.state.departure)];
-    parts.extend(state.iter().flatten().map(|entry| entry.id).filter(|id| !is_usual(id)).map(str::to_owned));
+    parts.extend(
+        found(one).iter().flatten().map(|entry| entry.id).filter(|id| !is_usual(id)).map(str::to_owned),
+    );
     if hypothesis.state.wander.0 > 0.0 {
         parts.push("wandering_zeros".to_owned());
     }

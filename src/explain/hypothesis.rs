@@ -12,6 +12,8 @@ pub(super) enum LeakCourse {
     Constant,
     /// C √P beside C P.
     Orifice,
+    /// Opens at a pressure: C P less a constant flow.
+    Cracking,
     /// Linear, from start ≥ 0 to end ≥ 0.
     Growing,
     /// Another level from this segment on.
@@ -39,8 +41,8 @@ pub(super) struct Hypothesis<'a> {
     pub free: Vec<Free>,
     /// Parameters that cannot be negative.
     pub positive: Vec<usize>,
-    /// Parameters whose sum is each leak's flow at the trace's end.
-    pub ends: [Vec<usize>; 3],
+    /// Parameters whose sum, with these signs, is each leak's flow at the trace's end.
+    pub ends: [Vec<(usize, f64)>; 3],
 }
 
 /// A subset of the leaks.
@@ -52,6 +54,8 @@ pub(super) fn subsets() -> impl Iterator<Item = Subset> {
 }
 
 pub(super) const LEAK_COLUMNS: [Column; 3] = [Column::LeakInternal, Column::LeakA, Column::LeakB];
+pub(super) const CRACKING_COLUMNS: [Column; 3] =
+    [Column::CrackingInternal, Column::CrackingA, Column::CrackingB];
 pub(super) const ORIFICE_COLUMNS: [Column; 3] = [Column::OrificeInternal, Column::OrificeA, Column::OrificeB];
 
 impl State<'_> {
@@ -133,6 +137,15 @@ impl<'a> Hypothesis<'a> {
         own
     }
 
+    /// The segment from which on all leaks are as at the end.
+    pub fn last_change(&self) -> usize {
+        let border = |course: &Option<LeakCourse>| match course {
+            Some(LeakCourse::Sudden(border)) => *border,
+            _ => 0,
+        };
+        self.leaks.iter().map(border).max().unwrap_or(0)
+    }
+
     fn add_leak(&mut self, equations: &NormalEquations, leak: usize, course: LeakCourse, segments: usize) {
         let column = LEAK_COLUMNS[leak];
         let mut add = |column: Column, course: Course, std: f64| {
@@ -149,6 +162,13 @@ impl<'a> Hypothesis<'a> {
                 let level = add(column, Course::Constant, LEAK_SIZE);
                 let root = add(ORIFICE_COLUMNS[leak], Course::Constant, LEAK_SIZE);
                 (vec![level, root], vec![level, root])
+            }
+            LeakCourse::Cracking => {
+                let level = add(column, Course::Constant, LEAK_SIZE);
+                let less = add(CRACKING_COLUMNS[leak], Course::Constant, LEAK_SIZE);
+                self.ends[leak] =
+                    level.map(|at| (at, 1.0)).into_iter().chain(less.map(|at| (at, -1.0))).collect();
+                (vec![level, less], vec![])
             }
             LeakCourse::Growing => {
                 let start = add(column, Course::FromBegin, LEAK_SIZE);
@@ -169,6 +189,6 @@ impl<'a> Hypothesis<'a> {
             }
         };
         self.positive.extend(positive.into_iter().flatten());
-        self.ends[leak] = ends.into_iter().flatten().collect();
+        self.ends[leak].extend(ends.into_iter().flatten().map(|at: usize| (at, 1.0)));
     }
 }

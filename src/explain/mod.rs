@@ -9,11 +9,12 @@ mod evidence;
 mod hypothesis;
 mod orthant;
 mod posterior;
+mod raw_products;
 mod readings;
 mod table;
 
 pub use columns::{Column, Course};
-pub use decision::{Belief, Decision, Explained, explain};
-pub use equations::{SEGMENTS, Statistic};
+pub use decision::{Belief, Decision, Explained, Explainer, Note, explain};
+pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
 pub use table::{Entry, Kind};

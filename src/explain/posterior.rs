@@ -1,10 +1,13 @@
 //! The posterior over the table: which explanations of the readings are left, and how large each leak is under them.
 
 use super::columns::{Column, Course, Scales};
-use super::equations::{NormalEquations, Statistic};
+use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
-use super::hypothesis::{Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, subsets};
+use super::hypothesis::{
+    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, subsets,
+};
 use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
+use super::raw_products::{RawProducts, Statistic};
 use super::readings::Readings;
 use super::table::{self, Entry, USUAL, USUAL_PRESSURE};
 use crate::rig::Rig;
@@ -36,6 +39,8 @@ pub(super) struct Weighed<'a> {
     pub probability: f64,
     /// Noise scale over what the readings scatter.
     pub misfit: f64,
+    /// When a leak last changed at once, s; 0 where none did.
+    pub changed_s: f64,
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
     pub leaks_m3s: Vec<[f64; 3]>,
     pub weights: Vec<f64>,
@@ -78,13 +83,14 @@ pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) ->
     if rows < LEAST_ROWS {
         return None;
     }
-    let first = Pass::new(statistic, rig, tables, PerLeak::default()).weigh();
+    let products = RawProducts::of(statistic, rig);
+    let first = Pass::new(statistic, &products, rig, tables, PerLeak::default()).weigh();
     let mean_m3s = PerLeak::from_fn(|leak| mean_leak(&first, leak as usize));
     let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
     if mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least) {
         return Some(first);
     }
-    Some(Pass::new(statistic, rig, tables, mean_m3s).weigh())
+    Some(Pass::new(statistic, &products, rig, tables, mean_m3s).weigh())
 }
 
 fn mean_leak(weighed: &[Weighed<'_>], leak: usize) -> f64 {
@@ -96,6 +102,7 @@ fn mean_leak(weighed: &[Weighed<'_>], leak: usize) -> f64 {
 /// All that one pass over the table needs.
 struct Pass<'a, 's> {
     statistic: &'s Statistic,
+    products: &'s RawProducts,
     rig: &'s Rig,
     tables: &'a Tables,
     found_m3s: PerLeak<f64>,
@@ -115,11 +122,18 @@ struct Scored<'a> {
 }
 
 impl<'a, 's> Pass<'a, 's> {
-    fn new(statistic: &'s Statistic, rig: &'s Rig, tables: &'a Tables, found_m3s: PerLeak<f64>) -> Self {
+    fn new(
+        statistic: &'s Statistic,
+        products: &'s RawProducts,
+        rig: &'s Rig,
+        tables: &'a Tables,
+        found_m3s: PerLeak<f64>,
+    ) -> Self {
         let flows = [rig.instruments.flow_a, rig.instruments.flow_b];
         let full_scale_m3s = flows[0].full_scale.max(flows[1].full_scale);
         Self {
             statistic,
+            products,
             rig,
             tables,
             found_m3s,
@@ -135,7 +149,7 @@ impl<'a, 's> Pass<'a, 's> {
     }
 
     fn weigh(&self) -> Vec<Weighed<'a>> {
-        let declared = self.equations(None, &self.columns());
+        let declared = self.equations(self.products, None, &self.columns());
         let mut all = self.constant(&declared);
         let states = best_states(&mut all);
         self.with_courses(&declared, &states, &mut all);
@@ -146,10 +160,15 @@ impl<'a, 's> Pass<'a, 's> {
         self.mix(&equations, all)
     }
 
-    fn equations(&self, mistake: Option<&Entry>, columns: &[(Column, Course)]) -> NormalEquations {
+    fn equations(
+        &self,
+        products: &RawProducts,
+        mistake: Option<&Entry>,
+        columns: &[(Column, Course)],
+    ) -> NormalEquations {
         let cylinder = &self.rig.cylinder;
         let mut readings = Readings::declared(cylinder, 1e6 / self.rig.fluid.bulk_modulus_pa);
-        let mut pressures_mpa = self.statistic.mean_pressures_pa().map(|p| 1e-6 * p);
+        let mut pressures_mpa = self.products.mean_pressures_pa(0).map(|p| 1e-6 * p);
         let mut roots = self.statistic.mean_roots();
         if let Some(mistake) = mistake.and_then(|entry| entry.mistake) {
             readings = readings.mended(mistake, cylinder);
@@ -157,7 +176,7 @@ impl<'a, 's> Pass<'a, 's> {
             roots = mistake.mended_pressures(roots);
         }
         let scales = Scales { rig: self.rig, readings, pressures_mpa, roots, leaks_m3s: self.found_m3s };
-        NormalEquations::new(self.statistic, &scales, columns)
+        NormalEquations::new(products, &scales, columns)
     }
 
     /// Departures that are weighed: pressures through the leaks found, where there are any.
@@ -181,7 +200,8 @@ impl<'a, 's> Pass<'a, 's> {
                 (1..self.segments).flat_map(|k| [(leak, Course::Before(k)), (leak, Course::Since(k))]),
             );
         }
-        columns.extend(ORIFICE_COLUMNS.map(|orifice| (orifice, Course::Constant)));
+        let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS);
+        columns.extend(by_law.map(|law| (law, Course::Constant)));
         for zero in [Column::ZeroA, Column::ZeroB] {
             columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
         }
@@ -255,6 +275,7 @@ impl<'a, 's> Pass<'a, 's> {
         let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
         let mut courses = vec![
             (LeakCourse::Orifice, self.tables.ln_course("orifice")),
+            (LeakCourse::Cracking, self.tables.ln_course("cracking")),
             (LeakCourse::Growing, self.tables.ln_course("growing")),
             (LeakCourse::Wandering, self.tables.ln_course("wandering")),
         ];
@@ -285,7 +306,8 @@ impl<'a, 's> Pass<'a, 's> {
     /// Mistakes of wiring, beside slightly wrong zeros and constant leaks.
     fn with_mistakes(&self, declared: &NormalEquations, all: &mut Vec<Scored<'a>>) -> Vec<NormalEquations> {
         let mut columns = vec![(Column::LeftSide, Course::Constant)];
-        columns.extend(USUAL.iter().map(|(column, course, _)| (*column, *course)));
+        columns
+            .extend(USUAL.iter().filter(|usual| usual.1 == Course::Constant).map(|usual| (usual.0, usual.1)));
         columns.extend(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)));
         let (Some(zeros), Some(departure), Some(wander)) =
             (self.tables.zeros.get(1), self.tables.departures.first(), self.tables.wanders.first())
@@ -293,15 +315,13 @@ impl<'a, 's> Pass<'a, 's> {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander };
+        let whole = self.products.whole();
         let mut kept = Vec::new();
         for entry in &self.tables.mistakes {
-            let mut equations = self.equations(Some(entry), &columns);
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
-            if ln_measure.iter().all(|ln| ln.abs() <= 0.0) {
-                equations = equations.with_noise_of(declared);
-            }
-            let ln_prior = entry.share.ln() - table::ln_wired()
-                + (0..2).map(|c| ln_measure[c] * equations.rows[c]).sum::<f64>();
+            let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
+            let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
+            let ln_prior = entry.share.ln() - table::ln_wired() + measure;
             for subset in subsets() {
                 let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
                 let ln_course = if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
@@ -368,7 +388,9 @@ impl<'a, 's> Pass<'a, 's> {
                 orthant.weights,
             )
         };
-        Some((ln, Weighed { hypothesis, probability: 0.0, misfit, leaks_m3s, weights }))
+        let changed = self.products.segments.get(hypothesis.last_change());
+        let changed_s = changed.map_or(0.0, |segment| segment.begin_s);
+        Some((ln, Weighed { hypothesis, probability: 0.0, misfit, changed_s, leaks_m3s, weights }))
     }
 
     /// Noise scales over the scatter of the readings themselves: louder sensors are no doubt about the model.
@@ -388,20 +410,27 @@ impl<'a, 's> Pass<'a, 's> {
         misfit: f64,
     ) -> Vec<[f64; 3]> {
         let widening = (1.0 + WIDENING * (misfit * misfit - WIDENED_MISFIT2).max(0.0)).sqrt();
-        let pressures_pa = self.statistic.mean_pressures_pa();
         let mut out = vec![[0.0; 3]; points.len()];
+        let changed = hypothesis.last_change();
+        let (all_pa, pressures_pa) =
+            (self.products.mean_pressures_pa(0), self.products.mean_pressures_pa(changed));
         for (leak, ends) in hypothesis.ends.iter().enumerate().filter(|(_, ends)| !ends.is_empty()) {
-            let places: Vec<usize> =
-                ends.iter().filter_map(|end| hypothesis.positive.iter().position(|one| one == end)).collect();
-            let flow = |point: &Vec<f64>| places.iter().map(|place| point[*place]).sum::<f64>();
+            let place = |(end, sign): &(usize, f64)| {
+                Some((hypothesis.positive.iter().position(|one| one == end)?, *sign))
+            };
+            let places: Vec<(usize, f64)> = ends.iter().filter_map(place).collect();
+            let flow = |point: &Vec<f64>| {
+                places.iter().map(|(place, sign)| sign * point[*place]).sum::<f64>().max(0.0)
+            };
             let mean: f64 = points.iter().zip(weights).map(|(point, weight)| weight * flow(point)).sum();
             let pressure_pa = pressures_pa[Leak::ALL[leak]].max(1.0);
+            let lately = pressure_pa / all_pa[Leak::ALL[leak]].max(1.0);
             let sheet = USUAL_PRESSURE * self.rig.instruments.pressure.full_scale / pressure_pa;
             let zero = self.pressure_zero_share(equations, hypothesis, fit, leak) / pressure_pa;
             for (index, (out, point)) in out.iter_mut().zip(points).enumerate() {
                 let spread = mean + widening * (flow(point) - mean);
-                let pressure =
-                    1.0 + zero + sheet * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
+                let off = sheet * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
+                let pressure = lately * (1.0 + zero + off);
                 out[leak] = (spread * pressure).max(0.0) * self.full_scale_m3s;
             }
         }

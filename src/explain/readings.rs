@@ -229,7 +229,6 @@ impl Mistake {
             Self::Factor(Of::Flows, factor) => [-factor.ln(), 0.0],
             Self::Factor(Of::FlowA | Of::FlowB, factor) => [-0.5 * factor.ln(), 0.0],
             Self::Factor(Of::Position, factor) => [0.0, -factor.ln()],
-            Self::Area(_, factor) => [0.5 * factor.ln(), 0.0],
             _ => [0.0, 0.0],
         }
     }

@@ -139,7 +139,8 @@ pub(super) fn zeros() -> Vec<Entry> {
 /// How a leak goes along the trace, beside being constant.
 pub(super) fn courses() -> Vec<Entry> {
     vec![
-        Entry::new("constant", Kind::Course, 0.77, "is steady"),
+        Entry::new("constant", Kind::Course, 0.75, "is steady"),
+        Entry::new("cracking", Kind::Course, share::UNCOMMON, "opens at a pressure"),
         Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
         Entry::new("growing", Kind::Course, 0.06, "grows or shrinks steadily"),
         Entry::new("sudden", Kind::Course, 0.06, "changed at once"),

@@ -289,6 +289,11 @@ impl Replay {
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
+    /// Whether the last record was left out as a spike.
+    pub fn left_out(&self) -> bool {
+        self.spikes.left_out()
+    }
+
     /// Alarms so far, in the order of time.
     pub fn alarms(&self) -> &[Alarm] {
         &self.alarms

@@ -4,6 +4,7 @@ use super::episode::comes_and_goes;
 use super::reason::{Reason, contradictions, gaps};
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
+use crate::explain::{Decision, Explained};
 use crate::wiring::{Orifice, Wiring, ZeroCheck};
 use pitchleak_core::{Estimate, Fluid, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,13 @@ pub struct Verdict {
     pub text: String,
     /// Why the status is doubtful or not sure, and what to check, first things first; none where it is sure.
     pub reasons: Vec<Reason>,
+    /// That each leak is above its threshold at the trace's end, as the posterior over explanations has it; none where it
+    /// wasn't asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<PerLeak<f64>>,
+    /// What explains the trace, best first, down to 1 %; likewise.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub explanations: Vec<Explained>,
 }
 
 /// How far model and declared noise are from explaining a trace, or the last stretch of a stream: means of ν²/S, about 1
@@ -162,6 +170,12 @@ impl Findings<'_> {
 }
 
 impl Verdict {
+    /// With what the posterior over explanations says beside it.
+    pub fn with_explanations(&mut self, decision: Decision) {
+        self.probability = Some(decision.probability);
+        self.explanations = decision.explanations;
+    }
+
     /// The verdict on what was found.
     pub fn of(findings: &Findings<'_>) -> Self {
         let faults = findings.faults();
@@ -178,6 +192,7 @@ impl Verdict {
         } else {
             (Status::NotSure, gaps)
         };
-        Self { status, text: statement::text(findings, status, &faults, &reasons), faults, reasons }
+        let text = statement::text(findings, status, &faults, &reasons);
+        Self { status, text, faults, reasons, probability: None, explanations: Vec::new() }
     }
 }

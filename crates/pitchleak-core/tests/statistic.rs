@@ -23,6 +23,7 @@ fn statistic<const S: usize>(samples: &[Sample<f64>]) -> Box<ContinuityStatistic
     for (index, sample) in samples.iter().enumerate() {
         statistic.push(if index == 0 { 0.0 } else { STEP_S }, sample);
     }
+    statistic.close();
     statistic
 }
 
@@ -117,4 +118,24 @@ fn a_missing_flow_rests() {
     let rows = |equation: usize| statistic.segments().iter().map(|s| s.rows(equation)).sum::<f64>();
     assert!((rows(0) - 79.0).abs() < 4.0, "{}", rows(0));
     assert!((rows(1) - 119.0).abs() < 4.0, "{}", rows(1));
+}
+
+/// A leak that opens at once ends a segment there, whatever time that is; noise alone ends none.
+#[test]
+fn a_sudden_leak_ends_a_segment() {
+    for (seed, onset) in [(11, 1015), (12, 1377), (13, 2000)] {
+        let mut samples = at_rest(seed, 3000);
+        for sample in &mut samples[onset..] {
+            sample.qa_m3s = sample.qa_m3s.map(|q| q + 0.5 / 60e3);
+        }
+        let mut ends = vec![0.0];
+        for segment in statistic::<12>(&samples).segments() {
+            ends.push(ends.last().unwrap() + segment.time_s());
+        }
+        let onset_s = STEP_S * onset as f64;
+        assert!(ends.iter().any(|end| (end - onset_s).abs() < 0.6), "{onset_s} {ends:?}");
+        let calm = statistic::<12>(&at_rest(seed, 3000));
+        let usual = calm.segments().iter().filter(|segment| (segment.time_s() / 4.0).fract() < 0.01).count();
+        assert!(usual + 1 >= calm.segments().len(), "{usual}");
+    }
 }

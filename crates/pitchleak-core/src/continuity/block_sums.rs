@@ -70,7 +70,8 @@ pub enum RawSum {
 pub const RAW_SUMS: usize = RawSum::AgedTime as usize + 1;
 
 /// A block's sums, and what its noise depends on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Block<T> {
     /// By [`RawSum`].
     pub sums: [T; RAW_SUMS],

@@ -3,17 +3,20 @@
 //! Whatever is linear in the raw sums can be asked of them afterwards: a zero, gain, lag or area set free, an exchange of
 //! columns. Memory is constant: where all segments are full, those two neighbours become one that differ least.
 
-use super::block_sums::{Block, BlockSums, RAW_SUMS, RawSum};
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
+use super::block_sums::{Block, BlockSums, MPA_PER_PA, RAW_SUMS, RawSum};
+use super::change::{SEGMENT_BLOCKS, Waiting};
 use super::whitening::{COLUMNS, EQUATIONS, Row, RowNoise, VOLUME_POWERS, Whitener};
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
 
 /// Entries of a packed symmetric matrix, row by row of its lower triangle.
 const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
-/// Blocks of a segment that was never merged: 4 s, the resolution of a change's time. Fewer cost the position its
-/// memory, as each segment's noise begins anew; chosen.
-const SEGMENT_BLOCKS: u32 = 16;
 /// Two neighbours that differ by so many standard deviations are as dear to merge as two of twice the length; chosen.
 const DIFFERENCE_SIGMAS: f64 = 3.0;
+/// Keeps pressures that do not change solvable; numerical.
+const DESCRIPTION_RIDGE: f64 = 1e-4;
 /// Mean size of a third difference of white noise of unit standard deviation: √(20 · 2/π).
 const THIRD_DIFFERENCE: f64 = 3.568_248_232;
 
@@ -29,6 +32,7 @@ const THIRD_DIFFERENCE: f64 = 3.568_248_232;
 )]
 pub struct ContinuityStatistic<T, const S: usize> {
     blocks: BlockSums<T>,
+    waiting: Waiting<T>,
     whitener: Whitener<T>,
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     segments: [Segment<T>; S],
@@ -39,7 +43,6 @@ pub struct ContinuityStatistic<T, const S: usize> {
     before: [[T; COLUMNS]; EQUATIONS],
     scatter: [Scatter<T>; CHANNELS],
     time_s: T,
-    sizes: PerLeak<T>,
     roots: PerLeak<T>,
 }
 
@@ -64,6 +67,7 @@ pub struct Segment<T> {
     rows: [T; EQUATIONS],
     blocks: u32,
     time_s: T,
+    pressure_time: PerLeak<T>,
 }
 
 /// Mean size of the third differences of a channel's readings.
@@ -105,6 +109,7 @@ impl<T: Real> Default for Segment<T> {
             rows: [T::zero(); EQUATIONS],
             blocks: 0,
             time_s: T::zero(),
+            pressure_time: PerLeak::default(),
         }
     }
 }
@@ -140,6 +145,11 @@ impl<T: Real> Segment<T> {
     /// How long it is, s.
     pub fn time_s(&self) -> T {
         self.time_s
+    }
+
+    /// Mean size of the pressure across each leak, Pa.
+    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
+        self.pressure_time.map(|sum| sum / (self.time_s * T::lit(MPA_PER_PA)))
     }
 
     /// What integrated noise of unit variance per s² adds to a product of chambers' columns: A A, A B, B B.
@@ -212,30 +222,80 @@ impl<T: Real> Segment<T> {
         }
         self.blocks += next.blocks;
         self.time_s += next.time_s;
+        self.pressure_time = self.pressure_time.zip(next.pressure_time).map(|(own, next)| own + next);
     }
 
-    /// What it costs to make one of two neighbours: their length, and how much their mean residuals differ.
+    /// What it costs to make one of two neighbours: their length, and what is lost where leaks and zeros of both are the same.
     fn cost(&self, next: &Self) -> T {
-        let mut chi_square = T::zero();
-        for equation in 0..EQUATIONS {
-            let (one, other) = (self.mean_residual(equation), next.mean_residual(equation));
-            if let (Some((a, information_a)), Some((b, information_b))) = (one, other) {
-                let information = information_a * information_b / (information_a + information_b);
-                chi_square += (a - b) * (a - b) * information;
+        let both =
+            |equation: usize, i: usize, j: usize| self.product(equation, i, j) + next.product(equation, i, j);
+        let apart = explained(|equation, i, j| self.product(equation, i, j))
+            + explained(|equation, i, j| next.product(equation, i, j));
+        let lost = (apart - explained(both)).at_least(T::zero());
+        let length = T::lit(f64::from(self.blocks) + f64::from(next.blocks));
+        length * (T::one() + lost / T::lit(DIFFERENCE_SIGMAS * DIFFERENCE_SIGMAS))
+    }
+}
+
+/// Leaks and zeros that a stretch is described by, for the sake of comparison; the left side first.
+const DESCRIPTION: usize = 6;
+
+/// χ² that leaks and zeros of its own explain of a stretch.
+fn explained<T: Real>(product: impl Fn(usize, usize, usize) -> T) -> T {
+    use RawSum as R;
+    let one = T::one();
+    let at = column;
+    let columns: [&[(usize, T)]; DESCRIPTION] = [
+        &[(at(R::ResidualA, 0), one), (at(R::ResidualB, 1), one)],
+        &[(at(R::Time, 0), one)],
+        &[(at(R::Time, 1), one)],
+        &[
+            (at(R::PressureA, 0), one),
+            (at(R::PressureB, 0), -one),
+            (at(R::PressureA, 1), -one),
+            (at(R::PressureB, 1), one),
+        ],
+        &[(at(R::PressureA, 0), one)],
+        &[(at(R::PressureB, 1), one)],
+    ];
+    let entry = |i: usize, j: usize| {
+        let mut sum = T::zero();
+        for (one, of_one) in columns[i] {
+            for (other, of_other) in columns[j] {
+                for equation in 0..EQUATIONS {
+                    sum += *of_one * *of_other * product(equation, *one, *other);
+                }
             }
         }
-        let length = T::lit(f64::from(self.blocks) + f64::from(next.blocks));
-        length * (T::one() + chi_square / T::lit(DIFFERENCE_SIGMAS * DIFFERENCE_SIGMAS))
+        sum
+    };
+    let mut factor = [[T::zero(); DESCRIPTION]; DESCRIPTION];
+    let mut half = [T::zero(); DESCRIPTION];
+    let mut sum = T::zero();
+    for i in 1..DESCRIPTION {
+        for j in 1..=i {
+            let mut value = entry(i, j);
+            if i == j {
+                value += T::lit(DESCRIPTION_RIDGE) * value;
+            }
+            for k in 1..j {
+                value -= factor[i][k] * factor[j][k];
+            }
+            factor[i][j] = if i == j { value.at_least(T::zero()).sqrt() } else { value / factor[j][j] };
+        }
+        let mut value = entry(i, 0);
+        for k in 1..i {
+            value -= factor[i][k] * half[k];
+        }
+        if factor[i][i] > T::zero() {
+            half[i] = value / factor[i][i];
+        } else {
+            // A column that is not there.
+            factor[i][i] = T::one();
+        }
+        sum += half[i] * half[i];
     }
-
-    /// The constant flow into chamber A that an equation has left over, m³/s, and its information.
-    fn mean_residual(&self, equation: usize) -> Option<(T, T)> {
-        let time = column(RawSum::Time, 0);
-        let information = self.product(equation, time, time);
-        let residual = self.product(equation, time, column(RawSum::ResidualA, 0))
-            + self.product(equation, time, column(RawSum::ResidualB, 1));
-        (information > T::zero()).then(|| (residual / information, information))
-    }
+    sum
 }
 
 impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
@@ -243,6 +303,7 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
     pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
         Self {
             blocks: BlockSums::new(cylinder, fluid),
+            waiting: Waiting::new(cylinder, sensors),
             whitener: Whitener::new(cylinder, fluid, sensors),
             segments: [Segment::default(); S],
             used: 0,
@@ -250,7 +311,6 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
             before: [[T::zero(); COLUMNS]; EQUATIONS],
             scatter: [Scatter::default(); CHANNELS],
             time_s: T::zero(),
-            sizes: PerLeak::default(),
             roots: PerLeak::default(),
         }
     }
@@ -270,22 +330,24 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
                 external_b: sample.pb_pa,
             };
             self.time_s += dt_s;
-            self.sizes = self.sizes.zip(pressures).map(|(sum, pressure)| sum + dt_s * pressure.abs());
             self.roots = self.roots.zip(pressures).map(|(sum, p)| sum + dt_s * signed_root(p).abs());
         }
         if let Some(block) = self.blocks.push(dt_s, sample) {
-            self.add(&block);
+            self.take(&block);
         }
+    }
+
+    /// Takes the blocks that still wait for their segment into one, for a verdict: of a statistic that goes on, close a copy.
+    pub fn close(&mut self) {
+        if let Some(at) = self.waiting.change() {
+            self.end_segment(at, 1);
+        }
+        self.end_segment(self.waiting.blocks().len(), 0);
     }
 
     /// The segments so far, oldest first.
     pub fn segments(&self) -> &[Segment<T>] {
         self.segments.get(..self.used).unwrap_or(&self.segments)
-    }
-
-    /// Mean size of the pressure across each leak, Pa.
-    pub fn mean_pressures_pa(&self) -> PerLeak<T> {
-        self.sizes.map(|sum| sum / self.time_s)
     }
 
     /// Mean root of that size, √Pa.
@@ -304,11 +366,35 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         self.lagged[equation][packed(i, j)]
     }
 
-    fn add(&mut self, block: &Block<T>) {
-        let is_full = self.segments[..self.used].last().is_none_or(|last| last.blocks >= SEGMENT_BLOCKS);
-        if is_full || block.begins_at.is_some() {
-            self.begin_segment();
+    fn take(&mut self, block: &Block<T>) {
+        if block.begins_at.is_some() {
+            self.close();
         }
+        self.waiting.add(block);
+        if self.waiting.is_full() {
+            match self.waiting.change() {
+                // The block in which a flow changed is of neither level.
+                Some(at) => self.end_segment(at, 1),
+                None => self.end_segment(SEGMENT_BLOCKS, 0),
+            }
+        }
+    }
+
+    /// Makes a segment of the oldest waiting blocks, and leaves out some that follow.
+    fn end_segment(&mut self, blocks: usize, left_out: usize) {
+        if blocks == 0 {
+            return;
+        }
+        self.begin_segment();
+        for place in 0..blocks {
+            if let Some(block) = self.waiting.blocks().get(place).copied() {
+                self.add(&block);
+            }
+        }
+        self.waiting.release(blocks + left_out);
+    }
+
+    fn add(&mut self, block: &Block<T>) {
         let mut block = *block;
         let begins_s = self.segments[..self.used].last().map_or(T::zero(), |last| last.time_s);
         for (aged, plain) in AGED {
@@ -326,6 +412,9 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         }
         segment.blocks += 1;
         segment.time_s += block.sums[RawSum::Time as usize];
+        let [pa, pb] = [RawSum::PressureA, RawSum::PressureB].map(|raw| block.sums[raw as usize]);
+        let sizes = PerLeak { internal: (pa - pb).abs(), external_a: pa.abs(), external_b: pb.abs() };
+        segment.pressure_time = segment.pressure_time.zip(sizes).map(|(sum, size)| sum + size);
     }
 
     /// Makes room where there is none; a segment's noise is independent of that of those before.

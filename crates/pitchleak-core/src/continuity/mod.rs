@@ -44,6 +44,7 @@
 //! ```
 
 mod block_sums;
+mod change;
 mod clocks;
 mod equation;
 mod gram;

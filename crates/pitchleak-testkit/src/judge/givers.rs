@@ -147,7 +147,7 @@ fn of_decision(decision: &Decision) -> Given {
         mean_lpm: decision.leakage.map(|belief| belief.mean_lpm),
         std_lpm: decision.leakage.map(|belief| belief.std_lpm),
         interval_lpm: decision.leakage.map(|belief| [belief.quantiles_lpm[0], belief.quantiles_lpm[2]]),
-        since_s: 0.0,
+        since_s: decision.changed_s,
         causes: accused(decision),
         text: format!(
             "{} {:?} {:?} misfit {:.2} wander {:.2}: {}",

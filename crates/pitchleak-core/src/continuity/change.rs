@@ -1,0 +1,158 @@
+//! Blocks that wait for their segment: where a leak changes at once a segment ends, at the block of the change.
+
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
+use super::block_sums::{Block, RawSum};
+use crate::{Cylinder, Real, Sensors};
+
+/// Blocks that wait at most: 6 s.
+pub(super) const WAITING: usize = 24;
+/// Blocks of a segment without a change: 4 s. Fewer cost the position its memory, as each segment's noise begins anew; chosen.
+pub(super) const SEGMENT_BLOCKS: usize = 16;
+/// Blocks on either side of a change at the least: as many as the regression has columns before it.
+const LEAST_SIDE: usize = 4;
+/// A change shows by so many standard deviations. A false one costs a border; chosen.
+const CHANGE_SIGMAS: f64 = 5.0;
+/// Constant flow, the leaks, and the change.
+const REGRESSORS: usize = 5;
+/// Keeps pressures that do not change solvable.
+const RIDGE: f64 = 1e-6;
+
+/// The waiting blocks.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Copy",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub(super) struct Waiting<T> {
+    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
+    blocks: [Block<T>; WAITING],
+    count: usize,
+    area_m2: [T; 2],
+    /// Variance of a balance's flow noise per s² of Σ dt², m².
+    variance: T,
+}
+
+impl<T: Real> Waiting<T> {
+    pub fn new(cylinder: &Cylinder<T>, sensors: &Sensors<T>) -> Self {
+        let square = |std: T, area: T| std * std / (area * area);
+        Self {
+            blocks: [Block::default(); WAITING],
+            count: 0,
+            area_m2: [cylinder.area_a_m2, cylinder.area_b_m2],
+            variance: square(sensors.flow_a.noise_std, cylinder.area_a_m2)
+                + square(sensors.flow_b.noise_std, cylinder.area_b_m2),
+        }
+    }
+
+    /// The waiting blocks, oldest first.
+    pub fn blocks(&self) -> &[Block<T>] {
+        self.blocks.get(..self.count).unwrap_or(&self.blocks)
+    }
+
+    /// One more.
+    pub fn add(&mut self, block: &Block<T>) {
+        if let Some(place) = self.blocks.get_mut(self.count) {
+            *place = *block;
+            self.count += 1;
+        }
+    }
+
+    /// Whether it has to let some go.
+    pub fn is_full(&self) -> bool {
+        self.count == WAITING
+    }
+
+    /// Lets the oldest go.
+    pub fn release(&mut self, released: usize) {
+        let released = released.min(self.count);
+        self.blocks.copy_within(released..self.count, 0);
+        self.count -= released;
+    }
+
+    /// The block in which a flow changed at once, if one did.
+    pub fn change(&self) -> Option<usize> {
+        let latest = self.count.checked_sub(LEAST_SIDE)?;
+        let mut best = (None, T::lit(CHANGE_SIGMAS * CHANGE_SIGMAS));
+        for at in LEAST_SIDE..latest {
+            for internal in [false, true] {
+                let square = self.contrast(at, internal).unwrap_or(T::zero());
+                if square > best.1 {
+                    best = (Some(at), square);
+                }
+            }
+        }
+        best.0
+    }
+
+    /// Square of a change's size in its standard deviations, the block `at` itself left out: of a constant flow, or of one
+    /// that follows the load pressure.
+    fn contrast(&self, at: usize, internal: bool) -> Option<T> {
+        let mut matrix = [[T::zero(); REGRESSORS]; REGRESSORS];
+        let mut vector = [T::zero(); REGRESSORS];
+        let (mut square, mut declared, mut rows) = (T::zero(), T::zero(), T::zero());
+        for (place, block) in self.blocks().iter().enumerate().filter(|(place, _)| *place != at) {
+            if block.fed != [true, true] {
+                return None;
+            }
+            let (left, row) = self.balance(block, place > at, internal);
+            for i in 0..REGRESSORS {
+                for j in 0..=i {
+                    matrix[i][j] += row[i] * row[j];
+                }
+                vector[i] += row[i] * left;
+            }
+            square += left * left;
+            declared += self.variance * block.time_square_s2[0];
+            rows += T::one();
+        }
+        let freedom = rows - T::lit(REGRESSORS as f64);
+        let (last, variance_share, explained) = solve_last(&mut matrix, &vector)?;
+        let variance = ((square - explained) / freedom).at_least(declared / rows);
+        Some(last * last / (variance * variance_share))
+    }
+
+    /// The balance of a block, in metres of travel: its left side, and the regressors.
+    fn balance(&self, block: &Block<T>, after: bool, internal: bool) -> (T, [T; REGRESSORS]) {
+        let sum = |raw: RawSum| block.sums[raw as usize];
+        let [a, b] = self.area_m2;
+        let (pa, pb, time) = (sum(RawSum::PressureA), sum(RawSum::PressureB), sum(RawSum::Time));
+        let changed = if internal { pa - pb } else { time };
+        let changed = if after { changed } else { T::zero() };
+        (sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b, [time, pa - pb, pa, pb, changed])
+    }
+}
+
+/// Least squares: the last coefficient, its variance for unit noise, and how much of the squares is explained.
+fn solve_last<T: Real, const N: usize>(matrix: &mut [[T; N]; N], vector: &[T; N]) -> Option<(T, T, T)> {
+    let mut half = [T::zero(); N];
+    let mut explained = T::zero();
+    for i in 0..N {
+        for j in 0..=i {
+            let mut value = matrix[i][j];
+            if i == j {
+                value += value * T::lit(RIDGE);
+            }
+            for k in 0..j {
+                value -= matrix[i][k] * matrix[j][k];
+            }
+            matrix[i][j] = if i == j { value.at_least(T::zero()).sqrt() } else { value / matrix[j][j] };
+        }
+        if matrix[i][i] <= T::zero() {
+            return None;
+        }
+        let mut value = vector[i];
+        for k in 0..i {
+            value -= matrix[i][k] * half[k];
+        }
+        half[i] = value / matrix[i][i];
+        explained += half[i] * half[i];
+    }
+    let pivot = matrix[N - 1][N - 1];
+    Some((half[N - 1] / pivot, T::one() / (pivot * pivot), explained))
+}

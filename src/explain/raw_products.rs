@@ -1,0 +1,187 @@
+//! Products of the raw sums, segment by segment, and what the sensors' noise adds to them in closed form.
+
+use crate::rig::Rig;
+use pitchleak_core::continuity::{
+    COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, Segment, column as place_of,
+};
+use pitchleak_core::{PerLeak, Sensors};
+
+/// Segments that the engine keeps of a trace.
+pub const SEGMENTS: usize = 12;
+/// The statistic as the engine keeps it.
+pub type Statistic = ContinuityStatistic<f64, SEGMENTS>;
+
+/// Readings that a flow's value at a block's end is the mean of.
+const END_READINGS: f64 = 7.0;
+
+/// Of a whole trace.
+pub(super) struct RawProducts {
+    pub segments: Vec<SegmentProducts>,
+    pub total_s: f64,
+}
+
+/// Of one segment, by equation.
+pub(super) struct SegmentProducts {
+    pub gram: [Vec<f64>; EQUATIONS],
+    pub noise: [Vec<f64>; EQUATIONS],
+    pub rows: [f64; EQUATIONS],
+    pub begin_s: f64,
+    pub time_s: f64,
+    /// Mean size of the pressures across the leaks, Pa.
+    pub pressures_pa: PerLeak<f64>,
+}
+
+impl RawProducts {
+    pub fn of(statistic: &Statistic, rig: &Rig) -> Self {
+        let noise_of = NoiseOf::new(rig);
+        let mut total_s = 0.0;
+        let mut segments = Vec::new();
+        for segment in statistic.segments() {
+            segments.push(SegmentProducts {
+                gram: [0, 1].map(|equation| dense(|i, j| segment.product(equation, i, j))),
+                noise: [0, 1].map(|equation| noise_of.products(segment, equation)),
+                rows: [0, 1].map(|equation| segment.rows(equation)),
+                begin_s: total_s,
+                time_s: segment.time_s(),
+                pressures_pa: segment.mean_pressures_pa(),
+            });
+            total_s += segment.time_s();
+        }
+        Self { segments, total_s }
+    }
+
+    /// All as one segment, for columns that do not change along the trace.
+    pub fn whole(&self) -> Self {
+        let sum = |of: &dyn Fn(&SegmentProducts) -> &Vec<f64>| {
+            let mut sum = vec![0.0; COLUMNS * COLUMNS];
+            for segment in &self.segments {
+                sum.iter_mut().zip(of(segment)).for_each(|(sum, value)| *sum += value);
+            }
+            sum
+        };
+        let whole = SegmentProducts {
+            gram: [0, 1].map(|equation| sum(&|segment| &segment.gram[equation])),
+            noise: [0, 1].map(|equation| sum(&|segment| &segment.noise[equation])),
+            rows: [0, 1].map(|equation| self.segments.iter().map(|segment| segment.rows[equation]).sum()),
+            begin_s: 0.0,
+            time_s: self.total_s,
+            pressures_pa: self.mean_pressures_pa(0),
+        };
+        Self { segments: vec![whole], total_s: self.total_s }
+    }
+
+    /// Mean size of the pressures across the leaks from a segment on, Pa.
+    pub fn mean_pressures_pa(&self, from: usize) -> PerLeak<f64> {
+        let later = || self.segments.iter().skip(from);
+        let time_s: f64 = later().map(|segment| segment.time_s).sum();
+        PerLeak::from_fn(|leak| {
+            later().map(|segment| segment.time_s * segment.pressures_pa[leak]).sum::<f64>() / time_s.max(1e-9)
+        })
+    }
+}
+
+fn dense(entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+    let mut matrix = vec![0.0; COLUMNS * COLUMNS];
+    for i in 0..COLUMNS {
+        for j in 0..=i {
+            let value = entry(i, j);
+            matrix[i * COLUMNS + j] = value;
+            matrix[j * COLUMNS + i] = value;
+        }
+    }
+    matrix
+}
+
+/// Sensors' noise in the raw sums.
+struct NoiseOf {
+    flow: [f64; 2],
+    pressure_mpa: f64,
+    position: f64,
+    area_m2: [f64; 2],
+    compressibility: f64,
+}
+
+/// A reading at a block's end in a raw sum: by how much, and times which volume (none, V_A, V_B).
+type AtEnd = (RawSum, f64, usize);
+
+impl NoiseOf {
+    fn new(rig: &Rig) -> Self {
+        let Sensors { flow_a, flow_b, pressure, position, .. } = rig.sensors();
+        let cylinder = &rig.cylinder;
+        Self {
+            flow: [flow_a.noise_std, flow_b.noise_std],
+            pressure_mpa: 1e-6 * pressure.noise_std,
+            position: position.noise_std,
+            area_m2: [cylinder.area_a_m2, cylinder.area_b_m2],
+            compressibility: 1e6 / rig.fluid.bulk_modulus_pa,
+        }
+    }
+
+    /// What noise adds to the products of raw columns in a segment.
+    fn products(&self, segment: &Segment<f64>, equation: usize) -> Vec<f64> {
+        use RawSum as R;
+        let mut out = vec![0.0; COLUMNS * COLUMNS];
+        let [aa, ab, bb] = segment.integral_noise(equation);
+        let integrals = [
+            (R::ResidualA, self.flow[0]),
+            (R::ResidualB, self.flow[1]),
+            (R::PressureA, self.pressure_mpa),
+            (R::PressureB, self.pressure_mpa),
+        ];
+        for (raw, std) in integrals {
+            add_pair(&mut out, raw, raw, [aa, ab, bb], std * std);
+        }
+        let [area_a, area_b] = self.area_m2;
+        let kappa = self.compressibility;
+        let ends: [(f64, Vec<AtEnd>); 5] = [
+            (self.position, vec![(R::Travel, 1.0, 0), (R::ResidualA, -area_a, 0), (R::ResidualB, area_b, 0)]),
+            (
+                self.pressure_mpa,
+                vec![
+                    (R::PressureChangeA, 1.0, 0),
+                    (R::StorageA, 1.0, 1),
+                    (R::StorageBOfA, 1.0, 2),
+                    (R::ResidualA, -kappa, 1),
+                ],
+            ),
+            (
+                self.pressure_mpa,
+                vec![
+                    (R::PressureChangeB, 1.0, 0),
+                    (R::StorageB, 1.0, 2),
+                    (R::StorageAOfB, 1.0, 1),
+                    (R::ResidualB, -kappa, 2),
+                ],
+            ),
+            (self.flow[0] / END_READINGS.sqrt(), vec![(R::FlowChangeA, 1.0, 0)]),
+            (self.flow[1] / END_READINGS.sqrt(), vec![(R::FlowChangeB, 1.0, 0)]),
+        ];
+        let noise = segment.end_noise(equation);
+        for (std, sums) in &ends {
+            for (one, of_one, volume) in sums {
+                for (other, of_other, other_volume) in sums {
+                    let power = volume_power(*volume, *other_volume);
+                    add_pair(&mut out, *one, *other, noise[power], std * std * of_one * of_other);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Place of a product of two volumes among 1, V_A, V_B, V_A², V_A V_B, V_B².
+fn volume_power(one: usize, other: usize) -> usize {
+    match (one.min(other), one.max(other)) {
+        (0, power) => power,
+        (1, 1) => 3,
+        (1, _) => 4,
+        _ => 5,
+    }
+}
+
+fn add_pair(out: &mut [f64], one: RawSum, other: RawSum, [aa, ab, bb]: [f64; 3], variance: f64) {
+    for (chamber, other_chamber, value) in [(0, 0, aa), (0, 1, ab), (1, 0, ab), (1, 1, bb)] {
+        let (i, j) = (place_of(one, chamber), place_of(other, other_chamber));
+        out[i * COLUMNS + j] += variance * value;
+    }
+}
