@@ -249,41 +249,24 @@ impl Marginal {
 
 /// What is not usual with probability 1 − α, of each kind.
 fn notes(weighed: &[Weighed<'_>]) -> Vec<Note> {
-    let kinds: [fn(&Weighed<'_>) -> Option<(&'static str, &'static str, &'static [&'static str])>; 3] = [
-        |one| one.hypothesis.wiring.map(|entry| (entry.id, entry.text, entry.alike)),
-        |one| {
-            beside_right_wires(one, one.hypothesis.state.zeros)
-                .map(|entry| (entry.id, entry.text, entry.alike))
-        },
-        |one| {
-            beside_right_wires(one, one.hypothesis.state.departure)
-                .map(|entry| (entry.id, entry.text, entry.alike))
-        },
-    ];
-    kinds.into_iter().filter_map(|kind| note(weighed, kind)).collect()
+    (0..3).filter_map(|kind| note(weighed, kind)).collect()
 }
 
-fn beside_right_wires<'a>(one: &Weighed<'_>, entry: &'a Entry) -> Option<&'a Entry> {
-    one.hypothesis.wiring.is_none().then_some(entry)
-}
-
-fn note(
-    weighed: &[Weighed<'_>],
-    kind: fn(&Weighed<'_>) -> Option<(&'static str, &'static str, &'static [&'static str])>,
-) -> Option<Note> {
-    let mut masses: Vec<(&'static str, &'static str, &'static [&'static str], f64)> = Vec::new();
+fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
+    let mut masses: Vec<(&Entry, f64)> = Vec::new();
     for one in weighed {
-        let Some((id, text, alike)) = kind(one).filter(|(id, _, _)| !is_usual(id)) else { continue };
-        match masses.iter_mut().find(|known| known.0 == id) {
-            Some(known) => known.3 += one.probability,
-            None => masses.push((id, text, alike, one.probability)),
+        let Some(entry) = found(one)[kind].filter(|entry| !is_usual(entry.id)) else { continue };
+        match masses.iter_mut().find(|(known, _)| known.id == entry.id) {
+            Some((_, mass)) => *mass += one.probability,
+            None => masses.push((entry, one.probability)),
         }
     }
-    masses.sort_by(|a, b| b.3.total_cmp(&a.3));
-    let probability = masses.iter().map(|one| one.3).sum();
-    let (id, text, alike, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
-    let others = masses.iter().skip(1).filter(|one| one.3 > ALPHA).map(|one| one.0);
-    Some(Note { id, probability, text, cannot_be_told_from: others.chain(alike.iter().copied()).collect() })
+    masses.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let probability = masses.iter().map(|(_, mass)| mass).sum();
+    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
+    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > ALPHA).map(|(entry, _)| entry.id);
+    let cannot_be_told_from = others.chain(best.alike.iter().copied()).collect();
+    Some(Note { id: best.id, probability, text: best.text, cannot_be_told_from })
 }
 
 /// What an explanation is made of: leaks, their courses, state, wiring.

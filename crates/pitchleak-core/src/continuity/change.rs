@@ -1,5 +1,8 @@
 //! Blocks that wait for their segment: where a leak changes at once a segment ends, at the block of the change.
 
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
 use super::block_sums::{Block, RawSum};
 use crate::{Cylinder, Real, Sensors};
 

@@ -3,6 +3,9 @@
 //! Whatever is linear in the raw sums can be asked of them afterwards: a zero, gain, lag or area set free, an exchange of
 //! columns. Memory is constant: where all segments are full, those two neighbours become one that differ least.
 
+// Index loops over const bounds: they read like the algebra and the bounds checks vanish.
+#![allow(clippy::needless_range_loop)]
+
 use super::block_sums::{Block, BlockSums, MPA_PER_PA, RAW_SUMS, RawSum};
 use super::change::{SEGMENT_BLOCKS, Waiting};
 use super::whitening::{COLUMNS, EQUATIONS, Row, RowNoise, VOLUME_POWERS, Whitener};
