@@ -47,7 +47,8 @@ pub(crate) const NOISIER_SIGMA: f64 = 3.5;
 pub(crate) const MEDIAN_EFFICIENCY: f64 = 0.37;
 /// Regular noise this many times the declared one is a ripple. Chosen: less harms nothing.
 pub(crate) const RIPPLE: f64 = 1.25;
-/// A row's samples are louder than noise where their differences' root mean square is so many standard deviations. Chosen: three.
+/// A row's samples show more than noise where their differences' root mean square is so many standard deviations.
+/// Chosen: three.
 pub(crate) const UNRESOLVED_SIGMA: f64 = 3.0;
 /// Correlation of fast noise beyond which it is a ripple. Derived: the autocorrelation of third differences of 600
 /// samples of white noise has a standard deviation of √(2.3/600) = 0.06 (Bartlett 1946); this is four of them.
@@ -200,8 +201,8 @@ pub(crate) const FEWEST_ROWS: usize = 30;
 /// An effect of this many standard deviations is called detectable. Derived: above the Bonferroni bound of about 4.2
 /// by nearly one, so that four of five are found.
 pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
-/// An effect is not to be believed where more is left in its equations than this share of what it and they have together. Chosen:
-/// nine tenths mended.
+/// An effect is doubtful where the residual of its equations beyond noise is more than this share of that and what it
+/// explains together. Chosen: nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
 /// What the probability of a name is multiplied by where something speaks against it that is no rival in its place. Chosen: even odds.
 pub(crate) const DOUBTED_ODDS: f64 = 0.5;

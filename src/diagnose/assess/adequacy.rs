@@ -44,7 +44,7 @@ impl Leftover {
         }
     }
 
-    /// They see the same from three sides: the largest counts.
+    /// Three views of one thing: the largest counts.
     fn most(&self) -> f64 {
         self.by_variable.iter().map(|(_, chi2)| *chi2).fold(self.by_size.max(self.by_colour), f64::max)
     }
@@ -58,7 +58,7 @@ pub(crate) struct Inadequacy {
     pub(crate) left: PerEquation<f64>,
 }
 
-/// Reasons to believe that more than noise is left.
+/// Reasons to believe that the residual is more than noise.
 pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
     let left = PerEquation::from_fn(|equation| Leftover::of(fit, equation));
     let mut complaints = Vec::new();

@@ -126,8 +126,8 @@ fn residual(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doub
     (left > UNMENDED_SHARE * (mended + left)).then(|| doubt(DoubtId::Residual, text))
 }
 
-/// Where it acts something else is left, of which a candidate beyond chance mends too little for a name of its own: the rest of what that
-/// does may stand under this one's name.
+/// The residual where it acts is more than noise, and a candidate too weak for a name explains some of it: the rest of
+/// that one's share may stand under this one's name.
 fn weak_rival(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let dispersion = fit.dispersion(fit.free.chi2);
     let acts = acts_in(fit, one.term);

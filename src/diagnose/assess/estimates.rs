@@ -19,7 +19,7 @@ fn estimate(fit: &Fit<'_>, term: Term) -> Estimate<f64> {
     fit.problem.place(term).and_then(|place| fit.estimate(place)).unwrap_or(unknown)
 }
 
-/// Leaks and bulk modulus, their standard deviations widened where more than the sensors' noise is left.
+/// Leaks and bulk modulus, their standard deviations widened where the residual is more than the sensors' noise.
 pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     let widening = fit.dispersion(fit.bounded.chi2).sqrt();
     let rows = &fit.rows().rows;

@@ -19,13 +19,13 @@ pub(crate) struct Motion {
     pub(crate) rms_mps: f64,
     /// On which side of its play sensor A would read.
     pub(crate) pa: Sides,
-    /// The same of sensor B.
+    /// On which side of its play sensor B would read.
     pub(crate) pb: Sides,
-    /// The same of the position sensor.
+    /// On which side of its play the position sensor would read.
     pub(crate) x: Sides,
     /// Where in its meter's dead band flow A would lie: zero while the meter shows something.
     pub(crate) qa: Sides,
-    /// The same of flow B.
+    /// Where in its meter's dead band flow B would lie.
     pub(crate) qb: Sides,
 }
 

@@ -68,7 +68,7 @@ pub(crate) fn effective(declared: &Sensors<f64>, checks: &[SensorCheck]) -> Sens
     largest(declared, checks, |check| if check.is_noisier() { check.found.std } else { check.declared_std })
 }
 
-/// The noise that changes from sample to sample: what the traces carry, more or less than declared. A ripple averages away.
+/// The noise from sample to sample that the traces carry, more or less than declared. A ripple averages away.
 pub(crate) fn white(declared: &Sensors<f64>, checks: &[SensorCheck]) -> Sensors<f64> {
     largest(declared, checks, |check| {
         let differs = check.is_quieter() || check.is_noisier() && !check.is_ripple();

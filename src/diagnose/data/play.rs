@@ -169,7 +169,7 @@ impl<'a> Followed<'a> {
     }
 }
 
-/// A drift that stays the same is none of a play.
+/// A steady drift is no sign of a play.
 fn without_mean(mut values: Vec<f64>) -> Vec<f64> {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter_mut().for_each(|value| *value -= mean);

@@ -116,7 +116,8 @@ impl<'a> Fit<'a> {
         Self::with_columns(&every, problem, structure, (at.clone(), at), assumed_error)
     }
 
-    /// The same with the columns of some terms alone, all that are fitted among them, and the noise taken elsewhere.
+    /// As [`around`](Self::around), with the columns of some terms alone, all that are fitted among them, and the noise
+    /// taken elsewhere.
     fn with_columns(
         places: &[usize],
         problem: &'a Problem<'a>,
@@ -239,7 +240,7 @@ impl<'a> Fit<'a> {
         self.estimate(term).is_some_and(|own| ends.iter().any(|end| (own.value - end).abs() <= own.std))
     }
 
-    /// Whether more is left than the sensors' noise.
+    /// Whether the residual is more than the sensors' noise.
     pub(crate) fn is_incomplete(&self) -> bool {
         self.equation_error.iter().any(|(_, error)| *error > 0.0)
     }

@@ -1,4 +1,4 @@
-//! The declared model and effects beside it, fitted to all traces at once.
+//! The declared model and its effects, fitted to all traces together.
 
 mod gauss_newton;
 mod predict;

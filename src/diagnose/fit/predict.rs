@@ -1,7 +1,7 @@
 //! What a fit says of samples that it was not fitted to, and how white its residual is, whitened at the noise that it shows. What signals
-//! do from sample to sample beyond their sensors' declared noise is noise of a worse sensor, or motion of the machine, of which nothing is
-//! left once the equations hold. The residual tells: whitened by noise that isn't there, white numbers look coloured, and coloured ones
-//! look small.
+//! do from sample to sample beyond their sensors' declared noise is noise of a worse sensor, or motion of the machine,
+//! which leaves no residual once the equations hold. The residual tells: whitened by noise that isn't there, white
+//! numbers look coloured, and coloured ones look small.
 
 use super::gauss_newton::Fit;
 use super::regression::{self, Solution, residual};
@@ -135,7 +135,8 @@ impl Fit<'_> {
         *self.colour[equation].get_or_init(|| of(equation))
     }
 
-    /// Where less is left than the noise should bring, by the share of it beyond the declared noise that brings as much (bisection).
+    /// Where the residual is less than the noise should bring, by the share of it beyond the declared noise that brings
+    /// as much (bisection).
     fn whitened_at_own_noise(&self, equation: Equation) -> Vec<f64> {
         let (mut low, mut high) = (0.0, 1.0);
         let mut white = self.whitened_at(high, equation);

@@ -280,7 +280,7 @@ impl Regression {
         self.innovations_by_entry(rows, solution, equation).map(|(_, value)| value).collect()
     }
 
-    /// The same with the entry that each belongs to.
+    /// Innovations with the entry that each belongs to.
     pub(crate) fn innovations_by_entry<'a>(
         &'a self,
         rows: &'a Rows,

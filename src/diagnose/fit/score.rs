@@ -52,7 +52,7 @@ impl Regression {
         self.score_of(solution, term, &cross, products, self.scale[term])
     }
 
-    /// The same for a column that is not part of the regression.
+    /// Score of a column that is not part of the regression.
     pub(crate) fn score_column(
         &self,
         solution: &Solution,

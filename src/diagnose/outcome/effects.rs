@@ -187,11 +187,11 @@ pub struct HoldLeak {
     /// Its standard deviation, m³/s: the larger of sensor noise and scatter between holds, and the declared bias
     /// and gain of the flow meter.
     pub std_m3s: f64,
-    /// The same flow from the declared model, fitted to what moves.
+    /// That flow as the declared model has it, fitted to the motion.
     pub predicted_before_m3s: f64,
     /// Its standard deviation, m³/s.
     pub predicted_before_std_m3s: f64,
-    /// The same with the effects found.
+    /// That flow as the model with the effects found has it.
     pub predicted_after_m3s: f64,
     /// Its standard deviation, m³/s.
     pub predicted_after_std_m3s: f64,

@@ -24,8 +24,8 @@ pub struct EquationResidual {
     /// Size of the residual as a multiple of the sensors' noise.
     #[serde(rename = "excess")]
     pub noise_ratio: f64,
-    /// Probability of autocorrelations this large in white noise (Box and Pierce 1970), whitened at the noise that is left
-    /// and where samples are fast enough to see the motion.
+    /// Probability of autocorrelations this large in white noise (Box and Pierce 1970), whitened at the residual's own
+    /// noise and where samples are fast enough to see the motion.
     pub whiteness_p: Option<f64>,
     /// Probability of skewness and kurtosis this far off in normal numbers (Jarque and Bera 1980, "Efficient tests
     /// for normality, homoscedasticity and serial independence of regression residuals", Econ. Lett. 6).

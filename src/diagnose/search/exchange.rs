@@ -126,7 +126,7 @@ fn replace(fit: &Fit<'_>, one: &mut Selected, best: &Trial) {
     *one = Selected { term: best.score.term, p_value: statistics::chi2_p(chi2_drop, 1.0), ..one.clone() };
 }
 
-/// Gives the place of such an effect to two beside which nothing is left unexplained; false where all keep theirs.
+/// Gives the place of such an effect to two beside which the residual is noise; false where all keep theirs.
 pub(super) fn split_one(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     if !all.fit.is_incomplete() {
         return false;

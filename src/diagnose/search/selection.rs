@@ -109,7 +109,7 @@ impl Selection<'_> {
         self.add_best(|_, _| true, progress)
     }
 
-    /// The same among some terms alone.
+    /// Adds the best of the wanted effects; false when none is significant.
     pub(super) fn add_best(
         &mut self,
         is_wanted: impl Fn(&Fit<'_>, usize) -> bool,

@@ -199,7 +199,7 @@ pub struct Candidate {
     pub critical_sigma: f64,
 }
 
-/// What each candidate leaves in traces of a sound rig once the declared model is fitted, compared.
+/// The columns of all candidates in traces of a sound rig, with the declared model fitted, compared.
 ///
 /// A candidate's score (Rao 1948) is normal with variance one. An effect of m standard deviations moves its own
 /// score by m and that of a rival by ρ m, where ρ is the correlation of the two columns under

@@ -59,14 +59,14 @@ impl Linearisation {
         self.residual_of(&seen, &as_felt(&seen, felt))
     }
 
-    /// The same at corrected readings.
+    /// Residuals of the equations at corrected readings: those `seen`, and those that forces feel.
     pub(crate) fn residual_of(&self, seen: &Signals<f64>, felt: &Signals<f64>) -> PerEquation<f64> {
         let mut residual = PerEquation::from(self.residual(seen));
         residual.force = self.residual(felt).force_n;
         residual
     }
 
-    /// What one unit of a term leaves there.
+    /// What one unit of a term adds to them.
     pub(crate) fn both_unit_terms(
         &self,
         (term, in_force): (Term, bool),
@@ -79,7 +79,7 @@ impl Linearisation {
         unit
     }
 
-    /// What one unit of a term leaves in [`Self::residual`] at corrected readings: a sensor's error also spoils what
+    /// What one unit of a term adds to [`Self::residual`] at corrected readings: a sensor's error also spoils what
     /// the physical effects found so far are computed from.
     pub(crate) fn unit_term(
         &self,
@@ -113,7 +113,7 @@ impl Linearisation {
         }
     }
 
-    /// The same with one term at another value, held within what physics allows.
+    /// This linearisation with one term at another value, held within what physics allows.
     #[must_use]
     pub(crate) fn with(mut self, term: Term, value: f64, constants: &EffectConstants<f64>) -> Self {
         self.set(term, value, constants);

@@ -76,7 +76,7 @@ impl<'a> WeakForm<'a> {
         self.noise_with(&self.sensitivities, equation_error)
     }
 
-    /// The same with other sensitivities.
+    /// The rows' noise at other sensitivities.
     pub(crate) fn noise_with<'b>(
         &'b self,
         sensitivities: &'b [PerEquation<Sensitivity>],

@@ -141,7 +141,7 @@ impl Rows {
         Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
     }
 
-    /// The same with its columns at these places among `count`.
+    /// The row with its columns at these places among `count`.
     pub(crate) fn at_places(self, places: &[usize], count: usize) -> Self {
         let mut columns = vec![vec![]; count];
         places.iter().zip(self.columns).for_each(|(place, column)| columns[*place] = column);

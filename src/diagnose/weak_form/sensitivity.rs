@@ -23,7 +23,7 @@ impl Default for Sensitivity {
 }
 
 impl Sensitivity {
-    /// The same where position, pressures, flows and force are so loud.
+    /// These sensitivities where position, pressures, flows and force have so many times their noise.
     #[must_use]
     pub(super) fn with_noise_factors(self, [x, pa, pb, qa, qb, force]: [f64; 6]) -> Self {
         Self { noise_factor: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
@@ -39,7 +39,8 @@ impl Sensitivity {
         self.noise_factor.iter().any(|times| *times > 1.0)
     }
 
-    /// The same where each channel has so many times the noise of its sensor; where it is loud, as it was.
+    /// These sensitivities where each channel has so many times the noise of its sensor; unchanged where samples miss
+    /// motion.
     #[must_use]
     pub(super) fn at_noise(mut self, times: &[f64; Channel::ALL.len()]) -> Self {
         if !self.is_unresolved() {

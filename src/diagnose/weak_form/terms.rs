@@ -86,7 +86,7 @@ pub(crate) fn all_terms() -> Vec<Term> {
 }
 
 impl Term {
-    /// What one unit leaves in the residual at an instant.
+    /// What one unit adds to the residual at an instant.
     pub(crate) fn unit_term(
         self,
         at: &Signals<f64>,
@@ -211,7 +211,7 @@ impl Term {
     }
 }
 
-/// Products of signals that stand for effects nobody listed.
+/// Products of signals: stand-ins for effects that the table lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Unlisted {
     /// Leak past the piston in proportion to |ẋ| P_L.

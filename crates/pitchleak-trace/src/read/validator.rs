@@ -207,7 +207,7 @@ const RANGES: usize = Signal::ALL.len() - 1;
 #[serde(from = "[Range; RANGES]", into = "[Range; RANGES]")]
 pub(super) struct Ranges {
     listed: [Range; RANGES],
-    /// The same in the order of a row's cells, which are compared with all of them at once.
+    /// The bounds in the order of a row's cells, which are compared with all of them together.
     bounds: [[f64; Signal::ALL.len()]; 2],
 }
 
@@ -282,7 +282,7 @@ impl Ranges {
         broken.map(|range| range.signal)
     }
 
-    /// In the unit of the column, which is SI where it is none.
+    /// In the unit of the column, else in SI.
     pub(super) fn describe(&self, signal: Signal, value: f64, unit: Option<Unit>) -> String {
         let range = self.listed.iter().find(|range| range.signal == signal);
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));

@@ -34,7 +34,7 @@ pub fn sentence(verdict: Verdict) -> &'static str {
         Verdict::PartlyExplained => {
             "partly explained: the effects below mend much, but not all of it is explained for sure"
         }
-        Verdict::NoMissingEffect => "no missing effect: what the declared model leaves over is sensor noise",
+        Verdict::NoMissingEffect => "no missing effect: the residual of the declared model is sensor noise",
         Verdict::Unexplained => "unexplained: something is missing, and no known effect fits",
         Verdict::InsufficientExcitation => {
             "insufficient excitation: too little happens in these traces to tell"
@@ -126,7 +126,7 @@ impl DiagnosisText<'_> {
 
     /// Size against the sensors' noise, whiteness, normality, and what the residual goes with.
     fn write_residuals(&self, out: &mut String) {
-        out.push_str("\nwhat is left                 of noise    white p   normal p   goes with\n");
+        out.push_str("\nresidual                     of noise    white p   normal p   goes with\n");
         let sides =
             [("before", &self.diagnosis.before.residuals), ("after", &self.diagnosis.after.residuals)];
         let shown = if self.diagnosis.effects.is_empty() { &sides[..1] } else { &sides[..] };
@@ -181,7 +181,7 @@ fn line(binned: &BinnedResidual) -> String {
     let (scale, scale_unit) = people(binned.against);
     let space = if scale_unit.is_empty() { "" } else { " " };
     format!(
-        "  {:<10} left over {} to {} {unit} against {} from {} to {}{space}{scale_unit}: {bars}",
+        "  {:<10} residual {} to {} {unit} against {} from {} to {}{space}{scale_unit}: {bars}",
         name(binned.equation),
         short(low * factor),
         short(high * factor),
