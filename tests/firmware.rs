@@ -214,7 +214,7 @@ fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) ->
             let found = rls.estimates();
             let (kappa, leaks) = (found.compressibility_per_pa, found.leaks_m3spa);
             let all = [kappa, leaks.internal, leaks.external_a, leaks.external_b];
-            let values = |k: usize| if k % 2 == 0 { all[k / 2].value } else { all[k / 2].std };
+            let values = |k: usize| if k.is_multiple_of(2) { all[k / 2].value } else { all[k / 2].std };
             told.insert(at, std::array::from_fn(values));
         }
     }

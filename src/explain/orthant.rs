@@ -102,11 +102,11 @@ mod tests {
         let matrix = nalgebra::DMatrix::from_fn(k, k, |i, j| covariance[i][j]);
         let inverse = matrix.clone().try_inverse().unwrap();
         let norm = ((2.0 * PI).powi(k as i32) * matrix.determinant()).sqrt();
-        let steps = if k == 2 { 1500 } else { 180 };
+        let steps: usize = if k == 2 { 1500 } else { 180 };
         let ranges: Vec<f64> = (0..k).map(|i| means[i].max(0.0) + 7.0 * covariance[i][i].sqrt()).collect();
         let cell: f64 = ranges.iter().map(|range| range / steps as f64).product();
         let (mut sum, mut first) = (0.0, 0.0);
-        for index in 0..(steps as usize).pow(k as u32) {
+        for index in 0..steps.pow(k as u32) {
             let mut rest = index;
             let x = nalgebra::DVector::from_fn(k, |i, _| {
                 let at = rest % steps;
