@@ -41,6 +41,8 @@ pub(super) struct Weighed<'a> {
     pub misfit: f64,
     /// When a leak last changed at once, s; 0 where none did.
     pub changed_s: f64,
+    /// Mean of C P of each leak, m³/s.
+    pub levels_m3s: [f64; 3],
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
     pub leaks_m3s: Vec<[f64; 3]>,
     pub weights: Vec<f64>,
@@ -85,7 +87,7 @@ pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) ->
     }
     let products = RawProducts::of(statistic, rig);
     let first = Pass::new(statistic, &products, rig, tables, PerLeak::default()).weigh();
-    let mean_m3s = PerLeak::from_fn(|leak| mean_leak(&first, leak as usize));
+    let mean_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
     let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
     if mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least) {
         return Some(first);
@@ -93,10 +95,9 @@ pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) ->
     Some(Pass::new(statistic, &products, rig, tables, mean_m3s).weigh())
 }
 
-fn mean_leak(weighed: &[Weighed<'_>], leak: usize) -> f64 {
-    let mean =
-        |one: &Weighed<'_>| one.leaks_m3s.iter().zip(&one.weights).map(|(q, w)| q[leak] * w).sum::<f64>();
-    weighed.iter().map(|one| one.probability * mean(one)).sum()
+/// Mean of C P: of a leak that opens at a pressure more than what flows, as a sensor's zero acts through C.
+fn mean_level(weighed: &[Weighed<'_>], leak: usize) -> f64 {
+    weighed.iter().map(|one| one.probability * one.levels_m3s[leak]).sum()
 }
 
 /// All that one pass over the table needs.
@@ -371,6 +372,7 @@ impl<'a, 's> Pass<'a, 's> {
             return None;
         }
         let mut ln = ln_posterior;
+        let mut levels_m3s = [0.0; 3];
         let (leaks_m3s, weights) = if hypothesis.positive.is_empty() {
             (vec![[0.0; 3]], vec![1.0])
         } else {
@@ -383,6 +385,7 @@ impl<'a, 's> Pass<'a, 's> {
             }
             let orthant = positive_orthant(&means, &covariance);
             ln += orthant.ln_probability;
+            levels_m3s = self.levels_m3s(&hypothesis, &orthant.points, &orthant.weights);
             (
                 self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points, &orthant.weights, misfit),
                 orthant.weights,
@@ -390,7 +393,20 @@ impl<'a, 's> Pass<'a, 's> {
         };
         let changed = self.products.segments.get(hypothesis.last_change());
         let changed_s = changed.map_or(0.0, |segment| segment.begin_s);
-        Some((ln, Weighed { hypothesis, probability: 0.0, misfit, changed_s, leaks_m3s, weights }))
+        Some((
+            ln,
+            Weighed { hypothesis, probability: 0.0, misfit, changed_s, levels_m3s, leaks_m3s, weights },
+        ))
+    }
+
+    fn levels_m3s(&self, hypothesis: &Hypothesis<'_>, points: &[Vec<f64>], weights: &[f64]) -> [f64; 3] {
+        [0, 1, 2].map(|leak| {
+            let rising = hypothesis.ends[leak].iter().filter(|(_, sign)| *sign > 0.0);
+            let places = rising.filter_map(|(end, _)| hypothesis.positive.iter().position(|one| one == end));
+            let mean =
+                |place: usize| points.iter().zip(weights).map(|(point, w)| w * point[place]).sum::<f64>();
+            places.map(mean).sum::<f64>() * self.full_scale_m3s
+        })
     }
 
     /// Noise scales over the scatter of the readings themselves: louder sensors are no doubt about the model.
