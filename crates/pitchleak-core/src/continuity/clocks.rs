@@ -65,7 +65,7 @@ impl<T: Copy> From<&Sample<T>> for Readings<T> {
 ///
 /// Between two of its readings a channel is the straight line from one to the other, so that the trapezoidal rule over all
 /// rows is that between the channel's own readings. A row waits until every channel is known at its time. A channel
-/// rests from its last reading to the next where the hole is longer than [`HOLE_STEPS`] steps of its own.
+/// rests from its last reading to the next where the hole is longer than four steps of its own.
 ///
 /// ```
 /// use pitchleak_core::continuity::{Clocks, Next, Readings};
