@@ -96,7 +96,7 @@ fn each_file_is_read_once_and_what_is_none_is_told() {
     patterns.push(other.display().to_string());
     let traces = FleetTrace::find(&patterns, &FleetRig::Beside).unwrap();
     assert_eq!(traces.len(), 2);
-    assert_eq!((traces[0].other_names.last(), traces[1].other_names.len()), (Some(&other), 0));
+    assert_eq!((traces[0].other_names.first(), traces[1].other_names.len()), (Some(&other), 0));
     let error = |name: &str| FleetTrace::find(&pattern(&farm, name), &FleetRig::Beside).unwrap_err();
     assert!(matches!(error("T8/*.csv"), FleetError::NoTrace(_)));
     assert!(matches!(error("T7"), FleetError::Folder(_)));
