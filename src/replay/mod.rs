@@ -24,6 +24,7 @@ pub(crate) use state::every_number;
 pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
+use crate::explain::Explainer;
 use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
@@ -369,6 +370,30 @@ pub fn replay<E: From<ReplayError>>(
         None => replay.suspicions(verdict, &weighed, &excerpt, &columns),
     };
     Ok(replay.report_with(summary, &weighed, suspect))
+}
+
+/// [`replay()`] with what the posterior over explanations says beside the verdict; a rig with effects of its own has none yet.
+///
+/// # Errors
+/// As [`replay()`].
+pub fn replay_explained<E: From<ReplayError>>(
+    reader: &mut TraceReader<'_>,
+    rig: &Rig,
+    mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
+) -> Result<ReplayReport, E> {
+    let mut explainer = rig.effects.is_empty().then(|| Explainer::new(rig));
+    let mut report = replay(reader, rig, |replay, record, renewed| {
+        match &mut explainer {
+            Some(explainer) if replay.left_out() => explainer.leave_out(record),
+            Some(explainer) => explainer.push(record),
+            None => {}
+        }
+        each(replay, record, renewed)
+    })?;
+    if let Some(decision) = explainer.and_then(|explainer| explainer.decision()) {
+        report.verdict.with_explanations(decision);
+    }
+    Ok(report)
 }
 
 /// The next good record; rows out of range go to `refused`, and the good ones after the first of them.

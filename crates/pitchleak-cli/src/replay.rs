@@ -2,9 +2,9 @@ use crate::failure::Failure;
 use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::explain::Explainer;
-use pitchleak::replay::{EstimateFile, replay};
+use pitchleak::replay::{EstimateFile, Replay, replay, replay_explained};
 use pitchleak::rig::EstimatorKind;
+use pitchleak::trace::Record;
 use pitchleak_view::Text;
 use pitchleak_view::page::{History, Page, PageFile};
 use pitchleak_view::text::ReplaySketch;
@@ -69,14 +69,8 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
     let mut history = page.is_some().then(History::default);
     let mut sketch = (output::draws() && !arguments.json).then(|| ReplaySketch::new(&trace.rig));
-    let mut explainer = (arguments.json && trace.rig.effects.is_empty()).then(|| Explainer::new(&trace.rig));
     let (mut reader, bar) = trace.open()?;
-    let mut report = replay(&mut reader, &trace.rig, |replay, record, renewed| {
-        match &mut explainer {
-            Some(explainer) if replay.left_out() => explainer.leave_out(record),
-            Some(explainer) => explainer.push(record),
-            None => {}
-        }
+    let each = |replay: &Replay, record: &Record, renewed: bool| {
         if let Some(history) = &mut history {
             history.add(replay, record, renewed);
         }
@@ -87,10 +81,12 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
             None => Ok(()),
             Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
         }
-    })?;
-    if let Some(decision) = explainer.and_then(|explainer| explainer.decision()) {
-        report.verdict.with_explanations(decision);
-    }
+    };
+    let report = if arguments.json {
+        replay_explained(&mut reader, &trace.rig, each)?
+    } else {
+        replay(&mut reader, &trace.rig, each)?
+    };
     file.map(EstimateFile::finish).transpose()?;
     if let Some((page, history)) = page.zip(history) {
         page.finish(&Page::of_replay(&report, &trace.rig, &history))?;
