@@ -137,10 +137,11 @@ impl<'a> Hypothesis<'a> {
         own
     }
 
-    /// The segment from which on all leaks are as at the end.
-    pub fn last_change(&self) -> usize {
+    /// The segment from which on all leaks are as at the end: where one wanders, the last.
+    pub fn last_change(&self, segments: usize) -> usize {
         let border = |course: &Option<LeakCourse>| match course {
             Some(LeakCourse::Sudden(border)) => *border,
+            Some(LeakCourse::Wandering) => segments.saturating_sub(1),
             _ => 0,
         };
         self.leaks.iter().map(border).max().unwrap_or(0)

@@ -391,7 +391,7 @@ impl<'a, 's> Pass<'a, 's> {
                 orthant.weights,
             )
         };
-        let changed = self.products.segments.get(hypothesis.last_change());
+        let changed = self.products.segments.get(hypothesis.last_change(self.segments));
         let changed_s = changed.map_or(0.0, |segment| segment.begin_s);
         Some((
             ln,
@@ -427,7 +427,7 @@ impl<'a, 's> Pass<'a, 's> {
     ) -> Vec<[f64; 3]> {
         let widening = (1.0 + WIDENING * (misfit * misfit - WIDENED_MISFIT2).max(0.0)).sqrt();
         let mut out = vec![[0.0; 3]; points.len()];
-        let changed = hypothesis.last_change();
+        let changed = hypothesis.last_change(self.segments);
         let (all_pa, pressures_pa) =
             (self.products.mean_pressures_pa(0), self.products.mean_pressures_pa(changed));
         for (leak, ends) in hypothesis.ends.iter().enumerate().filter(|(_, ends)| !ends.is_empty()) {
