@@ -162,8 +162,10 @@ fn emulate(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record])
     }
 }
 
+/// Of a program in one of the tests, which run beside each other.
 fn folder(program: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(program);
+    let test = std::thread::current().name().unwrap_or_default().replace(':', "-");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{program}-{test}"));
     std::fs::create_dir_all(&folder).unwrap();
     folder
 }
