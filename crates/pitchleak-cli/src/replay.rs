@@ -33,6 +33,10 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
 
+    /// Add what the posterior over explanations says to the JSON
+    #[arg(long, requires = "json")]
+    explain: bool,
+
     /// Exit with status 1 if a fault is found
     #[arg(long)]
     fail_on_fault: bool,
@@ -82,7 +86,7 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
             Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
         }
     };
-    let report = if arguments.json {
+    let report = if arguments.explain {
         replay_explained(&mut reader, &trace.rig, each)?
     } else {
         replay(&mut reader, &trace.rig, each)?

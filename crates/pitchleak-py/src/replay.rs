@@ -26,7 +26,7 @@ pub fn replay(
     let rig = rig.with_estimator(estimator)?;
     let mut signals = Signals::new(stop);
     let report = source.read(py, &rig, strict, |mut reader| {
-        pitchleak::replay::replay_explained(&mut reader, &rig, |_, _, _| signals.heed())
+        pitchleak::replay::replay(&mut reader, &rig, |_, _, _| signals.heed())
     })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
 }
@@ -47,7 +47,7 @@ pub fn over_time<'py>(
     let mut columns: [Vec<f64>; EstimateRow::COLUMNS.len()] = std::array::from_fn(|_| Vec::new());
     let mut signals = Signals::new(None);
     let report = source.read(py, &rig, strict, |mut reader| {
-        pitchleak::replay::replay_explained(&mut reader, &rig, |replay, record, _| {
+        pitchleak::replay::replay(&mut reader, &rig, |replay, record, _| {
             for (column, value) in columns.iter_mut().zip(replay.estimate_row(record).values()) {
                 column.push(value);
             }
