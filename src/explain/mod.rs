@@ -7,6 +7,7 @@ mod decision;
 mod equations;
 mod evidence;
 mod hypothesis;
+mod independence;
 mod orthant;
 mod posterior;
 mod raw_products;

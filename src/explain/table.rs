@@ -230,7 +230,10 @@ pub(super) fn pressures() -> Vec<Entry> {
     use Column as C;
     const PRESSURE: &str = "Open the sensor to air: what it shows is its zero.";
     let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(PRESSURE, None);
+    let gross = 0.05;
     vec![
+        entry("pressure_zero_gross_a", "the zero of pressure sensor A is far off").free(C::PressureZeroA, gross),
+        entry("pressure_zero_gross_b", "the zero of pressure sensor B is far off").free(C::PressureZeroB, gross),
         entry("pressure_zero_a", "the zero of pressure sensor A is off").free(C::PressureZeroA, 0.01),
         entry("pressure_zero_b", "the zero of pressure sensor B is off").free(C::PressureZeroB, 0.01),
         entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),
