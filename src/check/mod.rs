@@ -7,10 +7,10 @@ pub use readings::{Reading, SIGNALS, values};
 
 use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::replay::{Replay, ReplayError, replay};
-use crate::report::{EstimateEntry, Leakage, TraceSummary};
+use crate::report::{EstimateEntry, Leakage, TraceSummary, Verdict};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceReader};
-use crate::wiring::{Excerpt, Recorded, Wiring, explain, sensor_error, unit_by_scatter};
+use crate::wiring::{Excerpt, Recorded, Wiring, explain, unit_by_scatter};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct CheckReport {
     pub readings: Vec<Reading>,
     /// Channels that are dead, stuck, clipped, held or coarse.
     pub channels: Vec<ChannelFault>,
+    /// As `replay` has it.
+    pub verdict: Verdict,
     /// The mistake of wiring, sign or unit that explains what the columns as declared do not.
     pub wiring: Option<Wiring>,
     /// What the trace tells about each leak.
@@ -100,7 +102,6 @@ pub fn check<E: From<ReplayError>>(
     let whole = Recorded::new(&records, &rig);
     let found = whole.as_ref().and_then(explain);
     let found = found.or_else(|| unit_by_scatter(&excerpt, &rig));
-    let found = found.or_else(|| sensor_error(whole.as_ref()?));
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
@@ -110,6 +111,7 @@ pub fn check<E: From<ReplayError>>(
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,
         trace: replayed.trace,
+        verdict: replayed.verdict,
         rig: rig.name,
     })
 }

@@ -6,24 +6,23 @@ use super::raw_products::Statistic;
 use super::table::Entry;
 use crate::report::Status;
 use crate::rig::Rig;
-use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Leak, PerLeak};
-use serde::Serialize;
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use serde::{Deserialize, Serialize};
 
 /// α: a verdict is sure where at most this probability speaks against it. Chosen; a user's to change.
 pub const ALPHA: f64 = 0.05;
 /// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
-const WIRING_DOUBT: f64 = 0.5;
+pub const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
 const WANDER_DOUBT: f64 = 0.3;
 /// A noise scale of so many times the readings' own scatter contradicts the model. A guess.
-const MISFIT_DOUBT: f64 = 2.0;
+pub const MISFIT_DOUBT: f64 = 2.0;
 /// Explanations below this probability are not listed.
 const LEAST_LISTED: f64 = 0.01;
 
 /// What is believed of a leak at the trace's end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     /// Mean flow, L/min.
     pub mean_lpm: f64,
@@ -35,40 +34,51 @@ pub struct Belief {
     pub below_lpm: f64,
 }
 
+impl Belief {
+    /// Mean and standard deviation, L/min.
+    pub fn estimate_lpm(&self) -> Estimate<f64> {
+        Estimate { value: self.mean_lpm, std: self.std_lpm }
+    }
+}
+
 /// An explanation that is left.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Explained {
     /// Ids of what it is made of, joined by `+`.
     pub id: String,
     /// Posterior probability.
     pub probability: f64,
-    /// In words.
+    /// In words, leaks first.
     pub text: String,
+    /// What is off beside the leaks, in words; empty where nothing is.
+    pub cause: String,
+    /// Whether it is a mistake of wiring, sign or unit.
+    pub wiring: bool,
     /// What to do about it.
     pub remedy: Option<String>,
     /// Lines for `[columns]` or the rig file that mend it.
     pub columns: Vec<String>,
     /// Ids that no trace of these readings tells it from.
-    pub cannot_be_told_from: Vec<&'static str>,
+    pub cannot_be_told_from: Vec<String>,
     /// Mean leaks under it, L/min.
     pub leakage: PerLeak<f64>,
 }
 
 /// Something of sensors, rig or wiring that is not as declared, whatever the leaks are.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// Of the likeliest entry.
-    pub id: &'static str,
+    pub id: String,
     /// That it or one of those that it cannot be told from is so.
     pub probability: f64,
     /// In words.
-    pub text: &'static str,
+    pub text: String,
     /// Others of its kind that this trace leaves, and entries that no trace tells it from.
-    pub cannot_be_told_from: Vec<&'static str>,
+    pub cannot_be_told_from: Vec<String>,
 }
 
 /// The verdict of the posterior.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
     /// In a word.
     pub status: Status,
@@ -80,10 +90,12 @@ pub struct Decision {
     pub probability: PerLeak<f64>,
     /// How large each leak is, since it changed last.
     pub leakage: PerLeak<Belief>,
-    /// When a leak last changed at once, s from the trace's begin; 0 where none did.
-    pub changed_s: f64,
+    /// How long before the end a leak last changed at once, s, pauses not counted; none where none did.
+    pub changed_ago_s: Option<f64>,
     /// Best first.
     pub explanations: Vec<Explained>,
+    /// Whether the likeliest explanation has sensors and rig as declared.
+    pub as_declared: bool,
     /// What is not as declared, for certain.
     pub notes: Vec<Note>,
     /// Noise scale over the readings' own scatter.
@@ -92,41 +104,6 @@ pub struct Decision {
     pub wander: f64,
     /// Probability of a mistake of wiring, sign or unit.
     pub wiring: f64,
-}
-
-/// Gathers a trace's records, and explains them.
-#[derive(Clone, Debug)]
-pub struct Explainer {
-    rig: Rig,
-    statistic: Box<Statistic>,
-    /// Time of records left out since the last one, s.
-    left_out_s: f64,
-}
-
-impl Explainer {
-    /// Of a cylinder of this rig. What `[effects]` of the rig file correct is not corrected here.
-    pub fn new(rig: &Rig) -> Self {
-        let statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
-        Self { rig: rig.clone(), statistic, left_out_s: 0.0 }
-    }
-
-    /// Takes in the next record.
-    pub fn push(&mut self, record: &Record) {
-        let step_s = record.step_s();
-        let since_s = if step_s > 0.0 { step_s + self.left_out_s } else { 0.0 };
-        self.left_out_s = 0.0;
-        self.statistic.push(since_s, &record.sample);
-    }
-
-    /// Leaves out the next record, a spike.
-    pub fn leave_out(&mut self, record: &Record) {
-        self.left_out_s += record.dt_s;
-    }
-
-    /// What the records so far say; `None` where they are too few.
-    pub fn decision(&self) -> Option<Decision> {
-        explain(&self.statistic, &self.rig)
-    }
 }
 
 /// Explains a trace; `None` where there is too little of it.
@@ -170,8 +147,9 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         ruled_out,
         probability,
         leakage: beliefs.map(|marginal| marginal.belief()),
-        changed_s: changed_s(weighed),
+        changed_ago_s: changed_ago_s(weighed),
         explanations: listed(weighed),
+        as_declared: weighed.first().is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
         notes: notes(weighed),
         misfit,
         wander,
@@ -179,10 +157,9 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     }
 }
 
-/// When a leak changed at once, as the likeliest explanation has it.
-fn changed_s(weighed: &[Weighed<'_>]) -> f64 {
-    let best = weighed.iter().max_by(|a, b| a.probability.total_cmp(&b.probability));
-    best.map_or(0.0, |best| best.changed_s)
+/// How long ago a leak changed at once, as the likeliest explanation has it.
+fn changed_ago_s(weighed: &[Weighed<'_>]) -> Option<f64> {
+    weighed.iter().max_by(|a, b| a.probability.total_cmp(&b.probability))?.changed_ago_s
 }
 
 /// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
@@ -265,8 +242,8 @@ fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
     let probability = masses.iter().map(|(_, mass)| mass).sum();
     let (best, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
     let others = masses.iter().skip(1).filter(|(_, mass)| *mass > ALPHA).map(|(entry, _)| entry.id);
-    let cannot_be_told_from = others.chain(best.alike.iter().copied()).collect();
-    Some(Note { id: best.id, probability, text: best.text, cannot_be_told_from })
+    let cannot_be_told_from = others.chain(best.alike.iter().copied()).map(str::to_owned).collect();
+    Some(Note { id: best.id.to_owned(), probability, text: best.text.to_owned(), cannot_be_told_from })
 }
 
 /// What an explanation is made of: leaks, their courses, state, wiring.
@@ -317,6 +294,8 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
         id,
         probability: one.probability,
         text: words.join(", and "),
+        cause: words.join(", and "),
+        wiring: hypothesis.wiring.is_some(),
         remedy: (!remedies.is_empty()).then(|| remedies.join(" ")),
         columns: hypothesis
             .wiring
@@ -325,7 +304,7 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
             .flat_map(str::lines)
             .map(str::to_owned)
             .collect(),
-        cannot_be_told_from: unusual().flat_map(|entry| entry.alike).copied().collect(),
+        cannot_be_told_from: unusual().flat_map(|entry| entry.alike).map(|id| (*id).to_owned()).collect(),
         leakage,
     }
 }

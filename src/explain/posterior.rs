@@ -39,8 +39,8 @@ pub(super) struct Weighed<'a> {
     pub probability: f64,
     /// Noise scale over what the readings scatter.
     pub misfit: f64,
-    /// When a leak last changed at once, s; 0 where none did.
-    pub changed_s: f64,
+    /// How long before the end a leak last changed at once, s; none where none did.
+    pub changed_ago_s: Option<f64>,
     /// Mean of C P of each leak, m³/s.
     pub levels_m3s: [f64; 3],
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
@@ -417,11 +417,12 @@ impl<'a, 's> Pass<'a, 's> {
                 orthant.weights,
             )
         };
-        let changed = self.products.segments.get(hypothesis.last_change(self.segments));
-        let changed_s = changed.map_or(0.0, |segment| segment.begin_s);
+        let changed = Some(hypothesis.last_change(self.segments)).filter(|border| *border > 0);
+        let changed = changed.and_then(|border| self.products.segments.get(border));
+        let changed_ago_s = changed.map(|segment| self.products.total_s - segment.begin_s);
         Some((
             ln,
-            Weighed { hypothesis, probability: 0.0, misfit, changed_s, levels_m3s, leaks_m3s, weights },
+            Weighed { hypothesis, probability: 0.0, misfit, changed_ago_s, levels_m3s, leaks_m3s, weights },
         ))
     }
 

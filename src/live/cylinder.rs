@@ -5,6 +5,7 @@ use super::event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent};
 use super::history::History;
 use super::notices::Notices;
 use super::order::{Order, Turn};
+use super::weighing::Weighing;
 use crate::Rig;
 use crate::replay::{Stream, Taken};
 use crate::report::ReplayReport;
@@ -21,6 +22,7 @@ pub(super) struct Cylinder {
     told_s: Option<f64>,
     order: Order,
     history: History,
+    weighing: Weighing,
     #[serde(skip)]
     notices: Notices,
     /// Something came since the last [`Snapshot`](super::Snapshot).
@@ -62,6 +64,7 @@ impl Cylinder {
             told_s: None,
             order: Order::default(),
             history: History::default(),
+            weighing: Weighing::default(),
             notices: Notices::default(),
             changed: true,
         })
@@ -141,7 +144,8 @@ impl Cylinder {
 
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
-        if self.stream.time_s() != self.told_s {
+        if self.stream.time_s() != self.told_s || !self.weighing.is_of_now(&self.stream) {
+            self.weighing.decision_now(&self.stream);
             events.extend(self.estimate(name).map(|told| Event::Estimate(Box::new(told))));
         }
         self.tell_counted(name, events);
@@ -196,8 +200,9 @@ impl Cylinder {
         events.push(Event::Estimate(Box::new(estimate)));
     }
 
-    fn estimate(&self, name: &str) -> Option<EstimateEvent> {
-        let (t_s, report) = (self.stream.time_s()?, self.stream.report(name)?);
+    fn estimate(&mut self, name: &str) -> Option<EstimateEvent> {
+        let decision = self.weighing.decision(&self.stream);
+        let (t_s, report) = (self.stream.time_s()?, self.stream.report_as(name, decision)?);
         Some(EstimateEvent {
             cylinder: name.to_owned(),
             t_s,
@@ -212,7 +217,10 @@ impl Cylinder {
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report(name) else { return };
+        let decision = self.weighing.decision_now(&self.stream);
+        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report_as(name, decision) else {
+            return;
+        };
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
             let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));

@@ -19,6 +19,7 @@ mod notices;
 mod order;
 mod plain_json;
 mod watch;
+mod weighing;
 
 pub use batch::{Batch, BatchFormat};
 pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};

@@ -3,16 +3,16 @@
 use super::Replay;
 use crate::channels::ChannelFault;
 use crate::report::{
-    Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, Misfit, ReplayReport, Spell,
-    Suspicions, TraceSummary, Verdict,
+    Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell,
+    TraceSummary, Verdict,
 };
 use crate::units::LPM_PER_M3S;
-use crate::wiring::Orifice;
+use crate::explain::Decision;
+use crate::wiring::Wiring;
 use pitchleak_core::PerLeak;
 
 /// What a verdict is held against.
 pub(super) struct Weighed {
-    misfit: Misfit,
     /// Faults of channels that count, and earlier ones that are only told.
     pub channels: Vec<ChannelFault>,
     earlier_channels: Vec<ChannelFault>,
@@ -22,7 +22,6 @@ impl Replay {
     /// A file's verdict: all that was read.
     pub(super) fn whole_trace(&self) -> Weighed {
         Weighed {
-            misfit: self.consistency.whole(),
             channels: self.channel_faults(&self.channels),
             earlier_channels: Vec::new(),
         }
@@ -33,7 +32,7 @@ impl Replay {
         let channels = self.channel_faults(&self.channels.lately());
         let mut earlier_channels = self.channel_faults(&self.channels);
         earlier_channels.retain(|one| channels.iter().all(|fault| fault.channel != one.channel));
-        Weighed { misfit: self.consistency.lately(), channels, earlier_channels }
+        Weighed { channels, earlier_channels }
     }
 }
 
@@ -41,6 +40,7 @@ impl Replay {
 pub(super) struct Draft<'a> {
     replay: &'a Replay,
     weighed: &'a Weighed,
+    decision: Option<&'a Decision>,
     trace: TraceSummary,
     found: Option<pitchleak_core::Estimates<f64>>,
     estimates: Estimates,
@@ -52,19 +52,28 @@ pub(super) struct Draft<'a> {
 }
 
 impl<'a> Draft<'a> {
-    pub fn new(replay: &'a Replay, weighed: &'a Weighed, mut trace: TraceSummary) -> Self {
+    pub fn new(
+        replay: &'a Replay,
+        weighed: &'a Weighed,
+        decision: Option<&'a Decision>,
+        mut trace: TraceSummary,
+    ) -> Self {
         trace.warnings.extend(replay.spikes.warning());
         let found = replay.estimator.estimates();
         let excitation = found.as_ref().map(|found| found.excitation);
-        let leakage = replay.leakage(excitation.is_some());
+        let leakage = replay.leakage(excitation.is_some(), decision);
         let threshold_lpm = replay.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         Self {
-            estimates: replay.estimates(excitation),
+            estimates: replay.estimates(excitation, decision),
             trend: replay.trend(found.as_ref(), &leakage, &threshold_lpm),
-            changed_at_s: replay.changed_at_s,
+            changed_at_s: match decision {
+                Some(decision) => decision.changed_ago_s.map(|ago_s| replay.end_s - ago_s),
+                None => replay.changed_at_s,
+            },
             episodes: replay.episodes.list(),
             replay,
             weighed,
+            decision,
             trace,
             found,
             leakage,
@@ -72,13 +81,8 @@ impl<'a> Draft<'a> {
         }
     }
 
-    /// This draft where leaks pass an orifice: what looks like a change is then the pressure's.
-    pub fn through(self, orifice: &Orifice) -> Self {
-        Self { leakage: leakage_through(orifice), trend: PerLeak::default(), changed_at_s: None, ..self }
-    }
-
-    pub fn verdict(&self, suspicions: &Suspicions) -> Verdict {
-        let Replay { rig, detector, consistency, end_s, .. } = self.replay;
+    pub fn verdict(&self, wiring: Option<&Wiring>) -> Verdict {
+        let Replay { detector, consistency, end_s, .. } = self.replay;
         Verdict::of(&Findings {
             active: detector.active(),
             leakage: &self.leakage,
@@ -86,23 +90,21 @@ impl<'a> Draft<'a> {
             trends: &self.trend,
             episodes: &self.episodes,
             threshold_lpm: self.threshold_lpm,
-            meters_lpm: [rig.instruments.flow_a, rig.instruments.flow_b]
-                .map(|meter| meter.full_scale * LPM_PER_M3S),
-            fluid: rig.fluid,
             trace: &self.trace,
             end_s: *end_s,
-            misfit: self.found.as_ref().map(|_| self.weighed.misfit),
+            knows_noise: self.replay.knows_noise(),
             restarts_in_all: consistency.restarts(),
             changed_at_s: self.changed_at_s,
             channels: &self.weighed.channels,
             earlier_channels: &self.weighed.earlier_channels,
-            suspicions,
+            wiring,
+            decision: self.decision,
         })
     }
 
     pub fn report(self, verdict: Verdict) -> ReplayReport {
         let replay = self.replay;
-        let whole = self.found.as_ref().map(|_| replay.consistency.whole());
+        let ratios = self.found.as_ref().map(|_| replay.consistency.ratios());
         ReplayReport {
             schema: ReplayReport::SCHEMA,
             rig: replay.rig.name.clone(),
@@ -119,17 +121,10 @@ impl<'a> Draft<'a> {
                 .and_then(|found| found.flow_offsets_m3s)
                 .filter(|offsets| offsets.iter().all(|one| one.value.is_finite() && one.std.is_finite()))
                 .map(FlowMeterOffsets::new),
-            normalised_innovation: whole.map(|misfit| [misfit.balance, misfit.position]),
+            normalised_innovation: ratios,
             changed_at_s: self.changed_at_s,
             alarms: replay.alarms.clone(),
             score: replay.scoring.scores(),
         }
     }
-}
-
-fn leakage_through(orifice: &Orifice) -> PerLeak<Leakage> {
-    orifice
-        .sizes_m3s
-        .zip(orifice.net_m3s)
-        .map(|(size, net_m3s)| Leakage { net_mean_lpm: Some(net_m3s * LPM_PER_M3S), ..Leakage::new(size) })
 }

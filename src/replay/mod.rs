@@ -24,9 +24,9 @@ pub(crate) use state::every_number;
 pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
-use crate::explain::Explainer;
-use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};
-use crate::rig::Rig;
+use crate::explain::{Decision, Statistic, explain};
+use crate::report::{Alarm, ReplayReport, TraceSummary};
+use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
 use crate::units::LPM_PER_M3S;
 use crate::wiring::{Excerpt, Refused};
@@ -95,6 +95,9 @@ impl EstimateRow {
     }
 }
 
+/// A stream's verdict is held against so much of it: longer than a leak takes to show, shorter than a shift. Chosen.
+const HORIZON_S: f64 = 1200.0;
+
 /// A running replay.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Replay {
@@ -113,6 +116,7 @@ pub struct Replay {
     consistency: Consistency,
     spikes: Spikes,
     oil: OilTemperature,
+    statistic: Box<Statistic>,
     /// Time of the last record, s.
     end_s: f64,
     /// Of the last block, in its own standard deviations.
@@ -140,6 +144,7 @@ impl Replay {
             consistency: Consistency::default(),
             spikes: Spikes::new(&rig.sensors()),
             oil: OilTemperature::default(),
+            statistic: Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors())),
             end_s: 0.0,
             innovation: None,
             rig: rig.clone(),
@@ -189,6 +194,9 @@ impl Replay {
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
         self.oil.add(record);
+        if self.knows_noise() {
+            self.statistic.push(record.step_s(), &record.sample);
+        }
         let update = self.estimator.update(record);
         match update {
             Update::Balanced { innovation } => self.weigh(innovation),
@@ -198,7 +206,7 @@ impl Replay {
                     self.pressures = TracePressures::default();
                     self.changed_at_s = Some(record.t_s);
                 }
-                self.weigh_renewal(record.t_s, changed);
+                self.weigh_renewal(changed);
                 self.scoring.renew(self.estimator.leak_coefficients(), self.estimator.pressure_biases_pa());
                 self.detect(record.t_s, elapsed_s);
             }
@@ -206,6 +214,23 @@ impl Replay {
         }
         self.scoring.add(record);
         matches!(update, Update::Renewed { .. })
+    }
+
+    /// Whether the estimator knows how good its figures are: the paper's law does not, and nothing is weighed for it.
+    fn knows_noise(&self) -> bool {
+        self.rig.estimator.kind != EstimatorKind::Paper
+    }
+
+    /// What explains the records so far; none where they are too few.
+    pub fn decision(&self) -> Option<Decision> {
+        self.knows_noise().then(|| explain(&self.statistic, &self.rig))?
+    }
+
+    /// Forgets what is long ago: a stream may run for months.
+    fn forgetting(mut self) -> Self {
+        let fresh = Statistic::new(&self.rig.cylinder, &self.rig.fluid, &self.rig.sensors());
+        *self.statistic = fresh.forgetting(HORIZON_S);
+        self
     }
 
     /// Weighs whether model and noise explain a block.
@@ -217,8 +242,8 @@ impl Replay {
     }
 
     /// Weighs whether they explain the travel, or the estimates began anew.
-    fn weigh_renewal(&mut self, t_s: f64, changed: bool) {
-        if self.consistency.is_next_stretch(t_s) {
+    fn weigh_renewal(&mut self, changed: bool) {
+        if self.consistency.is_next_stretch() {
             self.channels.next_stretch();
         }
         if changed {
@@ -365,35 +390,12 @@ pub fn replay<E: From<ReplayError>>(
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());
-    let suspect = |verdict: &Verdict| match refused.as_ref().and_then(Refused::wiring) {
-        Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
-        None => replay.suspicions(verdict, &weighed, &excerpt, &columns),
+    let decision = replay.decision();
+    let wiring = match refused.as_ref().and_then(Refused::wiring) {
+        None => replay.wiring(decision.as_ref(), &weighed, &excerpt, &columns),
+        wiring => wiring,
     };
-    Ok(replay.report_with(summary, &weighed, suspect))
-}
-
-/// [`replay()`] with what the posterior over explanations says beside the verdict; a rig with effects of its own has none yet.
-///
-/// # Errors
-/// As [`replay()`].
-pub fn replay_explained<E: From<ReplayError>>(
-    reader: &mut TraceReader<'_>,
-    rig: &Rig,
-    mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
-) -> Result<ReplayReport, E> {
-    let mut explainer = rig.effects.is_empty().then(|| Explainer::new(rig));
-    let mut report = replay(reader, rig, |replay, record, renewed| {
-        match &mut explainer {
-            Some(explainer) if replay.left_out() => explainer.leave_out(record),
-            Some(explainer) => explainer.push(record),
-            None => {}
-        }
-        each(replay, record, renewed)
-    })?;
-    if let Some(decision) = explainer.and_then(|explainer| explainer.decision()) {
-        report.verdict.with_explanations(decision);
-    }
-    Ok(report)
+    Ok(replay.report_with(summary, &weighed, decision.as_ref(), wiring))
 }
 
 /// The next good record; rows out of range go to `refused`, and the good ones after the first of them.

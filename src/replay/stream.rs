@@ -1,6 +1,7 @@
 use super::Replay;
 use super::state::{self, RestoreError};
-use crate::report::{ReplayReport, Suspicions, TraceSummary, Verdict};
+use crate::explain::Decision;
+use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
 use crate::trace::{
@@ -87,7 +88,7 @@ impl Stream {
     /// As [`Replay::new`].
     pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, RlsError> {
         Ok(Self {
-            replay: Replay::new(rig)?,
+            replay: Replay::new(rig)?.forgetting(),
             evidence: Running::default(),
             validator: None,
             bad_rows,
@@ -202,18 +203,27 @@ impl Stream {
         &self.replay
     }
 
-    /// The report as it stands, its verdict held against the last ten to twenty minutes; `name` is the trace's. None before the
+    /// What explains the last twenty minutes or so; none where they say too little.
+    pub fn decision(&self) -> Option<Decision> {
+        self.replay.decision()
+    }
+
+    /// The report as it stands, its verdict held against the last twenty minutes or so; `name` is the trace's. None before the
     /// first part.
     pub fn report(&self, name: &str) -> Option<ReplayReport> {
+        self.report_as(name, self.decision().as_ref())
+    }
+
+    /// The report with a decision that was made before.
+    pub(crate) fn report_as(&self, name: &str, decision: Option<&Decision>) -> Option<ReplayReport> {
         let quality = self.validator.as_ref()?.quality();
         let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
         let summary = TraceSummary { begins, ..TraceSummary::new(name, quality) };
         let weighed = self.replay.last_stretch();
-        let refused = self.refused_for().filter(|_| quality.is_mostly_bad());
-        let suspect = |verdict: &Verdict| match refused {
-            Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
-            None => self.replay.suspicions_so_far(verdict, &weighed, &self.evidence),
+        let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
+            None => self.replay.wiring_so_far(&weighed, &self.evidence),
+            wiring => wiring,
         };
-        Some(self.replay.report_with(summary, &weighed, suspect))
+        Some(self.replay.report_with(summary, &weighed, decision, wiring))
     }
 }

@@ -4,9 +4,10 @@ use super::Replay;
 use super::draft::{Draft, Weighed};
 use super::known::is_known;
 use crate::channels::{ChannelFault, ChannelMonitor};
-use crate::report::{
-    EstimateEntry, Estimates, LeakTrend, Leakage, ReplayReport, Suspicions, TraceSummary, Verdict,
-};
+use super::correction::Correction;
+use crate::explain::Decision;
+use crate::report::{EstimateEntry, Estimates, LeakTrend, Leakage, ReplayReport, TraceSummary};
+use crate::wiring::Wiring;
 use crate::rig::EstimatorKind;
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
@@ -15,41 +16,23 @@ use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak}
 /// Why an estimate says nothing that is no finite number.
 const NO_NUMBER: &str = "the readings lead to no finite number";
 
-/// No leak is negative: by what one is, the model errs, and in the other leaks by as much.
-fn with_model_error(flows: PerLeak<Leakage>) -> PerLeak<Leakage> {
-    let negative = flows.iter().map(|(_, flow)| flow).filter(|flow| flow.is_negative());
-    let error_lpm = negative.map(|flow| -flow.mean_lpm).fold(0.0, f64::max);
-    flows.map(|flow| {
-        let std_lpm = flow.std_lpm.map(|std| if flow.is_negative() { std } else { std.hypot(error_lpm) });
-        Leakage { std_lpm, ..flow }
-    })
-}
-
 impl Replay {
     /// The report on the trace so far.
     pub fn report(&self, trace: TraceSummary) -> ReplayReport {
-        self.report_with(trace, &self.whole_trace(), |_| Suspicions::default())
+        self.report_with(trace, &self.whole_trace(), self.decision().as_ref(), None)
     }
 
-    /// The report with a verdict held against `weighed`; `suspect` says what else than leaks may explain the trace
-    /// where the figures alone give this verdict.
+    /// The report with a verdict held against `weighed`, as `decision` has it; `wiring` is the mistake that explains the
+    /// trace, if any does.
     pub(super) fn report_with(
         &self,
         trace: TraceSummary,
         weighed: &Weighed,
-        suspect: impl FnOnce(&Verdict) -> Suspicions,
+        decision: Option<&Decision>,
+        wiring: Option<Wiring>,
     ) -> ReplayReport {
-        let draft = Draft::new(self, weighed, trace);
-        let verdict = draft.verdict(&Suspicions::default());
-        let suspicions = suspect(&verdict);
-        if !suspicions.any() {
-            return draft.report(verdict);
-        }
-        let draft = match &suspicions.orifice {
-            Some(orifice) => draft.through(orifice),
-            None => draft,
-        };
-        let verdict = draft.verdict(&suspicions);
+        let draft = Draft::new(self, weighed, decision, trace);
+        let verdict = draft.verdict(wiring.as_ref());
         draft.report(verdict)
     }
 
@@ -80,25 +63,46 @@ impl Replay {
         faults
     }
 
-    /// Flows at the mean pressures of the trace, or since the leak changed, eq. (15); the internal one at the mean size of P_L, whatever
-    /// its sign.
-    pub(super) fn leakage(&self, knows_spread: bool) -> PerLeak<Leakage> {
+    /// Flows since they changed last, as the posterior has them, or else as the estimator has; the internal one at the mean size
+    /// of P_L, whatever its sign. With those of the rig file's effects.
+    pub(super) fn leakage(&self, knows_spread: bool, decision: Option<&Decision>) -> PerLeak<Leakage> {
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
-        let flows = sizes.zip(net).map(|(size, net)| {
-            let leakage = Leakage::new(size);
-            Leakage {
-                net_mean_lpm: Some(net.value * LPM_PER_M3S),
-                std_lpm: leakage.std_lpm.filter(|_| knows_spread && is_known(&size)),
-                ..leakage
-            }
-        });
-        with_model_error(flows)
+        let flows = sizes.zip(net);
+        let Some(decision) = decision else {
+            return flows.map(|(size, net)| {
+                let leakage = Leakage::new(size);
+                Leakage {
+                    net_mean_lpm: Some(net.value * LPM_PER_M3S),
+                    std_lpm: leakage.std_lpm.filter(|_| knows_spread && is_known(&size)),
+                    ..leakage
+                }
+            });
+        };
+        let shares = self.pressures.sizes().sizes_pa.zip(self.pressures.net().sizes_pa);
+        let own = self.correction.as_ref().map_or_else(PerLeak::default, Correction::mean_leaks_m3s);
+        decision.leakage.zip(shares).zip(own).map(|((belief, (size_pa, net_pa)), own_m3s)| {
+            let mean_lpm = belief.mean_lpm + own_m3s * LPM_PER_M3S;
+            let net_share = if size_pa > 0.0 { net_pa / size_pa } else { 1.0 };
+            Leakage { mean_lpm, net_mean_lpm: Some(net_share * mean_lpm), std_lpm: Some(belief.std_lpm) }
+        })
     }
 
-    pub(super) fn estimates(&self, excitation: Option<ExcitationReport<f64>>) -> Estimates {
+    pub(super) fn estimates(
+        &self,
+        excitation: Option<ExcitationReport<f64>>,
+        decision: Option<&Decision>,
+    ) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
-        let entries = self.leak_coefficients().zip(per_leak).map(|(coefficient, excitation)| {
+        let pressures_pa = self.pressures.sizes().sizes_pa;
+        let coefficients = self.leak_coefficients();
+        let coefficients = PerLeak::from_fn(|leak| match decision {
+            Some(decision) if pressures_pa[leak] > 0.0 => {
+                decision.leakage[leak].estimate_lpm().scaled(1.0 / (LPM_PER_M3S * pressures_pa[leak]))
+            }
+            _ => coefficients[leak],
+        });
+        let entries = coefficients.zip(per_leak).map(|(coefficient, excitation)| {
             let unit = EstimateEntry::COEFFICIENT_UNIT;
             match excitation {
                 _ if !is_known(&coefficient) => {
@@ -177,27 +181,5 @@ fn label(parameter: Parameter) -> &'static str {
         Parameter::GainA => "the gain of flow meter A",
         Parameter::GainB => "the gain of flow meter B",
         Parameter::GainPosition => "the gain of the position sensor",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_below_zero_beyond_chance_makes_the_others_unsure() {
-        let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None };
-        let of = |external_b_lpm| {
-            let flows = PerLeak {
-                internal: lpm(0.4, 0.003),
-                external_a: lpm(0.0, 0.003),
-                external_b: lpm(external_b_lpm, 0.01),
-            };
-            with_model_error(flows).map(|flow| flow.std_lpm)
-        };
-        let surer = of(-0.02);
-        assert_eq!((surer.internal, surer.external_b), (Some(0.003), Some(0.01)));
-        let unsure = of(-0.04);
-        assert_eq!((unsure.internal, unsure.external_b), (Some(0.003_f64.hypot(0.04)), Some(0.01)));
     }
 }

@@ -6,14 +6,13 @@ mod spell;
 mod statement;
 mod trend;
 mod verdict;
-mod zeros;
 
 pub use episode::Episode;
-pub use reason::{MISFIT, Reason, ReasonId};
+pub use reason::{Reason, ReasonId};
 pub use spell::Spell;
 pub use statement::{advice, capital, interval, with_interval};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
-pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
+pub use verdict::{Findings, Status, Verdict};
 
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;

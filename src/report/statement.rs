@@ -2,7 +2,6 @@
 
 use super::{Findings, Leakage, Reason, Status};
 use crate::units::duration;
-use crate::wiring::Orifice;
 use pitchleak_core::{Estimate, Leak};
 
 /// Where to look for a leak.
@@ -20,9 +19,9 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
     let mut sentences = Vec::new();
     if status.is_sure() {
         sentences.extend(faults.iter().map(|leak| fault(findings, *leak)));
-        sentences.extend(findings.suspicions.orifice.map(law));
         sentences.extend(excluded(findings));
         sentences.extend(unknown(findings));
+        sentences.extend(notes(findings));
     } else {
         sentences.extend(reasons.iter().take(1).flat_map(why));
         sentences.extend(apparent(findings, faults));
@@ -63,14 +62,6 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
     }
 }
 
-/// By which law they leak, where it is not the model's.
-fn law(Orifice { before, after, .. }: Orifice) -> String {
-    format!(
-        "It leaks as through an orifice, by the root of the pressure (figures are means over the trace): with that law the residual falls from {before:.1} to \
-         {after:.1} times the noise."
-    )
-}
-
 /// Leaks whose upper bound is below the threshold.
 fn excluded(findings: &Findings<'_>) -> Option<String> {
     let faults = findings.faults();
@@ -86,6 +77,12 @@ fn unknown(findings: &Findings<'_>) -> Option<String> {
     let open: Vec<_> =
         Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && !findings.is_below(*leak)).collect();
     (!open.is_empty()).then(|| format!("This trace cannot tell about {} leaks.", join(&open, "and")))
+}
+
+/// What of sensors and rig is not as declared, which the verdict has taken into account.
+fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
+    let notes = findings.decision.into_iter().flat_map(|decision| &decision.notes);
+    notes.map(|note| format!("Besides, {}.", note.text))
 }
 
 /// What alarms a verdict in doubt stands beside.
@@ -108,9 +105,7 @@ fn apparent(findings: &Findings<'_>, faults: &[Leak]) -> Option<String> {
 /// Episodes that ended, and sudden changes.
 fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let faults = findings.faults();
-    // An orifice's law passes for other leaks now and then, in the estimates by C P.
-    let told = findings.suspicions.orifice.is_none();
-    let ended = Leak::ALL.into_iter().filter(move |leak| told && !faults.contains(leak)).filter_map(|leak| {
+    let ended = Leak::ALL.into_iter().filter(move |leak| !faults.contains(leak)).filter_map(|leak| {
         let own: Vec<_> = findings.episodes.iter().filter(|episode| episode.fault == leak).collect();
         let last = own.last()?;
         let often = if own.len() > 1 { format!(", the last of {} times", own.len()) } else { String::new() };
@@ -136,14 +131,9 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     ended.collect::<Vec<_>>().into_iter().chain(no_longer_weighed(findings)).chain(changed)
 }
 
-/// What contradicted model or sensors before the last stretch of a stream.
+/// Faults of channels before the last stretch of a stream.
 fn no_longer_weighed(findings: &Findings<'_>) -> impl Iterator<Item = String> {
-    let unexplained = findings.misfit.and_then(|misfit| misfit.unexplained_s).map(|span_s| {
-        let [from, to] = span_s.map(|t_s| findings.trace.time(t_s, 0));
-        format!("Earlier: model and declared noise did not explain the readings between {from} and {to}.")
-    });
-    let channels = findings.earlier_channels.iter().map(|fault| format!("Earlier: {}.", fault.text));
-    channels.chain(unexplained)
+    findings.earlier_channels.iter().map(|fault| format!("Earlier: {}.", fault.text))
 }
 
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {

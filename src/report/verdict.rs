@@ -5,8 +5,8 @@ use super::reason::{Reason, contradictions, gaps};
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};
-use crate::wiring::{Orifice, Wiring, ZeroCheck};
-use pitchleak_core::{Estimate, Fluid, Leak, PerLeak};
+use crate::wiring::Wiring;
+use pitchleak_core::{Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// The word that heads a report.
@@ -61,35 +61,10 @@ pub struct Verdict {
     pub text: String,
     /// Why the status is doubtful or not sure, and what to check, first things first; none where it is sure.
     pub reasons: Vec<Reason>,
-    /// That each leak is above its threshold at the trace's end, as the posterior over explanations has it; none where it
-    /// wasn't asked.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// That each leak is above its threshold now; none where there is too little to weigh, or from the paper's law.
     pub probability: Option<PerLeak<f64>>,
-    /// What explains the trace, best first, down to 1 %; likewise.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// What explains the trace, best first, down to 1 %.
     pub explanations: Vec<Explained>,
-}
-
-/// How far model and declared noise are from explaining a trace, or the last stretch of a stream: means of ν²/S, about 1
-/// where they do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
-    /// Of the flow balance.
-    pub balance: f64,
-    /// Innovations in it.
-    pub balances: u64,
-    /// Of the flow balance in the worst quarter of a minute.
-    pub worst_window: f64,
-    /// Of the position equation.
-    pub position: f64,
-    /// Its largest mean over a minute or what there is.
-    pub worst_position: f64,
-    /// How often the estimates began anew.
-    pub restarts: u64,
-    /// Since when, s; −∞ over the whole trace.
-    pub since_s: f64,
-    /// Before that, the last ten minutes or so that they did not explain, s.
-    pub unexplained_s: Option<[f64; 2]>,
 }
 
 /// All that a verdict rests on.
@@ -107,92 +82,71 @@ pub struct Findings<'a> {
     pub episodes: &'a [Episode],
     /// Alarm thresholds, L/min.
     pub threshold_lpm: PerLeak<f64>,
-    /// Full scale of the flow meters A and B, L/min.
-    pub meters_lpm: [f64; 2],
-    /// The oil as the rig file declares it.
-    pub fluid: Fluid<f64>,
     /// What was read.
     pub trace: &'a TraceSummary,
     /// Time of the last row, s.
     pub end_s: f64,
-    /// None from an estimator that knows no noise.
-    pub misfit: Option<Misfit>,
+    /// Whether the estimator knows how good its figures are.
+    pub knows_noise: bool,
+
     /// How often the estimates began anew since the trace began, and when last.
     pub restarts_in_all: u64,
     /// See [`restarts_in_all`](Self::restarts_in_all).
     pub changed_at_s: Option<f64>,
     /// Faults of the channels that the estimator reads, …
     pub channels: &'a [ChannelFault],
-    /// … and those of before [`Misfit::since_s`].
+    /// … and those of before a stream's last stretch.
     pub earlier_channels: &'a [ChannelFault],
-    /// What else may explain the trace.
-    pub suspicions: &'a Suspicions,
-}
-
-/// What else than leaks may explain a trace.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Suspicions {
-    /// A mistake of wiring that does.
-    pub wiring: Option<Wiring>,
-    /// A sensor whose gain or zero is off that does.
-    pub sensor: Option<Wiring>,
-    /// The leaks held against zeros of the meters.
-    pub zeros: Option<ZeroCheck>,
-    /// Leaks through an orifice that explain what leaks as C P do not.
-    pub orifice: Option<Orifice>,
-}
-
-impl Suspicions {
-    /// Whether there is anything to weigh.
-    pub fn any(&self) -> bool {
-        self.wiring.is_some() || self.sensor.is_some() || self.zeros.is_some() || self.orifice.is_some()
-    }
+    /// A mistake of wiring that explains the trace.
+    pub wiring: Option<&'a Wiring>,
+    /// The posterior; none where there is too little to weigh.
+    pub decision: Option<&'a Decision>,
 }
 
 impl Findings<'_> {
-    /// The leaks to act on.
+    /// The leaks to act on: those that the posterior is sure of, those that come and go, and, where nothing was weighed, those
+    /// whose alarm stands.
     pub(super) fn faults(&self) -> Vec<Leak> {
-        let is_fault = |leak: &Leak| self.active[*leak] || comes_and_goes(self.episodes, *leak, self.end_s);
+        let is_fault = |leak: &Leak| match self.decision {
+            Some(decision) if decision.status.is_sure() => decision.faults.contains(leak),
+            _ => self.active[*leak] || comes_and_goes(self.episodes, *leak, self.end_s),
+        };
         Leak::ALL.into_iter().filter(is_fault).collect()
     }
 
     /// Whether a leak's flow is known well enough to be quoted.
     pub(super) fn is_known(&self, leak: Leak) -> bool {
-        self.estimates.leaks()[leak].identifiable
+        self.leakage[leak].std_lpm.is_some_and(|std| std < QUOTED_SHARE * self.leakage[leak].mean_lpm)
     }
 
-    /// Whether the data exclude, with 95 %, that a leak is above its threshold.
+    /// Whether the data exclude that a leak is above its threshold.
     pub(super) fn is_below(&self, leak: Leak) -> bool {
-        let Leakage { mean_lpm, std_lpm, .. } = self.leakage[leak];
-        let most = |std| Estimate { value: mean_lpm, std }.ci95()[1];
-        self.is_known(leak) && std_lpm.is_some_and(|std| most(std) < self.threshold_lpm[leak])
+        self.decision.is_some_and(|decision| decision.ruled_out.contains(&leak))
     }
 }
 
-impl Verdict {
-    /// With what the posterior over explanations says beside it.
-    pub fn with_explanations(&mut self, decision: Decision) {
-        self.probability = Some(decision.probability);
-        self.explanations = decision.explanations;
-    }
+/// A figure whose standard deviation is a larger share of it is none.
+const QUOTED_SHARE: f64 = 0.5;
 
+impl Verdict {
     /// The verdict on what was found.
     pub fn of(findings: &Findings<'_>) -> Self {
         let faults = findings.faults();
         let contradictions = contradictions(findings);
-        let gaps = gaps(findings);
-        let (status, reasons) = if !contradictions.is_empty() {
-            (Status::Doubtful, contradictions)
-        } else if findings.misfit.is_none() {
-            (Status::NotSure, gaps)
-        } else if !faults.is_empty() {
-            (Status::Leak, Vec::new())
-        } else if gaps.is_empty() {
-            (Status::Sound, Vec::new())
-        } else {
-            (Status::NotSure, gaps)
+        let gaps = gaps(findings, &faults);
+        let (status, reasons) = match findings.decision {
+            _ if !contradictions.is_empty() => (Status::Doubtful, contradictions),
+            Some(decision) if decision.status == Status::Leak => (Status::Leak, Vec::new()),
+            Some(decision) if decision.status == Status::Sound && gaps.is_empty() => (Status::Sound, gaps),
+            _ => (Status::NotSure, gaps),
         };
-        let text = statement::text(findings, status, &faults, &reasons);
-        Self { status, text, faults, reasons, probability: None, explanations: Vec::new() }
+        Self {
+            status,
+            text: statement::text(findings, status, &faults, &reasons),
+            faults,
+            reasons,
+            probability: findings.decision.map(|decision| decision.probability),
+            explanations: findings.decision.map(|decision| decision.explanations.clone()).unwrap_or_default(),
+        }
     }
 }

@@ -2,7 +2,7 @@ use crate::failure::Failure;
 use crate::input::{Input, Trace};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::replay::{EstimateFile, Replay, replay, replay_explained};
+use pitchleak::replay::{EstimateFile, Replay, replay};
 use pitchleak::rig::EstimatorKind;
 use pitchleak::trace::Record;
 use pitchleak_view::Text;
@@ -32,10 +32,6 @@ pub struct Arguments {
     /// Print the report as JSON (schema pitchleak.replay/1), a line for each trace
     #[arg(long)]
     json: bool,
-
-    /// Add what the posterior over explanations says to the JSON
-    #[arg(long, requires = "json")]
-    explain: bool,
 
     /// Exit with status 1 if a fault is found
     #[arg(long)]
@@ -86,11 +82,7 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
             Some(file) => file.write(&replay.estimate_row(record)).map_err(Failure::from),
         }
     };
-    let report = if arguments.explain {
-        replay_explained(&mut reader, &trace.rig, each)?
-    } else {
-        replay(&mut reader, &trace.rig, each)?
-    };
+    let report = replay(&mut reader, &trace.rig, each)?;
     file.map(EstimateFile::finish).transpose()?;
     if let Some((page, history)) = page.zip(history) {
         page.finish(&Page::of_replay(&report, &trace.rig, &history))?;

@@ -3,7 +3,7 @@
 use super::worlds::Part;
 use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak};
-use pitchleak::explain::{Decision, Statistic, explain};
+use pitchleak::explain::{Decision, Explained, Statistic, explain};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{Leakage, ReasonId, ReplayReport};
 use pitchleak::trace::{Record, TraceError, TraceReader};
@@ -114,24 +114,24 @@ impl VerdictGiver for Explain {
 
     fn judge(&self, trace: &[u8], rig: &Rig) -> Given {
         match explained(trace, rig) {
-            Ok(Some(decision)) => of_decision(&decision),
+            Ok(Some((decision, end_s))) => of_decision(&decision, end_s),
             Ok(None) => Given::refused("too little to explain".into()),
             Err(error) => Given::refused(error.to_string()),
         }
     }
 }
 
-fn explained(trace: &[u8], rig: &Rig) -> Result<Option<Decision>, TraceError> {
+fn explained(trace: &[u8], rig: &Rig) -> Result<Option<(Decision, f64)>, TraceError> {
     let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
     let mut record = Record::default();
     while reader.next_record(&mut record)? {
         statistic.push(record.step_s(), &record.sample);
     }
-    Ok(explain(&statistic, rig))
+    Ok(explain(&statistic, rig).map(|decision| (decision, record.t_s)))
 }
 
-fn of_decision(decision: &Decision) -> Given {
+fn of_decision(decision: &Decision, end_s: f64) -> Given {
     let sure = decision.status.is_sure();
     let words = PerLeak::from_fn(|leak: Leak| match leak {
         _ if !sure => Word::Perhaps,
@@ -147,8 +147,8 @@ fn of_decision(decision: &Decision) -> Given {
         mean_lpm: decision.leakage.map(|belief| belief.mean_lpm),
         std_lpm: decision.leakage.map(|belief| belief.std_lpm),
         interval_lpm: decision.leakage.map(|belief| [belief.quantiles_lpm[0], belief.quantiles_lpm[2]]),
-        since_s: decision.changed_s,
-        causes: accused(decision),
+        since_s: decision.changed_ago_s.map_or(0.0, |ago_s| end_s - ago_s),
+        causes: accused(&decision.explanations),
         text: format!(
             "{} {:?} {:?} misfit {:.2} wander {:.2}: {}",
             decision.status.word(),
@@ -162,9 +162,9 @@ fn of_decision(decision: &Decision) -> Given {
 }
 
 /// What explanations are made of, beside leaks, where they have most of the probability together.
-fn accused(decision: &Decision) -> Vec<Cause> {
+fn accused(explanations: &[Explained]) -> Vec<Cause> {
     let mut masses: Vec<(&str, f64)> = Vec::new();
-    for one in &decision.explanations {
+    for one in explanations {
         for id in one.id.split('+').filter(|id| !parts_of(id).is_empty()) {
             match masses.iter_mut().find(|(known, _)| *known == id) {
                 Some((_, mass)) => *mass += one.probability,
@@ -173,7 +173,7 @@ fn accused(decision: &Decision) -> Vec<Cause> {
         }
     }
     let alike = |id: &str| {
-        let own = decision.explanations.iter().filter(|one| one.id.split('+').any(|part| part == id));
+        let own = explanations.iter().filter(|one| one.id.split('+').any(|part| part == id));
         own.flat_map(|one| one.cannot_be_told_from.iter().flat_map(|id| parts_of(id))).collect()
     };
     let cause = |(id, mass): &(&str, f64)| Cause {
@@ -206,15 +206,6 @@ fn parts_of(id: &str) -> Vec<Part> {
     }
 }
 
-/// What a word of a program without probabilities is worth: its α is 5 %.
-fn worth(word: Word) -> f64 {
-    match word {
-        Word::Leaks => 0.95,
-        Word::Perhaps => 0.5,
-        Word::RuledOut => 0.05,
-    }
-}
-
 fn of_report(report: &ReplayReport) -> Given {
     let verdict = &report.verdict;
     let sure = verdict.status.is_sure();
@@ -228,23 +219,32 @@ fn of_report(report: &ReplayReport) -> Given {
     });
     let std = |leakage: Leakage| leakage.std_lpm.unwrap_or(0.0);
     let interval = |leakage: Leakage| [-1.96, 1.96].map(|z| leakage.mean_lpm + z * std(leakage));
-    let causes = verdict.reasons.iter().filter(|reason| accuses(reason.id));
+    let accused_by_reasons = verdict.reasons.iter().filter(|reason| accuses(reason.id));
+    let mut causes: Vec<Cause> = accused_by_reasons.map(|reason| cause(&reason.text)).collect();
+    causes.extend(accused(&verdict.explanations));
+    let unknown = PerLeak::from_fn(|_| 0.5);
     Given {
         sure,
         words,
-        probability: words.map(worth),
+        probability: verdict.probability.unwrap_or(unknown),
         mean_lpm: report.leakage.map(|leakage| leakage.mean_lpm),
         std_lpm: report.leakage.map(std),
         interval_lpm: report.leakage.map(interval),
         since_s: report.changed_at_s.unwrap_or(0.0),
-        causes: causes.map(|reason| cause(&reason.text)).collect(),
-        text: format!("{} {}", verdict.status.word(), verdict.text),
+        causes,
+        text: format!(
+            "{} {} {:?}: {}",
+            verdict.status.word(),
+            verdict.text,
+            report.leakage.map(|leakage| (leakage.mean_lpm, leakage.std_lpm)),
+            verdict.explanations.first().map_or("", |best| &best.id)
+        ),
     }
 }
 
 /// Whether a reason tells to mend something.
 fn accuses(id: ReasonId) -> bool {
-    matches!(id, ReasonId::Wiring | ReasonId::SensorError | ReasonId::OffsetOrLeak | ReasonId::Channel(_))
+    matches!(id, ReasonId::Wiring | ReasonId::Channel(_))
 }
 
 /// A cause by the columns that its sentence names, before and after "cannot be told apart".

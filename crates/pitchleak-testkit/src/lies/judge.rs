@@ -60,7 +60,6 @@ pub struct Said {
     leakage: PerLeak<LiveLeakage>,
     changed_at_s: Option<f64>,
     reasons: Vec<Reason>,
-    note: Vec<String>,
 }
 
 impl From<ReplayReport> for Said {
@@ -71,7 +70,6 @@ impl From<ReplayReport> for Said {
             leakage: report.leakage.map(LiveLeakage::from),
             changed_at_s: report.changed_at_s,
             reasons: report.verdict.reasons,
-            note: report.trace.warnings,
         }
     }
 }
@@ -79,30 +77,14 @@ impl From<ReplayReport> for Said {
 impl From<EstimateEvent> for Said {
     fn from(last: EstimateEvent) -> Self {
         let EstimateEvent { status, faults, leakage, changed_at_s, reasons, .. } = last;
-        Self { status, faults, leakage, changed_at_s, reasons, note: vec![] }
+        Self { status, faults, leakage, changed_at_s, reasons }
     }
 }
 
 pub fn replayed(trace: Vec<u8>, accuracy: f64) -> Result<ReplayReport, ReplayError> {
     let rig = rig(accuracy);
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace)), &rig)?;
-    let mut explainer = pitchleak::explain::Explainer::new(&rig);
-    let mut report = replay(&mut reader, &rig, |replay, record, _| {
-        if replay.left_out() { explainer.leave_out(record) } else { explainer.push(record) }
-        Ok::<_, ReplayError>(())
-    })?;
-    if std::env::var("OLD").is_err() {
-        let bad = report.verdict.reasons.iter().any(|r| matches!(r.id, ReasonId::Channel(k) if k != pitchleak::channels::ChannelFaultKind::Coarse) || r.id == ReasonId::MostlyBadRows);
-        if let Some(d) = explainer.decision() {
-            let status = if bad { Status::Doubtful } else { d.status };
-            if let Some(best) = d.explanations.first() { report.trace.warnings.push(format!("{:.2} {} misfit {:.2} P {:?}", best.probability, best.id, d.misfit, d.probability)); }
-            report.verdict.status = status;
-            report.verdict.faults = d.faults.clone();
-            for leak in Leak::ALL { report.leakage[leak].mean_lpm = d.leakage[leak].mean_lpm; report.leakage[leak].std_lpm = Some(d.leakage[leak].std_lpm); }
-            report.changed_at_s = (d.changed_s > 0.0).then_some(d.changed_s);
-        }
-    }
-    Ok(report)
+    replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))
 }
 
 /// All that a stream says, line by line.
@@ -163,12 +145,11 @@ pub struct Judged {
 /// At each door, of what the sensors of `accuracy` show of `truths`, with a lie.
 pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u64) -> [Judged; 2] {
     let (trace, shown) = recorded(truths, lie, accuracy, seed);
-    Door::ALL.map(|door| match if door == Door::Replay { door.said(trace.clone(), accuracy) } else { Err(String::new()) } {
+    Door::ALL.map(|door| match door.said(trace.clone(), accuracy) {
         Err(words) => {
             Judged { judgement: Judgement::InDoubt, named: has_words(&words, lie), misnamed: false }
         }
         Ok(said) => {
-            if judge(&said, leaking, shown) == Judgement::ConfidentlyWrong { eprintln!("WRONG {} {} {} {} {seed}: {:?} {:?} {:?}", lie.name, door.name(), leak_name(leaking), accuracy, said.faults, said.leakage.map(|l| (l.mean_lpm, l.std_lpm)), said.note); }
             let named = names(&said, lie);
             let accused = said.reasons.iter().any(|reason| reason.id == ReasonId::Wiring);
             Judged { judgement: judge(&said, leaking, shown), named, misnamed: accused && !named }

@@ -39,7 +39,7 @@ enum Finding {
 }
 
 fn finding(report: &CheckReport) -> Finding {
-    let misfits = report.normalised_innovation.and_then(misfit).is_some();
+    let misfits = misfit(&report.verdict).is_some();
     if !report.channels.is_empty() || report.wiring.is_some() || misfits {
         Finding::Broken
     } else if open(report).next().is_some() {
@@ -95,7 +95,7 @@ fn head(report: &CheckReport) -> Head {
 fn why(report: &CheckReport) -> String {
     let channel = report.channels.first().map(|fault| format!("{}.", capital(&fault.text)));
     let wiring = report.wiring.as_ref().map(|wiring| format!("{}.", capital(&wiring.suggestion)));
-    let misfit = report.normalised_innovation.and_then(misfit);
+    let misfit = misfit(&report.verdict);
     channel.or(wiring).or(misfit).unwrap_or_default()
 }
 
@@ -124,7 +124,7 @@ fn to_do(report: &CheckReport) -> Markup {
                         "Where that is so, mend it in the rig file: " code { "[columns] " (wiring.columns.join("; ")) }
                     } } }
                 }
-                @if let Some(text) = report.normalised_innovation.and_then(misfit) { li { (prose(&text)) } }
+                @if let Some(text) = misfit(&report.verdict) { li { (prose(&text)) } }
             },
         }
     }
@@ -167,8 +167,8 @@ fn reach(report: &CheckReport) -> Markup {
                 }
             } }
         } }
-        @if let Some(ratios) = report.normalised_innovation {
-            p { (prose(&misfit(ratios).unwrap_or_else(|| "Model and declared noise explain this trace.".to_owned()))) }
+        @if report.normalised_innovation.is_some() {
+            p { (prose(&misfit(&report.verdict).unwrap_or_else(|| "Model and declared noise explain this trace.".to_owned()))) }
         }
     }
 }

@@ -99,11 +99,11 @@ impl CheckText<'_> {
     }
 
     fn write_consistency(&self, out: &mut String) {
-        let Some(ratios) = self.report.normalised_innovation else { return };
         let (caution, reset) = self.palette.caution();
-        let _ = match misfit(ratios) {
+        let verdict = &self.report.verdict;
+        let _ = match misfit(verdict) {
             Some(sentence) => writeln!(out, "\n{caution}{sentence}{reset}"),
-            None => writeln!(out, "\nModel and declared noise explain this trace."),
+            None => writeln!(out, "\n`replay` says {}.", verdict.status.word()),
         };
     }
 }

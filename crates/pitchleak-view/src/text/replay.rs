@@ -6,7 +6,7 @@ use super::replay_terminal::{write_bars, write_courses};
 use crate::Palette;
 use pitchleak::core::AlarmState;
 use pitchleak::report::{
-    EstimateEntry, MISFIT, ReplayReport, TraceSummary, Verdict, interval, with_interval,
+    EstimateEntry, ReasonId, ReplayReport, TraceSummary, Verdict, capital, interval, with_interval,
 };
 use pitchleak::rig::Rig;
 use pitchleak::units::{LPM_PER_BAR, duration};
@@ -27,17 +27,10 @@ pub fn data_line(trace: &TraceSummary) -> String {
     line
 }
 
-/// Says so where the residuals are larger than the declared noise can make them.
-pub(crate) fn misfit(normalised_innovation: [f64; 2]) -> Option<String> {
-    let worst = normalised_innovation.into_iter().fold(0.0, f64::max);
-    (worst > MISFIT).then(|| {
-        format!(
-            "Model and declared noise do not explain this trace: its residuals are {:.1} times the noise of \
-             [sensors]. Either the sensors are worse than declared, or the model lacks an effect (see `pitchleak \
-             diagnose`).",
-            worst.sqrt()
-        )
-    })
+/// Says so where no explanation fits the readings.
+pub(crate) fn misfit(verdict: &Verdict) -> Option<String> {
+    let reason = verdict.reasons.iter().find(|reason| reason.id == ReasonId::ModelDoesNotFit)?;
+    Some(format!("{}.", capital(&reason.text)))
 }
 
 /// What a doubt may come from where nobody said whose trace it is.
