@@ -4,7 +4,7 @@ use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
 use super::hypothesis::{
-    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, subsets,
+    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, Subset, subsets,
 };
 use super::independence::inflation;
 use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
@@ -17,8 +17,12 @@ use pitchleak_core::{Leak, PerLeak};
 
 /// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
 const LEAST_LN: f64 = 9.0;
+/// As much in the first look, which asks for the best and for means alone; numerical.
+const FIRST_LOOK_LN: f64 = 3.0;
 /// States of sensors and rig beside which other courses of leaks are tried; numerical.
 const STATES_WITH_COURSES: usize = 5;
+/// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
+const BEYOND_WANDERING: f64 = 2.0;
 /// Of those, beside which pairs of leaks have courses of their own; numerical.
 const STATES_WITH_PAIRS: usize = 3;
 /// Gains and areas that are off by more are units.
@@ -119,6 +123,7 @@ struct Pass<'a, 's> {
 struct Scored<'a> {
     hypothesis: Hypothesis<'a>,
     ln_posterior: f64,
+    ln_likelihood: f64,
     /// Among the equations of this mistake of wiring, or the declared.
     wiring: usize,
 }
@@ -158,7 +163,7 @@ impl<'a, 's> Pass<'a, 's> {
         let states = best_states(&mut all);
         self.with_courses(&declared, &states, &mut all);
         all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        let weighed = self.mix(std::slice::from_ref(&declared), all);
+        let weighed = self.mix(std::slice::from_ref(&declared), all, FIRST_LOOK_LN);
         let inflation = weighed.first().map_or([1.0; 2], |best| {
             let fit = fit(&declared, &best.hypothesis.free);
             let coloured =
@@ -180,7 +185,7 @@ impl<'a, 's> Pass<'a, 's> {
         let mut equations = vec![declared];
         equations.extend(mistaken);
         all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        self.mix(&equations, all)
+        self.mix(&equations, all, LEAST_LN)
     }
 
     fn equations(
@@ -276,7 +281,7 @@ impl<'a, 's> Pass<'a, 's> {
         } else {
             fit.ln_evidence + hypothesis.ln_prior
         };
-        Scored { hypothesis, ln_posterior, wiring: 0 }
+        Scored { hypothesis, ln_posterior, ln_likelihood: fit.ln_likelihood, wiring: 0 }
     }
 
     fn has_impossible_gain(
@@ -295,40 +300,77 @@ impl<'a, 's> Pass<'a, 's> {
             .any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
     }
 
-    /// Other courses of the leaks, beside the best states.
+    /// Other courses of the leaks, beside the best states. A leak that wanders may do all that the others do: where even that
+    /// raises the likelihood by too little, they need not be asked.
     fn with_courses(&self, equations: &NormalEquations, states: &[State<'a>], all: &mut Vec<Scored<'a>>) {
+        let mut best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let courses = self.courses();
+        for (rank, state) in states.iter().enumerate() {
+            for subset in subsets().skip(1) {
+                let Some(steady) = find(all, *state, subset) else { continue };
+                let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
+                let together = |course: LeakCourse| subset.map(|there| there.then_some(course));
+                let wandering = LeakCourse::Wandering;
+                let ln_wandering = self.tables.ln_course("wandering");
+                let free = self.score(equations, *state, together(wandering), ln_wandering);
+                let gain = (free.ln_likelihood - steady_likelihood).max(0.0) + BEYOND_WANDERING;
+                let most = steady_ln - self.tables.ln_course("constant") + gain;
+                best = best.max(free.ln_posterior);
+                all.push(free);
+                for (course, ln_course) in &courses {
+                    // The pressure across the seal changes sign: what opens at one is no line of it.
+                    let is_line = !(subset[0] && *course == LeakCourse::Cracking);
+                    let by_pressure = matches!(course, LeakCourse::Orifice | LeakCourse::Cracking);
+                    if is_line && (by_pressure || most + ln_course > best - LEAST_LN) {
+                        let scored = self.score(equations, *state, together(*course), *ln_course);
+                        best = best.max(scored.ln_posterior);
+                        all.push(scored);
+                    }
+                }
+                if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && subset.iter().filter(|leak| **leak).count() == 2 {
+                    self.with_pairs(equations, *state, subset, most, &mut best, all);
+                }
+            }
+        }
+    }
+
+    /// Courses of leaks beside being constant and wandering, with their priors.
+    fn courses(&self) -> Vec<(LeakCourse, f64)> {
         let borders = self.segments.saturating_sub(1);
         let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
         let mut courses = vec![
             (LeakCourse::Orifice, self.tables.ln_course("orifice")),
             (LeakCourse::Cracking, self.tables.ln_course("cracking")),
             (LeakCourse::Growing, self.tables.ln_course("growing")),
-            (LeakCourse::Wandering, self.tables.ln_course("wandering")),
         ];
         courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
-        for state in states {
-            for subset in subsets().skip(1) {
-                for (course, ln_course) in &courses {
-                    // The pressure across the seal changes sign: what opens at one is no line of it.
-                    if subset[0] && *course == LeakCourse::Cracking {
-                        continue;
-                    }
-                    let leaks = subset.map(|there| there.then_some(*course));
-                    all.push(self.score(equations, *state, leaks, *ln_course));
-                }
-            }
-        }
+        courses
+    }
+
+    /// Two leaks each with a course of its own, where those can be as probable as the best.
+    fn with_pairs(
+        &self,
+        equations: &NormalEquations,
+        state: State<'a>,
+        subset: Subset,
+        most: f64,
+        best: &mut f64,
+        all: &mut Vec<Scored<'a>>,
+    ) {
+        let mut courses = self.courses();
         courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
         courses.push((LeakCourse::Constant, self.tables.ln_course("constant")));
-        for state in states.iter().filter(|state| state.wander.0 <= 0.0).take(STATES_WITH_PAIRS) {
-            for [one, other] in [[0, 1], [0, 2], [1, 2]] {
-                for (course, ln_one) in &courses {
-                    for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                        let mut leaks = [None; 3];
-                        (leaks[one], leaks[other]) = (Some(*course), Some(*another));
-                        all.push(self.score(equations, *state, leaks, ln_one + ln_other));
-                    }
+        let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
+        for (course, ln_one) in &courses {
+            for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
+                if most + ln_one + ln_other <= *best - LEAST_LN {
+                    continue;
                 }
+                let mut leaks = [None; 3];
+                (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
+                let scored = self.score(equations, state, leaks, ln_one + ln_other);
+                *best = best.max(scored.ln_posterior);
+                all.push(scored);
             }
         }
     }
@@ -345,6 +387,8 @@ impl<'a, 's> Pass<'a, 's> {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander };
+        let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
         let whole = self.products.whole();
         let mut kept = Vec::new();
         for entry in &self.tables.mistakes {
@@ -352,7 +396,8 @@ impl<'a, 's> Pass<'a, 's> {
             let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
             let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
             let ln_prior = entry.share.ln() - table::ln_wired() + measure;
-            for subset in subsets() {
+            let mut none_ln = f64::NEG_INFINITY;
+            for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
                 let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
                 let ln_course = if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
                 let mut hypothesis = Hypothesis::new(
@@ -366,7 +411,15 @@ impl<'a, 's> Pass<'a, 's> {
                 hypothesis.wiring = Some(entry);
                 let mut scored = self.scored(&equations, hypothesis);
                 scored.wiring = kept.len() + 1;
+                // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
+                if subset == [false; 3] {
+                    none_ln = scored.ln_posterior - scored.ln_likelihood;
+                }
+                let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < best - LEAST_LN;
                 all.push(scored);
+                if hopeless {
+                    break;
+                }
             }
             kept.push(equations);
         }
@@ -374,26 +427,26 @@ impl<'a, 's> Pass<'a, 's> {
     }
 
     /// Cuts leaks at zero, best first, until what follows cannot matter.
-    fn mix(&self, equations: &[NormalEquations], all: Vec<Scored<'a>>) -> Vec<Weighed<'a>> {
+    fn mix(&self, equations: &[NormalEquations], all: Vec<Scored<'a>>, least_ln: f64) -> Vec<Weighed<'a>> {
         let mut best = f64::NEG_INFINITY;
         let mut kept: Vec<(f64, Weighed<'a>)> = Vec::new();
         for scored in all {
-            if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - LEAST_LN {
+            if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - least_ln {
                 break;
             }
             let Some(equations) = equations.get(scored.wiring) else { continue };
-            let Some((ln, weighed)) = self.cut(equations, scored, best) else { continue };
+            let Some((ln, weighed)) = self.cut(equations, scored, best - least_ln) else { continue };
             best = best.max(ln);
             kept.push((ln, weighed));
         }
-        kept.retain(|(ln, _)| *ln > best - LEAST_LN);
+        kept.retain(|(ln, _)| *ln > best - least_ln);
         let sum: f64 = kept.iter().map(|(ln, _)| (ln - best).exp()).sum();
         kept.sort_by(|a, b| b.0.total_cmp(&a.0));
         kept.into_iter().map(|(ln, one)| Weighed { probability: (ln - best).exp() / sum, ..one }).collect()
     }
 
     /// An explanation with its leaks at least zero, its evidence and a sample of the leaks.
-    fn cut(&self, equations: &NormalEquations, scored: Scored<'a>, best: f64) -> Option<(f64, Weighed<'a>)> {
+    fn cut(&self, equations: &NormalEquations, scored: Scored<'a>, least: f64) -> Option<(f64, Weighed<'a>)> {
         let Scored { hypothesis, ln_posterior, .. } = scored;
         let fit = fit(equations, &hypothesis.free);
         let misfit = self.misfit(&fit);
@@ -406,7 +459,7 @@ impl<'a, 's> Pass<'a, 's> {
             let covariance = fit.covariance(&hypothesis.positive);
             let most_negative =
                 means.iter().enumerate().map(|(i, mean)| (mean / covariance[i][i].sqrt()).min(0.0));
-            if ln - 0.5 * most_negative.fold(0.0, f64::min).powi(2) < best - LEAST_LN {
+            if ln - 0.5 * most_negative.fold(0.0, f64::min).powi(2) < least {
                 return None;
             }
             let orthant = positive_orthant(&means, &covariance);
@@ -501,6 +554,12 @@ impl<'a, 's> Pass<'a, 's> {
             })
             .sum()
     }
+}
+
+/// These leaks, steady, in this state.
+fn find<'b, 'a>(all: &'b [Scored<'a>], state: State<'a>, subset: Subset) -> Option<&'b Scored<'a>> {
+    let steady = subset.map(|there| there.then_some(LeakCourse::Constant));
+    all.iter().find(|scored| scored.hypothesis.leaks == steady && scored.hypothesis.state == state)
 }
 
 /// The states of best evidence, each once, and as-declared with usual and slight zeros.

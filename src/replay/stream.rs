@@ -128,7 +128,6 @@ impl Stream {
 
     /// Takes in one record; says whether the estimates are new.
     fn push(&mut self, record: &Record) -> bool {
-        let restarts = self.replay.consistency.restarts();
         let renewed = self.replay.push(record);
         if self.refused.as_ref().is_some_and(|refused| refused.is_over(record.t_s)) {
             self.refused = None;
@@ -136,13 +135,8 @@ impl Stream {
         if let Some(refused) = &mut self.refused {
             refused.add(record);
         }
-        if self.replay.consistency.restarts() != restarts {
-            self.evidence.restart();
-        }
         if !self.replay.spikes.left_out() {
-            let replay = &self.replay;
-            self.evidence
-                .add(record, &replay.rig, || replay.leak_coefficients().map(|leak| leak.value.max(0.0)));
+            self.evidence.add(record, &self.replay.rig);
         }
         renewed
     }

@@ -7,8 +7,7 @@ use crate::explain::Decision;
 use crate::report::Status;
 use crate::rig::ColumnMap;
 use crate::wiring::{
-    Excerpt, Explanation, Mistake, Recorded, Running, Wiring, exchanged_by_force, exchanged_so_far, explain,
-    unit_by_scatter,
+    Excerpt, Explanation, Mistake, Recorded, Running, Wiring, exchanged_by_force, explain, unit_by_scatter,
 };
 
 impl Weighed {
@@ -51,9 +50,7 @@ impl Replay {
         if weighed.has_broken_channel() {
             return None;
         }
-        let found =
-            evidence.unit_by_scatter(&self.rig).or_else(|| exchanged_so_far(&evidence.stretch(&self.rig)));
-        found.map(|found| found.wiring(&self.rig.columns, &self.rig))
+        evidence.explanation(&self.rig).map(|found| found.wiring(&self.rig.columns, &self.rig))
     }
 }
 

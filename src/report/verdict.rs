@@ -107,9 +107,12 @@ impl Findings<'_> {
     /// The leaks to act on: those that the posterior is sure of, those that come and go, and, where nothing was weighed, those
     /// whose alarm stands.
     pub(super) fn faults(&self) -> Vec<Leak> {
-        let is_fault = |leak: &Leak| match self.decision {
-            Some(decision) if decision.status.is_sure() => decision.faults.contains(leak),
-            _ => self.active[*leak] || comes_and_goes(self.episodes, *leak, self.end_s),
+        let is_fault = |leak: &Leak| {
+            let now = match self.decision {
+                Some(decision) if decision.status.is_sure() => decision.faults.contains(leak),
+                _ => self.active[*leak],
+            };
+            now || comes_and_goes(self.episodes, *leak, self.end_s)
         };
         Leak::ALL.into_iter().filter(is_fault).collect()
     }
@@ -136,7 +139,7 @@ impl Verdict {
         let gaps = gaps(findings, &faults);
         let (status, reasons) = match findings.decision {
             _ if !contradictions.is_empty() => (Status::Doubtful, contradictions),
-            Some(decision) if decision.status == Status::Leak => (Status::Leak, Vec::new()),
+            Some(decision) if decision.status.is_sure() && !faults.is_empty() => (Status::Leak, Vec::new()),
             Some(decision) if decision.status == Status::Sound && gaps.is_empty() => (Status::Sound, gaps),
             _ => (Status::NotSure, gaps),
         };

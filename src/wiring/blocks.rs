@@ -31,8 +31,6 @@ pub(super) struct Block {
     /// ∫dt, s, and Σ dt², s².
     pub time_s: f64,
     pub time_square_s2: f64,
-    /// Time of its end, s.
-    pub end_s: f64,
 }
 
 impl Block {
@@ -94,7 +92,7 @@ impl Gatherer {
         if self.sum.time_s < BLOCK_S || self.sum.steps < BLOCK_STEPS {
             return None;
         }
-        let block = std::mem::take(&mut self.sum).block(self.follows, now.t_s);
+        let block = std::mem::take(&mut self.sum).block(self.follows);
         self.follows = block.is_some();
         block
     }
@@ -140,7 +138,7 @@ impl Sum {
         self.fed_b += u32::from(qb.is_some());
     }
 
-    fn block(self, follows: bool, end_s: f64) -> Option<Block> {
+    fn block(self, follows: bool) -> Option<Block> {
         let fed = match (self.fed_a == self.steps, self.fed_b == self.steps) {
             (true, true) => Fed::Both,
             (true, false) => Fed::OnlyA,
@@ -149,6 +147,6 @@ impl Sum {
         };
         let Self { a, b, roots, travel_m, time_s, time_square_s2, .. } = self;
         let force = (self.forces == self.steps).then_some(self.force);
-        Some(Block { follows, fed, a, b, roots, force, travel_m, time_s, time_square_s2, end_s })
+        Some(Block { follows, fed, a, b, roots, force, travel_m, time_s, time_square_s2 })
     }
 }

@@ -1,6 +1,6 @@
 //! Where the declared wiring does not explain a stretch, and whether a mistake of it does.
 
-use super::continuity::Continuity;
+use super::continuity::Recorded;
 use super::fit::Fit;
 use super::mistake::Mistake;
 use super::priors::Priors;
@@ -38,7 +38,7 @@ pub(super) struct Declared {
 
 impl Declared {
     /// With leaks as C P; where those are contradicted, also with part of each through an orifice.
-    pub fn by_each_law(stretch: &impl Continuity) -> Vec<Self> {
+    pub fn by_each_law(stretch: &Recorded<'_>) -> Vec<Self> {
         let rig = stretch.rig();
         let plain = Priors::declared(rig);
         let Some(fit) = stretch.fit(&plain) else { return vec![] };

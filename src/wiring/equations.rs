@@ -3,11 +3,10 @@
 
 use super::blocks::{Block, Chamber, Fed};
 use super::force::ForceSums;
-use super::priors::{PARAMETERS, SLOPE_OF, Vector};
+use super::priors::{PARAMETERS, Vector};
 use crate::rig::Rig;
 use nalgebra::SMatrix;
 use pitchleak_core::{Cylinder, Leak, PerLeak, Sensors};
-use serde::{Deserialize, Serialize};
 
 /// The weights of both chamber equations in one scalar equation, and the noise of it.
 #[derive(Clone, Copy, Debug)]
@@ -82,14 +81,14 @@ fn flow_variance(a: f64, b: f64, sensors: &Sensors<f64>, leaks: PerLeak<f64>, fl
 }
 
 /// One row: its left side, and the parameters' columns in their order, SI.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Row {
     left: f64,
     columns: [f64; PARAMETERS],
 }
 
 impl Row {
-    fn new(of: &Combination, block: &Block, noise: &Noise, after_begin_s: f64) -> Self {
+    fn new(of: &Combination, block: &Block, noise: &Noise) -> Self {
         let (a, b) = (&block.a, &block.b);
         let compression = of.a * a.compression + of.b * b.compression;
         let travel = of.position * block.travel_m;
@@ -108,11 +107,6 @@ impl Row {
                 flow_a,
                 flow_b,
                 -travel,
-                of.a * block.time_s * after_begin_s,
-                of.b * block.time_s * after_begin_s,
-                internal * after_begin_s,
-                at_a * after_begin_s,
-                at_b * after_begin_s,
                 (of.a - of.b) * block.roots.internal,
                 of.a * block.roots.external_a,
                 of.b * block.roots.external_b,
@@ -134,7 +128,7 @@ impl Row {
 }
 
 /// The normal equations of one of the two.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 struct Series {
     /// Lower triangle: the rest is zero.
     matrix: [[f64; PARAMETERS]; PARAMETERS],
@@ -146,7 +140,7 @@ struct Series {
 }
 
 /// A row free of its neighbours' noise, what it was divided by, and the variance of its last readings.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Whitened {
     row: Row,
     pivot: f64,
@@ -158,12 +152,12 @@ impl Series {
     ///
     /// Readings at a block's ends are in both blocks that they part, with opposite signs, so the rows' covariance is
     /// tridiagonal and its Cholesky factor has two diagonals.
-    fn add(&mut self, of: Option<&Combination>, block: &Block, noise: &Noise, after_begin_s: f64) {
+    fn add(&mut self, of: Option<&Combination>, block: &Block, noise: &Noise) {
         let last = self.last.take();
         let Some(of) = of else { return };
         let ends = noise.end_variance(of, block);
         let variance = of.flow_variance * block.time_square_s2 + 2.0 * ends;
-        let mut row = Row::new(of, block, noise, after_begin_s);
+        let mut row = Row::new(of, block, noise);
         let mut pivot = variance;
         if let Some(last) = last.filter(|_| block.follows) {
             let shared = last.ends.min(ends) / last.pivot;
@@ -190,45 +184,12 @@ impl Series {
     }
 }
 
-/// What drives a leak by either law, the pressure across it and its root, by size and with the sign: means, Pa and √Pa, or
-/// sums over time.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Driven {
-    pub sizes: [f64; 2],
-    pub net: [f64; 2],
-}
-
-impl Driven {
-    /// Means over all of these stretches.
-    pub(super) fn of(parts: &[&Equations], leak: Leak) -> Self {
-        let time_s = parts.iter().map(|part| part.time_s).sum::<f64>().max(f64::MIN_POSITIVE);
-        let mean = |of: fn(&Self) -> [f64; 2]| {
-            let sums = |at: usize| parts.iter().map(|part| of(&part.driven[leak])[at]).sum::<f64>();
-            [sums(0), sums(1)].map(|sum| sum / time_s)
-        };
-        Self { sizes: mean(|driven| driven.sizes), net: mean(|driven| driven.net) }
-    }
-
-    fn with(self, pressure: f64, root: f64) -> Self {
-        let Self { sizes: [size, root_size], net: [net, net_root] } = self;
-        Self {
-            sizes: [size + pressure.abs(), root_size + root.abs()],
-            net: [net + pressure, net_root + root],
-        }
-    }
-}
-
 /// The normal equations of a stretch of blocks.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Equations {
     /// Of the flow balance, and of the position against the flows.
     series: [Series; 2],
-    driven: PerLeak<Driven>,
     pub force: ForceSums,
-    time_s: f64,
-    blocks: u32,
-    /// Ends of the first and of the last block.
-    span_s: Option<[f64; 2]>,
 }
 
 impl Equations {
@@ -240,31 +201,15 @@ impl Equations {
     }
 
     /// Takes in the next block.
-    pub fn add(&mut self, block: &Block, noise: &Noise) {
-        let [begin_s, _] = self.span_s.unwrap_or([block.end_s; 2]);
-        self.span_s = Some([begin_s, block.end_s]);
-        self.time_s += block.time_s;
-        self.blocks = self.blocks.saturating_add(1);
+    fn add(&mut self, block: &Block, noise: &Noise) {
         self.force.add(block);
-        self.driven = PerLeak::from_fn(|leak| self.driven[leak].with(block.across(leak), block.roots[leak]));
         let [balance, travel] = &mut self.series;
-        let after_begin_s = block.end_s - begin_s;
-        balance.add(Some(&noise.balance).filter(|_| block.fed == Fed::Both), block, noise, after_begin_s);
-        travel.add(noise.travel.get(block.fed as usize), block, noise, after_begin_s);
-    }
-
-    /// How many there are.
-    pub fn blocks(&self) -> u32 {
-        self.blocks
-    }
-
-    /// Ends of the first and of the last block, s; none before there is one.
-    pub fn span_s(&self) -> Option<[f64; 2]> {
-        self.span_s
+        balance.add(Some(&noise.balance).filter(|_| block.fed == Fed::Both), block, noise);
+        travel.add(noise.travel.get(block.fed as usize), block, noise);
     }
 }
 
-/// As [`Series`], of several stretches together.
+/// As [`Series`], with a matrix that is whole.
 #[derive(Clone)]
 pub(super) struct Sums {
     pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
@@ -274,31 +219,13 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Of this one of both equations in all stretches, with slopes about the moment `middle_s`.
-    fn of(parts: &[&Equations], which: usize, middle_s: f64) -> Self {
-        let mut all = Self { matrix: SMatrix::zeros(), vector: Vector::zeros(), square: 0.0, rows: 0 };
-        for part in parts {
-            let (Some(series), Some([begin_s, _])) = (part.series.get(which), part.span_s) else { continue };
-            let mut matrix = SMatrix::from_fn(|i, j| series.matrix[i.max(j)][i.min(j)]);
-            let mut vector = Vector::from(series.vector);
-            let later_s = begin_s - middle_s;
-            for (mean, slope) in SLOPE_OF {
-                for at in 0..PARAMETERS {
-                    matrix[(slope, at)] += later_s * matrix[(mean, at)];
-                }
-                vector[slope] += later_s * vector[mean];
-            }
-            for (mean, slope) in SLOPE_OF {
-                for at in 0..PARAMETERS {
-                    matrix[(at, slope)] += later_s * matrix[(at, mean)];
-                }
-            }
-            all.matrix += matrix;
-            all.vector += vector;
-            all.square += series.square;
-            all.rows += series.rows as usize;
+    fn of(series: &Series) -> Self {
+        Self {
+            matrix: SMatrix::from_fn(|i, j| series.matrix[i.max(j)][i.min(j)]),
+            vector: Vector::from(series.vector),
+            square: series.square,
+            rows: series.rows as usize,
         }
-        all
     }
 
     /// For parameters in these units.
@@ -315,17 +242,14 @@ impl Sums {
     }
 }
 
-/// Both equations over some stretches: whatever the priors.
+/// Both equations: whatever the priors.
 #[derive(Clone)]
 pub(super) struct BothSums([Sums; 2]);
 
 impl BothSums {
-    /// With slopes about the middle of the stretches.
-    pub fn of(parts: &[&Equations]) -> Self {
-        let spans = || parts.iter().filter_map(|part| part.span_s());
-        let ends = spans().next().zip(spans().next_back());
-        let middle_s = ends.map_or(0.0, |([begin_s, _], [_, end_s])| 0.5 * (begin_s + end_s));
-        Self([0, 1].map(|which| Sums::of(parts, which, middle_s)))
+    /// Of a stretch.
+    pub fn of(equations: &Equations) -> Self {
+        Self(equations.series.each_ref().map(Sums::of))
     }
 
     /// Flow balance and position against the flows, for parameters in these units.

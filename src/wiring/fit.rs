@@ -2,10 +2,10 @@
 //! the whole piece, with the declared noise. Nothing restarts, so nothing is forgiven.
 
 use super::equations::{BothSums, Sums};
-use super::priors::{LEAKS, OFFSETS, ORIFICES, PARAMETERS, Priors, Vector};
+use super::priors::{LEAKS, PARAMETERS, Priors, Vector};
 use crate::rig::Rig;
 use nalgebra::{Cholesky, Const, SMatrix};
-use pitchleak_core::{Estimate, Leak, Parameter, PerLeak};
+use pitchleak_core::PerLeak;
 
 /// A fit: its residuals and parameters.
 #[derive(Clone, Copy, Debug)]
@@ -61,33 +61,6 @@ impl Fit {
         covariances[at].sqrt()
     }
 
-    /// A parameter in SI; its spread grows with the misfit.
-    fn estimate(&self, at: usize) -> Estimate<f64> {
-        let inflation = self.worst().max(1.0).sqrt();
-        Estimate { value: self.parameters[at], std: inflation * self.std(at) }.scaled(self.units[at])
-    }
-
-    /// A parameter of the estimator's, SI; of the compressibility what it is off its prior mean.
-    pub fn parameter(&self, parameter: Parameter) -> Estimate<f64> {
-        self.estimate(parameter as usize)
-    }
-
-    /// Leak coefficients, m³/(s·Pa).
-    pub fn leak_coefficients(&self) -> PerLeak<Estimate<f64>> {
-        PerLeak::from_fn(|leak| self.estimate(LEAKS + leak as usize))
-    }
-
-    /// Zeros of meters A and B in the middle of the records, m³/s.
-    pub fn offsets_m3s(&self) -> [Estimate<f64>; 2] {
-        [self.estimate(OFFSETS), self.estimate(OFFSETS + 1)]
-    }
-
-    /// χ² of all rows, and of the parameters against their priors.
-    pub fn chi_square(&self) -> f64 {
-        let sums = self.ratios.iter().zip(self.rows).map(|(ratio, rows)| ratio.unwrap_or(0.0) * rows as f64);
-        sums.sum::<f64>() + self.penalty
-    }
-
     /// The larger of the two ratios.
     pub fn worst(&self) -> f64 {
         self.ratios.iter().flatten().copied().fold(0.0, f64::max)
@@ -113,30 +86,6 @@ impl Fit {
         let inflation = self.worst().max(1.0).sqrt();
         let below = [1, 2, 3].map(|at: usize| -self.parameters[at] / (self.std(at) * inflation));
         below.into_iter().fold(0.0, f64::max)
-    }
-
-    /// The leak that lies furthest below zero, in its standard deviations; none where none does.
-    pub fn most_negative_leak(&self) -> Option<Leak> {
-        let sigmas = |leak: &Leak| self.parameters[LEAKS + *leak as usize] / self.std(LEAKS + *leak as usize);
-        let least = Leak::ALL.into_iter().min_by(|a, b| sigmas(a).total_cmp(&sigmas(b)))?;
-        (sigmas(&least) < 0.0).then_some(least)
-    }
-
-    /// Mean flow of a leak by both laws where P and √P across it were on average these, m³/s; its spread grows with the
-    /// misfit.
-    pub fn flow_m3s(&self, leak: Leak, [pressure, root]: [f64; 2]) -> Estimate<f64> {
-        let [plain, orifice] = [LEAKS, ORIFICES].map(|at| at + leak as usize);
-        let mut weights = Vector::zeros();
-        weights[plain] = pressure * self.units[plain];
-        weights[orifice] = root * self.units[orifice];
-        let variance = self.worst().max(1.0) * weights.dot(&self.information.solve(&weights));
-        Estimate { value: weights.dot(&self.parameters), std: variance.max(0.0).sqrt() }
-    }
-
-    /// How far a leak's coefficient by an orifice's law lies above zero, in such standard deviations.
-    pub fn orifice_sigmas(&self, leak: Leak) -> f64 {
-        let Estimate { value, std } = self.estimate(ORIFICES + leak as usize);
-        if std > 0.0 { value / std } else { 0.0 }
     }
 
     /// Whether the rig can be so: bulk modulus and sensor errors within their priors, no leak negative.

@@ -33,7 +33,6 @@ pub use running::Running;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
-use continuity::Continuity;
 use contradiction::{Declared, is_near};
 use fit::Fit;
 use force::ForceBalance;
@@ -89,8 +88,8 @@ fn exchanged_by(balance: &ForceBalance, stretch: &Recorded<'_>) -> Option<Explan
 }
 
 /// Exchanged pressures of a stream, which keeps no records to exchange the flows in.
-pub(crate) fn exchanged_so_far(stretch: &impl Continuity) -> Option<Explanation> {
-    let [before, after] = stretch.force_balance()?.holds_exchanged()?;
+pub(crate) fn exchanged_so_far(balance: &ForceBalance) -> Option<Explanation> {
+    let [before, after] = balance.holds_exchanged()?;
     Some(Explanation { mistakes: EXCHANGED_PRESSURES.into(), evidence: Evidence::Force { before, after } })
 }
 
@@ -167,7 +166,7 @@ pub fn misfit(records: &[Record], rig: &Rig) -> [Option<f64>; 2] {
 }
 
 /// Offsets and gains of a few percent are commoner than mistakes of wiring: where they explain as much, they do.
-fn sensor_errors_explain(stretch: &impl Continuity) -> bool {
+fn sensor_errors_explain(stretch: &Recorded<'_>) -> bool {
     let fit = stretch.fit(&Priors::with_sensor_errors(stretch.rig()));
     fit.is_some_and(|fit| is_near(&fit) && fit.is_possible())
 }
