@@ -211,6 +211,8 @@ impl Cylinder {
             leakage: report.leakage.map(LiveLeakage::from),
             changed_at_s: report.changed_at_s,
             trend: report.trend,
+            probability: report.verdict.probability,
+            explanation: report.verdict.explanations.into_iter().next().map(|best| best.id),
             reasons: report.verdict.reasons,
             time_ns: self.time_ns(t_s),
         })

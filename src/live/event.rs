@@ -52,6 +52,12 @@ pub struct EstimateEvent {
     /// Why the status is doubtful or not sure, and what to check, first things first; none where it is sure.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<Reason>,
+    /// That each leak is above its threshold, as weighed last: at most a minute ago, and since an alarm changed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<PerLeak<f64>>,
+    /// The likeliest explanation's id.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub explanation: Option<String>,
     /// Time of the sample, ns since 1970, where lines have time stamps.
     #[serde(skip)]
     pub time_ns: Option<i64>,

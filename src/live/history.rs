@@ -225,6 +225,8 @@ mod tests {
             leakage: PerLeak { internal: leakage, external_a: leakage, external_b: leakage },
             changed_at_s: None,
             trend: PerLeak::default(),
+            probability: None,
+            explanation: None,
             reasons: Vec::new(),
             time_ns: None,
         }

@@ -48,7 +48,7 @@ pub struct Lie {
     pub faults: &'static [&'static str],
     /// One of so many rows is recorded.
     pub every: usize,
-    /// Id of the reason that names it, and words of the reason's text.
+    /// Id of the reason that names it, and words of the reason's text; or `explanation` and part of the id of the likeliest.
     pub named: Option<[&'static str; 2]>,
 }
 
@@ -130,10 +130,10 @@ pub const LIES: &[Lie] = &[
     mistake("pa clipped", &["pa clipped 40 bar"], "channel_clipped", "pa reads"),
     mistake("qa held", &["qa held 500 ms"], "channel_held", "qa repeats"),
     mistake("x held", &["x held 500 ms"], "channel_held", "x repeats"),
-    mistake("qa 20 % gain", &["qa gain 20 %"], "sensor_error", "qa divided by"),
-    mistake("qb 20 % gain", &["qb gain 20 %"], "sensor_error", "qb divided by"),
-    mistake("pa 10 bar zero", &["pa offset 10 bar"], "sensor_error", "pa"),
-    mistake("pb 10 bar zero", &["pb offset 10 bar"], "sensor_error", "pb"),
+    mistake("qa 20 % gain", &["qa gain 20 %"], "explanation", "flow_gain_a"),
+    mistake("qb 20 % gain", &["qb gain 20 %"], "explanation", "flow_gain_b"),
+    mistake("pa 10 bar zero", &["pa offset 10 bar"], "explanation", "pressure_zero"),
+    mistake("pb 10 bar zero", &["pb offset 10 bar"], "explanation", "pressure_zero"),
 ];
 
 const DURATION_S: f64 = 60.0;

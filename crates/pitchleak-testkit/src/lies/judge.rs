@@ -60,6 +60,8 @@ pub struct Said {
     leakage: PerLeak<LiveLeakage>,
     changed_at_s: Option<f64>,
     reasons: Vec<Reason>,
+    /// Id of the likeliest.
+    explanation: Option<String>,
 }
 
 impl From<ReplayReport> for Said {
@@ -70,14 +72,15 @@ impl From<ReplayReport> for Said {
             leakage: report.leakage.map(LiveLeakage::from),
             changed_at_s: report.changed_at_s,
             reasons: report.verdict.reasons,
+            explanation: report.verdict.explanations.first().map(|best| best.id.clone()),
         }
     }
 }
 
 impl From<EstimateEvent> for Said {
     fn from(last: EstimateEvent) -> Self {
-        let EstimateEvent { status, faults, leakage, changed_at_s, reasons, .. } = last;
-        Self { status, faults, leakage, changed_at_s, reasons }
+        let EstimateEvent { status, faults, leakage, changed_at_s, reasons, explanation, .. } = last;
+        Self { status, faults, leakage, changed_at_s, reasons, explanation }
     }
 }
 
@@ -160,6 +163,9 @@ pub fn ask(truths: &[Truth], leaking: Leaking, lie: &Lie, accuracy: f64, seed: u
 /// Whether it is said what the lie is.
 fn names(said: &Said, lie: &Lie) -> bool {
     let Some([id, words]) = lie.named else { return false };
+    if id == "explanation" {
+        return said.explanation.as_ref().is_some_and(|best| best.contains(words));
+    }
     said.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
 }
 
