@@ -5,13 +5,11 @@
 use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
+use pitchleak::explain::{Decision, Statistic};
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::{Record, TraceReader};
-use pitchleak::explain::{Decision, Statistic};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
-use pitchleak::wiring::{
-    Excerpt, Exchange, Explanation, Mistake, Readings, Recorded, explain, misfit,
-};
+use pitchleak::wiring::{Excerpt, Exchange, Explanation, Mistake, Readings, Recorded, explain, misfit};
 use pitchleak_testkit::hopsan;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -310,7 +308,10 @@ fn a_zero_that_is_off_is_no_leak() {
                     flows.into_iter().nth(meter).unwrap().iter_mut().for_each(|flow| *flow += off);
                 }
                 let found = decision(&records, &rig);
-                assert!(found.faults.is_empty(), "{wind:?}, {accuracy}, meter {meter} off by {share}: {found:?}");
+                assert!(
+                    found.faults.is_empty(),
+                    "{wind:?}, {accuracy}, meter {meter} off by {share}: {found:?}"
+                );
             }
         }
     }

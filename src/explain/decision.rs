@@ -10,8 +10,6 @@ use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
-/// α: a verdict is sure where at most this probability speaks against it. Chosen; a user's to change.
-pub const ALPHA: f64 = 0.05;
 /// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
 pub const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
@@ -120,6 +118,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         weighed.iter().filter(|one| is(one)).fold(0.0, |sum, one| sum + one.probability).min(1.0)
     };
     let threshold_m3s = rig.alarms.threshold_m3s;
+    let alpha = rig.decision.alpha;
     let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, leak));
     let probability = PerLeak::from_fn(|leak| beliefs[leak].above(threshold_m3s[leak]));
     let wiring = mass(&|one| one.hypothesis.wiring.is_some());
@@ -127,10 +126,10 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let misfit = weighed.iter().map(|one| one.probability * one.misfit).sum();
     let is_ruled_out = |leak: &Leak| {
         wander < WANDER_DOUBT
-            && probability[*leak] <= ALPHA
-            && beliefs[*leak].quantile_if_there(1.0 - ALPHA) <= threshold_m3s[*leak]
+            && probability[*leak] <= alpha
+            && beliefs[*leak].quantile_if_there(1.0 - alpha) <= threshold_m3s[*leak]
     };
-    let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - ALPHA).collect();
+    let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - alpha).collect();
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
     let status = if wiring > WIRING_DOUBT || misfit > MISFIT_DOUBT {
         Status::Doubtful
@@ -149,8 +148,10 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         leakage: beliefs.map(|marginal| marginal.belief()),
         changed_ago_s: changed_ago_s(weighed),
         explanations: listed(weighed),
-        as_declared: weighed.first().is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
-        notes: notes(weighed),
+        as_declared: weighed
+            .first()
+            .is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
+        notes: notes(weighed, alpha),
         misfit,
         wander,
         wiring,
@@ -225,11 +226,11 @@ impl Marginal {
 }
 
 /// What is not usual with probability 1 − α, of each kind.
-fn notes(weighed: &[Weighed<'_>]) -> Vec<Note> {
-    (0..3).filter_map(|kind| note(weighed, kind)).collect()
+fn notes(weighed: &[Weighed<'_>], alpha: f64) -> Vec<Note> {
+    (0..3).filter_map(|kind| note(weighed, kind, alpha)).collect()
 }
 
-fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
+fn note(weighed: &[Weighed<'_>], kind: usize, alpha: f64) -> Option<Note> {
     let mut masses: Vec<(&Entry, f64)> = Vec::new();
     for one in weighed {
         let Some(entry) = found(one)[kind].filter(|entry| !is_usual(entry.id)) else { continue };
@@ -240,8 +241,8 @@ fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
     }
     masses.sort_by(|a, b| b.1.total_cmp(&a.1));
     let probability = masses.iter().map(|(_, mass)| mass).sum();
-    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
-    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > ALPHA).map(|(entry, _)| entry.id);
+    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - alpha)?;
+    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > alpha).map(|(entry, _)| entry.id);
     let cannot_be_told_from = others.chain(best.alike.iter().copied()).map(str::to_owned).collect();
     Some(Note { id: best.id.to_owned(), probability, text: best.text.to_owned(), cannot_be_told_from })
 }

@@ -15,7 +15,7 @@ mod readings;
 mod table;
 
 pub use columns::{Column, Course};
-pub use decision::{ALPHA, Belief, Decision, Explained, MISFIT_DOUBT, Note, WIRING_DOUBT, explain};
+pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, Note, WIRING_DOUBT, explain};
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
-pub use table::{Entry, Kind};
+pub use table::{Entry, Kind, explanations};

@@ -78,7 +78,8 @@ fn gibbs(means: &[f64], covariance: &[Vec<f64>], from: &Orthant) -> Orthant {
     let mut points = Vec::with_capacity(POINTS);
     for sweep in 0..GIBBS_BURN_IN + POINTS {
         for i in 0..k {
-            let others: f64 = (0..k).filter(|&j| j != i).map(|j| precision[(i, j)] * (point[j] - means[j])).sum();
+            let others: f64 =
+                (0..k).filter(|&j| j != i).map(|j| precision[(i, j)] * (point[j] - means[j])).sum();
             let given = means[i] - others / precision[(i, i)];
             let own = precision[(i, i)].sqrt().recip();
             let (normal, _) = above(-given / own, 1.0 - uniform(sweep, i));

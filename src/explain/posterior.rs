@@ -244,7 +244,12 @@ impl<'a, 's> Pass<'a, 's> {
     /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
     fn constant(&self, equations: &NormalEquations) -> Vec<Scored<'a>> {
         let mut all = Vec::new();
+        let declared = self.sizes.zeros.iter().all(|zero| *zero > 0.0);
         for (rank, zeros) in self.tables.zeros.iter().enumerate() {
+            // Who declares zeros knows them: they fail, but are not slightly off.
+            if declared && zeros.id == "flow_zeros" {
+                continue;
+            }
             for (place, departure) in self.departures().into_iter().enumerate() {
                 for wander in &self.tables.wanders {
                     if wander.0 > 0.0 && (rank > 1 || place > 1) {
@@ -327,7 +332,10 @@ impl<'a, 's> Pass<'a, 's> {
                         all.push(scored);
                     }
                 }
-                if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && subset.iter().filter(|leak| **leak).count() == 2 {
+                if rank < STATES_WITH_PAIRS
+                    && state.wander.0 <= 0.0
+                    && subset.iter().filter(|leak| **leak).count() == 2
+                {
                     self.with_pairs(equations, *state, subset, most, &mut best, all);
                 }
             }
@@ -465,10 +473,7 @@ impl<'a, 's> Pass<'a, 's> {
             let orthant = positive_orthant(&means, &covariance);
             ln += orthant.ln_probability;
             levels_m3s = self.levels_m3s(&hypothesis, &orthant.points, &orthant.weights);
-            (
-                self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points),
-                orthant.weights,
-            )
+            (self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points), orthant.weights)
         };
         let changed = Some(hypothesis.last_change(self.segments)).filter(|border| *border > 0);
         let changed = changed.and_then(|border| self.products.segments.get(border));

@@ -76,6 +76,19 @@ pub struct Entry {
     pub alike: &'static [&'static str],
 }
 
+impl Kind {
+    /// As in the list of explanations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Course => "course",
+            Self::Zeros => "zeros",
+            Self::Departure => "departure",
+            Self::Wander => "wander",
+            Self::Wiring => "wiring",
+        }
+    }
+}
+
 impl Entry {
     fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
         Self { id, kind, share, free: Vec::new(), mistake: None, text, remedy: "", mends: None, alike: &[] }
@@ -116,6 +129,24 @@ pub(super) const USUAL: [(Column, Course, f64); 11] = [
     (Column::DeadVolumeA, Course::Constant, USUAL_DEAD_VOLUME),
     (Column::DeadVolumeB, Course::Constant, USUAL_DEAD_VOLUME),
 ];
+
+/// All that is weighed: a line for each choice of each kind.
+pub fn explanations() -> Vec<Entry> {
+    let of_leaks = pressures();
+    let known = |entry: &Entry| of_leaks.iter().any(|other| other.id == entry.id);
+    let departures = departures().into_iter().filter(|entry| !known(entry));
+    let wander = wanders().into_iter().skip(1).map(|(_, share)| share).sum();
+    let wander = Entry::new("wandering_zeros", Kind::Wander, wander, "the flow meters' zeros wander");
+    let mut all: Vec<Entry> =
+        courses().into_iter().chain(zeros()).chain(departures).chain(pressures()).chain([wander]).collect();
+    for mistake in mistakes() {
+        match all.iter_mut().find(|entry| entry.id == mistake.id) {
+            Some(entry) => entry.share += mistake.share,
+            None => all.push(mistake),
+        }
+    }
+    all
+}
 
 /// Zeros of the flow meters, as shares of full scale.
 pub(super) fn zeros() -> Vec<Entry> {
@@ -232,8 +263,10 @@ pub(super) fn pressures() -> Vec<Entry> {
     let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(PRESSURE, None);
     let gross = 0.05;
     vec![
-        entry("pressure_zero_gross_a", "the zero of pressure sensor A is far off").free(C::PressureZeroA, gross),
-        entry("pressure_zero_gross_b", "the zero of pressure sensor B is far off").free(C::PressureZeroB, gross),
+        entry("pressure_zero_gross_a", "the zero of pressure sensor A is far off")
+            .free(C::PressureZeroA, gross),
+        entry("pressure_zero_gross_b", "the zero of pressure sensor B is far off")
+            .free(C::PressureZeroB, gross),
         entry("pressure_zero_a", "the zero of pressure sensor A is off").free(C::PressureZeroA, 0.01),
         entry("pressure_zero_b", "the zero of pressure sensor B is off").free(C::PressureZeroB, 0.01),
         entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),

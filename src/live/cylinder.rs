@@ -220,7 +220,8 @@ impl Cylinder {
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
         let decision = self.weighing.decision_now(&self.stream);
-        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report_as(name, decision) else {
+        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report_as(name, decision)
+        else {
             return;
         };
         for alarm in alarms {

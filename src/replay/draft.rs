@@ -2,12 +2,12 @@
 
 use super::Replay;
 use crate::channels::ChannelFault;
+use crate::explain::Decision;
 use crate::report::{
-    Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell,
-    TraceSummary, Verdict,
+    Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell, TraceSummary,
+    Verdict,
 };
 use crate::units::LPM_PER_M3S;
-use crate::explain::Decision;
 use crate::wiring::Wiring;
 use pitchleak_core::PerLeak;
 
@@ -21,10 +21,7 @@ pub(super) struct Weighed {
 impl Replay {
     /// A file's verdict: all that was read.
     pub(super) fn whole_trace(&self) -> Weighed {
-        Weighed {
-            channels: self.channel_faults(&self.channels),
-            earlier_channels: Vec::new(),
-        }
+        Weighed { channels: self.channel_faults(&self.channels), earlier_channels: Vec::new() }
     }
 
     /// A stream's: its last stretch. It may run for months, and what once misfitted is mended or forgotten.

@@ -1,16 +1,16 @@
 //! From a finished replay to its report.
 
 use super::Replay;
+use super::correction::Correction;
 use super::draft::{Draft, Weighed};
 use super::known::is_known;
 use crate::channels::{ChannelFault, ChannelMonitor};
-use super::correction::Correction;
 use crate::explain::Decision;
 use crate::report::{EstimateEntry, Estimates, LeakTrend, Leakage, ReplayReport, TraceSummary};
-use crate::wiring::Wiring;
 use crate::rig::EstimatorKind;
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
+use crate::wiring::Wiring;
 use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak};
 
 /// Why an estimate says nothing that is no finite number.

@@ -1,7 +1,7 @@
 //! Why a verdict is doubtful or not sure, each with what to check.
 
-use super::statement::{interval, join};
 use super::Findings;
+use super::statement::{interval, join};
 use crate::channels::ChannelFaultKind;
 use crate::explain::{Decision, Explained, MISFIT_DOUBT, WIRING_DOUBT};
 use crate::wiring::HOW_WIRED;
@@ -90,7 +90,10 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     let mend = if best.columns.is_empty() {
         format!("check {HOW_WIRED}, and record anew")
     } else {
-        format!("check {HOW_WIRED}; where that is so, mend it in the rig file: [columns] {}", best.columns.join("; "))
+        format!(
+            "check {HOW_WIRED}; where that is so, mend it in the rig file: [columns] {}",
+            best.columns.join("; ")
+        )
     };
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);
     Some(Reason::new(ReasonId::Wiring, text, mend))
@@ -147,7 +150,10 @@ fn undecided(findings: &Findings<'_>, decision: &Decision, leak: Leak) -> Reason
 }
 
 fn alarm_stands(leak: Leak) -> Reason {
-    let text = format!("the alarm of the {} leak stands, though the trace as a whole speaks against it", leak.label());
+    let text = format!(
+        "the alarm of the {} leak stands, though the trace as a whole speaks against it",
+        leak.label()
+    );
     Reason::new(ReasonId::Undecided, text, RECORD)
 }
 

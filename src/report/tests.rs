@@ -1,7 +1,7 @@
 use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
-use crate::times::{Clock, TimeFormat, Zone};
 use crate::explain::{Belief, Decision, Explained, Note};
+use crate::times::{Clock, TimeFormat, Zone};
 use crate::wiring::Wiring;
 
 fn entry(value: f64, std: f64) -> EstimateEntry {
@@ -185,7 +185,10 @@ fn a_leak_that_is_likely_and_not_sure_says_what_else_it_may_be() {
     assert!(text.contains("Internal leak above 0.10 L/min with 60 %: 0.0100 ± 0.0022 L/min."), "{text}");
     assert!(!text.contains("No internal"), "{text}");
     close.decision.as_mut().unwrap().explanations = vec![
-        Explained { leakage: PerLeak { internal: 0.4, ..PerLeak::default() }, ..explained("internal", "", 0.6) },
+        Explained {
+            leakage: PerLeak { internal: 0.4, ..PerLeak::default() },
+            ..explained("internal", "", 0.6)
+        },
         explained("flow_zero_a", "flow meter A's zero is off", 0.4),
     ];
     assert_eq!(close.judged(), (Status::NotSure, vec!["offset_or_leak"]));
@@ -310,7 +313,10 @@ fn what_happened_earlier_is_in_the_sentence() {
 
 #[test]
 fn the_papers_law_is_never_sure() {
-    assert_eq!(Found { knows_noise: false, decision: None, ..sound() }.judged(), (Status::NotSure, vec!["no_uncertainty"]));
+    assert_eq!(
+        Found { knows_noise: false, decision: None, ..sound() }.judged(),
+        (Status::NotSure, vec!["no_uncertainty"])
+    );
 }
 
 #[test]

@@ -265,7 +265,8 @@ mod tests {
         // Twelve uniform numbers less six: about a standard normal.
         let mut normal = move || {
             let uniform = |state: &mut u64| {
-                *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                *state =
+                    state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 (*state >> 11) as f64 / (1_u64 << 53) as f64
             };
             (0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0
@@ -284,7 +285,8 @@ mod tests {
             let Some(block) = blocks.push(if k == 0 { 0.0 } else { 0.01 }, &sample) else { continue };
             for (equation, row) in whitener.push(&block).into_iter().enumerate() {
                 let left = row.map(|row| {
-                    row.columns[RawSum::ResidualA as usize] + row.columns[RAW_SUMS + RawSum::ResidualB as usize]
+                    row.columns[RawSum::ResidualA as usize]
+                        + row.columns[RAW_SUMS + RawSum::ResidualB as usize]
                 });
                 if let (Some(before), Some(now)) = (last[equation], left) {
                     products[equation] += before * now;
