@@ -1,6 +1,7 @@
 use super::known::known_or_not;
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
+use pitchleak_core::continuity::Readings;
 use pitchleak_core::{
     Estimate, Estimates, LeakPressures, PaperEstimator, PaperGains, PerLeak, Rls, RlsError, RlsSettings,
     Sensors, Update,
@@ -79,7 +80,11 @@ impl Estimator {
     pub fn update(&mut self, record: &Record) -> Update<f64> {
         // A step of no length makes the core start anew.
         let dt_s = record.step_s();
-        each!(self, rls => rls.update(dt_s, &record.sample), chain => chain.update(dt_s, record))
+        // A flow may have a clock of its own.
+        each!(self,
+            rls => rls.update_readings(dt_s, &Readings::from(&record.sample)),
+            chain => chain.update(dt_s, record)
+        )
     }
 
     /// All that has been found; `None` for the paper's law, which knows no uncertainty.

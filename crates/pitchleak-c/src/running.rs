@@ -4,6 +4,7 @@ use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
 use crate::rig::PitchleakRig;
 use crate::state;
+use pitchleak_core::continuity::Readings;
 use pitchleak_core::{LeakDetector, Rls, Update};
 
 /// Says that the memory holds an estimator of N parameters.
@@ -72,7 +73,8 @@ pub(crate) unsafe fn update<M: Memory<N>, const N: usize>(
         Ok(running) => unsafe { &mut (*running.cast_mut()).estimator },
         Err(why) => return why,
     };
-    match rls.update(dt_s, &(*sample).into()) {
+    // A flow may have a clock of its own.
+    match rls.update_readings(dt_s, &Readings::from(&(*sample).into())) {
         Update::Started => PitchleakResult::Started,
         Update::Rejected => PitchleakResult::Rejected,
         Update::Renewed { elapsed_s, changed, .. } => {
