@@ -6,7 +6,6 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
-use pitchleak::core::continuity::Readings;
 use pitchleak::core::{
     AlarmSettings, LeakDetector, PaperEstimator, PaperGains, Rls, RlsSettings, Sample, SensorSpread, Sensors,
     Update,
@@ -210,15 +209,11 @@ fn on_host(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record])
         "rls4" => rls::<4>(rig, sensors, records, Rls::update),
         "rls6" => rls::<6>(rig, sensors, records, Rls::update),
         "rls9" => rls::<9>(rig, sensors, records, Rls::update),
-        "clocks4" => rls::<4>(rig, sensors, records, on_clocks),
-        "clocks6" => rls::<6>(rig, sensors, records, on_clocks),
-        "clocks9" => rls::<9>(rig, sensors, records, on_clocks),
+        "clocks4" => rls::<4>(rig, sensors, records, Rls::update_waiting),
+        "clocks6" => rls::<6>(rig, sensors, records, Rls::update_waiting),
+        "clocks9" => rls::<9>(rig, sensors, records, Rls::update_waiting),
         _ => paper(rig, records),
     }
-}
-
-fn on_clocks<const N: usize>(rls: &mut Rls<f64, N>, dt_s: f64, sample: &Sample<f64>) -> Update<f64> {
-    rls.update_readings(dt_s, &Readings::from(sample))
 }
 
 fn rls<const N: usize>(

@@ -1,6 +1,5 @@
 use crate::measure::{Estimator, Told};
 use crate::rig::Rig;
-use pitchleak_core::continuity::Readings;
 use pitchleak_core::{AlarmSettings, LeakDetector, Rls, RlsSettings, Sample, Update};
 
 /// The default estimator and its alarms, for channels that are all read at once.
@@ -21,7 +20,7 @@ impl<const N: usize, const CLOCKS: bool> Estimator for Leaks<N, CLOCKS> {
 
     fn update(&mut self, dt_s: f32, sample: &Sample<f32>) -> Option<f32> {
         let update = if CLOCKS {
-            self.rls.update_readings(dt_s, &Readings::from(sample))
+            self.rls.update_waiting(dt_s, sample)
         } else {
             self.rls.update(dt_s, sample)
         };

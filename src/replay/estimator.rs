@@ -1,7 +1,6 @@
 use super::known::known_or_not;
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::Record;
-use pitchleak_core::continuity::Readings;
 use pitchleak_core::{
     Estimate, Estimates, LeakPressures, PaperEstimator, PaperGains, PerLeak, Rls, RlsError, RlsSettings,
     Sensors, Update,
@@ -82,7 +81,7 @@ impl Estimator {
         let dt_s = record.step_s();
         // A flow may have a clock of its own.
         each!(self,
-            rls => rls.update_readings(dt_s, &Readings::from(&record.sample)),
+            rls => rls.update_waiting(dt_s, &record.sample),
             chain => chain.update(dt_s, record)
         )
     }

@@ -4,7 +4,6 @@ use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
 use crate::rig::PitchleakRig;
 use crate::state;
-use pitchleak_core::continuity::Readings;
 use pitchleak_core::{LeakDetector, Rls, Update};
 
 /// Says that the memory holds an estimator of N parameters.
@@ -74,7 +73,7 @@ pub(crate) unsafe fn update<M: Memory<N>, const N: usize>(
         Err(why) => return why,
     };
     // A flow may have a clock of its own.
-    match rls.update_readings(dt_s, &Readings::from(&(*sample).into())) {
+    match rls.update_waiting(dt_s, &(*sample).into()) {
         Update::Started => PitchleakResult::Started,
         Update::Rejected => PitchleakResult::Rejected,
         Update::Renewed { elapsed_s, changed, .. } => {

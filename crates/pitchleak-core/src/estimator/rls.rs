@@ -153,7 +153,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     /// Takes in the reading `sample`, `dt_s` after the one before. A flow without a reading rests over the steps to either side;
-    /// where it may come later, with a clock of its own, [`update_readings`](Self::update_readings) waits for it.
+    /// where it may come later, with a clock of its own, [`update_waiting`](Self::update_waiting) waits for it.
     #[inline]
     pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
         let () = Self::HAS_A_KNOWN_SIZE;
@@ -309,16 +309,23 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// own readings a channel is the straight line, and its noise is that of its own readings ([`Clocks`](crate::continuity::Clocks)).
     /// A channel without a reading is waited for, for a few steps of its own; then its chamber rests. Where the position or a pressure
     /// is missing for longer, nothing is integrated. Where all come at once it is [`update`](Self::update).
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn update_readings(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
         match *readings {
-            Readings { x: Some(x_m), pa: Some(pa_pa), pb: Some(pb_pa), qa: qa_m3s, qb: qb_m3s }
-                if self.clocks.is_empty() && !self.waits_for(dt_s, qa_m3s, qb_m3s) =>
-            {
-                self.update(dt_s, &Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None })
+            Readings { x: Some(x_m), pa: Some(pa_pa), pb: Some(pb_pa), qa: qa_m3s, qb: qb_m3s } => {
+                self.update_waiting(dt_s, &Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None })
             }
             _ => self.update_on_clocks(dt_s, readings),
         }
+    }
+
+    /// As [`update`](Self::update), but a flow without a reading is waited for, as by [`update_readings`](Self::update_readings).
+    #[inline]
+    pub fn update_waiting(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
+        if !self.clocks.is_empty() || self.waits_for(dt_s, sample.qa_m3s, sample.qb_m3s) {
+            return self.update_on_clocks(dt_s, &Readings::from(sample));
+        }
+        self.update(dt_s, sample)
     }
 
     /// Whether a flow has no reading after one that had.
