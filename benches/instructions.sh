@@ -25,8 +25,8 @@ while read -r estimator limit; do
 done <<END
 paper-law 61
 paper 113
-rls 650
-rls-offsets 940
-rls-gains 1960
+rls 630
+rls-offsets 910
+rls-gains 1760
 END
 exit $failed

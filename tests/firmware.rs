@@ -25,8 +25,15 @@ const BEGIN: &str = "<!-- firmware table: begin -->\n";
 const END: &str = "<!-- firmware table: end -->\n";
 
 /// Programs of the firmware, and what the table calls them.
-const PROGRAMS: [(&str, &str); 4] =
-    [("rls4", "N = 4"), ("rls6", "N = 6"), ("rls9", "N = 9"), ("paper", "paper's law")];
+const PROGRAMS: [(&str, &str); 7] = [
+    ("rls4", "N = 4"),
+    ("rls6", "N = 6"),
+    ("rls9", "N = 9"),
+    ("clocks4", "N = 4, on clocks"),
+    ("clocks6", "N = 6, on clocks"),
+    ("clocks9", "N = 9, on clocks"),
+    ("paper", "paper's law"),
+];
 /// Farthest that a microcontroller's estimates may be from the host's, in standard deviations of the estimate.
 const FARTHEST: f64 = 0.01;
 
@@ -114,10 +121,10 @@ fn records(rig: &Rig) -> Vec<Record> {
 fn sensors(rig: &Rig, program: &str) -> Sensors<f64> {
     let mut sensors = rig.sensors();
     let declare = |sensor: &mut SensorSpread<f64>| {
-        if program == "rls6" || program == "rls9" {
+        if program.ends_with(['6', '9']) {
             sensor.bias_std = 0.5 * sensor.noise_std;
         }
-        if program == "rls9" {
+        if program.ends_with('9') {
             sensor.gain_std = 0.005;
         }
     };
@@ -199,19 +206,27 @@ fn flash(binary: &Path) -> u32 {
 
 fn on_host(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Renewals {
     match program {
-        "rls4" => rls::<4>(rig, sensors, records),
-        "rls6" => rls::<6>(rig, sensors, records),
-        "rls9" => rls::<9>(rig, sensors, records),
+        "rls4" => rls::<4>(rig, sensors, records, Rls::update),
+        "rls6" => rls::<6>(rig, sensors, records, Rls::update),
+        "rls9" => rls::<9>(rig, sensors, records, Rls::update),
+        "clocks4" => rls::<4>(rig, sensors, records, Rls::update_waiting),
+        "clocks6" => rls::<6>(rig, sensors, records, Rls::update_waiting),
+        "clocks9" => rls::<9>(rig, sensors, records, Rls::update_waiting),
         _ => paper(rig, records),
     }
 }
 
-fn rls<const N: usize>(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Renewals {
+fn rls<const N: usize>(
+    rig: &Rig,
+    sensors: &Sensors<f64>,
+    records: &[Record],
+    update: impl Fn(&mut Rls<f64, N>, f64, &Sample<f64>) -> Update<f64>,
+) -> Renewals {
     let mut rls = Rls::<f64, N>::new(rig.cylinder, rig.fluid, sensors, RlsSettings::default()).unwrap();
     let mut detector = LeakDetector::new(AlarmSettings::default());
     let mut told = Renewals::new();
     for (at, record) in (1..).zip(records) {
-        if let Update::Renewed { elapsed_s, .. } = rls.update(record.step_s(), &record.sample) {
+        if let Update::Renewed { elapsed_s, .. } = update(&mut rls, record.step_s(), &record.sample) {
             detector.update(elapsed_s, &rls.mean_leaks_m3s());
             let found = rls.estimates();
             let (kappa, leaks) = (found.compressibility_per_pa, found.leaks_m3spa);

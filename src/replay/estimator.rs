@@ -79,7 +79,11 @@ impl Estimator {
     pub fn update(&mut self, record: &Record) -> Update<f64> {
         // A step of no length makes the core start anew.
         let dt_s = record.step_s();
-        each!(self, rls => rls.update(dt_s, &record.sample), chain => chain.update(dt_s, record))
+        // A flow may have a clock of its own.
+        each!(self,
+            rls => rls.update_waiting(dt_s, &record.sample),
+            chain => chain.update(dt_s, record)
+        )
     }
 
     /// All that has been found; `None` for the paper's law, which knows no uncertainty.

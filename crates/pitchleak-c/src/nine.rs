@@ -6,9 +6,9 @@ use crate::rig::PitchleakRig;
 use crate::running::{self, Memory};
 
 /// Size of `Pitchleak9` in 64-bit words.
-pub const PITCHLEAK9_WORDS: usize = 773;
+pub const PITCHLEAK9_WORDS: usize = 783;
 /// A state is never longer, bytes.
-pub const PITCHLEAK9_STATE_BYTES: usize = 6184;
+pub const PITCHLEAK9_STATE_BYTES: usize = 6264;
 
 /// Memory of an estimator of leaks, compressibility, the flow meters' offsets and the gains of flow meters and position sensor. Begin with `pitchleak9_begin`;
 /// it may be moved and copied.

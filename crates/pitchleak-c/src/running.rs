@@ -72,7 +72,8 @@ pub(crate) unsafe fn update<M: Memory<N>, const N: usize>(
         Ok(running) => unsafe { &mut (*running.cast_mut()).estimator },
         Err(why) => return why,
     };
-    match rls.update(dt_s, &(*sample).into()) {
+    // A flow may have a clock of its own.
+    match rls.update_waiting(dt_s, &(*sample).into()) {
         Update::Started => PitchleakResult::Started,
         Update::Rejected => PitchleakResult::Rejected,
         Update::Renewed { elapsed_s, changed, .. } => {

@@ -157,3 +157,34 @@ fn a_position_between_readings_is_no_reading() {
         assert!((position - 1.0).abs() < 0.15, "{position}");
     }
 }
+
+/// Who waits for a flow and then reads all at once by [`Rls::update`] begins anew: nothing is integrated over what waited.
+#[test]
+fn a_sample_that_does_not_wait_forgets_those_that_do() {
+    let samples = noisy(SEEDS.start);
+    let mut rls = new();
+    for sample in &samples[..500] {
+        rls.update_readings(0.01, &Readings::from(sample));
+    }
+    let told = |update: Update<f64>| core::mem::discriminant(&update);
+    let waits = Readings { qa: None, ..Readings::from(&samples[500]) };
+    assert_eq!(told(rls.update_readings(0.01, &waits)), told(Update::Accepted));
+    assert_eq!(told(rls.update(0.01, &samples[501])), told(Update::Started));
+    assert_ne!(told(rls.update(0.01, &samples[502])), told(Update::Started));
+}
+
+/// A flow that rests by [`Rls::update`] tells nothing over the steps beside it; the leak is found all the same, if less exactly.
+#[test]
+fn a_flow_may_rest_for_a_sample() {
+    let (mut all, mut some) = (new(), new());
+    for (k, sample) in noisy(SEEDS.start).iter().enumerate() {
+        all.update(0.01, sample);
+        let qa_m3s = sample.qa_m3s.filter(|_| k % 10 > 0);
+        let qb_m3s = sample.qb_m3s.filter(|_| k % 25 > 0);
+        some.update(0.01, &Sample { qa_m3s, qb_m3s, ..*sample });
+    }
+    for ((name, whole), (_, found)) in all.leak_coefficients().into_iter().zip(some.leak_coefficients()) {
+        let apart = (found.value - whole.value) / found.std;
+        assert!(apart.abs() < 3.0 && found.std < 4.0 * whole.std, "{name:?}: {found:?} {whole:?}");
+    }
+}

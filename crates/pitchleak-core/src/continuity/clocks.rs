@@ -88,7 +88,9 @@ impl<T: Copy> From<&Sample<T>> for Readings<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Clocks<T> {
     channels: [Channel<T>; CHANNELS],
+    /// From `first` on, around.
     rows: [Waiting<T>; ROWS],
+    first: u8,
     count: u8,
 }
 
@@ -129,6 +131,7 @@ impl<T: Real> Waiting<T> {
         row
     }
 
+    #[inline]
     fn reading(&self, channel: usize) -> Option<T> {
         let value = self.readings.get(channel).copied();
         value.filter(|_| self.read & (1 << channel) != 0)
@@ -188,6 +191,42 @@ enum Known<T> {
     },
 }
 
+impl<T: Real> Channel<T> {
+    /// At the time of the first row that waits, `dt_s` after the row before; `next` is its reading in the rows that wait, whether in
+    /// the first of them, and `after_s` the time from the row before to it, or to the last row.
+    fn known(&self, dt_s: T, next: Option<(T, bool)>, after_s: T) -> Known<T> {
+        let own_step_s = self.age_s + after_s;
+        let last = self.last.filter(|_| own_step_s <= T::lit(HOLE_STEPS) * self.step_s);
+        match (last, next) {
+            (Some(_), None) => Known::NotYet,
+            (Some(_), Some((value, true))) => Known::Value { value, read: true, own_step_s },
+            (Some(last), Some((next, false))) => {
+                let share = (self.age_s + dt_s) / own_step_s;
+                Known::Value { value: last + share * (next - last), read: false, own_step_s }
+            }
+            // After a rest, or a hole: the reading itself is known, the time before it is not.
+            (None, Some((value, true))) => Known::Value { value, read: true, own_step_s: dt_s },
+            (None, _) => Known::Rests,
+        }
+    }
+
+    /// The first row that waits is told, with this reading, `dt_s` after the row before.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each channel
+    fn leave(&mut self, dt_s: T, reading: Option<T>, rests: bool) {
+        self.age_s += dt_s;
+        if rests {
+            self.last = None;
+        }
+        if reading.is_some() {
+            self.last = reading;
+            if self.age_s.is_finite() {
+                self.step_s = self.age_s.at_most(T::lit(STEP_GROWTH) * self.step_s);
+            }
+            self.age_s = T::zero();
+        }
+    }
+}
+
 impl<T: Real> Clocks<T> {
     /// Before any reading; of a channel that was read once nobody knows how soon it comes again: `longest_s` it may take.
     pub fn new(longest_s: T) -> Self {
@@ -195,6 +234,7 @@ impl<T: Real> Clocks<T> {
         Self {
             channels: [Channel { last: None, age_s: T::infinity(), step_s }; CHANNELS],
             rows: [Waiting::new(T::zero(), &Readings::default()); ROWS],
+            first: 0,
             count: 0,
         }
     }
@@ -218,10 +258,18 @@ impl<T: Real> Clocks<T> {
         }
     }
 
-    /// Before any reading again, with the steps that the channels had.
-    pub fn anew(&self) -> Self {
-        let begin = |channel: Channel<T>| Channel { last: None, age_s: T::infinity(), ..channel };
-        Self { channels: self.channels.map(begin), count: 0, ..*self }
+    /// Rows that wait are forgotten.
+    pub fn forget_rows(&mut self) {
+        self.count = 0;
+    }
+
+    /// Goes on as before any reading, with the steps that the channels had.
+    pub fn begin_anew(&mut self) {
+        self.count = 0;
+        for channel in &mut self.channels {
+            channel.last = None;
+            channel.age_s = T::infinity();
+        }
     }
 
     /// Takes in what was read `dt_s` after the row before.
@@ -229,7 +277,8 @@ impl<T: Real> Clocks<T> {
         if usize::from(self.count) >= ROWS {
             self.thin();
         }
-        if let Some(row) = self.rows.get_mut(usize::from(self.count)) {
+        let place = self.place(usize::from(self.count));
+        if let Some(row) = self.rows.get_mut(place) {
             *row = Waiting::new(dt_s, readings);
             self.count += 1;
         }
@@ -237,7 +286,7 @@ impl<T: Real> Clocks<T> {
 
     /// The first row that waits, once every channel is known at its time.
     pub fn pop(&mut self) -> Next<T> {
-        let Some(front) = self.waiting().next().copied() else { return Next::Waits };
+        let Some(front) = self.waiting(0).copied() else { return Next::Waits };
         let mut values = [None; CHANNELS];
         let mut read = [false; CHANNELS];
         let mut own_step_s = [front.dt_s; CHANNELS];
@@ -252,8 +301,11 @@ impl<T: Real> Clocks<T> {
                 }
             }
         }
-        let rests = values.map(|value| value.is_none());
-        self.leave(&front, &rests);
+        for (c, channel) in self.channels.iter_mut().enumerate() {
+            channel.leave(front.dt_s, front.reading(c), values[c].is_none());
+        }
+        self.first = self.place(1) as u8;
+        self.count -= 1;
         let [Some(x_m), Some(pa_pa), Some(pb_pa), qa_m3s, qb_m3s] = values else { return Next::Gap };
         const { assert!(NEEDED == 3) };
         let sample = Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None };
@@ -261,81 +313,68 @@ impl<T: Real> Clocks<T> {
         Next::Row(Row { dt_s: front.dt_s, sample, read, own_step_s, thinned: front.thinned })
     }
 
-    fn waiting(&self) -> impl Iterator<Item = &Waiting<T>> {
-        self.rows.iter().take(usize::from(self.count))
+    /// Where the row stands before which `before` others wait.
+    #[inline]
+    fn place(&self, before: usize) -> usize {
+        let place = usize::from(self.first) + before;
+        if place < ROWS { place } else { place - ROWS }
+    }
+
+    /// The row before which `before` others wait.
+    #[inline]
+    fn waiting(&self, before: usize) -> Option<&Waiting<T>> {
+        if before < usize::from(self.count) { self.rows.get(self.place(before)) } else { None }
     }
 
     /// A channel at the time of the first row that waits, `dt_s` after the row before.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each channel
     fn known(&self, channel: usize, dt_s: T) -> Known<T> {
-        let Some(Channel { last, age_s, step_s }) = self.channels.get(channel).copied() else {
-            return Known::Rests;
-        };
-        let longest_s = T::lit(HOLE_STEPS) * step_s;
+        let Some(own) = self.channels.get(channel) else { return Known::Rests };
         let mut after_s = T::zero();
-        for (place, row) in self.waiting().enumerate() {
+        let mut before = 0;
+        while let Some(row) = self.waiting(before) {
             after_s += row.dt_s;
-            let Some(next) = row.reading(channel) else { continue };
-            let own_step_s = age_s + after_s;
-            return match last.filter(|_| own_step_s <= longest_s) {
-                // After a rest, or a hole: the reading itself is known, the time before it is not.
-                None if place == 0 => Known::Value { value: next, read: true, own_step_s: dt_s },
-                None => Known::Rests,
-                Some(_) if place == 0 => Known::Value { value: next, read: true, own_step_s },
-                Some(last) => {
-                    let share = (age_s + dt_s) / own_step_s;
-                    Known::Value { value: last + share * (next - last), read: false, own_step_s }
-                }
-            };
-        }
-        if last.is_none() || age_s + after_s > longest_s { Known::Rests } else { Known::NotYet }
-    }
-
-    /// The first row that waits is told.
-    fn leave(&mut self, front: &Waiting<T>, rests: &[bool; CHANNELS]) {
-        for (c, (channel, rests)) in self.channels.iter_mut().zip(rests).enumerate() {
-            let reading = front.reading(c);
-            channel.age_s += front.dt_s;
-            if *rests {
-                channel.last = None;
+            if let Some(next) = row.reading(channel) {
+                return own.known(dt_s, Some((next, before == 0)), after_s);
             }
-            if reading.is_some() {
-                channel.last = reading;
-                if channel.age_s.is_finite() {
-                    channel.step_s = channel.age_s.at_most(T::lit(STEP_GROWTH) * channel.step_s);
-                }
-                channel.age_s = T::zero();
-            }
+            before += 1;
         }
-        self.remove(0);
-    }
-
-    fn remove(&mut self, place: usize) {
-        if let Some(later) = self.rows.get_mut(place..) {
-            if !later.is_empty() {
-                later.rotate_left(1);
-            }
-            self.count = self.count.saturating_sub(1);
-        }
+        own.known(dt_s, None, after_s)
     }
 
     /// Drops the row with the fewest readings, of several the one that leaves the shortest step; never the newest.
     fn thin(&mut self) {
         let mut least = (u32::MAX, T::infinity());
-        let mut place = 0;
-        for (k, pair) in self.rows.windows(2).enumerate() {
-            let [row, next] = pair else { continue };
+        let mut dropped = 0;
+        let mut before = 0;
+        while let (Some(row), Some(next)) = (self.waiting(before), self.waiting(before + 1)) {
             let readings = row.read.count_ones();
             let step_s = row.dt_s + next.dt_s;
             if readings < least.0 || (readings == least.0 && step_s < least.1) {
                 least = (readings, step_s);
-                place = k;
+                dropped = before;
             }
+            before += 1;
         }
-        if let Some(next) = self.rows.get_mut(place + 1) {
+        let next = self.place(dropped + 1);
+        if let Some(next) = self.rows.get_mut(next) {
             next.dt_s = least.1;
             next.thinned = true;
         }
-        self.remove(place);
+        for before in (0..dropped).rev() {
+            self.move_up(before);
+        }
+        self.first = self.place(1) as u8;
+        self.count -= 1;
+    }
+
+    /// A row changes its place with the next.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each row
+    fn move_up(&mut self, before: usize) {
+        let (from, to) = (self.place(before), self.place(before + 1));
+        if from < ROWS && to < ROWS {
+            self.rows.swap(from, to);
+        }
     }
 }
 

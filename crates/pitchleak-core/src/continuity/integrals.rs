@@ -116,6 +116,19 @@ impl<T: Real> Integrals<T> {
         self.time_square += step.time_square;
         self.steps += step.steps;
     }
+
+    /// Over all but `steps`, some of those that it went over.
+    #[cold]
+    #[inline(never)]
+    pub fn without(&self, steps: &Self) -> Self {
+        Self {
+            a: self.a.without(&steps.a),
+            b: self.b.without(&steps.b),
+            time: self.time - steps.time,
+            time_square: self.time_square - steps.time_square,
+            steps: self.steps - steps.steps,
+        }
+    }
 }
 
 impl<T: Real> ChamberIntegrals<T> {
@@ -123,5 +136,13 @@ impl<T: Real> ChamberIntegrals<T> {
         self.flow += step.flow;
         self.compression += step.compression;
         self.pressure += step.pressure;
+    }
+
+    fn without(&self, steps: &Self) -> Self {
+        Self {
+            flow: self.flow - steps.flow,
+            compression: self.compression - steps.compression,
+            pressure: self.pressure - steps.pressure,
+        }
     }
 }

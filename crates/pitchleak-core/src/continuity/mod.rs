@@ -14,7 +14,7 @@
 //! - [`Weights`]: how the two equations combine to two whose errors are independent, the *balance* and the *position*.
 //! - [`Equation`] and [`combine`]: the row that such a combination is, with a column for each [`Parameter`](crate::Parameter).
 //! - [`MovingAverage`]: what the pressures' noise at the ends of blocks does, inverted, so that rows are independent.
-//! - [`BlockPressures`] and [`PressureMeans`]: the pressures at which leak flows are quoted.
+//! - [`PressureMeans`]: the pressures at which leak flows are quoted.
 //! - [`ContinuityStatistic`]: all that any explanation of the readings asks, in constant memory: whitened rows with a column
 //!   for every [`RawSum`] of a [`Block`], as Gram matrices of segments of the trace.
 //!
@@ -62,6 +62,6 @@ pub use gram::{CHANNELS, ContinuityStatistic, Segment, column};
 pub use integrals::{ChamberIntegrals, Integrals, Measured, Step};
 pub use moving_average::MovingAverage;
 pub use noise::{NoiseStd, PressureNoise};
-pub use pressure_means::{BlockPressures, PressureMeans};
+pub use pressure_means::PressureMeans;
 pub use weights::Weights;
 pub use whitening::{COLUMNS, EQUATIONS, VOLUME_POWERS};

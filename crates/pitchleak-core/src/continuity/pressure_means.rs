@@ -1,31 +1,6 @@
 use super::integrals::Integrals;
 use crate::{LeakPressures, PerLeak, Real};
 
-/// A block's length by now, and its pressures.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct BlockPressures<T> {
-    /// ∫ dt, s.
-    pub time_s: T,
-    /// Number of steps.
-    pub steps: T,
-    /// ∫ P_A dt, Pa·s.
-    a: T,
-    /// ∫ P_B dt, Pa·s.
-    b: T,
-}
-
-impl<T: Real> BlockPressures<T> {
-    /// Goes on over `step`, the time that follows.
-    #[inline]
-    pub fn add(&mut self, step: &Integrals<T>) {
-        self.time_s += step.time;
-        self.steps += step.steps;
-        self.a += step.a.pressure;
-        self.b += step.b.pressure;
-    }
-}
-
 /// Forgotten means of |P_L|, P_A, P_B, Pa: at these the leak flows are quoted. |P_L| is taken of each
 /// block's mean, so that sensor noise does not count as pressure.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,14 +15,14 @@ pub struct PressureMeans<T> {
 
 impl<T: Real> PressureMeans<T> {
     /// Takes in a block; all before it counts by `keep` (0 to 1).
-    pub fn add_block(&mut self, block: &BlockPressures<T>, keep: T) {
+    pub fn add_block(&mut self, block: &Integrals<T>, keep: T) {
         self.forget(keep);
-        self.time += block.time_s;
-        let load = block.a - block.b;
+        self.time += block.time;
+        let load = block.a.pressure - block.b.pressure;
         self.load += load.abs();
-        self.load_sign += if load < T::zero() { -block.time_s } else { block.time_s };
-        self.a += block.a;
-        self.b += block.b;
+        self.load_sign += if load < T::zero() { -block.time } else { block.time };
+        self.a += block.a.pressure;
+        self.b += block.b.pressure;
     }
 
     /// Weighs all that was taken in by `keep` (0 to 1).
@@ -78,8 +53,10 @@ impl<T: Real> PressureMeans<T> {
 mod tests {
     use super::*;
 
-    fn block(time_s: f64, pa_pa: f64, pb_pa: f64) -> BlockPressures<f64> {
-        BlockPressures { time_s, steps: 25.0, a: pa_pa * time_s, b: pb_pa * time_s }
+    fn block(time_s: f64, pa_pa: f64, pb_pa: f64) -> Integrals<f64> {
+        let mut block = Integrals { time: time_s, ..Integrals::default() };
+        (block.a.pressure, block.b.pressure) = (pa_pa * time_s, pb_pa * time_s);
+        block
     }
 
     /// What is weighed by time and forgetting is the mean: Σ w P / Σ w.

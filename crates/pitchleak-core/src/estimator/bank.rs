@@ -3,7 +3,7 @@
 
 use super::evidence::Evidence;
 use super::hypothesis::Hypothesis;
-use super::information::{Information, Prior, Solution};
+use super::information::{Posterior, Prior, Solution};
 use super::mixture::Mixture;
 use super::parameter::{LEAKS, Parameter, leak_column};
 use crate::Real;
@@ -62,6 +62,8 @@ pub(super) struct Bank<T, const N: usize> {
     log_weights: [T; HYPOTHESES],
     /// The evidence of the last [`RECENT_S`]; the best has zero.
     recent: [T; HYPOTHESES],
+    /// Of the latest block.
+    pub evidence: Evidence<T, N>,
     pending: Pending<T, N>,
 }
 
@@ -93,7 +95,6 @@ enum Pending<T, const N: usize> {
     ))
 )]
 struct Renewal<T, const N: usize> {
-    evidence: Evidence<T, N>,
     /// Variances by which the offsets of chambers A and B have moved.
     drifted: [T; 2],
     /// How much larger than declared the noise is.
@@ -136,6 +137,7 @@ impl<T: Real, const N: usize> Bank<T, N> {
             hypotheses,
             log_weights: unheard(),
             recent: [T::zero(); HYPOTHESES],
+            evidence: Evidence::none(),
             pending: Pending::Nothing,
         }
     }
@@ -150,28 +152,15 @@ impl<T: Real, const N: usize> Bank<T, N> {
         self.pending = Pending::Nothing;
     }
 
-    /// Begins to take in a block, after which zeros have moved by something of the variances `drifted`; `inflation` says how
+    /// Begins to take in the block of `evidence`, after which zeros have moved by something of the variances `drifted`; `inflation` says how
     /// much larger than declared the noise is, `known` is what was known before.
     #[cfg_attr(target_os = "none", inline(never))] // its stack is none of the other samples'
-    pub fn begin(
-        &mut self,
-        evidence: Evidence<T, N>,
-        drifted: [T; 2],
-        inflation: T,
-        prior: &Prior<'_, T>,
-        known: &Solution<T, N>,
-    ) {
+    pub fn begin(&mut self, drifted: [T; 2], inflation: T, prior: &Prior<'_, T>, known: &Solution<T, N>) {
         let by_jump = match &mut self.pending {
-            Pending::Jump(hypothesis) => {
-                let before = hypothesis.solve(prior);
-                hypothesis.learn(&evidence.block);
-                let after = hypothesis.solve(prior);
-                Some(evidence.log_likelihood(&known.mean, &before, &after).0 / inflation)
-            }
+            Pending::Jump(jumped) => Some(self.evidence.gain(jumped, prior, &known.mean) / inflation),
             _ => None,
         };
-        let mut renewal = Renewal {
-            evidence,
+        self.pending = Pending::Renewal(Renewal {
             drifted,
             inflation,
             heard: 0,
@@ -181,10 +170,8 @@ impl<T: Real, const N: usize> Bank<T, N> {
             news: false,
             slopes_ps: [(T::zero(), T::zero()); LEAKS],
             mixture: Mixture::new(),
-        };
-        let [steady, ..] = &mut self.hypotheses;
-        renewal.hear(steady, &self.log_weights, prior, known);
-        self.pending = Pending::Renewal(renewal);
+        });
+        self.hear(prior, known);
     }
 
     /// Whether a renewal is half done.
@@ -196,13 +183,20 @@ impl<T: Real, const N: usize> Bank<T, N> {
     /// Goes on with a renewal, which began with this `prior` and what was `known`: at its end, what is known.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
-        let Pending::Renewal(renewal) = &mut self.pending else { return None };
-        let heard = usize::from(renewal.heard);
-        let Some(hypothesis) = self.hypotheses.get_mut(heard) else {
+        let Pending::Renewal(renewal) = &self.pending else { return None };
+        if usize::from(renewal.heard) >= HYPOTHESES {
             return self.conclude(prior, known);
-        };
-        renewal.hear(hypothesis, &self.log_weights, prior, known);
+        }
+        self.hear(prior, known);
         None
+    }
+
+    /// The next hypothesis is heard.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    fn hear(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) {
+        let Pending::Renewal(renewal) = &mut self.pending else { return };
+        let Some(hypothesis) = self.hypotheses.get_mut(usize::from(renewal.heard)) else { return };
+        renewal.hear(&self.evidence, hypothesis, &self.log_weights, prior, known);
     }
 
     /// Weighs the hypotheses, all of which were heard.
@@ -210,17 +204,16 @@ impl<T: Real, const N: usize> Bank<T, N> {
     fn conclude(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
         let Pending::Renewal(renewal) = &self.pending else { return None };
         let Renewal { gained, by_jump, news, slopes_ps, .. } = *renewal;
-        let time_s = renewal.evidence.block.time_s;
-        let suspected = if news { None } else { self.suspect_jump(renewal, prior, known) };
-        *known = match &suspected {
-            Some((_, solution)) => *solution,
-            None => renewal.mixture.solution(),
-        };
-        let chi_square = renewal.evidence.block.chi_square(&known.mean);
-        self.pending = Pending::Nothing;
-        if let Some((hypothesis, _)) = suspected {
-            self.pending = Pending::Jump(hypothesis);
+        let time_s = self.evidence.block.time_s;
+        let mut jumped = Hypothesis::steady(T::infinity());
+        if !news && self.suspects_jump(renewal, prior, known, &mut jumped) {
+            *known = jumped.known.solution(prior);
+            self.pending = Pending::Jump(jumped);
+        } else {
+            *known = renewal.mixture.solution();
+            self.pending = Pending::Nothing;
         }
+        let chi_square = self.evidence.block.chi_square(&known.mean);
         if !news {
             self.weigh(&gained, time_s);
         }
@@ -231,13 +224,14 @@ impl<T: Real, const N: usize> Bank<T, N> {
     }
 
     /// Holds against the hypotheses that the leaks jumped to anything usual just before this block, all else as
-    /// known. Where that is much more likely it is what is known until the next block.
-    fn suspect_jump(
+    /// known, as `jumped` says then. Whether that is much more likely.
+    fn suspects_jump(
         &self,
         renewal: &Renewal<T, N>,
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
-    ) -> Option<(Hypothesis<T, N>, Solution<T, N>)> {
+        jumped: &mut Hypothesis<T, N>,
+    ) -> bool {
         let mut variance = [T::zero(); N];
         for i in 0..N {
             variance[i] = known.covariance[i][i];
@@ -246,18 +240,13 @@ impl<T: Real, const N: usize> Bank<T, N> {
             variance[leak_column(i)] += T::lit(USUAL_JUMP * USUAL_JUMP);
         }
         let pivots = variance.map(|variance| T::one() / variance);
-        let mut jumped = Hypothesis::steady(T::infinity());
-        jumped.known = Information::of(&known.mean, &pivots, prior);
-        let before = jumped.solve(prior);
-        jumped.learn(&renewal.evidence.block);
-        let after = jumped.solve(prior);
-        let (gain, _) = renewal.evidence.log_likelihood(&known.mean, &before, &after);
+        jumped.known.set(&known.mean, &pivots, prior);
+        let gain = self.evidence.gain(jumped, prior, &known.mean);
         let mut foretold = T::neg_infinity();
         for k in 0..HYPOTHESES {
             foretold = (self.log_weights[k] + renewal.gained[k]).at_least(foretold);
         }
-        let suspected = gain / renewal.inflation - foretold >= T::lit(JUMPED);
-        suspected.then(|| (jumped, after.solution()))
+        gain / renewal.inflation - foretold >= T::lit(JUMPED)
     }
 
     fn weigh(&mut self, gained: &[T; HYPOTHESES], time_s: T) {
@@ -319,6 +308,7 @@ impl<T: Real, const N: usize> Renewal<T, N> {
     /// least.
     fn hear(
         &mut self,
+        evidence: &Evidence<T, N>,
         hypothesis: &mut Hypothesis<T, N>,
         log_weights: &[T; HYPOTHESES],
         prior: &Prior<'_, T>,
@@ -327,13 +317,11 @@ impl<T: Real, const N: usize> Renewal<T, N> {
         for (offset, variance) in moved::<T, N>(&self.drifted) {
             hypothesis.known.diffuse(offset, variance);
         }
-        hypothesis.advance(self.evidence.block.time_s);
-        let before = hypothesis.solve(prior);
-        hypothesis.learn(&self.evidence.block);
-        let after = hypothesis.solve(prior);
-        let (gain, growth) = self.evidence.log_likelihood(&known.mean, &before, &after);
+        hypothesis.advance(evidence.block.time_s);
+        let mut posterior = Posterior::room();
+        let (gain, growth) = evidence.teach(hypothesis, prior, &known.mean, &mut posterior);
         if self.heard == self.best_trend {
-            self.slopes_ps = after.slopes();
+            self.slopes_ps = posterior.slopes();
         }
         if self.heard == 0 {
             // Before there is something to foretell with, all hypotheses say the same, up to rounding.
@@ -345,7 +333,7 @@ impl<T: Real, const N: usize> Renewal<T, N> {
             *own = gained;
             if *before > T::lit(LEAST) {
                 let share = T::one() - (T::lit(LEAST) - *before).libm_exp();
-                self.mixture.add(share, *before + gained, &after);
+                self.mixture.add(share, *before + gained, &posterior);
             }
         }
         self.heard += 1;
@@ -409,7 +397,7 @@ mod tests {
 
     /// The leaks that the hypotheses know, by the number of the one that saw them.
     fn known(bank: &Bank<f64, 4>) -> [i32; HYPOTHESES] {
-        bank.hypotheses.map(|hypothesis| hypothesis.solve(&PRIOR).mean[1].round() as i32)
+        bank.hypotheses.map(|hypothesis| hypothesis.solved(&PRIOR).mean[1].round() as i32)
     }
 
     /// Who is refuted takes over what the best knows, if its own past holds it back longer than the best's; the best stays as it is,

@@ -28,7 +28,7 @@ pub(super) struct BlockSums<T, const N: usize> {
     pub aged: [T; LEAKS],
     /// Σ y²/S.
     pub square: T,
-    /// Number of terms.
+    /// Number of terms, which whoever adds them keeps.
     pub count: T,
 }
 
@@ -57,7 +57,6 @@ impl<T: Real, const N: usize> BlockSums<T, N> {
             self.aged[i] += weight * aged[i] * f[leak_column(i)];
         }
         self.square += weight * y * y;
-        self.count += T::one();
     }
 
     /// Mean age of what each leak's column tells of, s.
@@ -114,27 +113,34 @@ pub(super) struct Block<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Block<T, N> {
+    /// Tells nothing.
+    pub fn empty() -> Self {
+        Self { time_s: T::zero(), information: Information::new(), square: T::zero(), count: T::zero() }
+    }
+
     /// Of the position equation's `sums` and the `balances`; `column_noise` is what sensor noise in column 0 adds to Σ f₀² on average.
-    pub fn new(
+    /// In place: it is too large to be moved about.
+    pub fn fill(
+        &mut self,
         time_s: T,
         sums: &BlockSums<T, N>,
         balances: &[Option<Balance<T, N>>; BALANCES],
         column_noise: T,
-    ) -> Self {
-        let mut block = Self::of_position(time_s, sums, column_noise);
+    ) {
+        self.fill_position(time_s, sums, column_noise);
         for Balance { equation, age_s } in balances.iter().flatten() {
-            block.information.add_row(&equation.columns, equation.left, *age_s);
-            block.square += equation.left * equation.left;
-            block.count += T::one();
+            self.information.add_row(&equation.columns, equation.left, *age_s);
+            self.square += equation.left * equation.left;
+            self.count += T::one();
         }
-        block
     }
 
     /// All rows of a leak's column count as if as old as they are on average.
-    fn of_position(time_s: T, sums: &BlockSums<T, N>, column_noise: T) -> Self {
+    fn fill_position(&mut self, time_s: T, sums: &BlockSums<T, N>, column_noise: T) {
         let middle_s = T::lit(0.5) * time_s;
         let age_s = sums.ages_s().map(|age| age + middle_s);
-        let mut information = Information { column_noise, levels: sums.vector, ..Information::new() };
+        let information = &mut self.information;
+        (information.column_noise, information.levels) = (column_noise, sums.vector);
         for i in 0..N {
             for j in 0..=i {
                 *information.matrix.level_mut(i, j) = sums.matrix[i][j];
@@ -151,7 +157,19 @@ impl<T: Real, const N: usize> Block<T, N> {
             }
             information.slopes[i] = -age_s[i] * sums.vector[own];
         }
-        Self { time_s, information, square: sums.square, count: sums.count }
+        (self.time_s, self.square, self.count) = (time_s, sums.square, sums.count);
+    }
+
+    #[cfg(test)]
+    pub fn new(
+        time_s: T,
+        sums: &BlockSums<T, N>,
+        balances: &[Option<Balance<T, N>>; BALANCES],
+        column_noise: T,
+    ) -> Self {
+        let mut block = Self::empty();
+        block.fill(time_s, sums, balances, column_noise);
+        block
     }
 
     /// Σ (y − fᵀθ)² at `theta`, and the number of rows.
@@ -183,6 +201,7 @@ mod tests {
     fn block() -> Block<f64, 4> {
         let mut sums = BlockSums::new();
         (0..2).for_each(|k| sums.add(&F[k], &[0.0; LEAKS], Y[k], WEIGHT));
+        sums.count = 2.0;
         let balance =
             |k: usize| Some(Balance { equation: Equation { left: Y[k], columns: F[k] }, age_s: AGE_S });
         Block::new(0.0, &sums, &[balance(2), balance(3)], 0.0)

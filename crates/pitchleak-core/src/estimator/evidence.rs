@@ -2,7 +2,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block::Block;
-use super::information::{Information, Posterior};
+use super::hypothesis::Hypothesis;
+use super::information::{Posterior, Prior};
 use super::parameter::LEAKS;
 use crate::Real;
 
@@ -36,29 +37,37 @@ pub(super) struct Evidence<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Evidence<T, N> {
-    pub fn new(block: Block<T, N>, mean_0: T, reference: &[T; N]) -> Self {
-        let Information { mut levels, slopes, column_noise, .. } = block.information;
-        levels[0] += column_noise * mean_0;
-        let (score, slope_score) =
-            block.information.residual((levels, slopes), reference, &[T::zero(); LEAKS]);
-        Self { block, score, slope_score }
+    /// Of no block.
+    pub fn none() -> Self {
+        Self { block: Block::empty(), score: [T::zero(); N], slope_score: [T::zero(); LEAKS] }
     }
 
-    /// ln of the block's probability by a hypothesis, from what it knew `before` and `after` the block, and ln of how much the determinant of
-    /// its information has grown.
-    pub fn log_likelihood(
+    /// The block is there: it is held against the `reference`.
+    pub fn refer(&mut self, mean_0: T, reference: &[T; N]) {
+        let known = &self.block.information;
+        (self.score, self.slope_score) = (known.levels, known.slopes);
+        self.score[0] += known.column_noise * mean_0;
+        known.take_explained(&mut self.score, &mut self.slope_score, reference, &[T::zero(); LEAKS]);
+    }
+
+    /// The hypothesis takes the block in; `posterior` becomes what it knows then. ln of the block's probability by it, from what it
+    /// foretold before, and ln of how much the determinant of its information has grown.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    pub fn teach(
         &self,
+        hypothesis: &mut Hypothesis<T, N>,
+        prior: &Prior<'_, T>,
         reference: &[T; N],
-        before: &Posterior<T, N>,
-        after: &Posterior<T, N>,
+        posterior: &mut Posterior<T, N>,
     ) -> (T, T) {
-        let mut apart = [T::zero(); N];
+        hypothesis.solve(prior, posterior);
+        let slopes_ps = posterior.slopes_ps();
+        let mut apart = posterior.mean;
         for i in 0..N {
-            apart[i] = before.mean[i] - reference[i];
+            apart[i] -= reference[i];
         }
-        let slopes_ps = before.slopes_ps();
-        let score = (self.score, self.slope_score);
-        let (levels, slopes) = self.block.information.residual(score, &apart, &slopes_ps);
+        let (mut levels, mut slopes) = (self.score, self.slope_score);
+        self.block.information.take_explained(&mut levels, &mut slopes, &apart, &slopes_ps);
         // |y − H θ|² at the reference, less that at θ⁻.
         let mut square = T::zero();
         for i in 0..N {
@@ -67,19 +76,26 @@ impl<T: Real, const N: usize> Evidence<T, N> {
         for i in 0..LEAKS {
             square += slopes_ps[i] * (self.slope_score[i] + slopes[i]);
         }
-        let learnt = after.variance(&levels, &slopes);
+        let pivots = posterior.pivots();
+        hypothesis.learn(&self.block);
+        hypothesis.solve(prior, posterior);
+        let learnt = posterior.variance(&levels, &slopes);
         // Noise in column 0 makes its entry of b larger by chance.
-        let by_noise = self.block.information.column_noise * after.variance_0();
-        let growth = after.growth_since(before);
+        let by_noise = self.block.information.column_noise * posterior.variance_0();
+        let growth = posterior.growth_since(&pivots);
         (T::lit(0.5) * (square + learnt - by_noise - growth), growth)
+    }
+
+    /// As [`teach`](Self::teach): ln of the block's probability alone.
+    #[cfg_attr(target_os = "none", inline(never))] // its stack is none of what follows
+    pub fn gain(&self, hypothesis: &mut Hypothesis<T, N>, prior: &Prior<'_, T>, reference: &[T; N]) -> T {
+        self.teach(hypothesis, prior, reference, &mut Posterior::room()).0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::block::{Balance, BlockSums};
-    use super::super::hypothesis::Hypothesis;
-    use super::super::information::Prior;
     use super::*;
     use crate::continuity::Equation;
     use nalgebra::{DMatrix, DVector};
@@ -122,6 +138,12 @@ mod tests {
             Some(Balance { equation: Equation { left: row.y, columns: row.f }, age_s: row.age_s })
         };
         Block::new(0.5, &sums, &[balance(&balances[0]), balance(&balances[1])], 0.0)
+    }
+
+    fn evidence(block: Block<f64, 4>, reference: &[f64; 4]) -> Evidence<f64, 4> {
+        let mut evidence = Evidence { block, ..Evidence::none() };
+        evidence.refer(0.0, reference);
+        evidence
     }
 
     /// ln N(y; H m, 1 + H P Hᵀ) without the constant, and the posterior, by dense matrices.
@@ -168,16 +190,11 @@ mod tests {
             let rows = rows(index);
             let block = block(&rows);
             let reference = [0.1, -0.2, 0.3, 0.05];
-            let evidence = Evidence::new(block, 0.0, &reference);
-            let before = constant.solve(&PRIOR);
-            constant.learn(&block);
-            let after = constant.solve(&PRIOR);
-            let (stays, _) = evidence.log_likelihood(&reference, &before, &after);
+            let evidence = evidence(block, &reference);
+            let mut after = Posterior::room();
+            let (stays, _) = evidence.teach(&mut constant, &PRIOR, &reference, &mut after);
             trend.advance(block.time_s);
-            let before = trend.solve(&PRIOR);
-            trend.learn(&block);
-            let after = trend.solve(&PRIOR);
-            let (changes, _) = evidence.log_likelihood(&reference, &before, &after);
+            let (changes, _) = evidence.teach(&mut trend, &PRIOR, &reference, &mut after);
 
             let (log_steady, mean, cov) = dense(&rows, 0.0, &steady.0, &steady.1);
             steady = (mean, cov);
@@ -219,10 +236,10 @@ mod tests {
                 let column_noise = ROWS as f64 * (size * NOISE).powi(2);
                 let block = Block::new(0.5, &sums, &[None; 2], column_noise);
                 let mut hypothesis = Hypothesis::<f64, 4>::steady(f64::INFINITY);
-                let before = hypothesis.solve(&PRIOR);
-                hypothesis.learn(&block);
-                let after = hypothesis.solve(&PRIOR);
-                Evidence::new(block, 0.0, &[0.0; 4]).log_likelihood(&[0.0; 4], &before, &after).0
+                let reference = [0.0; 4];
+                evidence(block, &reference)
+                    .teach(&mut hypothesis, &PRIOR, &reference, &mut Posterior::room())
+                    .0
             };
             differences.push(told(1.0) - told(0.0));
         }

@@ -47,13 +47,12 @@ impl<T: Real, const N: usize> Hypothesis<T, N> {
     /// Knows what `other` knows.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn take_over(&mut self, other: &Self) {
-        self.known = if !self.has_slopes {
-            other.known.without_slopes()
+        self.known = other.known;
+        if !self.has_slopes {
+            self.known = other.known.without_slopes();
         } else if other.has_slopes {
-            other.known.with_slopes_in(other.memory_s / self.memory_s)
-        } else {
-            other.known
-        };
+            self.known.count_slopes_in(other.memory_s / self.memory_s);
+        }
     }
 
     /// Change of a level per s, prior units, where a slope is one; zero where there are none.
@@ -73,8 +72,14 @@ impl<T: Real, const N: usize> Hypothesis<T, N> {
         self.known.add(&block.information, self.rate_ps());
     }
 
-    pub fn solve(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
-        self.known.solve(prior, self.rate_ps())
+    /// Makes `posterior` what it knows.
+    pub fn solve(&self, prior: &Prior<'_, T>, posterior: &mut Posterior<T, N>) {
+        self.known.solve(prior, self.rate_ps(), posterior);
+    }
+
+    #[cfg(test)]
+    pub fn solved(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
+        self.known.solved(prior, self.rate_ps())
     }
 }
 
@@ -110,7 +115,7 @@ mod tests {
     fn finds_levels_and_slopes_of_leaks_that_grow() {
         for memory_s in [10.0, 100.0, 3600.0] {
             let trend = grown(memory_s);
-            let now = trend.solve(&PRIOR);
+            let now = trend.solved(&PRIOR);
             for i in 0..LEAKS {
                 let start = [1e-3, 2e-3, 5e-4][i];
                 // A block's rows count as if of its middle.
@@ -126,7 +131,7 @@ mod tests {
         let mut other = Hypothesis::trend(7.0);
         other.take_over(&long);
         let ends = [long, other].map(|trend| {
-            let now = trend.solve(&PRIOR);
+            let now = trend.solved(&PRIOR);
             (now.mean, now.slopes_ps())
         });
         for i in 0..LEAKS {

@@ -5,7 +5,7 @@ use super::parameter::{LEAKS, Parameter, leak_column};
 use super::update::Innovation;
 use crate::Real;
 use crate::continuity::Equation;
-use crate::linalg::{Factors, Joint};
+use crate::linalg::{Factors, Joint, Pivots};
 
 /// Normal equations of the N parameters as they are now, their levels, and of the leaks' slopes, with a unit prior; and what
 /// noise in column 0 does to them.
@@ -80,7 +80,7 @@ impl<T: Real, const N: usize> Solution<T, N> {
     /// What is known before any sample.
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn of_prior(offsets: &[[T; 2]; 2]) -> Self {
-        Information::new().solve(&Prior { mean_0: T::zero(), offsets }, T::zero()).solution()
+        Information::new().solution(&Prior { mean_0: T::zero(), offsets })
     }
 
     /// Variance of aᵀθ.
@@ -116,19 +116,17 @@ impl<T: Real, const N: usize> Information<T, N> {
         }
     }
 
-    /// Independent levels of this mean and each its own information, prior included.
-    pub fn of(mean: &[T; N], known: &[T; N], prior: &Prior<'_, T>) -> Self {
-        let mut information = Self::new();
+    /// Knows of independent levels this mean and each its own information, prior included, where it knew nothing.
+    pub fn set(&mut self, mean: &[T; N], known: &[T; N], prior: &Prior<'_, T>) {
         for i in 0..N {
             for j in 0..=i {
                 if let Some(prior) = prior_entry(prior.offsets, i, j) {
-                    *information.matrix.level_mut(i, j) -= prior;
+                    *self.matrix.level_mut(i, j) -= prior;
                 }
             }
-            *information.matrix.level_mut(i, i) += known[i];
-            information.levels[i] = known[i] * mean[i];
+            *self.matrix.level_mut(i, i) += known[i];
+            self.levels[i] = known[i] * mean[i];
         }
-        information
     }
 
     /// Adds what a block tells, in which slopes are counted per s; here one is `rate_ps`.
@@ -157,6 +155,7 @@ impl<T: Real, const N: usize> Information<T, N> {
 
     /// Adds a row f of unit variance that is `age_s` old: with slopes s per s it reads fᵀ(θ − age ∘ s), so that of levels and slopes
     /// together it is the row (f, −age ∘ f).
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each row
     pub fn add_row(&mut self, f: &[T; N], y: T, age_s: T) {
         for i in 0..N {
             for j in 0..=i {
@@ -183,19 +182,17 @@ impl<T: Real, const N: usize> Information<T, N> {
         Self { matrix, levels, slopes: [T::zero(); LEAKS], column_noise: self.column_noise }
     }
 
-    /// The same where a slope of one is what `unit` was, in units of before.
-    pub fn with_slopes_in(&self, unit: T) -> Self {
-        let mut scaled = *self;
+    /// From now on a slope of one is what `unit` was, in units of before.
+    pub fn count_slopes_in(&mut self, unit: T) {
         for i in 0..LEAKS {
             for j in 0..=i {
-                *scaled.matrix.slope_mut(i, j) *= unit * unit;
+                *self.matrix.slope_mut(i, j) *= unit * unit;
             }
             for j in 0..N {
-                scaled.matrix.cross[i][j] *= unit;
+                self.matrix.cross[i][j] *= unit;
             }
-            scaled.slopes[i] *= unit;
+            self.slopes[i] *= unit;
         }
-        scaled
     }
 
     /// Weighs all that is known by `keep` (0 to 1), and moves the levels on by `moved` times their slopes.
@@ -262,14 +259,15 @@ impl<T: Real, const N: usize> Information<T, N> {
         }
     }
 
-    /// What is left of the vectors `of_levels` and `of_slopes` without what levels and slopes of this size explain, M (levels, slopes).
+    /// Takes from the vectors `of_levels` and `of_slopes` what levels and slopes of this size explain, M (levels, slopes).
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
-    pub fn residual(
+    pub fn take_explained(
         &self,
-        (mut of_levels, mut of_slopes): ([T; N], [T; LEAKS]),
+        of_levels: &mut [T; N],
+        of_slopes: &mut [T; LEAKS],
         levels: &[T; N],
         slopes: &[T; LEAKS],
-    ) -> ([T; N], [T; LEAKS]) {
+    ) {
         of_levels[0] += self.column_noise * levels[0];
         for i in 0..N {
             for j in 0..i {
@@ -292,18 +290,31 @@ impl<T: Real, const N: usize> Information<T, N> {
                 }
             }
         }
-        (of_levels, of_slopes)
     }
 
     /// Posterior mean, and what its covariance follows from. A slope of one is `rate_ps` prior units per s; where that is zero there are
-    /// none. Noise in column 0 (errors in variables) is taken out of matrix and vector.
+    /// none. Noise in column 0 (errors in variables) is taken out of matrix and vector. In place: it is too large to be moved about.
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
-    pub fn solve(&self, prior: &Prior<'_, T>, rate_ps: T) -> Posterior<T, N> {
+    pub fn solve(&self, prior: &Prior<'_, T>, rate_ps: T, posterior: &mut Posterior<T, N>) {
+        let Posterior { mean, half, rate_ps: rate, factors } = posterior;
+        (*mean, *half, *rate) = (self.levels, self.slopes, rate_ps);
         let entry = |i: usize, j: usize| prior_entry(prior.offsets, i, j);
-        let mut posterior =
-            Posterior { mean: self.levels, half: self.slopes, rate_ps, factors: Factors::unit() };
-        posterior.factors.factor(&self.matrix, rate_ps > T::zero(), entry, self.column_noise);
-        posterior.factors.solve(&mut posterior.mean, &mut posterior.half, prior.mean_0);
+        factors.factor(&self.matrix, rate_ps > T::zero(), entry, self.column_noise);
+        factors.solve(mean, half, prior.mean_0);
+    }
+
+    /// What is known of the levels where there are no slopes.
+    #[cfg_attr(target_os = "none", inline(never))] // its stack is none of what follows
+    pub fn solution(&self, prior: &Prior<'_, T>) -> Solution<T, N> {
+        let mut posterior = Posterior::room();
+        self.solve(prior, T::zero(), &mut posterior);
+        Solution::of(posterior.mean, posterior.covariance())
+    }
+
+    #[cfg(test)]
+    pub fn solved(&self, prior: &Prior<'_, T>, rate_ps: T) -> Posterior<T, N> {
+        let mut posterior = Posterior::room();
+        self.solve(prior, rate_ps, &mut posterior);
         posterior
     }
 }
@@ -334,6 +345,18 @@ pub(super) struct Posterior<T, const N: usize> {
 }
 
 impl<T: Real, const N: usize> Posterior<T, N> {
+    /// Room for one.
+    #[inline(always)]
+    pub fn room() -> Self {
+        Self { mean: [T::one(); N], half: [T::one(); LEAKS], rate_ps: T::one(), factors: Factors::room() }
+    }
+
+    /// Pivots of its information.
+    #[inline]
+    pub fn pivots(&self) -> Pivots<T, N> {
+        self.factors.pivots()
+    }
+
     /// Variance of level 0.
     pub fn variance_0(&self) -> T {
         self.factors.variance_0()
@@ -362,9 +385,9 @@ impl<T: Real, const N: usize> Posterior<T, N> {
         slopes
     }
 
-    /// ln of how much larger the determinant of the information is than it was `before`.
-    pub fn growth_since(&self, before: &Self) -> T {
-        self.factors.determinant_over(&before.factors).at_most(T::max_value()).libm_ln()
+    /// ln of how much larger the determinant of the information is than it was with the pivots `before`.
+    pub fn growth_since(&self, before: &Pivots<T, N>) -> T {
+        self.factors.determinant_over(before).at_most(T::max_value()).libm_ln()
     }
 
     /// Covariance of the levels, lower triangle.
@@ -373,8 +396,7 @@ impl<T: Real, const N: usize> Posterior<T, N> {
         self.factors.covariance()
     }
 
-    /// The levels with their whole covariance.
-    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg(test)]
     pub fn solution(&self) -> Solution<T, N> {
         Solution::of(self.mean, self.covariance())
     }
@@ -412,7 +434,7 @@ mod tests {
             sum + v * v.transpose() * 1e6
         });
         let inverse = expected.try_inverse().unwrap();
-        let posterior = information.solve(&PRIOR, 0.0);
+        let posterior = information.solved(&PRIOR, 0.0);
         let (solution, a) = (posterior.solution(), [0.3, -1.0, 2.0, 0.5]);
         let dense = (inverse * nalgebra::Vector4::from(a)).dot(&nalgebra::Vector4::from(a));
         assert!((posterior.variance(&a, &[0.0; 3]) / dense - 1.0).abs() < 1e-9);
@@ -423,8 +445,8 @@ mod tests {
                 assert!((solution.covariance[i][j] - inverse[(i, j)]).abs() < 1e-9 * inverse[(i, i)].abs());
             }
         }
-        let before = Information::<f64, 4>::new().solve(&PRIOR, 0.0);
-        assert!((posterior.growth_since(&before) - expected.determinant().ln()).abs() < 1e-9);
+        let before = Information::<f64, 4>::new().solved(&PRIOR, 0.0);
+        assert!((posterior.growth_since(&before.pivots()) - expected.determinant().ln()).abs() < 1e-9);
     }
 
     #[test]
@@ -464,7 +486,7 @@ mod tests {
                 .add(&Block::new(1.0, &sums, &[None; 2], 100.0 * count * NOISE * NOISE).information, 0.0);
         }
         let prior = Prior { mean_0, ..PRIOR };
-        let found = information.solve(&prior, 0.0).solution().mean;
+        let found = information.solved(&prior, 0.0).solution().mean;
         assert!(found.iter().zip(truth).all(|(found, truth)| (found - truth).abs() < 1e-3), "{found:?}");
     }
 
@@ -475,7 +497,7 @@ mod tests {
         for _ in 0..200 {
             information.advance(0.5, 0.0);
         }
-        let solution = information.solve(&PRIOR, 0.0).solution();
+        let solution = information.solved(&PRIOR, 0.0).solution();
         assert!((solution.covariance[0][0] - 1.0).abs() < 1e-9);
         assert!(solution.mean[1].abs() < 1e-9);
     }

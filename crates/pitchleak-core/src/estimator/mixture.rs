@@ -90,7 +90,7 @@ mod tests {
         }
         let mut information = Information::new();
         information.add(&Block::new(1.0, &sums, &[None; 2], 0.0).information, 0.0);
-        information.solve(&PRIOR, 0.0)
+        information.solved(&PRIOR, 0.0)
     }
 
     /// Σ w m and Σ w (P + (m − m̄)(m − m̄)ᵀ), whatever the order, and one of no weight left out.

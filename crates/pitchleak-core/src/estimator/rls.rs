@@ -1,7 +1,6 @@
 use super::bank::{Bank, STEPS};
-use super::block::{BALANCES, Balance, Block, BlockSums};
+use super::block::{BALANCES, Balance, BlockSums};
 use super::change::ChangeDetector;
-use super::evidence::Evidence;
 use super::information::{Prior, Solution};
 use super::innovations::Innovations;
 use super::parameter::{LEAKS, Parameter};
@@ -10,8 +9,8 @@ use super::prior::{OffsetPrior, Zeros, offset_units, prior_spread};
 use super::settings::{self, RlsError, RlsSettings};
 use super::update::{Innovation, Update};
 use crate::continuity::{
-    BlockPressures, Clocks, Equation, Integrals, Measured, MovingAverage, Next, NoiseStd, PerChannel,
-    PressureMeans, PressureNoise, Readings, Row, Step, Weights, combine,
+    Clocks, Equation, Integrals, Measured, MovingAverage, Next, NoiseStd, PerChannel, PressureMeans,
+    PressureNoise, Readings, Row, Step, Weights, combine,
 };
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 
@@ -72,11 +71,11 @@ pub struct Rls<T, const N: usize> {
     unlearnt_s: T,
     /// Blocks of the balance since then; after a sudden change the first one counts at once.
     unlearnt: usize,
-    block: BlockPressures<T>,
+    block: Integrals<T>,
     /// How long it will be, s.
     block_time_s: T,
-    /// The part of the block in which both flows were measured.
-    fed: Integrals<T>,
+    /// The part of the block in which not both flows were measured.
+    unfed: Integrals<T>,
     pressure_noise: PressureNoise<T>,
     /// The balance equation's moving-average noise filter: last whitened block.
     memory: Option<MovingAverage<T, N>>,
@@ -92,6 +91,10 @@ pub struct Rls<T, const N: usize> {
     clocks: Clocks<T>,
     /// Step by which the last sample was taken in without a wait, s; zero where it waited.
     step_s: T,
+    /// The longest step to a sample that does not wait, s; zero while rows wait.
+    longest_s: T,
+    /// Largest flow that is a reading, m³/s.
+    flow_limit_m3s: T,
 }
 
 impl<T: Real, const N: usize> Rls<T, N> {
@@ -130,9 +133,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
             balances: [None; BALANCES],
             unlearnt_s: T::zero(),
             unlearnt: 0,
-            block: BlockPressures::default(),
+            block: Integrals::default(),
             block_time_s: settings.block_time_s,
-            fed: Integrals::default(),
+            unfed: Integrals::default(),
             pressure_noise: PressureNoise::default(),
             memory: None,
             column_noise: T::zero(),
@@ -144,40 +147,68 @@ impl<T: Real, const N: usize> Rls<T, N> {
             pressures: PressureMeans::default(),
             clocks: Clocks::new(settings.max_step_s),
             step_s: T::zero(),
+            longest_s: settings.max_step_s,
+            flow_limit_m3s: T::lit(1e3) * cylinder.area_a_m2 * cylinder.stroke_m,
         })
     }
 
-    /// Takes in the reading `sample`, `dt_s` after the one before.
+    /// Takes in the reading `sample`, `dt_s` after the one before. A flow without a reading rests over the steps to either side;
+    /// where it may come later, with a clock of its own, [`update_waiting`](Self::update_waiting) waits for it.
     #[inline]
     pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
         let () = Self::HAS_A_KNOWN_SIZE;
         if !self.plausible(sample) {
             return Update::Rejected;
         }
-        if !self.clocks.is_empty() {
-            return self.update_on_clocks(dt_s, &Readings::from(sample));
-        }
-        let Some(last) = self.last.as_ref().filter(|_| self.is_integrable(dt_s)) else {
-            return self.restart(sample);
+        let follows = dt_s > T::zero() && dt_s <= self.longest_s;
+        let Some(last) = self.last.filter(|_| follows) else {
+            return self.begin_at(&Sample { force_n: None, ..*sample });
         };
-        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, last, sample);
-        if measured != Measured::Both {
-            return self.update_without_a_flow(dt_s, sample);
-        }
-        self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
         self.last = Some(Sample { force_n: None, ..*sample });
-        self.step_s = dt_s;
-        self.fed.add(&step);
-        let weights = self.both;
-        self.advance(&step, &weights, Some(sample.x_m));
+        self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
+        let Step { integrals: step, measured } = Step::between(&self.cylinder, dt_s, &last, sample);
+        let weights = if measured == Measured::Both {
+            self.step_s = dt_s;
+            self.both
+        } else {
+            self.rest(step, measured, sample.x_m)
+        };
+        if measured != Measured::Neither {
+            self.advance(&step, &weights, Some(sample.x_m));
+        }
         self.finish(&step)
+    }
+
+    /// Not both flows were measured over `step`: the position goes on by the one that was, or anew.
+    #[cold]
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn rest(&mut self, step: Integrals<T>, measured: Measured, x_m: T) -> Weights<T> {
+        self.unfed.add(&step);
+        let only = match measured {
+            Measured::OnlyA => Weights::only_a,
+            Measured::OnlyB => Weights::only_b,
+            Measured::Both | Measured::Neither => {
+                self.anchor(x_m);
+                self.sums.count -= T::one();
+                return self.both;
+            }
+        };
+        only(&self.cylinder, &self.noise, &self.possible_leaks_m3spa())
+    }
+
+    /// Nothing goes over from what came before.
+    #[cold]
+    fn begin_at(&mut self, sample: &Sample<T>) -> Update<T> {
+        self.clocks.forget_rows();
+        self.longest_s = self.settings.max_step_s;
+        self.restart(sample)
     }
 
     /// The step is taken in: what is due at its end.
     #[inline(always)]
     fn finish(&mut self, step: &Integrals<T>) -> Update<T> {
         self.block.add(step);
-        let full = self.block.time_s >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
+        let full = self.block.time >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
         if full {
             self.close_block()
         } else if self.bank.is_renewing() {
@@ -244,7 +275,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     #[cold]
     fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
-        self.last = Some(Sample { force_n: None, ..*sample });
+        self.last = Some(*sample);
         self.anchor(sample.x_m);
         self.memory = None;
         self.pressure_noise.interrupt();
@@ -271,22 +302,45 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Largest position, m, pressure, Pa, and flow, m³/s, that are readings.
     #[inline]
     fn limits(&self) -> (T, T, T) {
-        let flow = T::lit(1e3) * self.cylinder.area_a_m2 * self.cylinder.stroke_m;
-        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), flow)
+        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), self.flow_limit_m3s)
     }
 
     /// Takes in what was read `dt_s` after the readings before, of channels that need not all come at once: between two of its
     /// own readings a channel is the straight line, and its noise is that of its own readings ([`Clocks`](crate::continuity::Clocks)).
     /// A channel without a reading is waited for, for a few steps of its own; then its chamber rests. Where the position or a pressure
-    /// is missing for longer, nothing is integrated.
-    ///
-    /// [`update`](Self::update) does so, too, where a flow has no reading.
+    /// is missing for longer, nothing is integrated. Where all come at once it is [`update`](Self::update).
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn update_readings(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
-        if let Readings { x: Some(x_m), pa: Some(pa_pa), pb: Some(pb_pa), qa: qa_m3s, qb: qb_m3s } = *readings
-        {
-            return self.update(dt_s, &Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None });
+        match *readings {
+            Readings { x: Some(x_m), pa: Some(pa_pa), pb: Some(pb_pa), qa: qa_m3s, qb: qb_m3s } => {
+                self.update_waiting(dt_s, &Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n: None })
+            }
+            _ => self.update_on_clocks(dt_s, readings),
         }
+    }
+
+    /// As [`update`](Self::update), but a flow without a reading is waited for, as by [`update_readings`](Self::update_readings).
+    #[inline]
+    pub fn update_waiting(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
+        if !self.clocks.is_empty() || self.waits_for(dt_s, sample.qa_m3s, sample.qb_m3s) {
+            return self.update_on_clocks(dt_s, &Readings::from(sample));
+        }
+        self.update(dt_s, sample)
+    }
+
+    /// Whether a flow has no reading after one that had.
+    #[inline]
+    fn waits_for(&self, dt_s: T, qa_m3s: Option<T>, qb_m3s: Option<T>) -> bool {
+        let missing = |last: Option<T>, now: Option<T>| now.is_none() && last.is_some();
+        let waits = |last: &Sample<T>| missing(last.qa_m3s, qa_m3s) || missing(last.qb_m3s, qb_m3s);
+        (qa_m3s.is_none() || qb_m3s.is_none())
+            && self.is_integrable(dt_s)
+            && self.last.as_ref().is_some_and(waits)
+    }
+
+    #[cold]
+    #[cfg_attr(target_os = "none", inline(never))]
+    fn update_on_clocks(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
         let (x_limit, pressure_limit, flow_limit) = self.limits();
         let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
         let PerChannel { x, pa, pb, qa, qb } = *readings;
@@ -295,28 +349,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
             && ok(pb, pressure_limit)
             && ok(qa, flow_limit)
             && ok(qb, flow_limit);
-        if plausible { self.update_on_clocks(dt_s, readings) } else { Update::Rejected }
-    }
-
-    /// A flow has no reading at one end of the step to `sample`: it rests, or is waited for if it was read before.
-    #[cold]
-    fn update_without_a_flow(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
-        let missing = |last: Option<T>, now: Option<T>| last.is_some() && now.is_none();
-        let waits =
-            |last: Sample<T>| missing(last.qa_m3s, sample.qa_m3s) || missing(last.qb_m3s, sample.qb_m3s);
-        if self.last.is_some_and(waits) {
-            self.update_on_clocks(dt_s, &Readings::from(sample))
-        } else {
-            self.take_row(&Row::read(dt_s, sample))
+        if !plausible {
+            return Update::Rejected;
         }
-    }
-
-    #[cold]
-    #[cfg_attr(target_os = "none", inline(never))]
-    fn update_on_clocks(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
         if !self.is_integrable(dt_s) {
             self.last = None;
-            self.clocks = self.clocks.anew();
+            self.clocks.begin_anew();
         } else if let Some(last) = self.last.filter(|_| self.clocks.is_empty()) {
             let step_s = Some(self.step_s).filter(|step_s| *step_s > T::zero());
             self.clocks.go_on_after(&last, step_s);
@@ -337,34 +375,36 @@ impl<T: Real, const N: usize> Rls<T, N> {
                 },
             };
         }
+        self.longest_s = if self.clocks.is_empty() { self.settings.max_step_s } else { T::zero() };
         update
     }
 
     fn take_row(&mut self, row: &Row<T>) -> Update<T> {
         let Some(last) = self.last.replace(row.sample) else { return self.restart(&row.sample) };
-        let Step { integrals: step, measured } = Step::between(&self.cylinder, row.dt_s, &last, &row.sample);
+        let Step { integrals: mut step, measured } =
+            Step::between(&self.cylinder, row.dt_s, &last, &row.sample);
         if row.read.pa && row.read.pb && !row.thinned {
             self.pressure_noise.add([last.pa_pa, last.pb_pa], [row.sample.pa_pa, row.sample.pb_pa]);
         } else {
             self.pressure_noise.interrupt();
         }
+        if measured == Measured::Neither || !row.read.x {
+            self.sums.count -= T::one();
+        }
         if measured == Measured::Neither {
             self.anchor(row.sample.x_m);
         } else {
             let weights = self.weights_of(measured, &diluted(&self.noise, row));
-            if measured == Measured::Both {
-                self.feed(&step, &weights);
-            }
             self.advance(&step, &weights, row.read.x.then_some(row.sample.x_m));
+            if measured == Measured::Both {
+                // The balance counts its noise as if every channel had been read with every sample.
+                step.time_square *= weights.balance_variance / self.both.balance_variance;
+            }
+        }
+        if measured != Measured::Both {
+            self.unfed.add(&step);
         }
         self.finish(&step)
-    }
-
-    /// Adds a step to the balance's, which counts its noise as if every channel had been read with every sample.
-    fn feed(&mut self, step: &Integrals<T>, weights: &Weights<T>) {
-        let mut step = *step;
-        step.time_square *= weights.balance_variance / self.both.balance_variance;
-        self.fed.add(&step);
     }
 
     /// Closes a block of the balance; after every second one the renewal of the estimates begins.
@@ -376,7 +416,9 @@ impl<T: Real, const N: usize> Rls<T, N> {
             self.memory = None;
         }
         let innovation = balance.as_ref().map(|equation| self.watch_balance(equation));
-        let time_s = self.block.time_s;
+        let time_s = self.block.time;
+        // As many rows of the position as steps, but for those with which it was not compared.
+        self.sums.count += self.block.steps;
         let keep = T::one() / (T::one() + time_s / T::lit(AVERAGING_S));
         self.pressures.add_block(&self.block, keep);
         self.innovations.forget(keep);
@@ -384,9 +426,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let watched = balance.as_ref().zip(innovation);
         let changed =
             watched.is_some_and(|(equation, by_known)| self.has_changed(equation, by_known, inflation));
-        self.block = BlockPressures::default();
+        self.block = Integrals::default();
         self.block_time_s = self.settings.block_time_s;
-        self.fed = Integrals::default();
+        if self.unfed.steps > T::zero() {
+            self.unfed = Integrals::default();
+        }
         if changed {
             let elapsed_s = self.unlearnt_s + time_s;
             self.begin_anew();
@@ -401,7 +445,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     fn has_changed(&mut self, balance: &Equation<T, N>, by_known: Innovation<T>, inflation: T) -> bool {
         let slopes_ps = self.slopes_ps.map(|(mean, _)| mean);
-        self.change.update(balance, self.block.time_s, &self.solution, by_known, &slopes_ps, inflation)
+        self.change.update(balance, self.block.time, &self.solution, by_known, &slopes_ps, inflation)
     }
 
     /// Puts a balance to those that will be learnt from together.
@@ -418,11 +462,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Begins to learn what the blocks since the last time tell of the parameters.
     fn learn(&mut self, inflation: T) {
-        let block = Block::new(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
         let drifted = self.drifted();
         let prior = prior(self.compressibility, &self.scale, &self.offsets);
-        let evidence = Evidence::new(block, prior.mean_0, &self.solution.mean);
-        self.bank.begin(evidence, drifted, inflation, &prior, &self.solution);
+        let evidence = &mut self.bank.evidence;
+        evidence.block.fill(self.unlearnt_s, &self.sums, &self.balances, self.column_noise);
+        evidence.refer(prior.mean_0, &self.solution.mean);
+        self.bank.begin(drifted, inflation, &prior, &self.solution);
         self.empty_sums();
     }
 
@@ -489,18 +534,25 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
     fn whitened_balance(&mut self) -> Option<Equation<T, N>> {
-        if self.fed.steps < T::lit(2.0) {
+        let without_unfed;
+        let fed = if self.unfed.steps > T::zero() {
+            without_unfed = self.block.without(&self.unfed);
+            &without_unfed
+        } else {
+            &self.block
+        };
+        if fed.steps < T::lit(2.0) {
             return None;
         }
         let (weight_a, weight_b) = (self.cylinder.area_b_m2, self.cylinder.area_a_m2);
-        let equation = combine(&self.fed, weight_a, weight_b, self.compressibility, &self.scale);
+        let equation = combine(fed, weight_a, weight_b, self.compressibility, &self.scale);
         let stored = self.stored_oil_variance(
             weight_a,
             weight_b,
             [self.noise.pressure_pa * self.noise.pressure_pa; 2],
         ) * self.compressibility
             * self.compressibility;
-        let flows = self.both.balance_variance * self.fed.time_square;
+        let flows = self.both.balance_variance * fed.time_square;
         let now = MovingAverage::after(self.memory.as_ref(), equation, flows, stored);
         self.memory = Some(now);
         Some(now.whitened())

@@ -21,7 +21,7 @@ pub(crate) struct Factors<T, const N: usize> {
 /// L − Hᵀ D⁻¹ H with H = W⁻¹ Cᵀ.
 #[derive(Clone, Copy)]
 struct Slopes<T, const N: usize> {
-    /// Whether there are any: else W, D are one and H is zero.
+    /// Whether there are any: else D is one, and W and H are of no use.
     any: bool,
     /// W at [`below`] the diagonal.
     lower: [T; SLOPES],
@@ -29,6 +29,13 @@ struct Slopes<T, const N: usize> {
     half: [[T; N]; SLOPES],
     pivots: [T; SLOPES],
     inverse_pivot: [T; SLOPES],
+}
+
+/// Pivots of a joint matrix: their product is its determinant.
+#[derive(Clone, Copy)]
+pub(crate) struct Pivots<T, const N: usize> {
+    levels: [T; N],
+    slopes: [T; SLOPES],
 }
 
 /// Place of what stands in row `i` and column `j` < `i`, row by row.
@@ -40,8 +47,8 @@ const fn below(i: usize, j: usize) -> usize {
 impl<T: Real, const N: usize> Slopes<T, N> {
     #[inline(always)]
     fn none() -> Self {
-        let (one, zero) = ([T::one(); SLOPES], [T::zero(); SLOPES]);
-        Self { any: false, lower: zero, half: [[T::zero(); N]; SLOPES], pivots: one, inverse_pivot: one }
+        let one = [T::one(); SLOPES];
+        Self { any: false, lower: one, half: [[T::one(); N]; SLOPES], pivots: one, inverse_pivot: one }
     }
 
     /// The columns of `matrix`.
@@ -146,15 +153,15 @@ impl<T: Real, const N: usize> Slopes<T, N> {
 }
 
 impl<T: Real, const N: usize> Factors<T, N> {
-    /// Those of the unit matrix.
+    /// Room for factors. All in it is one: zeros would be cleared by a function that is slow on a microcontroller.
     #[inline(always)]
-    pub fn unit() -> Self {
+    pub fn room() -> Self {
         Self {
             slopes: Slopes::none(),
-            upper: [[T::zero(); N]; N],
+            upper: [[T::one(); N]; N],
             pivots: [T::one(); N],
             inverse_pivot: [T::one(); N],
-            taken: T::zero(),
+            taken: T::one(),
         }
     }
 
@@ -173,7 +180,15 @@ impl<T: Real, const N: usize> Factors<T, N> {
             self.slopes.eliminate(matrix);
             self.slopes.leave(matrix, &mut self.upper);
         } else {
-            self.upper = *matrix.lower();
+            if self.slopes.any {
+                self.slopes = Slopes::none();
+            }
+            // Entry by entry: what stands above the diagonal is of no use.
+            for i in 0..N {
+                for j in 0..i + 1 {
+                    self.upper[i][j] = matrix.level(i, j);
+                }
+            }
         }
         self.factor_levels(prior, column_noise);
     }
@@ -269,12 +284,19 @@ impl<T: Real, const N: usize> Factors<T, N> {
         self.inverse_pivot[0]
     }
 
-    /// det A over det B; the pivots one by one, as their product may be beyond f32.
-    pub fn determinant_over(&self, other: &Self) -> T {
+    /// D.
+    #[inline]
+    pub fn pivots(&self) -> Pivots<T, N> {
+        Pivots { levels: self.pivots, slopes: self.slopes.pivots }
+    }
+
+    /// det A over that of a matrix with the pivots `other`; one by one, as their product may be beyond f32.
+    #[inline]
+    pub fn determinant_over(&self, other: &Pivots<T, N>) -> T {
         let ratio = |own: &[T], other: &[T]| {
             own.iter().zip(other).fold(T::one(), |product, (own, other)| product * (*own / *other))
         };
-        ratio(&self.pivots, &other.pivots) * ratio(&self.slopes.pivots, &other.slopes.pivots)
+        ratio(&self.pivots, &other.levels) * ratio(&self.slopes.pivots, &other.slopes)
     }
 
     /// z of U z = x.
@@ -373,7 +395,7 @@ mod tests {
             rows in prop::collection::vec(prop::array::uniform7(-2.0..2.0), 1..12), v in prop::array::uniform7(-1.0..1.0),
         ) {
             let joint = joint(&rows);
-            let mut factors = Factors::unit();
+            let mut factors = Factors::room();
             factors.factor(&joint, true, unit, 0.0);
             let matrix = dense(&joint);
             let inverse = matrix.try_inverse().unwrap();
@@ -395,7 +417,7 @@ mod tests {
                 }
             }
             prop_assert!((factors.variance_0() - inverse[(0, 0)]).abs() < 1e-9);
-            prop_assert!((factors.determinant_over(&Factors::unit()) / matrix.determinant() - 1.0).abs() < 1e-9);
+            prop_assert!((factors.determinant_over(&Factors::room().pivots()) / matrix.determinant() - 1.0).abs() < 1e-9);
         }
     }
 
@@ -405,7 +427,7 @@ mod tests {
         let rows = [[0.3, -1.2, 2.0, 0.7, 0.0, 0.0, 0.0], [1.0, 0.4, -0.6, 1.5, 0.0, 0.0, 0.0]];
         let joint = joint(&rows);
         let [with, without] = [true, false].map(|slopes| {
-            let mut factors = Factors::unit();
+            let mut factors = Factors::room();
             factors.factor(&joint, slopes, unit, 0.2);
             factors
         });
@@ -418,6 +440,6 @@ mod tests {
         });
         assert!(solved[0].iter().zip(solved[1]).all(|(with, without)| same(*with, without)));
         assert!(same(with.variance(&vector, &[0.0; 3]), without.variance(&vector, &[0.0; 3])));
-        assert!(same(with.determinant_over(&without), 1.0));
+        assert!(same(with.determinant_over(&without.pivots()), 1.0));
     }
 }

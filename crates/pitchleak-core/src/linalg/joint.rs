@@ -39,6 +39,7 @@ impl<T: Real, const N: usize> Joint<T, N> {
     }
 
     /// Of the levels: what stands on and below the diagonal.
+    #[cfg(test)]
     pub fn lower(&self) -> &[[T; N]; N] {
         &self.square
     }

@@ -7,5 +7,5 @@
 mod factors;
 mod joint;
 
-pub(crate) use factors::Factors;
+pub(crate) use factors::{Factors, Pivots};
 pub(crate) use joint::{Joint, symmetric};
