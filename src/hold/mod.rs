@@ -8,6 +8,7 @@
 //! 3. `presence` weighs which leaks there are: none is negative, most cylinders have none.
 //! 4. [`HoldTest`] is what was found, [`HoldTest::report`] the verdict and its words.
 
+mod advice;
 mod equations;
 mod fit;
 mod nodes;
@@ -18,5 +19,6 @@ mod recorder;
 mod report;
 mod verdict;
 
+pub use advice::advise;
 pub use outcome::{HeldLeak, HoldSummary, HoldTest};
 pub use recorder::{EndedBy, Recorder};

@@ -64,6 +64,8 @@ impl Held {
 #[derive(Clone, Debug)]
 pub struct Recorder {
     averaged: [usize; 2],
+    /// Noise of a pressure reading.
+    pressure_std_pa: f64,
     now: Option<Held>,
     /// Over: what follows until a port opens is not usable.
     is_over: bool,
@@ -79,6 +81,7 @@ impl Recorder {
             ((noise_std / wanted).powi(2).ceil() as usize).clamp(1, MOST_AVERAGED)
         };
         Self {
+            pressure_std_pa: sensors.pressure.noise_std,
             averaged: [
                 averaged(sensors.pressure.noise_std, PRESSURE_STD_PA),
                 averaged(sensors.position.noise_std, POSITION_STD_M),
@@ -115,6 +118,9 @@ impl Recorder {
         });
         if let Some(ended_by) = ending(&held.readings, self.averaged) {
             self.is_over = true;
+            if ended_by == EndedBy::Pressure {
+                held.readings.truncate(filled(&held.readings, self.pressure_std_pa));
+            }
             self.end(ended_by);
         }
     }
@@ -151,6 +157,13 @@ fn ending(readings: &[Reading], [of_pressure, of_position]: [usize; 2]) -> Optio
     (count >= MOST_READINGS).then_some(EndedBy::Enough)
 }
 
+/// How many readings there are before a chamber may be empty: a mean that is below 5 bar has readings of none in it.
+fn filled(readings: &[Reading], std_pa: f64) -> usize {
+    let surely_pa = LEAST_PRESSURE_PA + 2.0 * std_pa;
+    let low = |reading: &Reading| reading.pa_pa.min(reading.pb_pa) < surely_pa;
+    readings.iter().position(low).unwrap_or(readings.len())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,7 +193,7 @@ mod tests {
         let falling = holds((0..100).map(|k| record(time(k), Some(true), 0.1, 50e5 - 1e5 * f64::from(k))));
         assert_eq!(
             (falling.len(), falling[0].ended_by, falling[0].readings.len()),
-            (1, EndedBy::Pressure, 47)
+            (1, EndedBy::Pressure, 45)
         );
         let moving = holds((0..100).map(|k| record(time(k), Some(true), 0.1 - 1e-4 * f64::from(k), 50e5)));
         assert_eq!((moving.len(), moving[0].ended_by), (1, EndedBy::Motion));

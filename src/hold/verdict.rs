@@ -64,7 +64,7 @@ impl HoldTest {
         let (text, suggestion) = match self.summary.ended_by {
             EndedBy::Pressure => (
                 "a chamber is below 5 bar as soon as the ports are shut",
-                "shut them while both chambers are under pressure, 20 bar or more",
+                "shut them while both chambers are under 20 bar or more; where they are, a leak of litres a minute empties one: look for oil outside",
             ),
             EndedBy::Motion => (
                 "the piston moves by 2 mm at once",

@@ -25,7 +25,7 @@ pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
 use crate::explain::Explainer;
-use crate::hold::Recorder;
+use crate::hold::{self, Recorder};
 use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
@@ -384,14 +384,14 @@ pub fn replay<E: From<ReplayError>>(
     let mut record = Record::default();
     let columns = reader.columns(&rig.columns);
     let mut refused = None;
-    let mut hold = None;
+    let mut holds: Option<Recorder> = None;
     while next_record(reader, &mut record, &mut refused, || Refused::new(rig, &columns))? {
         let renewed = replay.push(&record);
-        if record.shut == Some(true) && hold.is_none() {
-            hold = Some(Recorder::new(rig));
+        if record.shut == Some(true) && holds.is_none() {
+            holds = Some(Recorder::new(rig));
         }
-        if let Some(hold) = &mut hold {
-            hold.push(&record);
+        if let Some(holds) = &mut holds {
+            holds.push(&record);
         }
         if !replay.spikes.left_out() && !replay.is_shut {
             excerpt.add(&record);
@@ -400,7 +400,7 @@ pub fn replay<E: From<ReplayError>>(
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
-    if let Some(hold) = hold.and_then(|hold| hold.finish(rig)) {
+    if let Some(hold) = holds.and_then(|holds| holds.finish(rig)) {
         return Ok(hold.report(summary, rig));
     }
     let weighed = replay.whole_trace();
@@ -409,7 +409,9 @@ pub fn replay<E: From<ReplayError>>(
         Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
         None => replay.suspicions(verdict, &weighed, &excerpt, &columns),
     };
-    Ok(replay.report_with(summary, &weighed, suspect))
+    let mut report = replay.report_with(summary, &weighed, suspect);
+    hold::advise(&mut report, reader.quality());
+    Ok(report)
 }
 
 /// [`replay()`] with what the posterior over explanations says beside the verdict; a rig with effects of its own has none yet.
