@@ -126,7 +126,8 @@ def simulate(
     (K, ``"45 °C"``, ``"20 °C -> 60 °C @ 0 s..600 s"`` or a CSV file) makes the leaks, which have their size at
     40 °C, follow the oil's viscosity. ``shut`` (``"5 s..15 s"``) shuts both ports: a hold test. ``effects`` are
     sizes by id in SI. ``noise`` is 3 σ of every sensor as a share of full scale, ``"none"`` or ``"rig"``; ``bias``
-    the greatest constant offset. ``faults`` are mistakes of the sensors (``"qa dead"``, ``"pa offset 10 bar"``, ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see
+    the greatest constant offset. ``faults`` are mistakes of the sensors (``"qa dead"``, ``"pa offset 10 bar"``,
+    ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see
     ``pitchleak simulate --help``). ``out`` writes the trace (.csv, .csv.gz) and the truth beside it (.json)
     instead of keeping it. ``progress`` is True (a bar where tqdm is installed and somebody watches), False, or a
     function of the share that is done and 1.

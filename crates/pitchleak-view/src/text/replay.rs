@@ -100,7 +100,10 @@ impl ReplayText<'_> {
         self.write_leaks(&mut out);
         if let Some(sketch) = self.sketch {
             write_bars(&mut out, self.report, sketch, self.palette);
-            write_courses(&mut out, self.report, sketch, self.palette);
+            // What was open before a hold tells nothing of it.
+            if self.report.hold.is_none() {
+                write_courses(&mut out, self.report, sketch, self.palette);
+            }
         }
         self.write_spells(&mut out);
         self.write_alarms(&mut out);
