@@ -68,7 +68,7 @@ fn rms_lpm(outcomes: &[Outcome]) -> f64 {
     (outcomes.iter().map(|one| one.error_lpm.powi(2)).sum::<f64>() / outcomes.len() as f64).sqrt()
 }
 
-/// Theory: rms errors of 0.0006 and 0.0009 L/min in 10 s; 0.001 is what has to be kept.
+/// The Cramér–Rao bound with leaks of any sign is 0.0006 and 0.0009 L/min in 10 s; 0.001 is what has to be kept.
 #[test]
 fn a_hundredth_of_a_litre_is_found_in_ten_seconds_and_its_interval_holds() {
     let (mut covered, mut all) = (0, 0);

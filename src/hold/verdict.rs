@@ -9,7 +9,7 @@ use crate::rig::Rig;
 use crate::units::{LPM_PER_M3S, readable};
 use pitchleak_core::{Leak, PerLeak};
 
-/// Misfits beyond so many standard deviations of chance contradict the model (theory: χ²/n) …
+/// Misfits beyond so many standard deviations of chance contradict the model …
 const CHANCE_SIGMAS: f64 = 5.0;
 /// … where the residuals' squares are as large beside the declared noise's: sensors are a little worse than declared now and then.
 const LEAST_MISFIT: f64 = 1.5;
