@@ -16,6 +16,8 @@ mod table;
 
 pub use columns::{Column, Course};
 pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, Note, WIRING_DOUBT, explain};
+pub(crate) use orthant::{Orthant, positive_orthant};
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
+pub(crate) use table::LEAK_SHARE;
 pub use table::{Entry, Kind, explanations};

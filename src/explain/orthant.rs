@@ -18,7 +18,7 @@ const GIBBS_BURN_IN: usize = 64;
 const LEAST_TAIL: f64 = 1e-12;
 
 /// A weighted sample.
-pub(super) struct Orthant {
+pub(crate) struct Orthant {
     /// ln of the probability of the positive orthant.
     pub ln_probability: f64,
     /// Points, variable by variable.
@@ -39,7 +39,7 @@ pub(super) fn normal_quantile(probability: f64) -> f64 {
 }
 
 /// N(`means`, `covariance`) where every variable is positive.
-pub(super) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
+pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
     // What is furthest below zero is drawn first: what follows is drawn given it.
     let mut order: Vec<usize> = (0..means.len()).collect();
     let height = |i: &usize| means[*i] / covariance[*i][*i].sqrt();

@@ -6,7 +6,7 @@ use crate::replay::Stream;
 use serde::{Deserialize, Serialize};
 
 /// After so large a share of the time since something happened the posterior can have changed. Chosen.
-const SHARE: f64 = 0.1;
+const SHARE: f64 = 0.2;
 /// At least, and at most, s. Chosen.
 const BOUNDS_S: (f64, f64) = (1.0, 60.0);
 

@@ -135,7 +135,7 @@ impl Stream {
         if let Some(refused) = &mut self.refused {
             refused.add(record);
         }
-        if !self.replay.spikes.left_out() {
+        if !self.replay.spikes.left_out() && !self.replay.is_shut {
             self.evidence.add(record, &self.replay.rig);
         }
         renewed

@@ -17,6 +17,10 @@ pub enum ReasonId {
     Wiring,
     /// More rows are bad than good.
     MostlyBadRows,
+    /// A hold asks for a bulk modulus that the rig file rules out.
+    BulkModulusImpossible,
+    /// A hold's leak comes out negative.
+    NegativeLeak,
     /// A sensor that is off explains the trace as well as a leak does.
     OffsetOrLeak,
     /// The residuals are larger than the declared noise can make them.
@@ -36,6 +40,8 @@ impl ReasonId {
             Self::Channel(kind) => kind.id(),
             Self::Wiring => "wiring",
             Self::MostlyBadRows => "mostly_bad_rows",
+            Self::BulkModulusImpossible => "bulk_modulus_impossible",
+            Self::NegativeLeak => "negative_leak",
             Self::OffsetOrLeak => "offset_or_leak",
             Self::ModelDoesNotFit => "model_does_not_fit",
             Self::NotIdentifiable => "not_identifiable",
@@ -63,7 +69,7 @@ pub struct Reason {
 }
 
 impl Reason {
-    pub(super) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
+    pub(crate) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
         Self { id, text: text.into(), suggestion: Some(suggestion.into()) }
     }
 }
