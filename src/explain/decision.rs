@@ -3,6 +3,7 @@
 use super::hypothesis::{LeakCourse, State};
 use super::posterior::{Tables, Weighed, weigh};
 use super::raw_products::Statistic;
+use super::sizes::{mended, sentence};
 use super::table::Entry;
 use crate::report::Status;
 use crate::rig::Rig;
@@ -90,6 +91,8 @@ pub struct Decision {
     pub leakage: PerLeak<Belief>,
     /// How long before the end a leak last changed at once, s, pauses not counted; none where none did.
     pub changed_ago_s: Option<f64>,
+    /// Mean size of the pressures across the leaks since then, Pa: a leak's coefficient is its flow over it.
+    pub pressures_pa: PerLeak<f64>,
     /// Best first.
     pub explanations: Vec<Explained>,
     /// Whether the likeliest explanation has sensors and rig as declared.
@@ -146,21 +149,17 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         ruled_out,
         probability,
         leakage: beliefs.map(|marginal| marginal.belief()),
-        changed_ago_s: changed_ago_s(weighed),
-        explanations: listed(weighed),
+        changed_ago_s: weighed.first().and_then(|best| best.changed_ago_s),
+        pressures_pa: weighed.first().map_or_else(PerLeak::default, |best| best.pressures_pa),
+        explanations: listed(weighed, rig),
         as_declared: weighed
             .first()
             .is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
-        notes: notes(weighed, alpha),
+        notes: notes(weighed, rig),
         misfit,
         wander,
         wiring,
     }
-}
-
-/// How long ago a leak changed at once, as the likeliest explanation has it.
-fn changed_ago_s(weighed: &[Weighed<'_>]) -> Option<f64> {
-    weighed.iter().max_by(|a, b| a.probability.total_cmp(&b.probability))?.changed_ago_s
 }
 
 /// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
@@ -226,11 +225,12 @@ impl Marginal {
 }
 
 /// What is not usual with probability 1 − α, of each kind.
-fn notes(weighed: &[Weighed<'_>], alpha: f64) -> Vec<Note> {
-    (0..3).filter_map(|kind| note(weighed, kind, alpha)).collect()
+fn notes(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Note> {
+    (0..3).filter_map(|kind| note(weighed, kind, rig)).collect()
 }
 
-fn note(weighed: &[Weighed<'_>], kind: usize, alpha: f64) -> Option<Note> {
+fn note(weighed: &[Weighed<'_>], kind: usize, rig: &Rig) -> Option<Note> {
+    let alpha = rig.decision.alpha;
     let mut masses: Vec<(&Entry, f64)> = Vec::new();
     for one in weighed {
         let Some(entry) = found(one)[kind].filter(|entry| !is_usual(entry.id)) else { continue };
@@ -242,13 +242,19 @@ fn note(weighed: &[Weighed<'_>], kind: usize, alpha: f64) -> Option<Note> {
     masses.sort_by(|a, b| b.1.total_cmp(&a.1));
     let probability = masses.iter().map(|(_, mass)| mass).sum();
     let (best, _) = *masses.first().filter(|_| probability >= 1.0 - alpha)?;
+    let likeliest = weighed.iter().find(|one| found(one)[kind].is_some_and(|entry| entry.id == best.id));
     let others = masses.iter().skip(1).filter(|(_, mass)| *mass > alpha).map(|(entry, _)| entry.id);
     let cannot_be_told_from = others.chain(best.alike.iter().copied()).map(str::to_owned).collect();
-    Some(Note { id: best.id.to_owned(), probability, text: best.text.to_owned(), cannot_be_told_from })
+    Some(Note {
+        id: best.id.to_owned(),
+        probability,
+        text: likeliest.map_or_else(|| best.text.to_owned(), |one| sentence(best, &one.found, rig)),
+        cannot_be_told_from,
+    })
 }
 
 /// What an explanation is made of: leaks, their courses, state, wiring.
-fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
+fn listed(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Explained> {
     let mut out: Vec<Explained> = Vec::new();
     for one in weighed {
         let id = id(one);
@@ -271,7 +277,7 @@ fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
                     .map(|(old, new)| (old * known.probability + new * one.probability) / sum);
                 known.probability = sum;
             }
-            None => out.push(explained(id, one, leakage)),
+            None => out.push(explained(id, one, leakage, rig)),
         }
     }
     out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -282,11 +288,11 @@ fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
     out
 }
 
-fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained {
+fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>, rig: &Rig) -> Explained {
     let hypothesis = &one.hypothesis;
     let parts = found(one);
     let unusual = || parts.iter().flatten().filter(|entry| !is_usual(entry.id));
-    let mut words: Vec<String> = unusual().map(|entry| entry.text.to_owned()).collect();
+    let mut words: Vec<String> = unusual().map(|entry| sentence(entry, &one.found, rig)).collect();
     if hypothesis.state.wander.0 > 0.0 {
         words.push("the flow meters' zeros wander".to_owned());
     }
@@ -304,6 +310,7 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
             .into_iter()
             .flat_map(str::lines)
             .map(str::to_owned)
+            .chain(unusual().flat_map(|entry| mended(entry, &one.found, rig)))
             .collect(),
         cannot_be_told_from: unusual().flat_map(|entry| entry.alike).map(|id| (*id).to_owned()).collect(),
         leakage,

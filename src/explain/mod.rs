@@ -12,6 +12,7 @@ mod orthant;
 mod posterior;
 mod raw_products;
 mod readings;
+mod sizes;
 mod table;
 
 pub use columns::{Column, Course};

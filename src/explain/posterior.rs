@@ -10,10 +10,11 @@ use super::independence::inflation;
 use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
 use super::raw_products::{RawProducts, Statistic};
 use super::readings::Readings;
+use super::sizes::Found;
 use super::table::{self, Entry, USUAL, USUAL_PRESSURE};
 use crate::rig::Rig;
 use pitchleak_core::continuity::CHANNELS;
-use pitchleak_core::{Leak, PerLeak};
+use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
 const LEAST_LN: f64 = 9.0;
@@ -45,6 +46,10 @@ pub(super) struct Weighed<'a> {
     pub misfit: f64,
     /// How long before the end a leak last changed at once, s; none where none did.
     pub changed_ago_s: Option<f64>,
+    /// Mean size of the pressures across the leaks since then, Pa.
+    pub pressures_pa: PerLeak<f64>,
+    /// What is not as declared, in its columns' units.
+    pub found: Vec<Found>,
     /// Mean of C P of each leak, m³/s.
     pub levels_m3s: [f64; 3],
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
@@ -398,12 +403,13 @@ impl<'a, 's> Pass<'a, 's> {
         let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
         let whole = self.products.whole();
+        let ln_wired = table::ln_wired();
         let mut kept = Vec::new();
         for entry in &self.tables.mistakes {
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
             let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
             let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
-            let ln_prior = entry.share.ln() - table::ln_wired() + measure;
+            let ln_prior = entry.share.ln() - ln_wired + measure;
             let mut none_ln = f64::NEG_INFINITY;
             for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
                 let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
@@ -475,13 +481,38 @@ impl<'a, 's> Pass<'a, 's> {
             levels_m3s = self.levels_m3s(&hypothesis, &orthant.points, &orthant.weights);
             (self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points), orthant.weights)
         };
+        let found = self.found(equations, &hypothesis, &fit);
+        let pressures_pa = self.products.mean_pressures_pa(hypothesis.last_change(self.segments));
         let changed = Some(hypothesis.last_change(self.segments)).filter(|border| *border > 0);
         let changed = changed.and_then(|border| self.products.segments.get(border));
         let changed_ago_s = changed.map(|segment| self.products.total_s - segment.begin_s);
         Some((
             ln,
-            Weighed { hypothesis, probability: 0.0, misfit, changed_ago_s, levels_m3s, leaks_m3s, weights },
+            Weighed {
+                hypothesis,
+                probability: 0.0,
+                misfit,
+                changed_ago_s,
+                pressures_pa,
+                found,
+                levels_m3s,
+                leaks_m3s,
+                weights,
+            },
         ))
+    }
+
+    /// The columns that its state sets free, as far as they are steady.
+    fn found(&self, equations: &NormalEquations, hypothesis: &Hypothesis<'_>, fit: &Fit) -> Vec<Found> {
+        let State { zeros, departure, .. } = hypothesis.state;
+        let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
+        let size = |column: Column| {
+            let place = equations.place(column, Course::Constant)?;
+            let at = hypothesis.free.iter().position(|free| free.column == place)?;
+            let variance = fit.covariance(&[at])[0][0];
+            Some((column, Estimate { value: fit.means[at], std: variance.max(0.0).sqrt() }))
+        };
+        columns.filter_map(|(column, ..)| size(*column)).collect()
     }
 
     fn levels_m3s(&self, hypothesis: &Hypothesis<'_>, points: &[Vec<f64>], weights: &[f64]) -> [f64; 3] {

@@ -15,7 +15,9 @@ mod share {
     pub const RARE: f64 = 0.01;
     /// Two at once.
     pub const VERY_RARE: f64 = 0.002;
-    /// All mistakes of wiring, sign, unit and geometry together.
+    /// Two wires exchanged, or a sign turned: each, once in a thousand recordings.
+    pub const EXCHANGED: f64 = 0.001;
+    /// All other mistakes of wiring, unit and geometry together.
     pub const WIRING: f64 = 0.005;
 }
 
@@ -336,9 +338,18 @@ pub(super) fn mistakes() -> Vec<Entry> {
             ("unit_area_b", Mistake::Area(1, factor), "area B is in another unit", None),
         ]);
     }
-    let share = share::WIRING / all.len() as f64;
+    let others = all.iter().filter(|(id, ..)| !is_exchange(id)).count().max(1) as f64;
     all.into_iter()
-        .map(|(id, mistake, text, mends)| Entry {
+        .map(|(id, mistake, text, mends)| {
+            (
+                id,
+                mistake,
+                text,
+                mends,
+                if is_exchange(id) { share::EXCHANGED } else { share::WIRING / others },
+            )
+        })
+        .map(|(id, mistake, text, mends, share)| Entry {
             mistake: Some(mistake),
             ..Entry::new(id, Kind::Wiring, share, text).remedy(WIRES, mends)
         })
@@ -362,7 +373,11 @@ const FACTORS: [f64; 10] = [
 /// A slipped decimal point, and a diameter for a radius.
 const SLIPS: [f64; 4] = [10.0, 0.1, 4.0, 0.25];
 
+fn is_exchange(id: &str) -> bool {
+    id.starts_with("exchanged") || id.starts_with("sign")
+}
+
 /// ln prior probability of as declared wiring.
 pub(super) fn ln_wired() -> f64 {
-    (1.0 - share::WIRING).ln()
+    (1.0 - mistakes().iter().map(|mistake| mistake.share).sum::<f64>()).ln()
 }

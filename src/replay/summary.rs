@@ -94,11 +94,11 @@ impl Replay {
         decision: Option<&Decision>,
     ) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
-        let pressures_pa = self.pressures.sizes().sizes_pa;
         let coefficients = self.leak_coefficients();
         let coefficients = PerLeak::from_fn(|leak| match decision {
-            Some(decision) if pressures_pa[leak] > 0.0 => {
-                decision.leakage[leak].estimate_lpm().scaled(1.0 / (LPM_PER_M3S * pressures_pa[leak]))
+            Some(decision) if decision.pressures_pa[leak] > 0.0 => {
+                let per_pa = 1.0 / (LPM_PER_M3S * decision.pressures_pa[leak]);
+                decision.leakage[leak].estimate_lpm().scaled(per_pa)
             }
             _ => coefficients[leak],
         });

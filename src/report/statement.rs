@@ -19,6 +19,7 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
     let mut sentences = Vec::new();
     if status.is_sure() {
         sentences.extend(faults.iter().map(|leak| fault(findings, *leak)));
+        sentences.extend(law(findings));
         sentences.extend(excluded(findings));
         sentences.extend(unknown(findings));
         sentences.extend(notes(findings));
@@ -61,6 +62,18 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
         _ => format!("{label} leak of {} L/min: {}.", interval(&findings.leakage[leak]), advice(leak)),
     }
 }
+
+/// By which law they leak, where it is not the model's for certain.
+fn law(findings: &Findings<'_>) -> Option<String> {
+    let decision = findings.decision?;
+    let orifices = decision.explanations.iter().filter(|one| one.id.contains(":orifice"));
+    let probability: f64 = orifices.map(|one| one.probability).sum();
+    (probability >= LAW_SURE)
+        .then(|| "It leaks as through an orifice, by the root of the pressure.".to_owned())
+}
+
+/// A law is named where it is at least so probable: explanations below 1 % are not listed. Chosen.
+const LAW_SURE: f64 = 0.9;
 
 /// Leaks whose upper bound is below the threshold.
 fn excluded(findings: &Findings<'_>) -> Option<String> {

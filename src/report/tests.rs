@@ -84,6 +84,7 @@ fn decision(active: PerLeak<bool>) -> Decision {
         probability: active.map(|active| if active { 0.999 } else { 0.001 }),
         leakage: PerLeak::from_fn(|_| Belief::default()),
         changed_ago_s: None,
+        pressures_pa: PerLeak::default(),
         explanations: Vec::new(),
         as_declared: true,
         notes: Vec::new(),
