@@ -219,7 +219,7 @@ fn reader<'a>(rows: &[String], rig: &Rig) -> TraceReader<'a> {
     TraceReader::from_stream("t", Box::new(std::io::Cursor::new(file(rows).into_bytes())), rig).unwrap()
 }
 
-/// What misfitted, or hung, for a while is told as long as the stream runs, and counts for ten to twenty minutes; a file's
+/// What misfitted, or hung, for a while counts for ten to twenty minutes; what hung is told as long as the stream runs. A file's
 /// verdict is on the whole of it.
 #[test]
 fn what_was_wrong_once_does_not_keep_a_stream_in_doubt_for_ever() {
@@ -237,10 +237,7 @@ fn what_was_wrong_once_does_not_keep_a_stream_in_doubt_for_ever() {
     };
     for (rows, said) in [
         (long_trace(&rig, hangs), "Earlier: qa reads 3 L/min from 60.00 s to 89.96 s"),
-        (
-            long_trace(&rig, scatters),
-            "Earlier: model and declared noise did not explain the readings between",
-        ),
+        (long_trace(&rig, scatters), ""),
     ] {
         let mut stream = Stream::new(&rig, BadRows::Skip).unwrap();
         let (begun, rest) = rows.split_at(5 * 60 * 25);
@@ -251,6 +248,8 @@ fn what_was_wrong_once_does_not_keep_a_stream_in_doubt_for_ever() {
         assert_eq!((status, faults), (Status::Leak, vec![Leak::Internal]), "{text}");
         assert!(text.contains(said), "{text}");
         let whole = replay(&mut reader(&rows, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap();
-        assert_eq!(whole.verdict.status, Status::Doubtful, "{said}");
+        // A meter that hung is none to rely on; one that was loud for half a minute of 45 is.
+        let status = if said.is_empty() { Status::Leak } else { Status::Doubtful };
+        assert_eq!(whole.verdict.status, status, "{said}");
     }
 }

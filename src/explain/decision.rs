@@ -357,6 +357,7 @@ fn id(one: &Weighed<'_>) -> String {
             Some(LeakCourse::Growing) => format!("{}:growing", leak.id()),
             Some(LeakCourse::Sudden(_)) => format!("{}:sudden", leak.id()),
             Some(LeakCourse::Wandering) => format!("{}:wandering", leak.id()),
+            Some(LeakCourse::Creeping) => format!("{}:creeping", leak.id()),
         };
         parts.push(name);
     }

@@ -9,7 +9,7 @@ use super::hypothesis::{
 use super::independence::inflation;
 use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
 use super::raw_products::{RawProducts, Statistic};
-use super::readings::Readings;
+use super::readings::{Mistake, Of, Readings};
 use super::sizes::Found;
 use super::table::{self, Entry, USUAL, USUAL_PRESSURE};
 use crate::rig::Rig;
@@ -262,6 +262,10 @@ impl<'a, 's> Pass<'a, 's> {
                     }
                     let state = State { zeros, departure, wander: *wander };
                     for subset in subsets() {
+                        // A pressure's gain acts through the leak past the piston.
+                        if departure.is_through_seal() && !subset[0] {
+                            continue;
+                        }
                         let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
                         let ln_course =
                             if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
@@ -355,6 +359,7 @@ impl<'a, 's> Pass<'a, 's> {
             (LeakCourse::Orifice, self.tables.ln_course("orifice")),
             (LeakCourse::Cracking, self.tables.ln_course("cracking")),
             (LeakCourse::Growing, self.tables.ln_course("growing")),
+            (LeakCourse::Creeping, self.tables.ln_course("creeping")),
         ];
         courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
         courses
@@ -405,7 +410,7 @@ impl<'a, 's> Pass<'a, 's> {
         let whole = self.products.whole();
         let ln_wired = table::ln_wired();
         let mut kept = Vec::new();
-        for entry in &self.tables.mistakes {
+        for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
             let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
             let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
@@ -438,6 +443,22 @@ impl<'a, 's> Pass<'a, 's> {
             kept.push(equations);
         }
         kept
+    }
+
+    /// Readings without any scatter are of every unit.
+    fn is_told(&self, entry: &Entry) -> bool {
+        let Some(Mistake::Factor(of, _)) = entry.mistake else { return true };
+        let scatter = self.statistic.scatter();
+        let has = |channel: usize| scatter[channel].is_some_and(|std| std > 0.0);
+        match of {
+            Of::Position => has(0),
+            Of::PressureA => has(1),
+            Of::PressureB => has(2),
+            Of::Pressures => has(1) && has(2),
+            Of::FlowA => has(3),
+            Of::FlowB => has(4),
+            Of::Flows => has(3) && has(4),
+        }
     }
 
     /// Cuts leaks at zero, best first, until what follows cannot matter.

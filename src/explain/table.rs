@@ -27,6 +27,8 @@ pub(crate) const LEAK_SHARE: f64 = 0.03;
 pub(super) const LEAK_SIZE: f64 = 0.05;
 /// How far a leak that wanders steps at a segment's border, 1 σ in shares of full scale. A guess.
 pub(super) const LEAK_STEP: f64 = 0.02;
+/// The same of a leak that changes little by little. A guess.
+pub(super) const LEAK_CREEP: f64 = 0.005;
 /// Zero of a meter that declares none: a tenth of the usual accuracy of 1 % of full scale. A guess.
 const USUAL_ZERO: f64 = 0.001;
 /// Drift of that zero along a trace. A guess.
@@ -101,6 +103,11 @@ impl Entry {
         self
     }
 
+    /// Whether it acts through a leak past the piston alone.
+    pub(super) fn is_through_seal(&self) -> bool {
+        self.free.iter().any(|free| matches!(free.0, Column::ThroughSealA | Column::ThroughSealB))
+    }
+
     fn drifting(mut self, column: Column, std: f64) -> Self {
         self.free.push((column, Course::Drift, std));
         self
@@ -172,12 +179,13 @@ pub(super) fn zeros() -> Vec<Entry> {
 /// How a leak goes along the trace, beside being constant.
 pub(super) fn courses() -> Vec<Entry> {
     vec![
-        Entry::new("constant", Kind::Course, 0.75, "is steady"),
+        Entry::new("constant", Kind::Course, 0.72, "is steady"),
         Entry::new("cracking", Kind::Course, share::UNCOMMON, "opens at a pressure"),
         Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
         Entry::new("growing", Kind::Course, 0.06, "grows or shrinks steadily"),
         Entry::new("sudden", Kind::Course, 0.06, "changed at once"),
         Entry::new("wandering", Kind::Course, 0.03, "comes and goes"),
+        Entry::new("creeping", Kind::Course, 0.03, "changes little by little"),
     ]
 }
 

@@ -7,6 +7,7 @@ use super::notices::Notices;
 use super::order::{Order, Turn};
 use super::weighing::Weighing;
 use crate::Rig;
+use crate::explain::Decision;
 use crate::replay::{Stream, Taken};
 use crate::report::ReplayReport;
 use crate::trace::{BadReason, BadRows, LineLayout};
@@ -145,8 +146,9 @@ impl Cylinder {
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
         if self.stream.time_s() != self.told_s || !self.weighing.is_of_now(&self.stream) {
-            self.weighing.decision_now(&self.stream);
-            events.extend(self.estimate(name).map(|told| Event::Estimate(Box::new(told))));
+            // Kept apart: a run that goes on from here says what one run says.
+            let decision = self.stream.decision();
+            events.extend(self.estimate(name, decision.as_ref()).map(|told| Event::Estimate(Box::new(told))));
         }
         self.tell_counted(name, events);
     }
@@ -192,7 +194,8 @@ impl Cylinder {
         if before_s.is_none() || intervals(before_s) == intervals(self.stream.time_s()) {
             return;
         }
-        let Some(estimate) = self.estimate(name) else { return };
+        self.weighing.renew(&self.stream);
+        let Some(estimate) = self.estimate(name, self.weighing.decision()) else { return };
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
@@ -200,8 +203,7 @@ impl Cylinder {
         events.push(Event::Estimate(Box::new(estimate)));
     }
 
-    fn estimate(&mut self, name: &str) -> Option<EstimateEvent> {
-        let decision = self.weighing.decision(&self.stream);
+    fn estimate(&self, name: &str, decision: Option<&Decision>) -> Option<EstimateEvent> {
         let (t_s, report) = (self.stream.time_s()?, self.stream.report_as(name, decision)?);
         Some(EstimateEvent {
             cylinder: name.to_owned(),
@@ -219,11 +221,9 @@ impl Cylinder {
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        let decision = self.weighing.decision_now(&self.stream);
-        let Some(ReplayReport { leakage, alarms, verdict, .. }) = self.stream.report_as(name, decision)
-        else {
-            return;
-        };
+        self.weighing.renew_now(&self.stream);
+        let report = self.stream.report_as(name, self.weighing.decision());
+        let Some(ReplayReport { leakage, alarms, verdict, .. }) = report else { return };
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
             let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));

@@ -20,26 +20,27 @@ pub(super) struct Weighing {
 }
 
 impl Weighing {
-    /// The decision as it stands, made anew where that is due.
-    pub fn decision(&mut self, stream: &Stream) -> Option<&Decision> {
-        if let Some(t_s) = stream.time_s() {
-            let since_s = *self.since_s.get_or_insert(t_s);
-            let (least_s, most_s) = BOUNDS_S;
-            let pause_s = (SHARE * (t_s - since_s)).clamp(least_s, most_s);
-            if self.at_s.is_none_or(|at_s| !(0.0..pause_s).contains(&(t_s - at_s))) {
-                self.weigh(stream, t_s);
-            }
-        }
+    /// The decision as it stands.
+    pub fn decision(&self) -> Option<&Decision> {
         self.decision.as_ref()
     }
 
-    /// The decision of this moment, after something happened.
-    pub fn decision_now(&mut self, stream: &Stream) -> Option<&Decision> {
-        if let Some(t_s) = stream.time_s() {
-            self.since_s = Some(t_s);
+    /// Decides anew where that is due.
+    pub fn renew(&mut self, stream: &Stream) {
+        let Some(t_s) = stream.time_s() else { return };
+        let since_s = *self.since_s.get_or_insert(t_s);
+        let (least_s, most_s) = BOUNDS_S;
+        let pause_s = (SHARE * (t_s - since_s)).clamp(least_s, most_s);
+        if self.at_s.is_none_or(|at_s| !(0.0..pause_s).contains(&(t_s - at_s))) {
             self.weigh(stream, t_s);
         }
-        self.decision.as_ref()
+    }
+
+    /// Decides anew after something happened.
+    pub fn renew_now(&mut self, stream: &Stream) {
+        let Some(t_s) = stream.time_s() else { return };
+        self.since_s = Some(t_s);
+        self.weigh(stream, t_s);
     }
 
     /// Whether the decision is of the last sample.

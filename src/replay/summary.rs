@@ -94,11 +94,15 @@ impl Replay {
         decision: Option<&Decision>,
     ) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
-        let coefficients = self.leak_coefficients();
+        let (coefficients, certain) = (self.leak_coefficients(), self.estimator.leak_coefficients());
         let coefficients = PerLeak::from_fn(|leak| match decision {
             Some(decision) if decision.pressures_pa[leak] > 0.0 => {
                 let per_pa = 1.0 / (LPM_PER_M3S * decision.pressures_pa[leak]);
-                decision.leakage[leak].estimate_lpm().scaled(per_pa)
+                let found = decision.leakage[leak].estimate_lpm().scaled(per_pa);
+                // The effects of the rig file part a flow between its laws.
+                let (wide, certain) = (coefficients[leak].std, certain[leak].std);
+                let doubt = (wide * wide - certain * certain).max(0.0).sqrt();
+                Estimate { std: found.std.hypot(doubt), ..found }
             }
             _ => coefficients[leak],
         });

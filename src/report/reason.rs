@@ -123,11 +123,9 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         let text = format!("this trace cannot tell about {} leaks", join(&untold, "and"));
         Reason::new(ReasonId::NotIdentifiable, text, RECORD)
     });
-    let stands = Leak::ALL.into_iter().filter(|leak| findings.active[*leak] && findings.is_below(*leak));
     untold
         .into_iter()
         .chain(undecided.into_iter().map(|leak| self::undecided(findings, decision, leak)))
-        .chain(stands.map(|leak| alarm_stands(leak)))
         .collect()
 }
 
@@ -153,14 +151,6 @@ fn undecided(findings: &Findings<'_>, decision: &Decision, leak: Leak) -> Reason
             "record longer: the interval narrows with the square root of the time",
         ),
     }
-}
-
-fn alarm_stands(leak: Leak) -> Reason {
-    let text = format!(
-        "the alarm of the {} leak stands, though the trace as a whole speaks against it",
-        leak.label()
-    );
-    Reason::new(ReasonId::Undecided, text, RECORD)
 }
 
 /// What remains may not stand for the cylinder.

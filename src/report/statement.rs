@@ -95,7 +95,9 @@ fn unknown(findings: &Findings<'_>) -> Option<String> {
 /// What of sensors and rig is not as declared, which the verdict has taken into account.
 fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let notes = findings.decision.into_iter().flat_map(|decision| &decision.notes);
-    notes.map(|note| format!("Besides, {}.", note.text))
+    let stands = Leak::ALL.into_iter().filter(|leak| findings.active[*leak] && findings.is_below(*leak));
+    let stands = stands.map(|leak| format!("That explains the alarm of the {} leak.", leak.label()));
+    notes.map(|note| format!("Besides, {}.", note.text)).chain(stands)
 }
 
 /// What alarms a verdict in doubt stands beside.
@@ -118,7 +120,9 @@ fn apparent(findings: &Findings<'_>, faults: &[Leak]) -> Option<String> {
 /// Episodes that ended, and sudden changes.
 fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let faults = findings.faults();
-    let ended = Leak::ALL.into_iter().filter(move |leak| !faults.contains(leak)).filter_map(|leak| {
+    // Beside sensors that are off alarms were raised and cleared for those.
+    let told = findings.decision.is_none_or(|decision| decision.as_declared);
+    let ended = Leak::ALL.into_iter().filter(move |leak| told && !faults.contains(leak)).filter_map(|leak| {
         let own: Vec<_> = findings.episodes.iter().filter(|episode| episode.fault == leak).collect();
         let last = own.last()?;
         let often = if own.len() > 1 { format!(", the last of {} times", own.len()) } else { String::new() };

@@ -199,9 +199,11 @@ fn a_leak_that_is_likely_and_not_sure_says_what_else_it_may_be() {
 }
 
 #[test]
-fn an_alarm_that_stands_against_the_whole_trace_is_not_sound() {
-    let standing = Found { active: INTERNAL, ..sound() };
-    assert_eq!(standing.judged(), (Status::NotSure, vec!["undecided"]));
+fn an_alarm_that_the_whole_trace_speaks_against_is_explained() {
+    let mut standing = Found { active: INTERNAL, ..sound() };
+    standing.decision.as_mut().unwrap().ruled_out = Leak::ALL.to_vec();
+    assert_eq!(standing.judged(), (Status::Sound, vec![]));
+    assert!(standing.verdict().text.contains("That explains the alarm of the internal leak."));
 }
 
 /// A sensor that is off is told, and spoils no verdict that does not hang on it.
