@@ -31,6 +31,7 @@ fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
             .map(|leak| LeakSize::Coefficient(leak).into()),
         rig: rig.clone(),
         oil_temperature: None,
+        shut: None,
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

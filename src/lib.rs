@@ -33,6 +33,7 @@ pub mod curve;
 pub mod diagnose;
 pub mod explain;
 pub mod fleet;
+pub mod hold;
 pub mod live;
 pub mod output;
 pub mod reference;

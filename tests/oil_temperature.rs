@@ -26,6 +26,7 @@ fn trend(grows: bool, oil: &str, shown: bool) -> LeakTrend {
         rig: rig.clone(),
         leaks: leaks.map(|_| course.within_trace(DURATION_S)),
         oil_temperature: Some(OilTemperature::of(oil, DURATION_S).unwrap()),
+        shut: None,
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

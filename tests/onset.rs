@@ -25,6 +25,7 @@ fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
         reference: Emulation::paper().reference(&history, rig().cylinder.stroke_m).expect("fits"),
         leaks: PerLeak::from_fn(size),
         oil_temperature: None,
+        shut: None,
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

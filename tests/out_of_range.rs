@@ -34,6 +34,7 @@ fn truths(wind: WindCase, duration_s: f64) -> Vec<Truth> {
         rig,
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
         oil_temperature: None,
+        shut: None,
         effects: Default::default(),
         start_s: 30.0,
         warm_up_s: 10.0,

@@ -22,6 +22,7 @@ fn scenario() -> Scenario {
         reference: Emulation::paper().reference(&history, 0.2).expect("fits"),
         leaks: PerLeak::default(),
         oil_temperature: None,
+        shut: None,
         effects: EffectSet::default(),
         start_s: 20.0,
         warm_up_s: 3.0,

@@ -107,6 +107,7 @@ fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
         reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
         leaks,
         oil_temperature: None,
+        shut: None,
         effects: EffectSet::default(),
         start_s: 0.0,
         warm_up_s: 10.0,

@@ -85,6 +85,7 @@ impl Wind {
             leaks: leaks.map(|leak| LeakSize::Coefficient(leak).into()),
             rig,
             oil_temperature,
+            shut: None,
             effects: EffectSet::default(),
             start_s: 5.0,
             warm_up_s: 3.0,

@@ -6,6 +6,7 @@ mod readings;
 pub use readings::{Reading, SIGNALS, values};
 
 use crate::channels::{ChannelFault, ChannelMonitor};
+use crate::hold::HoldSummary;
 use crate::replay::{Replay, ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
@@ -30,6 +31,9 @@ pub struct CheckReport {
     pub channels: Vec<ChannelFault>,
     /// The mistake of wiring, sign or unit that explains what the columns as declared do not.
     pub wiring: Option<Wiring>,
+    /// Of a hold test: how much of it is usable, and the smallest leaks that it finds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hold: Option<HoldSummary>,
     /// What the trace tells about each leak.
     pub leaks: PerLeak<Reach>,
     /// What the trace tells about the bulk modulus.
@@ -90,8 +94,10 @@ pub fn check<E: From<ReplayError>>(
     let columns = reader.columns(&rig.columns);
     let replayed = replay(reader, &rig, |replay, record, renewed| {
         extremes.add(record);
-        monitor.add(record);
-        excerpt.add(record);
+        if !replay.is_shut() {
+            monitor.add(record);
+            excerpt.add(record);
+        }
         each(replay, record, renewed)
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
@@ -100,12 +106,13 @@ pub fn check<E: From<ReplayError>>(
     let whole = Recorded::new(&records, &rig);
     let found = whole.as_ref().and_then(explain);
     let found = found.or_else(|| unit_by_scatter(&excerpt, &rig));
-    let found = found.or_else(|| sensor_error(whole.as_ref()?));
+    let found = found.or_else(|| sensor_error(whole.as_ref()?)).filter(|_| replayed.hold.is_none());
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
         wiring: found.map(|found| found.wiring(&columns, &rig)),
+        hold: replayed.hold,
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,

@@ -14,7 +14,10 @@ mod readings;
 mod table;
 
 pub use columns::{Column, Course};
+pub(crate) use decision::ALPHA;
 pub use decision::{Belief, Decision, Explained, Explainer, Note, explain};
+pub(crate) use orthant::{Orthant, positive_orthant};
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
+pub(crate) use table::LEAK_SHARE;
 pub use table::{Entry, Kind};

@@ -14,7 +14,7 @@ const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.
 const LEAST_TAIL: f64 = 1e-12;
 
 /// A weighted sample.
-pub(super) struct Orthant {
+pub(crate) struct Orthant {
     /// ln of the probability of the positive orthant.
     pub ln_probability: f64,
     /// Points, variable by variable.
@@ -35,7 +35,7 @@ pub(super) fn normal_quantile(probability: f64) -> f64 {
 }
 
 /// N(`means`, `covariance`) where every variable is positive.
-pub(super) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
+pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
     let factor = cholesky(covariance);
     let mut points = Vec::with_capacity(POINTS);
     let mut ln_weights = Vec::with_capacity(POINTS);

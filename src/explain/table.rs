@@ -20,7 +20,7 @@ mod share {
 }
 
 /// Prior probability of each leak. A guess.
-pub(super) const LEAK_SHARE: f64 = 0.03;
+pub(crate) const LEAK_SHARE: f64 = 0.03;
 /// Size of a leak, share of the flow meters' full scale, half normal. A guess.
 pub(super) const LEAK_SIZE: f64 = 0.05;
 /// How far a leak that wanders steps at a segment's border, 1 σ in shares of full scale. A guess.

@@ -106,6 +106,7 @@ impl<'a> Draft<'a> {
         ReplayReport {
             schema: ReplayReport::SCHEMA,
             rig: replay.rig.name.clone(),
+            hold: None,
             estimator: replay.rig.estimator.kind,
             verdict,
             trend: self.trend,

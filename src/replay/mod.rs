@@ -25,6 +25,7 @@ pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
 use crate::explain::Explainer;
+use crate::hold::{self, Recorder};
 use crate::report::{Alarm, ReplayReport, Suspicions, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
@@ -113,6 +114,8 @@ pub struct Replay {
     consistency: Consistency,
     spikes: Spikes,
     oil: OilTemperature,
+    /// Whether the ports are shut: a hold is for [`hold`](crate::hold), not for this estimator.
+    is_shut: bool,
     /// Time of the last record, s.
     end_s: f64,
     /// Of the last block, in its own standard deviations.
@@ -140,6 +143,7 @@ impl Replay {
             consistency: Consistency::default(),
             spikes: Spikes::new(&rig.sensors()),
             oil: OilTemperature::default(),
+            is_shut: false,
             end_s: 0.0,
             innovation: None,
             rig: rig.clone(),
@@ -159,8 +163,29 @@ impl Replay {
     /// Takes in one record; says whether the estimates are new.
     #[inline]
     pub fn push(&mut self, record: &Record) -> bool {
-        self.channels.add(record);
         self.end_s = record.t_s;
+        if let Some(is_shut) = record.shut
+            && is_shut != self.is_shut
+        {
+            self.is_shut = is_shut;
+            return self.open_or_shut(record);
+        }
+        if self.is_shut {
+            return false;
+        }
+        self.push_open(record)
+    }
+
+    /// Takes in a record at which the ports are shut or opened: what passes while they are shut is not in its flows.
+    #[cold]
+    fn open_or_shut(&mut self, record: &Record) -> bool {
+        !self.is_shut && self.push_open(&Record { after_gap: true, ..*record })
+    }
+
+    /// Takes in a record of open ports.
+    #[inline]
+    fn push_open(&mut self, record: &Record) -> bool {
+        self.channels.add(record);
         if self.spikes.leave_out(record) {
             return false;
         }
@@ -290,6 +315,11 @@ impl Replay {
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
+    /// Whether both ports are shut: such records are for [`hold`](crate::hold).
+    pub fn is_shut(&self) -> bool {
+        self.is_shut
+    }
+
     /// Whether the last record was left out as a spike.
     pub fn left_out(&self) -> bool {
         self.spikes.left_out()
@@ -354,22 +384,34 @@ pub fn replay<E: From<ReplayError>>(
     let mut record = Record::default();
     let columns = reader.columns(&rig.columns);
     let mut refused = None;
+    let mut holds: Option<Recorder> = None;
     while next_record(reader, &mut record, &mut refused, || Refused::new(rig, &columns))? {
         let renewed = replay.push(&record);
-        if !replay.spikes.left_out() {
+        if record.shut == Some(true) && holds.is_none() {
+            holds = Some(Recorder::new(rig));
+        }
+        if let Some(holds) = &mut holds {
+            holds.push(&record);
+        }
+        if !replay.spikes.left_out() && !replay.is_shut {
             excerpt.add(&record);
         }
         each(&replay, &record, renewed)?;
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
+    if let Some(hold) = holds.and_then(|holds| holds.finish(rig)) {
+        return Ok(hold.report(summary, rig));
+    }
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());
     let suspect = |verdict: &Verdict| match refused.as_ref().and_then(Refused::wiring) {
         Some(wiring) => Suspicions { wiring: Some(wiring), ..Suspicions::default() },
         None => replay.suspicions(verdict, &weighed, &excerpt, &columns),
     };
-    Ok(replay.report_with(summary, &weighed, suspect))
+    let mut report = replay.report_with(summary, &weighed, suspect);
+    hold::advise(&mut report, reader.quality());
+    Ok(report)
 }
 
 /// [`replay()`] with what the posterior over explanations says beside the verdict; a rig with effects of its own has none yet.
@@ -390,6 +432,9 @@ pub fn replay_explained<E: From<ReplayError>>(
         }
         each(replay, record, renewed)
     })?;
+    if report.hold.is_some() {
+        return Ok(report);
+    }
     if let Some(decision) = explainer.and_then(|explainer| explainer.decision()) {
         report.verdict.with_explanations(decision);
     }

@@ -138,7 +138,7 @@ impl Stream {
         if self.replay.consistency.restarts() != restarts {
             self.evidence.restart();
         }
-        if !self.replay.spikes.left_out() {
+        if !self.replay.spikes.left_out() && !self.replay.is_shut {
             let replay = &self.replay;
             self.evidence
                 .add(record, &replay.rig, || replay.leak_coefficients().map(|leak| leak.value.max(0.0)));

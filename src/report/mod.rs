@@ -11,10 +11,12 @@ mod zeros;
 pub use episode::Episode;
 pub use reason::{MISFIT, Reason, ReasonId};
 pub use spell::Spell;
+pub(crate) use statement::join;
 pub use statement::{advice, capital, interval, with_interval};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
 pub use verdict::{Findings, Misfit, Status, Suspicions, Verdict};
 
+use crate::hold::HoldSummary;
 use crate::rig::EstimatorKind;
 use crate::score::LeakScore;
 use crate::times::Clock;
@@ -45,6 +47,9 @@ pub struct ReplayReport {
     /// model and declared noise explain it, far above where they do not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normalised_innovation: Option<[f64; 2]>,
+    /// Of a hold test: how much of it was usable. Its leakages are means over that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hold: Option<HoldSummary>,
     /// What to make of it.
     pub verdict: Verdict,
     /// How fast each leak changes; none where the data don't tell.

@@ -83,7 +83,7 @@ pub struct Reason {
 }
 
 impl Reason {
-    pub(super) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
+    pub(crate) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
         Self { id, text: text.into(), suggestion: Some(suggestion.into()) }
     }
 }

@@ -190,7 +190,7 @@ pub fn capital(text: &str) -> String {
 }
 
 /// "internal, external A or external B".
-pub(super) fn join(leaks: &[Leak], word: &str) -> String {
+pub(crate) fn join(leaks: &[Leak], word: &str) -> String {
     match leaks {
         [one] => one.label().to_owned(),
         [head @ .., last] => {

@@ -67,6 +67,7 @@ impl Found {
             normalised_innovation: None,
             estimates: self.estimates,
             leakage: self.leakage,
+            hold: None,
             changed_at_s: self.changed_at_s,
             trend: self.trends,
             spells: Spell::of(&self.episodes, self.trace.duration_s, 60.0),

@@ -49,6 +49,8 @@ pub struct Scenario {
     pub leaks: PerLeak<LeakCourse>,
     /// The oil's temperature, which the leaks follow by its viscosity; none where it doesn't matter.
     pub oil_temperature: Option<OilTemperature>,
+    /// While both ports are shut, in the trace's time: a hold test.
+    pub shut: Option<Span>,
     /// Effects beyond the model.
     pub effects: EffectSet<f64>,
     /// Time of the reference at which the trace begins, s.
@@ -78,6 +80,8 @@ pub struct Truth {
     pub leaks_m3s: PerLeak<f64>,
     /// Oil temperature, K, where the scenario has one.
     pub temp_k: Option<f64>,
+    /// Whether both ports are shut, where the scenario has a hold.
+    pub is_shut: Option<bool>,
 }
 
 /// Why a scenario cannot be simulated.
@@ -219,6 +223,9 @@ impl Scenario {
             rig.leaks_m3spa = now;
         }
         rig.emulator.set_time(t_s);
+        if let Some(shut) = &self.shut {
+            rig.emulator.set_shut(shut.contains(t_s));
+        }
         match &self.oil_temperature {
             Some(oil) => Ok(rig.emulator.set_temperature(oil.at(t_s))?),
             None => Ok(()),
@@ -311,6 +318,7 @@ impl RunningRig {
             },
             leaks_m3s: reading.leaks_m3s,
             temp_k: scenario.oil_temperature.as_ref().map(|oil| oil.at(t_s)),
+            is_shut: scenario.shut.map(|shut| shut.contains(t_s)),
         }
     }
 }

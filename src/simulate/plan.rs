@@ -1,6 +1,6 @@
 use super::{
     Biases, EffectSize, EffectsError, Followed, LeakCourse, LeakCourseError, OilTemperature,
-    OilTemperatureError, Recording, Scenario, SensorFault, effects,
+    OilTemperatureError, Recording, Scenario, SensorFault, Span, effects,
 };
 use crate::Rig;
 use crate::output::Inputs;
@@ -101,6 +101,8 @@ pub struct Plan {
     pub onset_s: f64,
     /// The oil's temperature, as [`OilTemperature::of`] reads it.
     pub oil_temperature: Option<String>,
+    /// While both ports are shut, in the trace's time: a hold test.
+    pub shut: Option<Span>,
     /// Effects beyond those of the rig file.
     pub effects: Vec<EffectSize>,
     /// Noise of the sensors.
@@ -173,6 +175,7 @@ impl Plan {
                 rig,
                 leaks: leaks.map(|leak| leak.within_trace(duration_s)),
                 oil_temperature: oil_temperature.transpose()?,
+                shut: self.shut,
                 start_s,
                 warm_up_s: WARM_UP_S,
                 duration_s,

@@ -19,6 +19,8 @@ struct Column {
 pub struct Row {
     /// What sensors and clock show.
     pub shown: Reading,
+    /// Whether both ports are shut, where there is a hold.
+    pub is_shut: Option<bool>,
     /// The true leak flows, m³/s.
     pub leaks_m3s: PerLeak<f64>,
 }
@@ -26,7 +28,7 @@ pub struct Row {
 impl Row {
     /// The reading of an instant, with its leak flows.
     pub fn new(truth: &Truth, shown: Reading) -> Self {
-        Self { shown, leaks_m3s: truth.leaks_m3s }
+        Self { shown, is_shut: truth.is_shut, leaks_m3s: truth.leaks_m3s }
     }
 }
 
@@ -45,6 +47,11 @@ const READINGS: [Column; 7] = [
 ];
 const TEMPERATURE: Column =
     Column { header: "temp_c", decimals: 3, value: |row| row.shown.temp_k.map_or(f64::NAN, |k| k - 273.15) };
+const SHUT: Column = Column {
+    header: "shut",
+    decimals: 0,
+    value: |row| row.is_shut.map_or(f64::NAN, |is| f64::from(u8::from(is))),
+};
 const LEAKS: [Column; 3] = [
     Column { header: "q_int_lpm", decimals: 6, value: |row| row.leaks_m3s.internal * LPM_PER_M3S },
     Column { header: "q_ext_a_lpm", decimals: 6, value: |row| row.leaks_m3s.external_a * LPM_PER_M3S },
@@ -71,10 +78,11 @@ impl Default for TraceLayout {
 }
 
 impl TraceLayout {
-    /// The columns that a scenario's trace has; the oil's temperature only where the scenario says it.
+    /// The columns that a scenario's trace has; the oil's temperature and `shut` only where the scenario says them.
     pub fn of(scenario: &Scenario) -> Self {
         let temperature = scenario.oil_temperature.as_ref().map(|_| TEMPERATURE);
-        Self(READINGS.into_iter().chain(temperature).chain(LEAKS).collect())
+        let shut = scenario.shut.map(|_| SHUT);
+        Self(READINGS.into_iter().chain(temperature).chain(shut).chain(LEAKS).collect())
     }
 
     /// The columns without a row.

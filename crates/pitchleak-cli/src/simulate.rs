@@ -3,7 +3,9 @@ use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
-use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, share_of_full_scale};
+use pitchleak::simulate::{
+    EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, Span, share_of_full_scale,
+};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use std::ops::ControlFlow;
@@ -52,6 +54,11 @@ pub struct Arguments {
     /// their size at 40 °C and follow the viscosity of an oil ISO VG 32; the trace gets a column temp_c
     #[arg(long, value_name = "T|FILE")]
     oil_temp: Option<String>,
+
+    /// Hold test: both ports are shut in this part of the trace ("5 s..15 s"), which gets a column `shut`. The piston stays where
+    /// the oil and the load let it
+    #[arg(long, value_name = "SPAN")]
+    shut: Option<Span>,
 
     /// Effect beyond the model and its size in SI units; may be given more than once
     #[arg(long, value_name = "ID=VALUE")]
@@ -116,6 +123,7 @@ Examples:
   pitchleak simulate --wind 13 --leak-internal '0 -> 0.5 L/min' --oil-temp '30 °C -> 55 °C' --duration '10 min' --out trace.csv
   pitchleak simulate --wind 21 --noise '0.3 %' --fault 'swap pa pb' --fault 'qa drift 1 %/h' --out trace.csv
   pitchleak simulate --wind run.outb --rig turbine7.toml --effect viscous_friction=1500 --out trace.csv
+  pitchleak simulate --position '100 mm' --load '2 kN' --shut '2 s..' --leak-internal '0.01 L/min' --noise rig --duration '12 s' --out hold.csv
   pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
 
 fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
@@ -173,6 +181,7 @@ impl Arguments {
             },
             onset_s: self.onset.unwrap_or(0.0),
             oil_temperature: self.oil_temp.clone(),
+            shut: self.shut,
             effects: self.effect.clone(),
             noise: self.noise,
             bias_share: self.bias,

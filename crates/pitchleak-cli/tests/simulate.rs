@@ -39,6 +39,27 @@ fn a_simulated_leak_is_found_again() {
     assert!((found - 0.8).abs() < 0.03, "{found} L/min");
 }
 
+/// Simulated, judged and checked as a hold, with neither flow meter.
+#[test]
+fn a_simulated_hold_is_judged_without_meters() {
+    let folder = TempDir::new().unwrap();
+    let trace = folder.path().join("hold.csv");
+    let arguments = ["--position", "100 mm", "--load", "4 kN", "--shut", "1 s..", "--duration", "11 s"];
+    let rest = ["--leak-external-b", "0.0003 L/min/bar", "--noise", "rig", "--fault", "qa missing"];
+    let output = simulate(&trace, &[&arguments[..], &rest, &["--fault", "qb missing"]].concat());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+
+    let path = trace.display().to_string();
+    let report = pitchleak(&["replay", &path, "--json"]);
+    let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+    assert_eq!((&report["verdict"]["status"], &report["hold"]["holds"]), (&"leak".into(), &1.into()));
+    assert_eq!(report["verdict"]["faults"], serde_json::json!(["external_b"]));
+    assert_eq!(report["hold"]["ended_by"], "pressure");
+
+    let text = String::from_utf8(pitchleak(&["check", &path]).stdout).unwrap();
+    assert!(text.contains("This is a hold test: ") && text.contains("external B leaks from 0.00"), "{text}");
+}
+
 #[test]
 fn the_same_seed_gives_the_same_trace_and_another_does_not() {
     let folder = TempDir::new().unwrap();

@@ -3,7 +3,9 @@ use crate::rig::Rig;
 use crate::signals::{Signals, Stopped};
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::core::PerLeak;
-use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, RecordingError, share_of_full_scale};
+use pitchleak::simulate::{
+    EffectSize, Followed, LeakCourse, Plan, RecordingError, Span, share_of_full_scale,
+};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use pyo3::prelude::*;
@@ -53,6 +55,7 @@ pub struct Order {
     leak_external_b: Quantity,
     onset: Quantity,
     oil_temp: Option<Quantity>,
+    shut: Option<String>,
     effects: BTreeMap<String, f64>,
     noise: Quantity,
     bias: Quantity,
@@ -107,6 +110,10 @@ pub fn simulate<'py>(
     Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }
 
+fn span(text: &str) -> PyResult<Span> {
+    text.parse().map_err(|error| value_error(format!("shut: {error}")))
+}
+
 impl Order {
     fn followed(&self) -> PyResult<Followed> {
         match (&self.wind, &self.position, &self.load) {
@@ -149,6 +156,7 @@ impl Order {
             },
             onset_s: self.onset.si("onset", Dimension::Time)?,
             oil_temperature: self.oil_temp.as_ref().map(Quantity::text),
+            shut: self.shut.as_deref().map(span).transpose()?,
             effects: self.effects.iter().map(effect).collect::<PyResult<_>>()?,
             noise: self.noise.parsed("noise")?,
             bias_share: share_of_full_scale(&self.bias.text())

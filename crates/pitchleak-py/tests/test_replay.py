@@ -241,3 +241,24 @@ def test_rigs_compare_and_travel(rig):
     with pytest.raises(FileNotFoundError) as error:
         pl.Rig.load("nowhere.toml")
     assert error.value.filename == "nowhere.toml"
+
+
+def test_a_hold_is_judged_without_flows():
+    trace = pl.simulate(
+        position="100 mm", load="4 kN", shut="2 s..", leak_internal="0.0003 L/min/bar", noise="0.3 %", duration=12
+    )
+    rig = pl.Rig.paper().replace(accuracy="0.3 %")
+    held = {name: values for name, values in trace.columns.items() if name not in ("qa_lpm", "qb_lpm")}
+    out = pl.replay(held, rig)
+    assert (out.verdict.status, out.verdict.faults) == ("leak", ("internal",))
+    assert out.hold.ended_by == "trace" and out.hold.usable_s == pytest.approx(9.99)
+    assert out.hold.leaks.internal.probability > 0.95
+    shut = held["shut"] > 0.5
+    true = np.abs(held["q_int_lpm"][shut]).mean()
+    assert out.leakage.internal.mean_lpm == pytest.approx(true, abs=2.6 * out.leakage.internal.std_lpm)
+    table = pytest.importorskip("pyarrow").table(held | {"shut": shut})
+    for frame in (held | {"shut": shut}, table):
+        assert pl.replay(frame, rig).raw == out.raw
+    assert pl.check(held, rig).hold == out.hold
+    with pytest.raises(ValueError, match="shut: `2 s` is no span of time"):
+        pl.simulate(position="100 mm", load="4 kN", shut="2 s")

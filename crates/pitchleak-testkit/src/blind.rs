@@ -104,6 +104,7 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
         reference: reference(excitation),
         leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
         oil_temperature: None,
+        shut: None,
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

@@ -10,6 +10,7 @@
 pub mod blind;
 #[cfg(feature = "judges")]
 pub mod confidence;
+pub mod hold;
 pub mod hopsan;
 #[cfg(feature = "judges")]
 pub mod judge;

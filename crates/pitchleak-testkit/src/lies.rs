@@ -198,6 +198,7 @@ fn scenario(wind: WindCase, leaks: PerLeak<LeakCourse>, effects: EffectSet<f64>)
         reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
         leaks,
         oil_temperature: None,
+        shut: None,
         effects,
         start_s: 20.0,
         warm_up_s: 10.0,

@@ -25,6 +25,8 @@ pub enum Signal {
     Force,
     /// `temp`: oil temperature.
     Temperature,
+    /// `shut`: 1 while both ports are shut between valve and cylinder, else 0: no flow, for certain.
+    Shut,
     /// `q_int`: reference flow of the internal leak.
     LeakInternal,
     /// `q_ext_a`: reference flow of the external leak at A.
@@ -35,7 +37,7 @@ pub enum Signal {
 
 impl Signal {
     /// Every signal, in the order of the contract's table.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Time,
         Self::Timestamp,
         Self::Position,
@@ -46,6 +48,7 @@ impl Signal {
         Self::FlowB,
         Self::Force,
         Self::Temperature,
+        Self::Shut,
         Self::LeakInternal,
         Self::LeakExternalA,
         Self::LeakExternalB,
@@ -64,6 +67,7 @@ impl Signal {
             Self::FlowB => "qb",
             Self::Force => "force",
             Self::Temperature => "temp",
+            Self::Shut => "shut",
             Self::LeakInternal => "q_int",
             Self::LeakExternalA => "q_ext_a",
             Self::LeakExternalB => "q_ext_b",
@@ -75,11 +79,11 @@ impl Signal {
         Self::ALL.into_iter().find(|signal| signal.name() == name)
     }
 
-    /// What the signal measures; a timestamp has no unit.
+    /// What the signal measures; a timestamp has no unit, nor has what is either so or not.
     pub fn dimension(self) -> Option<Dimension> {
         match self {
             Self::Time => Some(Dimension::Time),
-            Self::Timestamp => None,
+            Self::Timestamp | Self::Shut => None,
             Self::Position => Some(Dimension::Length),
             Self::Speed => Some(Dimension::Speed),
             Self::PressureA | Self::PressureB => Some(Dimension::Pressure),

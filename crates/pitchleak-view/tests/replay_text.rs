@@ -39,6 +39,7 @@ fn report(status: Status) -> ReplayReport {
             external_a: lpm(-0.0004, 0.0011),
             external_b: lpm(0.0, 0.2),
         },
+        hold: None,
         changed_at_s: None,
         trend: PerLeak::default(),
         spells: Vec::new(),

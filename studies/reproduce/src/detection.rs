@@ -154,6 +154,7 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
         reference,
         leaks: PerLeak::from_fn(size),
         oil_temperature: None,
+        shut: None,
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

@@ -132,6 +132,7 @@ impl Run {
             reference,
             leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
             oil_temperature: None,
+            shut: None,
             effects: EffectSet::default(),
             start_s: START_S,
             warm_up_s: START_S,

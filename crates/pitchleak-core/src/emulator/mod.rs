@@ -20,6 +20,8 @@ pub struct Axis<T> {
     pub valve: Valve<T>,
     /// Controller: of position, per m; of force, per N.
     pub gains: Gains<T>,
+    /// Both ports are shut between valve and cylinder: no flow, whatever the spool does.
+    pub is_shut: bool,
 }
 
 /// Everything the emulator is built of.
@@ -87,8 +89,8 @@ impl<T: Real> EmulatorParams<T> {
         let supply = Supply { pump_flow_m3s: supply.pump_flow_m3s * scale, ..supply };
         let drop = supply.relief_pressure_pa / T::lit(3.0);
         let params = Self {
-            pitch: Axis { plant, valve, gains: position_gains(&cylinder, &valve, drop) },
-            load: Axis { plant: load, valve, gains: force_gains(&load.model, &valve, drop) },
+            pitch: Axis { plant, valve, gains: position_gains(&cylinder, &valve, drop), is_shut: false },
+            load: Axis { plant: load, valve, gains: force_gains(&load.model, &valve, drop), is_shut: false },
             supply,
             internal_step_s: T::lit(1e-4),
         };
@@ -189,6 +191,11 @@ impl<T: Real> Emulator<T> {
         if time_s.is_finite() {
             self.params.pitch.plant.time_s = time_s;
         }
+    }
+
+    /// Shuts both ports of the pitching cylinder, or opens them: a hold test.
+    pub fn set_shut(&mut self, is_shut: bool) {
+        self.params.pitch.is_shut = is_shut;
     }
 
     /// Changes the effects that act on the pitching cylinder.

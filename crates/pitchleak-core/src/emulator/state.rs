@@ -187,6 +187,9 @@ impl<T: Real> State<T> {
     }
 
     fn flows(&self, axis: &Axis<T>, (pa_pa, pb_pa): (T, T), spool: T) -> ValveFlows<T> {
+        if axis.is_shut {
+            return ValveFlows::default();
+        }
         axis.valve.flows(spool, self.supply_pa, pa_pa, pb_pa)
     }
 }

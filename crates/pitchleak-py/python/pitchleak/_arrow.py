@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ._columns import nanoseconds, numbers
+from ._columns import YES_OR_NO, nanoseconds, numbers
 from ._pitchleak import Layout, Rig, Table
 from ._tabular import optional
 
@@ -22,7 +22,8 @@ def from_polars(frame: Any, rig: Rig, first_ns: int | None) -> Table:
         series = frame.to_series(place)
         kind = series.dtype
         if content == "numbers":
-            _expect(kind.is_numeric() or kind == polars.Null, series.name, kind, content)
+            is_flag = kind == polars.Boolean and series.name == YES_OR_NO
+            _expect(kind.is_numeric() or kind == polars.Null or is_flag, series.name, kind, content)
             series = series.cast(polars.Float64)
         else:
             _expect(kind == polars.Datetime, series.name, kind, content)
@@ -44,7 +45,10 @@ def from_arrow(data: Any, rig: Rig, first_ns: int | None) -> Table:
         kind = column.type.value_type if arrow.types.is_dictionary(column.type) else column.type
         if content == "numbers":
             are = (arrow.types.is_floating, arrow.types.is_integer, arrow.types.is_decimal, arrow.types.is_null)
-            _expect(any(is_one(kind) for is_one in are), name, column.type, content)
+            is_flag = arrow.types.is_boolean(kind) and name == YES_OR_NO
+            _expect(is_flag or any(is_one(kind) for is_one in are), name, column.type, content)
+            if is_flag:
+                column = column.cast(arrow.uint8())
             column = column.cast(arrow.float64(), safe=False)
         else:
             _expect(arrow.types.is_timestamp(kind), name, column.type, content)

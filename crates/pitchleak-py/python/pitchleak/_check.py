@@ -12,7 +12,7 @@ from ._pitchleak import Rig
 from ._raw import Raw
 from ._records import record
 from ._report import LABELS
-from ._results import PerLeak, Trace
+from ._results import Hold, PerLeak, Trace
 from ._tabular import Tabular
 
 if TYPE_CHECKING:
@@ -98,6 +98,8 @@ class Check(Raw, Paged, Tabular):
     """What it tells about the bulk modulus."""
     normalised_innovation: tuple[float, ...] | None = None
     """About 1 each where model and declared noise explain the trace, far above where they do not."""
+    hold: Hold | None = None
+    """Of a hold test: how much of it is usable, and the smallest leaks that it finds."""
     channels: tuple[ChannelFault, ...] = ()
     """Channels that are dead, stuck, clipped, held or coarse."""
     wiring: Wiring | None = None

@@ -8,6 +8,9 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Nanoseconds = npt.NDArray[np.int64]
 
+#: The one column that is either so or not.
+YES_OR_NO = "shut"
+
 _NOT_A_TIME = np.datetime64("NaT", "ns")
 
 
@@ -18,7 +21,7 @@ def numbers(name: str, values: Any) -> Floats:
         array = np.ma.filled(array.astype(np.float64), np.nan)
     if array.dtype == object:
         array = _from_objects(name, array)
-    if array.dtype.kind not in "iuf":
+    if array.dtype.kind not in ("iufb" if name == YES_OR_NO else "iuf"):
         raise TypeError(f"column `{name}` holds {array.dtype}; numbers are expected")
     return np.require(array, np.float64, ["C", "A"])
 

@@ -16,6 +16,7 @@ from ._results import (
     Alarm,
     Episode,
     Estimates,
+    Hold,
     Leakage,
     PerLeak,
     Score,
@@ -63,6 +64,8 @@ class Report(Raw):
     """Offsets of the meters ``a`` and ``b``, where the rig file says that they may be off, L/min."""
     normalised_innovation: tuple[float, ...] | None = None
     """About 1 each where model and declared noise explain the trace, far above where they do not."""
+    hold: Hold | None = None
+    """Of a hold test: how much of it was usable; leakages are means over that."""
     changed_at_s: float | None = None
     """When a leak last changed suddenly, s; flows are means since then."""
     raw: dict[str, Any] = field(init=False, default_factory=dict)

@@ -245,6 +245,34 @@ class Spell:
 
 
 @dataclass(frozen=True, slots=True)
+class HeldLeak:
+    """One leak in a hold test, as a mean over its usable time."""
+
+    probability: float
+    """Probability that there is such a leak at all."""
+    ci95_lpm: tuple[float, ...]
+    """The interval that holds its flow with 95 % where there is one, L/min."""
+    smallest_lpm: float
+    """The smallest flow that this hold would find, L/min."""
+    pressure_bar: float
+    """Mean pressure that drives it, bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """How much of a trace was a hold test: rows whose ``shut`` is 1."""
+
+    usable_s: float
+    """Usable time of all holds together, s."""
+    ended_by: str
+    """What ended the longest: ``trace``, ``pressure`` (5 bar), ``motion`` (2 mm), ``opened`` or ``enough``."""
+    holds: int
+    """How many there are."""
+    leaks: PerLeak[HeldLeak] | None = None
+    """Each leak; None where nothing was usable."""
+
+
+@dataclass(frozen=True, slots=True)
 class Score:
     """One leak against its reference flow in steady state, eq. (15) and (16)."""
 

@@ -183,6 +183,7 @@ fn column_of(header: &str, map: &ColumnMap) -> Column {
     let mapped = map.iter().find(|(_, column)| column.name.trim() == header);
     let content = match mapped {
         Some((Signal::Timestamp, _)) => Content::Timestamp,
+        Some((Signal::Shut, _)) => SHUT,
         Some((signal, column)) => column.reading().map_or(Content::Ignored, |unit| number(*signal, unit)),
         None => bind_by_suffix(header),
     };
@@ -192,15 +193,20 @@ fn column_of(header: &str, map: &ColumnMap) -> Column {
 fn bind_by_suffix(header: &str) -> Content {
     match standard(header) {
         Some((signal, Some(unit))) => number(signal, unit),
+        Some((Signal::Shut, None)) => SHUT,
         Some(_) => Content::Timestamp,
         None => Content::Ignored,
     }
 }
 
-/// The signal of a header as the contract writes it, and its unit; a timestamp has none.
+/// It has no unit: 0 or 1.
+const SHUT: Content = Content::Number(Signal::Shut, None);
+
+/// The signal of a header as the contract writes it, and its unit; a timestamp has none, nor has `shut`.
 pub(super) fn standard(header: &str) -> Option<(Signal, Option<Unit>)> {
-    if header == Signal::Timestamp.name() {
-        return Some((Signal::Timestamp, None));
+    let unitless = [Signal::Timestamp, Signal::Shut].into_iter().find(|signal| header == signal.name());
+    if let Some(signal) = unitless {
+        return Some((signal, None));
     }
     let (name, suffix) = header.rsplit_once('_')?;
     let signal = Signal::by_name(name)?;

@@ -67,6 +67,9 @@ pub struct Record {
     pub speed_mps: Option<f64>,
     /// Oil temperature, K.
     pub temperature_k: Option<f64>,
+    /// Whether both ports are shut between valve and cylinder: then both flows are zero for certain.
+    #[serde(default)]
+    pub shut: Option<bool>,
     /// Reference flows of the internal, external A and external B leak, m³/s.
     pub leak_m3s: PerLeak<Option<f64>>,
 }

@@ -547,3 +547,26 @@ fn a_reader_that_is_dropped_ends_its_thread() {
         std::thread::yield_now();
     }
 }
+
+/// `shut` has no unit: 0 or 1, by its own name or a foreign one; an empty cell says nothing, another number is a bad row.
+#[test]
+fn shut_is_zero_or_one() {
+    let mut rig = Rig::paper();
+    let map = "[columns]\nshut = \"Valve closed\"\n";
+    for header in ["shut", "Valve closed"] {
+        let text = format!(
+            "t_s,x_m,pa_pa,pb_pa,{header}\n0,0.1,5e6,4e6,0\n1,0.1,5e6,4e6,1\n2,0.1,5e6,4e6,\n3,0.1,5e6,4e6,7\n"
+        );
+        if header != "shut" {
+            rig.columns = Rig::parse(&format!("{}{map}", rig.to_toml()), "rig").expect("a rig").columns;
+        }
+        let mut reader =
+            TraceReader::from_stream("t", Box::new(std::io::Cursor::new(text)), &rig).expect("a trace");
+        let (mut record, mut shut) = (Record::default(), Vec::new());
+        while reader.next_record(&mut record).expect("rows") {
+            shut.push(record.shut);
+        }
+        assert_eq!(shut, [Some(false), Some(true), None], "{header}");
+        assert_eq!(reader.quality().skipped, 1, "{header}");
+    }
+}

@@ -167,6 +167,7 @@ fn readings(row: &Row) -> Record {
         },
         speed_mps: reading(Signal::Speed),
         temperature_k: reading(Signal::Temperature),
+        shut: reading(Signal::Shut).map(|shut| shut > 0.5),
         leak_m3s: PerLeak {
             internal: reading(Signal::LeakInternal),
             external_a: reading(Signal::LeakExternalA),
@@ -256,6 +257,7 @@ impl Ranges {
             Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
             both_ways(Signal::Speed, 100.0),
             Range { signal: Signal::Time, least: -MOST_TIME_S, most: MOST_TIME_S },
+            Range { signal: Signal::Shut, least: 0.0, most: 1.0 },
             // As much as the largest meter that a rig may have.
             both_ways(Signal::LeakInternal, 10.0),
             both_ways(Signal::LeakExternalA, 10.0),
@@ -291,6 +293,7 @@ impl Ranges {
             Signal::Temperature
             | Signal::Speed
             | Signal::Time
+            | Signal::Shut
             | Signal::LeakInternal
             | Signal::LeakExternalA
             | Signal::LeakExternalB => "what is possible",

@@ -275,6 +275,7 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
         let entry = section.section(signal.name())?;
         match signal.dimension() {
             Some(_) => entry.allow(&["name", "unit", "scale", "offset"])?,
+            None if signal == Signal::Shut => entry.allow(&["name"])?,
             None => entry.allow(&["name", "unit", "scale", "offset", "format", "zone"])?,
         }
         let name =

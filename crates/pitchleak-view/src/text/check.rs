@@ -2,7 +2,7 @@
 
 use super::Text;
 use super::check_sketch::CheckSketch;
-use super::replay::{data_line, misfit, rig_line};
+use super::replay::{data_line, hold_line, misfit, rig_line};
 use crate::Palette;
 use pitchleak::check::{CheckReport, Reach};
 use pitchleak::core::PerLeak;
@@ -36,6 +36,9 @@ impl CheckText<'_> {
         let mut out = String::new();
         let _ = writeln!(out, "trace  {}: {}", self.report.trace.path, data_line(&self.report.trace));
         let _ = writeln!(out, "rig    {}\n", rig_line(&self.report.rig));
+        if let Some(hold) = &self.report.hold {
+            let _ = writeln!(out, "This is a hold test: {}.\n", hold_line(hold));
+        }
         self.write_readings(&mut out);
         self.write_channels(&mut out);
         self.write_reach(&mut out);

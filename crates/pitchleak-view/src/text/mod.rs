@@ -14,7 +14,7 @@ pub(crate) use diagnosis::companions;
 pub use diagnosis::sentence;
 pub use fleet::fleet_terminal;
 pub use replay::data_line;
-pub(crate) use replay::{misfit, missing_rig, rig_line};
+pub(crate) use replay::{hold_line, misfit, missing_rig, rig_line};
 pub use replay_sketch::ReplaySketch;
 
 use crate::Palette;

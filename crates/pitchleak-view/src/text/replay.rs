@@ -4,12 +4,13 @@ use super::Text;
 use super::replay_sketch::ReplaySketch;
 use super::replay_terminal::{write_bars, write_courses};
 use crate::Palette;
-use pitchleak::core::AlarmState;
+use pitchleak::core::{AlarmState, Leak};
+use pitchleak::hold::{HeldLeak, HoldSummary};
 use pitchleak::report::{
     EstimateEntry, MISFIT, ReplayReport, TraceSummary, Verdict, interval, with_interval,
 };
 use pitchleak::rig::Rig;
-use pitchleak::units::{LPM_PER_BAR, duration};
+use pitchleak::units::{LPM_PER_BAR, duration, readable};
 use std::fmt::Write;
 
 /// One line on the data: how much, how regular, what was lost.
@@ -53,6 +54,16 @@ pub(crate) fn rig_line(rig: &str) -> String {
     }
 }
 
+/// How much of a hold test counts, and from which size on it finds each leak.
+pub(crate) fn hold_line(hold: &HoldSummary) -> String {
+    let Some(leaks) = &hold.leaks else { return "nothing of it is usable".to_owned() };
+    let smallest = |(leak, held): (Leak, &HeldLeak)| {
+        format!("{} leaks from {} L/min", leak.label(), readable(held.smallest_lpm, 2))
+    };
+    let smallest: Vec<_> = leaks.iter().map(smallest).collect();
+    format!("{} s usable; finds {} on", readable(hold.usable_s, 3), smallest.join(", "))
+}
+
 /// More alarms than these are told as spells alone.
 const MOST_ALARMS: usize = 12;
 
@@ -89,14 +100,20 @@ impl ReplayText<'_> {
         self.write_leaks(&mut out);
         if let Some(sketch) = self.sketch {
             write_bars(&mut out, self.report, sketch, self.palette);
-            write_courses(&mut out, self.report, sketch, self.palette);
+            // What was open before a hold tells nothing of it.
+            if self.report.hold.is_none() {
+                write_courses(&mut out, self.report, sketch, self.palette);
+            }
         }
         self.write_spells(&mut out);
         self.write_alarms(&mut out);
         self.write_scores(&mut out);
         let _ = writeln!(out, "\ntrace      {}: {}", self.report.trace.path, data_line(&self.report.trace));
         let _ = writeln!(out, "rig        {}", rig_line(&self.report.rig));
-        let _ = writeln!(out, "estimator  {}", self.report.estimator.name());
+        let _ = match &self.report.hold {
+            Some(hold) => writeln!(out, "hold test  {}", hold_line(hold)),
+            None => writeln!(out, "estimator  {}", self.report.estimator.name()),
+        };
         out
     }
 

@@ -47,6 +47,7 @@ impl Motion {
             reference,
             leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
             oil_temperature: None,
+            shut: None,
             effects: EffectSet::default(),
             start_s: 10.0,
             warm_up_s: 10.0,

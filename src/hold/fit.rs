@@ -1,0 +1,216 @@
+//! Maximum likelihood of compressibility and leaks over all holds of a trace.
+//!
+//! Readings stand on both sides of the equations, so plain least squares would take the noise of the pressures for
+//! compression and find κ too small, down to none in a sound hold. So signals and unknowns are found in turn: the equations are
+//! made linear at the likeliest signals, which begin as running means, and κ stays at the rig file's for the first rounds
+//! (errors in variables by Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
+
+use super::equations::{Known, Normal, Unknowns};
+use super::nodes::{Cooling, LEAST_INFORMATION, RESOLUTION, Search};
+use super::profile::Profile;
+use super::recorder::{Held, LEAST_READINGS, Reading};
+use crate::rig::Rig;
+use crate::units::LPM_PER_M3S;
+use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
+use pitchleak_core::{Estimate, PerLeak};
+
+/// Unit of the leak coefficients: 1 L/min at 50 bar, in m³/(s·Pa).
+pub(super) const LEAK_UNIT_M3SPA: f64 = 1.0 / LPM_PER_M3S / 50e5;
+/// Rounds in all, and those of them in which κ is held.
+const ROUNDS: usize = 16;
+const ROUNDS_HELD: usize = 4;
+/// κ stays within these multiples of the rig file's on its way.
+const KAPPA_RANGE: [f64; 2] = [0.2, 5.0];
+/// A rig file that knows its oil for certain knows it to this share, and a sensor without noise has this of its full scale.
+const LEAST_SHARE: f64 = 1e-6;
+/// A hold's residuals are averaged over so many parts, where noise has gone and errors of the model haven't.
+const PARTS: usize = 10;
+
+/// What the holds say.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// The likelihood of the leaks at each compressibility.
+    pub profile: Profile,
+    /// κ as the rig file has it, 1/Pa.
+    pub declared_ppa: Estimate<f64>,
+    /// Means of |P_L|, P_A, P_B, Pa.
+    pub pressures_pa: PerLeak<f64>,
+    /// P_A − P_B, Pa.
+    pub load_pressure_pa: f64,
+    pub misfit: Misfit,
+    pub usable_s: f64,
+}
+
+/// Squares of the residuals over those that noise has, about 1 each where the model is right.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Misfit {
+    /// Of all readings.
+    pub readings: f64,
+    /// Of means over a tenth of a hold.
+    pub course: f64,
+    /// Largest of the two in units of what chance makes of it, 1 σ.
+    pub sigmas: f64,
+    /// What they would be by the noise that adds up in the volume of a large leak: the equations leave it out.
+    pub of_leak: f64,
+}
+
+/// The holds that have readings enough.
+pub(super) fn usable(holds: &[Held]) -> Vec<&Held> {
+    holds.iter().filter(|held| held.readings.len() >= LEAST_READINGS && held.usable_s() > 0.0).collect()
+}
+
+/// Fits all holds of a rig together; none where no hold is usable, or no finite number comes out.
+pub(super) fn fit(rig: &Rig, holds: &[&Held]) -> Option<Fit> {
+    let declared_ppa = 1.0 / rig.fluid.bulk_modulus_pa;
+    let spread = (rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa).max(LEAST_SHARE);
+    let known = known(rig, declared_ppa);
+    let mut search = Search::new(&known, holds);
+    let mut kappa = Estimate { value: 1.0, std: spread };
+    for round in 0..ROUNDS {
+        let mut normal = search.normal(kappa.value * declared_ppa);
+        normal.information[(0, 0)] += spread.powi(-2);
+        normal.right[0] += (1.0 - kappa.value) * spread.powi(-2);
+        let unknowns = solve(&normal, round < ROUNDS_HELD)?;
+        search.smooth(&unknowns);
+        let std = normal.information.try_inverse()?[(0, 0)].sqrt();
+        kappa = Estimate { value: (kappa.value + unknowns[0]).clamp(KAPPA_RANGE[0], KAPPA_RANGE[1]), std };
+    }
+    let normal = search.normal(kappa.value * declared_ppa);
+    let misfit = misfit(&search.innovations(&solve(&normal, true)?));
+    let pressures_pa = mean_pressures_pa(holds, |load| load.abs());
+    let cooling = Cooling::of(rig, holds, &pressures_pa)?;
+    let worse = misfit.readings.max(misfit.course).max(1.0);
+    let share = kappa.std / kappa.value;
+    let profile = Profile::new(kappa.value.ln(), share.min(spread), |ln_kappa| {
+        let node = search.clone().node(ln_kappa.exp() * declared_ppa)?;
+        Some(node.explained(&cooling)?.widened(worse))
+    })?;
+    let leaks = profile.at(kappa.value.ln()).leaks;
+    let misfit = Misfit { of_leak: of_leak(rig, holds, kappa.value * declared_ppa, &leaks), ..misfit };
+    let fit = Fit {
+        profile,
+        declared_ppa: Estimate { value: declared_ppa, std: spread * declared_ppa },
+        pressures_pa,
+        load_pressure_pa: mean_pressures_pa(holds, |load| load).internal,
+        misfit,
+        usable_s: holds.iter().map(|held| held.usable_s()).sum(),
+    };
+    fit.misfit.readings.is_finite().then_some(fit)
+}
+
+fn known(rig: &Rig, declared_ppa: f64) -> Known<'_> {
+    let (sensors, sheets) = (rig.sensors(), &rig.instruments);
+    let variance = |std: f64, full_scale: f64| std.max(LEAST_SHARE * full_scale).powi(2);
+    let pressure = variance(sensors.pressure.noise_std, sheets.pressure.full_scale);
+    let position = variance(sensors.position.noise_std, sheets.position.full_scale);
+    Known {
+        cylinder: &rig.cylinder,
+        variances: Vector3::new(position, pressure, pressure),
+        units: Vector4::new(declared_ppa, LEAK_UNIT_M3SPA, LEAK_UNIT_M3SPA, LEAK_UNIT_M3SPA),
+    }
+}
+
+/// The unknowns; κ stays where it is while it is held.
+pub(super) fn solve(normal: &Normal, is_held: bool) -> Option<Unknowns> {
+    let Normal { mut information, mut right, .. } = *normal;
+    if is_held {
+        for other in 1..4 {
+            information[(0, other)] = 0.0;
+            information[(other, 0)] = 0.0;
+        }
+        (information[(0, 0)], right[0]) = (1.0, 0.0);
+    }
+    Some(factor(&information)?.solve(&right))
+}
+
+/// A leak that nothing tells of has next to no information, but never less than none.
+fn factor(information: &Matrix4<f64>) -> Option<nalgebra::Cholesky<f64, nalgebra::U4>> {
+    let least = LEAST_INFORMATION + RESOLUTION * information.trace();
+    let ridge = Matrix4::from_diagonal(&Vector4::new(0.0, least, least, least));
+    (information + ridge).cholesky()
+}
+
+/// A leak's volume has the noise of the pressures summed over the hold, C σ √(T h), beside κ V σ of a reading: squares of both.
+fn of_leak(rig: &Rig, holds: &[&Held], kappa_ppa: f64, leaks: &Vector3<f64>) -> f64 {
+    let square = |held: &&&Held| {
+        let step_s = held.usable_s() / held.readings.len() as f64;
+        let x_m = held.readings.first().map_or(0.0, |reading| reading.x_m);
+        let volume_m3 = rig.cylinder.volume_a_m3(x_m).min(rig.cylinder.volume_b_m3(x_m));
+        let [through, a, b] = leaks.map(|leak| leak.max(0.0) * LEAK_UNIT_M3SPA).into();
+        // P_L has the noise of both pressures.
+        let coefficient = (2.0 * through * through + a.max(b).powi(2)).sqrt();
+        (coefficient / (kappa_ppa * volume_m3)).powi(2) * held.usable_s() * step_s
+    };
+    1.0 + holds.iter().map(|held| square(&held)).fold(0.0, f64::max)
+}
+
+/// Running means over a tenth of the hold, turned about its end points where it ends.
+pub(super) fn running_means(readings: &[Reading]) -> Vec<Reading> {
+    let reach = (readings.len() / 20).max(1).min(readings.len() - 1) as isize;
+    let at = |index: isize| -> Vector3<f64> {
+        let last = readings.len() as isize - 1;
+        let vector = |k: isize| {
+            let r = &readings[k as usize];
+            Vector3::new(r.x_m, r.pa_pa, r.pb_pa)
+        };
+        if index < 0 {
+            2.0 * vector(0) - vector(-index)
+        } else if index > last {
+            2.0 * vector(last) - vector(2 * last - index)
+        } else {
+            vector(index)
+        }
+    };
+    let count = (2 * reach + 1) as f64;
+    let mut sum: Vector3<f64> = (-reach..=reach).map(&at).sum();
+    let mut means = Vec::with_capacity(readings.len());
+    for (index, reading) in readings.iter().enumerate() {
+        let mean = sum / count;
+        means.push(Reading { t_s: reading.t_s, x_m: mean.x, pa_pa: mean.y, pb_pa: mean.z });
+        let index = index as isize;
+        if index + 1 < readings.len() as isize {
+            sum += at(index + 1 + reach) - at(index - reach);
+        }
+    }
+    means
+}
+
+/// Means over time of P_L, as `size` has it, P_A and P_B, Pa.
+fn mean_pressures_pa(holds: &[&Held], size: impl Fn(f64) -> f64) -> PerLeak<f64> {
+    let (mut sum, mut time_s) = (PerLeak::<f64>::default(), 0.0);
+    for pair in holds.iter().flat_map(|held| held.readings.windows(2)) {
+        let [from, to] = pair else { continue };
+        let step_s = to.t_s - from.t_s;
+        let [a_pa, b_pa] = [0.5 * (from.pa_pa + to.pa_pa), 0.5 * (from.pb_pa + to.pb_pa)];
+        sum.internal += step_s * size(a_pa - b_pa);
+        sum.external_a += step_s * a_pa;
+        sum.external_b += step_s * b_pa;
+        time_s += step_s;
+    }
+    sum.map(|sum| sum / f64::max(time_s, f64::MIN_POSITIVE))
+}
+
+fn misfit(innovations: &[Vec<Vector2<f64>>]) -> Misfit {
+    // Two means of each hold and four unknowns are fitted.
+    let fitted = 2.0 * innovations.len() as f64 + 4.0;
+    let count = 2.0 * innovations.iter().map(Vec::len).sum::<usize>() as f64;
+    let squares: f64 = innovations.iter().flatten().map(Vector2::norm_squared).sum();
+    let readings = squares / (count - fitted).max(1.0);
+    let (mut course, mut parts) = (0.0, 0.0);
+    for of_hold in innovations {
+        let length = of_hold.len().div_ceil(PARTS).max(1);
+        for part in of_hold.chunks(length) {
+            course += part.iter().sum::<Vector2<f64>>().norm_squared() / part.len() as f64;
+            parts += 2.0;
+        }
+    }
+    let free = f64::max(parts - fitted, 1.0);
+    let course = course / free;
+    let beyond = |ratio: f64, count: f64| (ratio - 1.0) / (2.0 / f64::max(count, 1.0)).sqrt();
+    Misfit {
+        readings,
+        course,
+        sigmas: beyond(readings, count - fitted).max(beyond(course, free)),
+        of_leak: 1.0,
+    }
+}

@@ -1,0 +1,107 @@
+//! What a hold test found.
+
+use super::fit::{Fit, fit, usable};
+use super::presence::{Beliefs, beliefs};
+use super::recorder::{EndedBy, Held, Recorder};
+use crate::explain::ALPHA;
+use crate::rig::Rig;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::PerLeak;
+use serde::Serialize;
+
+/// How much of a trace was a hold test, and what it could find.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct HoldSummary {
+    /// Usable time, of all holds of the trace together, s.
+    pub usable_s: f64,
+    /// What ended the longest of them.
+    pub ended_by: EndedBy,
+    /// How many there are.
+    pub holds: usize,
+    /// Each leak; none where nothing was usable.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leaks: Option<PerLeak<HeldLeak>>,
+}
+
+/// One leak in a hold test, as a mean over its usable time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct HeldLeak {
+    /// Probability that there is such a leak at all.
+    pub probability: f64,
+    /// The interval that holds its flow with 95 % where there is one, L/min.
+    pub ci95_lpm: [f64; 2],
+    /// The smallest flow that this hold would find, L/min.
+    pub smallest_lpm: f64,
+    /// Mean pressure that drives it, bar: |P_A − P_B|, P_A or P_B.
+    pub pressure_bar: f64,
+}
+
+/// A finished hold test.
+#[derive(Clone, Debug)]
+pub struct HoldTest {
+    pub(super) summary: HoldSummary,
+    pub(super) found: Option<Found>,
+    /// Position and both pressures never change by a digit.
+    pub(super) is_frozen: bool,
+}
+
+/// What the usable readings say.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    pub fit: Fit,
+    pub beliefs: Beliefs,
+}
+
+impl Recorder {
+    /// The hold test of a trace of this rig; none where the ports were never shut.
+    pub fn finish(self, rig: &Rig) -> Option<HoldTest> {
+        let holds = self.holds();
+        let longest = holds.iter().max_by(|a, b| a.usable_s().total_cmp(&b.usable_s()))?;
+        let usable = usable(&holds);
+        let found = fit(rig, &usable).filter(|_| !usable.is_empty()).map(|fit| {
+            let beliefs = beliefs(&fit, 1.0 - ALPHA);
+            Found { fit, beliefs }
+        });
+        let summary = HoldSummary {
+            usable_s: found.as_ref().map_or(0.0, |found| found.fit.usable_s),
+            ended_by: longest.ended_by,
+            holds: holds.len(),
+            leaks: found.as_ref().map(Found::leaks),
+        };
+        Some(HoldTest { summary, is_frozen: is_frozen(&usable), found })
+    }
+}
+
+impl HoldTest {
+    /// How much of it was usable, and what it could find.
+    pub fn summary(&self) -> &HoldSummary {
+        &self.summary
+    }
+}
+
+impl Found {
+    fn leaks(&self) -> PerLeak<HeldLeak> {
+        self.beliefs.leaks.zip(self.fit.pressures_pa).map(|(belief, pressure_pa)| {
+            let lpm = |coefficient: f64| coefficient * pressure_pa * LPM_PER_M3S;
+            HeldLeak {
+                probability: belief.probability,
+                ci95_lpm: belief.interval.map(lpm),
+                smallest_lpm: lpm(belief.smallest),
+                pressure_bar: pressure_pa / 1e5,
+            }
+        })
+    }
+}
+
+/// So many equal readings are no chance.
+const FROZEN_READINGS: usize = 50;
+
+/// Whether a recorder seems to stand still: real sensors flicker in their last digit.
+#[allow(clippy::float_cmp)]
+fn is_frozen(holds: &[&Held]) -> bool {
+    let same = |held: &&Held| {
+        let [first, rest @ ..] = held.readings.as_slice() else { return true };
+        rest.iter().all(|r| r.x_m == first.x_m && r.pa_pa == first.pa_pa && r.pb_pa == first.pb_pa)
+    };
+    holds.iter().map(|held| held.readings.len()).sum::<usize>() >= FROZEN_READINGS && holds.iter().all(same)
+}

@@ -1,0 +1,248 @@
+//! Which leaks there are, and how large: no leak is negative, and most cylinders have none.
+//!
+//! Nearly the same drift comes of a leak at A and of one past the piston
+//! together with one at B. So each of the eight sets of leaks is weighed by its evidence: a leak of the set is half normal, one outside
+//! is zero. Shares and size are those of docs/explanations.md.
+
+use super::fit::{Fit, LEAK_UNIT_M3SPA};
+use super::nodes::Node;
+use crate::explain::{LEAK_SHARE, Orthant, positive_orthant};
+use crate::units::LPM_PER_M3S;
+use nalgebra::{DMatrix, DVector};
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use statrs::function::erf::erfc;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Size of a leak that a cylinder may have, half normal, at 50 bar, L/min. A guess: that of docs/explanations.md for a meter of 20 L/min.
+const LEAK_SIZE_LPM: f64 = 1.0;
+/// In [`LEAK_UNIT_M3SPA`].
+const SIZE: f64 = LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 / LEAK_UNIT_M3SPA;
+
+/// What is believed of one leak; coefficients in m³/(s·Pa), where there is such a leak.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(super) struct Belief {
+    /// That there is one.
+    pub probability: f64,
+    pub mean: f64,
+    pub std: f64,
+    /// Quantiles of 2.5 and 97.5 %.
+    pub interval: [f64; 2],
+    /// The smallest that would be found in this hold.
+    pub smallest: f64,
+}
+
+/// What is believed of all leaks, and of the oil.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beliefs {
+    pub leaks: PerLeak<Belief>,
+    /// That oil leaks by whatever way.
+    pub any: f64,
+    /// κ, 1/Pa.
+    pub kappa_ppa: Estimate<f64>,
+    /// By how much leaks of any sign would explain the readings better than leaks that are none or positive: squares of
+    /// residuals in those of the noise.
+    pub negative: f64,
+}
+
+/// Weighs the leaks of a fit; `sure` is the probability from which a leak counts as found.
+pub(super) fn beliefs(fit: &Fit, sure: f64) -> Beliefs {
+    let nodes = grid(fit);
+    let sets: Vec<Vec<usize>> =
+        (0..8).map(|members| (0..3).filter(|leak| members >> leak & 1 == 1).collect()).collect();
+    let mut weighed: Vec<Weighed> = sets.iter().flat_map(|members| over_kappa(members, &nodes)).collect();
+    let possible = weighed.iter().map(|one| one.squares).fold(f64::INFINITY, f64::min);
+    let any_sign = nodes.iter().map(|place| place.node.squares).fold(f64::INFINITY, f64::min);
+    let largest = weighed.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
+    weighed.iter_mut().for_each(|one| one.weight = (one.weight - largest).exp());
+    let all: f64 = weighed.iter().map(|one| one.weight).sum();
+    weighed.iter_mut().for_each(|one| one.weight /= all);
+    let moment = |power: i32| weighed.iter().map(|one| one.weight * one.kappa.powi(power)).sum::<f64>();
+    let (mean, square) = (moment(1), moment(2));
+    let kappa = Estimate { value: mean, std: (square - mean * mean).max(0.0).sqrt() };
+    let middle = fit.profile.at(mean.ln());
+    Beliefs {
+        leaks: PerLeak::from_fn(|leak| {
+            let own = index(leak);
+            let alone = 1.0 / (middle.information[(own, own)] + SIZE.powi(-2)).sqrt();
+            let smallest = alone * detected_sigmas(alone, sure);
+            Belief { smallest: smallest * LEAK_UNIT_M3SPA, ..spread(&weighed, own) }
+        }),
+        any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
+        kappa_ppa: kappa.scaled(fit.declared_ppa.value),
+        negative: possible - any_sign,
+    }
+}
+
+/// Place of a leak among the unknowns.
+pub(super) fn index(leak: Leak) -> usize {
+    match leak {
+        Leak::Internal => 0,
+        Leak::ExternalA => 1,
+        Leak::ExternalB => 2,
+    }
+}
+
+/// Places on the grid of κ, of which those that count are taken, so many at the most.
+const PLACES: usize = 2000;
+const TAKEN: usize = 15;
+/// A place counts where its weight is this far below the largest, ln.
+const LEAST_LN_WEIGHT: f64 = -12.0;
+
+/// The likelihood at a κ, in the rig file's, and ln of what was believed of it before.
+struct Place {
+    kappa: f64,
+    ln_prior: f64,
+    node: Node,
+}
+
+fn grid(fit: &Fit) -> Vec<Place> {
+    let [from, to] = fit.profile.range();
+    let relative = fit.declared_ppa.std / fit.declared_ppa.value;
+    let places = (0..=PLACES).map(|k| from + (to - from) * k as f64 / PLACES as f64);
+    let least = fit.profile.at(0.5 * (from + to)).squares;
+    places
+        .map(|ln_kappa| {
+            let node = fit.profile.at(ln_kappa);
+            let ln_prior = -0.5 * (ln_kappa / relative).powi(2);
+            Place { kappa: ln_kappa.exp(), ln_prior, node: Node { squares: node.squares - least, ..node } }
+        })
+        .collect()
+}
+
+/// One set of leaks that are there, at one κ.
+struct Weighed {
+    members: Vec<usize>,
+    kappa: f64,
+    /// Probability, as its logarithm until all are known.
+    weight: f64,
+    /// Of the residuals, where the likeliest leaks of this set are possible; else infinite.
+    squares: f64,
+    orthant: Option<Orthant>,
+}
+
+/// A set of leaks, whatever their sign, at one κ.
+struct Normal {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Of the residuals.
+    squares: f64,
+    /// ln of prior and evidence, without the orthant's probability.
+    ln_weight: f64,
+}
+
+impl Normal {
+    fn new(members: &[usize], place: &Place) -> Option<Self> {
+        let Place { node, ln_prior, .. } = place;
+        let count = members.len();
+        let ln_share = count as f64 * LEAK_SHARE.ln() + (3 - count) as f64 * (1.0 - LEAK_SHARE).ln();
+        let pull = node.information * node.leaks;
+        let precision = DMatrix::from_fn(count, count, |i, j| {
+            node.information[(members[i], members[j])] + if i == j { SIZE.powi(-2) } else { 0.0 }
+        });
+        let right = DVector::from_fn(count, |i, _| pull[members[i]]);
+        let factor = precision.cholesky()?;
+        let mean = factor.solve(&right);
+        // Half normal sizes of density 2/(τ √(2π)) at none, times a normal integral over the orthant.
+        let ln_det = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+        let squares = node.squares + node.leaks.dot(&pull) - mean.dot(&right);
+        let ln_size = count as f64 * (2.0 / SIZE).ln();
+        let ln_weight = ln_share + ln_prior - 0.5 * squares + ln_size - 0.5 * ln_det;
+        Some(Self { mean, covariance: factor.inverse(), squares, ln_weight })
+    }
+
+    /// About what the orthant's probability makes of it, as if leaks were independent.
+    fn ln_about(&self) -> f64 {
+        let variances = self.covariance.diagonal();
+        let tails = self.mean.iter().zip(&variances).map(|(mean, variance)| ln_tail(-mean / variance.sqrt()));
+        self.ln_weight + tails.sum::<f64>()
+    }
+}
+
+/// ln of the normal's probability above a point.
+fn ln_tail(point: f64) -> f64 {
+    if point < 5.0 {
+        return (0.5 * erfc(point / SQRT_2)).ln();
+    }
+    -0.5 * point * point - (point * (2.0 * PI).sqrt()).ln()
+}
+
+/// A set of leaks at the places of κ that count for it.
+fn over_kappa(members: &[usize], places: &[Place]) -> Vec<Weighed> {
+    let about: Vec<f64> = places
+        .iter()
+        .map(|place| Normal::new(members, place).map_or(f64::NEG_INFINITY, |normal| normal.ln_about()))
+        .collect();
+    let largest = about.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let counts = |ln: &f64| *ln > largest + LEAST_LN_WEIGHT;
+    let first = about.iter().position(counts).unwrap_or(0);
+    let last = about.iter().rposition(counts).unwrap_or(0);
+    let step = ((last - first) / (TAKEN - 1)).max(1);
+    let taken = places[first..=last].iter().step_by(step);
+    let weighed = taken.filter_map(|place| {
+        let normal = Normal::new(members, place)?;
+        let rows: Vec<Vec<f64>> =
+            normal.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let orthant = (!members.is_empty()).then(|| positive_orthant(normal.mean.as_slice(), &rows));
+        let ln_orthant = orthant.as_ref().map_or(0.0, |orthant| orthant.ln_probability);
+        // Each stands for the step of ln κ up to the next.
+        let weight = normal.ln_weight + ln_orthant + (step as f64).ln();
+        let is_possible = normal.mean.iter().all(|leak| *leak >= 0.0);
+        let squares = if is_possible { normal.squares } else { f64::INFINITY };
+        Some(Weighed { members: members.to_vec(), kappa: place.kappa, weight, squares, orthant })
+    });
+    weighed.collect()
+}
+
+impl Weighed {
+    /// Of a leak: values and weights of the sample.
+    fn points(&self, own: usize) -> impl Iterator<Item = (f64, f64)> {
+        let place = self.members.iter().position(|member| *member == own);
+        let sample = place.and_then(|place| Some((place, self.orthant.as_ref()?)));
+        sample.into_iter().flat_map(move |(place, orthant)| {
+            orthant.points.iter().zip(&orthant.weights).map(move |(p, w)| (p[place], self.weight * w))
+        })
+    }
+}
+
+/// Sets of so little weight don't count.
+const LEAST_WEIGHT: f64 = 1e-6;
+
+/// Probability, mean, spread and interval of a leak over the sets that have it.
+fn spread(sets: &[Weighed], own: usize) -> Belief {
+    let with: Vec<&Weighed> = sets.iter().filter(|set| set.members.contains(&own)).collect();
+    let probability: f64 = with.iter().map(|set| set.weight).sum();
+    let heavy = with.iter().filter(|set| set.weight > LEAST_WEIGHT * probability);
+    let mut points: Vec<(f64, f64)> = heavy.flat_map(|set| set.points(own)).collect();
+    let all = points.iter().map(|(_, weight)| weight).sum::<f64>().max(f64::MIN_POSITIVE);
+    let mean = points.iter().map(|(value, weight)| value * weight).sum::<f64>() / all;
+    let variance = points.iter().map(|(value, weight)| (value - mean).powi(2) * weight).sum::<f64>() / all;
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let quantile = |probability: f64| {
+        let mut sum = 0.0;
+        let above = points.iter().find(|(_, weight)| {
+            sum += weight / all;
+            sum >= probability
+        });
+        above.or(points.last()).map_or(0.0, |(value, _)| *value)
+    };
+    Belief {
+        probability,
+        mean: mean * LEAK_UNIT_M3SPA,
+        std: variance.sqrt() * LEAK_UNIT_M3SPA,
+        interval: [quantile(0.025), quantile(0.975)].map(|value| value * LEAK_UNIT_M3SPA),
+        ..Belief::default()
+    }
+}
+
+/// How many of its standard deviations a single leak must have to be believed with the probability `sure`: its odds are
+/// those before times the evidence s/(1 − s) · 2σ/τ · e^(z²/2), of which the tail below zero is left out.
+fn detected_sigmas(std: f64, sure: f64) -> f64 {
+    let wanted = (sure / (1.0 - sure) * (1.0 - LEAK_SHARE) / LEAK_SHARE).ln();
+    let occam = (2.0 * std / SIZE).ln();
+    (2.0 * (wanted - occam)).max(1.0).sqrt()
+}
+
+/// Standard deviation of the half normal size that a leak has before any reading, m³/(s·Pa).
+pub(super) fn prior_std() -> f64 {
+    LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 * (1.0 - 2.0 / std::f64::consts::PI).sqrt()
+}
