@@ -3,16 +3,15 @@
 use super::hypothesis::{LeakCourse, State};
 use super::posterior::{Tables, Weighed, weigh};
 use super::raw_products::Statistic;
+use super::sizes::{mended, sentence};
 use super::table::Entry;
 use crate::report::Status;
 use crate::rig::Rig;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Leak, PerLeak};
-use serde::Serialize;
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use serde::{Deserialize, Serialize};
 
-/// α: a verdict is sure where at most this probability speaks against it. Chosen; a user's to change.
-pub const ALPHA: f64 = 0.05;
 /// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
 const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
@@ -23,7 +22,7 @@ const MISFIT_DOUBT: f64 = 2.0;
 const LEAST_LISTED: f64 = 0.01;
 
 /// What is believed of a leak at the trace's end.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
     /// Mean flow, L/min.
     pub mean_lpm: f64,
@@ -35,40 +34,51 @@ pub struct Belief {
     pub below_lpm: f64,
 }
 
+impl Belief {
+    /// Mean and standard deviation, L/min.
+    pub fn estimate_lpm(&self) -> Estimate<f64> {
+        Estimate { value: self.mean_lpm, std: self.std_lpm }
+    }
+}
+
 /// An explanation that is left.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Explained {
     /// Ids of what it is made of, joined by `+`.
     pub id: String,
     /// Posterior probability.
     pub probability: f64,
-    /// In words.
+    /// In words, leaks first.
     pub text: String,
+    /// What is off beside the leaks, in words; empty where nothing is.
+    pub cause: String,
+    /// Whether it is a mistake of wiring, sign or unit.
+    pub wiring: bool,
     /// What to do about it.
     pub remedy: Option<String>,
     /// Lines for `[columns]` or the rig file that mend it.
     pub columns: Vec<String>,
     /// Ids that no trace of these readings tells it from.
-    pub cannot_be_told_from: Vec<&'static str>,
+    pub cannot_be_told_from: Vec<String>,
     /// Mean leaks under it, L/min.
     pub leakage: PerLeak<f64>,
 }
 
 /// Something of sensors, rig or wiring that is not as declared, whatever the leaks are.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// Of the likeliest entry.
-    pub id: &'static str,
+    pub id: String,
     /// That it or one of those that it cannot be told from is so.
     pub probability: f64,
     /// In words.
-    pub text: &'static str,
+    pub text: String,
     /// Others of its kind that this trace leaves, and entries that no trace tells it from.
-    pub cannot_be_told_from: Vec<&'static str>,
+    pub cannot_be_told_from: Vec<String>,
 }
 
 /// The verdict of the posterior.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
     /// In a word.
     pub status: Status,
@@ -80,10 +90,14 @@ pub struct Decision {
     pub probability: PerLeak<f64>,
     /// How large each leak is, since it changed last.
     pub leakage: PerLeak<Belief>,
-    /// When a leak last changed at once, s from the trace's begin; 0 where none did.
-    pub changed_s: f64,
+    /// How long before the end a leak last changed at once, s, pauses not counted; none where none did.
+    pub changed_ago_s: Option<f64>,
+    /// Mean size of the pressures across the leaks since then, Pa: a leak's coefficient is its flow over it.
+    pub pressures_pa: PerLeak<f64>,
     /// Best first.
     pub explanations: Vec<Explained>,
+    /// Whether the likeliest explanation has sensors and rig as declared.
+    pub as_declared: bool,
     /// What is not as declared, for certain.
     pub notes: Vec<Note>,
     /// Noise scale over the readings' own scatter.
@@ -143,6 +157,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         weighed.iter().filter(|one| is(one)).fold(0.0, |sum, one| sum + one.probability).min(1.0)
     };
     let threshold_m3s = rig.alarms.threshold_m3s;
+    let alpha = rig.decision.alpha;
     let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, leak));
     let probability = PerLeak::from_fn(|leak| beliefs[leak].above(threshold_m3s[leak]));
     let wiring = mass(&|one| one.hypothesis.wiring.is_some());
@@ -150,10 +165,10 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let misfit = weighed.iter().map(|one| one.probability * one.misfit).sum();
     let is_ruled_out = |leak: &Leak| {
         wander < WANDER_DOUBT
-            && probability[*leak] <= ALPHA
-            && beliefs[*leak].quantile_if_there(1.0 - ALPHA) <= threshold_m3s[*leak]
+            && probability[*leak] <= alpha
+            && beliefs[*leak].quantile_if_there(1.0 - alpha) <= threshold_m3s[*leak]
     };
-    let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - ALPHA).collect();
+    let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - alpha).collect();
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
     let status = if wiring > WIRING_DOUBT || misfit > MISFIT_DOUBT {
         Status::Doubtful
@@ -170,19 +185,17 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         ruled_out,
         probability,
         leakage: beliefs.map(|marginal| marginal.belief()),
-        changed_s: changed_s(weighed),
-        explanations: listed(weighed),
-        notes: notes(weighed),
+        changed_ago_s: weighed.first().and_then(|best| best.changed_ago_s),
+        pressures_pa: weighed.first().map_or_else(PerLeak::default, |best| best.pressures_pa),
+        explanations: listed(weighed, rig),
+        as_declared: weighed
+            .first()
+            .is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
+        notes: notes(weighed, rig),
         misfit,
         wander,
         wiring,
     }
-}
-
-/// When a leak changed at once, as the likeliest explanation has it.
-fn changed_s(weighed: &[Weighed<'_>]) -> f64 {
-    let best = weighed.iter().max_by(|a, b| a.probability.total_cmp(&b.probability));
-    best.map_or(0.0, |best| best.changed_s)
 }
 
 /// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
@@ -248,11 +261,12 @@ impl Marginal {
 }
 
 /// What is not usual with probability 1 − α, of each kind.
-fn notes(weighed: &[Weighed<'_>]) -> Vec<Note> {
-    (0..3).filter_map(|kind| note(weighed, kind)).collect()
+fn notes(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Note> {
+    (0..3).filter_map(|kind| note(weighed, kind, rig)).collect()
 }
 
-fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
+fn note(weighed: &[Weighed<'_>], kind: usize, rig: &Rig) -> Option<Note> {
+    let alpha = rig.decision.alpha;
     let mut masses: Vec<(&Entry, f64)> = Vec::new();
     for one in weighed {
         let Some(entry) = found(one)[kind].filter(|entry| !is_usual(entry.id)) else { continue };
@@ -263,14 +277,20 @@ fn note(weighed: &[Weighed<'_>], kind: usize) -> Option<Note> {
     }
     masses.sort_by(|a, b| b.1.total_cmp(&a.1));
     let probability = masses.iter().map(|(_, mass)| mass).sum();
-    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - ALPHA)?;
-    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > ALPHA).map(|(entry, _)| entry.id);
-    let cannot_be_told_from = others.chain(best.alike.iter().copied()).collect();
-    Some(Note { id: best.id, probability, text: best.text, cannot_be_told_from })
+    let (best, _) = *masses.first().filter(|_| probability >= 1.0 - alpha)?;
+    let likeliest = weighed.iter().find(|one| found(one)[kind].is_some_and(|entry| entry.id == best.id));
+    let others = masses.iter().skip(1).filter(|(_, mass)| *mass > alpha).map(|(entry, _)| entry.id);
+    let cannot_be_told_from = others.chain(best.alike.iter().copied()).map(str::to_owned).collect();
+    Some(Note {
+        id: best.id.to_owned(),
+        probability,
+        text: likeliest.map_or_else(|| best.text.to_owned(), |one| sentence(best, &one.found, rig)),
+        cannot_be_told_from,
+    })
 }
 
 /// What an explanation is made of: leaks, their courses, state, wiring.
-fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
+fn listed(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Explained> {
     let mut out: Vec<Explained> = Vec::new();
     for one in weighed {
         let id = id(one);
@@ -293,7 +313,7 @@ fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
                     .map(|(old, new)| (old * known.probability + new * one.probability) / sum);
                 known.probability = sum;
             }
-            None => out.push(explained(id, one, leakage)),
+            None => out.push(explained(id, one, leakage, rig)),
         }
     }
     out.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -304,11 +324,11 @@ fn listed(weighed: &[Weighed<'_>]) -> Vec<Explained> {
     out
 }
 
-fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained {
+fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>, rig: &Rig) -> Explained {
     let hypothesis = &one.hypothesis;
     let parts = found(one);
     let unusual = || parts.iter().flatten().filter(|entry| !is_usual(entry.id));
-    let mut words: Vec<String> = unusual().map(|entry| entry.text.to_owned()).collect();
+    let mut words: Vec<String> = unusual().map(|entry| sentence(entry, &one.found, rig)).collect();
     if hypothesis.state.wander.0 > 0.0 {
         words.push("the flow meters' zeros wander".to_owned());
     }
@@ -317,6 +337,8 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
         id,
         probability: one.probability,
         text: words.join(", and "),
+        cause: words.join(", and "),
+        wiring: hypothesis.wiring.is_some(),
         remedy: (!remedies.is_empty()).then(|| remedies.join(" ")),
         columns: hypothesis
             .wiring
@@ -324,8 +346,9 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>) -> Explained 
             .into_iter()
             .flat_map(str::lines)
             .map(str::to_owned)
+            .chain(unusual().flat_map(|entry| mended(entry, &one.found, rig)))
             .collect(),
-        cannot_be_told_from: unusual().flat_map(|entry| entry.alike).copied().collect(),
+        cannot_be_told_from: unusual().flat_map(|entry| entry.alike).map(|id| (*id).to_owned()).collect(),
         leakage,
     }
 }
@@ -370,6 +393,7 @@ fn id(one: &Weighed<'_>) -> String {
             Some(LeakCourse::Growing) => format!("{}:growing", leak.id()),
             Some(LeakCourse::Sudden(_)) => format!("{}:sudden", leak.id()),
             Some(LeakCourse::Wandering) => format!("{}:wandering", leak.id()),
+            Some(LeakCourse::Creeping) => format!("{}:creeping", leak.id()),
         };
         parts.push(name);
     }

@@ -35,6 +35,8 @@ pub(super) struct Free {
 pub(super) struct Fit {
     /// ln p(y | model), up to what all models share.
     pub ln_evidence: f64,
+    /// The same without Occam's factor: what more freedom can raise.
+    pub ln_likelihood: f64,
     /// Noise scales s² of the balance and of the position's equation.
     pub scales: [f64; 2],
     /// Posterior means, in the columns' units.
@@ -160,6 +162,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let is_possible = ln_evidence.is_finite() && chi_square > LEAST_CHI_SQUARE;
     Fit {
         ln_evidence: if is_possible { ln_evidence } else { f64::NEG_INFINITY },
+        ln_likelihood: ln_evidence + 0.5 * ln_determinant,
         scales,
         means: means.iter().zip(free).map(|(mean, free)| mean * free.std).collect(),
         stds: free.iter().map(|free| free.std).collect(),

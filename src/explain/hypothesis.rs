@@ -3,7 +3,7 @@
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::Free;
-use super::table::{Entry, LEAK_SHARE, LEAK_SIZE, LEAK_STEP, USUAL};
+use super::table::{Entry, LEAK_CREEP, LEAK_SHARE, LEAK_SIZE, LEAK_STEP, USUAL};
 use std::f64::consts::LN_2;
 
 /// How a leak goes along the trace.
@@ -18,8 +18,10 @@ pub(super) enum LeakCourse {
     Growing,
     /// Another level from this segment on.
     Sudden(usize),
-    /// A random walk of small steps at the segments' borders.
+    /// A random walk at the segments' borders.
     Wandering,
+    /// The same of small steps: growth of any course.
+    Creeping,
 }
 
 /// Sensors and rig: a zero, a departure, a wander.
@@ -141,7 +143,7 @@ impl<'a> Hypothesis<'a> {
     pub fn last_change(&self, segments: usize) -> usize {
         let border = |course: &Option<LeakCourse>| match course {
             Some(LeakCourse::Sudden(border)) => *border,
-            Some(LeakCourse::Wandering) => segments.saturating_sub(1),
+            Some(LeakCourse::Wandering | LeakCourse::Creeping) => segments.saturating_sub(1),
             _ => 0,
         };
         self.leaks.iter().map(border).max().unwrap_or(0)
@@ -181,10 +183,11 @@ impl<'a> Hypothesis<'a> {
                 let since = add(column, Course::Since(border), LEAK_SIZE);
                 (vec![before, since], vec![since])
             }
-            LeakCourse::Wandering => {
+            LeakCourse::Wandering | LeakCourse::Creeping => {
+                let step = if course == LeakCourse::Wandering { LEAK_STEP } else { LEAK_CREEP };
                 let level = add(column, Course::Constant, LEAK_SIZE);
                 for border in 1..segments {
-                    add(column, Course::Before(border), LEAK_STEP);
+                    add(column, Course::Before(border), step);
                 }
                 (vec![level], vec![level])
             }

@@ -10,6 +10,10 @@ use std::f64::consts::{PI, SQRT_2};
 /// Points of the sample: the probability is known to a percent or so.
 pub(super) const POINTS: usize = 512;
 const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
+/// A sample worth fewer points than this is drawn anew; numerical.
+const LEAST_POINTS: f64 = 20.0;
+/// Sweeps until a sample has forgotten where it began; numerical.
+const GIBBS_BURN_IN: usize = 64;
 /// Below such a tail its first asymptotic term serves.
 const LEAST_TAIL: f64 = 1e-12;
 
@@ -36,6 +40,69 @@ pub(super) fn normal_quantile(probability: f64) -> f64 {
 
 /// N(`means`, `covariance`) where every variable is positive.
 pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
+    // What is furthest below zero is drawn first: what follows is drawn given it.
+    let mut order: Vec<usize> = (0..means.len()).collect();
+    let height = |i: &usize| means[*i] / covariance[*i][*i].sqrt();
+    order.sort_by(|i, j| height(i).total_cmp(&height(j)));
+    let sorted: Vec<f64> = order.iter().map(|&i| means[i]).collect();
+    let turned: Vec<Vec<f64>> =
+        order.iter().map(|&i| order.iter().map(|&j| covariance[i][j]).collect()).collect();
+    let mut found = sorted_orthant(&sorted, &turned);
+    if found.independent() < LEAST_POINTS {
+        found = Orthant { ln_probability: found.ln_probability, ..gibbs(&sorted, &turned, &found) };
+    }
+    for point in &mut found.points {
+        let sorted = point.clone();
+        order.iter().zip(sorted).for_each(|(&place, value)| point[place] = value);
+    }
+    found
+}
+
+impl Orthant {
+    /// How many points of equal weight its sample is worth.
+    fn independent(&self) -> f64 {
+        1.0 / self.weights.iter().map(|weight| weight * weight).sum::<f64>()
+    }
+}
+
+/// A sample of equal weights where that of the separation of variables degenerates: each variable in turn given all
+/// others (Gibbs; Geweke 1991, "Efficient simulation from the multivariate normal subject to linear constraints").
+fn gibbs(means: &[f64], covariance: &[Vec<f64>], from: &Orthant) -> Orthant {
+    let k = means.len();
+    let heaviest = (0..from.points.len()).max_by(|&i, &j| from.weights[i].total_cmp(&from.weights[j]));
+    let mut point = heaviest.map_or_else(|| vec![0.0; k], |place| from.points[place].clone());
+    let matrix = nalgebra::DMatrix::from_fn(k, k, |i, j| covariance[i][j]);
+    let Some(precision) = matrix.cholesky().map(|factor| factor.inverse()) else {
+        return Orthant { ln_probability: 0.0, points: from.points.clone(), weights: from.weights.clone() };
+    };
+    let mut points = Vec::with_capacity(POINTS);
+    for sweep in 0..GIBBS_BURN_IN + POINTS {
+        for i in 0..k {
+            let others: f64 =
+                (0..k).filter(|&j| j != i).map(|j| precision[(i, j)] * (point[j] - means[j])).sum();
+            let given = means[i] - others / precision[(i, i)];
+            let own = precision[(i, i)].sqrt().recip();
+            let (normal, _) = above(-given / own, 1.0 - uniform(sweep, i));
+            point[i] = (given + own * normal).max(0.0);
+        }
+        if sweep >= GIBBS_BURN_IN {
+            points.push(point.clone());
+        }
+    }
+    Orthant { ln_probability: 0.0, points, weights: vec![1.0 / POINTS as f64; POINTS] }
+}
+
+/// A standard normal above `least`, of which `share` lies above it, and ln of the probability of being there.
+fn above(least: f64, share: f64) -> (f64, f64) {
+    let tail = 0.5 * erfc(least / SQRT_2);
+    if tail > LEAST_TAIL {
+        (-normal_quantile(tail * share), tail.ln())
+    } else {
+        (least - share.ln() / least, -0.5 * least * least - (least * (2.0 * PI).sqrt()).ln())
+    }
+}
+
+fn sorted_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
     let factor = cholesky(covariance);
     let mut points = Vec::with_capacity(POINTS);
     let mut ln_weights = Vec::with_capacity(POINTS);
@@ -61,16 +128,8 @@ fn draw(point: usize, means: &[f64], factor: &[Vec<f64>]) -> (Vec<f64>, f64) {
     for (i, mean) in means.iter().enumerate() {
         let given: f64 = mean + factor[i].iter().zip(&normals).map(|(l, z): (&f64, &f64)| l * z).sum::<f64>();
         let own = factor[i][i];
-        let least = -given / own;
-        let tail = 0.5 * erfc(least / SQRT_2);
-        let share = 1.0 - uniform(point, i);
-        let normal = if tail > LEAST_TAIL {
-            ln_weight += tail.ln();
-            -normal_quantile(tail * share)
-        } else {
-            ln_weight -= 0.5 * least * least + (least * (2.0 * PI).sqrt()).ln();
-            least - share.ln() / least
-        };
+        let (normal, ln_tail) = above(-given / own, 1.0 - uniform(point, i));
+        ln_weight += ln_tail;
         normals.push(normal);
         values.push((given + own * normal).max(0.0));
     }

@@ -4,31 +4,36 @@ use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
 use super::hypothesis::{
-    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, subsets,
+    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State, Subset, subsets,
 };
+use super::independence::inflation;
 use super::orthant::{POINTS, normal_quantile, positive_orthant, uniform};
 use super::raw_products::{RawProducts, Statistic};
-use super::readings::Readings;
+use super::readings::{Mistake, Of, Readings};
+use super::sizes::Found;
 use super::table::{self, Entry, USUAL, USUAL_PRESSURE};
 use crate::rig::Rig;
 use pitchleak_core::continuity::CHANNELS;
-use pitchleak_core::{Leak, PerLeak};
+use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
 const LEAST_LN: f64 = 9.0;
+/// As much in the first look, which asks for the best and for means alone; numerical.
+const FIRST_LOOK_LN: f64 = 3.0;
 /// States of sensors and rig beside which other courses of leaks are tried; numerical.
 const STATES_WITH_COURSES: usize = 5;
+/// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
+const BEYOND_WANDERING: f64 = 2.0;
 /// Of those, beside which pairs of leaks have courses of their own; numerical.
 const STATES_WITH_PAIRS: usize = 3;
 /// Gains and areas that are off by more are units.
-const MOST_GAIN: f64 = 0.3;
+const MOST_GAIN: f64 = 0.15;
 /// Leaks below this share of their threshold say nothing of the pressure sensors; a guess.
 const LEAST_LEAK: f64 = 0.5;
-/// A mistake of wiring must bring the noise to the declared: within so many times. A guess.
-const WIRED_MISFIT: f64 = 1.3;
-/// A noise scale above this square widens the leaks' spread: by √(1 + 10 (m² − 1.15)). Guesses.
-const WIDENED_MISFIT2: f64 = 1.15;
-const WIDENING: f64 = 10.0;
+/// A noise scale of so many times the readings' own scatter, squared, may be chance; above, an effect is missing, which is
+/// alike in about ten blocks: a push of the pitch. Guesses.
+const CHANCE_MISFIT2: f64 = 1.15;
+const MISFIT_WORTH: f64 = 10.0;
 /// Rows of an equation below which nothing can be said.
 const LEAST_ROWS: f64 = 8.0;
 
@@ -39,8 +44,12 @@ pub(super) struct Weighed<'a> {
     pub probability: f64,
     /// Noise scale over what the readings scatter.
     pub misfit: f64,
-    /// When a leak last changed at once, s; 0 where none did.
-    pub changed_s: f64,
+    /// How long before the end a leak last changed at once, s; none where none did.
+    pub changed_ago_s: Option<f64>,
+    /// Mean size of the pressures across the leaks since then, Pa.
+    pub pressures_pa: PerLeak<f64>,
+    /// What is not as declared, in its columns' units.
+    pub found: Vec<Found>,
     /// Mean of C P of each leak, m³/s.
     pub levels_m3s: [f64; 3],
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
@@ -86,13 +95,14 @@ pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) ->
         return None;
     }
     let products = RawProducts::of(statistic, rig);
-    let first = Pass::new(statistic, &products, rig, tables, PerLeak::default()).weigh();
+    let (first, inflation) = Pass::new(statistic, &products, rig, tables, PerLeak::default()).look();
     let mean_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
     let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
-    if mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least) {
-        return Some(first);
-    }
-    Some(Pass::new(statistic, &products, rig, tables, mean_m3s).weigh())
+    let is_sound = mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least);
+    let found_m3s = if is_sound { PerLeak::default() } else { mean_m3s };
+    let products = products.worth(inflation);
+    let weighed = Pass::new(statistic, &products, rig, tables, found_m3s).weigh();
+    (!weighed.is_empty()).then_some(weighed)
 }
 
 /// Mean of C P: of a leak that opens at a pressure more than what flows, as a sensor's zero acts through C.
@@ -118,6 +128,7 @@ struct Pass<'a, 's> {
 struct Scored<'a> {
     hypothesis: Hypothesis<'a>,
     ln_posterior: f64,
+    ln_likelihood: f64,
     /// Among the equations of this mistake of wiring, or the declared.
     wiring: usize,
 }
@@ -149,6 +160,27 @@ impl<'a, 's> Pass<'a, 's> {
         }
     }
 
+    /// A first look, without mistakes of wiring: which leaks there are, and how many blocks are independent.
+    fn look(&self) -> (Vec<Weighed<'a>>, [f64; 2]) {
+        let columns = self.columns();
+        let declared = self.equations(self.products, None, &columns);
+        let mut all = self.constant(&declared);
+        let states = best_states(&mut all);
+        self.with_courses(&declared, &states, &mut all);
+        all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        let weighed = self.mix(std::slice::from_ref(&declared), all, FIRST_LOOK_LN);
+        let inflation = weighed.first().map_or([1.0; 2], |best| {
+            let fit = fit(&declared, &best.hypothesis.free);
+            let coloured =
+                inflation(self.products, &self.scales(None), &declared, &columns, &best.hypothesis, &fit);
+            [0, 1].map(|c| {
+                let misfit2 = fit.scales[c] / self.scatter[c].powi(2);
+                coloured[c].max(1.0 + MISFIT_WORTH * (misfit2 - CHANCE_MISFIT2).max(0.0))
+            })
+        });
+        (weighed, inflation)
+    }
+
     fn weigh(&self) -> Vec<Weighed<'a>> {
         let declared = self.equations(self.products, None, &self.columns());
         let mut all = self.constant(&declared);
@@ -158,7 +190,7 @@ impl<'a, 's> Pass<'a, 's> {
         let mut equations = vec![declared];
         equations.extend(mistaken);
         all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        self.mix(&equations, all)
+        self.mix(&equations, all, LEAST_LN)
     }
 
     fn equations(
@@ -167,6 +199,10 @@ impl<'a, 's> Pass<'a, 's> {
         mistake: Option<&Entry>,
         columns: &[(Column, Course)],
     ) -> NormalEquations {
+        NormalEquations::new(products, &self.scales(mistake), columns)
+    }
+
+    fn scales(&self, mistake: Option<&Entry>) -> Scales<'s> {
         let cylinder = &self.rig.cylinder;
         let mut readings = Readings::declared(cylinder, 1e6 / self.rig.fluid.bulk_modulus_pa);
         let mut pressures_mpa = self.products.mean_pressures_pa(0).map(|p| 1e-6 * p);
@@ -176,8 +212,7 @@ impl<'a, 's> Pass<'a, 's> {
             pressures_mpa = mistake.mended_pressures(pressures_mpa);
             roots = mistake.mended_pressures(roots);
         }
-        let scales = Scales { rig: self.rig, readings, pressures_mpa, roots, leaks_m3s: self.found_m3s };
-        NormalEquations::new(products, &scales, columns)
+        Scales { rig: self.rig, readings, pressures_mpa, roots, leaks_m3s: self.found_m3s }
     }
 
     /// Departures that are weighed: pressures through the leaks found, where there are any.
@@ -214,7 +249,12 @@ impl<'a, 's> Pass<'a, 's> {
     /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
     fn constant(&self, equations: &NormalEquations) -> Vec<Scored<'a>> {
         let mut all = Vec::new();
+        let declared = self.sizes.zeros.iter().all(|zero| *zero > 0.0);
         for (rank, zeros) in self.tables.zeros.iter().enumerate() {
+            // Who declares zeros knows them: they fail, but are not slightly off.
+            if declared && zeros.id == "flow_zeros" {
+                continue;
+            }
             for (place, departure) in self.departures().into_iter().enumerate() {
                 for wander in &self.tables.wanders {
                     if wander.0 > 0.0 && (rank > 1 || place > 1) {
@@ -222,6 +262,10 @@ impl<'a, 's> Pass<'a, 's> {
                     }
                     let state = State { zeros, departure, wander: *wander };
                     for subset in subsets() {
+                        // A pressure's gain acts through the leak past the piston.
+                        if departure.is_through_seal() && !subset[0] {
+                            continue;
+                        }
                         let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
                         let ln_course =
                             if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
@@ -251,7 +295,7 @@ impl<'a, 's> Pass<'a, 's> {
         } else {
             fit.ln_evidence + hypothesis.ln_prior
         };
-        Scored { hypothesis, ln_posterior, wiring: 0 }
+        Scored { hypothesis, ln_posterior, ln_likelihood: fit.ln_likelihood, wiring: 0 }
     }
 
     fn has_impossible_gain(
@@ -270,36 +314,81 @@ impl<'a, 's> Pass<'a, 's> {
             .any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
     }
 
-    /// Other courses of the leaks, beside the best states.
+    /// Other courses of the leaks, beside the best states. A leak that wanders may do all that the others do: where even that
+    /// raises the likelihood by too little, they need not be asked.
     fn with_courses(&self, equations: &NormalEquations, states: &[State<'a>], all: &mut Vec<Scored<'a>>) {
+        let mut best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let courses = self.courses();
+        for (rank, state) in states.iter().enumerate() {
+            for subset in subsets().skip(1) {
+                let Some(steady) = find(all, *state, subset) else { continue };
+                let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
+                let together = |course: LeakCourse| subset.map(|there| there.then_some(course));
+                let wandering = LeakCourse::Wandering;
+                let ln_wandering = self.tables.ln_course("wandering");
+                let free = self.score(equations, *state, together(wandering), ln_wandering);
+                let gain = (free.ln_likelihood - steady_likelihood).max(0.0) + BEYOND_WANDERING;
+                let most = steady_ln - self.tables.ln_course("constant") + gain;
+                best = best.max(free.ln_posterior);
+                all.push(free);
+                for (course, ln_course) in &courses {
+                    // The pressure across the seal changes sign: what opens at one is no line of it.
+                    let is_line = !(subset[0] && *course == LeakCourse::Cracking);
+                    let by_pressure = matches!(course, LeakCourse::Orifice | LeakCourse::Cracking);
+                    if is_line && (by_pressure || most + ln_course > best - LEAST_LN) {
+                        let scored = self.score(equations, *state, together(*course), *ln_course);
+                        best = best.max(scored.ln_posterior);
+                        all.push(scored);
+                    }
+                }
+                if rank < STATES_WITH_PAIRS
+                    && state.wander.0 <= 0.0
+                    && subset.iter().filter(|leak| **leak).count() == 2
+                {
+                    self.with_pairs(equations, *state, subset, most, &mut best, all);
+                }
+            }
+        }
+    }
+
+    /// Courses of leaks beside being constant and wandering, with their priors.
+    fn courses(&self) -> Vec<(LeakCourse, f64)> {
         let borders = self.segments.saturating_sub(1);
         let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
         let mut courses = vec![
             (LeakCourse::Orifice, self.tables.ln_course("orifice")),
             (LeakCourse::Cracking, self.tables.ln_course("cracking")),
             (LeakCourse::Growing, self.tables.ln_course("growing")),
-            (LeakCourse::Wandering, self.tables.ln_course("wandering")),
+            (LeakCourse::Creeping, self.tables.ln_course("creeping")),
         ];
         courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
-        for state in states {
-            for subset in subsets().skip(1) {
-                for (course, ln_course) in &courses {
-                    let leaks = subset.map(|there| there.then_some(*course));
-                    all.push(self.score(equations, *state, leaks, *ln_course));
-                }
-            }
-        }
+        courses
+    }
+
+    /// Two leaks each with a course of its own, where those can be as probable as the best.
+    fn with_pairs(
+        &self,
+        equations: &NormalEquations,
+        state: State<'a>,
+        subset: Subset,
+        most: f64,
+        best: &mut f64,
+        all: &mut Vec<Scored<'a>>,
+    ) {
+        let mut courses = self.courses();
         courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
         courses.push((LeakCourse::Constant, self.tables.ln_course("constant")));
-        for state in states.iter().filter(|state| state.wander.0 <= 0.0).take(STATES_WITH_PAIRS) {
-            for [one, other] in [[0, 1], [0, 2], [1, 2]] {
-                for (course, ln_one) in &courses {
-                    for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                        let mut leaks = [None; 3];
-                        (leaks[one], leaks[other]) = (Some(*course), Some(*another));
-                        all.push(self.score(equations, *state, leaks, ln_one + ln_other));
-                    }
+        let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
+        for (course, ln_one) in &courses {
+            for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
+                if most + ln_one + ln_other <= *best - LEAST_LN {
+                    continue;
                 }
+                let mut leaks = [None; 3];
+                (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
+                let scored = self.score(equations, state, leaks, ln_one + ln_other);
+                *best = best.max(scored.ln_posterior);
+                all.push(scored);
             }
         }
     }
@@ -316,14 +405,18 @@ impl<'a, 's> Pass<'a, 's> {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander };
+        let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
         let whole = self.products.whole();
+        let ln_wired = table::ln_wired();
         let mut kept = Vec::new();
-        for entry in &self.tables.mistakes {
+        for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
             let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
             let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
-            let ln_prior = entry.share.ln() - table::ln_wired() + measure;
-            for subset in subsets() {
+            let ln_prior = entry.share.ln() - ln_wired + measure;
+            let mut none_ln = f64::NEG_INFINITY;
+            for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
                 let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
                 let ln_course = if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
                 let mut hypothesis = Hypothesis::new(
@@ -337,40 +430,61 @@ impl<'a, 's> Pass<'a, 's> {
                 hypothesis.wiring = Some(entry);
                 let mut scored = self.scored(&equations, hypothesis);
                 scored.wiring = kept.len() + 1;
+                // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
+                if subset == [false; 3] {
+                    none_ln = scored.ln_posterior - scored.ln_likelihood;
+                }
+                let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < best - LEAST_LN;
                 all.push(scored);
+                if hopeless {
+                    break;
+                }
             }
             kept.push(equations);
         }
         kept
     }
 
+    /// Readings without any scatter are of every unit.
+    fn is_told(&self, entry: &Entry) -> bool {
+        let Some(Mistake::Factor(of, _)) = entry.mistake else { return true };
+        let scatter = self.statistic.scatter();
+        let has = |channel: usize| scatter[channel].is_some_and(|std| std > 0.0);
+        match of {
+            Of::Position => has(0),
+            Of::PressureA => has(1),
+            Of::PressureB => has(2),
+            Of::Pressures => has(1) && has(2),
+            Of::FlowA => has(3),
+            Of::FlowB => has(4),
+            Of::Flows => has(3) && has(4),
+        }
+    }
+
     /// Cuts leaks at zero, best first, until what follows cannot matter.
-    fn mix(&self, equations: &[NormalEquations], all: Vec<Scored<'a>>) -> Vec<Weighed<'a>> {
+    fn mix(&self, equations: &[NormalEquations], all: Vec<Scored<'a>>, least_ln: f64) -> Vec<Weighed<'a>> {
         let mut best = f64::NEG_INFINITY;
         let mut kept: Vec<(f64, Weighed<'a>)> = Vec::new();
         for scored in all {
-            if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - LEAST_LN {
+            if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - least_ln {
                 break;
             }
             let Some(equations) = equations.get(scored.wiring) else { continue };
-            let Some((ln, weighed)) = self.cut(equations, scored, best) else { continue };
+            let Some((ln, weighed)) = self.cut(equations, scored, best - least_ln) else { continue };
             best = best.max(ln);
             kept.push((ln, weighed));
         }
-        kept.retain(|(ln, _)| *ln > best - LEAST_LN);
+        kept.retain(|(ln, _)| *ln > best - least_ln);
         let sum: f64 = kept.iter().map(|(ln, _)| (ln - best).exp()).sum();
         kept.sort_by(|a, b| b.0.total_cmp(&a.0));
         kept.into_iter().map(|(ln, one)| Weighed { probability: (ln - best).exp() / sum, ..one }).collect()
     }
 
     /// An explanation with its leaks at least zero, its evidence and a sample of the leaks.
-    fn cut(&self, equations: &NormalEquations, scored: Scored<'a>, best: f64) -> Option<(f64, Weighed<'a>)> {
+    fn cut(&self, equations: &NormalEquations, scored: Scored<'a>, least: f64) -> Option<(f64, Weighed<'a>)> {
         let Scored { hypothesis, ln_posterior, .. } = scored;
         let fit = fit(equations, &hypothesis.free);
         let misfit = self.misfit(&fit);
-        if hypothesis.wiring.is_some() && misfit > WIRED_MISFIT {
-            return None;
-        }
         let mut ln = ln_posterior;
         let mut levels_m3s = [0.0; 3];
         let (leaks_m3s, weights) = if hypothesis.positive.is_empty() {
@@ -380,23 +494,46 @@ impl<'a, 's> Pass<'a, 's> {
             let covariance = fit.covariance(&hypothesis.positive);
             let most_negative =
                 means.iter().enumerate().map(|(i, mean)| (mean / covariance[i][i].sqrt()).min(0.0));
-            if ln - 0.5 * most_negative.fold(0.0, f64::min).powi(2) < best - LEAST_LN {
+            if ln - 0.5 * most_negative.fold(0.0, f64::min).powi(2) < least {
                 return None;
             }
             let orthant = positive_orthant(&means, &covariance);
             ln += orthant.ln_probability;
             levels_m3s = self.levels_m3s(&hypothesis, &orthant.points, &orthant.weights);
-            (
-                self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points, &orthant.weights, misfit),
-                orthant.weights,
-            )
+            (self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points), orthant.weights)
         };
-        let changed = self.products.segments.get(hypothesis.last_change(self.segments));
-        let changed_s = changed.map_or(0.0, |segment| segment.begin_s);
+        let found = self.found(equations, &hypothesis, &fit);
+        let pressures_pa = self.products.mean_pressures_pa(hypothesis.last_change(self.segments));
+        let changed = Some(hypothesis.last_change(self.segments)).filter(|border| *border > 0);
+        let changed = changed.and_then(|border| self.products.segments.get(border));
+        let changed_ago_s = changed.map(|segment| self.products.total_s - segment.begin_s);
         Some((
             ln,
-            Weighed { hypothesis, probability: 0.0, misfit, changed_s, levels_m3s, leaks_m3s, weights },
+            Weighed {
+                hypothesis,
+                probability: 0.0,
+                misfit,
+                changed_ago_s,
+                pressures_pa,
+                found,
+                levels_m3s,
+                leaks_m3s,
+                weights,
+            },
         ))
+    }
+
+    /// The columns that its state sets free, as far as they are steady.
+    fn found(&self, equations: &NormalEquations, hypothesis: &Hypothesis<'_>, fit: &Fit) -> Vec<Found> {
+        let State { zeros, departure, .. } = hypothesis.state;
+        let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
+        let size = |column: Column| {
+            let place = equations.place(column, Course::Constant)?;
+            let at = hypothesis.free.iter().position(|free| free.column == place)?;
+            let variance = fit.covariance(&[at])[0][0];
+            Some((column, Estimate { value: fit.means[at], std: variance.max(0.0).sqrt() }))
+        };
+        columns.filter_map(|(column, ..)| size(*column)).collect()
     }
 
     fn levels_m3s(&self, hypothesis: &Hypothesis<'_>, points: &[Vec<f64>], weights: &[f64]) -> [f64; 3] {
@@ -414,18 +551,14 @@ impl<'a, 's> Pass<'a, 's> {
         (0..2).map(|c| fit.scales[c].sqrt() / self.scatter[c]).fold(0.0, f64::max)
     }
 
-    /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of a model that does not fit
-    /// and of pressure sensors.
+    /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of pressure sensors.
     fn leaks_m3s(
         &self,
         equations: &NormalEquations,
         hypothesis: &Hypothesis<'_>,
         fit: &Fit,
         points: &[Vec<f64>],
-        weights: &[f64],
-        misfit: f64,
     ) -> Vec<[f64; 3]> {
-        let widening = (1.0 + WIDENING * (misfit * misfit - WIDENED_MISFIT2).max(0.0)).sqrt();
         let mut out = vec![[0.0; 3]; points.len()];
         let changed = hypothesis.last_change(self.segments);
         let (all_pa, pressures_pa) =
@@ -438,16 +571,16 @@ impl<'a, 's> Pass<'a, 's> {
             let flow = |point: &Vec<f64>| {
                 places.iter().map(|(place, sign)| sign * point[*place]).sum::<f64>().max(0.0)
             };
-            let mean: f64 = points.iter().zip(weights).map(|(point, weight)| weight * flow(point)).sum();
             let pressure_pa = pressures_pa[Leak::ALL[leak]].max(1.0);
             let lately = pressure_pa / all_pa[Leak::ALL[leak]].max(1.0);
             let sheet = USUAL_PRESSURE * self.rig.instruments.pressure.full_scale / pressure_pa;
             let zero = self.pressure_zero_share(equations, hypothesis, fit, leak) / pressure_pa;
+            // The mean size of a pressure of changing sign follows a zero by an unknown share.
+            let spread = if leak == 0 { f64::hypot(sheet, zero) } else { sheet };
             for (index, (out, point)) in out.iter_mut().zip(points).enumerate() {
-                let spread = mean + widening * (flow(point) - mean);
-                let off = sheet * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
+                let off = spread * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
                 let pressure = lately * (1.0 + zero + off);
-                out[leak] = (spread * pressure).max(0.0) * self.full_scale_m3s;
+                out[leak] = (flow(point) * pressure).max(0.0) * self.full_scale_m3s;
             }
         }
         out
@@ -478,6 +611,12 @@ impl<'a, 's> Pass<'a, 's> {
             })
             .sum()
     }
+}
+
+/// These leaks, steady, in this state.
+fn find<'b, 'a>(all: &'b [Scored<'a>], state: State<'a>, subset: Subset) -> Option<&'b Scored<'a>> {
+    let steady = subset.map(|there| there.then_some(LeakCourse::Constant));
+    all.iter().find(|scored| scored.hypothesis.leaks == steady && scored.hypothesis.state == state)
 }
 
 /// The states of best evidence, each once, and as-declared with usual and slight zeros.

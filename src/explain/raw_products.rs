@@ -50,6 +50,18 @@ impl RawProducts {
         Self { segments, total_s }
     }
 
+    /// With so many times fewer independent blocks by equation.
+    pub fn worth(mut self, inflation: [f64; EQUATIONS]) -> Self {
+        for segment in &mut self.segments {
+            for (equation, inflation) in inflation.into_iter().enumerate() {
+                segment.gram[equation].iter_mut().for_each(|product| *product /= inflation);
+                segment.noise[equation].iter_mut().for_each(|product| *product /= inflation);
+                segment.rows[equation] /= inflation;
+            }
+        }
+        self
+    }
+
     /// All as one segment, for columns that do not change along the trace.
     pub fn whole(&self) -> Self {
         let sum = |of: &dyn Fn(&SegmentProducts) -> &Vec<f64>| {

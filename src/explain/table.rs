@@ -15,7 +15,9 @@ mod share {
     pub const RARE: f64 = 0.01;
     /// Two at once.
     pub const VERY_RARE: f64 = 0.002;
-    /// All mistakes of wiring, sign, unit and geometry together.
+    /// Two wires exchanged, or a sign turned: each, once in a thousand recordings.
+    pub const EXCHANGED: f64 = 0.001;
+    /// All other mistakes of wiring, unit and geometry together.
     pub const WIRING: f64 = 0.005;
 }
 
@@ -25,6 +27,8 @@ pub(crate) const LEAK_SHARE: f64 = 0.03;
 pub(super) const LEAK_SIZE: f64 = 0.05;
 /// How far a leak that wanders steps at a segment's border, 1 σ in shares of full scale. A guess.
 pub(super) const LEAK_STEP: f64 = 0.02;
+/// The same of a leak that changes little by little. A guess.
+pub(super) const LEAK_CREEP: f64 = 0.005;
 /// Zero of a meter that declares none: a tenth of the usual accuracy of 1 % of full scale. A guess.
 const USUAL_ZERO: f64 = 0.001;
 /// Drift of that zero along a trace. A guess.
@@ -76,6 +80,19 @@ pub struct Entry {
     pub alike: &'static [&'static str],
 }
 
+impl Kind {
+    /// As in the list of explanations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Course => "course",
+            Self::Zeros => "zeros",
+            Self::Departure => "departure",
+            Self::Wander => "wander",
+            Self::Wiring => "wiring",
+        }
+    }
+}
+
 impl Entry {
     fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
         Self { id, kind, share, free: Vec::new(), mistake: None, text, remedy: "", mends: None, alike: &[] }
@@ -84,6 +101,11 @@ impl Entry {
     fn free(mut self, column: Column, std: f64) -> Self {
         self.free.push((column, Course::Constant, std));
         self
+    }
+
+    /// Whether it acts through a leak past the piston alone.
+    pub(super) fn is_through_seal(&self) -> bool {
+        self.free.iter().any(|free| matches!(free.0, Column::ThroughSealA | Column::ThroughSealB))
     }
 
     fn drifting(mut self, column: Column, std: f64) -> Self {
@@ -117,6 +139,24 @@ pub(super) const USUAL: [(Column, Course, f64); 11] = [
     (Column::DeadVolumeB, Course::Constant, USUAL_DEAD_VOLUME),
 ];
 
+/// All that is weighed: a line for each choice of each kind.
+pub fn explanations() -> Vec<Entry> {
+    let of_leaks = pressures();
+    let known = |entry: &Entry| of_leaks.iter().any(|other| other.id == entry.id);
+    let departures = departures().into_iter().filter(|entry| !known(entry));
+    let wander = wanders().into_iter().skip(1).map(|(_, share)| share).sum();
+    let wander = Entry::new("wandering_zeros", Kind::Wander, wander, "the flow meters' zeros wander");
+    let mut all: Vec<Entry> =
+        courses().into_iter().chain(zeros()).chain(departures).chain(pressures()).chain([wander]).collect();
+    for mistake in mistakes() {
+        match all.iter_mut().find(|entry| entry.id == mistake.id) {
+            Some(entry) => entry.share += mistake.share,
+            None => all.push(mistake),
+        }
+    }
+    all
+}
+
 /// Zeros of the flow meters, as shares of full scale.
 pub(super) fn zeros() -> Vec<Entry> {
     const REZERO: &str = "Shut both ports and read the meters: what they show is their zero.";
@@ -139,12 +179,13 @@ pub(super) fn zeros() -> Vec<Entry> {
 /// How a leak goes along the trace, beside being constant.
 pub(super) fn courses() -> Vec<Entry> {
     vec![
-        Entry::new("constant", Kind::Course, 0.75, "is steady"),
+        Entry::new("constant", Kind::Course, 0.72, "is steady"),
         Entry::new("cracking", Kind::Course, share::UNCOMMON, "opens at a pressure"),
         Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
         Entry::new("growing", Kind::Course, 0.06, "grows or shrinks steadily"),
         Entry::new("sudden", Kind::Course, 0.06, "changed at once"),
         Entry::new("wandering", Kind::Course, 0.03, "comes and goes"),
+        Entry::new("creeping", Kind::Course, 0.03, "changes little by little"),
     ]
 }
 
@@ -230,7 +271,12 @@ pub(super) fn pressures() -> Vec<Entry> {
     use Column as C;
     const PRESSURE: &str = "Open the sensor to air: what it shows is its zero.";
     let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(PRESSURE, None);
+    let gross = 0.05;
     vec![
+        entry("pressure_zero_gross_a", "the zero of pressure sensor A is far off")
+            .free(C::PressureZeroA, gross),
+        entry("pressure_zero_gross_b", "the zero of pressure sensor B is far off")
+            .free(C::PressureZeroB, gross),
         entry("pressure_zero_a", "the zero of pressure sensor A is off").free(C::PressureZeroA, 0.01),
         entry("pressure_zero_b", "the zero of pressure sensor B is off").free(C::PressureZeroB, 0.01),
         entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),
@@ -300,9 +346,18 @@ pub(super) fn mistakes() -> Vec<Entry> {
             ("unit_area_b", Mistake::Area(1, factor), "area B is in another unit", None),
         ]);
     }
-    let share = share::WIRING / all.len() as f64;
+    let others = all.iter().filter(|(id, ..)| !is_exchange(id)).count().max(1) as f64;
     all.into_iter()
-        .map(|(id, mistake, text, mends)| Entry {
+        .map(|(id, mistake, text, mends)| {
+            (
+                id,
+                mistake,
+                text,
+                mends,
+                if is_exchange(id) { share::EXCHANGED } else { share::WIRING / others },
+            )
+        })
+        .map(|(id, mistake, text, mends, share)| Entry {
             mistake: Some(mistake),
             ..Entry::new(id, Kind::Wiring, share, text).remedy(WIRES, mends)
         })
@@ -326,7 +381,11 @@ const FACTORS: [f64; 10] = [
 /// A slipped decimal point, and a diameter for a radius.
 const SLIPS: [f64; 4] = [10.0, 0.1, 4.0, 0.25];
 
+fn is_exchange(id: &str) -> bool {
+    id.starts_with("exchanged") || id.starts_with("sign")
+}
+
 /// ln prior probability of as declared wiring.
 pub(super) fn ln_wired() -> f64 {
-    (1.0 - share::WIRING).ln()
+    (1.0 - mistakes().iter().map(|mistake| mistake.share).sum::<f64>()).ln()
 }

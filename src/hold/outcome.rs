@@ -3,7 +3,6 @@
 use super::fit::{Fit, fit, usable};
 use super::presence::{Beliefs, beliefs};
 use super::recorder::{EndedBy, Held, Recorder};
-use crate::explain::ALPHA;
 use crate::rig::Rig;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::PerLeak;
@@ -59,7 +58,7 @@ impl Recorder {
         let longest = holds.iter().max_by(|a, b| a.usable_s().total_cmp(&b.usable_s()))?;
         let usable = usable(&holds);
         let found = fit(rig, &usable).filter(|_| !usable.is_empty()).map(|fit| {
-            let beliefs = beliefs(&fit, 1.0 - ALPHA);
+            let beliefs = beliefs(&fit, 1.0 - rig.decision.alpha);
             Found { fit, beliefs }
         });
         let summary = HoldSummary {

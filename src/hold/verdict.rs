@@ -3,7 +3,6 @@
 use super::outcome::{Found, HoldTest};
 use super::recorder::EndedBy;
 use crate::channels::ChannelFaultKind;
-use crate::explain::ALPHA;
 use crate::report::{Reason, ReasonId, Status, Verdict, advice, capital, join, with_interval};
 use crate::rig::Rig;
 use crate::units::{LPM_PER_M3S, readable};
@@ -34,7 +33,8 @@ impl HoldTest {
         let Some(found) = &self.found else {
             return told(Status::NotSure, Vec::new(), vec![self.too_short()], "");
         };
-        let sorted = found.sorted(&threshold_lpm);
+        let sure = 1.0 - rig.decision.alpha;
+        let sorted = found.sorted(&threshold_lpm, sure);
         let contradictions = self.contradictions(found, rig);
         if !contradictions.is_empty() {
             let apparent = found.apparent(&sorted.found);
@@ -51,7 +51,7 @@ impl HoldTest {
         let text = sentences.join(" ");
         if !sorted.found.is_empty() {
             told(Status::Leak, sorted.found, Vec::new(), &text)
-        } else if found.beliefs.any > 1.0 - ALPHA {
+        } else if found.beliefs.any > sure {
             told(Status::NotSure, Vec::new(), vec![found.which_way()], &text)
         } else if sorted.open.is_empty() {
             told(Status::Sound, Vec::new(), Vec::new(), &text)
@@ -111,9 +111,9 @@ impl HoldTest {
 }
 
 impl Found {
-    fn sorted(&self, threshold_lpm: &PerLeak<f64>) -> Sorted {
+    fn sorted(&self, threshold_lpm: &PerLeak<f64>, sure: f64) -> Sorted {
         let is_driven = |leak: Leak| leak != Leak::Internal || self.fit.pressures_pa.internal > LEAST_LOAD_PA;
-        let is_found = |leak: &Leak| is_driven(*leak) && self.beliefs.leaks[*leak].probability >= 1.0 - ALPHA;
+        let is_found = |leak: &Leak| is_driven(*leak) && self.beliefs.leaks[*leak].probability >= sure;
         let (found, others): (Vec<_>, Vec<_>) = Leak::ALL.into_iter().partition(is_found);
         let (excluded, open) = others
             .into_iter()

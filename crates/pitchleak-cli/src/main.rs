@@ -4,6 +4,7 @@ mod check;
 mod columns;
 mod completions;
 mod diagnose;
+mod explanations;
 mod failure;
 mod fleet;
 mod init;
@@ -49,6 +50,7 @@ enum Command {
     Columns(columns::Arguments),
     Init(init::Arguments),
     Fleet(fleet::Arguments),
+    Explanations(explanations::Arguments),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
@@ -117,6 +119,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Columns(arguments) => columns::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),
+        Command::Explanations(arguments) => explanations::run(arguments),
         Command::Watch(arguments) => watch::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Reproduce(arguments) => reproduce::run(arguments),

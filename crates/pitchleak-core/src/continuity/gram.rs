@@ -37,10 +37,8 @@ pub struct ContinuityStatistic<T, const S: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     segments: [Segment<T>; S],
     used: usize,
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    lagged: [[T; PACKED]; EQUATIONS],
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
-    before: [[T; COLUMNS]; EQUATIONS],
+    /// What is longer ago than this may be forgotten, s.
+    horizon_s: T,
     scatter: [Scatter<T>; CHANNELS],
     time_s: T,
     roots: PerLeak<T>,
@@ -307,12 +305,22 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
             whitener: Whitener::new(cylinder, fluid, sensors),
             segments: [Segment::default(); S],
             used: 0,
-            lagged: [[T::zero(); PACKED]; EQUATIONS],
-            before: [[T::zero(); COLUMNS]; EQUATIONS],
+            horizon_s: T::max_value(),
             scatter: [Scatter::default(); CHANNELS],
             time_s: T::zero(),
             roots: PerLeak::default(),
         }
+    }
+
+    /// Of a stream: forgets what is longer ago than `horizon_s`, as soon as its place is needed.
+    #[must_use]
+    pub fn forgetting(self, horizon_s: T) -> Self {
+        Self { horizon_s, ..self }
+    }
+
+    /// Length of all segments but the first.
+    fn later_s(&self) -> T {
+        self.segments().iter().skip(1).fold(T::zero(), |sum, segment| sum + segment.time_s)
     }
 
     /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
@@ -361,11 +369,6 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         self.scatter.map(|scatter| scatter.std())
     }
 
-    /// Product of two columns of neighbouring rows, symmetric, over the whole trace.
-    pub fn lagged_product(&self, equation: usize, i: usize, j: usize) -> T {
-        self.lagged[equation][packed(i, j)]
-    }
-
     fn take(&mut self, block: &Block<T>) {
         if block.begins_at.is_some() {
             self.close();
@@ -407,8 +410,6 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         for (equation, row) in rows.into_iter().enumerate() {
             let Some(row) = row else { continue };
             segment.add(equation, &row);
-            add_lagged(&mut self.lagged[equation], &self.before[equation], &row.columns);
-            self.before[equation] = row.columns;
         }
         segment.blocks += 1;
         segment.time_s += block.sums[RawSum::Time as usize];
@@ -419,6 +420,10 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
 
     /// Makes room where there is none; a segment's noise is independent of that of those before.
     fn begin_segment(&mut self) {
+        if self.used == S && self.later_s() >= self.horizon_s {
+            self.segments.copy_within(1.., 0);
+            self.used -= 1;
+        }
         if self.used == S {
             let cheapest = (1..S)
                 .map(|next| (next, self.segments[next - 1].cost(&self.segments[next])))
@@ -432,16 +437,5 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         self.segments[self.used] = Segment::default();
         self.used += 1;
         self.whitener.begin_anew();
-        self.before = [[T::zero(); COLUMNS]; EQUATIONS];
-    }
-}
-
-fn add_lagged<T: Real>(lagged: &mut [T; PACKED], before: &[T; COLUMNS], now: &[T; COLUMNS]) {
-    let mut place = lagged.iter_mut();
-    let half = T::lit(0.5);
-    for i in 0..COLUMNS {
-        for (j, entry) in (0..=i).zip(place.by_ref()) {
-            *entry += half * (now[i] * before[j] + before[i] * now[j]);
-        }
     }
 }

@@ -248,3 +248,57 @@ fn inverse<T: Real>(a: &Matrix2<T>, fed: [bool; 2]) -> Matrix2<T> {
         [false, false] => [[zero; 2]; 2],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::block_sums::{BlockSums, RawSum};
+    use super::*;
+    use crate::Sample;
+
+    /// Neighbouring rows of a cylinder at rest, as noisy sensors read it, know nothing of each other.
+    #[test]
+    fn whitened_noise_is_white() {
+        let (cylinder, fluid, sensors) = (Cylinder::<f64>::paper(), Fluid::paper(), Sensors::<f64>::paper());
+        let mut blocks = BlockSums::new(&cylinder, &fluid);
+        let mut whitener = Whitener::new(&cylinder, &fluid, &sensors);
+        let mut state = 1_u64;
+        // Twelve uniform numbers less six: about a standard normal.
+        let mut normal = move || {
+            let uniform = |state: &mut u64| {
+                *state =
+                    state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (*state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0
+        };
+        let mut last = [None; EQUATIONS];
+        let (mut products, mut rows) = ([0.0; EQUATIONS], [0.0; EQUATIONS]);
+        for k in 0..60_000 {
+            let sample = Sample {
+                x_m: 0.07 + sensors.position.noise_std * normal(),
+                pa_pa: 5e6 + sensors.pressure.noise_std * normal(),
+                pb_pa: 3e6 + sensors.pressure.noise_std * normal(),
+                qa_m3s: Some(sensors.flow_a.noise_std * normal()),
+                qb_m3s: Some(sensors.flow_b.noise_std * normal()),
+                force_n: None,
+            };
+            let Some(block) = blocks.push(if k == 0 { 0.0 } else { 0.01 }, &sample) else { continue };
+            for (equation, row) in whitener.push(&block).into_iter().enumerate() {
+                let left = row.map(|row| {
+                    row.columns[RawSum::ResidualA as usize]
+                        + row.columns[RAW_SUMS + RawSum::ResidualB as usize]
+                });
+                if let (Some(before), Some(now)) = (last[equation], left) {
+                    products[equation] += before * now;
+                    rows[equation] += 1.0;
+                }
+                last[equation] = left;
+            }
+        }
+        for equation in 0..EQUATIONS {
+            let correlation: f64 = products[equation] / rows[equation];
+            assert!(rows[equation] > 2000.0);
+            assert!(correlation.abs() < 4.0 / rows[equation].sqrt(), "{equation} {correlation}");
+        }
+    }
+}

@@ -114,24 +114,24 @@ impl VerdictGiver for Explain {
 
     fn judge(&self, trace: &[u8], rig: &Rig) -> Given {
         match explained(trace, rig) {
-            Ok(Some(decision)) => of_decision(&decision),
+            Ok(Some((decision, end_s))) => of_decision(&decision, end_s),
             Ok(None) => Given::refused("too little to explain".into()),
             Err(error) => Given::refused(error.to_string()),
         }
     }
 }
 
-fn explained(trace: &[u8], rig: &Rig) -> Result<Option<Decision>, TraceError> {
+fn explained(trace: &[u8], rig: &Rig) -> Result<Option<(Decision, f64)>, TraceError> {
     let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
     let mut record = Record::default();
     while reader.next_record(&mut record)? {
         statistic.push(record.step_s(), &record.sample);
     }
-    Ok(explain(&statistic, rig))
+    Ok(explain(&statistic, rig).map(|decision| (decision, record.t_s)))
 }
 
-fn of_decision(decision: &Decision) -> Given {
+fn of_decision(decision: &Decision, end_s: f64) -> Given {
     let sure = decision.status.is_sure();
     let words = PerLeak::from_fn(|leak: Leak| match leak {
         _ if !sure => Word::Perhaps,
@@ -147,7 +147,7 @@ fn of_decision(decision: &Decision) -> Given {
         mean_lpm: decision.leakage.map(|belief| belief.mean_lpm),
         std_lpm: decision.leakage.map(|belief| belief.std_lpm),
         interval_lpm: decision.leakage.map(|belief| [belief.quantiles_lpm[0], belief.quantiles_lpm[2]]),
-        since_s: decision.changed_s,
+        since_s: decision.changed_ago_s.map_or(0.0, |ago_s| end_s - ago_s),
         causes: accused(decision),
         text: format!(
             "{} {:?} {:?} misfit {:.2} wander {:.2}: {}",

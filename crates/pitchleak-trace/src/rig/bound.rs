@@ -25,6 +25,8 @@ pub(super) const POSITION_SCALE: Bound = Bound::between(1e-4, 1e3);
 pub(super) const FORCE_SCALE: Bound = Bound::between(0.1, 1e9);
 /// Shares of full scale and of a reading.
 pub(super) const SHARE: Bound = Bound::from_zero(1.0);
+/// What may speak against a sure verdict.
+pub(super) const ALPHA: Bound = Bound::between(1e-6, 0.5);
 /// Shares of full scale in an hour: a recording of seconds may drift by a percent.
 pub(super) const DRIFT_PER_HOUR: Bound = Bound::from_zero(1e3);
 /// Times that an estimator remembers or gathers for, s.

@@ -11,7 +11,8 @@ pub use document::{Fault, Place, RigError};
 pub use effects::{EffectMap, EffectValue};
 pub use instruments::{Instrument, Instruments};
 pub use settings::{
-    ColumnMap, CsvSettings, Decimal, Delimiter, EstimatorKind, EstimatorSettings, ForeignColumn,
+    ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
+    ForeignColumn,
 };
 
 use crate::units::Dimension;
@@ -36,6 +37,8 @@ pub struct Rig {
     pub estimator: EstimatorSettings,
     /// `[alarms]`.
     pub alarms: AlarmSettings<f64>,
+    /// `[decision]`.
+    pub decision: DecisionSettings,
     /// `[columns]`.
     pub columns: ColumnMap,
     /// `[csv]`.
@@ -58,6 +61,7 @@ impl Rig {
             fluid: Fluid::paper(),
             estimator: EstimatorSettings::default(),
             alarms: AlarmSettings::default(),
+            decision: DecisionSettings::default(),
             columns: ColumnMap::new(),
             csv: CsvSettings::default(),
             effects: EffectMap::new(),
@@ -94,7 +98,17 @@ impl Rig {
             document.fail(error.span().map(|span| span.start), Fault::Syntax(message))
         })?;
         let root = Section::root(&document, table.get_ref());
-        root.allow(&["cylinder", "fluid", "sensors", "estimator", "alarms", "columns", "csv", "effects"])?;
+        root.allow(&[
+            "cylinder",
+            "fluid",
+            "sensors",
+            "estimator",
+            "alarms",
+            "decision",
+            "columns",
+            "csv",
+            "effects",
+        ])?;
         let cylinder = read_cylinder(&root.section("cylinder")?)?;
         let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
         Ok(Self {
@@ -104,6 +118,7 @@ impl Rig {
             instruments,
             estimator: EstimatorSettings::read(&root.section("estimator")?)?,
             alarms: settings::read_alarms(&root.section("alarms")?, &instruments)?,
+            decision: DecisionSettings::read(&root.section("decision")?)?,
             columns: settings::read_columns(&root.section("columns")?)?,
             csv: CsvSettings::read(&root.section("csv")?)?,
             effects: effects::read(&root.section("effects")?)?,

@@ -143,6 +143,28 @@ pub(super) fn read_alarms(
     })
 }
 
+/// `[decision]`: when a verdict is sure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DecisionSettings {
+    /// α: a verdict is sure where at most this probability speaks against it.
+    pub alpha: f64,
+}
+
+impl Default for DecisionSettings {
+    /// 5 %, as of intervals; chosen.
+    fn default() -> Self {
+        Self { alpha: 0.05 }
+    }
+}
+
+impl DecisionSettings {
+    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
+        section.allow(&["alpha"])?;
+        let alpha = section.quantity("alpha", Dimension::Share, bound::ALPHA)?;
+        Ok(alpha.map_or_else(Self::default, |alpha| Self { alpha }))
+    }
+}
+
 /// `[csv]`: what a text file of numbers leaves open; the file says what this doesn't.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct CsvSettings {

@@ -1,6 +1,6 @@
 use super::bound::{self, Bound};
 use super::effects;
-use super::{CsvSettings, ForeignColumn, Instrument, Rig};
+use super::{CsvSettings, DecisionSettings, ForeignColumn, Instrument, Rig};
 use crate::signal::Signal;
 use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;
@@ -69,6 +69,7 @@ impl Rig {
         let mut out = String::new();
         self.write_machine(&mut out);
         self.write_settings(&mut out);
+        self.write_decision(&mut out);
         self.write_columns(&mut out);
         self.write_csv(&mut out);
         self.write_effects(&mut out);
@@ -136,6 +137,13 @@ impl Rig {
                 ("hold_time", seconds(Some(self.alarms.hold_time_s), bound::HOLD_TIME)),
             ],
         );
+    }
+
+    fn write_decision(&self, out: &mut String) {
+        if self.decision != DecisionSettings::default() {
+            let alpha = bound::ALPHA.nearest(self.decision.alpha);
+            let _ = write!(out, "\n[decision]\nalpha = {alpha:?}\n");
+        }
     }
 
     fn write_columns(&self, out: &mut String) {

@@ -1,0 +1,67 @@
+//! How large what is not as declared is, in people's units.
+
+use super::columns::Column;
+use super::table::Entry;
+use crate::report::with_interval;
+use crate::rig::Rig;
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::Estimate;
+
+/// A column of an explanation, and what was found of it in its own unit.
+pub(super) type Found = (Column, Estimate<f64>);
+
+/// An entry's sentence with the sizes of its columns.
+pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
+    let own = entry.free.iter().filter_map(|(column, _, _)| {
+        let (_, size) = found.iter().find(|(known, _)| known == column)?;
+        Some((*column, *size))
+    });
+    let mut columns: Vec<Found> = Vec::new();
+    for one in own.filter(|(_, size)| size.value.abs() > size.std) {
+        if !columns.iter().any(|(known, _)| *known == one.0) {
+            columns.push(one);
+        }
+    }
+    let several = columns.len() > 1;
+    let sizes: Vec<String> =
+        columns.iter().map(|(column, size)| text(*column, *size, rig, several)).collect();
+    if sizes.is_empty() {
+        entry.text.to_owned()
+    } else {
+        format!("{} by {}", entry.text, sizes.join(" and "))
+    }
+}
+
+/// Declared area, as it would have to be; other entries' lines name columns that only the trace's reader knows.
+pub(super) fn mended(entry: &Entry, found: &[Found], rig: &Rig) -> Vec<String> {
+    let of = |column: Column| found.iter().find(|(known, _)| *known == column).map(|(_, size)| size.value);
+    let declared = [(Column::AreaA, rig.cylinder.area_a_m2), (Column::AreaB, rig.cylinder.area_b_m2)];
+    let area = declared.into_iter().find_map(|(column, area_m2)| Some(1e4 * area_m2 * (1.0 + of(column)?)));
+    let line = entry.mends.filter(|_| matches!(entry.id, "area_a" | "area_b")).zip(area);
+    line.map(|(line, area_cm2)| line.replace("{}", &format!("{area_cm2:.2}"))).into_iter().collect()
+}
+
+fn text(column: Column, size: Estimate<f64>, rig: &Rig, several: bool) -> String {
+    let sheets = &rig.instruments;
+    let pressure_bar = 1e-5 * sheets.pressure.full_scale;
+    let cylinder = &rig.cylinder;
+    let swept_cm3 = |area_m2: f64| 1e6 * area_m2 * cylinder.stroke_m;
+    let (factor, unit, which) = match column {
+        Column::ZeroA => (LPM_PER_M3S * sheets.flow_a.full_scale, "L/min", "A"),
+        Column::ZeroB => (LPM_PER_M3S * sheets.flow_b.full_scale, "L/min", "B"),
+        Column::LagA => (1e3, "ms", "A"),
+        Column::LagB => (1e3, "ms", "B"),
+        Column::Lags => (1e3, "ms", "the lag"),
+        Column::DeadVolumeA => (swept_cm3(cylinder.area_a_m2), "cm³", "A"),
+        Column::DeadVolumeB => (swept_cm3(cylinder.area_b_m2), "cm³", "B"),
+        Column::PositionZero => (1e3 * cylinder.stroke_m, "mm", "x"),
+        Column::PressureZeroA => (pressure_bar, "bar", "A"),
+        Column::PressureZeroB => (pressure_bar, "bar", "B"),
+        Column::GainA | Column::AreaA | Column::PressureGainA => (100.0, "%", "A"),
+        Column::GainB | Column::AreaB | Column::PressureGainB => (100.0, "%", "B"),
+        _ => (100.0, "%", "both"),
+    };
+    let size = size.scaled(factor);
+    let interval = with_interval(size.value, Some(size.std.abs()));
+    if several { format!("{interval} {unit} ({which})") } else { format!("{interval} {unit}") }
+}
