@@ -9,7 +9,7 @@ use crate::report::Status;
 use crate::rig::Rig;
 use crate::trace::Record;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{Estimate, Leak, PerLeak};
+use pitchleak_core::{Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
@@ -32,13 +32,6 @@ pub struct Belief {
     pub quantiles_lpm: [f64; 3],
     /// Where there is such a leak, it is smaller than this with 97.5 %, L/min.
     pub below_lpm: f64,
-}
-
-impl Belief {
-    /// Mean and standard deviation, L/min.
-    pub fn estimate_lpm(&self) -> Estimate<f64> {
-        Estimate { value: self.mean_lpm, std: self.std_lpm }
-    }
 }
 
 /// An explanation that is left.
@@ -92,12 +85,8 @@ pub struct Decision {
     pub leakage: PerLeak<Belief>,
     /// How long before the end a leak last changed at once, s, pauses not counted; none where none did.
     pub changed_ago_s: Option<f64>,
-    /// Mean size of the pressures across the leaks since then, Pa: a leak's coefficient is its flow over it.
-    pub pressures_pa: PerLeak<f64>,
     /// Best first.
     pub explanations: Vec<Explained>,
-    /// Whether the likeliest explanation has sensors and rig as declared.
-    pub as_declared: bool,
     /// What is not as declared, for certain.
     pub notes: Vec<Note>,
     /// Noise scale over the readings' own scatter.
@@ -186,11 +175,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         probability,
         leakage: beliefs.map(|marginal| marginal.belief()),
         changed_ago_s: weighed.first().and_then(|best| best.changed_ago_s),
-        pressures_pa: weighed.first().map_or_else(PerLeak::default, |best| best.pressures_pa),
         explanations: listed(weighed, rig),
-        as_declared: weighed
-            .first()
-            .is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
         notes: notes(weighed, rig),
         misfit,
         wander,

@@ -46,8 +46,6 @@ pub(super) struct Weighed<'a> {
     pub misfit: f64,
     /// How long before the end a leak last changed at once, s; none where none did.
     pub changed_ago_s: Option<f64>,
-    /// Mean size of the pressures across the leaks since then, Pa.
-    pub pressures_pa: PerLeak<f64>,
     /// What is not as declared, in its columns' units.
     pub found: Vec<Found>,
     /// Mean of C P of each leak, m³/s.
@@ -408,7 +406,7 @@ impl<'a, 's> Pass<'a, 's> {
         let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
         let whole = self.products.whole();
-        let ln_wired = table::ln_wired();
+        let ln_wired = table::ln_wired(&self.tables.mistakes);
         let mut kept = Vec::new();
         for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
@@ -503,7 +501,6 @@ impl<'a, 's> Pass<'a, 's> {
             (self.leaks_m3s(equations, &hypothesis, &fit, &orthant.points), orthant.weights)
         };
         let found = self.found(equations, &hypothesis, &fit);
-        let pressures_pa = self.products.mean_pressures_pa(hypothesis.last_change(self.segments));
         let changed = Some(hypothesis.last_change(self.segments)).filter(|border| *border > 0);
         let changed = changed.and_then(|border| self.products.segments.get(border));
         let changed_ago_s = changed.map(|segment| self.products.total_s - segment.begin_s);
@@ -514,7 +511,6 @@ impl<'a, 's> Pass<'a, 's> {
                 probability: 0.0,
                 misfit,
                 changed_ago_s,
-                pressures_pa,
                 found,
                 levels_m3s,
                 leaks_m3s,

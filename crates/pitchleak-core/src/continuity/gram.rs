@@ -37,8 +37,6 @@ pub struct ContinuityStatistic<T, const S: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     segments: [Segment<T>; S],
     used: usize,
-    /// What is longer ago than this may be forgotten, s.
-    horizon_s: T,
     scatter: [Scatter<T>; CHANNELS],
     time_s: T,
     roots: PerLeak<T>,
@@ -305,22 +303,10 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
             whitener: Whitener::new(cylinder, fluid, sensors),
             segments: [Segment::default(); S],
             used: 0,
-            horizon_s: T::max_value(),
             scatter: [Scatter::default(); CHANNELS],
             time_s: T::zero(),
             roots: PerLeak::default(),
         }
-    }
-
-    /// Of a stream: forgets what is longer ago than `horizon_s`, as soon as its place is needed.
-    #[must_use]
-    pub fn forgetting(self, horizon_s: T) -> Self {
-        Self { horizon_s, ..self }
-    }
-
-    /// Length of all segments but the first.
-    fn later_s(&self) -> T {
-        self.segments().iter().skip(1).fold(T::zero(), |sum, segment| sum + segment.time_s)
     }
 
     /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
@@ -420,10 +406,6 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
 
     /// Makes room where there is none; a segment's noise is independent of that of those before.
     fn begin_segment(&mut self) {
-        if self.used == S && self.later_s() >= self.horizon_s {
-            self.segments.copy_within(1.., 0);
-            self.used -= 1;
-        }
         if self.used == S {
             let cheapest = (1..S)
                 .map(|next| (next, self.segments[next - 1].cost(&self.segments[next])))
