@@ -408,7 +408,7 @@ impl<'a, 's> Pass<'a, 's> {
         let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
         let whole = self.products.whole();
-        let ln_wired = table::ln_wired();
+        let ln_wired = table::ln_wired(&self.tables.mistakes);
         let mut kept = Vec::new();
         for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
             let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());

@@ -386,6 +386,6 @@ fn is_exchange(id: &str) -> bool {
 }
 
 /// ln prior probability of as declared wiring.
-pub(super) fn ln_wired() -> f64 {
-    (1.0 - mistakes().iter().map(|mistake| mistake.share).sum::<f64>()).ln()
+pub(super) fn ln_wired(mistakes: &[Entry]) -> f64 {
+    (1.0 - mistakes.iter().map(|mistake| mistake.share).sum::<f64>()).ln()
 }

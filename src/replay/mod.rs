@@ -355,7 +355,7 @@ impl Replay {
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
 
-    /// Whether both ports are shut: such records are for [`hold`](crate::hold).
+    /// Whether both ports are shut: such records are for [`crate::hold`].
     pub fn is_shut(&self) -> bool {
         self.is_shut
     }

@@ -123,7 +123,7 @@ Examples:
   pitchleak simulate --wind 13 --leak-internal '0 -> 0.5 L/min' --oil-temp '30 °C -> 55 °C' --duration '10 min' --out trace.csv
   pitchleak simulate --wind 21 --noise '0.3 %' --fault 'swap pa pb' --fault 'qa drift 1 %/h' --out trace.csv
   pitchleak simulate --wind run.outb --rig turbine7.toml --effect viscous_friction=1500 --out trace.csv
-  pitchleak simulate --position '100 mm' --load '2 kN' --shut '2 s..' --leak-internal '0.01 L/min' --noise rig --duration '12 s' --out hold.csv
+  pitchleak simulate --position '100 mm' --load '4 kN' --shut '2 s..' --leak-internal '0.01 L/min' --noise rig --duration '12 s' --out hold.csv
   pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
 
 fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {

@@ -568,5 +568,7 @@ fn shut_is_zero_or_one() {
         }
         assert_eq!(shut, [Some(false), Some(true), None], "{header}");
         assert_eq!(reader.quality().skipped, 1, "{header}");
+        let warnings = reader.quality().warnings().join("\n");
+        assert!(warnings.contains("7 is outside what is possible (0 to 1)"), "{warnings}");
     }
 }

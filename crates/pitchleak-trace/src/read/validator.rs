@@ -301,6 +301,7 @@ impl Ranges {
         };
         let text = |value: f64| readable(unit.map_or(value, |unit| unit.from_si(value)), 6);
         let name = unit.map_or_else(|| signal.dimension().map_or("", Dimension::si), |unit| unit.text);
-        format!("{} {name} is outside {source} ({} to {} {name})", text(value), text(least), text(most))
+        let name = if name.is_empty() { String::new() } else { format!(" {name}") };
+        format!("{}{name} is outside {source} ({} to {}{name})", text(value), text(least), text(most))
     }
 }
