@@ -89,6 +89,8 @@ pub enum Course {
     Since(usize),
     /// In this segment alone.
     Within(usize),
+    /// Until this segment, and in it falling to 0.
+    Fading(usize),
 }
 
 /// A column by chamber: combinations of raw sums in the equation of A and of B.
@@ -222,9 +224,9 @@ fn aged(raw: RawSum) -> RawSum {
 }
 
 impl Course {
-    /// Shares of the column and of its moment in time, in segment `segment` that lies between `begin_s` and, of the whole
-    /// trace, `total_s`.
-    pub(super) fn shares(self, segment: usize, begin_s: f64, total_s: f64) -> [f64; 2] {
+    /// Shares of the column and of its moment in time, in a segment that begins at `begin_s` and lasts `time_s`, of a trace of
+    /// `total_s`.
+    pub(super) fn shares(self, segment: usize, [begin_s, time_s]: [f64; 2], total_s: f64) -> [f64; 2] {
         let within = |there: bool| [if there { 1.0 } else { 0.0 }, 0.0];
         match self {
             Self::Constant => [1.0, 0.0],
@@ -234,6 +236,8 @@ impl Course {
             Self::Before(border) => within(segment < border),
             Self::Since(border) => within(segment >= border),
             Self::Within(only) => within(segment == only),
+            Self::Fading(last) if segment == last => [1.0, -1.0 / time_s],
+            Self::Fading(last) => within(segment < last),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::hypothesis::{LeakCourse, State};
 use super::posterior::{Tables, Weighed, weigh};
 use super::raw_products::Statistic;
 use super::sizes::{mended, sentence};
-use super::table::Entry;
+use super::table::{Entry, LEAK_SHARE};
 use crate::report::Status;
 use crate::rig::Rig;
 use crate::units::LPM_PER_M3S;
@@ -87,6 +87,8 @@ pub struct Decision {
     pub ruled_out: Vec<Leak>,
     /// That each leak is above its threshold at the trace's end.
     pub probability: PerLeak<f64>,
+    /// That there is each leak, or was along the trace, of whatever size.
+    pub present: PerLeak<f64>,
     /// How large each leak is, since it changed last.
     pub leakage: PerLeak<Belief>,
     /// How long before the end a leak last changed at once, s, pauses not counted; none where none did.
@@ -128,9 +130,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let wander = mass(&|one| one.hypothesis.state.wander.0 > 0.0);
     let misfit = weighed.iter().map(|one| one.probability * one.misfit).sum();
     let is_ruled_out = |leak: &Leak| {
-        wander < WANDER_DOUBT
-            && probability[*leak] <= alpha
-            && beliefs[*leak].quantile_if_there(1.0 - alpha) <= threshold_m3s[*leak]
+        wander < WANDER_DOUBT && beliefs[*leak].above_at_even_odds(threshold_m3s[*leak]) <= alpha
     };
     let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - alpha).collect();
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
@@ -148,6 +148,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         faults,
         ruled_out,
         probability,
+        present: PerLeak::from_fn(|leak| mass(&|one| one.hypothesis.leaks[leak as usize].is_some())),
         leakage: beliefs.map(|marginal| marginal.belief()),
         changed_ago_s: weighed.first().and_then(|best| best.changed_ago_s),
         pressures_pa: weighed.first().map_or_else(PerLeak::default, |best| best.pressures_pa),
@@ -162,66 +163,82 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     }
 }
 
-/// The mixture's distribution of one leak: flows, rising, with weights; zero where there is none.
+/// The mixture's distribution of one leak: flows, rising, with weights, and whether they are a leak's; past a sound seal
+/// seeps a little.
 struct Marginal {
-    none: f64,
-    flows_m3s: Vec<(f64, f64)>,
+    flows: Vec<Flow>,
+}
+
+struct Flow {
+    m3s: f64,
+    weight: f64,
+    is_leak: bool,
 }
 
 impl Marginal {
     fn of(weighed: &[Weighed<'_>], leak: Leak) -> Self {
-        let mut none = 0.0;
-        let mut flows_m3s = Vec::new();
-        for one in weighed {
-            if one.hypothesis.leaks[leak as usize].is_none() {
-                none += one.probability;
-            } else {
-                let points = one.leaks_m3s.iter().zip(&one.weights);
-                flows_m3s
-                    .extend(points.map(|(flows, weight)| (flows[leak as usize], weight * one.probability)));
-            }
-        }
-        flows_m3s.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Self { none, flows_m3s }
+        let of_one = |one: &Weighed<'_>| {
+            let is_leak = one.hypothesis.leaks[leak as usize].is_some();
+            let flow = |(flows, weight): (&[f64; 3], &f64)| Flow {
+                m3s: flows[leak as usize],
+                weight: weight * one.probability,
+                is_leak,
+            };
+            one.leaks_m3s.iter().zip(&one.weights).map(flow).collect::<Vec<_>>()
+        };
+        let mut flows: Vec<Flow> = weighed.iter().flat_map(of_one).collect();
+        flows.sort_by(|a, b| a.m3s.total_cmp(&b.m3s));
+        Self { flows }
+    }
+
+    fn sum(&self, of: impl Fn(&Flow) -> f64) -> f64 {
+        self.flows.iter().map(of).sum()
     }
 
     fn above(&self, threshold_m3s: f64) -> f64 {
-        let above = self.flows_m3s.iter().filter(|(flow, _)| *flow > threshold_m3s);
-        above.fold(0.0, |sum, (_, weight)| sum + weight).min(1.0)
+        self.sum(|flow| if flow.m3s > threshold_m3s { flow.weight } else { 0.0 }).min(1.0)
     }
 
-    fn quantile(&self, none: f64, probability: f64) -> f64 {
-        let there: f64 = self.flows_m3s.iter().map(|(_, weight)| weight).sum();
-        let mut below = none;
-        let wanted = probability * (none + there);
-        if below >= wanted {
-            return 0.0;
-        }
-        for (flow, weight) in &self.flows_m3s {
-            below += weight;
-            if below >= wanted {
-                return *flow;
-            }
-        }
-        self.flows_m3s.last().map_or(0.0, |(flow, _)| *flow)
+    /// The same where a leak had been as probable as none before the trace: that leaks are rare is no finding of this trace.
+    fn above_at_even_odds(&self, threshold_m3s: f64) -> f64 {
+        let even =
+            |flow: &Flow| flow.weight * if flow.is_leak { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
+        self.sum(|flow| if flow.m3s > threshold_m3s { even(flow) } else { 0.0 }) / self.sum(even)
+    }
+
+    fn quantile(&self, probability: f64) -> f64 {
+        quantile(self.flows.iter(), probability)
     }
 
     fn quantile_if_there(&self, probability: f64) -> f64 {
-        self.quantile(0.0, probability)
+        quantile(self.flows.iter().filter(|flow| flow.is_leak), probability)
     }
 
     fn belief(&self) -> Belief {
-        let moment =
-            |power: i32| self.flows_m3s.iter().map(|(flow, weight)| weight * flow.powi(power)).sum::<f64>();
+        let moment = |power: i32| self.sum(|flow| flow.weight * flow.m3s.powi(power));
         let mean = moment(1);
         let std = (moment(2) - mean * mean).max(0.0).sqrt();
         Belief {
             mean_lpm: LPM_PER_M3S * mean,
             std_lpm: LPM_PER_M3S * std,
-            quantiles_lpm: [0.025, 0.5, 0.975].map(|q| LPM_PER_M3S * self.quantile(self.none, q)),
+            quantiles_lpm: [0.025, 0.5, 0.975].map(|q| LPM_PER_M3S * self.quantile(q)),
             below_lpm: LPM_PER_M3S * self.quantile_if_there(0.975),
         }
     }
+}
+
+fn quantile<'a>(flows: impl Iterator<Item = &'a Flow> + Clone, probability: f64) -> f64 {
+    let wanted = probability * flows.clone().map(|flow| flow.weight).sum::<f64>();
+    let mut below = 0.0;
+    let mut last_m3s = 0.0;
+    for flow in flows {
+        below += flow.weight;
+        last_m3s = flow.m3s;
+        if below >= wanted {
+            break;
+        }
+    }
+    last_m3s
 }
 
 /// What is not usual with probability 1 − α, of each kind.
@@ -259,6 +276,9 @@ fn listed(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Explained> {
     for one in weighed {
         let id = id(one);
         let at = |leak: usize| {
+            if one.hypothesis.leaks[leak].is_none() {
+                return 0.0;
+            }
             let mean = one
                 .leaks_m3s
                 .iter()

@@ -1,6 +1,7 @@
 //! Normal equations of the columns of all explanations, from the statistic.
 
 use super::columns::{Column, Course, PerChamber, Scales};
+use super::evidence::ln_scale_prior;
 use super::raw_products::RawProducts;
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 use std::collections::HashMap;
@@ -16,8 +17,10 @@ pub(super) struct NormalEquations {
     noise: [Vec<f64>; EQUATIONS],
     /// Rows of each equation.
     pub rows: [f64; EQUATIONS],
-    /// What noise adds to the left side's square.
-    left_noise: [f64; EQUATIONS],
+    /// What noise adds to the left side's square: as declared, and as the readings scatter.
+    left_noise: [[f64; 2]; EQUATIONS],
+    /// The noise scale that the readings' scatter shows; none where nothing is known to be mended.
+    scatter: [Option<f64>; EQUATIONS],
     places: HashMap<(Column, Course), usize>,
 }
 
@@ -47,18 +50,20 @@ impl NormalEquations {
             gram: [vec![0.0; size * size], vec![0.0; size * size]],
             noise: [vec![0.0; size * size], vec![0.0; size * size]],
             rows: [0.0; EQUATIONS],
-            left_noise: [0.0; EQUATIONS],
+            left_noise: [[0.0; 2]; EQUATIONS],
+            scatter: [None; EQUATIONS],
             places: columns.iter().enumerate().map(|(place, key)| (*key, place)).collect(),
         };
         let kinds: HashMap<Column, [PerChamber; 2]> =
             columns.iter().map(|(column, _)| (*column, scales.column(*column))).collect();
         for (index, segment) in products.segments.iter().enumerate() {
-            let shares = |course: &Course| course.shares(index, segment.begin_s, products.total_s);
+            let shares = |course: &Course| course.shares(index, segment.span_s(), products.total_s);
             let sparse: Vec<Sparse> =
                 columns.iter().map(|(column, course)| combine(&kinds[column], shares(course))).collect();
             for equation in 0..EQUATIONS {
                 accumulate(&mut own.gram[equation], &sparse, &segment.gram[equation]);
                 accumulate(&mut own.noise[equation], &sparse, &segment.noise[equation]);
+                own.left_noise[equation][1] += square(&sparse[0], &segment.scattered[equation]);
                 own.rows[equation] += segment.rows[equation];
             }
         }
@@ -81,25 +86,50 @@ impl NormalEquations {
         Square { entries: &self.noise[equation], size: self.size }
     }
 
-    /// Measures the left side by the noise that it would have in `other` equations: else a mistake that multiplies the
-    /// readings' noise by less than those explains it. One that makes it louder is measured by its own: to take off what is
-    /// expected more would leave the chance by which a run's noise differs from it.
-    /// Only in the equations whose measure the mistake leaves as it is.
-    pub fn with_noise_of(mut self, other: &Self, ln_measure: [f64; EQUATIONS]) -> Self {
-        for (equation, ln_measure) in ln_measure.into_iter().enumerate() {
-            if ln_measure != 0.0 {
+    /// With rows measured by the noise that they have once a mistake is mended, as those of the `declared` equations are by
+    /// theirs; and ln of what that changes of the evidence, where mending multiplies densities of the readings by
+    /// e^`ln_jacobian` in each block.
+    ///
+    /// Readings without motion are noise in every unit: what makes that quieter or louder explains nothing, so the measure
+    /// counts against a mistake alone. What does tell is a scatter that the sheet does not allow; one that is better than the
+    /// sheet is no mistake. Where the declared noise and the scatter differ, the smaller change counts.
+    pub fn measured_as(mut self, declared: &Self, ln_jacobian: f64) -> (Self, f64) {
+        let mut ln_measure = 0.0;
+        let mut ln_noise = 0.0;
+        for equation in 0..EQUATIONS {
+            let ([own, own_scatter], [other, scatter]) =
+                (self.left_noise[equation], declared.left_noise[equation]);
+            if [own, own_scatter, other, scatter].iter().any(|noise| *noise <= 0.0) {
                 continue;
             }
-            let more = (other.left_noise[equation] - self.left_noise[equation]).max(0.0);
-            self.gram[equation][0] = (self.gram[equation][0] + more).max(0.0);
+            let louder = (own / other).min(own_scatter / scatter);
+            let products = self.gram[equation].iter_mut().chain(&mut self.noise[equation]);
+            products.for_each(|product| *product /= louder);
+            self.scatter[equation] = Some(own_scatter / (other * louder));
+            ln_measure += self.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder.ln());
+            ln_noise += ln_scale_prior(own_scatter / other) - ln_scale_prior((scatter / other).max(1.0));
         }
-        self
+        (self, ln_measure.min(0.0) + ln_noise)
+    }
+
+    /// ln of what is taken back from a fit whose noise scales are below the readings' own scatter: a mistake turns noise into
+    /// other noise, which by chance may be smaller.
+    pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
+        let one = |equation: usize| {
+            let scatter = self.scatter[equation].unwrap_or(0.0);
+            if scatter > scales[equation] {
+                -0.5 * self.rows[equation] * (scatter / scales[equation]).ln()
+            } else {
+                0.0
+            }
+        };
+        (0..EQUATIONS).map(one).sum()
     }
 
     /// Columns that are mostly noise are zero. The left side's noise is what the residual is measured by.
     fn silence(&mut self, columns: &[(Column, Course)]) {
         for equation in 0..EQUATIONS {
-            self.left_noise[equation] = std::mem::take(&mut self.noise[equation][0]);
+            self.left_noise[equation][0] = std::mem::take(&mut self.noise[equation][0]);
             for (place, (column, _)) in columns.iter().enumerate().skip(1) {
                 let is_leak = matches!(column, Column::LeakInternal | Column::LeakA | Column::LeakB);
                 let power = self.gram(equation).row(place)[place];
@@ -120,6 +150,11 @@ fn combine(kind: &[PerChamber; 2], shares: [f64; 2]) -> Sparse {
     let [plain, moment] = kind.each_ref().map(|chambers| chambers.iter().flatten());
     let values = plain.zip(moment).map(|(plain, moment)| shares[0] * plain + shares[1] * moment);
     values.enumerate().filter(|(_, value)| *value != 0.0).collect()
+}
+
+/// A combination's square under these products.
+fn square(one: &Sparse, products: &[f64]) -> f64 {
+    one.iter().flat_map(|(i, by)| one.iter().map(move |(j, also)| by * also * products[i * COLUMNS + j])).sum()
 }
 
 fn accumulate(sum: &mut [f64], columns: &[Sparse], products: &[f64]) {

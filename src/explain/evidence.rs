@@ -156,9 +156,8 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
             }
         }
     }
-    let scale_terms: f64 =
-        (0..2).map(|c| n[c] * scales[c].ln() + NU * (scales[c].ln() + 1.0 / scales[c] - 1.0)).sum();
-    let ln_evidence = -0.5 * (chi_square + ln_determinant + scale_terms);
+    let ln_scales: f64 = (0..2).map(|c| ln_scale_prior(scales[c]) - 0.5 * n[c] * scales[c].ln()).sum();
+    let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);
     let is_possible = ln_evidence.is_finite() && chi_square > LEAST_CHI_SQUARE;
     Fit {
         ln_evidence: if is_possible { ln_evidence } else { f64::NEG_INFINITY },
@@ -168,6 +167,11 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
         stds: free.iter().map(|free| free.std).collect(),
         factor,
     }
+}
+
+/// ln of the prior density of a noise scale s², up to a constant: −½ν (ln s² + 1/s² − 1).
+pub(super) fn ln_scale_prior(scale: f64) -> f64 {
+    -0.5 * NU * (scale.ln() + 1.0 / scale - 1.0)
 }
 
 /// Solves (1 + X'X) θ = X'y for the scaled products, of which the first row and column are y's, and leaves Cholesky's factor

@@ -20,7 +20,7 @@ pub(super) enum LeakCourse {
     Sudden(usize),
     /// A random walk at the segments' borders.
     Wandering,
-    /// The same of small steps: growth of any course.
+    /// The same of small steps, each spread over a segment: growth of any course.
     Creeping,
 }
 
@@ -90,6 +90,8 @@ impl State<'_> {
 /// What the rig file declares of sizes, in the columns' units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sizes {
+    /// What a sound seal lets past, share of full scale.
+    pub seepage: f64,
     pub compressibility: f64,
     pub zeros: [f64; 2],
     pub gains: [f64; 2],
@@ -135,6 +137,9 @@ impl<'a> Hypothesis<'a> {
                 own.add_leak(equations, leak, *course, segments);
             }
         }
+        if leaks[0].is_none() {
+            own.add_seepage(equations, sizes.seepage);
+        }
         own.ln_prior += own.positive.len() as f64 * LN_2;
         own
     }
@@ -147,6 +152,15 @@ impl<'a> Hypothesis<'a> {
             _ => 0,
         };
         self.leaks.iter().map(border).max().unwrap_or(0)
+    }
+
+    fn add_seepage(&mut self, equations: &NormalEquations, std: f64) {
+        if let Some(column) = equations.place(Column::LeakInternal, Course::Constant) {
+            let at = self.free.len();
+            self.free.push(Free { column, std });
+            self.positive.push(at);
+            self.ends[0].push((at, 1.0));
+        }
     }
 
     fn add_leak(&mut self, equations: &NormalEquations, leak: usize, course: LeakCourse, segments: usize) {
@@ -183,11 +197,17 @@ impl<'a> Hypothesis<'a> {
                 let since = add(column, Course::Since(border), LEAK_SIZE);
                 (vec![before, since], vec![since])
             }
-            LeakCourse::Wandering | LeakCourse::Creeping => {
-                let step = if course == LeakCourse::Wandering { LEAK_STEP } else { LEAK_CREEP };
+            LeakCourse::Wandering => {
                 let level = add(column, Course::Constant, LEAK_SIZE);
                 for border in 1..segments {
-                    add(column, Course::Before(border), step);
+                    add(column, Course::Before(border), LEAK_STEP);
+                }
+                (vec![level], vec![level])
+            }
+            LeakCourse::Creeping => {
+                let level = add(column, Course::Constant, LEAK_SIZE);
+                for segment in 0..segments {
+                    add(column, Course::Fading(segment), LEAK_CREEP);
                 }
                 (vec![level], vec![level])
             }

@@ -35,7 +35,7 @@ pub(super) fn inflation(
             for (free, mean) in hypothesis.free.iter().zip(&fit.means) {
                 if equations.gram(equation).row(free.column)[free.column] > 0.0 {
                     let (column, course) = columns[free.column];
-                    let shares = course.shares(index, segment.begin_s, products.total_s);
+                    let shares = course.shares(index, segment.span_s(), products.total_s);
                     let own = combination(scales, column, shares);
                     sum.iter_mut().zip(own).for_each(|(sum, own)| *sum -= mean * own);
                 }

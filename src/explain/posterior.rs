@@ -150,6 +150,7 @@ impl<'a, 's> Pass<'a, 's> {
             tables,
             found_m3s,
             sizes: Sizes {
+                seepage: table::USUAL_SEEPAGE * rig.alarms.threshold_m3s.internal / full_scale_m3s,
                 compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
                 zeros: flows.map(|flow| flow.bias),
                 gains: flows.map(|flow| flow.gain),
@@ -235,6 +236,7 @@ impl<'a, 's> Pass<'a, 's> {
             columns.extend(
                 (1..self.segments).flat_map(|k| [(leak, Course::Before(k)), (leak, Course::Since(k))]),
             );
+            columns.extend((0..self.segments).map(|k| (leak, Course::Fading(k))));
         }
         let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS);
         columns.extend(by_law.map(|law| (law, Course::Constant)));
@@ -293,7 +295,7 @@ impl<'a, 's> Pass<'a, 's> {
         let ln_posterior = if self.has_impossible_gain(equations, &hypothesis, &fit) {
             f64::NEG_INFINITY
         } else {
-            fit.ln_evidence + hypothesis.ln_prior
+            fit.ln_evidence + hypothesis.ln_prior + equations.ln_chance(fit.scales)
         };
         Scored { hypothesis, ln_posterior, ln_likelihood: fit.ln_likelihood, wiring: 0 }
     }
@@ -411,10 +413,10 @@ impl<'a, 's> Pass<'a, 's> {
         let ln_wired = table::ln_wired(&self.tables.mistakes);
         let mut kept = Vec::new();
         for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
-            let ln_measure = entry.mistake.map_or([0.0; 2], |mistake| mistake.ln_measure());
-            let equations = self.equations(&whole, Some(entry), &columns).with_noise_of(declared, ln_measure);
-            let measure: f64 = ln_measure.iter().zip(equations.rows).map(|(ln, rows)| ln * rows).sum();
-            let ln_prior = entry.share.ln() - ln_wired + measure;
+            let ln_jacobian = entry.mistake.map_or(0.0, Mistake::ln_jacobian);
+            let mended = self.equations(&whole, Some(entry), &columns);
+            let (equations, ln_measure) = mended.measured_as(declared, ln_jacobian);
+            let ln_prior = entry.share.ln() - ln_wired + ln_measure;
             let mut none_ln = f64::NEG_INFINITY;
             for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
                 let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));

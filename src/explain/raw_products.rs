@@ -2,7 +2,7 @@
 
 use crate::rig::Rig;
 use pitchleak_core::continuity::{
-    COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, Segment, column as place_of,
+    CHANNELS, COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, Segment, column as place_of,
 };
 use pitchleak_core::{PerLeak, Sensors};
 
@@ -14,6 +14,8 @@ pub type Statistic = ContinuityStatistic<f64, SEGMENTS>;
 /// Readings that a flow's value at a block's end is the mean of.
 const END_READINGS: f64 = 7.0;
 
+const LEAST_TIME_S: f64 = 1e-9;
+
 /// Of a whole trace.
 pub(super) struct RawProducts {
     pub segments: Vec<SegmentProducts>,
@@ -24,6 +26,8 @@ pub(super) struct RawProducts {
 pub(super) struct SegmentProducts {
     pub gram: [Vec<f64>; EQUATIONS],
     pub noise: [Vec<f64>; EQUATIONS],
+    /// The same of noise as the readings scatter, where that is not as declared.
+    pub scattered: [Vec<f64>; EQUATIONS],
     pub rows: [f64; EQUATIONS],
     pub begin_s: f64,
     pub time_s: f64,
@@ -31,15 +35,24 @@ pub(super) struct SegmentProducts {
     pub pressures_pa: PerLeak<f64>,
 }
 
+impl SegmentProducts {
+    /// When it begins, and how long it lasts, s.
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.begin_s, self.time_s.max(LEAST_TIME_S)]
+    }
+}
+
 impl RawProducts {
     pub fn of(statistic: &Statistic, rig: &Rig) -> Self {
-        let noise_of = NoiseOf::new(rig);
+        let noise_of = NoiseOf::declared(rig);
+        let scattered = noise_of.scattered(&statistic.scatter());
         let mut total_s = 0.0;
         let mut segments = Vec::new();
         for segment in statistic.segments() {
             segments.push(SegmentProducts {
                 gram: [0, 1].map(|equation| dense(|i, j| segment.product(equation, i, j))),
                 noise: [0, 1].map(|equation| noise_of.products(segment, equation)),
+                scattered: [0, 1].map(|equation| scattered.products(segment, equation)),
                 rows: [0, 1].map(|equation| segment.rows(equation)),
                 begin_s: total_s,
                 time_s: segment.time_s(),
@@ -56,6 +69,7 @@ impl RawProducts {
             for (equation, inflation) in inflation.into_iter().enumerate() {
                 segment.gram[equation].iter_mut().for_each(|product| *product /= inflation);
                 segment.noise[equation].iter_mut().for_each(|product| *product /= inflation);
+                segment.scattered[equation].iter_mut().for_each(|product| *product /= inflation);
                 segment.rows[equation] /= inflation;
             }
         }
@@ -74,6 +88,7 @@ impl RawProducts {
         let whole = SegmentProducts {
             gram: [0, 1].map(|equation| sum(&|segment| &segment.gram[equation])),
             noise: [0, 1].map(|equation| sum(&|segment| &segment.noise[equation])),
+            scattered: [0, 1].map(|equation| sum(&|segment| &segment.scattered[equation])),
             rows: [0, 1].map(|equation| self.segments.iter().map(|segment| segment.rows[equation]).sum()),
             begin_s: 0.0,
             time_s: self.total_s,
@@ -87,7 +102,7 @@ impl RawProducts {
         let later = || self.segments.iter().skip(from);
         let time_s: f64 = later().map(|segment| segment.time_s).sum();
         PerLeak::from_fn(|leak| {
-            later().map(|segment| segment.time_s * segment.pressures_pa[leak]).sum::<f64>() / time_s.max(1e-9)
+            later().map(|segment| segment.time_s * segment.pressures_pa[leak]).sum::<f64>() / time_s.max(LEAST_TIME_S)
         })
     }
 }
@@ -107,7 +122,7 @@ fn dense(entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
 /// Sensors' noise in the raw sums.
 struct NoiseOf {
     flow: [f64; 2],
-    pressure_mpa: f64,
+    pressure_mpa: [f64; 2],
     position: f64,
     area_m2: [f64; 2],
     compressibility: f64,
@@ -117,15 +132,27 @@ struct NoiseOf {
 type AtEnd = (RawSum, f64, usize);
 
 impl NoiseOf {
-    fn new(rig: &Rig) -> Self {
+    fn declared(rig: &Rig) -> Self {
         let Sensors { flow_a, flow_b, pressure, position, .. } = rig.sensors();
         let cylinder = &rig.cylinder;
         Self {
             flow: [flow_a.noise_std, flow_b.noise_std],
-            pressure_mpa: 1e-6 * pressure.noise_std,
+            pressure_mpa: [1e-6 * pressure.noise_std; 2],
             position: position.noise_std,
             area_m2: [cylinder.area_a_m2, cylinder.area_b_m2],
             compressibility: 1e6 / rig.fluid.bulk_modulus_pa,
+        }
+    }
+
+    /// With the channels' own scatter (x, P_A, P_B, Q_A, Q_B) where that is known.
+    fn scattered(&self, scatter: &[Option<f64>; CHANNELS]) -> Self {
+        let [x, pa, pb, qa, qb] = *scatter;
+        Self {
+            flow: [qa.unwrap_or(self.flow[0]), qb.unwrap_or(self.flow[1])],
+            pressure_mpa: [(pa, 0), (pb, 1)]
+                .map(|(std_pa, c)| std_pa.map_or(self.pressure_mpa[c], |std_pa| 1e-6 * std_pa)),
+            position: x.unwrap_or(self.position),
+            ..*self
         }
     }
 
@@ -137,8 +164,8 @@ impl NoiseOf {
         let integrals = [
             (R::ResidualA, self.flow[0]),
             (R::ResidualB, self.flow[1]),
-            (R::PressureA, self.pressure_mpa),
-            (R::PressureB, self.pressure_mpa),
+            (R::PressureA, self.pressure_mpa[0]),
+            (R::PressureB, self.pressure_mpa[1]),
         ];
         for (raw, std) in integrals {
             add_pair(&mut out, raw, raw, [aa, ab, bb], std * std);
@@ -148,7 +175,7 @@ impl NoiseOf {
         let ends: [(f64, Vec<AtEnd>); 5] = [
             (self.position, vec![(R::Travel, 1.0, 0), (R::ResidualA, -area_a, 0), (R::ResidualB, area_b, 0)]),
             (
-                self.pressure_mpa,
+                self.pressure_mpa[0],
                 vec![
                     (R::PressureChangeA, 1.0, 0),
                     (R::StorageA, 1.0, 1),
@@ -157,7 +184,7 @@ impl NoiseOf {
                 ],
             ),
             (
-                self.pressure_mpa,
+                self.pressure_mpa[1],
                 vec![
                     (R::PressureChangeB, 1.0, 0),
                     (R::StorageB, 1.0, 2),

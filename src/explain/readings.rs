@@ -222,14 +222,12 @@ impl Readings {
 }
 
 impl Mistake {
-    /// ln of the change of measure per row of the balance and of the position's equation: the density is that of the
-    /// readings as recorded, so whoever shrinks them gains nothing by it.
-    pub(super) fn ln_measure(self) -> [f64; 2] {
+    /// ln by which mending multiplies the density of both flows, given position and pressures.
+    pub(super) fn ln_jacobian(self) -> f64 {
         match self {
-            Self::Factor(Of::Flows, factor) => [-factor.ln(), 0.0],
-            Self::Factor(Of::FlowA | Of::FlowB, factor) => [-0.5 * factor.ln(), 0.0],
-            Self::Factor(Of::Position, factor) => [0.0, -factor.ln()],
-            _ => [0.0, 0.0],
+            Self::Factor(Of::Flows, factor) => -2.0 * factor.ln(),
+            Self::Factor(Of::FlowA | Of::FlowB, factor) => -factor.ln(),
+            _ => 0.0,
         }
     }
 

@@ -11,7 +11,7 @@ use crate::explain::Decision;
 use crate::replay::{Stream, Taken};
 use crate::report::ReplayReport;
 use crate::trace::{BadReason, BadRows, LineLayout};
-use pitchleak_core::RlsError;
+use pitchleak_core::{AlarmState, RlsError};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -235,7 +235,10 @@ impl Cylinder {
                 t_s: alarm.time_s,
                 fault: alarm.fault,
                 state: alarm.state,
-                status: verdict.status,
+                status: match alarm.state {
+                    AlarmState::Raised => verdict.status_of(alarm.fault),
+                    AlarmState::Cleared => verdict.status,
+                },
                 leakage: leakage[alarm.fault].into(),
                 time_ns,
             }));

@@ -44,7 +44,7 @@ pub struct EstimateEvent {
     pub faults: Vec<Leak>,
     /// Mean leak flows since the start, or since `changed_at_s`.
     pub leakage: PerLeak<LiveLeakage>,
-    /// When the leak last changed at once, s.
+    /// When the leak last changed, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changed_at_s: Option<f64>,
     /// How fast each leak changes; none where the data don't tell.

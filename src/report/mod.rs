@@ -57,7 +57,7 @@ pub struct ReplayReport {
     pub episodes: Vec<Episode>,
     /// The episodes in short: those of a leak that follow one another closely are told as one.
     pub spells: Vec<Spell>,
-    /// When the leak last changed at once, s: the estimates then began anew.
+    /// When the leak last changed, s: the estimates then began anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changed_at_s: Option<f64>,
     /// In the order of time.

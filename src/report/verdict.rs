@@ -84,6 +84,8 @@ pub struct Findings<'a> {
     pub threshold_lpm: PerLeak<f64>,
     /// What was read.
     pub trace: &'a TraceSummary,
+    /// How sure a verdict has to be.
+    pub alpha: f64,
     /// Time of the last row, s.
     pub end_s: f64,
     /// Whether the estimator knows how good its figures are.
@@ -112,7 +114,8 @@ impl Findings<'_> {
                 Some(decision) if decision.status.is_sure() => decision.faults.contains(leak),
                 _ => self.active[*leak],
             };
-            now || comes_and_goes(self.episodes, *leak, self.end_s)
+            let is_there = self.decision.is_none_or(|decision| decision.present[*leak] >= 1.0 - self.alpha);
+            now || is_there && comes_and_goes(self.episodes, *leak, self.end_s)
         };
         Leak::ALL.into_iter().filter(is_fault).collect()
     }
@@ -132,6 +135,11 @@ impl Findings<'_> {
 const QUOTED_SHARE: f64 = 0.5;
 
 impl Verdict {
+    /// Of this leak alone: who is sure of another is not sure of it.
+    pub fn status_of(&self, leak: Leak) -> Status {
+        if self.status.is_sure() && !self.faults.contains(&leak) { Status::NotSure } else { self.status }
+    }
+
     /// The verdict on what was found.
     pub fn of(findings: &Findings<'_>) -> Self {
         let faults = findings.faults();
