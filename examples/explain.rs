@@ -1,6 +1,7 @@
 //! The posterior over explanations of a trace: `cargo run --example explain -- TRACE [RIG]`.
 
 use pitchleak::Rig;
+use pitchleak::core::PerLeak;
 use pitchleak::explain::{Statistic, explain};
 use pitchleak::trace::{Record, TraceReader};
 use std::path::Path;
@@ -20,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         statistic.push(record.step_s(), &record.sample);
     }
     let begun = Instant::now();
-    let decision = explain(&statistic, &rig).ok_or("too little to explain")?;
+    let decision = explain(&statistic, &rig, PerLeak::default()).ok_or("too little to explain")?;
     eprintln!("{:.1} ms", begun.elapsed().as_secs_f64() * 1e3);
     println!("{}", serde_json::to_string_pretty(&decision)?);
     Ok(())

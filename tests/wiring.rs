@@ -339,5 +339,5 @@ fn a_leak_is_no_zero_that_is_off() {
 fn decision(records: &[Record], rig: &Rig) -> Decision {
     let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
     records.iter().for_each(|record| statistic.push(record.step_s(), &record.sample));
-    pitchleak::explain::explain(&statistic, rig).unwrap()
+    pitchleak::explain::explain(&statistic, rig, PerLeak::default()).unwrap()
 }

@@ -88,7 +88,12 @@ impl Tables {
 }
 
 /// Weighs the whole table; `None` where there is too little to weigh.
-pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) -> Option<Vec<Weighed<'a>>> {
+pub(super) fn weigh<'a>(
+    statistic: &Statistic,
+    rig: &Rig,
+    tables: &'a Tables,
+    doubts_m3s: PerLeak<f64>,
+) -> Option<Vec<Weighed<'a>>> {
     let rows: f64 =
         (0..2).map(|c| statistic.segments().iter().map(|s| s.rows(c)).sum::<f64>()).fold(0.0, f64::max);
     if rows < LEAST_ROWS {
@@ -101,7 +106,8 @@ pub(super) fn weigh<'a>(statistic: &Statistic, rig: &Rig, tables: &'a Tables) ->
     let is_sound = mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least);
     let found_m3s = if is_sound { PerLeak::default() } else { mean_m3s };
     let products = products.worth(inflation);
-    let weighed = Pass::new(statistic, &products, rig, tables, found_m3s).weigh();
+    let last = Pass { doubts_m3s, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
+    let weighed = last.weigh();
     (!weighed.is_empty()).then_some(weighed)
 }
 
@@ -117,6 +123,8 @@ struct Pass<'a, 's> {
     rig: &'s Rig,
     tables: &'a Tables,
     found_m3s: PerLeak<f64>,
+    /// Spreads of the leaks beside what the trace leaves open.
+    doubts_m3s: PerLeak<f64>,
     sizes: Sizes,
     segments: usize,
     full_scale_m3s: f64,
@@ -149,6 +157,7 @@ impl<'a, 's> Pass<'a, 's> {
             rig,
             tables,
             found_m3s,
+            doubts_m3s: PerLeak::default(),
             sizes: Sizes {
                 seepage: table::USUAL_SEEPAGE * rig.alarms.threshold_m3s.internal / full_scale_m3s,
                 compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
@@ -316,8 +325,8 @@ impl<'a, 's> Pass<'a, 's> {
             .any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
     }
 
-    /// Other courses of the leaks, beside the best states. A leak that wanders may do all that the others do: where even that
-    /// raises the likelihood by too little, they need not be asked.
+    /// Other courses of the leaks, beside the best states. Leaks that wander or creep may do all that the others do: where even
+    /// that raises the likelihood by too little, they need not be asked.
     fn with_courses(&self, equations: &NormalEquations, states: &[State<'a>], all: &mut Vec<Scored<'a>>) {
         let mut best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let courses = self.courses();
@@ -326,13 +335,15 @@ impl<'a, 's> Pass<'a, 's> {
                 let Some(steady) = find(all, *state, subset) else { continue };
                 let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
                 let together = |course: LeakCourse| subset.map(|there| there.then_some(course));
-                let wandering = LeakCourse::Wandering;
-                let ln_wandering = self.tables.ln_course("wandering");
-                let free = self.score(equations, *state, together(wandering), ln_wandering);
-                let gain = (free.ln_likelihood - steady_likelihood).max(0.0) + BEYOND_WANDERING;
+                let mut most_likely = steady_likelihood;
+                for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
+                    let free = self.score(equations, *state, together(course), self.ln_course(course));
+                    most_likely = most_likely.max(free.ln_likelihood);
+                    best = best.max(free.ln_posterior);
+                    all.push(free);
+                }
+                let gain = most_likely - steady_likelihood + BEYOND_WANDERING;
                 let most = steady_ln - self.tables.ln_course("constant") + gain;
-                best = best.max(free.ln_posterior);
-                all.push(free);
                 for (course, ln_course) in &courses {
                     // The pressure across the seal changes sign: what opens at one is no line of it.
                     let is_line = !(subset[0] && *course == LeakCourse::Cracking);
@@ -353,7 +364,12 @@ impl<'a, 's> Pass<'a, 's> {
         }
     }
 
-    /// Courses of leaks beside being constant and wandering, with their priors.
+    /// Of leaks that wander or creep.
+    fn ln_course(&self, course: LeakCourse) -> f64 {
+        self.tables.ln_course(if course == LeakCourse::Creeping { "creeping" } else { "wandering" })
+    }
+
+    /// Courses of leaks beside these and being constant, with their priors.
     fn courses(&self) -> Vec<(LeakCourse, f64)> {
         let borders = self.segments.saturating_sub(1);
         let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
@@ -361,7 +377,6 @@ impl<'a, 's> Pass<'a, 's> {
             (LeakCourse::Orifice, self.tables.ln_course("orifice")),
             (LeakCourse::Cracking, self.tables.ln_course("cracking")),
             (LeakCourse::Growing, self.tables.ln_course("growing")),
-            (LeakCourse::Creeping, self.tables.ln_course("creeping")),
         ];
         courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
         courses
@@ -580,9 +595,10 @@ impl<'a, 's> Pass<'a, 's> {
             // The mean size of a pressure of changing sign follows a zero by an unknown share.
             let spread = if leak == 0 { f64::hypot(sheet, zero) } else { sheet };
             for (index, (out, point)) in out.iter_mut().zip(points).enumerate() {
-                let off = spread * normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
-                let pressure = lately * (1.0 + zero + off);
-                out[leak] = (flow(point) * pressure).max(0.0) * self.full_scale_m3s;
+                let normal = normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
+                let doubt = self.doubts_m3s[Leak::ALL[leak]] * normal_quantile(uniform((index * 59) % POINTS, 11 + leak));
+                let pressure = lately * (1.0 + zero + spread * normal);
+                out[leak] = (flow(point) * pressure * self.full_scale_m3s + doubt).max(0.0);
             }
         }
         out

@@ -248,20 +248,15 @@ impl Replay {
 
     /// What explains the records so far; none where they are too few.
     pub fn decision(&self) -> Option<Decision> {
-        let mut decision = self.knows_noise().then(|| explain(&self.statistic, &self.rig)).flatten()?;
-        for (leak, doubt_lpm) in self.effect_doubts_lpm() {
-            let belief = &mut decision.leakage[leak];
-            belief.std_lpm = belief.std_lpm.hypot(doubt_lpm);
-        }
-        Some(decision)
+        self.knows_noise().then(|| explain(&self.statistic, &self.rig, self.effect_doubts_m3s())).flatten()
     }
 
-    /// What the uncertainty of the rig file's effects adds to the leaks' spreads, L/min.
-    fn effect_doubts_lpm(&self) -> PerLeak<f64> {
+    /// What the uncertainty of the rig file's effects adds to the leaks' spreads, m³/s.
+    fn effect_doubts_m3s(&self) -> PerLeak<f64> {
         let pressures = self.pressures.sizes();
         let certain = self.estimator.leak_flows_m3s(&pressures).unwrap_or_default();
         let doubt = |(wide, certain): (Estimate<f64>, Estimate<f64>)| {
-            LPM_PER_M3S * (wide.std.powi(2) - certain.std.powi(2)).max(0.0).sqrt()
+            (wide.std.powi(2) - certain.std.powi(2)).max(0.0).sqrt()
         };
         self.leak_flows_m3s(&pressures).zip(certain).map(doubt)
     }

@@ -99,7 +99,7 @@ impl Replay {
             Some(decision) if decision.pressures_pa[leak] > 0.0 => {
                 let per_pa = 1.0 / (LPM_PER_M3S * decision.pressures_pa[leak]);
                 let found = decision.leakage[leak].estimate_lpm().scaled(per_pa);
-                // The effects of the rig file part a flow between its laws.
+                // Effects of the rig file part a flow between its laws: its sum is known better than they are.
                 let (wide, certain) = (coefficients[leak].std, certain[leak].std);
                 let doubt = (wide * wide - certain * certain).max(0.0).sqrt();
                 Estimate { std: found.std.hypot(doubt), ..found }

@@ -137,10 +137,10 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let changed = findings.changed_at_s.map(|at_s| {
         let at = findings.trace.time(at_s, 2);
         match findings.restarts_in_all {
-            0 | 1 => format!("The leaks changed at once at {at}: figures are those since then."),
+            0 | 1 => format!("The leaks changed at {at}: figures are those since then."),
             restarts => {
                 format!(
-                    "The leaks changed at once {restarts} times, last at {at}: figures are those since then."
+                    "The leaks changed {restarts} times, last at {at}: figures are those since then."
                 )
             }
         }

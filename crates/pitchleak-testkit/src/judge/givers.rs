@@ -128,7 +128,7 @@ fn explained(trace: &[u8], rig: &Rig) -> Result<Option<(Decision, f64)>, TraceEr
     while reader.next_record(&mut record)? {
         statistic.push(record.step_s(), &record.sample);
     }
-    Ok(explain(&statistic, rig).map(|decision| (decision, record.t_s)))
+    Ok(explain(&statistic, rig, PerLeak::default()).map(|decision| (decision, record.t_s)))
 }
 
 fn of_decision(decision: &Decision, end_s: f64) -> Given {
