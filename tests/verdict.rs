@@ -93,7 +93,8 @@ fn a_leak_that_grew_and_stays_is_a_leak_and_no_zero() {
     // Who leaves zeros undeclared may have them wherever a data sheet does.
     let mut declared = rig(1e-2);
     (declared.instruments.flow_a.bias, declared.instruments.flow_b.bias) = (1e-4, 1e-4);
-    let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace)), &declared).expect("opens");
+    let mut reader =
+        TraceReader::from_stream("trace", Box::new(Cursor::new(trace)), &declared).expect("opens");
     let report = replay(&mut reader, &declared, |_, _, _| Ok::<_, ReplayError>(())).expect("is read");
     assert_eq!(report.verdict.status, Status::Leak, "{}", report.verdict.text);
     let last = shown.last().expect("has rows");
@@ -101,7 +102,10 @@ fn a_leak_that_grew_and_stays_is_a_leak_and_no_zero() {
     let found = report.estimates.external_leak_a_coefficient.value;
     let [low, high] = report.estimates.external_leak_a_coefficient.ci95.expect("is known");
     let text = &report.verdict.text;
-    assert!((found / truth - 1.0).abs() < 0.1 && (low..high).contains(&truth), "{found} of {truth} m³/(s·Pa): {text}");
+    assert!(
+        (found / truth - 1.0).abs() < 0.1 && (low..high).contains(&truth),
+        "{found} of {truth} m³/(s·Pa): {text}"
+    );
     assert!(report.verdict.explanations[0].cause.is_empty(), "{:?}", report.verdict.explanations);
 }
 

@@ -202,8 +202,7 @@ impl Marginal {
 
     /// The same where a leak had been as probable as none before the trace: that leaks are rare is no finding of this trace.
     fn above_at_even_odds(&self, threshold_m3s: f64) -> f64 {
-        let even =
-            |flow: &Flow| flow.weight * if flow.is_leak { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
+        let even = |flow: &Flow| flow.weight * if flow.is_leak { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
         self.sum(|flow| if flow.m3s > threshold_m3s { even(flow) } else { 0.0 }) / self.sum(even)
     }
 

@@ -154,7 +154,9 @@ fn combine(kind: &[PerChamber; 2], shares: [f64; 2]) -> Sparse {
 
 /// A combination's square under these products.
 fn square(one: &Sparse, products: &[f64]) -> f64 {
-    one.iter().flat_map(|(i, by)| one.iter().map(move |(j, also)| by * also * products[i * COLUMNS + j])).sum()
+    one.iter()
+        .flat_map(|(i, by)| one.iter().map(move |(j, also)| by * also * products[i * COLUMNS + j]))
+        .sum()
 }
 
 fn accumulate(sum: &mut [f64], columns: &[Sparse], products: &[f64]) {

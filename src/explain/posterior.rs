@@ -596,7 +596,8 @@ impl<'a, 's> Pass<'a, 's> {
             let spread = if leak == 0 { f64::hypot(sheet, zero) } else { sheet };
             for (index, (out, point)) in out.iter_mut().zip(points).enumerate() {
                 let normal = normal_quantile(uniform((index * 197) % POINTS, 8 + leak));
-                let doubt = self.doubts_m3s[Leak::ALL[leak]] * normal_quantile(uniform((index * 59) % POINTS, 11 + leak));
+                let doubt = self.doubts_m3s[Leak::ALL[leak]]
+                    * normal_quantile(uniform((index * 59) % POINTS, 11 + leak));
                 let pressure = lately * (1.0 + zero + spread * normal);
                 out[leak] = (flow(point) * pressure * self.full_scale_m3s + doubt).max(0.0);
             }

@@ -102,7 +102,8 @@ impl RawProducts {
         let later = || self.segments.iter().skip(from);
         let time_s: f64 = later().map(|segment| segment.time_s).sum();
         PerLeak::from_fn(|leak| {
-            later().map(|segment| segment.time_s * segment.pressures_pa[leak]).sum::<f64>() / time_s.max(LEAST_TIME_S)
+            later().map(|segment| segment.time_s * segment.pressures_pa[leak]).sum::<f64>()
+                / time_s.max(LEAST_TIME_S)
         })
     }
 }

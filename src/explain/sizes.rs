@@ -1,6 +1,7 @@
 //! How large what is not as declared is, in people's units.
 
 use super::columns::Column;
+use super::readings::Mistake;
 use super::table::Entry;
 use crate::report::with_interval;
 use crate::rig::Rig;
@@ -12,6 +13,10 @@ pub(super) type Found = (Column, Estimate<f64>);
 
 /// An entry's sentence with the sizes of its columns.
 pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
+    if let Some(Mistake::Factor(_, factor) | Mistake::Area(_, factor)) = entry.mistake {
+        let (times, way) = if factor > 1.0 { (factor, "large") } else { (1.0 / factor, "small") };
+        return format!("{}: {} times too {way}", entry.text, (100.0 * times).round() / 100.0);
+    }
     let own = entry.free.iter().filter_map(|(column, _, _)| {
         let (_, size) = found.iter().find(|(known, _)| known == column)?;
         Some((*column, *size))

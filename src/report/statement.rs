@@ -139,9 +139,7 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
         match findings.restarts_in_all {
             0 | 1 => format!("The leaks changed at {at}: figures are those since then."),
             restarts => {
-                format!(
-                    "The leaks changed {restarts} times, last at {at}: figures are those since then."
-                )
+                format!("The leaks changed {restarts} times, last at {at}: figures are those since then.")
             }
         }
     });

@@ -112,7 +112,8 @@ proptest! {
         // At resonance the piston slams with thousands of bar; oil pressed above β is let go.
         prop_assume!(most < 0.9 * model.fluid.bulk_modulus_pa);
         let after = oil_m3(&plant, &state);
-        prop_assert!(least >= -1e5 && most_vapour > 0.0, "least pressure {least}, vapour {most_vapour}");
+        // Oil may reach the least pressure in the very step that ends the pull.
+        prop_assert!(least >= -1e5 && (most_vapour > 0.0 || least <= -1e5), "least pressure {least}, vapour {most_vapour}");
         prop_assert!((after.0 / before.0 - 1.0).abs() < 1e-9 && (after.1 / before.1 - 1.0).abs() < 1e-9,
             "{before:?} {after:?}");
     }

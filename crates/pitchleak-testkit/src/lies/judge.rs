@@ -166,12 +166,16 @@ fn names(said: &Said, lie: &Lie) -> bool {
     if id == "explanation" {
         return said.explanation.as_ref().is_some_and(|best| best.contains(words));
     }
-    said.reasons.iter().any(|reason| reason.id.name() == id && reason.text.contains(words))
+    said.reasons.iter().any(|reason| reason.id.name() == id && has_any(&reason.text, words))
+}
+
+fn has_any(text: &str, words: &str) -> bool {
+    words.split('|').any(|words| text.contains(words))
 }
 
 /// Whether the message that refuses a trace names the fault.
 fn has_words(said: &str, lie: &Lie) -> bool {
-    lie.named.is_some_and(|[_, words]| said.contains(words))
+    lie.named.is_some_and(|[_, words]| has_any(said, words))
 }
 
 /// The trace as CSV, as users have it, and the truth up to its last row.
