@@ -2,12 +2,14 @@
 //!
 //! docs/explanations.md has the equations; the table of explanations is data.
 
+mod candidates;
 mod columns;
 mod decision;
 mod equations;
 mod evidence;
 mod hypothesis;
 mod independence;
+mod leak_sample;
 mod orthant;
 mod posterior;
 mod raw_products;
