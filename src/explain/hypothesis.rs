@@ -4,6 +4,7 @@ use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::Free;
 use super::table::{Entry, LEAK_CREEP, LEAK_SHARE, LEAK_SIZE, LEAK_STEP, USUAL};
+use pitchleak_core::{Leak, PerLeak};
 use std::f64::consts::LN_2;
 
 /// How a leak goes along the trace.
@@ -90,8 +91,8 @@ impl State<'_> {
 /// What the rig file declares of sizes, in the columns' units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sizes {
-    /// What a sound seal lets past, share of full scale.
-    pub seepage: f64,
+    /// What seeps where nothing leaks, share of full scale.
+    pub seepage: PerLeak<f64>,
     pub compressibility: f64,
     pub zeros: [f64; 2],
     pub gains: [f64; 2],
@@ -132,13 +133,13 @@ impl<'a> Hypothesis<'a> {
             ends: Default::default(),
         };
         for (leak, course) in leaks.iter().enumerate() {
-            if let Some(course) = course {
-                own.ln_prior += (LEAK_SHARE / (1.0 - LEAK_SHARE)).ln();
-                own.add_leak(equations, leak, *course, segments);
+            match course {
+                Some(course) => {
+                    own.ln_prior += (LEAK_SHARE / (1.0 - LEAK_SHARE)).ln();
+                    own.add_leak(equations, leak, *course, segments);
+                }
+                None => own.add_seepage(equations, leak, sizes.seepage[Leak::ALL[leak]]),
             }
-        }
-        if leaks[0].is_none() {
-            own.add_seepage(equations, sizes.seepage);
         }
         own.ln_prior += own.positive.len() as f64 * LN_2;
         own
@@ -154,12 +155,12 @@ impl<'a> Hypothesis<'a> {
         self.leaks.iter().map(border).max().unwrap_or(0)
     }
 
-    fn add_seepage(&mut self, equations: &NormalEquations, std: f64) {
-        if let Some(column) = equations.place(Column::LeakInternal, Course::Constant) {
+    fn add_seepage(&mut self, equations: &NormalEquations, leak: usize, std: f64) {
+        if let Some(column) = equations.place(LEAK_COLUMNS[leak], Course::Constant) {
             let at = self.free.len();
             self.free.push(Free { column, std });
             self.positive.push(at);
-            self.ends[0].push((at, 1.0));
+            self.ends[leak].push((at, 1.0));
         }
     }
 

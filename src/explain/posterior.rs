@@ -150,7 +150,7 @@ impl<'a, 's> Pass<'a, 's> {
             found_m3s,
             doubts_m3s: PerLeak::default(),
             sizes: Sizes {
-                seepage: table::USUAL_SEEPAGE * rig.alarms.threshold_m3s.internal / full_scale_m3s,
+                seepage: rig.alarms.threshold_m3s.map(|fault| table::USUAL_SEEPAGE * fault / full_scale_m3s),
                 compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
                 zeros: flows.map(|flow| flow.bias),
                 gains: flows.map(|flow| flow.gain),

@@ -29,7 +29,7 @@ pub(super) const LEAK_SIZE: f64 = 0.05;
 pub(super) const LEAK_STEP: f64 = 0.02;
 /// The same of a leak that changes little by little. A guess.
 pub(super) const LEAK_CREEP: f64 = 0.005;
-/// What a sound seal lets past, half normal, share of what is a fault: no cylinder is tight. A guess.
+/// What seeps where nothing leaks, half normal, share of what is a fault: no seal is tight, and few fittings are. A guess.
 pub(super) const USUAL_SEEPAGE: f64 = 0.3;
 /// Zero of a meter that declares none: a tenth of the usual accuracy of 1 % of full scale. A guess.
 const USUAL_ZERO: f64 = 0.001;
