@@ -64,7 +64,7 @@ fn a_page_of_a_replay_has_all_its_parts() {
     assert_complete_in_itself(&page);
     let parts = [
         "LEAK</h1>",
-        "External A leak of 0.50",
+        "External A leak of 0.5",
         "What to do",
         "What this trace does not tell",
         "id=\"leaks\"",
