@@ -20,7 +20,7 @@ fn main() {
         let accuracies: Vec<f64> = accuracies.iter().filter_map(|a| a.parse().ok()).collect();
         return on_its_way::print(&accuracies, &seeds);
     }
-    let outcomes = sweep(&ACCURACIES, &WindCase::ALL, seeds);
+    let outcomes = sweep(&ACCURACIES, &WindCase::ALL, seeds, 1);
     print!("{}", summary(&outcomes));
     for file in arguments.iter().filter(|a| a.ends_with(".csv")) {
         if let Err(error) = std::fs::write(file, csv(&outcomes)) {

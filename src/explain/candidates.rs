@@ -4,251 +4,278 @@ use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, LeakCourse, State, Subset, subsets};
-use super::posterior::{LEAST_LN, Pass, Scored};
-use super::readings::{Mistake, Of};
+use super::mended::Mended;
+use super::pass::Pass;
 use super::table::{self, Entry, USUAL};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
 const BEYOND_WANDERING: f64 = 2.0;
 /// States of sensors and rig, best first, beside which pairs of leaks have courses of their own; numerical.
 const STATES_WITH_PAIRS: usize = 3;
+/// States of sensors and rig beside which other courses of leaks are tried; numerical.
+const STATES_WITH_COURSES: usize = 5;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
 
-impl<'a> Pass<'a, '_> {
+/// How each leak goes, as far as it is there.
+type Leaks = [Option<LeakCourse>; 3];
+
+/// An explanation and its evidence before leaks are cut at zero.
+pub(super) struct Scored<'a> {
+    pub hypothesis: Hypothesis<'a>,
+    pub ln_posterior: f64,
+    ln_likelihood: f64,
+    scales: [f64; 2],
+    /// Among the equations of this mistake of wiring, or the declared.
+    pub wiring: usize,
+}
+
+/// Explanations as they are found.
+pub(super) struct Candidates<'a, 'p> {
+    pass: &'p Pass<'a, 'p>,
+    /// Of the readings as declared.
+    declared: &'p NormalEquations,
+    all: Vec<Scored<'a>>,
+}
+
+impl<'a, 'p> Candidates<'a, 'p> {
     /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
-    pub(super) fn constant(&self, equations: &NormalEquations) -> Vec<Scored<'a>> {
-        let mut all = Vec::new();
-        let declared = self.sizes.zeros.iter().all(|zero| *zero > 0.0);
-        for (rank, zeros) in self.tables.zeros.iter().enumerate() {
+    pub fn with_constant_leaks(pass: &'p Pass<'a, 'p>, declared: &'p NormalEquations) -> Self {
+        let mut own = Self { pass, declared, all: Vec::new() };
+        let knows_zeros = pass.sizes.zeros.iter().all(|zero| *zero > 0.0);
+        for (rank, zeros) in pass.tables.zeros.iter().enumerate() {
             // Who declares zeros knows them: they fail, but are not slightly off.
-            if declared && zeros.id == "flow_zeros" {
+            if knows_zeros && zeros.id == "flow_zeros" {
                 continue;
             }
-            for (place, departure) in self.departures().into_iter().enumerate() {
-                for wander in &self.tables.wanders {
+            for (place, departure) in pass.departures().into_iter().enumerate() {
+                for wander in &pass.tables.wanders {
                     if wander.0 > 0.0 && (rank > 1 || place > 1) {
                         continue;
                     }
-                    let state = State { zeros, departure, wander: *wander };
-                    for subset in subsets() {
-                        // A pressure's gain acts through the leak past the piston.
-                        if departure.is_through_seal() && !subset[0] {
-                            continue;
-                        }
-                        let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
-                        let ln_course =
-                            if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
-                        all.push(self.score(equations, state, leaks, ln_course));
-                    }
+                    own.add_constant_leaks(State { zeros, departure, wander: *wander });
                 }
             }
         }
-        all
+        own
     }
 
-    fn score(
-        &self,
-        equations: &NormalEquations,
-        state: State<'a>,
-        leaks: [Option<LeakCourse>; 3],
-        ln_course: f64,
-    ) -> Scored<'a> {
-        let hypothesis = Hypothesis::new(equations, &self.sizes, self.segments, state, leaks, ln_course);
-        self.scored(equations, hypothesis)
+    fn add_constant_leaks(&mut self, state: State<'a>) {
+        for subset in subsets() {
+            // A pressure's gain acts through the leak past the piston.
+            if state.departure.is_through_seal() && !subset[0] {
+                continue;
+            }
+            self.add(state, together(subset, LeakCourse::Constant), self.ln_constant(subset));
+        }
     }
 
-    fn scored(&self, equations: &NormalEquations, hypothesis: Hypothesis<'a>) -> Scored<'a> {
-        let fit = fit(equations, &hypothesis.free);
-        let ln_posterior = if self.has_impossible_gain(equations, &hypothesis, &fit) {
-            f64::NEG_INFINITY
-        } else {
-            fit.ln_evidence + hypothesis.ln_prior + equations.ln_chance(fit.scales)
-        };
-        Scored { hypothesis, ln_posterior, ln_likelihood: fit.ln_likelihood, wiring: 0 }
+    /// Best first.
+    pub fn best_first(mut self) -> Vec<Scored<'a>> {
+        self.sort();
+        self.all
     }
 
-    fn has_impossible_gain(
-        &self,
-        equations: &NormalEquations,
-        hypothesis: &Hypothesis<'_>,
-        fit: &Fit,
-    ) -> bool {
-        let gains =
-            [Column::GainA, Column::GainB, Column::Gains, Column::AreaA, Column::AreaB, Column::PositionGain];
-        let places = gains.map(|gain| equations.place(gain, Course::Constant));
-        hypothesis
-            .free
-            .iter()
-            .zip(&fit.means)
-            .any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
+    fn sort(&mut self) {
+        self.all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     }
 
-    /// Other courses of the leaks, beside the best states. Leaks that wander or creep may do all that the others do: where even
-    /// that raises the likelihood by too little, they need not be asked.
-    pub(super) fn with_courses(
-        &self,
-        equations: &NormalEquations,
-        states: &[State<'a>],
-        all: &mut Vec<Scored<'a>>,
-    ) {
-        let mut best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-        let courses = self.courses();
-        for (rank, state) in states.iter().enumerate() {
+    fn best_ln(&self) -> f64 {
+        self.all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Prior of constant leaks.
+    fn ln_constant(&self, subset: Subset) -> f64 {
+        if subset == [false; 3] { 0.0 } else { self.pass.tables.ln_course(LeakCourse::Constant) }
+    }
+
+    /// Its ln posterior and ln likelihood.
+    fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> (f64, f64) {
+        let hypothesis =
+            Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course);
+        let scored = Scored::new(self.declared, hypothesis);
+        let found = (scored.ln_posterior, scored.ln_likelihood);
+        self.all.push(scored);
+        found
+    }
+
+    /// Other courses of the leaks, beside the best states, as far as they can be within `least_ln` of the best.
+    pub fn add_courses(&mut self, least_ln: f64) {
+        self.sort();
+        let mut best = self.best_ln();
+        for (rank, state) in best_states(&self.all).into_iter().enumerate() {
             for subset in subsets().skip(1) {
-                let Some(steady) = find(all, *state, subset) else { continue };
-                let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
-                let together = |course: LeakCourse| subset.map(|there| there.then_some(course));
-                let mut most_likely = steady_likelihood;
-                for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
-                    let free = self.score(equations, *state, together(course), self.ln_course(course));
-                    most_likely = most_likely.max(free.ln_likelihood);
-                    best = best.max(free.ln_posterior);
-                    all.push(free);
-                }
-                let gain = most_likely - steady_likelihood + BEYOND_WANDERING;
-                let most = steady_ln - self.tables.ln_course("constant") + gain;
-                for (course, ln_course) in &courses {
+                let Some(most) = self.add_free_courses(state, subset, &mut best) else { continue };
+                let least = |best: f64| best - least_ln;
+                for (course, ln_course) in self.pass.courses() {
                     // The pressure across the seal changes sign: what opens at one is no line of it.
-                    let is_line = !(subset[0] && *course == LeakCourse::Cracking);
+                    let is_line = !(subset[0] && course == LeakCourse::Cracking);
                     let by_pressure = matches!(course, LeakCourse::Orifice | LeakCourse::Cracking);
-                    if is_line && (by_pressure || most + ln_course > best - LEAST_LN) {
-                        let scored = self.score(equations, *state, together(*course), *ln_course);
-                        best = best.max(scored.ln_posterior);
-                        all.push(scored);
+                    if is_line && (by_pressure || most + ln_course > least(best)) {
+                        best = best.max(self.add(state, together(subset, course), ln_course).0);
                     }
                 }
-                if rank < STATES_WITH_PAIRS
-                    && state.wander.0 <= 0.0
-                    && subset.iter().filter(|leak| **leak).count() == 2
-                {
-                    self.with_pairs(equations, *state, subset, most, &mut best, all);
+                let are_two = subset.iter().filter(|leak| **leak).count() == 2;
+                if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && are_two {
+                    self.add_pairs(state, subset, most, &mut best, least_ln);
                 }
             }
         }
     }
 
-    /// Of leaks that wander or creep.
-    fn ln_course(&self, course: LeakCourse) -> f64 {
-        self.tables.ln_course(if course == LeakCourse::Creeping { "creeping" } else { "wandering" })
-    }
-
-    /// Courses of leaks beside these and being constant, with their priors.
-    fn courses(&self) -> Vec<(LeakCourse, f64)> {
-        let borders = self.segments.saturating_sub(1);
-        let sudden = self.tables.ln_course("sudden") - (borders.max(1) as f64).ln();
-        let mut courses = vec![
-            (LeakCourse::Orifice, self.tables.ln_course("orifice")),
-            (LeakCourse::Cracking, self.tables.ln_course("cracking")),
-            (LeakCourse::Growing, self.tables.ln_course("growing")),
-        ];
-        courses.extend((1..self.segments).map(|border| (LeakCourse::Sudden(border), sudden)));
-        courses
+    /// Leaks that wander or creep may do all that the others do: returns what a course without its prior may reach at the most.
+    /// Where even that raises the likelihood by too little, it need not be asked.
+    fn add_free_courses(&mut self, state: State<'a>, subset: Subset, best: &mut f64) -> Option<f64> {
+        let steady = find(&self.all, state, subset)?;
+        let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
+        let mut most_likely = steady_likelihood;
+        for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
+            let ln_course = self.pass.tables.ln_course(course);
+            let (ln_posterior, ln_likelihood) = self.add(state, together(subset, course), ln_course);
+            most_likely = most_likely.max(ln_likelihood);
+            *best = best.max(ln_posterior);
+        }
+        let gain = most_likely - steady_likelihood + BEYOND_WANDERING;
+        Some(steady_ln - self.pass.tables.ln_course(LeakCourse::Constant) + gain)
     }
 
     /// Two leaks each with a course of its own, where those can be as probable as the best.
-    fn with_pairs(
-        &self,
-        equations: &NormalEquations,
-        state: State<'a>,
-        subset: Subset,
-        most: f64,
-        best: &mut f64,
-        all: &mut Vec<Scored<'a>>,
-    ) {
-        let mut courses = self.courses();
+    fn add_pairs(&mut self, state: State<'a>, subset: Subset, most: f64, best: &mut f64, least_ln: f64) {
+        let mut courses = self.pass.courses();
         courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
-        courses.push((LeakCourse::Constant, self.tables.ln_course("constant")));
+        courses.push((LeakCourse::Constant, self.pass.tables.ln_course(LeakCourse::Constant)));
         let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
         for (course, ln_one) in &courses {
             for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                if most + ln_one + ln_other <= *best - LEAST_LN {
+                if most + ln_one + ln_other <= *best - least_ln {
                     continue;
                 }
                 let mut leaks = [None; 3];
                 (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
-                let scored = self.score(equations, state, leaks, ln_one + ln_other);
-                *best = best.max(scored.ln_posterior);
-                all.push(scored);
+                *best = best.max(self.add(state, leaks, ln_one + ln_other).0);
             }
         }
     }
 
-    /// Mistakes of wiring, beside slightly wrong zeros and constant leaks.
-    pub(super) fn with_mistakes(
-        &self,
-        declared: &NormalEquations,
-        all: &mut Vec<Scored<'a>>,
-    ) -> Vec<NormalEquations> {
-        let mut columns = vec![(Column::LeftSide, Course::Constant)];
-        columns
-            .extend(USUAL.iter().filter(|usual| usual.1 == Course::Constant).map(|usual| (usual.0, usual.1)));
-        columns.extend(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)));
+    /// Mistakes of wiring, beside slightly wrong zeros and constant leaks; their equations.
+    pub fn add_mistakes(&mut self, least_ln: f64) -> Vec<Mended> {
+        let tables = self.pass.tables;
         let (Some(zeros), Some(departure), Some(wander)) =
-            (self.tables.zeros.get(1), self.tables.departures.first(), self.tables.wanders.first())
+            (tables.zeros.get(1), tables.departures.first(), tables.wanders.first())
         else {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander };
-        let best = all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-        let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
-        let whole = self.products.whole();
-        let ln_wired = table::ln_wired(&self.tables.mistakes);
+        let least = self.best_ln() - least_ln;
+        let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
+        let scales = best.map_or([1.0; 2], |best| best.scales);
+        let whole = self.pass.products.whole();
+        let columns = steady_columns();
+        let ln_wired = table::ln_wired(&tables.mistakes);
         let mut kept = Vec::new();
-        for entry in self.tables.mistakes.iter().filter(|entry| self.is_told(entry)) {
-            let ln_jacobian = entry.mistake.map_or(0.0, Mistake::ln_jacobian);
-            let mended = self.equations(&whole, Some(entry), &columns);
-            let (equations, ln_measure) = mended.measured_as(declared, ln_jacobian);
-            let ln_prior = entry.share.ln() - ln_wired + ln_measure;
-            let mut none_ln = f64::NEG_INFINITY;
-            for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
-                let leaks = subset.map(|there| there.then_some(LeakCourse::Constant));
-                let ln_course = if subset == [false; 3] { 0.0 } else { self.tables.ln_course("constant") };
-                let mut hypothesis = Hypothesis::new(
-                    &equations,
-                    &self.sizes,
-                    self.segments,
-                    state,
-                    leaks,
-                    ln_course + ln_prior,
-                );
-                hypothesis.wiring = Some(entry);
-                let mut scored = self.scored(&equations, hypothesis);
-                scored.wiring = kept.len() + 1;
-                // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
-                if subset == [false; 3] {
-                    none_ln = scored.ln_posterior - scored.ln_likelihood;
-                }
-                let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < best - LEAST_LN;
-                all.push(scored);
-                if hopeless {
-                    break;
-                }
-            }
-            kept.push(equations);
+        for entry in tables.mistakes.iter().filter(|entry| self.pass.tells(entry)) {
+            let Some(mistake) = entry.mistake else { continue };
+            let equations = self.pass.equations(&whole, Some(entry), &columns);
+            let mended = Mended::new(equations, self.declared, mistake, scales);
+            let ln_prior = entry.share.ln() - ln_wired + mended.ln_measure;
+            self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
+            kept.push(mended);
         }
         kept
     }
 
-    /// Readings without any scatter are of every unit.
-    fn is_told(&self, entry: &Entry) -> bool {
-        let Some(Mistake::Factor(of, _)) = entry.mistake else { return true };
-        let scatter = self.statistic.scatter();
-        let has = |channel: usize| scatter[channel].is_some_and(|std| std > 0.0);
-        match of {
-            Of::Position => has(0),
-            Of::PressureA => has(1),
-            Of::PressureB => has(2),
-            Of::Pressures => has(1) && has(2),
-            Of::FlowA => has(3),
-            Of::FlowB => has(4),
-            Of::Flows => has(3) && has(4),
+    /// A mistake with each set of leaks, unless no leak can make it as probable as `least`.
+    fn add_mistake(&mut self, mended: &Mended, mistaken: Mistaken<'a>, least: f64) {
+        let Mistaken { entry, state, ln_prior, wiring } = mistaken;
+        let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
+        let mut none_ln = f64::NEG_INFINITY;
+        for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
+            let leaks = together(subset, LeakCourse::Constant);
+            let ln_prior = self.ln_constant(subset) + ln_prior;
+            let (sizes, segments) = (&self.pass.sizes, self.pass.segments);
+            let mut hypothesis = Hypothesis::new(&mended.equations, sizes, segments, state, leaks, ln_prior);
+            hypothesis.wiring = Some(entry);
+            let mut scored = Scored::new(&mended.equations, hypothesis);
+            scored.wiring = wiring;
+            scored.ln_posterior += mended.ln_chance(scored.scales);
+            // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
+            if subset == [false; 3] {
+                none_ln = scored.ln_posterior - scored.ln_likelihood;
+            }
+            let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < least;
+            self.all.push(scored);
+            if hopeless {
+                break;
+            }
         }
     }
 }
 
+/// A mistake of wiring as it is weighed.
+struct Mistaken<'a> {
+    entry: &'a Entry,
+    state: State<'a>,
+    ln_prior: f64,
+    wiring: usize,
+}
+
+impl<'a> Scored<'a> {
+    fn new(equations: &NormalEquations, hypothesis: Hypothesis<'a>) -> Self {
+        let Fit { ln_evidence, ln_likelihood, scales, means, .. } = fit(equations, &hypothesis.free);
+        let ln_posterior = if has_impossible_gain(equations, &hypothesis, &means) {
+            f64::NEG_INFINITY
+        } else {
+            ln_evidence + hypothesis.ln_prior
+        };
+        Self { hypothesis, ln_posterior, ln_likelihood, scales, wiring: 0 }
+    }
+}
+
+fn has_impossible_gain(equations: &NormalEquations, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
+    let gains =
+        [Column::GainA, Column::GainB, Column::Gains, Column::AreaA, Column::AreaB, Column::PositionGain];
+    let places = gains.map(|gain| equations.place(gain, Course::Constant));
+    let mut free = hypothesis.free.iter().zip(means);
+    free.any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
+}
+
+/// All that is free beside a mistake of wiring.
+fn steady_columns() -> Vec<(Column, Course)> {
+    let usual = USUAL.iter().map(|(column, course, _)| (*column, *course));
+    std::iter::once((Column::LeftSide, Course::Constant))
+        .chain(usual.filter(|(_, course)| *course == Course::Constant))
+        .chain(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)))
+        .collect()
+}
+
+/// These leaks on one course.
+fn together(subset: Subset, course: LeakCourse) -> Leaks {
+    subset.map(|there| there.then_some(course))
+}
+
 /// These leaks, steady, in this state.
 fn find<'b, 'a>(all: &'b [Scored<'a>], state: State<'a>, subset: Subset) -> Option<&'b Scored<'a>> {
-    let steady = subset.map(|there| there.then_some(LeakCourse::Constant));
+    let steady = together(subset, LeakCourse::Constant);
     all.iter().find(|scored| scored.hypothesis.leaks == steady && scored.hypothesis.state == state)
+}
+
+/// The states of best evidence, each once, of explanations best first, and as-declared with usual and slight zeros.
+fn best_states<'a>(all: &[Scored<'a>]) -> Vec<State<'a>> {
+    let mut states: Vec<State<'a>> = Vec::new();
+    for scored in all.iter() {
+        if states.len() < STATES_WITH_COURSES && !states.contains(&scored.hypothesis.state) {
+            states.push(scored.hypothesis.state);
+        }
+    }
+    let plain = all.iter().map(|scored| scored.hypothesis.state).filter(|state| {
+        state.wander.0 <= 0.0
+            && state.departure.id == "as_declared"
+            && ["zeros_usual", "flow_zeros"].contains(&state.zeros.id)
+    });
+    for state in plain {
+        if !states.contains(&state) {
+            states.push(state);
+        }
+    }
+    states
 }

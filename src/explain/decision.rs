@@ -1,7 +1,9 @@
 //! What the posterior says of the leaks, and what an operator acts on.
 
 use super::hypothesis::{LeakCourse, State};
-use super::posterior::{Tables, Weighed, weigh};
+use super::leak_sample::Weighed;
+use super::pass::Tables;
+use super::posterior::weigh;
 use super::raw_products::Statistic;
 use super::sizes::{mended, sentence};
 use super::table::{Entry, LEAK_SHARE};
@@ -129,7 +131,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let probability = PerLeak::from_fn(|leak| beliefs[leak].above(threshold_m3s[leak]));
     let wiring = mass(&|one| one.hypothesis.wiring.is_some());
     let wander = mass(&|one| one.hypothesis.state.wander.0 > 0.0);
-    let misfit = weighed.iter().map(|one| one.probability * one.misfit).sum();
+    let misfit = weighed.iter().map(|one| one.probability * one.misfits[0].max(one.misfits[1])).sum();
     let is_ruled_out = |leak: &Leak| {
         wander < WANDER_DOUBT && beliefs[*leak].above_at_even_odds(threshold_m3s[*leak]) <= alpha
     };
@@ -369,17 +371,10 @@ fn id(one: &Weighed<'_>) -> String {
     let hypothesis = &one.hypothesis;
     let mut parts: Vec<String> = Vec::new();
     for (leak, course) in Leak::ALL.iter().zip(hypothesis.leaks) {
-        let name = match course {
-            None => continue,
-            Some(LeakCourse::Constant) => leak.id().to_owned(),
-            Some(LeakCourse::Orifice) => format!("{}:orifice", leak.id()),
-            Some(LeakCourse::Cracking) => format!("{}:cracking", leak.id()),
-            Some(LeakCourse::Growing) => format!("{}:growing", leak.id()),
-            Some(LeakCourse::Sudden(_)) => format!("{}:sudden", leak.id()),
-            Some(LeakCourse::Wandering) => format!("{}:wandering", leak.id()),
-            Some(LeakCourse::Creeping) => format!("{}:creeping", leak.id()),
-        };
-        parts.push(name);
+        parts.extend(course.map(|course| match course {
+            LeakCourse::Constant => leak.id().to_owned(),
+            course => format!("{}:{}", leak.id(), course.id()),
+        }));
     }
     parts.extend(
         found(one).iter().flatten().map(|entry| entry.id).filter(|id| !is_usual(id)).map(str::to_owned),

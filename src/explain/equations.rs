@@ -1,7 +1,6 @@
 //! Normal equations of the columns of all explanations, from the statistic.
 
 use super::columns::{Column, Course, PerChamber, Scales};
-use super::evidence::ln_scale_prior;
 use super::raw_products::RawProducts;
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 use std::collections::HashMap;
@@ -19,8 +18,6 @@ pub(super) struct NormalEquations {
     pub rows: [f64; EQUATIONS],
     /// What noise adds to the left side's square: as declared, and as the readings scatter.
     left_noise: [[f64; 2]; EQUATIONS],
-    /// The noise scale that the readings' scatter shows; none where nothing is known to be mended.
-    scatter: [Option<f64>; EQUATIONS],
     places: HashMap<(Column, Course), usize>,
 }
 
@@ -51,7 +48,6 @@ impl NormalEquations {
             noise: [vec![0.0; size * size], vec![0.0; size * size]],
             rows: [0.0; EQUATIONS],
             left_noise: [[0.0; 2]; EQUATIONS],
-            scatter: [None; EQUATIONS],
             places: columns.iter().enumerate().map(|(place, key)| (*key, place)).collect(),
         };
         let kinds: HashMap<Column, [PerChamber; 2]> =
@@ -86,44 +82,21 @@ impl NormalEquations {
         Square { entries: &self.noise[equation], size: self.size }
     }
 
-    /// With rows measured by the noise that they have once a mistake is mended, as those of the `declared` equations are by
-    /// theirs; and ln of what that changes of the evidence, where mending multiplies densities of the readings by
-    /// e^`ln_jacobian` in each block.
-    ///
-    /// Readings without motion are noise in every unit: what makes that quieter or louder explains nothing, so the measure
-    /// counts against a mistake alone. What does tell is a scatter that the sheet does not allow; one that is better than the
-    /// sheet is no mistake. Where the declared noise and the scatter differ, the smaller change counts.
-    pub fn measured_as(mut self, declared: &Self, ln_jacobian: f64) -> (Self, f64) {
-        let mut ln_measure = 0.0;
-        let mut ln_noise = 0.0;
-        for equation in 0..EQUATIONS {
-            let ([own, own_scatter], [other, scatter]) =
-                (self.left_noise[equation], declared.left_noise[equation]);
-            if [own, own_scatter, other, scatter].iter().any(|noise| *noise <= 0.0) {
-                continue;
-            }
-            let louder = (own / other).min(own_scatter / scatter);
-            let products = self.gram[equation].iter_mut().chain(&mut self.noise[equation]);
-            products.for_each(|product| *product /= louder);
-            self.scatter[equation] = Some(own_scatter / (other * louder));
-            ln_measure += self.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder.ln());
-            ln_noise += ln_scale_prior(own_scatter / other) - ln_scale_prior((scatter / other).max(1.0));
-        }
-        (self, ln_measure.min(0.0) + ln_noise)
+    /// What noise adds to the left side's square: as declared, and as the readings scatter.
+    pub fn left_noise(&self, equation: usize) -> [f64; 2] {
+        self.left_noise[equation]
     }
 
-    /// ln of what is taken back from a fit whose noise scales are below the readings' own scatter: a mistake turns noise into
-    /// other noise, which by chance may be smaller.
-    pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
-        let one = |equation: usize| {
-            let scatter = self.scatter[equation].unwrap_or(0.0);
-            if scatter > scales[equation] {
-                -0.5 * self.rows[equation] * (scatter / scales[equation]).ln()
-            } else {
-                0.0
-            }
-        };
-        (0..EQUATIONS).map(one).sum()
+    /// With rows whose unit is `unit` times the noise, and readings that scatter so many times as much as that allows, all
+    /// squared: the columns' noise is of the readings' own scale already.
+    pub fn measured_by(mut self, unit: [f64; EQUATIONS], scatter: [f64; EQUATIONS]) -> Self {
+        for equation in 0..EQUATIONS {
+            self.gram[equation].iter_mut().for_each(|product| *product /= unit[equation]);
+            self.noise[equation]
+                .iter_mut()
+                .for_each(|product| *product /= unit[equation] * scatter[equation]);
+        }
+        self
     }
 
     /// Columns that are mostly noise are zero. The left side's noise is what the residual is measured by.

@@ -42,7 +42,7 @@ pub(super) struct Fit {
     /// Posterior means, in the columns' units.
     pub means: Vec<f64>,
     stds: Vec<f64>,
-    /// Cholesky factor of M, row by row, behind a row and a column of the left side.
+    /// Cholesky factor U of M = U'U, row by row, before a row and a column of the left side.
     factor: Vec<f64>,
 }
 
@@ -57,21 +57,21 @@ impl Fit {
         (0..of.len()).map(|i| (0..of.len()).map(|j| entry(i, j)).collect()).collect()
     }
 
-    /// L⁻¹ e_i.
+    /// U⁻ᵀ e_i.
     fn half_solved(&self, i: usize) -> Vec<f64> {
         let p = self.stds.len();
+        let factor = |row: usize, column: usize| self.factor[row * (p + 1) + column];
         let mut out = vec![0.0; p];
         for row in i..p {
             let target = if row == i { 1.0 } else { 0.0 };
-            let factor = &self.factor[(row + 1) * (p + 1) + 1..(row + 2) * (p + 1)];
-            let known: f64 = (i..row).map(|k| factor[k] * out[k]).sum();
-            out[row] = (target - known) / factor[row];
+            let known: f64 = (i..row).map(|k| factor(k, row) * out[k]).sum();
+            out[row] = (target - known) / factor(row, row);
         }
         out
     }
 }
 
-/// Products of the columns set free, scaled by their priors, the left side first.
+/// Products of the columns set free, scaled by their priors, the left side last: upper triangles.
 struct Products {
     size: usize,
     gram: [Vec<f64>; 2],
@@ -84,16 +84,13 @@ impl Products {
         let mut out =
             Self { size, gram: [vec![0.0; size * size], vec![0.0; size * size]], noise: Default::default() };
         out.noise = out.gram.clone();
-        let key = |i: usize| match i.checked_sub(1).and_then(|i| free.get(i)) {
-            Some(free) => (free.column, free.std),
-            None => (0, 1.0),
-        };
+        let key = |i: usize| free.get(i).map_or((0, 1.0), |free| (free.column, free.std));
         for c in 0..2 {
             let (gram, noise) = (equations.gram(c), equations.noise(c));
             for i in 0..size {
                 let (row, of_row) = key(i);
                 let (gram, noise) = (gram.row(row), noise.row(row));
-                for j in 0..=i {
+                for j in i..size {
                     let (column, of_column) = key(j);
                     out.gram[c][i * size + j] = of_row * of_column * gram[column];
                     out.noise[c][i * size + j] = of_row * of_column * noise[column];
@@ -116,14 +113,14 @@ impl Products {
     }
 
     /// Products less those of the noise, over the scale.
-    fn clean(&self, c: usize, rows: f64, scale: f64, sum: &mut [f64]) {
+    fn clean(&self, c: usize, rows: f64, scale: f64, clean: &mut [f64]) {
         let kept = self.kept(c, rows, scale);
         let over = 1.0 / scale;
         for i in 0..self.size {
-            let span = i * self.size..i * self.size + i + 1;
+            let span = i * self.size + i..(i + 1) * self.size;
             let products = self.gram[c][span.clone()].iter().zip(&self.noise[c][span.clone()]);
-            for ((out, (gram, noise)), kept_j) in sum[span].iter_mut().zip(products).zip(&kept) {
-                *out += over * gram - kept[i] * kept_j * noise;
+            for ((out, (gram, noise)), kept_j) in clean[span].iter_mut().zip(products).zip(&kept[i..]) {
+                *out = over * gram - kept[i] * kept_j * noise;
             }
         }
     }
@@ -135,20 +132,18 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let products = Products::of(equations, free);
     let size = products.size;
     let mut scales = [1.0; 2];
+    let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
     let mut factor = vec![0.0; size * size];
     let mut means = vec![0.0; free.len()];
     let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
     for step in 0..=STEPS {
-        let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
         for c in 0..2 {
             products.clean(c, n[c], scales[c], &mut each[c]);
         }
         for (out, (one, other)) in factor.iter_mut().zip(each[0].iter().zip(&each[1])) {
             *out = one + other;
         }
-        let left = factor[0];
         (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
-        chi_square += left;
         if step < STEPS {
             for c in 0..2 {
                 let residual = scales[c] * residual(&each[c], size, &means).max(0.0);
@@ -174,43 +169,42 @@ pub(super) fn ln_scale_prior(scale: f64) -> f64 {
     -0.5 * NU * (scale.ln() + 1.0 / scale - 1.0)
 }
 
-/// Solves (1 + X'X) θ = X'y for the scaled products, of which the first row and column are y's, and leaves Cholesky's factor
-/// in their place: ln of its determinant, and by how much the fit lowers y'y, below zero.
+/// Solves (1 + X'X) θ = X'y for the scaled products, of which the last row and column are y's, and leaves Cholesky's factor
+/// in their place: ln of its determinant, and y'y less what the fit explains.
 fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
+    let last = size - 1;
     let mut ln_determinant = 0.0;
-    for i in 1..size {
-        let (above, rest) = products.split_at_mut(i * size);
-        let row = &mut rest[..size];
-        for j in 1..i {
-            let known = &above[j * size..j * size + j + 1];
-            let dot: f64 = row[1..j].iter().zip(&known[1..j]).map(|(a, b)| a * b).sum();
-            row[j] = (row[j] - dot) / known[j];
+    for k in 0..last {
+        let (above, below) = products.split_at_mut((k + 1) * size);
+        let row = &mut above[k * size..];
+        let pivot = (1.0 + row[k]).max(LEAST_PIVOT).sqrt();
+        ln_determinant += 2.0 * pivot.ln();
+        row[k] = pivot;
+        row[k + 1..].iter_mut().for_each(|entry| *entry /= pivot);
+        for (i, other) in (k + 1..size).zip(below.chunks_exact_mut(size)) {
+            let by = row[i];
+            for (out, entry) in other[i..].iter_mut().zip(&row[i..]) {
+                *out -= by * entry;
+            }
         }
-        let dot: f64 = row[1..i].iter().map(|value| value * value).sum();
-        row[i] = (1.0 + row[i] - dot).max(LEAST_PIVOT).sqrt();
-        ln_determinant += 2.0 * row[i].ln();
-        let dot: f64 = row[1..i].iter().zip(means.iter()).map(|(l, half)| l * half).sum();
-        means[i - 1] = (row[0] - dot) / row[i];
     }
-    let explained: f64 = means.iter().map(|half| half * half).sum();
-    for i in (1..size).rev() {
+    for i in (0..last).rev() {
         let row = &products[i * size..(i + 1) * size];
-        means[i - 1] /= row[i];
-        let mean = means[i - 1];
-        for (other, l) in means[..i - 1].iter_mut().zip(&row[1..i]) {
-            *other -= l * mean;
-        }
+        let known: f64 = row[i + 1..last].iter().zip(&means[i + 1..]).map(|(u, mean)| u * mean).sum();
+        means[i] = (row[last] - known) / row[i];
     }
-    (ln_determinant, -explained)
+    (ln_determinant, products[last * size + last])
 }
 
-/// Sum of squared residuals, from products that stand in the lower triangle.
+/// Sum of squared residuals, from products.
 fn residual(products: &[f64], size: usize, means: &[f64]) -> f64 {
-    let mut sum = products[0];
-    for (i, mean) in (1..size).zip(means) {
-        let row = &products[i * size..i * size + i + 1];
-        let others: f64 = row[1..i].iter().zip(means).map(|(product, other)| product * other).sum();
-        sum += mean * (2.0 * others + mean * row[i] - 2.0 * row[0]);
+    let last = size - 1;
+    let mut sum = products[last * size + last];
+    for (i, mean) in means.iter().enumerate() {
+        let row = &products[i * size..(i + 1) * size];
+        let others: f64 =
+            row[i + 1..last].iter().zip(&means[i + 1..]).map(|(product, other)| product * other).sum();
+        sum += mean * (2.0 * (others - row[last]) + mean * row[i]);
     }
     sum
 }

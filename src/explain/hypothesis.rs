@@ -25,6 +25,64 @@ pub(super) enum LeakCourse {
     Creeping,
 }
 
+impl LeakCourse {
+    /// As in the table of explanations.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Constant => "constant",
+            Self::Orifice => "orifice",
+            Self::Cracking => "cracking",
+            Self::Growing => "growing",
+            Self::Sudden(_) => "sudden",
+            Self::Wandering => "wandering",
+            Self::Creeping => "creeping",
+        }
+    }
+}
+
+/// A free parameter of a leak, which can't be negative unless it is a `step`.
+struct Term {
+    column: Column,
+    course: Course,
+    std: f64,
+    step: bool,
+    /// By how much it is part of the flow at the trace's end.
+    at_end: f64,
+}
+
+/// What is free of a leak on this course; where there is none, what seeps.
+fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize) -> Vec<Term> {
+    let own = |course: Course, at_end: f64| Term {
+        column: LEAK_COLUMNS[leak],
+        course,
+        std: LEAK_SIZE,
+        step: false,
+        at_end,
+    };
+    let level = || own(Course::Constant, 1.0);
+    let step = |course: Course, std: f64| Term { std, step: true, ..own(course, 0.0) };
+    match course {
+        None => vec![Term { std: seepage, ..level() }],
+        Some(LeakCourse::Constant) => vec![level()],
+        Some(LeakCourse::Orifice) => vec![level(), Term { column: ORIFICE_COLUMNS[leak], ..level() }],
+        Some(LeakCourse::Cracking) => {
+            vec![level(), Term { column: CRACKING_COLUMNS[leak], at_end: -1.0, ..level() }]
+        }
+        Some(LeakCourse::Growing) => vec![own(Course::FromBegin, 0.0), own(Course::ToEnd, 1.0)],
+        Some(LeakCourse::Sudden(border)) => {
+            vec![own(Course::Before(border), 0.0), own(Course::Since(border), 1.0)]
+        }
+        Some(LeakCourse::Wandering) => {
+            let steps = (1..segments).map(|border| step(Course::Before(border), LEAK_STEP));
+            std::iter::once(level()).chain(steps).collect()
+        }
+        Some(LeakCourse::Creeping) => {
+            let steps = (0..segments).map(|segment| step(Course::Fading(segment), LEAK_CREEP));
+            std::iter::once(level()).chain(steps).collect()
+        }
+    }
+}
+
 /// Sensors and rig: a zero, a departure, a wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State<'a> {
@@ -133,12 +191,11 @@ impl<'a> Hypothesis<'a> {
             ends: Default::default(),
         };
         for (leak, course) in leaks.iter().enumerate() {
-            match course {
-                Some(course) => {
-                    own.ln_prior += (LEAK_SHARE / (1.0 - LEAK_SHARE)).ln();
-                    own.add_leak(equations, leak, *course, segments);
-                }
-                None => own.add_seepage(equations, leak, sizes.seepage[Leak::ALL[leak]]),
+            if course.is_some() {
+                own.ln_prior += (LEAK_SHARE / (1.0 - LEAK_SHARE)).ln();
+            }
+            for term in terms(leak, *course, sizes.seepage[Leak::ALL[leak]], segments) {
+                own.add(equations, leak, &term);
             }
         }
         own.ln_prior += own.positive.len() as f64 * LN_2;
@@ -155,65 +212,15 @@ impl<'a> Hypothesis<'a> {
         self.leaks.iter().map(border).max().unwrap_or(0)
     }
 
-    fn add_seepage(&mut self, equations: &NormalEquations, leak: usize, std: f64) {
-        if let Some(column) = equations.place(LEAK_COLUMNS[leak], Course::Constant) {
-            let at = self.free.len();
-            self.free.push(Free { column, std });
+    fn add(&mut self, equations: &NormalEquations, leak: usize, term: &Term) {
+        let Some(column) = equations.place(term.column, term.course) else { return };
+        let at = self.free.len();
+        self.free.push(Free { column, std: term.std });
+        if !term.step {
             self.positive.push(at);
-            self.ends[leak].push((at, 1.0));
         }
-    }
-
-    fn add_leak(&mut self, equations: &NormalEquations, leak: usize, course: LeakCourse, segments: usize) {
-        let column = LEAK_COLUMNS[leak];
-        let mut add = |column: Column, course: Course, std: f64| {
-            let place = equations.place(column, course)?;
-            self.free.push(Free { column: place, std });
-            Some(self.free.len() - 1)
-        };
-        let (positive, ends) = match course {
-            LeakCourse::Constant => {
-                let level = add(column, Course::Constant, LEAK_SIZE);
-                (vec![level], vec![level])
-            }
-            LeakCourse::Orifice => {
-                let level = add(column, Course::Constant, LEAK_SIZE);
-                let root = add(ORIFICE_COLUMNS[leak], Course::Constant, LEAK_SIZE);
-                (vec![level, root], vec![level, root])
-            }
-            LeakCourse::Cracking => {
-                let level = add(column, Course::Constant, LEAK_SIZE);
-                let less = add(CRACKING_COLUMNS[leak], Course::Constant, LEAK_SIZE);
-                self.ends[leak] =
-                    level.map(|at| (at, 1.0)).into_iter().chain(less.map(|at| (at, -1.0))).collect();
-                (vec![level, less], vec![])
-            }
-            LeakCourse::Growing => {
-                let start = add(column, Course::FromBegin, LEAK_SIZE);
-                let end = add(column, Course::ToEnd, LEAK_SIZE);
-                (vec![start, end], vec![end])
-            }
-            LeakCourse::Sudden(border) => {
-                let before = add(column, Course::Before(border), LEAK_SIZE);
-                let since = add(column, Course::Since(border), LEAK_SIZE);
-                (vec![before, since], vec![since])
-            }
-            LeakCourse::Wandering => {
-                let level = add(column, Course::Constant, LEAK_SIZE);
-                for border in 1..segments {
-                    add(column, Course::Before(border), LEAK_STEP);
-                }
-                (vec![level], vec![level])
-            }
-            LeakCourse::Creeping => {
-                let level = add(column, Course::Constant, LEAK_SIZE);
-                for segment in 0..segments {
-                    add(column, Course::Fading(segment), LEAK_CREEP);
-                }
-                (vec![level], vec![level])
-            }
-        };
-        self.positive.extend(positive.into_iter().flatten());
-        self.ends[leak].extend(ends.into_iter().flatten().map(|at: usize| (at, 1.0)));
+        if term.at_end != 0.0 {
+            self.ends[leak].push((at, term.at_end));
+        }
     }
 }

@@ -10,7 +10,9 @@ mod evidence;
 mod hypothesis;
 mod independence;
 mod leak_sample;
+mod mended;
 mod orthant;
+mod pass;
 mod posterior;
 mod raw_products;
 mod readings;
@@ -19,7 +21,7 @@ mod table;
 
 pub use columns::{Column, Course};
 pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, Note, WIRING_DOUBT, explain};
-pub(crate) use orthant::{Orthant, positive_orthant};
+pub(crate) use orthant::{Orthant, POINTS, positive_orthant};
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
 pub(crate) use table::LEAK_SHARE;

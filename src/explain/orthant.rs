@@ -6,9 +6,14 @@
 
 use statrs::function::erf::{erfc, erfc_inv};
 use std::f64::consts::{PI, SQRT_2};
+use std::sync::LazyLock;
 
-/// Points of the sample: the probability is known to a percent or so.
-pub(super) const POINTS: usize = 512;
+/// Points of a sample: the probability is known to a percent or so.
+pub(crate) const POINTS: usize = 512;
+/// The same of what weighs little: to ten percent or so.
+pub(super) const FEW_POINTS: usize = 64;
+/// Variables at the most: two of each leak.
+pub(super) const MOST: usize = 6;
 const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
 /// A sample worth fewer points than this is drawn anew; numerical.
 const LEAST_POINTS: f64 = 20.0;
@@ -21,8 +26,8 @@ const LEAST_TAIL: f64 = 1e-12;
 pub(crate) struct Orthant {
     /// ln of the probability of the positive orthant.
     pub ln_probability: f64,
-    /// Points, variable by variable.
-    pub points: Vec<Vec<f64>>,
+    /// Points: their variables, zero behind the last.
+    pub points: Vec<[f64; MOST]>,
     /// Their weights, of sum 1.
     pub weights: Vec<f64>,
 }
@@ -34,12 +39,19 @@ pub(super) fn uniform(point: usize, dimension: usize) -> f64 {
 }
 
 /// Quantile of the standard normal.
-pub(super) fn normal_quantile(probability: f64) -> f64 {
+fn normal_quantile(probability: f64) -> f64 {
     -SQRT_2 * erfc_inv(2.0 * probability)
 }
 
-/// N(`means`, `covariance`) where every variable is positive.
-pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
+/// Standard normals beside a sample of leaks, independent of its points and of each other.
+pub(super) static NORMALS: LazyLock<Vec<[f64; MOST]>> = LazyLock::new(|| {
+    let strides = [197, 197, 197, 59, 59, 59];
+    let normal = |point: usize, i: usize| normal_quantile(uniform((point * strides[i]) % POINTS, 8 + i));
+    (0..POINTS).map(|point| std::array::from_fn(|i| normal(point, i))).collect()
+});
+
+/// N(`means`, `covariance`), of `MOST` variables or fewer, where every one is positive; a sample of `count` points.
+pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>], count: usize) -> Orthant {
     // What is furthest below zero is drawn first: what follows is drawn given it.
     let mut order: Vec<usize> = (0..means.len()).collect();
     let height = |i: &usize| means[*i] / covariance[*i][*i].sqrt();
@@ -47,12 +59,12 @@ pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthan
     let sorted: Vec<f64> = order.iter().map(|&i| means[i]).collect();
     let turned: Vec<Vec<f64>> =
         order.iter().map(|&i| order.iter().map(|&j| covariance[i][j]).collect()).collect();
-    let mut found = sorted_orthant(&sorted, &turned);
-    if found.independent() < LEAST_POINTS {
+    let mut found = sorted_orthant(&sorted, &turned, count);
+    if found.independent() < LEAST_POINTS * count as f64 / POINTS as f64 {
         found = Orthant { ln_probability: found.ln_probability, ..gibbs(&sorted, &turned, &found) };
     }
     for point in &mut found.points {
-        let sorted = point.clone();
+        let sorted = *point;
         order.iter().zip(sorted).for_each(|(&place, value)| point[place] = value);
     }
     found
@@ -70,13 +82,14 @@ impl Orthant {
 fn gibbs(means: &[f64], covariance: &[Vec<f64>], from: &Orthant) -> Orthant {
     let k = means.len();
     let heaviest = (0..from.points.len()).max_by(|&i, &j| from.weights[i].total_cmp(&from.weights[j]));
-    let mut point = heaviest.map_or_else(|| vec![0.0; k], |place| from.points[place].clone());
+    let mut point = heaviest.map_or([0.0; MOST], |place| from.points[place]);
     let matrix = nalgebra::DMatrix::from_fn(k, k, |i, j| covariance[i][j]);
     let Some(precision) = matrix.cholesky().map(|factor| factor.inverse()) else {
         return Orthant { ln_probability: 0.0, points: from.points.clone(), weights: from.weights.clone() };
     };
-    let mut points = Vec::with_capacity(POINTS);
-    for sweep in 0..GIBBS_BURN_IN + POINTS {
+    let count = from.points.len();
+    let mut points = Vec::with_capacity(count);
+    for sweep in 0..GIBBS_BURN_IN + count {
         for i in 0..k {
             let others: f64 =
                 (0..k).filter(|&j| j != i).map(|j| precision[(i, j)] * (point[j] - means[j])).sum();
@@ -86,10 +99,10 @@ fn gibbs(means: &[f64], covariance: &[Vec<f64>], from: &Orthant) -> Orthant {
             point[i] = (given + own * normal).max(0.0);
         }
         if sweep >= GIBBS_BURN_IN {
-            points.push(point.clone());
+            points.push(point);
         }
     }
-    Orthant { ln_probability: 0.0, points, weights: vec![1.0 / POINTS as f64; POINTS] }
+    Orthant { ln_probability: 0.0, points, weights: vec![1.0 / count as f64; count] }
 }
 
 /// A standard normal above `least`, of which `share` lies above it, and ln of the probability of being there.
@@ -102,11 +115,11 @@ fn above(least: f64, share: f64) -> (f64, f64) {
     }
 }
 
-fn sorted_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
+fn sorted_orthant(means: &[f64], covariance: &[Vec<f64>], count: usize) -> Orthant {
     let factor = cholesky(covariance);
-    let mut points = Vec::with_capacity(POINTS);
-    let mut ln_weights = Vec::with_capacity(POINTS);
-    for point in 0..POINTS {
+    let mut points = Vec::with_capacity(count);
+    let mut ln_weights = Vec::with_capacity(count);
+    for point in 0..count {
         let (values, ln_weight) = draw(point, means, &factor);
         points.push(values);
         ln_weights.push(ln_weight);
@@ -115,23 +128,23 @@ fn sorted_orthant(means: &[f64], covariance: &[Vec<f64>]) -> Orthant {
     let weights: Vec<f64> = ln_weights.iter().map(|ln| (ln - largest).exp()).collect();
     let sum: f64 = weights.iter().sum();
     Orthant {
-        ln_probability: largest + (sum / POINTS as f64).ln(),
+        ln_probability: largest + (sum / count as f64).ln(),
         points,
         weights: weights.iter().map(|weight| weight / sum).collect(),
     }
 }
 
-fn draw(point: usize, means: &[f64], factor: &[Vec<f64>]) -> (Vec<f64>, f64) {
-    let mut normals = Vec::with_capacity(means.len());
-    let mut values = Vec::with_capacity(means.len());
+fn draw(point: usize, means: &[f64], factor: &[Vec<f64>]) -> ([f64; MOST], f64) {
+    let mut normals = [0.0; MOST];
+    let mut values = [0.0; MOST];
     let mut ln_weight = 0.0;
     for (i, mean) in means.iter().enumerate() {
-        let given: f64 = mean + factor[i].iter().zip(&normals).map(|(l, z): (&f64, &f64)| l * z).sum::<f64>();
+        let given: f64 = mean + factor[i][..i].iter().zip(&normals).map(|(l, z)| l * z).sum::<f64>();
         let own = factor[i][i];
         let (normal, ln_tail) = above(-given / own, 1.0 - uniform(point, i));
         ln_weight += ln_tail;
-        normals.push(normal);
-        values.push((given + own * normal).max(0.0));
+        normals[i] = normal;
+        values[i] = (given + own * normal).max(0.0);
     }
     (values, ln_weight)
 }
@@ -189,7 +202,7 @@ mod tests {
             (vec![-1.0, 0.2, 2.0], vec![vec![1.0, 0.7, 0.2], vec![0.7, 1.0, 0.5], vec![0.2, 0.5, 2.0]]),
         ];
         for (means, covariance) in cases {
-            let found = positive_orthant(&means, &covariance);
+            let found = positive_orthant(&means, &covariance, POINTS);
             let (probability, mean) = by_quadrature(&means, &covariance);
             let first: f64 = found.points.iter().zip(&found.weights).map(|(p, w)| p[0] * w).sum();
             assert!(
@@ -205,7 +218,7 @@ mod tests {
     /// Far out in the tail the sample stays on the right side, and its probability finite.
     #[test]
     fn far_tails_are_finite() {
-        let found = positive_orthant(&[-30.0], &[vec![1.0]]);
+        let found = positive_orthant(&[-30.0], &[vec![1.0]], POINTS);
         let expected = -450.0 - (30.0 * (2.0 * PI).sqrt()).ln();
         assert!((found.ln_probability - expected).abs() < 0.01, "{}", found.ln_probability);
         assert!(found.points.iter().all(|point| point[0] >= 0.0 && point[0] < 1.0));

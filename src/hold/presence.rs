@@ -6,7 +6,7 @@
 
 use super::fit::{Fit, LEAK_UNIT_M3SPA};
 use super::nodes::Node;
-use crate::explain::{LEAK_SHARE, Orthant, positive_orthant};
+use crate::explain::{LEAK_SHARE, Orthant, POINTS, positive_orthant};
 use crate::units::LPM_PER_M3S;
 use nalgebra::{DMatrix, DVector};
 use pitchleak_core::{Estimate, Leak, PerLeak};
@@ -182,7 +182,7 @@ fn over_kappa(members: &[usize], places: &[Place]) -> Vec<Weighed> {
         let normal = Normal::new(members, place)?;
         let rows: Vec<Vec<f64>> =
             normal.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-        let orthant = (!members.is_empty()).then(|| positive_orthant(normal.mean.as_slice(), &rows));
+        let orthant = (!members.is_empty()).then(|| positive_orthant(normal.mean.as_slice(), &rows, POINTS));
         let ln_orthant = orthant.as_ref().map_or(0.0, |orthant| orthant.ln_probability);
         // Each stands for the step of ln κ up to the next.
         let weight = normal.ln_weight + ln_orthant + (step as f64).ln();

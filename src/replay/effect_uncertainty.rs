@@ -60,6 +60,11 @@ impl EffectUncertainty {
     }
 }
 
+/// What the effects' uncertainty adds to the spread of a `certain` figure, as a standard deviation.
+pub(super) fn added_std(wide: Estimate<f64>, certain: Estimate<f64>) -> f64 {
+    (wide.std * wide.std - certain.std * certain.std).max(0.0).sqrt()
+}
+
 /// The rig with one effect a standard deviation larger, or smaller where that is out of bounds.
 fn shifted(rig: &Rig, effect: Effect, std: f64) -> Option<Rig> {
     let spec = effect.spec();

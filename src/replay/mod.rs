@@ -33,7 +33,7 @@ use crate::units::LPM_PER_M3S;
 use crate::wiring::{Excerpt, Refused};
 use consistency::Consistency;
 use correction::Correction;
-use effect_uncertainty::EffectUncertainty;
+use effect_uncertainty::{EffectUncertainty, added_std};
 use episodes::Episodes;
 use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
 use pressures::TracePressures;
@@ -255,10 +255,7 @@ impl Replay {
     fn effect_doubts_m3s(&self) -> PerLeak<f64> {
         let pressures = self.pressures.sizes();
         let certain = self.estimator.leak_flows_m3s(&pressures).unwrap_or_default();
-        let doubt = |(wide, certain): (Estimate<f64>, Estimate<f64>)| {
-            (wide.std.powi(2) - certain.std.powi(2)).max(0.0).sqrt()
-        };
-        self.leak_flows_m3s(&pressures).zip(certain).map(doubt)
+        self.leak_flows_m3s(&pressures).zip(certain).map(|(wide, certain)| added_std(wide, certain))
     }
 
     /// Forgets what is long ago: a stream may run for months.

@@ -3,6 +3,7 @@
 use super::Replay;
 use super::correction::Correction;
 use super::draft::{Draft, Weighed};
+use super::effect_uncertainty::added_std;
 use super::known::is_known;
 use crate::channels::{ChannelFault, ChannelMonitor};
 use crate::explain::Decision;
@@ -100,8 +101,7 @@ impl Replay {
                 let per_pa = 1.0 / (LPM_PER_M3S * decision.pressures_pa[leak]);
                 let found = decision.leakage[leak].estimate_lpm().scaled(per_pa);
                 // Effects of the rig file part a flow between its laws: its sum is known better than they are.
-                let (wide, certain) = (coefficients[leak].std, certain[leak].std);
-                let doubt = (wide * wide - certain * certain).max(0.0).sqrt();
+                let doubt = added_std(coefficients[leak], certain[leak]);
                 Estimate { std: found.std.hypot(doubt), ..found }
             }
             _ => coefficients[leak],

@@ -120,9 +120,24 @@ pub const LIES: &[Lie] = &[
         "wiring",
         "sign of qa and qb turned|qa and qb count the other way",
     ),
-    mistake("qa without sign", &["qa absolute"], "wiring", "sign that qa lost"),
-    mistake("qb without sign", &["qb absolute"], "wiring", "sign that qb lost"),
-    mistake("both flows without sign", &["qa absolute", "qb absolute"], "wiring", "sign that qa and qb lost"),
+    mistake(
+        "qa without sign",
+        &["qa absolute"],
+        "wiring",
+        "sign that qa lost|qa counts the other way, or lost its sign",
+    ),
+    mistake(
+        "qb without sign",
+        &["qb absolute"],
+        "wiring",
+        "sign that qb lost|qb counts the other way, or lost its sign",
+    ),
+    mistake(
+        "both flows without sign",
+        &["qa absolute", "qb absolute"],
+        "wiring",
+        "sign that qa and qb lost|lost its sign|lost their signs",
+    ),
     mistake("x from the other end", &["x other_end"], "wiring", "other end|x counts from the B end"),
     mistake("pa in psi", &["pa in psi"], "wiring", "pa divided by 14.5|pa is in another unit: 14.5"),
     mistake(

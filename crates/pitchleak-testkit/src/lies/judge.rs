@@ -222,11 +222,17 @@ impl Outcome {
 }
 
 /// Every lie × leak × accuracy × wind at each door, `seeds` times each; the order and the seeds don't depend on the cores.
-pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome> {
-    let cylinders: Vec<_> = winds.iter().flat_map(|wind| LEAKING.map(|leaking| (*wind, leaking))).collect();
-    let of_cylinder = |(wind, leaking): &(WindCase, Leaking)| {
-        let truths = truths(*wind, *leaking);
-        let cases: Vec<_> = accuracies.iter().flat_map(|a| LIES.iter().map(move |lie| (*a, lie))).collect();
+/// Of the leaks of a wind each mistake is seen with one in `every`, of the next wind with the next one.
+pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64, every: usize) -> Vec<Outcome> {
+    let of_wind = |(place, wind)| (0..LEAKING.len()).map(move |leak| (place + leak, wind, LEAKING[leak]));
+    let cylinders: Vec<_> = winds.iter().enumerate().flat_map(of_wind).collect();
+    let of_cylinder = |(place, wind, leaking): &(usize, &WindCase, Leaking)| {
+        let truths = truths(**wind, *leaking);
+        let is_seen = |(index, lie): &(usize, &'static Lie)| {
+            lie.family != Family::Mistake || (index + place).is_multiple_of(every)
+        };
+        let lies: Vec<_> = LIES.iter().enumerate().filter(is_seen).map(|(_, lie)| lie).collect();
+        let cases: Vec<_> = accuracies.iter().flat_map(|a| lies.iter().map(move |lie| (*a, *lie))).collect();
         let outcomes = |(accuracy, lie): &(f64, &'static Lie)| {
             let asked: Vec<_> =
                 (1..=seeds).map(|seed| ask(&truths, *leaking, lie, *accuracy, seed)).collect();
@@ -238,7 +244,7 @@ pub fn sweep(accuracies: &[f64], winds: &[WindCase], seeds: u64) -> Vec<Outcome>
                     lie,
                     leaking: *leaking,
                     accuracy: *accuracy,
-                    wind: *wind,
+                    wind: **wind,
                     right: count(Judgement::Right),
                     in_doubt: count(Judgement::InDoubt),
                     confidently_wrong: count(Judgement::ConfidentlyWrong),

@@ -1,0 +1,76 @@
+//! Equations of readings whose wiring is mended, comparable with those of the readings as declared.
+//!
+//! Readings without motion are noise in every unit: what makes that quieter or louder explains nothing, so the measure
+//! counts against a mistake alone. What does tell is a scatter that the sheet does not allow; one that is better than the
+//! sheet is no mistake. Where the declared noise and the scatter differ, the smaller change counts.
+
+use super::equations::NormalEquations;
+use super::evidence::ln_scale_prior;
+use super::readings::Mistake;
+use pitchleak_core::continuity::EQUATIONS;
+
+/// The equation without the piston's motion. How fast it moves is not known beforehand, so that of the other no density of
+/// flow and position together is known: with v ~ N(0, V²) of any scale V, a unit f of both flows costs ln f by the flows'
+/// density and gives it back by V, which is f times smaller.
+const BALANCE: usize = 0;
+
+/// Rows are measured by the noise that they have once mended, as the declared ones are by theirs.
+pub(super) struct Mended {
+    pub equations: NormalEquations,
+    /// ln of what that changes of the evidence.
+    pub ln_measure: f64,
+    /// The noise scale that the readings' scatter shows; none where nothing is known of it.
+    scatter: [Option<f64>; EQUATIONS],
+    /// How much of its scatter the best explanation as declared leaves, at most all.
+    left: [f64; EQUATIONS],
+}
+
+impl Mended {
+    /// Of readings without this mistake; the best explanation as declared has the noise `scales`.
+    pub fn new(
+        mended: NormalEquations,
+        declared: &NormalEquations,
+        mistake: Mistake,
+        scales: [f64; EQUATIONS],
+    ) -> Self {
+        let ln_jacobian = mistake.ln_jacobian();
+        let mut scatter_scales = [None; EQUATIONS];
+        let (mut louder, mut left) = ([1.0; EQUATIONS], [1.0; EQUATIONS]);
+        let (mut ln_measure, mut ln_noise) = (0.0, 0.0);
+        for equation in 0..EQUATIONS {
+            let ([own, own_scatter], [other, scatter]) =
+                (mended.left_noise(equation), declared.left_noise(equation));
+            if [own, own_scatter, other, scatter].iter().any(|noise| *noise <= 0.0) {
+                continue;
+            }
+            louder[equation] = (own / other).min(own_scatter / scatter);
+            scatter_scales[equation] = Some(own_scatter / (other * louder[equation]));
+            left[equation] = (scales[equation] * other / scatter).min(1.0);
+            if equation == BALANCE {
+                ln_measure +=
+                    mended.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder[equation].ln());
+            }
+            ln_noise += ln_scale_prior(own_scatter / other) - ln_scale_prior((scatter / other).max(1.0));
+        }
+        Self {
+            equations: mended.measured_by(louder, scatter_scales.map(|scale| scale.unwrap_or(1.0).max(1.0))),
+            ln_measure: ln_measure.min(0.0) + ln_noise,
+            scatter: scatter_scales,
+            left,
+        }
+    }
+
+    /// ln of what is taken back from a fit whose noise scales are below what the readings' own scatter leaves as declared: a
+    /// mistake turns noise into other noise, which by chance may be smaller.
+    pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
+        let one = |equation: usize| {
+            let scatter = self.left[equation] * self.scatter[equation].unwrap_or(0.0);
+            if scatter > scales[equation] {
+                -0.5 * self.equations.rows[equation] * (scatter / scales[equation]).ln()
+            } else {
+                0.0
+            }
+        };
+        (0..EQUATIONS).map(one).sum()
+    }
+}

@@ -1,0 +1,182 @@
+//! One pass over the table: the statistic in the columns of all explanations, as far as leaks are known.
+
+use super::columns::{Column, Course, Scales};
+use super::equations::NormalEquations;
+use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes};
+use super::raw_products::{RawProducts, Statistic};
+use super::readings::{Mistake, Of, Readings};
+use super::table::{self, Entry, USUAL};
+use crate::rig::Rig;
+use pitchleak_core::continuity::CHANNELS;
+use pitchleak_core::{Leak, PerLeak};
+
+/// The table as it is weighed.
+pub(super) struct Tables {
+    pub zeros: Vec<Entry>,
+    pub departures: Vec<Entry>,
+    pub pressures: Vec<Entry>,
+    pub wanders: Vec<(f64, f64)>,
+    pub mistakes: Vec<Entry>,
+    pub courses: Vec<Entry>,
+}
+
+impl Tables {
+    pub fn new() -> Self {
+        Self {
+            zeros: table::zeros(),
+            departures: table::departures(),
+            pressures: table::pressures(),
+            wanders: table::wanders(),
+            mistakes: table::mistakes(),
+            courses: table::courses(),
+        }
+    }
+
+    pub fn ln_course(&self, course: LeakCourse) -> f64 {
+        let entry = self.courses.iter().find(|entry| entry.id == course.id());
+        entry.map_or(f64::NEG_INFINITY, |entry| entry.share.ln())
+    }
+}
+
+/// All that one pass over the table needs.
+pub(super) struct Pass<'a, 's> {
+    pub statistic: &'s Statistic,
+    pub products: &'s RawProducts,
+    pub rig: &'s Rig,
+    pub tables: &'a Tables,
+    pub found_m3s: PerLeak<f64>,
+    /// Spreads of the leaks beside what the trace leaves open.
+    pub doubts_m3s: PerLeak<f64>,
+    pub sizes: Sizes,
+    pub segments: usize,
+    pub full_scale_m3s: f64,
+    /// Scatter of the readings over the declared noise, at least 1: of flows, and of the position.
+    pub scatter: [f64; 2],
+}
+
+impl<'a, 's> Pass<'a, 's> {
+    pub fn new(
+        statistic: &'s Statistic,
+        products: &'s RawProducts,
+        rig: &'s Rig,
+        tables: &'a Tables,
+        found_m3s: PerLeak<f64>,
+    ) -> Self {
+        let flows = [rig.instruments.flow_a, rig.instruments.flow_b];
+        let full_scale_m3s = flows[0].full_scale.max(flows[1].full_scale);
+        Self {
+            statistic,
+            products,
+            rig,
+            tables,
+            found_m3s,
+            doubts_m3s: PerLeak::default(),
+            sizes: Sizes {
+                seepage: rig.alarms.threshold_m3s.map(|fault| table::USUAL_SEEPAGE * fault / full_scale_m3s),
+                compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
+                zeros: flows.map(|flow| flow.bias),
+                gains: flows.map(|flow| flow.gain),
+            },
+            segments: statistic.segments().len(),
+            full_scale_m3s,
+            scatter: scatter(statistic, rig),
+        }
+    }
+
+    pub fn equations(
+        &self,
+        products: &RawProducts,
+        mistake: Option<&Entry>,
+        columns: &[(Column, Course)],
+    ) -> NormalEquations {
+        NormalEquations::new(products, &self.scales(mistake), columns)
+    }
+
+    pub fn scales(&self, mistake: Option<&Entry>) -> Scales<'s> {
+        let cylinder = &self.rig.cylinder;
+        let mut readings = Readings::declared(cylinder, 1e6 / self.rig.fluid.bulk_modulus_pa);
+        let mut pressures_mpa = self.products.mean_pressures_pa(0).map(|p| 1e-6 * p);
+        let mut roots = self.statistic.mean_roots();
+        if let Some(mistake) = mistake.and_then(|entry| entry.mistake) {
+            readings = readings.mended(mistake, cylinder);
+            pressures_mpa = mistake.mended_pressures(pressures_mpa);
+            roots = mistake.mended_pressures(roots);
+        }
+        Scales { rig: self.rig, readings, pressures_mpa, roots, leaks_m3s: self.found_m3s }
+    }
+
+    /// Departures that are weighed: pressures through the leaks found, where there are any.
+    pub fn departures(&self) -> Vec<&'a Entry> {
+        let second = Leak::ALL.iter().any(|leak| self.found_m3s[*leak] > 0.0);
+        let pressures = if second { &self.tables.pressures[..] } else { &[] };
+        let known = |entry: &&Entry| !pressures.iter().any(|other| other.id == entry.id);
+        self.tables.departures.iter().filter(known).chain(pressures).collect()
+    }
+
+    pub fn columns(&self) -> Vec<(Column, Course)> {
+        let mut columns = vec![(Column::LeftSide, Course::Constant)];
+        columns.extend(USUAL.iter().map(|(column, course, _)| (*column, *course)));
+        let entries = self.tables.zeros.iter().chain(self.departures());
+        columns.extend(
+            entries.flat_map(|entry| entry.free.iter().map(|(column, course, _)| (*column, *course))),
+        );
+        for leak in LEAK_COLUMNS {
+            columns.extend([Course::Constant, Course::FromBegin, Course::ToEnd].map(|course| (leak, course)));
+            columns.extend(
+                (1..self.segments).flat_map(|k| [(leak, Course::Before(k)), (leak, Course::Since(k))]),
+            );
+            columns.extend((0..self.segments).map(|k| (leak, Course::Fading(k))));
+        }
+        let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS);
+        columns.extend(by_law.map(|law| (law, Course::Constant)));
+        for zero in [Column::ZeroA, Column::ZeroB] {
+            columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
+        }
+        let mut seen = std::collections::HashSet::new();
+        columns.retain(|key| seen.insert(*key));
+        columns
+    }
+
+    /// Courses of leaks beside being constant, wandering and creeping, with their priors.
+    pub fn courses(&self) -> Vec<(LeakCourse, f64)> {
+        let borders = 1..self.segments;
+        let ln_borders = (borders.len().max(1) as f64).ln();
+        let with_prior = |course: LeakCourse| (course, self.tables.ln_course(course));
+        let sudden = borders.map(|border| {
+            let (course, ln_course) = with_prior(LeakCourse::Sudden(border));
+            (course, ln_course - ln_borders)
+        });
+        let others = [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing].map(with_prior);
+        others.into_iter().chain(sudden).collect()
+    }
+
+    /// Whether these readings tell a mistake: without any scatter they are of every unit.
+    pub fn tells(&self, entry: &Entry) -> bool {
+        let Some(Mistake::Factor(of, _)) = entry.mistake else { return true };
+        let scatter = self.statistic.scatter();
+        let has = |channel: usize| scatter[channel].is_some_and(|std| std > 0.0);
+        match of {
+            Of::Position => has(0),
+            Of::PressureA => has(1),
+            Of::PressureB => has(2),
+            Of::Pressures => has(1) && has(2),
+            Of::FlowA => has(3),
+            Of::FlowB => has(4),
+            Of::Flows => has(3) && has(4),
+        }
+    }
+}
+
+/// Scatter of flows and of the position over the declared noise.
+fn scatter(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
+    let sensors = rig.sensors();
+    let found: [Option<f64>; CHANNELS] = statistic.scatter();
+    let over = |found: Option<f64>, declared: f64| match found {
+        Some(found) if declared > 0.0 => (found / declared).max(1.0),
+        _ => 1.0,
+    };
+    [
+        over(found[3], sensors.flow_a.noise_std).max(over(found[4], sensors.flow_b.noise_std)),
+        over(found[0], sensors.position.noise_std),
+    ]
+}
