@@ -1,14 +1,16 @@
-//! Time per sample of the estimators, at the rate of a gateway.
+//! Time per sample of the estimators, at the rate of a gateway; and of a decision.
 
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use pitchleak::Rig;
 use pitchleak::core::{
-    Cylinder, Fluid, PaperEstimator, PaperGains, PaperLaw, Rls, RlsSettings, Sample, Sensors, regressors,
+    Cylinder, Fluid, PaperEstimator, PaperGains, PaperLaw, PerLeak, Rls, RlsSettings, Sample, Sensors,
+    regressors,
 };
+use pitchleak::explain::{Statistic, explain};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::trace::{TableLayout, TraceReader};
+use pitchleak::trace::{Record, TableLayout, TraceReader};
 
 const SAMPLES: usize = 10_000;
 
@@ -104,6 +106,24 @@ fn columns(c: &mut Criterion, samples: &[Sample<f64>]) {
     });
 }
 
+/// One decision of the posterior, on a recorded leak of 40 s.
+fn decision(c: &mut Criterion) {
+    let Ok(rig) = Rig::load(data("rig.toml")) else { return };
+    let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+    let Ok(mut reader) = TraceReader::open(data("external_a.csv.gz"), &rig) else { return };
+    let mut record = Record::default();
+    while let Ok(true) = reader.next_record(&mut record) {
+        statistic.push(record.step_s(), &record.sample);
+    }
+    let mut group = c.benchmark_group("per decision");
+    group.sample_size(20);
+    group.bench_function("posterior", |b| b.iter(|| explain(&statistic, &rig, PerLeak::default())));
+}
+
+fn data(name: &str) -> String {
+    format!("{}/data/traces/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
 fn per_sample(c: &mut Criterion) {
     let samples = samples(SAMPLES);
     rls::<4>(c, "rls", &samples);
@@ -113,5 +133,5 @@ fn per_sample(c: &mut Criterion) {
     columns(c, &self::samples(1_000_000));
 }
 
-criterion_group!(benches, per_sample);
+criterion_group!(benches, per_sample, decision);
 criterion_main!(benches);

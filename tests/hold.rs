@@ -3,9 +3,10 @@
 use pitchleak::Rig;
 use pitchleak::core::Leak;
 use pitchleak::hold::EndedBy;
-use pitchleak::replay::{ReplayError, replay};
+use pitchleak::live::{Event, HoldEvent, LineFormat, LiveConfig, Watch};
+use pitchleak::replay::{ReplayError, Stream, replay};
 use pitchleak::report::{ReplayReport, Status};
-use pitchleak::trace::TraceReader;
+use pitchleak::trace::{BadRows, TraceReader};
 use pitchleak_testkit::hold::{HeldCylinder, HeldTrace};
 use pitchleak_testkit::{coverage_bounds, rig, white_noise};
 use rayon::prelude::*;
@@ -222,4 +223,68 @@ fn a_trace_with_neither_meters_nor_a_hold_is_told_of_both() {
         verdict.text
     );
     assert!(!verdict.text.contains("Record longer"), "{}", verdict.text);
+}
+
+/// The hold events of a live feed.
+fn told(text: &str) -> Vec<HoldEvent> {
+    let mut watch = Watch::new(LiveConfig::of(declared()), Some(LineFormat::Csv));
+    let mut events = Vec::new();
+    text.lines().for_each(|line| watch.take(line.as_bytes(), &mut events));
+    watch.finish(&mut events);
+    let holds = events.into_iter().filter_map(|event| match event {
+        Event::Hold(hold) => Some(*hold),
+        _ => None,
+    });
+    holds.collect()
+}
+
+/// With the port opened again after the hold.
+fn opened(text: &str) -> String {
+    let rows = (1..200).map(|k| format!("{:.2},100,60,40,0\n", 100.0 + f64::from(k) / 100.0));
+    text.to_owned() + &rows.collect::<String>()
+}
+
+/// One event as soon as the hold is over: while the ports are still shut, when one opens, or with the input.
+#[test]
+fn a_stream_says_of_each_hold_what_a_replay_of_it_does() {
+    let leaky = |leaks_lpm| HeldCylinder { leaks_lpm, ..HeldCylinder::default() };
+    let cases = [
+        ([0.0, 0.2, 0.0], EndedBy::Pressure, EndedBy::Pressure),
+        ([0.01, 0.0, 0.0], EndedBy::Opened, EndedBy::Trace),
+        ([0.0, 0.0, 0.0], EndedBy::Opened, EndedBy::Trace),
+    ];
+    for (leaks_lpm, ended_by, with_the_input) in cases {
+        let held = trace(leaky(leaks_lpm), 10.0, 4);
+        let expected = judged(&held.text);
+        for (text, ended_by) in [(opened(&held.text), ended_by), (held.text.clone(), with_the_input)] {
+            let [event] = &told(&text)[..] else { panic!("{leaks_lpm:?}: {:?}", told(&text)) };
+            let of_event = event.leakage.map(|size| (size.mean_lpm, size.std_lpm));
+            assert_eq!(of_event, expected.leakage.map(|size| (size.mean_lpm, size.std_lpm)));
+            assert_eq!((event.status, &event.faults), (expected.verdict.status, &expected.verdict.faults));
+            assert_eq!(event.hold.ended_by, ended_by);
+        }
+    }
+}
+
+#[test]
+fn a_stream_that_is_saved_amid_a_hold_goes_on_with_it() {
+    let held = trace(HeldCylinder { leaks_lpm: [0.01, 0.0, 0.0], ..HeldCylinder::default() }, 10.0, 5);
+    let text = opened(&held.text);
+    let (header, rows) = text.split_once('\n').expect("a header");
+    let rows: Vec<&str> = rows.lines().collect();
+    let rig = declared();
+    let feed = |stream: &mut Stream, rows: &[&str]| {
+        let part = format!("{header}\n{}\n", rows.join("\n"));
+        let bytes = Box::new(std::io::Cursor::new(part.into_bytes()));
+        stream.extend(TraceReader::from_stream("hold", bytes, &rig).expect("a part")).expect("good rows");
+        stream.ended_hold("hold")
+    };
+    let mut whole = Stream::new(&rig, BadRows::Skip).expect("a rig");
+    let expected = feed(&mut whole, &rows).expect("a hold has ended");
+    let mut first = Stream::new(&rig, BadRows::Skip).expect("a rig");
+    assert!(feed(&mut first, &rows[..500]).is_none());
+    let mut second = Stream::restore(&first.save().expect("saved")).expect("restored");
+    assert_eq!(feed(&mut second, &rows[500..]).expect("a hold has ended").leakage, expected.leakage);
+    assert_eq!(expected.verdict.faults, [Leak::Internal]);
+    assert!(feed(&mut second, &rows[rows.len() - 1..]).is_none(), "told once");
 }

@@ -87,6 +87,9 @@ pub fn assert_told(events: &[Event]) {
                 let size = LiveLeakage { mean_lpm: leak.mean_lpm, std_lpm: leak.std_lpm };
                 trend && flow(size) && leak.max_lpm.is_finite() && (0.0..=1.0).contains(&leak.alarm_share)
             }),
+            Event::Hold(event) => {
+                event.leakage.iter().all(|(_, size)| flow(*size)) && event.hold.usable_s >= 0.0
+            }
             Event::Notice(event) => event.t_s.is_none_or(f64::is_finite),
         };
         assert!(finite, "{event:?}");

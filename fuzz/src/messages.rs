@@ -47,5 +47,6 @@ fn cylinder_of(event: &Event) -> &str {
         Event::Alarm(event) => &event.cylinder,
         Event::Notice(event) => &event.cylinder,
         Event::Summary(event) => &event.cylinder,
+        Event::Hold(event) => &event.cylinder,
     }
 }

@@ -3,7 +3,7 @@
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
-use super::hypothesis::{Hypothesis, LEAK_COLUMNS, LeakCourse, State, Subset, subsets};
+use super::hypothesis::{CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, State, Subset, subsets};
 use super::mended::Mended;
 use super::pass::Pass;
 use super::table::{self, Entry, USUAL};
@@ -108,10 +108,11 @@ impl<'a, 'p> Candidates<'a, 'p> {
                 let Some(most) = self.add_free_courses(state, subset, &mut best) else { continue };
                 let least = |best: f64| best - least_ln;
                 for (course, ln_course) in self.pass.courses() {
-                    // The pressure across the seal changes sign: what opens at one is no line of it.
-                    let is_line = !(subset[0] && course == LeakCourse::Cracking);
+                    let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
                     let by_pressure = matches!(course, LeakCourse::Orifice | LeakCourse::Cracking);
-                    if is_line && (by_pressure || most + ln_course > least(best)) {
+                    if (can_crack || course != LeakCourse::Cracking)
+                        && (by_pressure || most + ln_course > least(best))
+                    {
                         best = best.max(self.add(state, together(subset, course), ln_course).0);
                     }
                 }

@@ -66,7 +66,8 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
         Some(LeakCourse::Constant) => vec![level()],
         Some(LeakCourse::Orifice) => vec![level(), Term { column: ORIFICE_COLUMNS[leak], ..level() }],
         Some(LeakCourse::Cracking) => {
-            vec![level(), Term { column: CRACKING_COLUMNS[leak], at_end: -1.0, ..level() }]
+            let less = CRACKING_COLUMNS[leak].map(|column| Term { column, at_end: -1.0, ..level() });
+            std::iter::once(level()).chain(less).collect()
         }
         Some(LeakCourse::Growing) => vec![own(Course::FromBegin, 0.0), own(Course::ToEnd, 1.0)],
         Some(LeakCourse::Sudden(border)) => {
@@ -115,8 +116,9 @@ pub(super) fn subsets() -> impl Iterator<Item = Subset> {
 }
 
 pub(super) const LEAK_COLUMNS: [Column; 3] = [Column::LeakInternal, Column::LeakA, Column::LeakB];
-pub(super) const CRACKING_COLUMNS: [Column; 3] =
-    [Column::CrackingInternal, Column::CrackingA, Column::CrackingB];
+/// None past the piston: the pressure across the seal changes sign, and what opens at one is no line of it.
+pub(super) const CRACKING_COLUMNS: [Option<Column>; 3] =
+    [None, Some(Column::CrackingA), Some(Column::CrackingB)];
 pub(super) const ORIFICE_COLUMNS: [Column; 3] = [Column::OrificeInternal, Column::OrificeA, Column::OrificeB];
 
 impl State<'_> {

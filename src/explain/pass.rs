@@ -127,7 +127,7 @@ impl<'a, 's> Pass<'a, 's> {
             );
             columns.extend((0..self.segments).map(|k| (leak, Course::Fading(k))));
         }
-        let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS);
+        let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS.into_iter().flatten());
         columns.extend(by_law.map(|law| (law, Course::Constant)));
         for zero in [Column::ZeroA, Column::ZeroB] {
             columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));

@@ -54,9 +54,19 @@ pub(super) struct Found {
 impl Recorder {
     /// The hold test of a trace of this rig; none where the ports were never shut.
     pub fn finish(self, rig: &Rig) -> Option<HoldTest> {
-        let holds = self.holds();
+        HoldTest::of(&self.holds(), rig)
+    }
+
+    /// The hold test that has ended since this was asked last; none where none did.
+    pub fn ended(&mut self, rig: &Rig) -> Option<HoldTest> {
+        HoldTest::of(&self.take_ended(), rig)
+    }
+}
+
+impl HoldTest {
+    fn of(holds: &[Held], rig: &Rig) -> Option<Self> {
         let longest = holds.iter().max_by(|a, b| a.usable_s().total_cmp(&b.usable_s()))?;
-        let usable = usable(&holds);
+        let usable = usable(holds);
         let found = fit(rig, &usable).filter(|_| !usable.is_empty()).map(|fit| {
             let beliefs = beliefs(&fit, 1.0 - rig.decision.alpha);
             Found { fit, beliefs }
@@ -67,11 +77,9 @@ impl Recorder {
             holds: holds.len(),
             leaks: found.as_ref().map(Found::leaks),
         };
-        Some(HoldTest { summary, is_frozen: is_frozen(&usable), found })
+        Some(Self { summary, is_frozen: is_frozen(&usable), found })
     }
-}
 
-impl HoldTest {
     /// How much of it was usable, and what it could find.
     pub fn summary(&self) -> &HoldSummary {
         &self.summary

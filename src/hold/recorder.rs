@@ -2,7 +2,7 @@
 
 use crate::rig::Rig;
 use crate::trace::Record;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Below this gauge pressure air comes out of the oil, and a chamber is soon empty, Pa.
 const LEAST_PRESSURE_PA: f64 = 5e5;
@@ -19,7 +19,7 @@ const MOST_READINGS: usize = 100_000;
 pub(super) const LEAST_READINGS: usize = 8;
 
 /// What ended a hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EndedBy {
     /// The trace, or a pause of it.
@@ -35,7 +35,7 @@ pub enum EndedBy {
 }
 
 /// One reading while the ports are shut; SI.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Reading {
     pub t_s: f64,
     pub x_m: f64,
@@ -44,7 +44,7 @@ pub(super) struct Reading {
 }
 
 /// A hold's usable readings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Held {
     pub readings: Vec<Reading>,
     pub ended_by: EndedBy,
@@ -61,7 +61,7 @@ impl Held {
 }
 
 /// Keeps the readings of a trace's holds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Recorder {
     averaged: [usize; 2],
     /// Noise of a pressure reading.
@@ -133,6 +133,11 @@ impl Recorder {
     pub(super) fn holds(mut self) -> Vec<Held> {
         self.end(EndedBy::Trace);
         self.done
+    }
+
+    /// The holds that have ended since they were asked for last.
+    pub(super) fn take_ended(&mut self) -> Vec<Held> {
+        std::mem::take(&mut self.done)
     }
 }
 

@@ -1,7 +1,7 @@
 //! One cylinder's estimator, and what it has to say.
 
 use super::config::LiveConfig;
-use super::event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent};
+use super::event::{AlarmEvent, EstimateEvent, Event, HoldEvent, LiveLeakage, NoticeEvent};
 use super::history::History;
 use super::notices::Notices;
 use super::order::{Order, Turn};
@@ -132,6 +132,8 @@ impl Cylinder {
                     self.tell_alarms(line.name, events);
                 }
                 self.tell_estimate_if_due(line.name, before_s, config.interval_s, events);
+                let hold = self.stream.ended_hold(line.name);
+                events.extend(self.hold(line.name, hold));
             }
             Err(fault) => self.notice(line.name, "unreadable", fault.to_string(), events),
         }
@@ -150,7 +152,13 @@ impl Cylinder {
             let decision = self.stream.decision();
             events.extend(self.estimate(name, decision.as_ref()).map(|told| Event::Estimate(Box::new(told))));
         }
+        events.extend(self.hold(name, self.stream.hold_so_far(name)));
         self.tell_counted(name, events);
+    }
+
+    fn hold(&self, name: &str, report: Option<ReplayReport>) -> Option<Event> {
+        let t_s = self.stream.time_s()?;
+        HoldEvent::new(name, t_s, self.time_ns(t_s), report?).map(|hold| Event::Hold(Box::new(hold)))
     }
 
     /// What was counted and not said.

@@ -1,7 +1,8 @@
 //! What goes out.
 
 use super::history::{LeakSummary, Span};
-use crate::report::{LeakTrend, Leakage, Reason, Status};
+use crate::hold::HoldSummary;
+use crate::report::{LeakTrend, Leakage, Reason, ReplayReport, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -28,6 +29,8 @@ pub enum Event {
     Notice(NoticeEvent),
     /// What the leaks were in an hour or a day.
     Summary(SummaryEvent),
+    /// What a hold test found.
+    Hold(Box<HoldEvent>),
 }
 
 /// What is known of a cylinder.
@@ -70,6 +73,14 @@ pub struct LiveLeakage {
     pub mean_lpm: f64,
     /// Standard deviation of its error, L/min; none from the paper's law.
     pub std_lpm: Option<f64>,
+}
+
+impl LiveLeakage {
+    /// As fields of line protocol, each behind a comma.
+    fn influx(self, leak: Leak) -> String {
+        let std = self.std_lpm.map(|std_lpm| format!(",{}_std_lpm={std_lpm}", leak.id()));
+        format!(",{}_mean_lpm={}", leak.id(), self.mean_lpm) + &std.unwrap_or_default()
+    }
 }
 
 impl From<Leakage> for LiveLeakage {
@@ -121,6 +132,32 @@ pub struct SummaryEvent {
     pub time_ns: Option<i64>,
 }
 
+/// What a [hold test](crate::hold) found: when it has ended, or as far as it is at the end of the input.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HoldEvent {
+    /// None where the lines name none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub cylinder: String,
+    /// Time of the sample that ended it, s.
+    pub t_s: f64,
+    /// Of this test alone.
+    pub status: Status,
+    /// Leaks that it found, also below their threshold.
+    pub faults: Vec<Leak>,
+    /// Mean flows over the usable time.
+    pub leakage: PerLeak<LiveLeakage>,
+    /// How much was usable, and what it could find.
+    pub hold: HoldSummary,
+    /// The verdict in words.
+    pub text: String,
+    /// Why the status is doubtful or not sure, and what to check, first things first; none where it is sure.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
+    /// As of [`EstimateEvent`].
+    #[serde(skip)]
+    pub time_ns: Option<i64>,
+}
+
 /// Lines that were left out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NoticeEvent {
@@ -135,6 +172,23 @@ pub struct NoticeEvent {
     pub count: u64,
     /// The first of them.
     pub text: String,
+}
+
+impl HoldEvent {
+    /// Of a hold test's report; none of another.
+    pub(super) fn new(cylinder: &str, t_s: f64, time_ns: Option<i64>, report: ReplayReport) -> Option<Self> {
+        Some(Self {
+            cylinder: cylinder.to_owned(),
+            t_s,
+            status: report.verdict.status,
+            faults: report.verdict.faults,
+            leakage: report.leakage.map(LiveLeakage::from),
+            hold: report.hold?,
+            text: report.verdict.text,
+            reasons: report.verdict.reasons,
+            time_ns,
+        })
+    }
 }
 
 impl Event {
@@ -155,6 +209,7 @@ impl Event {
             Self::Alarm(event) => ("pitchleak_alarm", &event.cylinder, event.time_ns),
             Self::Notice(event) => ("pitchleak_notice", &event.cylinder, None),
             Self::Summary(event) => ("pitchleak_summary", &event.cylinder, event.time_ns),
+            Self::Hold(event) => ("pitchleak_hold", &event.cylinder, event.time_ns),
         };
         let mut line = tagged(name, "cylinder", cylinder);
         let quoted =
@@ -167,11 +222,7 @@ impl Event {
                     let _ = write!(values, ",reason=\"{}\"", reason.id.name());
                 }
                 for leak in Leak::ALL {
-                    let LiveLeakage { mean_lpm, std_lpm } = event.leakage[leak];
-                    let _ = write!(values, ",{}_mean_lpm={mean_lpm}", leak.id());
-                    if let Some(std_lpm) = std_lpm {
-                        let _ = write!(values, ",{}_std_lpm={std_lpm}", leak.id());
-                    }
+                    values.push_str(&event.leakage[leak].influx(leak));
                     if let Some(trend) = event.trend[leak] {
                         let _ = write!(values, ",{}_slope_lpm_per_h={}", leak.id(), trend.slope_lpm_per_h);
                     }
@@ -204,6 +255,15 @@ impl Event {
                     if let Some(trend) = leakage.trend_lpm_per_day {
                         let _ = write!(values, ",{name}_slope_lpm_per_day={}", trend.slope);
                     }
+                }
+                write!(line, " {values}")
+            }
+            Self::Hold(event) => {
+                let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
+                let _ = write!(values, ",usable_s={},text=\"{}\"", event.hold.usable_s, quoted(&event.text));
+                for leak in Leak::ALL {
+                    values.push_str(&event.leakage[leak].influx(leak));
+                    let _ = write!(values, ",{}_found={}", leak.id(), event.faults.contains(&leak));
                 }
                 write!(line, " {values}")
             }

@@ -24,7 +24,9 @@ mod weighing;
 pub use batch::{Batch, BatchFormat};
 pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};
 pub use config::{ConfigError, LiveConfig, LiveDocument};
-pub use event::{AlarmEvent, EstimateEvent, Event, LiveLeakage, NoticeEvent, OutputFormat, SummaryEvent};
+pub use event::{
+    AlarmEvent, EstimateEvent, Event, HoldEvent, LiveLeakage, NoticeEvent, OutputFormat, SummaryEvent,
+};
 pub use format::LineFormat;
 pub use history::{DayTrend, LeakSummary, Span};
 pub use watch::Watch;

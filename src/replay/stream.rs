@@ -1,6 +1,7 @@
 use super::Replay;
 use super::state::{self, RestoreError};
 use crate::explain::Decision;
+use crate::hold::Recorder;
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
@@ -34,6 +35,9 @@ pub struct Stream {
     /// While rows are refused as out of range.
     #[serde(default)]
     refused: Option<Box<Refused>>,
+    /// From the first shut port on.
+    #[serde(default)]
+    holds: Option<Box<Recorder>>,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
     pub epoch_ns: Option<i64>,
 }
@@ -93,6 +97,7 @@ impl Stream {
             validator: None,
             bad_rows,
             refused: None,
+            holds: None,
             epoch_ns: None,
         })
     }
@@ -129,6 +134,12 @@ impl Stream {
     /// Takes in one record; says whether the estimates are new.
     fn push(&mut self, record: &Record) -> bool {
         let renewed = self.replay.push(record);
+        if record.shut == Some(true) && self.holds.is_none() {
+            self.holds = Some(Box::new(Recorder::new(&self.replay.rig)));
+        }
+        if let Some(holds) = &mut self.holds {
+            holds.push(record);
+        }
         if self.refused.as_ref().is_some_and(|refused| refused.is_over(record.t_s)) {
             self.refused = None;
         }
@@ -197,6 +208,19 @@ impl Stream {
         &self.replay
     }
 
+    /// The report on the [hold test](crate::hold) that has ended since this was asked last; none where none did.
+    pub fn ended_hold(&mut self, name: &str) -> Option<ReplayReport> {
+        let hold = self.holds.as_mut()?.ended(&self.replay.rig)?;
+        Some(hold.report(self.summary(name)?, self.rig()))
+    }
+
+    /// The same of the hold that goes on, as far as it is.
+    pub fn hold_so_far(&self, name: &str) -> Option<ReplayReport> {
+        let holds = self.holds.as_deref().filter(|_| self.replay.is_shut)?;
+        let hold = holds.clone().finish(self.rig())?;
+        Some(hold.report(self.summary(name)?, self.rig()))
+    }
+
     /// What explains the last twenty minutes or so; none where they say too little.
     pub fn decision(&self) -> Option<Decision> {
         self.replay.decision()
@@ -210,14 +234,18 @@ impl Stream {
 
     /// The report with a decision that was made before.
     pub(crate) fn report_as(&self, name: &str, decision: Option<&Decision>) -> Option<ReplayReport> {
-        let quality = self.validator.as_ref()?.quality();
-        let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
-        let summary = TraceSummary { begins, ..TraceSummary::new(name, quality) };
+        let summary = self.summary(name)?;
         let weighed = self.replay.last_stretch();
-        let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
+        let mostly_bad = self.validator.as_ref()?.quality().is_mostly_bad();
+        let wiring = match self.refused_for().filter(|_| mostly_bad) {
             None => self.replay.wiring_so_far(&weighed, &self.evidence),
             wiring => wiring,
         };
         Some(self.replay.report_with(summary, &weighed, decision, wiring))
+    }
+    fn summary(&self, name: &str) -> Option<TraceSummary> {
+        let quality = self.validator.as_ref()?.quality();
+        let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));
+        Some(TraceSummary { begins, ..TraceSummary::new(name, quality) })
     }
 }

@@ -315,6 +315,10 @@ impl<B: Broker> Service<B> {
                     self.log.say(Level::Warning, &notice.kind, text.trim_start());
                     (topic(cylinder, &format!("notice/{}", notice.kind)), Keeping::Latest)
                 }
+                Event::Hold(hold) => {
+                    self.log.say(Level::Info, "hold", &format!("{} {}", hold.cylinder, hold.text));
+                    (topic(&hold.cylinder, "hold"), Keeping::Latest)
+                }
                 Event::Summary(summary) => {
                     let topic = topic(&summary.cylinder, summary.span.id());
                     if summary.span == Span::Day {
