@@ -223,15 +223,27 @@ fn a_trace_with_neither_meters_nor_a_hold_is_told_of_both() {
         verdict.text
     );
     assert!(!verdict.text.contains("Record longer"), "{}", verdict.text);
+    let estimates = events(&open).into_iter().filter_map(|event| match event {
+        Event::Estimate(estimate) => Some(estimate.reasons),
+        _ => None,
+    });
+    let reasons = estimates.last().expect("an estimate");
+    let advice = reasons.iter().find_map(|reason| reason.suggestion.clone()).expect("advice");
+    assert!(advice.starts_with("no flow is recorded: shut both ports"), "{advice}");
 }
 
-/// The hold events of a live feed.
-fn told(text: &str) -> Vec<HoldEvent> {
+/// What a live feed leads to.
+fn events(text: &str) -> Vec<Event> {
     let mut watch = Watch::new(LiveConfig::of(declared()), Some(LineFormat::Csv));
     let mut events = Vec::new();
     text.lines().for_each(|line| watch.take(line.as_bytes(), &mut events));
     watch.finish(&mut events);
-    let holds = events.into_iter().filter_map(|event| match event {
+    events
+}
+
+/// Its hold events.
+fn told(text: &str) -> Vec<HoldEvent> {
+    let holds = events(text).into_iter().filter_map(|event| match event {
         Event::Hold(hold) => Some(*hold),
         _ => None,
     });

@@ -1,7 +1,7 @@
 use super::Replay;
 use super::state::{self, RestoreError};
 use crate::explain::Decision;
-use crate::hold::Recorder;
+use crate::hold::{self, Recorder};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
@@ -241,7 +241,9 @@ impl Stream {
             None => self.replay.wiring_so_far(&weighed, &self.evidence),
             wiring => wiring,
         };
-        Some(self.replay.report_with(summary, &weighed, decision, wiring))
+        let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
+        hold::advise(&mut report, self.validator.as_ref()?.quality());
+        Some(report)
     }
     fn summary(&self, name: &str) -> Option<TraceSummary> {
         let quality = self.validator.as_ref()?.quality();
