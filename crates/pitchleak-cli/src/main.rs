@@ -85,11 +85,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// A trace alone is replayed: `pitchleak logger.csv`.
+/// A trace alone is replayed: `pitchleak logger.csv`. What has a dot or a folder in it is one that may be missing: no command has.
 fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let is_trace = arguments.get(1).is_some_and(|first| {
         let name = first.to_string_lossy();
-        let is_file = *name == *"-" || (!name.starts_with('-') && Path::new(first).is_file());
+        let is_path = name.contains(['.', '/']) || Path::new(first).is_file();
+        let is_file = *name == *"-" || (!name.starts_with('-') && is_path);
         is_file && Cli::command().find_subcommand(&*name).is_none()
     });
     if is_trace {

@@ -274,4 +274,7 @@ fn a_trace_alone_is_replayed_and_quiet_says_results_only() {
     assert_eq!((&quiet.stdout, text(&quiet.stderr).as_str()), (&named.stdout, ""));
     // What is neither a command nor a file is a mistake of usage.
     assert_eq!(pitchleak(&["reply"], folder.path()).status.code(), Some(2));
+    let missing = pitchleak(&["b.csv"], folder.path());
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(text(&missing.stderr).starts_with("error: b.csv: "), "{}", text(&missing.stderr));
 }
