@@ -223,11 +223,11 @@ fn a_trace_with_neither_meters_nor_a_hold_is_told_of_both() {
         verdict.text
     );
     assert!(!verdict.text.contains("Record longer"), "{}", verdict.text);
-    let estimates = events(&open).into_iter().filter_map(|event| match event {
+    let mut estimates = events(&open).into_iter().filter_map(|event| match event {
         Event::Estimate(estimate) => Some(estimate.reasons),
         _ => None,
     });
-    let reasons = estimates.last().expect("an estimate");
+    let reasons = estimates.next_back().expect("an estimate");
     let advice = reasons.iter().find_map(|reason| reason.suggestion.clone()).expect("advice");
     assert!(advice.starts_with("no flow is recorded: shut both ports"), "{advice}");
 }
