@@ -36,12 +36,14 @@ pub(super) struct Candidates<'a, 'p> {
     /// Of the readings as declared.
     declared: &'p NormalEquations,
     all: Vec<Scored<'a>>,
+    /// The largest ln posterior of them.
+    best_ln: f64,
 }
 
 impl<'a, 'p> Candidates<'a, 'p> {
     /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
     pub fn with_constant_leaks(pass: &'p Pass<'a, 'p>, declared: &'p NormalEquations) -> Self {
-        let mut own = Self { pass, declared, all: Vec::new() };
+        let mut own = Self { pass, declared, all: Vec::new(), best_ln: f64::NEG_INFINITY };
         let knows_zeros = pass.sizes.zeros.iter().all(|zero| *zero > 0.0);
         for (rank, zeros) in pass.tables.zeros.iter().enumerate() {
             // Who declares zeros knows them: they fail, but are not slightly off.
@@ -80,45 +82,43 @@ impl<'a, 'p> Candidates<'a, 'p> {
         self.all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     }
 
-    fn best_ln(&self) -> f64 {
-        self.all.iter().map(|scored| scored.ln_posterior).fold(f64::NEG_INFINITY, f64::max)
-    }
-
     /// Prior of constant leaks.
     fn ln_constant(&self, subset: Subset) -> f64 {
         if subset == [false; 3] { 0.0 } else { self.pass.tables.ln_course(LeakCourse::Constant) }
     }
 
-    /// Its ln posterior and ln likelihood.
-    fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> (f64, f64) {
+    /// Its ln likelihood.
+    fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
         let hypothesis =
             Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course);
         let scored = Scored::new(self.declared, hypothesis);
-        let found = (scored.ln_posterior, scored.ln_likelihood);
+        let ln_likelihood = scored.ln_likelihood;
+        self.best_ln = self.best_ln.max(scored.ln_posterior);
         self.all.push(scored);
-        found
+        ln_likelihood
     }
 
     /// Other courses of the leaks, beside the best states, as far as they can be within `least_ln` of the best.
     pub fn add_courses(&mut self, least_ln: f64) {
         self.sort();
-        let mut best = self.best_ln();
+        let courses = self.pass.courses();
         for (rank, state) in best_states(&self.all).into_iter().enumerate() {
             for subset in subsets().skip(1) {
-                let Some(most) = self.add_free_courses(state, subset, &mut best) else { continue };
-                let least = |best: f64| best - least_ln;
-                for (course, ln_course) in self.pass.courses() {
-                    let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
-                    let by_pressure = matches!(course, LeakCourse::Orifice | LeakCourse::Cracking);
-                    if (can_crack || course != LeakCourse::Cracking)
-                        && (by_pressure || most + ln_course > least(best))
-                    {
-                        best = best.max(self.add(state, together(subset, course), ln_course).0);
+                let Some(most) = self.add_free_courses(state, subset) else { continue };
+                let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
+                for (course, ln_course) in &courses {
+                    let is_asked = match course {
+                        LeakCourse::Orifice => true,
+                        LeakCourse::Cracking => can_crack,
+                        _ => most + ln_course > self.best_ln - least_ln,
+                    };
+                    if is_asked {
+                        self.add(state, together(subset, *course), *ln_course);
                     }
                 }
                 let are_two = subset.iter().filter(|leak| **leak).count() == 2;
                 if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && are_two {
-                    self.add_pairs(state, subset, most, &mut best, least_ln);
+                    self.add_pairs(state, subset, &courses, most, least_ln);
                 }
             }
         }
@@ -126,34 +126,39 @@ impl<'a, 'p> Candidates<'a, 'p> {
 
     /// Leaks that wander or creep may do all that the others do: returns what a course without its prior may reach at the most.
     /// Where even that raises the likelihood by too little, it need not be asked.
-    fn add_free_courses(&mut self, state: State<'a>, subset: Subset, best: &mut f64) -> Option<f64> {
+    fn add_free_courses(&mut self, state: State<'a>, subset: Subset) -> Option<f64> {
         let steady = find(&self.all, state, subset)?;
         let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
         let mut most_likely = steady_likelihood;
         for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
             let ln_course = self.pass.tables.ln_course(course);
-            let (ln_posterior, ln_likelihood) = self.add(state, together(subset, course), ln_course);
-            most_likely = most_likely.max(ln_likelihood);
-            *best = best.max(ln_posterior);
+            most_likely = most_likely.max(self.add(state, together(subset, course), ln_course));
         }
         let gain = most_likely - steady_likelihood + BEYOND_WANDERING;
         Some(steady_ln - self.pass.tables.ln_course(LeakCourse::Constant) + gain)
     }
 
     /// Two leaks each with a course of its own, where those can be as probable as the best.
-    fn add_pairs(&mut self, state: State<'a>, subset: Subset, most: f64, best: &mut f64, least_ln: f64) {
-        let mut courses = self.pass.courses();
+    fn add_pairs(
+        &mut self,
+        state: State<'a>,
+        subset: Subset,
+        courses: &[(LeakCourse, f64)],
+        most: f64,
+        least_ln: f64,
+    ) {
+        let mut courses = courses.to_vec();
         courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
         courses.push((LeakCourse::Constant, self.pass.tables.ln_course(LeakCourse::Constant)));
         let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
         for (course, ln_one) in &courses {
             for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                if most + ln_one + ln_other <= *best - least_ln {
+                if most + ln_one + ln_other <= self.best_ln - least_ln {
                     continue;
                 }
                 let mut leaks = [None; 3];
                 (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
-                *best = best.max(self.add(state, leaks, ln_one + ln_other).0);
+                self.add(state, leaks, ln_one + ln_other);
             }
         }
     }
@@ -167,7 +172,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander };
-        let least = self.best_ln() - least_ln;
+        let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
         let whole = self.pass.products.whole();

@@ -103,7 +103,7 @@ pub(super) struct Hypothesis<'a> {
     pub free: Vec<Free>,
     /// Parameters that cannot be negative.
     pub positive: Vec<usize>,
-    /// Parameters whose sum, with these signs, is each leak's flow at the trace's end.
+    /// Places among those, whose sum, times these, is each leak's flow at the trace's end.
     pub ends: [Vec<(usize, f64)>; 3],
 }
 
@@ -216,13 +216,10 @@ impl<'a> Hypothesis<'a> {
 
     fn add(&mut self, equations: &NormalEquations, leak: usize, term: &Term) {
         let Some(column) = equations.place(term.column, term.course) else { return };
-        let at = self.free.len();
-        self.free.push(Free { column, std: term.std });
         if !term.step {
-            self.positive.push(at);
+            self.ends[leak].push((self.positive.len(), term.at_end));
+            self.positive.push(self.free.len());
         }
-        if term.at_end != 0.0 {
-            self.ends[leak].push((at, term.at_end));
-        }
+        self.free.push(Free { column, std: term.std });
     }
 }

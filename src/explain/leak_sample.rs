@@ -62,13 +62,13 @@ pub(super) fn cut<'a>(
     }
     let count = if ln_posterior < best - LITTLE_LN { FEW_POINTS } else { POINTS };
     let orthant = positive_orthant(&means, &covariance, count);
-    let weighed = Fitted { pass, equations, hypothesis, fit }.weighed(&orthant);
-    Some((ln_posterior + orthant.ln_probability, Weighed { weights: orthant.weights, ..weighed }))
+    let ln = ln_posterior + orthant.ln_probability;
+    Some((ln, Fitted { pass, equations, hypothesis, fit }.weighed(orthant)))
 }
 
 impl<'a> Fitted<'_, 'a> {
-    /// Without its probability, which others are needed for, and the weights of the sample.
-    fn weighed(self, orthant: &Orthant) -> Weighed<'a> {
+    /// Without its probability, which others are needed for.
+    fn weighed(self, orthant: Orthant) -> Weighed<'a> {
         let border = self.last_change();
         let products = self.pass.products;
         let changed = Some(border).filter(|border| *border > 0);
@@ -79,9 +79,9 @@ impl<'a> Fitted<'_, 'a> {
             changed_ago_s: changed.map(|segment| products.total_s - segment.begin_s),
             pressures_pa: products.mean_pressures_pa(border),
             found: self.found(),
-            levels_m3s: self.levels_m3s(orthant),
+            levels_m3s: self.levels_m3s(&orthant),
             leaks_m3s: self.leaks_m3s(&orthant.points),
-            weights: Vec::new(),
+            weights: orthant.weights,
             hypothesis: self.hypothesis,
         }
     }
@@ -104,16 +104,9 @@ impl<'a> Fitted<'_, 'a> {
         self.hypothesis.free.iter().position(|free| free.column == place)
     }
 
-    /// What makes up a leak's flow at the trace's end: places in a point, with signs.
-    fn ends(&self, leak: usize) -> Vec<(usize, f64)> {
-        let place = |end: usize| self.hypothesis.positive.iter().position(|one| *one == end);
-        self.hypothesis.ends[leak].iter().filter_map(|(end, sign)| Some((place(*end)?, *sign))).collect()
-    }
-
     fn levels_m3s(&self, orthant: &Orthant) -> [f64; 3] {
         [0, 1, 2].map(|leak| {
-            let ends = self.ends(leak);
-            let rising = ends.iter().filter(|(_, sign)| *sign > 0.0);
+            let rising = self.hypothesis.ends[leak].iter().filter(|(_, sign)| *sign > 0.0);
             let weighed = || orthant.points.iter().zip(&orthant.weights);
             let mean = |place: usize| weighed().map(|(point, w)| w * point[place]).sum::<f64>();
             rising.map(|(place, _)| mean(*place)).sum::<f64>() * self.pass.full_scale_m3s
@@ -131,8 +124,7 @@ impl<'a> Fitted<'_, 'a> {
         let products = self.pass.products;
         let all_pa = products.mean_pressures_pa(0);
         let pressures_pa = products.mean_pressures_pa(self.last_change());
-        for leak in 0..3 {
-            let ends = self.ends(leak);
+        for (leak, ends) in self.hypothesis.ends.iter().enumerate() {
             if ends.is_empty() {
                 continue;
             }

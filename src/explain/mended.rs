@@ -19,9 +19,8 @@ pub(super) struct Mended {
     pub equations: NormalEquations,
     /// ln of what that changes of the evidence.
     pub ln_measure: f64,
-    /// The noise scale that the readings' scatter shows; none where nothing is known of it.
-    scatter: [Option<f64>; EQUATIONS],
-    /// How much of its scatter the best explanation as declared leaves, at most all.
+    /// Noise scales of the readings' own scatter, as far as the best explanation as declared leaves it; 0 where nothing is
+    /// known of it.
     left: [f64; EQUATIONS],
 }
 
@@ -34,8 +33,7 @@ impl Mended {
         scales: [f64; EQUATIONS],
     ) -> Self {
         let ln_jacobian = mistake.ln_jacobian();
-        let mut scatter_scales = [None; EQUATIONS];
-        let (mut louder, mut left) = ([1.0; EQUATIONS], [1.0; EQUATIONS]);
+        let (mut louder, mut scattered, mut left) = ([1.0; EQUATIONS], [1.0; EQUATIONS], [0.0; EQUATIONS]);
         let (mut ln_measure, mut ln_noise) = (0.0, 0.0);
         for equation in 0..EQUATIONS {
             let ([own, own_scatter], [other, scatter]) =
@@ -44,8 +42,8 @@ impl Mended {
                 continue;
             }
             louder[equation] = (own / other).min(own_scatter / scatter);
-            scatter_scales[equation] = Some(own_scatter / (other * louder[equation]));
-            left[equation] = (scales[equation] * other / scatter).min(1.0);
+            scattered[equation] = own_scatter / (other * louder[equation]);
+            left[equation] = (scales[equation] * other / scatter).min(1.0) * scattered[equation];
             if equation == BALANCE {
                 ln_measure +=
                     mended.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder[equation].ln());
@@ -53,9 +51,8 @@ impl Mended {
             ln_noise += ln_scale_prior(own_scatter / other) - ln_scale_prior((scatter / other).max(1.0));
         }
         Self {
-            equations: mended.measured_by(louder, scatter_scales.map(|scale| scale.unwrap_or(1.0).max(1.0))),
+            equations: mended.measured_by(louder, scattered.map(|scale| scale.max(1.0))),
             ln_measure: ln_measure.min(0.0) + ln_noise,
-            scatter: scatter_scales,
             left,
         }
     }
@@ -64,9 +61,9 @@ impl Mended {
     /// mistake turns noise into other noise, which by chance may be smaller.
     pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
         let one = |equation: usize| {
-            let scatter = self.left[equation] * self.scatter[equation].unwrap_or(0.0);
-            if scatter > scales[equation] {
-                -0.5 * self.equations.rows[equation] * (scatter / scales[equation]).ln()
+            let left = self.left[equation];
+            if left > scales[equation] {
+                -0.5 * self.equations.rows[equation] * (left / scales[equation]).ln()
             } else {
                 0.0
             }

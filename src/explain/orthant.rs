@@ -33,7 +33,7 @@ pub(crate) struct Orthant {
 }
 
 /// Coordinate of a point in the unit cube.
-pub(super) fn uniform(point: usize, dimension: usize) -> f64 {
+fn uniform(point: usize, dimension: usize) -> f64 {
     let step = PRIMES[dimension % PRIMES.len()].sqrt();
     ((point as f64 + 0.5) * step).fract().clamp(1e-9, 1.0 - 1e-9)
 }

@@ -93,6 +93,17 @@ impl Recorder {
         }
     }
 
+    /// Takes in a record where there may be holds: `recorder` is none up to the first.
+    #[inline]
+    pub fn record(recorder: &mut Option<Self>, record: &Record, rig: &Rig) {
+        if record.shut == Some(true) && recorder.is_none() {
+            *recorder = Some(Self::new(rig));
+        }
+        if let Some(recorder) = recorder {
+            recorder.push(record);
+        }
+    }
+
     /// Takes in one record. An empty cell of `shut` says that nothing changed.
     pub fn push(&mut self, record: &Record) {
         let is_shut = record.shut.unwrap_or(self.was_shut);
@@ -133,6 +144,12 @@ impl Recorder {
     pub(super) fn holds(mut self) -> Vec<Held> {
         self.end(EndedBy::Trace);
         self.done
+    }
+
+    /// Drops all holds that have ended but the last: a stream that nobody asks for them would grow.
+    pub fn keep_last(&mut self) {
+        let first = self.done.len().saturating_sub(1);
+        self.done.drain(..first);
     }
 
     /// The holds that have ended since they were asked for last.

@@ -419,12 +419,7 @@ pub fn replay<E: From<ReplayError>>(
     let mut holds: Option<Recorder> = None;
     while next_record(reader, &mut record, &mut refused, || Refused::new(rig, &columns))? {
         let renewed = replay.push(&record);
-        if record.shut == Some(true) && holds.is_none() {
-            holds = Some(Recorder::new(rig));
-        }
-        if let Some(holds) = &mut holds {
-            holds.push(&record);
-        }
+        Recorder::record(&mut holds, &record, rig);
         if !replay.spikes.left_out() && !replay.is_shut {
             excerpt.add(&record);
         }

@@ -37,7 +37,7 @@ pub struct Stream {
     refused: Option<Box<Refused>>,
     /// From the first shut port on.
     #[serde(default)]
-    holds: Option<Box<Recorder>>,
+    holds: Option<Recorder>,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
     pub epoch_ns: Option<i64>,
 }
@@ -134,12 +134,8 @@ impl Stream {
     /// Takes in one record; says whether the estimates are new.
     fn push(&mut self, record: &Record) -> bool {
         let renewed = self.replay.push(record);
-        if record.shut == Some(true) && self.holds.is_none() {
-            self.holds = Some(Box::new(Recorder::new(&self.replay.rig)));
-        }
-        if let Some(holds) = &mut self.holds {
-            holds.push(record);
-        }
+        Recorder::record(&mut self.holds, record, &self.replay.rig);
+        self.holds.iter_mut().for_each(Recorder::keep_last);
         if self.refused.as_ref().is_some_and(|refused| refused.is_over(record.t_s)) {
             self.refused = None;
         }
@@ -208,7 +204,7 @@ impl Stream {
         &self.replay
     }
 
-    /// The report on the [hold test](crate::hold) that has ended since this was asked last; none where none did.
+    /// The report on the last [hold test](crate::hold) that has ended since this was asked last; none where none did.
     pub fn ended_hold(&mut self, name: &str) -> Option<ReplayReport> {
         let hold = self.holds.as_mut()?.ended(&self.replay.rig)?;
         Some(hold.report(self.summary(name)?, self.rig()))
@@ -216,7 +212,7 @@ impl Stream {
 
     /// The same of the hold that goes on, as far as it is.
     pub fn hold_so_far(&self, name: &str) -> Option<ReplayReport> {
-        let holds = self.holds.as_deref().filter(|_| self.replay.is_shut)?;
+        let holds = self.holds.as_ref().filter(|_| self.replay.is_shut)?;
         let hold = holds.clone().finish(self.rig())?;
         Some(hold.report(self.summary(name)?, self.rig()))
     }
@@ -234,17 +230,17 @@ impl Stream {
 
     /// The report with a decision that was made before.
     pub(crate) fn report_as(&self, name: &str, decision: Option<&Decision>) -> Option<ReplayReport> {
-        let summary = self.summary(name)?;
+        let (summary, quality) = (self.summary(name)?, self.validator.as_ref()?.quality());
         let weighed = self.replay.last_stretch();
-        let mostly_bad = self.validator.as_ref()?.quality().is_mostly_bad();
-        let wiring = match self.refused_for().filter(|_| mostly_bad) {
+        let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
             None => self.replay.wiring_so_far(&weighed, &self.evidence),
             wiring => wiring,
         };
         let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
-        hold::advise(&mut report, self.validator.as_ref()?.quality());
+        hold::advise(&mut report, quality);
         Some(report)
     }
+
     fn summary(&self, name: &str) -> Option<TraceSummary> {
         let quality = self.validator.as_ref()?.quality();
         let begins = self.epoch_ns.and_then(|first_ns| Clock::new(first_ns, &TimeFormat::default()));

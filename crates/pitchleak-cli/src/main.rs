@@ -90,8 +90,8 @@ fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     let is_trace = arguments.get(1).is_some_and(|first| {
         let name = first.to_string_lossy();
         let is_path = name.contains(['.', '/']) || Path::new(first).is_file();
-        let is_file = *name == *"-" || (!name.starts_with('-') && is_path);
-        is_file && Cli::command().find_subcommand(&*name).is_none()
+        let names_a_trace = *name == *"-" || (!name.starts_with('-') && is_path);
+        names_a_trace && Cli::command().find_subcommand(&*name).is_none()
     });
     if is_trace {
         arguments.insert(1, "replay".into());
