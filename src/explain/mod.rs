@@ -17,6 +17,7 @@ mod posterior;
 mod raw_products;
 mod readings;
 mod sizes;
+mod still;
 mod table;
 
 pub use columns::{Column, Course};
@@ -24,5 +25,5 @@ pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, Note, WIRING_DOUBT
 pub(crate) use orthant::{Orthant, POINTS, positive_orthant};
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
-pub(crate) use table::LEAK_SHARE;
 pub use table::{Entry, Kind, explanations};
+pub(crate) use table::{LEAK_SHARE, USUAL_DRIFT, USUAL_GAIN, USUAL_ZERO};

@@ -1,5 +1,6 @@
 //! Products of the raw sums, segment by segment, and what the sensors' noise adds to them in closed form.
 
+use super::still::settle;
 use crate::rig::Rig;
 use pitchleak_core::continuity::{
     CHANNELS, COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, Segment, column as place_of,
@@ -60,6 +61,7 @@ impl RawProducts {
             });
             total_s += segment.time_s();
         }
+        settle(&mut segments);
         Self { segments, total_s }
     }
 
@@ -161,15 +163,15 @@ impl NoiseOf {
     fn products(&self, segment: &Segment<f64>, equation: usize) -> Vec<f64> {
         use RawSum as R;
         let mut out = vec![0.0; COLUMNS * COLUMNS];
-        let [aa, ab, bb] = segment.integral_noise(equation);
+        let [flow_a, flow_b, pressure] = segment.integral_noise(equation);
         let integrals = [
-            (R::ResidualA, self.flow[0]),
-            (R::ResidualB, self.flow[1]),
-            (R::PressureA, self.pressure_mpa[0]),
-            (R::PressureB, self.pressure_mpa[1]),
+            (R::ResidualA, self.flow[0], flow_a),
+            (R::ResidualB, self.flow[1], flow_b),
+            (R::PressureA, self.pressure_mpa[0], pressure),
+            (R::PressureB, self.pressure_mpa[1], pressure),
         ];
-        for (raw, std) in integrals {
-            add_pair(&mut out, raw, raw, [aa, ab, bb], std * std);
+        for (raw, std, noise) in integrals {
+            add_pair(&mut out, raw, raw, noise, std * std);
         }
         let [area_a, area_b] = self.area_m2;
         let kappa = self.compressibility;

@@ -28,9 +28,9 @@ pub enum RestoreError {
 }
 
 /// Name and version of the saved form, …
-const SCHEMA: &str = "pitchleak.state/8";
+const SCHEMA: &str = "pitchleak.state/9";
 /// … which begins every state as a text of CBOR.
-const HEAD: &[u8] = b"\x71pitchleak.state/8";
+const HEAD: &[u8] = b"\x71pitchleak.state/9";
 /// The head of a saved state of any version.
 const ANY_HEAD: &[u8] = b"\x71pitchleak.state/";
 /// Bytes of the checksum at the end: CRC-32 of all before it, little-endian. It finds every single wrong bit and every

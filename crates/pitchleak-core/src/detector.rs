@@ -49,6 +49,15 @@ impl<T: Real> Default for AlarmSettings<T> {
     }
 }
 
+impl<T: Real> AlarmSettings<T> {
+    /// Whether a flow, m³/s, is above `threshold_m3s` for certain: what an alarm has to be for the hold time.
+    pub fn is_evidence(&self, threshold_m3s: T, flow: &Estimate<T>) -> bool {
+        let half_width = |alpha| confidence_half_width(flow.std, threshold_m3s, alpha);
+        flow.value > half_width(self.false_alarm_probability)
+            && flow.value - half_width(self.early_alarm_probability) > threshold_m3s
+    }
+}
+
 /// A change of one alarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -108,12 +117,11 @@ impl<T: Real> Channel<T> {
         dt_s: T,
         flow: &Estimate<T>,
     ) -> Option<AlarmState> {
-        let half_width = |alpha| confidence_half_width(flow.std, threshold_m3s, alpha);
-        let sure = half_width(settings.false_alarm_probability);
         let evidence = if self.active {
+            let sure = confidence_half_width(flow.std, threshold_m3s, settings.false_alarm_probability);
             flow.value + sure < settings.clear_share * threshold_m3s
         } else {
-            flow.value > sure && flow.value - half_width(settings.early_alarm_probability) > threshold_m3s
+            settings.is_evidence(threshold_m3s, flow)
         };
         if !evidence {
             self.evidence_time_s = T::zero();

@@ -3,14 +3,13 @@
 //!
 //! Pressures are summed in MPa, so that squares of the sums stay within single precision's range; all else is SI.
 
+use super::clocks::Row;
 use crate::{Cylinder, Fluid, Real, Sample, signed_root};
 
 /// Usual length of a block, s.
 const BLOCK_S: f64 = 0.25;
 /// Steps that a block has at the least: fewer are no average, at 10 Hz.
 const LEAST_STEPS: u32 = 8;
-/// A meter that is silent for so many usual blocks rests; chosen.
-const SILENT_BLOCKS: f64 = 2.0;
 /// Readings averaged about a block's end for the change of a flow over it.
 const END_READINGS: usize = 7;
 /// Those of them that come after the end.
@@ -79,6 +78,8 @@ pub struct Block<T> {
     pub fed: [bool; 2],
     /// Σ dt² between a flow meter's own readings, s².
     pub time_square_s2: [T; 2],
+    /// Σ dt² between the readings of the pressures, s².
+    pub pressure_square_s2: T,
     /// V_A and V_B at the block's end, m³.
     pub volumes_m3: [T; 2],
     /// No block comes right before it: its begin has noise of its own, with these volumes.
@@ -111,18 +112,17 @@ struct Sums<T> {
     flow_m3: [T; 2],
     sums: [T; RAW_SUMS],
     time_square_s2: [T; 2],
+    pressure_square_s2: T,
     volumes_m3: [T; 2],
     fed: [bool; 2],
     steps: u32,
 }
 
-/// A flow meter with a clock of its own.
+/// A flow meter.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Meter<T> {
     last_m3s: Option<T>,
-    /// Time since its last reading, s.
-    silent_s: T,
     readings_m3s: [T; END_READINGS],
     count: usize,
     /// Mean of the readings about the last block's end, m³/s.
@@ -130,24 +130,20 @@ struct Meter<T> {
 }
 
 impl<T: Real> Meter<T> {
-    /// Takes the reading after a step; what has flowed since its last reading, and the square of that time.
-    fn read(&mut self, dt_s: T, reading_m3s: Option<T>) -> Option<(T, T)> {
-        self.silent_s += dt_s;
-        let now = reading_m3s?;
-        if let Some(place) = self.readings_m3s.get_mut(self.count % END_READINGS) {
-            *place = now;
+    /// Takes what stands in a row, and whether it was read just then; what has flowed since the row before.
+    fn take(&mut self, dt_s: T, flow_m3s: Option<T>, was_read: bool) -> Option<T> {
+        let last = core::mem::replace(&mut self.last_m3s, flow_m3s);
+        let now = flow_m3s?;
+        if was_read {
+            if let Some(place) = self.readings_m3s.get_mut(self.count % END_READINGS) {
+                *place = now;
+            }
+            self.count += 1;
         }
-        self.count += 1;
-        let (silent_s, last) = (self.silent_s, self.last_m3s);
-        self.silent_s = T::zero();
-        self.last_m3s = Some(now);
-        last.map(|last| (T::lit(0.5) * (now + last) * silent_s, silent_s * silent_s))
+        last.map(|last| T::lit(0.5) * (now + last) * dt_s)
     }
 
-    fn rests(&mut self) -> bool {
-        if self.silent_s > T::lit(SILENT_BLOCKS * BLOCK_S) {
-            self.last_m3s = None;
-        }
+    fn rests(&self) -> bool {
         self.last_m3s.is_none()
     }
 
@@ -176,16 +172,15 @@ impl<T: Real> BlockSums<T> {
         }
     }
 
-    /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive; gives
-    /// the block that ended a few readings before.
-    pub fn push(&mut self, dt_s: T, sample: &Sample<T>) -> Option<Block<T>> {
-        let Some(last) = self.last.filter(|_| dt_s > T::zero()) else {
+    /// Takes in a row, which begins after a pause where its step is not positive; gives the block that ended a few rows before.
+    pub fn push(&mut self, row: &Row<T>) -> Option<Block<T>> {
+        let Some(last) = self.last.filter(|_| row.dt_s > T::zero()) else {
             let block = self.release();
-            self.begin(sample);
+            self.begin(&row.sample);
             return block;
         };
-        self.add(dt_s, &last, sample);
-        self.last = Some(*sample);
+        self.add(&last, row);
+        self.last = Some(row.sample);
         let block = self.count_down();
         if self.is_complete() {
             let fed = self.begin_fed();
@@ -202,7 +197,7 @@ impl<T: Real> BlockSums<T> {
     fn begin(&mut self, sample: &Sample<T>) {
         self.meters = [Meter::default(); 2];
         for (meter, reading) in self.meters.iter_mut().zip([sample.qa_m3s, sample.qb_m3s]) {
-            meter.read(T::zero(), reading);
+            let _ = meter.take(T::zero(), reading, true);
         }
         self.last = Some(*sample);
         self.begins_at = Some(self.volumes_m3(sample.x_m));
@@ -210,8 +205,8 @@ impl<T: Real> BlockSums<T> {
         self.countdown = READINGS_AFTER;
     }
 
-    fn begin_fed(&mut self) -> [bool; 2] {
-        let [a, b] = &mut self.meters;
+    fn begin_fed(&self) -> [bool; 2] {
+        let [a, b] = &self.meters;
         [!a.rests(), !b.rests()]
     }
 
@@ -222,18 +217,24 @@ impl<T: Real> BlockSums<T> {
         [area_a * x_m + dead_a, area_b * (self.stroke_m - x_m) + dead_b]
     }
 
-    fn add(&mut self, dt_s: T, last: &Sample<T>, sample: &Sample<T>) {
+    fn add(&mut self, last: &Sample<T>, row: &Row<T>) {
         use RawSum as R;
+        let Row { dt_s, ref sample, .. } = *row;
         let half = T::lit(0.5);
         let mpa = T::lit(MPA_PER_PA);
         let volumes_m3 = self.volumes_m3(half * (sample.x_m + last.x_m));
         let change = [mpa * (sample.pa_pa - last.pa_pa), mpa * (sample.pb_pa - last.pb_pa)];
         let [pa, pb] = [half * mpa * (sample.pa_pa + last.pa_pa), half * mpa * (sample.pb_pa + last.pb_pa)];
         let open = &mut self.open;
-        for (side, reading) in [sample.qa_m3s, sample.qb_m3s].into_iter().enumerate() {
-            if let Some((flown_m3, square_s2)) = self.meters[side].read(dt_s, reading) {
+        let flows = [
+            (sample.qa_m3s, row.read.qa, row.own_step_s.qa),
+            (sample.qb_m3s, row.read.qb, row.own_step_s.qb),
+        ];
+        for (side, (flow, was_read, own_step_s)) in flows.into_iter().enumerate() {
+            if let Some(flown_m3) = self.meters[side].take(dt_s, flow, was_read) {
                 open.flow_m3[side] += flown_m3;
-                open.time_square_s2[side] += square_s2;
+                // Over all rows between two readings these are the square of the time between those.
+                open.time_square_s2[side] += own_step_s * dt_s;
             }
         }
         let t_s = open.sums[R::Time as usize] + half * dt_s;
@@ -255,15 +256,15 @@ impl<T: Real> BlockSums<T> {
         sum(R::AgedPressureA, dt_s * t_s * pa);
         sum(R::AgedPressureB, dt_s * t_s * pb);
         sum(R::AgedTime, dt_s * t_s);
+        open.pressure_square_s2 += dt_s * dt_s;
         open.volumes_m3 = volumes_m3;
         open.steps += 1;
     }
 
-    /// A block ends where it is long enough, at a reading of all meters that are read at all.
-    fn is_complete(&mut self) -> bool {
+    /// A block ends where it is long enough.
+    fn is_complete(&self) -> bool {
         let time_s = self.open.sums[RawSum::Time as usize];
-        let is_long = time_s >= T::lit(BLOCK_S - 1e-9) && self.open.steps >= LEAST_STEPS;
-        is_long && self.meters.iter_mut().all(|meter| meter.rests() || meter.silent_s <= T::zero())
+        time_s >= T::lit(BLOCK_S - 1e-9) && self.open.steps >= LEAST_STEPS
     }
 
     /// Once the readings after an end are there, its means are taken and its block comes out.
@@ -286,13 +287,14 @@ impl<T: Real> BlockSums<T> {
             }
             meter.end_m3s = end;
         }
-        let Sums { flow_m3, mut sums, time_square_s2, volumes_m3, fed, .. } = sums?;
+        let Sums { flow_m3, mut sums, time_square_s2, pressure_square_s2, volumes_m3, fed, .. } = sums?;
         let travel = sums[RawSum::Travel as usize];
         let stored = |raw: RawSum| self.compressibility * sums[raw as usize];
         let residual_a = flow_m3[0] - self.area_m2[0] * travel - stored(RawSum::StorageA);
         let residual_b = flow_m3[1] + self.area_m2[1] * travel - stored(RawSum::StorageB);
         sums[RawSum::ResidualA as usize] = if fed[0] { residual_a } else { T::zero() };
         sums[RawSum::ResidualB as usize] = if fed[1] { residual_b } else { T::zero() };
-        Some(Block { sums, fed, time_square_s2, volumes_m3, begins_at: self.begins_at.take() })
+        let begins_at = self.begins_at.take();
+        Some(Block { sums, fed, time_square_s2, pressure_square_s2, volumes_m3, begins_at })
     }
 }

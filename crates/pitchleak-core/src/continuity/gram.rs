@@ -8,7 +8,8 @@
 
 use super::block_sums::{Block, BlockSums, MPA_PER_PA, RAW_SUMS, RawSum};
 use super::change::{SEGMENT_BLOCKS, Waiting};
-use super::whitening::{COLUMNS, EQUATIONS, Row, RowNoise, VOLUME_POWERS, Whitener};
+use super::clocks::{self, Clocks, Next, Readings};
+use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS, Whitener};
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
 
 /// Entries of a packed symmetric matrix, row by row of its lower triangle.
@@ -31,6 +32,10 @@ const THIRD_DIFFERENCE: f64 = 3.568_248_232;
     ))
 )]
 pub struct ContinuityStatistic<T, const S: usize> {
+    clocks: Clocks<T>,
+    /// The last row, and its step, s.
+    last: Option<Sample<T>>,
+    step_s: T,
     blocks: BlockSums<T>,
     waiting: Waiting<T>,
     whitener: Whitener<T>,
@@ -43,6 +48,9 @@ pub struct ContinuityStatistic<T, const S: usize> {
     time_s: T,
     roots: PerLeak<T>,
 }
+
+/// A flow without a reading for so long rests, until its own step is known; as long as two blocks. Chosen.
+const LONGEST_SILENCE_S: f64 = 0.5;
 
 /// Channels whose scatter is watched: position, P_A, P_B, Q_A, Q_B.
 pub const CHANNELS: usize = 5;
@@ -60,7 +68,7 @@ pub const CHANNELS: usize = 5;
 pub struct Segment<T> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     gram: [[T; PACKED]; EQUATIONS],
-    integral_noise: [[T; 3]; EQUATIONS],
+    integral_noise: [[[T; 3]; INTEGRALS]; EQUATIONS],
     end_noise: [[[T; 3]; VOLUME_POWERS]; EQUATIONS],
     rows: [T; EQUATIONS],
     blocks: u32,
@@ -102,7 +110,7 @@ impl<T: Real> Default for Segment<T> {
     fn default() -> Self {
         Self {
             gram: [[T::zero(); PACKED]; EQUATIONS],
-            integral_noise: [[T::zero(); 3]; EQUATIONS],
+            integral_noise: [[[T::zero(); 3]; INTEGRALS]; EQUATIONS],
             end_noise: [[[T::zero(); 3]; VOLUME_POWERS]; EQUATIONS],
             rows: [T::zero(); EQUATIONS],
             blocks: 0,
@@ -150,8 +158,9 @@ impl<T: Real> Segment<T> {
         self.pressure_time.map(|sum| sum / (self.time_s * T::lit(MPA_PER_PA)))
     }
 
-    /// What integrated noise of unit variance per s² adds to a product of chambers' columns: A A, A B, B B.
-    pub fn integral_noise(&self, equation: usize) -> [T; 3] {
+    /// What integrated noise of unit variance per s² adds to a product of chambers' columns, A A, A B, B B: noise of Q_A, of Q_B
+    /// and of the pressures.
+    pub fn integral_noise(&self, equation: usize) -> [[T; 3]; INTEGRALS] {
         self.integral_noise[equation]
     }
 
@@ -170,8 +179,10 @@ impl<T: Real> Segment<T> {
             }
         }
         let RowNoise { integral, end } = row.noise;
-        for (sum, value) in self.integral_noise[equation].iter_mut().zip(integral) {
-            *sum += value;
+        for (sums, values) in self.integral_noise[equation].iter_mut().zip(integral) {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += value;
+            }
         }
         for (sums, values) in self.end_noise[equation].iter_mut().zip(end) {
             for (sum, value) in sums.iter_mut().zip(values) {
@@ -208,8 +219,11 @@ impl<T: Real> Segment<T> {
             for (sum, value) in self.gram[equation].iter_mut().zip(next.gram[equation]) {
                 *sum += value;
             }
-            for (sum, value) in self.integral_noise[equation].iter_mut().zip(next.integral_noise[equation]) {
-                *sum += value;
+            for (sums, values) in self.integral_noise[equation].iter_mut().zip(next.integral_noise[equation])
+            {
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value;
+                }
             }
             for (sums, values) in self.end_noise[equation].iter_mut().zip(next.end_noise[equation]) {
                 for (sum, value) in sums.iter_mut().zip(values) {
@@ -300,6 +314,9 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
     /// No reading yet.
     pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
         Self {
+            clocks: Clocks::new(T::lit(LONGEST_SILENCE_S)),
+            last: None,
+            step_s: T::zero(),
             blocks: BlockSums::new(cylinder, fluid),
             waiting: Waiting::new(cylinder, sensors),
             whitener: Whitener::new(cylinder, fluid, sensors),
@@ -340,7 +357,55 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
             self.time_s += dt_s;
             self.roots = self.roots.zip(pressures).map(|(sum, p)| sum + dt_s * signed_root(p).abs());
         }
-        if let Some(block) = self.blocks.push(dt_s, sample) {
+        self.place(dt_s, sample);
+    }
+
+    /// Brings flows that are not read with every sample to the samples' times.
+    fn place(&mut self, dt_s: T, sample: &Sample<T>) {
+        if dt_s <= T::zero() {
+            self.clocks.begin_anew();
+            self.step_s = T::zero();
+        } else if !self.clocks.is_empty() || self.waits_for(sample) {
+            if let Some(last) = self.last.filter(|_| self.clocks.is_empty()) {
+                self.clocks.go_on_after(&last, Some(self.step_s).filter(|step_s| *step_s > T::zero()));
+            }
+            self.step_s = T::zero();
+            self.clocks.push(dt_s, &Readings::from(sample));
+            return self.take_waiting();
+        } else {
+            // A flow that was not read before has another step than the rows.
+            self.step_s = if self.follows(sample) { dt_s } else { T::zero() };
+        }
+        self.take_row(&clocks::Row::read(dt_s, sample));
+    }
+
+    /// Whether a flow has no reading after one that had.
+    fn waits_for(&self, now: &Sample<T>) -> bool {
+        let is_missing = |last: Option<T>, now: Option<T>| last.is_some() && now.is_none();
+        self.last
+            .is_some_and(|last| is_missing(last.qa_m3s, now.qa_m3s) || is_missing(last.qb_m3s, now.qb_m3s))
+    }
+
+    /// Whether each flow that is read was read with the row before, too.
+    fn follows(&self, now: &Sample<T>) -> bool {
+        let follows = |last: Option<T>, now: Option<T>| last.is_some() || now.is_none();
+        self.last.is_some_and(|last| follows(last.qa_m3s, now.qa_m3s) && follows(last.qb_m3s, now.qb_m3s))
+    }
+
+    #[cold]
+    fn take_waiting(&mut self) {
+        loop {
+            match self.clocks.pop() {
+                Next::Waits => return,
+                Next::Gap => self.last = None,
+                Next::Row(row) => self.take_row(&row),
+            }
+        }
+    }
+
+    fn take_row(&mut self, row: &clocks::Row<T>) {
+        self.last = Some(row.sample);
+        if let Some(block) = self.blocks.push(row) {
             self.take(&block);
         }
     }

@@ -35,11 +35,14 @@ pub struct Row<T> {
 /// B's, B's with itself.
 #[derive(Clone, Copy, Debug)]
 pub struct RowNoise<T> {
-    /// Of integrals over the blocks, times Σ dt².
-    pub integral: [T; 3],
+    /// Of integrals over the blocks, times Σ dt²: of Q_A, of Q_B, of the pressures.
+    pub integral: [[T; 3]; INTEGRALS],
     /// Of readings at the blocks' ends, times 1, V_A, V_B, V_A², V_A V_B and V_B², m³.
     pub end: [[T; 3]; VOLUME_POWERS],
 }
+
+/// Integrals whose readings may come at rates of their own: Q_A, Q_B, and the pressures.
+pub const INTEGRALS: usize = 3;
 
 /// Products of volumes up to the second order.
 pub const VOLUME_POWERS: usize = 6;
@@ -69,7 +72,7 @@ pub struct Whitener<T> {
     last: [[T; COLUMNS]; 2],
     /// Covariances between the rows of two chambers' columns, for a unit source in each: of noise that is integrated, and
     /// of that at the ends of blocks before.
-    integral: [Matrix2<T>; 3],
+    integral: [[Matrix2<T>; 3]; INTEGRALS],
     ends: [Matrix2<T>; 3],
     begun: bool,
 }
@@ -90,7 +93,7 @@ impl<T: Real> Whitener<T> {
             end: [[T::zero(); 2]; 2],
             gain: [[T::zero(); 2]; 2],
             last: [[T::zero(); COLUMNS]; 2],
-            integral: [[[T::zero(); 2]; 2]; 3],
+            integral: [[[[T::zero(); 2]; 2]; 3]; INTEGRALS],
             ends: [[[T::zero(); 2]; 2]; 3],
             begun: false,
         }
@@ -107,7 +110,7 @@ impl<T: Real> Whitener<T> {
             self.end = self.end_variance(volumes_m3);
             self.gain = [[T::zero(); 2]; 2];
             self.last = [[T::zero(); COLUMNS]; 2];
-            self.integral = [[[T::zero(); 2]; 2]; 3];
+            self.integral = [[[[T::zero(); 2]; 2]; 3]; INTEGRALS];
             self.ends = [[[T::zero(); 2]; 2]; 3];
             self.begun = true;
         }
@@ -160,12 +163,15 @@ impl<T: Real> Whitener<T> {
         let turned = |covariance: &Matrix2<T>| product(&product(&gain, covariance), &transposed(&gain));
         // A reading at the block's begin is in this block with the opposite sign of the one before.
         let back = add(&gain, &[[-T::one(), T::zero()], [T::zero(), -T::one()]]);
-        let time_square = block.time_square_s2[0].at_least(block.time_square_s2[1]);
+        let [of_a, of_b] = block.time_square_s2;
+        let time_squares = [of_a, of_b, block.pressure_square_s2];
         for (pair, (of, with)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             let mut unit = [[T::zero(); 2]; 2];
             let scale = T::one() / (self.area_m2[of] * self.area_m2[with]);
             unit[of][with] = scale;
-            self.integral[pair] = add(&turned(&self.integral[pair]), &scaled(&unit, time_square));
+            for (integral, time_square) in self.integral.iter_mut().zip(time_squares) {
+                integral[pair] = add(&turned(&integral[pair]), &scaled(&unit, time_square));
+            }
             let begin = product(&product(&back, &unit), &transposed(&back));
             self.ends[pair] = add(&turned(&self.ends[pair]), &begin);
         }
@@ -210,7 +216,7 @@ impl<T: Real> Whitener<T> {
         let [va, vb] = block.volumes_m3;
         let powers = [T::one(), va, vb, va * va, va * vb, vb * vb];
         let noise = RowNoise {
-            integral: self.integral.map(|covariance| seen(&covariance)),
+            integral: self.integral.map(|pairs| pairs.map(|covariance| seen(&covariance))),
             end: powers.map(|power| end.map(|value| power * value)),
         };
         Row { columns, noise }
@@ -252,6 +258,7 @@ fn inverse<T: Real>(a: &Matrix2<T>, fed: [bool; 2]) -> Matrix2<T> {
 #[cfg(test)]
 mod tests {
     use super::super::block_sums::{BlockSums, RawSum};
+    use super::super::clocks;
     use super::*;
     use crate::Sample;
 
@@ -282,7 +289,8 @@ mod tests {
                 qb_m3s: Some(sensors.flow_b.noise_std * normal()),
                 force_n: None,
             };
-            let Some(block) = blocks.push(if k == 0 { 0.0 } else { 0.01 }, &sample) else { continue };
+            let step_s = if k == 0 { 0.0 } else { 0.01 };
+            let Some(block) = blocks.push(&clocks::Row::read(step_s, &sample)) else { continue };
             for (equation, row) in whitener.push(&block).into_iter().enumerate() {
                 let left = row.map(|row| {
                     row.columns[RawSum::ResidualA as usize]

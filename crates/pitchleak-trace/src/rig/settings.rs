@@ -174,6 +174,9 @@ pub struct CsvSettings {
     pub decimal: Option<Decimal>,
     /// How times are written.
     pub time: Option<TimeFormat>,
+    /// The file is a part of a recording, with the time and some of its channels; one that is called `value` is called so. Never
+    /// of a rig file.
+    pub part: Option<String>,
 }
 
 /// What stands between two cells.
@@ -269,7 +272,7 @@ impl CsvSettings {
         let zone = read_zone(section)?;
         let time =
             (kind.is_some() || zone.is_some()).then(|| TimeFormat { kind: kind.unwrap_or_default(), zone });
-        Ok(Self { delimiter, decimal, time })
+        Ok(Self { delimiter, decimal, time, part: None })
     }
 }
 

@@ -160,7 +160,7 @@ impl Rig {
         if self.csv == CsvSettings::default() {
             return;
         }
-        let CsvSettings { delimiter, decimal, time } = &self.csv;
+        let CsvSettings { delimiter, decimal, time, part: _ } = &self.csv;
         out.push_str("\n[csv]\n");
         put(
             out,
