@@ -14,6 +14,9 @@ use pitchleak_core::continuity::EQUATIONS;
 /// density and gives it back by V, which is f times smaller.
 const BALANCE: usize = 0;
 
+/// Noise whose mean square is so many standard deviations above its own is chance, and no misfit that a mistake explains. Chosen.
+const CHANCE_SIGMAS: f64 = 2.0;
+
 /// Rows are measured by the noise that they have once mended, as the declared ones are by theirs.
 pub(super) struct Mended {
     pub equations: NormalEquations,
@@ -43,7 +46,8 @@ impl Mended {
             }
             louder[equation] = (own / other).min(own_scatter / scatter);
             scattered[equation] = own_scatter / (other * louder[equation]);
-            left[equation] = (scales[equation] * other / scatter).min(1.0) * scattered[equation];
+            let chance = 1.0 + CHANCE_SIGMAS * (2.0 / declared.rows[equation].max(1.0)).sqrt();
+            left[equation] = (scales[equation] * other / scatter).min(chance) * scattered[equation];
             if equation == BALANCE {
                 ln_measure +=
                     mended.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder[equation].ln());

@@ -32,11 +32,11 @@ pub(super) const LEAK_CREEP: f64 = 0.005;
 /// What seeps where nothing leaks, half normal, share of what is a fault: no seal is tight, and few fittings are. A guess.
 pub(super) const USUAL_SEEPAGE: f64 = 0.3;
 /// Zero of a meter that declares none: a tenth of the usual accuracy of 1 % of full scale. A guess.
-const USUAL_ZERO: f64 = 0.001;
+pub(crate) const USUAL_ZERO: f64 = 0.001;
 /// Drift of that zero along a trace. A guess.
-const USUAL_DRIFT: f64 = 0.0005;
+pub(crate) const USUAL_DRIFT: f64 = 0.0005;
 /// Gain of a meter that declares none. A guess.
-const USUAL_GAIN: f64 = 0.005;
+pub(crate) const USUAL_GAIN: f64 = 0.005;
 /// Lag of a meter, s: one or two periods of its own averaging. A guess.
 const USUAL_LAG_S: f64 = 0.010;
 /// Hose and port, share of the swept volume: 20 cm³ of the paper's 250 cm³. A guess.
