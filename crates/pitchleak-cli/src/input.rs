@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::output::Inputs;
 use pitchleak::trace::{BadRows, TraceReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Input {
@@ -24,6 +24,10 @@ pub struct Input {
     #[arg(long)]
     strict: bool,
 
+    /// The files are one recording: each has its time and some of the channels
+    #[arg(long)]
+    join: bool,
+
     #[command(flatten)]
     text_format: TextFormat,
 }
@@ -34,9 +38,12 @@ impl Input {
         &self,
         mut judge: impl FnMut(Trace) -> Result<Outcome, Failure>,
     ) -> Result<Outcome, Failure> {
+        if self.join {
+            return self.trace(self.traces.clone()).and_then(judge);
+        }
         let (mut worst, mut errors) = (Outcome::Done, 0);
         for path in &self.traces {
-            match self.trace(path.clone()).and_then(&mut judge) {
+            match self.trace(vec![path.clone()]).and_then(&mut judge) {
                 Ok(Outcome::Done) => {}
                 Ok(Outcome::FaultFound) => worst = Outcome::FaultFound,
                 Err(failure) if self.traces.len() == 1 || failure.is_broken_pipe() => return Err(failure),
@@ -54,26 +61,27 @@ impl Input {
 
     /// A file that is written by `flag` is of one trace.
     pub fn check_single(&self, flag: &'static str, given: bool) -> Result<(), Failure> {
-        if given && self.traces.len() > 1 {
+        if given && self.traces.len() > 1 && !self.join {
             return Err(Failure::OneTraceOnly { flag, traces: self.traces.len() });
         }
         Ok(())
     }
 
-    fn trace(&self, path: PathBuf) -> Result<Trace, Failure> {
+    fn trace(&self, paths: Vec<PathBuf>) -> Result<Trace, Failure> {
         let mut rig = match &self.rig {
             Some(rig) => Rig::load(rig)?,
-            None => Rig::beside(&path)?,
+            None => Rig::beside(paths.first().map_or(Path::new("-"), PathBuf::as_path))?,
         };
         self.text_format.settle(&mut rig);
         let bad_rows = if self.strict { BadRows::Fatal } else { BadRows::Skip };
-        Ok(Trace { path, rig, bad_rows, follows: self.traces.len() > 1 })
+        Ok(Trace { follows: self.traces.len() > paths.len(), paths, rig, bad_rows })
     }
 }
 
 /// One of the traces.
 pub struct Trace {
-    path: PathBuf,
+    /// One, or those of one recording.
+    paths: Vec<PathBuf>,
     pub rig: Rig,
     bad_rows: BadRows,
     /// Whether it is one of many, whose texts are kept apart.
@@ -83,15 +91,30 @@ pub struct Trace {
 impl Trace {
     /// The files read, which are not to be written over.
     pub fn files(&self) -> Inputs {
-        Inputs::of(std::iter::once(self.path.as_path()).chain(self.rig.file()))
+        Inputs::of(self.paths.iter().map(PathBuf::as_path).chain(self.rig.file()))
     }
 
     /// The trace, and a bar that follows the reading on a terminal.
     pub fn open(&self) -> Result<(TraceReader<'static>, ProgressBar), Failure> {
-        let size = std::fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
+        let [path] = &self.paths[..] else {
+            return Ok((self.open_again()?.ahead(), ProgressBar::hidden()));
+        };
+        let size = std::fs::metadata(path).map_or(0, |metadata| metadata.len());
         let bar = progress(size);
-        let reader = TraceReader::open_through(&self.path, &self.rig, |file| Box::new(bar.wrap_read(file)))?;
+        let reader = TraceReader::open_through(path, &self.rig, |file| Box::new(bar.wrap_read(file)))?;
         Ok((reader.with_bad_rows(self.bad_rows).ahead(), bar))
+    }
+
+    /// The trace without a bar, to be read again and again.
+    pub fn open_again(&self) -> Result<TraceReader<'static>, Failure> {
+        if self.paths.iter().any(|path| path == Path::new("-")) {
+            return Err(Failure::ReadOnce);
+        }
+        let reader = match &self.paths[..] {
+            [path] => TraceReader::open(path, &self.rig)?,
+            paths => TraceReader::join(paths, &self.rig)?,
+        };
+        Ok(reader.with_bad_rows(self.bad_rows))
     }
 
     /// Prints a report: as a line of JSON, else as text, with an empty line behind it where others follow.

@@ -95,11 +95,6 @@ impl Signal {
         }
     }
 
-    /// Whether a row without this reading is of no use.
-    pub fn is_required(self) -> bool {
-        matches!(self, Self::Time | Self::Timestamp | Self::Position | Self::PressureA | Self::PressureB)
-    }
-
     /// Whether a sensor of the cylinder reads it.
     pub fn is_sensor(self) -> bool {
         use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};

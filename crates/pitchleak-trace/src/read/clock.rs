@@ -6,6 +6,11 @@ const GAP_FACTOR: f64 = 5.0;
 const LONGEST_FIRST_STEP_S: f64 = 1.0;
 /// Times closer than this are the same, s.
 const LEAST_STEP_S: f64 = 1e-9;
+
+/// Whether two times, s, are the same.
+pub(super) fn is_same(one_s: f64, other_s: f64) -> bool {
+    (one_s - other_s).abs() < LEAST_STEP_S
+}
 /// So many rows in order, all before the last good one, are a clock that was set back.
 const RESTART_ROWS: u32 = 10;
 /// So many steps of a new length in a row are a new sampling rate.

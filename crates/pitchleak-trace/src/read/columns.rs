@@ -50,8 +50,36 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Reads a header row.
+    /// Reads the header row of a trace.
     pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
+        let layout = Self::of_part(headers, map)?;
+        layout.check(map, &REQUIRED)?;
+        Ok(layout)
+    }
+
+    /// Of the parts of one recording.
+    pub(super) fn joined<'l>(parts: impl Iterator<Item = &'l Self>) -> Self {
+        let mut whole = Self {
+            columns: Vec::new(),
+            absent: Vec::new(),
+            counted: Counted::Lines,
+            time: TimeFormat::default(),
+            reading: None,
+        };
+        for part in parts {
+            // Each file has a time of its own.
+            let known = whole.gives(Signal::Time);
+            let is_time =
+                |column: &Column| matches!(column.content.signal(), Some(Signal::Time | Signal::Timestamp));
+            whole.columns.extend(part.columns.iter().filter(|column| !(known && is_time(column))).cloned());
+            whole.reading = whole.reading.or_else(|| part.reading.clone());
+            whole.time = part.time.clone();
+        }
+        whole
+    }
+
+    /// Reads the header row of a part of a trace.
+    fn of_part(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
         let mut columns: Vec<_> = headers.iter().map(|header| column_of(header.trim(), map)).collect();
         prefer_time(&mut columns);
         let layout = Self {
@@ -61,9 +89,7 @@ impl Layout {
             time: declared_time(map),
             reading: None,
         };
-        layout.check_doubled()?;
         layout.check_units()?;
-        layout.check_missing(map)?;
         Ok(layout)
     }
 
@@ -146,8 +172,10 @@ impl Layout {
         Ok(())
     }
 
-    fn check_missing(&self, map: &ColumnMap) -> Result<(), TraceFault> {
-        for (signal, words) in REQUIRED {
+    /// Whether each signal comes once, and those that are required come.
+    pub(super) fn check(&self, map: &ColumnMap, required: &[(Signal, &str)]) -> Result<(), TraceFault> {
+        self.check_doubled()?;
+        for &(signal, words) in required {
             if self.gives(signal) {
                 continue;
             }
@@ -304,8 +332,25 @@ pub(super) fn bind(
     }
     let mut map = rig.columns.clone();
     map.extend(foreign.clone());
-    let layout = Layout::new(headers, &map)?;
+    let layout = match rig.csv.part {
+        None => Layout::new(headers, &map)?,
+        Some(_) => {
+            let layout = Layout::of_part(headers, &map)?;
+            layout.check(&map, &REQUIRED[..1])?;
+            layout
+        }
+    };
     Ok(Bound { layout, foreign })
+}
+
+/// What a channel is called whose name is its file's.
+const NAMELESS: [&str; 5] = ["value", "values", "wert", "data", "y"];
+
+/// Names the channel of a file that holds one.
+pub(super) fn name_part(headers: &mut [String], rig: &Rig) {
+    let Some(part) = &rig.csv.part else { return };
+    let is_nameless = |header: &&mut String| NAMELESS.contains(&header.trim().to_lowercase().as_str());
+    headers.iter_mut().filter(is_nameless).for_each(|header| header.clone_from(part));
 }
 
 /// The signal of a header that the contract or the rig file names.

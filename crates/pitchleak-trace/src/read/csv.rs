@@ -7,7 +7,7 @@ use super::error::{BadReason, BadRow, Counted};
 use super::format::{Format, Reading, Stream};
 use super::number::plain_number;
 use super::records::{Record, Records, Stop, Text, stopped_early};
-use super::row::{Fault, Next, Row, RowSource, check_present};
+use super::row::{Fault, Next, Row, RowSource, check_time};
 use super::stamps::Epoch;
 use crate::header::shorten;
 use crate::rig::{Decimal, Rig};
@@ -148,7 +148,7 @@ pub(super) fn read_cells<'a>(
     }
     *last_cells = [cells.length(), last_cells[0]];
     if cells.ended() {
-        check_present(&layout.columns, row)
+        check_time(&layout.columns, row)
     } else {
         Err(Fault { column: None, reason: BadReason::LongRow })
     }

@@ -4,10 +4,10 @@ use super::columns::{Column, Content, Layout};
 use super::csv::{Cells, describe, read_cells};
 use super::error::TraceFault;
 use super::error::{BadReason, BadRow, Counted};
-use super::row::Row;
 use super::row::{BadRows, Record};
+use super::row::{NEEDED, Row};
 use super::stamps::Epoch;
-use super::validator::{MOST_TIME_S, RowValidator};
+use super::validator::{MOST_TIME_S, RowValidator, missing};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 
@@ -85,7 +85,10 @@ pub fn read(
     let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
     *epoch_ns = epoch.first_ns();
     let bad = match read {
-        Ok(()) => validator.check(&row, layout, record),
+        Ok(()) => match NEEDED.into_iter().find(|signal| row.get(*signal).is_nan()) {
+            None => validator.check(&row, layout, record),
+            Some(signal) => Some(missing(&row, layout, signal)),
+        },
         Err(fault) => Some(describe(layout, line, cells, &fault)),
     };
     let Some(bad) = bad else { return Ok(LineRead::Good) };

@@ -1,6 +1,7 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
 mod ahead;
+mod changed;
 mod clock;
 mod columns;
 mod csv;
@@ -9,9 +10,11 @@ mod error;
 mod file;
 mod format;
 mod inspect;
+mod join;
 mod line;
 mod mat;
 mod number;
+mod own_clocks;
 mod parquet;
 mod proposal;
 mod quality;
@@ -23,6 +26,7 @@ mod table;
 mod table_text;
 mod validator;
 
+pub use changed::FlowChange;
 pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, LineRead, read as read_line};
@@ -35,6 +39,9 @@ pub use validator::{OVERRANGE, RowValidator};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::Clock;
+use changed::ChangedFlows;
+use join::Joined;
+use own_clocks::OwnClocks;
 use row::{Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
@@ -95,6 +102,19 @@ impl TraceReader<'static> {
         Self::from_source(name, stream, None, rig)
     }
 
+    /// Opens files of one recording, each with its time and some of the channels, whatever their rates. A column `value` is
+    /// called as its file is.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), of each file, and of all together.
+    pub fn join(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, TraceError> {
+        let names: Vec<String> = paths.iter().map(|path| path.as_ref().display().to_string()).collect();
+        match Joined::open(paths, rig) {
+            Ok(rows) => Ok(Self::over(&names.join(" + "), Box::new(rows), rig)),
+            Err((trace, fault)) => Err(TraceError { trace, fault }),
+        }
+    }
+
     fn from_source(
         name: &str,
         stream: Box<dyn Read + Send>,
@@ -140,6 +160,7 @@ impl<'a> TraceReader<'a> {
     }
 
     fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
+        let rows = Box::new(OwnClocks::of(rows));
         let validator = RowValidator::new(rig, rows.layout());
         Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false, first_ns: None }
     }
@@ -162,6 +183,12 @@ impl<'a> TraceReader<'a> {
     /// What has to be kept for the next part of the trace.
     pub fn into_validator(self) -> RowValidator {
         self.validator
+    }
+
+    /// The same trace with other flows; one that is missing has to stay so.
+    #[must_use]
+    pub fn with_flows(self, change: FlowChange<'a>) -> Self {
+        Self { rows: Box::new(ChangedFlows { rows: self.rows, change }), ..self }
     }
 
     /// Says what becomes of bad rows.

@@ -54,6 +54,18 @@ impl TraceQuality {
         (self.regular_steps > 0).then(|| self.regular_steps as f64 / self.regular_time_s)
     }
 
+    /// The same of the flow that is read most seldom, of those that are read at all.
+    pub fn slowest_hz(&self) -> Option<f64> {
+        let share = |rests: u64| (self.rows - rests) as f64 / self.rows as f64;
+        let least = self.flow_rests.into_iter().map(share).filter(|share| *share > 0.0).fold(1.0, f64::min);
+        self.sample_rate_hz().map(|rate_hz| least * rate_hz)
+    }
+
+    /// Whether most bad rows go back in time.
+    pub fn is_out_of_order(&self) -> bool {
+        2 * self.reasons.get(&BadReason::TimeBack).copied().unwrap_or(0) > self.skipped
+    }
+
     /// Whether more rows are bad than good.
     pub fn is_mostly_bad(&self) -> bool {
         self.skipped > self.rows

@@ -107,28 +107,36 @@ pub(super) struct Fault {
     pub(super) reason: BadReason,
 }
 
-/// An empty cell is a missing value only where every row must have one.
-#[inline]
-pub(super) fn check_present(columns: &[Column], row: &Row) -> Result<(), Fault> {
-    let time = row.get(Signal::Time);
-    let needed = time + row.get(Signal::Position) + row.get(Signal::PressureA) + row.get(Signal::PressureB);
-    if needed.is_finite() {
-        return Ok(());
-    }
-    Err(blame(columns, row))
-}
+/// What every row must have beside its time.
+pub(super) const NEEDED: [Signal; 3] = [Signal::Position, Signal::PressureA, Signal::PressureB];
 
-/// The cell that makes the sum of the needed ones no number.
-#[cold]
-fn blame(columns: &[Column], row: &Row) -> Fault {
-    for (index, column) in columns.iter().enumerate() {
-        let Some(signal) = column.content.signal().filter(|signal| signal.is_required()) else { continue };
-        let signal = if signal == Signal::Timestamp { Signal::Time } else { signal };
-        let value = row.get(signal);
-        if !value.is_finite() {
-            let reason = if value.is_nan() { BadReason::Missing } else { BadReason::OutOfRange };
-            return Fault { column: Some(index), reason };
+impl Row {
+    /// Whether it has all that a row must have.
+    #[inline(always)]
+    pub(super) fn has_needed(&self) -> bool {
+        !NEEDED.into_iter().map(|signal| self.get(signal)).sum::<f64>().is_nan()
+    }
+
+    /// Takes what it lacks from another row.
+    pub(super) fn fill(&mut self, other: &Self) {
+        for (cell, other) in self.cells.iter_mut().zip(other.cells) {
+            if cell.is_nan() {
+                *cell = other;
+            }
         }
     }
-    Fault { column: None, reason: BadReason::OutOfRange }
+}
+
+/// Every row must have its time; what else is empty may come on a clock of its own.
+#[inline]
+pub(super) fn check_time(columns: &[Column], row: &Row) -> Result<(), Fault> {
+    let time = row.get(Signal::Time);
+    if time.is_finite() { Ok(()) } else { Err(blame(columns, time)) }
+}
+
+#[cold]
+fn blame(columns: &[Column], time: f64) -> Fault {
+    let is_time = |column: &Column| matches!(column.content.signal(), Some(Signal::Time | Signal::Timestamp));
+    let reason = if time.is_nan() { BadReason::Missing } else { BadReason::OutOfRange };
+    Fault { column: columns.iter().position(is_time), reason }
 }

@@ -3,7 +3,7 @@
 use super::columns::{Content, Layout};
 use super::error::{BadReason, BadRow, Counted};
 use super::error::{TraceError, TraceFault};
-use super::row::{Next, Row, RowSource, check_present};
+use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -122,7 +122,7 @@ impl<'a> TableRows<'a> {
         let infinite = self.current.iter().find(|cells| value(cells).is_infinite());
         let (index, reason, detail) = match infinite {
             Some(cells) => (Some(cells.index), BadReason::NotANumber, "not a finite number"),
-            None => match check_present(&self.layout.columns, row) {
+            None => match check_time(&self.layout.columns, row) {
                 Err(fault) if fault.reason == BadReason::Missing => (fault.column, fault.reason, "missing"),
                 Err(fault) => (fault.column, fault.reason, fault.reason.text()),
                 Ok(()) => (None, BadReason::NotANumber, BadReason::NotANumber.text()),
@@ -169,7 +169,7 @@ impl RowSource for TableRows<'_> {
         }
         let at = self.at;
         self.at += 1;
-        if finite && check_present(&self.layout.columns, row).is_ok() {
+        if finite && check_time(&self.layout.columns, row).is_ok() {
             return Ok(Next::Row);
         }
         Ok(Next::Bad(self.blame(at, row)))

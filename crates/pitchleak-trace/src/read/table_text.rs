@@ -1,6 +1,6 @@
 //! The first lines of a text file as a table: where its header is, and what its first rows say.
 
-use super::columns::{Bound, TextRow, bare_unit, bind, column};
+use super::columns::{Bound, TextRow, bare_unit, bind, column, name_part};
 use super::error::TraceFault;
 use super::records::Records;
 use super::records::text;
@@ -64,7 +64,8 @@ impl TextTable {
     }
 
     /// Columns of a file that is no text, with their first cells.
-    pub(super) fn of_columns(headers: Vec<String>, rows: Vec<TextRow>, rig: &Rig) -> Self {
+    pub(super) fn of_columns(mut headers: Vec<String>, rows: Vec<TextRow>, rig: &Rig) -> Self {
+        name_part(&mut headers, rig);
         let bound = bind(&headers, None, &rows, rig);
         Self {
             delimiter: Delimiter::Comma,
@@ -136,6 +137,7 @@ impl Head {
         let first = header + 1 + usize::from(units.is_some());
         let rows = rows.get(first..).unwrap_or_default();
         fit_trailing(&mut headers, rows);
+        name_part(&mut headers, rig);
         let bound = bind(&headers, units.as_ref().map(|row| row.cells.as_slice()), rows, rig);
         Some(Self { line: row.line, headers, units, bound, first })
     }

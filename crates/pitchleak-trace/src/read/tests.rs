@@ -117,7 +117,6 @@ fn bad_rows_are_counted_with_their_place_and_skipped() {
         ("0.03,0.1,5e6,1e999,0,0", BadReason::NotANumber, Some("pb_pa")),
         ("0.03,0.1,5e6,4e6,0,nan", BadReason::NotANumber, Some("qb_m3s")),
         ("0.03,0.1,5e6,4e6,1.2.3,0", BadReason::NotANumber, Some("qa_m3s")),
-        ("0.03,,5e6,4e6,0,0", BadReason::Missing, Some("x_m")),
         (",0.1,5e6,4e6,0,0", BadReason::Missing, Some("t_s")),
         ("0.03,0.1,5e6,4e6,0", BadReason::ShortRow, None),
         ("0.03,0.1,5e6,4e6,0,0,0", BadReason::LongRow, None),
@@ -143,6 +142,64 @@ fn bad_rows_are_counted_with_their_place_and_skipped() {
         let message = read_all(strict).unwrap_err().to_string();
         assert!(message.starts_with("trace.csv: line 5"), "{message}");
     }
+}
+
+/// A straight line, so that each reading between two others is known.
+fn on_own_clocks(cells: impl Fn(usize, usize) -> bool) -> String {
+    let row = |k: usize| {
+        let t = k as f64;
+        let values = [0.05 + 1e-4 * t, 5e6 + 1e3 * t, 4e6 - 2e3 * t, 1e-6 * t, -1e-6 * t];
+        let cell = |(place, value): (usize, f64)| {
+            if cells(k, place) { format!(",{value:.9}") } else { ",".to_owned() }
+        };
+        format!("{:.2}{}", 0.01 * t, values.into_iter().enumerate().map(cell).collect::<String>())
+    };
+    file(&(0..400).map(row).collect::<Vec<_>>())
+}
+
+/// Each channel in rows of its own: a row for each reading of the slowest, all else on the straight line there, and no row is bad.
+#[test]
+fn channels_on_clocks_of_their_own_meet_in_the_rows_of_the_slowest() {
+    let apart = on_own_clocks(|k, place| k % 5 == place);
+    let slow_pressures = on_own_clocks(|k, place| !(1..=2).contains(&place) || k % 7 == 3);
+    for (text, every, flows) in [(apart, 5, true), (slow_pressures, 7, true)] {
+        let (records, quality) = read(text).unwrap();
+        assert_eq!(quality.skipped, 0, "{:?}", quality.first_bad);
+        assert!(records.len() >= 400 / every - 2, "{}", records.len());
+        for record in &records[1..] {
+            let (k, sample) = (record.t_s / 0.01, record.sample);
+            assert!(
+                (sample.x_m - 0.05 - 1e-4 * k).abs() < 1e-8 && (sample.pa_pa - 5e6 - 1e3 * k).abs() < 0.1
+            );
+            assert!((sample.pb_pa - 4e6 + 2e3 * k).abs() < 0.1);
+            assert_eq!(sample.qa_m3s.is_some(), flows);
+            assert!((sample.qa_m3s.unwrap() - 1e-6 * k).abs() < 1e-9);
+        }
+    }
+}
+
+/// A slow flow stands in one row for each of its readings, where all else is faster.
+#[test]
+fn no_reading_counts_as_two() {
+    let text = on_own_clocks(|k, place| match place {
+        0..=2 => k % 4 == place,
+        _ => k % 20 == 3,
+    });
+    let (records, _) = read(text).unwrap();
+    let with_flow = records.iter().filter(|record| record.sample.qa_m3s.is_some()).count();
+    assert!((18..=20).contains(&with_flow) && records.len() > 95, "{with_flow} of {}", records.len());
+}
+
+/// A channel that rests for long: its rows are bad, each with its place, and those around it as they were.
+#[test]
+fn where_a_channel_rests_rows_are_bad() {
+    let (records, quality) = read(on_own_clocks(|k, place| place != 1 || !(100..200).contains(&k))).unwrap();
+    assert_eq!(records.len(), 300);
+    assert!((88..=100).contains(&quality.skipped), "{}", quality.skipped);
+    let bad = &quality.first_bad[0];
+    assert_eq!((bad.reason, bad.column.as_deref()), (BadReason::Missing, Some("pa_pa")));
+    let message = read(on_own_clocks(|_, place| place != 1)).unwrap_err().to_string();
+    assert!(message.contains("`pa_pa`: empty"), "{message}");
 }
 
 #[test]
@@ -444,7 +501,7 @@ fn bad_cells_of_a_table_are_named() {
         let reader = TraceReader::from_table("table", &layout(), vec![batch], &Rig::paper()).unwrap();
         read_all(reader.with_bad_rows(BadRows::Fatal)).unwrap_err().to_string()
     };
-    assert_eq!(message(1, 2, f64::NAN), "table: row 2, column `x_mm`: missing");
+    assert_eq!(message(0, 2, f64::NAN), "table: row 2, column `t_ms`: missing");
     assert_eq!(message(4, 1, f64::INFINITY), "table: row 1, column `qa_lpm`: not a finite number");
     assert_eq!(message(0, 3, 5.0), "table: row 3, column `t_ms`: 0.005 s is not after 0.02 s");
     assert!(message(2, 0, 900.0).starts_with("table: row 0, column `pa_bar`: 900 bar is outside"));

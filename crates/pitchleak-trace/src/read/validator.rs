@@ -3,7 +3,7 @@
 use super::clock::{Clock, Step};
 use super::columns::Layout;
 use super::error::TraceFault;
-use super::error::{BadReason, BadRow};
+use super::error::{BadReason, BadRow, Counted};
 use super::quality::TraceQuality;
 use super::row::Row;
 use super::row::{BadRows, Record};
@@ -92,7 +92,10 @@ impl RowValidator {
     pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
             self.refused = signal.is_sensor().then(|| readings(row));
-            let detail = self.ranges.describe(signal, row.get(signal), layout.unit_of(signal));
+            let detail = match row.get(signal) {
+                value if value.is_finite() => self.ranges.describe(signal, value, layout.unit_of(signal)),
+                _ => BadReason::OutOfRange.text().to_owned(),
+            };
             return Some(bad_cell(row, layout, signal, BadReason::OutOfRange, detail));
         }
         let t_s = row.get(Signal::Time);
@@ -182,6 +185,16 @@ fn bad_cell(row: &Row, layout: &Layout, signal: Signal, reason: BadReason, detai
     let header = layout.header_of(signal).or_else(|| layout.header_of(Signal::Timestamp));
     let column = header.map(|header| shorten(header, 40));
     BadRow { line: row.line, counted: layout.counted, column, reason, detail }
+}
+
+/// A row without a reading that it must have.
+#[cold]
+pub(super) fn missing(row: &Row, layout: &Layout, signal: Signal) -> BadRow {
+    let detail = match layout.counted {
+        Counted::Lines => "empty",
+        Counted::Rows => "missing",
+    };
+    bad_cell(row, layout, signal, BadReason::Missing, detail.to_owned())
 }
 
 /// A vacuum, Pa gauge.

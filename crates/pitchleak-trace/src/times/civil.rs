@@ -30,9 +30,25 @@ pub(super) fn read_date(text: &str, order: DateOrder) -> Option<Reading> {
 
 /// `22:10:31.5`, `10:10:31 PM`, `0:00:00,01`; hours beyond 23 are time that has passed.
 pub(super) fn read_of_day(text: &str) -> Option<i128> {
+    if let Some(ns) = minutes_and_seconds(text) {
+        return Some(ns);
+    }
     let mut scan = Scan(text);
     let time = scan.clock().filter(|time| time.has_seconds)?;
     scan.0.is_empty().then(|| since_midnight_ns([time.hour, time.minute, time.second], time.ns))
+}
+
+/// `12:34,5`, as a spreadsheet shows a time that it was given to the tenth of a second; within the hour.
+fn minutes_and_seconds(text: &str) -> Option<i128> {
+    let (minutes, rest) = text.split_once(':')?;
+    let (seconds, fraction) = rest.split_once([',', '.'])?;
+    let number = |text: &str, most: usize| {
+        let is_number = (1..=most).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit());
+        is_number.then(|| text.parse::<u32>().ok()).flatten()
+    };
+    let [minute, second] = [number(minutes, 2)?, number(seconds, 2)?];
+    let ns = number(fraction, 9)? * 10_u32.pow(9 - fraction.len() as u32);
+    (minute < 60 && second < 60).then(|| since_midnight_ns([0, minute, second], ns))
 }
 
 pub(super) fn ns_of(time: Time) -> i128 {

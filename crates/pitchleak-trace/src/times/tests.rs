@@ -50,11 +50,9 @@ fn what_is_not_plain_is_refused() {
     for cells in [["0.01", "0.02"], ["46000.0", "46000.01"], ["20261120221031", "20261120221032"]] {
         assert!(matches!(guess(&cells), Err(TimeFault::BareNumber(_))), "{cells:?}");
     }
-    for cells in [
-        ["10:31.5", "10:31.6"],
-        ["yesterday", "today"],
-        ["20.11.2026 12:00:00 CST", "20.11.2026 12:00:01 IST"],
-    ] {
+    for cells in
+        [["10:31", "10:32"], ["yesterday", "today"], ["20.11.2026 12:00:00 CST", "20.11.2026 12:00:01 IST"]]
+    {
         assert!(matches!(guess(&cells), Err(TimeFault::Unknown(_))), "{cells:?}");
     }
 }
