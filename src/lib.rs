@@ -36,6 +36,7 @@ pub mod fleet;
 pub mod hold;
 pub mod live;
 pub mod output;
+pub mod prove;
 pub mod reference;
 pub mod replay;
 pub mod report;

@@ -2,6 +2,7 @@ use pitchleak::diagnose::FittedAndJudged;
 use pitchleak::fleet::FleetError;
 use pitchleak::live::{CheckpointError, ConfigError};
 use pitchleak::output::OutputError;
+use pitchleak::prove::ProveError;
 use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::rig::RigError;
 use pitchleak::simulate::{PlanError, RecordingError};
@@ -27,6 +28,12 @@ pub enum Failure {
     /// The replay of a trace.
     #[error(transparent)]
     Replay(#[from] ReplayError),
+    /// A leak that cannot be put into a trace.
+    #[error(transparent)]
+    Prove(#[from] ProveError),
+    /// A trace that is read more than once.
+    #[error("standard input is read once, and this takes files: give a file")]
+    ReadOnce,
     /// The traces of a fleet.
     #[error(transparent)]
     Fleet(#[from] FleetError),

@@ -12,6 +12,7 @@ mod input;
 mod interrupt;
 mod man;
 mod output;
+mod prove;
 mod replay;
 mod reproduce;
 mod simulate;
@@ -47,6 +48,7 @@ enum Command {
     Replay(replay::Arguments),
     Diagnose(diagnose::Arguments),
     Check(check::Arguments),
+    Prove(prove::Arguments),
     Columns(columns::Arguments),
     Init(init::Arguments),
     Fleet(fleet::Arguments),
@@ -117,6 +119,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Replay(arguments) => replay::run(arguments),
         Command::Diagnose(arguments) => diagnose::run(arguments),
         Command::Check(arguments) => check::run(arguments),
+        Command::Prove(arguments) => prove::run(arguments),
         Command::Columns(arguments) => columns::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),

@@ -55,6 +55,12 @@ pub fn bar(length: u64, template: &str) -> ProgressBar {
     ProgressBar::new(length).with_style(style)
 }
 
+/// A count of work whose length nobody knows, on standard error; hidden where that is no terminal.
+pub fn spinner(template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
+    ProgressBar::new_spinner().with_style(style)
+}
+
 /// Colours only on a terminal, and only where nobody forbids them (no-color.org).
 pub fn palette() -> Palette {
     let forbidden = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())

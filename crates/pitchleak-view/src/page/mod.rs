@@ -10,6 +10,7 @@ mod diagnose;
 mod fleet;
 mod history;
 pub mod machine;
+mod proof;
 mod replay;
 
 pub use history::History;

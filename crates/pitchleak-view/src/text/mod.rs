@@ -5,6 +5,7 @@ mod check_sketch;
 mod diagnosis;
 mod fleet;
 mod fleet_sketch;
+pub(crate) mod proof;
 mod replay;
 mod replay_sketch;
 mod replay_terminal;

@@ -73,9 +73,11 @@ impl ReplaySketch {
     }
 }
 
-/// Says so where a verdict in doubt rests on no rig file.
+/// Says so where a verdict in doubt, or one with something that is not as declared, rests on no rig file.
 pub(crate) fn missing_rig(report: &ReplayReport) -> Option<&'static str> {
-    (report.rig == Rig::PAPER_NAME && !report.verdict.status.is_sure()).then_some(NO_RIG)
+    let verdict = &report.verdict;
+    let is_declared = verdict.explanations.first().is_none_or(|best| best.cause.is_empty());
+    (report.rig == Rig::PAPER_NAME && !(verdict.status.is_sure() && is_declared)).then_some(NO_RIG)
 }
 
 /// A report, and how it is to be shown.
