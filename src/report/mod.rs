@@ -96,6 +96,12 @@ pub struct TraceSummary {
     pub duration_s: f64,
     /// Samples per second where they come regularly; none for a single row.
     pub sample_rate_hz: Option<f64>,
+    /// The same of the channel that is read most seldom.
+    #[serde(skip)]
+    pub slowest_hz: Option<f64>,
+    /// Whether most bad rows go back in time.
+    #[serde(skip)]
+    pub is_out_of_order: bool,
     /// Pauses much longer than the usual step.
     pub gaps: u64,
     /// How the file was read, where it is not as this program writes one.
@@ -115,6 +121,8 @@ impl TraceSummary {
             begins: None,
             duration_s: quality.duration_s,
             sample_rate_hz: quality.sample_rate_hz(),
+            slowest_hz: quality.slowest_hz(),
+            is_out_of_order: quality.is_out_of_order(),
             gaps: quality.gaps,
             reading: quality.reading.clone(),
             warnings: quality.warnings(),

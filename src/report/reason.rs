@@ -4,6 +4,7 @@ use super::Findings;
 use super::statement::{interval, join};
 use crate::channels::ChannelFaultKind;
 use crate::explain::{Decision, Explained, MISFIT_DOUBT, WIRING_DOUBT};
+use crate::units::readable;
 use crate::wiring::HOW_WIRED;
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
@@ -29,6 +30,8 @@ pub enum ReasonId {
     NotIdentifiable,
     /// A leak's interval reaches beyond its threshold, and yet not for sure.
     Undecided,
+    /// Between two readings the piston moves unseen.
+    SampledTooSeldom,
     /// The estimator knows no uncertainty.
     NoUncertainty,
 }
@@ -46,6 +49,7 @@ impl ReasonId {
             Self::ModelDoesNotFit => "model_does_not_fit",
             Self::NotIdentifiable => "not_identifiable",
             Self::Undecided => "undecided",
+            Self::SampledTooSeldom => "sampled_too_seldom",
             Self::NoUncertainty => "no_uncertainty",
         }
     }
@@ -111,6 +115,9 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         let text = "the paper's law knows no uncertainty: its figures may be right or not";
         return vec![Reason::new(ReasonId::NoUncertainty, text, "replay with `--estimator rls`")];
     }
+    if let Some(seldom) = sampled_too_seldom(findings) {
+        return vec![seldom];
+    }
     let Some(decision) = findings.decision else {
         let text = "this trace is too short to tell about leaks, or nothing explains it at all";
         return vec![Reason::new(ReasonId::NotIdentifiable, text, RECORD)];
@@ -127,6 +134,23 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         .into_iter()
         .chain(undecided.into_iter().map(|leak| self::undecided(findings, decision, leak)))
         .collect()
+}
+
+/// One reading in a block of 0.25 s: with fewer the trapezoids between readings are not what has flowed, and no noise says so.
+const LEAST_RATE_HZ: f64 = 4.0;
+
+/// Readings that come once a second are a control system's log, not a recording.
+fn sampled_too_seldom(findings: &Findings<'_>) -> Option<Reason> {
+    let rate_hz = findings.trace.slowest_hz.filter(|rate_hz| *rate_hz < LEAST_RATE_HZ)?;
+    let text = format!(
+        "readings come every {} s, and between them the piston moves unseen",
+        readable(1.0 / rate_hz, 2)
+    );
+    Some(Reason::new(
+        ReasonId::SampledTooSeldom,
+        text,
+        "record 10 to 1000 readings a second, samples and not averages, for a minute in motion",
+    ))
 }
 
 const RECORD: &str = "record longer, with the piston moving and both pressures changing";
@@ -161,10 +185,14 @@ fn mostly_bad_rows(findings: &Findings<'_>) -> Option<Reason> {
         Reason::new(
             ReasonId::MostlyBadRows,
             format!("{} of {rows} rows are bad and were skipped", trace.skipped),
-            "see the warnings on what is wrong with them, and `pitchleak columns` on how the file is read",
+            if trace.is_out_of_order { SORT } else { SEE },
         )
     })
 }
+
+const SORT: &str = "they are not in the order of time: sort them by time and read the trace again";
+const SEE: &str =
+    "see the warnings on what is wrong with them, and `pitchleak columns` on how the file is read";
 
 const SENSORS_TELL: &str = "check whether the sensors are as good as declared and wired as declared (`pitchleak check`); `pitchleak \
                             diagnose` looks for an effect that the model lacks";

@@ -1,7 +1,7 @@
 //! What an operator acts on.
 
 use super::episode::comes_and_goes;
-use super::reason::{Reason, contradictions, gaps};
+use super::reason::{Reason, ReasonId, contradictions, gaps};
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};
@@ -147,6 +147,7 @@ impl Verdict {
         let gaps = gaps(findings, &faults);
         let (status, reasons) = match findings.decision {
             _ if !contradictions.is_empty() => (Status::Doubtful, contradictions),
+            _ if gaps.iter().any(|gap| gap.id == ReasonId::SampledTooSeldom) => (Status::NotSure, gaps),
             Some(decision) if decision.status.is_sure() && !faults.is_empty() => (Status::Leak, Vec::new()),
             Some(decision) if decision.status == Status::Sound && gaps.is_empty() => (Status::Sound, gaps),
             _ => (Status::NotSure, gaps),

@@ -278,3 +278,106 @@ fn a_trace_alone_is_replayed_and_quiet_says_results_only() {
     assert_eq!(missing.status.code(), Some(2));
     assert!(text(&missing.stderr).starts_with("error: b.csv: "), "{}", text(&missing.stderr));
 }
+
+/// What stands in the way of a verdict is told first, with the one remedy, by `replay` and `check` alike.
+#[test]
+fn the_true_obstacle_is_told_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm";
+    let row = |t_s: f64, i: f64| format!("{t_s:.2},{}", plain(i).split_once(',').unwrap().1);
+    write(folder.path(), "once_a_second.csv", header, |i| row(i, i));
+    write(folder.path(), "shuffled.csv", header, |i| row((7919.0 * i) % 200.0 * 0.01, i));
+    let cases = [
+        ("once_a_second.csv", "not_sure", "Readings come every 1 s"),
+        ("shuffled.csv", "doubtful", "They are not in the order of time: sort them by time"),
+    ];
+    for (name, status, words) in cases {
+        for command in ["replay", "check"] {
+            let output = pitchleak(&[command, name, "--json"], folder.path());
+            let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(report["verdict"]["status"], status, "{command} {name}");
+            assert!(
+                report["verdict"]["text"].as_str().unwrap().contains(words),
+                "{command} {name}: {report}"
+            );
+        }
+    }
+}
+
+/// `12:34,5`, as a spreadsheet writes it.
+#[test]
+fn minutes_and_tenths_of_seconds_are_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let time = |i: f64| format!("{:02}:{:04.1}", (i / 600.0).floor() + 58.0, (0.1 * i) % 60.0);
+    let row = |i: f64| format!("{};{}", time(i), european(i).split_once(';').unwrap().1).replace('.', ",");
+    write(folder.path(), "a.csv", "Time;x_mm;pa_bar;pb_bar;qa_lpm;qb_lpm", row);
+    let output = pitchleak(&["replay", "a.csv", "--json"], folder.path());
+    let report: serde_json::Value =
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", text(&output.stderr)));
+    assert_eq!(
+        (report["trace"]["skipped"].as_u64(), report["trace"]["sample_rate_hz"].as_f64()),
+        (Some(0), Some(10.0))
+    );
+}
+
+#[test]
+fn files_of_one_recording_are_one_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "whole.csv", "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm", plain);
+    let columns = |from: usize, to: usize| {
+        move |i: f64| {
+            let row = plain(i);
+            let cells: Vec<_> = row.split(',').collect();
+            format!("{},{}", cells[0], cells[from..to].join(","))
+        }
+    };
+    write(folder.path(), "x_mm.csv", "t_s,value", columns(1, 2));
+    write(folder.path(), "pressures.csv", "t_s,pa_bar,pb_bar", columns(2, 4));
+    write(folder.path(), "flows.csv", "t_s,qa_lpm,qb_lpm", columns(4, 6));
+    let report = |arguments: &[&str]| -> serde_json::Value {
+        serde_json::from_slice(&pitchleak(arguments, folder.path()).stdout).unwrap()
+    };
+    let joined = report(&["replay", "--join", "x_mm.csv", "pressures.csv", "flows.csv", "--json"]);
+    let whole = report(&["replay", "whole.csv", "--json"]);
+    assert_eq!(joined["estimates"], whole["estimates"]);
+    assert_eq!(joined["trace"]["path"], "x_mm.csv + pressures.csv + flows.csv");
+    let apart = pitchleak(&["replay", "--join", "x_mm.csv", "flows.csv"], folder.path());
+    let said = text(&apart.stderr);
+    assert!(
+        said.starts_with("error: the files together: no column for pressure A") && said.lines().count() == 1,
+        "{said}"
+    );
+}
+
+/// Each mistake is one line that says what is allowed.
+#[test]
+fn a_leak_is_put_into_a_file_with_flows() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "a.csv", "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm", plain);
+    let without = |i: f64| plain(i).rsplitn(3, ',').last().unwrap().to_owned();
+    write(folder.path(), "no_flows.csv", "t_s,x_mm,pa_bar,pb_bar", without);
+    let cases: [(&[&str], &str); 5] = [
+        (&["prove", "-"], "standard input is read once"),
+        (&["prove", "no_flows.csv"], "no flow is measured"),
+        (&["prove", "a.csv", "--leak-internal", "0.3"], "a flow needs its unit, e.g. \"0.3 L/min\""),
+        (&["prove", "a.csv", "--leak-external-a", "0 L/min"], "more than none"),
+        (&["prove", "a.csv", "--report", "a.csv"], "a report is written as .html"),
+    ];
+    for (arguments, words) in cases {
+        let output = pitchleak(arguments, folder.path());
+        let said = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(words), "{arguments:?}: {said}");
+    }
+    let output = pitchleak(
+        &["prove", "a.csv", "--leak-internal", "0.5 L/min", "--json", "--report", "p.html"],
+        folder.path(),
+    );
+    let proof: serde_json::Value =
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", text(&output.stderr)));
+    assert_eq!(
+        (proof["schema"].as_str(), proof["cases"].as_array().unwrap().len()),
+        (Some("pitchleak.prove/1"), 1)
+    );
+    let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
+    assert!(page.contains("Internal leak, 0.5 L/min put in"));
+}

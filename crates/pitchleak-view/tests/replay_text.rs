@@ -51,6 +51,8 @@ fn report(status: Status) -> ReplayReport {
             begins: None,
             duration_s: 60.0,
             sample_rate_hz: Some(100.000_000_001),
+            slowest_hz: None,
+            is_out_of_order: false,
             gaps: 0,
             reading: None,
             warnings: Vec::new(),
