@@ -26,10 +26,22 @@ impl Followed {
             Self::Wind(wind, emulation) => {
                 Ok(emulation.reference(&History::of(wind)?, rig.cylinder.stroke_m)?)
             }
-            Self::Given { position, load } => Ok(Reference::of(
-                constant_or_file(position, "x", Dimension::Length)?,
-                constant_or_file(load, "force", Dimension::Force)?,
-            )),
+            Self::Given { position, load } => {
+                let reference = Reference::of(
+                    constant_or_file(position, "x", Dimension::Length)?,
+                    constant_or_file(load, "force", Dimension::Force)?,
+                );
+                let (position_m, _) = reference.at(0.0);
+                let stroke_m = rig.cylinder.stroke_m;
+                // Where a recorded position is beyond its end, the piston stays there.
+                if reference.span_s().is_none() && !(0.0..=stroke_m).contains(&position_m) {
+                    return Err(PlanError::BeyondStroke {
+                        position: position.clone(),
+                        stroke_mm: 1e3 * stroke_m,
+                    });
+                }
+                Ok(reference)
+            }
         }
     }
 }

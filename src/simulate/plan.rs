@@ -133,6 +133,14 @@ pub enum PlanError {
     /// Position or load to follow.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// A piston beyond its end.
+    #[error("position {position} is beyond the cylinder's stroke (0 to {stroke_mm} mm)")]
+    BeyondStroke {
+        /// As given.
+        position: String,
+        /// mm.
+        stroke_mm: f64,
+    },
     /// Effects that cannot be switched on.
     #[error(transparent)]
     Effects(#[from] EffectsError),

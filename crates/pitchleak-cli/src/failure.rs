@@ -19,6 +19,9 @@ pub enum Failure {
     /// The rig file.
     #[error(transparent)]
     Rig(#[from] RigError),
+    /// The command line.
+    #[error("{0}")]
+    Arguments(String),
     /// The trace.
     #[error(transparent)]
     Trace(#[from] TraceError),

@@ -19,6 +19,7 @@ mod simulate;
 mod text_format;
 mod watch;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use std::ffi::OsString;
@@ -101,13 +102,40 @@ fn with_command(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
-/// Help and version, which were asked for, or what is wrong with the command line.
+/// Help and version, which were asked for, or what is wrong with the command line, in one line.
 fn tell(answer: &clap::Error) -> Result<Outcome, Failure> {
-    if answer.use_stderr() {
+    if answer.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         answer.exit();
+    }
+    if answer.use_stderr() {
+        return Err(Failure::Arguments(in_one_line(&answer.to_string())));
     }
     answer.print()?;
     Ok(Outcome::Done)
+}
+
+/// What the parser of arguments says: the mistake, its tip, and how the command is used where arguments are missing.
+fn in_one_line(answer: &str) -> String {
+    let lines = || answer.lines().map(str::trim).filter(|line| !line.is_empty());
+    let mut line = String::new();
+    for part in
+        lines().filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more information"))
+    {
+        let part = part.trim_start_matches("error: ").trim_start_matches("tip: ");
+        line += if line.is_empty() || part.starts_with('[') {
+            ""
+        } else if line.ends_with(':') {
+            " "
+        } else {
+            "; "
+        };
+        line += if part.starts_with('[') { " " } else { "" };
+        line += part;
+    }
+    match lines().find_map(|part| part.strip_prefix("Usage: ")) {
+        Some(usage) if line.contains("required arguments") => format!("{line} (usage: {usage})"),
+        _ => line,
+    }
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {

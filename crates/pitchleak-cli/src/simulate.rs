@@ -35,15 +35,15 @@ pub struct Arguments {
     /// Leak past the piston: mean flow over the run's first minute ("0.5 L/min") or coefficient ("0.02
     /// L/min/bar"); it may grow ("0.1 L/min -> 0.5 L/min @ 10 s..300 s"), begin or end ("0.5 L/min @ ..200 s"), come and go
     /// ("0.5 L/min every 60 s for 10 s")
-    #[arg(long, value_name = "Q", default_value = "0")]
+    #[arg(long, value_name = "Q", default_value = "0", value_parser = leak, allow_hyphen_values = true)]
     leak_internal: LeakCourse,
 
     /// Leak out of chamber A
-    #[arg(long, value_name = "Q", default_value = "0")]
+    #[arg(long, value_name = "Q", default_value = "0", value_parser = leak, allow_hyphen_values = true)]
     leak_external_a: LeakCourse,
 
     /// Leak out of chamber B
-    #[arg(long, value_name = "Q", default_value = "0")]
+    #[arg(long, value_name = "Q", default_value = "0", value_parser = leak, allow_hyphen_values = true)]
     leak_external_b: LeakCourse,
 
     /// Time into the trace at which leaks without times of their own open [default: before it begins]
@@ -129,6 +129,14 @@ Examples:
 fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
     let value = units::parse(text, dimension).map_err(|error| error.to_string())?;
     if value < 0.0 { Err("must not be negative".into()) } else { Ok(value) }
+}
+
+fn leak(text: &str) -> Result<LeakCourse, String> {
+    // A bare number is m³/s, of which nobody thinks.
+    if text.trim().parse::<f64>().is_ok_and(|number| number > 0.0) {
+        return Err("a leak needs its unit, e.g. \"0.5 L/min\"".to_owned());
+    }
+    text.parse::<LeakCourse>().map_err(|error| error.to_string())
 }
 
 fn time(text: &str) -> Result<f64, String> {

@@ -179,7 +179,7 @@ fn unusable_traces_are_refused_in_one_line() {
     // Not the place itself: beside it may lie a rig file of somebody else.
     let folder = place.path("folder");
     fs::create_dir(&folder).unwrap();
-    assert_refused(&replay(&folder, &[]), &["directory"]);
+    assert_refused(&replay(&folder, &[]), &["a folder, not a trace"]);
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn bad_rows_are_skipped_counted_and_said_and_fatal_when_strict() {
     let spoil: [Spoil; 8] = [
         ("word", &|rows| rows[700] = rows[700].replacen("7.00", "seven", 1), "line 702, column `t_s`"),
         ("nan", &|rows| rows[700] = "7.00,NaN,0,5e6,3e6,0,0".to_owned(), "column `x_m`: not a finite number"),
-        ("empty cell", &|rows| rows[700] = "7.00,,0,5e6,3e6,0,0".to_owned(), "column `x_m`: empty"),
+        ("no time", &|rows| rows[700] = ",0.1,0,5e6,3e6,0,0".to_owned(), "column `t_s`: empty"),
         ("short", &|rows| rows[700] = "7.00,0.1".to_owned(), "2 cells, 7 expected"),
         ("long", &|rows| rows[700].push_str(",1,2"), "9 cells, 7 expected"),
         ("outside", &|rows| rows[700] = "7.00,0.35,0,5e6,3e6,0,0".to_owned(), "0.35 m is outside the stroke"),

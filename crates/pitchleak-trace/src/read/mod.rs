@@ -85,6 +85,7 @@ impl TraceReader<'static> {
         }
         let name = path.display().to_string();
         match File::open(path) {
+            Ok(_) if path.is_dir() => Err(TraceError { trace: name, fault: TraceFault::Format(FOLDER) }),
             Ok(file) => {
                 // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
                 let again = file.try_clone().ok();
@@ -127,6 +128,8 @@ impl TraceReader<'static> {
         }
     }
 }
+
+const FOLDER: &str = "a folder, not a trace: name the files in it, e.g. by `*.csv`";
 
 impl TraceReader<'static> {
     /// Reads a long trace in a thread of its own, a little ahead of the records that are taken, where there is a second core.
