@@ -41,7 +41,8 @@ def try_all(columns):
     replayed, checked, _ = outcomes
     assert (replayed is None) == (checked is None)
     if replayed is not None:
-        assert replayed.trace.samples + replayed.trace.skipped == np.size(columns["t_s"])
+        # A row that lacks a reading may lie between two that have it: it is neither a sample nor bad.
+        assert replayed.trace.samples + replayed.trace.skipped <= np.size(columns["t_s"])
         assert estimator.state().raw == replayed.raw
     return replayed
 
@@ -138,7 +139,7 @@ def test_any_sample(readings):
             TypeError,
             "column `x_m`, row 1: str where a number is expected",
         ),
-        ({"x_m": np.array([0.1, 0.1, np.nan, 0.1, 0.1])}, pl.TraceError, "row 2, column `x_m`: missing"),
+        ({"t_s": np.array([0, 0.01, np.nan, 0.03, 0.04])}, pl.TraceError, "row 2, column `t_s`: missing"),
         ({"qa_m3s": np.array([0, 0, 0, np.inf, 0])}, pl.TraceError, "row 3, column `qa_m3s`: not a finite number"),
         ({"t_s": np.zeros(5)}, pl.TraceError, "row 1, column `t_s`: 0 s is not after 0 s"),
         ({"pa_atm": np.zeros(5)}, pl.TraceWarning, "columns ignored: pa_atm"),

@@ -212,8 +212,8 @@ def test_many_cylinders(columns, rig):
 
 def test_an_error_names_its_cylinder(columns, rig):
     bad = {name: values.copy() for name, values in columns.items()}
-    bad["x_mm"][7] = np.nan
-    with pytest.raises(pl.TraceError, match="row 7, column `x_mm`: missing") as error:
+    bad["t_s"][7] = np.nan
+    with pytest.raises(pl.TraceError, match="row 7, column `t_s`: missing") as error:
         pl.replay([columns, bad], rig, strict=True)
     assert error.value.__notes__ == ["in cylinder 1"]
 
