@@ -115,6 +115,8 @@ pub(super) fn damaged(what: &str) -> ParquetError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
     Number,
+    /// Whole numbers, so many decimals of each.
+    Decimal(u32),
     /// Times, so many nanoseconds each.
     Stamp(i64),
     /// Times in 96 bits, which the format gave up.
@@ -205,9 +207,13 @@ mod converted {
 /// Types as they are said today.
 mod logical {
     pub(super) const STRING: usize = 1;
+    pub(super) const DECIMAL: usize = 5;
     pub(super) const TIMESTAMP: usize = 8;
     pub(super) const INTEGER: usize = 10;
 }
+
+/// Of 64 bits.
+const MOST_DECIMALS: u32 = 18;
 
 fn kind(physical: Physical, element: &Fields<'_>) -> Result<Kind> {
     let logical = element.get(10).map(|logical| logical.fields()).transpose()?;
@@ -224,6 +230,15 @@ fn kind(physical: Physical, element: &Fields<'_>) -> Result<Kind> {
         }
         (_, Some(converted::TIMESTAMP_MILLIS)) => Some(1_000_000),
         (_, Some(converted::TIMESTAMP_MICROS)) => Some(1_000),
+        (Some(logical::DECIMAL), _) | (_, Some(converted::DECIMAL)) => {
+            let decimals = u32::try_from(element.whole(7)?.unwrap_or(0))?;
+            let is_whole = matches!(physical, Physical::INT32 | Physical::INT64);
+            return Ok(if is_whole && decimals <= MOST_DECIMALS {
+                Kind::Decimal(decimals)
+            } else {
+                Kind::Other
+            });
+        }
         (Some(logical::INTEGER) | None, _) => None,
         (Some(logical::STRING), _) if physical == Physical::BYTE_ARRAY => return Ok(Kind::Text),
         _ => return Ok(Kind::Other),
@@ -231,11 +246,7 @@ fn kind(physical: Physical, element: &Fields<'_>) -> Result<Kind> {
     Ok(match (physical, stamp_ns) {
         (Physical::INT64, Some(ns)) => Kind::Stamp(ns),
         (Physical::INT96, _) => Kind::Int96,
-        (Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE, None)
-            if converted != Some(converted::DECIMAL) =>
-        {
-            Kind::Number
-        }
+        (Physical::INT32 | Physical::INT64 | Physical::FLOAT | Physical::DOUBLE, None) => Kind::Number,
         (Physical::BYTE_ARRAY, None) if converted == Some(converted::UTF8) => Kind::Text,
         _ => Kind::Other,
     })

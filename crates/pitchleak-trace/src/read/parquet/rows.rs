@@ -80,7 +80,7 @@ fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     for (index, (field, bound_column)) in fields.iter().zip(&layout.columns).enumerate() {
         let fits = match bound_column.content {
             Content::Ignored => continue,
-            Content::Number(..) => field.kind == Kind::Number,
+            Content::Number(..) => matches!(field.kind, Kind::Number | Kind::Decimal(_)),
             Content::Timestamp => !matches!(field.kind, Kind::Other | Kind::Int96),
         };
         if field.kind == Kind::Int96 {
@@ -165,16 +165,16 @@ fn sample(file: &dyn Columns, fields: &[Field], rig: &Rig) -> Result<Vec<TextRow
     for (index, field) in fields.iter().enumerate() {
         let cells: Vec<String> = match field.kind {
             Kind::Other => continue,
-            Kind::Number if is_plain(field, rig) => continue,
+            Kind::Number | Kind::Decimal(_) if is_plain(field, rig) => continue,
             Kind::Stamp(_) | Kind::Int96 => vec!["2000-01-01T00:00:00".to_owned()],
             Kind::Text => {
                 let mut reader = file.read(0, field.place).map_err(damaged)?;
                 let texts = texts(&mut reader, field.optional, SAMPLE)?;
                 texts.iter().map(|text| String::from_utf8_lossy(text.data()).into_owned()).collect()
             }
-            Kind::Number => {
+            Kind::Number | Kind::Decimal(_) => {
                 let mut reader = file.read(0, field.place).map_err(damaged)?;
-                let values = numbers(&mut reader, field.optional, SAMPLE)?;
+                let values = numbers(&mut reader, field.kind, field.optional, SAMPLE)?;
                 values
                     .iter()
                     .map(|value| if value.is_nan() { String::new() } else { value.to_string() })
@@ -258,12 +258,12 @@ impl Batches {
                     texts.iter().map(|text| self.epoch.seconds(text.data()).unwrap_or(f64::NAN)).collect()
                 }
                 (Content::Timestamp, _) => {
-                    let values = numbers(reader, read.optional, BATCH)?;
+                    let values = numbers(reader, read.kind, read.optional, BATCH)?;
                     let seconds =
                         |value: &f64| self.epoch.seconds(value.to_string().as_bytes()).unwrap_or(f64::NAN);
                     values.iter().map(seconds).collect()
                 }
-                _ => numbers(reader, read.optional, BATCH)?,
+                _ => numbers(reader, read.kind, read.optional, BATCH)?,
             };
             cells.push(Cells { signal, unit, values: Cow::Owned(values), index: read.field });
         }
@@ -290,13 +290,26 @@ fn read<D: DataType, V: Clone>(
     Ok(levels.iter().take(records).map(cell).map(|cell| cell.unwrap_or(missing.clone())).collect())
 }
 
-fn numbers(reader: &mut ColumnReader, optional: bool, rows: usize) -> Result<Vec<f64>, TraceFault> {
+fn numbers(
+    reader: &mut ColumnReader,
+    kind: Kind,
+    optional: bool,
+    rows: usize,
+) -> Result<Vec<f64>, TraceFault> {
     let none = f64::NAN;
+    let unit = match kind {
+        Kind::Decimal(decimals) => 10_f64.powi(decimals as i32),
+        _ => 1.0,
+    };
     match reader {
         ColumnReader::DoubleColumnReader(reader) => read(reader, optional, rows, none, |value| value),
         ColumnReader::FloatColumnReader(reader) => read(reader, optional, rows, none, f64::from),
-        ColumnReader::Int32ColumnReader(reader) => read(reader, optional, rows, none, f64::from),
-        ColumnReader::Int64ColumnReader(reader) => read(reader, optional, rows, none, |value| value as f64),
+        ColumnReader::Int32ColumnReader(reader) => {
+            read(reader, optional, rows, none, |value| f64::from(value) / unit)
+        }
+        ColumnReader::Int64ColumnReader(reader) => {
+            read(reader, optional, rows, none, |value| value as f64 / unit)
+        }
         _ => Err(TraceFault::Damaged("a column is not of the type that it says".to_owned())),
     }
 }

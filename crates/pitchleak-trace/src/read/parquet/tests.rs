@@ -16,6 +16,9 @@ enum Column {
     Doubles(Vec<Option<f64>>),
     Floats(Vec<f32>),
     Whole(Vec<i32>),
+    /// Thousandths in 32 and in 64 bits, as Spark writes decimals.
+    Decimals(Vec<i32>),
+    LongDecimals(Vec<i64>),
     Stamps(TimeUnit, Vec<i64>),
     Stamps96(Vec<Int96>),
     Texts(Vec<String>),
@@ -36,6 +39,8 @@ fn file_with(properties: WriterProperties, columns: &[(&str, Column)], rows: usi
             Column::Doubles(_) => (Physical::DOUBLE, None),
             Column::Floats(_) => (Physical::FLOAT, None),
             Column::Whole(_) => (Physical::INT32, None),
+            Column::Decimals(_) => (Physical::INT32, Some(LogicalType::decimal(3, 9))),
+            Column::LongDecimals(_) => (Physical::INT64, Some(LogicalType::decimal(3, 18))),
             Column::Stamps(unit, _) => (Physical::INT64, Some(LogicalType::timestamp(true, *unit))),
             Column::Stamps96(_) => (Physical::INT96, None),
             Column::Texts(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
@@ -43,7 +48,14 @@ fn file_with(properties: WriterProperties, columns: &[(&str, Column)], rows: usi
         let optional = matches!(column, Column::Doubles(_));
         let repetition = if optional { Repetition::OPTIONAL } else { Repetition::REQUIRED };
         let field = Type::primitive_type_builder(name, physical).with_repetition(repetition);
-        Arc::new(field.with_logical_type(logical).build().unwrap())
+        let (precision, scale) = match column {
+            Column::Decimals(_) => (9, 3),
+            Column::LongDecimals(_) => (18, 3),
+            _ => (-1, -1),
+        };
+        Arc::new(
+            field.with_logical_type(logical).with_precision(precision).with_scale(scale).build().unwrap(),
+        )
     };
     let schema =
         Type::group_type_builder("trace").with_fields(columns.iter().map(field).collect()).build().unwrap();
@@ -63,10 +75,10 @@ fn file_with(properties: WriterProperties, columns: &[(&str, Column)], rows: usi
                 Column::Floats(values) => {
                     column.typed::<FloatType>().write_batch(&values[part.clone()], None, None).unwrap()
                 }
-                Column::Whole(values) => {
+                Column::Decimals(values) | Column::Whole(values) => {
                     column.typed::<Int32Type>().write_batch(&values[part.clone()], None, None).unwrap()
                 }
-                Column::Stamps(_, values) => {
+                Column::LongDecimals(values) | Column::Stamps(_, values) => {
                     column.typed::<Int64Type>().write_batch(&values[part.clone()], None, None).unwrap()
                 }
                 Column::Stamps96(values) => {
@@ -160,6 +172,25 @@ fn zstd_is_read() {
     let plain = read(file_by(Compression::UNCOMPRESSED, &with_time("t_s", doubles(|i| i)), ROWS)).unwrap();
     for (writer, bytes) in BY_ZSTD {
         assert_eq!(read(bytes.to_vec()).unwrap(), plain, "{writer}");
+    }
+}
+
+/// Decimals are whole numbers and how many decimals they have.
+#[test]
+fn decimals_are_numbers() {
+    let trace = |x: Column, pa: Column| {
+        vec![("t_s", doubles(|i| 0.01 * i)), ("x_mm", x), ("pa_bar", pa), ("pb_bar", doubles(|_| 40.0))]
+    };
+    let whole = trace(doubles(|i| 100.0 + 0.001 * i), doubles(|i| 50.0 - 0.25 * i));
+    let decimals = trace(
+        Column::Decimals((0..ROWS as i32).map(|i| 100_000 + i).collect()),
+        Column::LongDecimals((0..ROWS as i64).map(|i| 50_000 - 250 * i).collect()),
+    );
+    let [expected, found] = [whole, decimals].map(|columns| read(file(&columns, ROWS)).unwrap());
+    assert_eq!((found.len(), expected.len()), (ROWS, ROWS));
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!((found.sample.x_m - expected.sample.x_m).abs() < 1e-12);
+        assert!((found.sample.pa_pa - expected.sample.pa_pa).abs() < 1e-6);
     }
 }
 
