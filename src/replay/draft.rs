@@ -88,6 +88,7 @@ impl<'a> Draft<'a> {
             episodes: &self.episodes,
             threshold_lpm: self.threshold_lpm,
             trace: &self.trace,
+            assumed: self.replay.rig.assumed,
             alpha: self.replay.rig.decision.alpha,
             end_s: *end_s,
             knows_noise: self.replay.knows_noise(),

@@ -30,6 +30,8 @@ pub enum ReasonId {
     NotIdentifiable,
     /// A leak's interval reaches beyond its threshold, and yet not for sure.
     Undecided,
+    /// No rig file was given, and the trace is of another cylinder than the paper's.
+    NoRigFile,
     /// Between two readings the piston moves unseen.
     SampledTooSeldom,
     /// The estimator knows no uncertainty.
@@ -49,9 +51,17 @@ impl ReasonId {
             Self::ModelDoesNotFit => "model_does_not_fit",
             Self::NotIdentifiable => "not_identifiable",
             Self::Undecided => "undecided",
+            Self::NoRigFile => "no_rig_file",
             Self::SampledTooSeldom => "sampled_too_seldom",
             Self::NoUncertainty => "no_uncertainty",
         }
+    }
+}
+
+impl ReasonId {
+    /// Whether it has to be mended before anything is said of leaks.
+    pub(super) fn precedes_a_verdict(self) -> bool {
+        matches!(self, Self::SampledTooSeldom | Self::NoRigFile)
     }
 }
 
@@ -118,6 +128,9 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
     if let Some(seldom) = sampled_too_seldom(findings) {
         return vec![seldom];
     }
+    if let Some(other) = findings.decision.and_then(|decision| another_cylinder(findings, decision)) {
+        return vec![other];
+    }
     let Some(decision) = findings.decision else {
         let text = "this trace is too short to tell about leaks, or nothing explains it at all";
         return vec![Reason::new(ReasonId::NotIdentifiable, text, RECORD)];
@@ -134,6 +147,21 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         .into_iter()
         .chain(undecided.into_iter().map(|leak| self::undecided(findings, decision, leak)))
         .collect()
+}
+
+/// What of an explanation is the cylinder's, or a meter's scale, by which areas show.
+const OF_THE_CYLINDER: [&str; 5] = ["gain", "area", "dead_volume", "stroke", "exchanged"];
+
+/// A trace that nobody gave a rig file for is judged on the paper's cylinder where it is one.
+fn another_cylinder(findings: &Findings<'_>, decision: &Decision) -> Option<Reason> {
+    let best = decision.explanations.first().filter(|_| findings.assumed.rig)?;
+    OF_THE_CYLINDER.iter().any(|part| best.id.contains(part)).then(|| {
+        Reason::new(
+            ReasonId::NoRigFile,
+            format!("no rig file was given, and this is hardly the paper's cylinder: {}", best.cause),
+            "say yours: `pitchleak init TRACE` begins a rig.toml beside the trace",
+        )
+    })
 }
 
 /// One reading in a block of 0.25 s: with fewer the trapezoids between readings are not what has flowed, and no noise says so.

@@ -31,6 +31,10 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
         }
     }
     sentences.extend(before(findings));
+    // Without any rig file the line of the rig says so.
+    if findings.assumed.sensors && !findings.assumed.rig {
+        sentences.push("The rig file has no [sensors]: meters as the paper's are supposed.".to_owned());
+    }
     sentences.extend(Leak::ALL.into_iter().filter_map(|leak| grows(findings, leak, status)));
     sentences.join(" ")
 }

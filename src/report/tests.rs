@@ -35,6 +35,7 @@ impl Found {
             episodes: &self.episodes,
             threshold_lpm: PerLeak { internal: 0.1, external_a: 0.1, external_b: 0.1 },
             trace: &self.trace,
+            assumed: crate::rig::Assumed::default(),
             alpha: 0.05,
             end_s: 60.0,
             knows_noise: self.knows_noise,

@@ -1,10 +1,11 @@
 //! What an operator acts on.
 
 use super::episode::comes_and_goes;
-use super::reason::{Reason, ReasonId, contradictions, gaps};
+use super::reason::{Reason, contradictions, gaps};
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};
+use crate::rig::Assumed;
 use crate::wiring::Wiring;
 use pitchleak_core::{Leak, PerLeak};
 use serde::{Deserialize, Serialize};
@@ -84,6 +85,8 @@ pub struct Findings<'a> {
     pub threshold_lpm: PerLeak<f64>,
     /// What was read.
     pub trace: &'a TraceSummary,
+    /// What of the rig nobody declared.
+    pub assumed: Assumed,
     /// How sure a verdict has to be.
     pub alpha: f64,
     /// Time of the last row, s.
@@ -147,7 +150,7 @@ impl Verdict {
         let gaps = gaps(findings, &faults);
         let (status, reasons) = match findings.decision {
             _ if !contradictions.is_empty() => (Status::Doubtful, contradictions),
-            _ if gaps.iter().any(|gap| gap.id == ReasonId::SampledTooSeldom) => (Status::NotSure, gaps),
+            _ if gaps.iter().any(|gap| gap.id.precedes_a_verdict()) => (Status::NotSure, gaps),
             Some(decision) if decision.status.is_sure() && !faults.is_empty() => (Status::Leak, Vec::new()),
             Some(decision) if decision.status == Status::Sound && gaps.is_empty() => (Status::Sound, gaps),
             _ => (Status::NotSure, gaps),

@@ -381,3 +381,39 @@ fn a_leak_is_put_into_a_file_with_flows() {
     let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
     assert!(page.contains("Internal leak, 0.5 L/min put in"));
 }
+
+/// Who gives no rig file is judged on the paper's cylinder where the trace is one of it, and told to give one where it isn't. Who
+/// gives no sensors is told whose are supposed.
+#[test]
+fn what_nobody_declared_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("own.csv");
+    let own = ["simulate", "--wind", "13", "--noise", "rig", "--out", out.to_str().unwrap()];
+    assert!(pitchleak(&own, folder.path()).status.success());
+    let verdict = |arguments: &[&str]| -> serde_json::Value {
+        let output = pitchleak(arguments, folder.path());
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["verdict"].clone()
+    };
+    assert_eq!(verdict(&["replay", "own.csv", "--json"])["status"], "sound");
+    // A cylinder of twice the area: twice the flow for the same travel.
+    let text = std::fs::read_to_string(&out).unwrap();
+    let doubled = text.lines().enumerate().map(|(at, line)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        for cell in cells[4..6].iter_mut().filter(|_| at > 0) {
+            *cell = format!("{:.6}", 2.0 * cell.parse::<f64>().unwrap());
+        }
+        cells.join(",") + "\n"
+    });
+    std::fs::write(folder.path().join("other.csv"), doubled.collect::<String>()).unwrap();
+    for command in ["replay", "check"] {
+        let told = verdict(&[command, "other.csv", "--json"]);
+        assert!(!["leak", "sound"].contains(&told["status"].as_str().unwrap()), "{told}");
+    }
+    let rig = include_str!("../../../data/traces/rig.toml").split("[sensors]").next().unwrap();
+    std::fs::write(folder.path().join("bare.toml"), rig).unwrap();
+    let told = verdict(&["replay", "own.csv", "--rig", "bare.toml", "--json"]);
+    assert!(
+        told["text"].as_str().unwrap().ends_with("has no [sensors]: meters as the paper's are supposed."),
+        "{told}"
+    );
+}

@@ -45,6 +45,24 @@ pub struct Rig {
     pub csv: CsvSettings,
     /// `[effects]`: what a diagnosis found.
     pub effects: EffectMap,
+    /// What nobody declared.
+    pub assumed: Assumed,
+}
+
+/// What is the paper's because nobody said otherwise.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Assumed {
+    /// All of it: no rig file was given, nor stood beside the trace.
+    pub rig: bool,
+    /// The sensors: the rig file has no `[sensors]`.
+    pub sensors: bool,
+}
+
+/// Rigs of the same numbers are the same rig, whoever gave them.
+impl PartialEq for Assumed {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Rig {
@@ -65,6 +83,7 @@ impl Rig {
             columns: ColumnMap::new(),
             csv: CsvSettings::default(),
             effects: EffectMap::new(),
+            assumed: Assumed::default(),
         }
     }
 
@@ -81,7 +100,10 @@ impl Rig {
     /// there is nothing.
     pub fn beside(trace: &Path) -> Result<Self, RigError> {
         let neighbour = trace.with_file_name("rig.toml");
-        if trace != Path::new("-") && neighbour.is_file() { Self::load(neighbour) } else { Ok(Self::paper()) }
+        if trace != Path::new("-") && neighbour.is_file() {
+            return Self::load(neighbour);
+        }
+        Ok(Self { assumed: Assumed { rig: true, sensors: true }, ..Self::paper() })
     }
 
     /// The file it was read from; none of the built-in one.
@@ -122,6 +144,7 @@ impl Rig {
             columns: settings::read_columns(&root.section("columns")?)?,
             csv: CsvSettings::read(&root.section("csv")?)?,
             effects: effects::read(&root.section("effects")?)?,
+            assumed: Assumed { rig: false, sensors: !root.section("sensors")?.is_present() },
         })
     }
 

@@ -76,6 +76,9 @@ impl ReplaySketch {
 /// Says so where a verdict in doubt, or one with something that is not as declared, rests on no rig file.
 pub(crate) fn missing_rig(report: &ReplayReport) -> Option<&'static str> {
     let verdict = &report.verdict;
+    if verdict.reasons.iter().any(|reason| reason.id == ReasonId::NoRigFile) {
+        return None;
+    }
     let is_declared = verdict.explanations.first().is_none_or(|best| best.cause.is_empty());
     (report.rig == Rig::PAPER_NAME && !(verdict.status.is_sure() && is_declared)).then_some(NO_RIG)
 }
