@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Leak, PerLeak};
+use pitchleak::core::{Leak, Sample};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
-use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing};
 use pitchleak::trace::TraceReader;
-use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak::wind::WindCase;
+use pitchleak_testkit::windy::minute;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -17,34 +17,14 @@ use std::fmt::Write;
 use std::io::Cursor;
 
 const NAMES: [&str; 5] = ["x_m", "pa_pa", "pb_pa", "qa_m3s", "qb_m3s"];
-const LPM: f64 = 1.0 / 60e3;
 
 /// A minute at 100 Hz: times, and the readings of x, P_A, P_B, Q_A, Q_B.
 fn trace(wind: WindCase, leak: Option<Leak>, seed: u64) -> Vec<(f64, [f64; 5])> {
-    let rig = Rig::paper();
-    let history = History::of(&Wind::BuiltIn(wind)).unwrap();
-    let size = |which| LeakSize::MeanFlow(if leak == Some(which) { 0.4 * LPM } else { 0.0 });
-    let sensors = rig.sensors();
-    let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig,
-        leaks: PerLeak::from_fn(|which| LeakCourse::from(size(which))),
-        oil_temperature: None,
-        shut: None,
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
-        duration_s: 60.0,
-        sample_rate_hz: 100.0,
+    let readings = |(t_s, sample): (f64, Sample<f64>)| {
+        let [qa, qb] = [sample.qa_m3s, sample.qb_m3s].map(Option::unwrap);
+        (t_s, [sample.x_m, sample.pa_pa, sample.pb_pa, qa, qb])
     };
-    let truths = scenario.collect(scenario.leak_coefficients().unwrap()).unwrap();
-    let mut sensing = Sensing::new(sensors, Biases::default(), seed);
-    let mut read = |truth: &pitchleak::simulate::Truth| {
-        let sample = sensing.read(&truth.sample);
-        let flow = |flow: Option<f64>| flow.unwrap();
-        (truth.t_s, [sample.x_m, sample.pa_pa, sample.pb_pa, flow(sample.qa_m3s), flow(sample.qb_m3s)])
-    };
-    truths.iter().map(&mut read).collect()
+    minute(wind, leak.map(|leak| (leak, 0.4)), seed).into_iter().map(readings).collect()
 }
 
 /// Which cells of a row are there.

@@ -3,17 +3,16 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Leak, PerLeak, Sample};
+use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::prove::{Proof, ProveError, prove};
 use pitchleak::replay::ReplayError;
-use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing};
+use pitchleak::simulate::{Biases, Sensing};
 use pitchleak::trace::{TraceError, TraceReader};
-use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak::wind::WindCase;
+use pitchleak_testkit::windy::minute;
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::io::Cursor;
-
-const LPM: f64 = 1.0 / 60e3;
 
 fn row(text: &mut String, t_s: f64, sample: &Sample<f64>) {
     let Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, .. } = sample;
@@ -29,25 +28,9 @@ const HEADER: &str = "t_s,x_m,pa_pa,pb_pa,qa_m3s,qb_m3s\n";
 
 /// A minute at 100 Hz.
 fn trace(wind: WindCase, leak: Option<Leak>, seed: u64) -> String {
-    let rig = Rig::paper();
-    let history = History::of(&Wind::BuiltIn(wind)).unwrap();
-    let size = |which| LeakSize::MeanFlow(if leak == Some(which) { 0.3 * LPM } else { 0.0 });
-    let mut sensing = Sensing::new(rig.sensors(), Biases::default(), seed);
-    let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig,
-        leaks: PerLeak::from_fn(|which| LeakCourse::from(size(which))),
-        oil_temperature: None,
-        shut: None,
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
-        duration_s: 60.0,
-        sample_rate_hz: 100.0,
-    };
     let mut text = HEADER.to_owned();
-    for truth in scenario.collect(scenario.leak_coefficients().unwrap()).unwrap() {
-        row(&mut text, truth.t_s, &sensing.read(&truth.sample));
+    for (t_s, sample) in minute(wind, leak.map(|leak| (leak, 0.3)), seed) {
+        row(&mut text, t_s, &sample);
     }
     text
 }

@@ -30,19 +30,18 @@ const TOLD: f64 = 0.1;
 type Information = SMatrix<f64, UNKNOWN, UNKNOWN>;
 
 /// What the records so far say.
-#[derive(Clone)]
-pub(super) struct Bound {
+pub(super) struct Bound<'r> {
     information: Information,
     onset_s: f64,
     duration_s: f64,
     last: Option<Record>,
     flow_std: [f64; 2],
-    rig: Rig,
+    rig: &'r Rig,
 }
 
-impl Bound {
+impl<'r> Bound<'r> {
     /// Of leaks that begin at `onset_s` in a trace of `duration_s`.
-    pub fn new(rig: &Rig, onset_s: f64, duration_s: f64) -> Self {
+    pub fn new(rig: &'r Rig, onset_s: f64, duration_s: f64) -> Self {
         let sheets = [rig.instruments.flow_a, rig.instruments.flow_b];
         let noises = [rig.sensors().flow_a.noise_std, rig.sensors().flow_b.noise_std];
         let mut information = Information::zeros();
@@ -57,17 +56,14 @@ impl Bound {
             know(DRIFTS + side, USUAL_DRIFT * sheet.full_scale / noise);
             know(GAINS + side, declared(sheet.gain, USUAL_GAIN));
         }
-        Self { information, onset_s, duration_s, last: None, flow_std: noises, rig: rig.clone() }
+        Self { information, onset_s, duration_s, last: None, flow_std: noises, rig }
     }
 
     pub fn add(&mut self, record: &Record) {
         let last = self.last.replace(*record).filter(|_| record.step_s() > 0.0);
         let (sample, cylinder) = (&record.sample, &self.rig.cylinder);
         let Some(before) = last.map(|last| last.sample) else { return };
-        let volumes = [
-            cylinder.dead_volume_a_m3 + cylinder.area_a_m2 * sample.x_m,
-            cylinder.dead_volume_b_m3 + cylinder.area_b_m2 * (cylinder.stroke_m - sample.x_m),
-        ];
+        let volumes = [cylinder.volume_a_m3(sample.x_m), cylinder.volume_b_m3(sample.x_m)];
         let rises = [sample.pa_pa - before.pa_pa, sample.pb_pa - before.pb_pa];
         let (pa, pb) = (sample.pa_pa, sample.pb_pa);
         let pressures = [[pa - pb, pa, 0.0], [pb - pa, 0.0, pb]];

@@ -276,7 +276,7 @@ impl<'r> Trial<'r> {
         if drive.gain() > 0.5 { drive.mean_size } else { drive.mean.abs() }
     }
 
-    fn bound(&self) -> Bound {
+    fn bound(&self) -> Bound<'r> {
         Bound::new(self.rig, self.onset_s, self.recorded.trace.duration_s)
     }
 
@@ -383,9 +383,7 @@ impl<'r> Trial<'r> {
         let (mut low, mut high) = (bound_lpm.unwrap_or(threshold_lpm) / 2.0, MOST_THRESHOLDS * threshold_lpm);
         let mut found = |size_lpm: f64| {
             step();
-            let mut reader = self.with_leak(open()?, leak, size_lpm);
-            let report = replay(&mut reader, self.rig, |_, _, _| Ok::<(), ReplayError>(()));
-            Ok::<bool, E>(self.is_found(&report.map_err(ProveError::from)?, leak, size_lpm))
+            Ok::<bool, E>(self.put_in(open, leak, size_lpm)?.found)
         };
         // Doubled up to a size that is found: a leak far above it may not be what the meters can read.
         let mut size_lpm = 2.0 * low;

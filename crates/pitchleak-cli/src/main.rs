@@ -122,14 +122,12 @@ fn in_one_line(answer: &str) -> String {
         lines().filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more information"))
     {
         let part = part.trim_start_matches("error: ").trim_start_matches("tip: ");
-        line += if line.is_empty() || part.starts_with('[') {
-            ""
-        } else if line.ends_with(':') {
-            " "
-        } else {
-            "; "
+        line += match line.chars().last() {
+            None => "",
+            Some(':') => " ",
+            Some(_) if part.starts_with('[') => " ",
+            Some(_) => "; ",
         };
-        line += if part.starts_with('[') { " " } else { "" };
         line += part;
     }
     match lines().find_map(|part| part.strip_prefix("Usage: ")) {

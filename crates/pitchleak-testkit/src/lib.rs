@@ -21,6 +21,8 @@ mod noise;
 pub mod rig;
 mod statistics;
 pub mod trace_text;
+#[cfg(feature = "judges")]
+pub mod windy;
 
 pub use motion::{Motion, Multisine};
 pub use noise::{noisy, seeded, sensors_of, white_noise};

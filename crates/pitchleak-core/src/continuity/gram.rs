@@ -130,6 +130,12 @@ pub const fn column(raw: RawSum, chamber: usize) -> usize {
     chamber * RAW_SUMS + raw as usize
 }
 
+fn add_each<T: Real, const N: usize>(sums: &mut [[T; 3]; N], values: &[[T; 3]; N]) {
+    for (sum, value) in sums.iter_mut().flatten().zip(values.iter().flatten()) {
+        *sum += *value;
+    }
+}
+
 /// Sums over time, by what they are sums of.
 const AGED: [(RawSum, RawSum); 3] = [
     (RawSum::AgedPressureA, RawSum::PressureA),
@@ -179,16 +185,8 @@ impl<T: Real> Segment<T> {
             }
         }
         let RowNoise { integral, end } = row.noise;
-        for (sums, values) in self.integral_noise[equation].iter_mut().zip(integral) {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += value;
-            }
-        }
-        for (sums, values) in self.end_noise[equation].iter_mut().zip(end) {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += value;
-            }
-        }
+        add_each(&mut self.integral_noise[equation], &integral);
+        add_each(&mut self.end_noise[equation], &end);
         self.rows[equation] += T::one();
     }
 
@@ -219,17 +217,8 @@ impl<T: Real> Segment<T> {
             for (sum, value) in self.gram[equation].iter_mut().zip(next.gram[equation]) {
                 *sum += value;
             }
-            for (sums, values) in self.integral_noise[equation].iter_mut().zip(next.integral_noise[equation])
-            {
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum += value;
-                }
-            }
-            for (sums, values) in self.end_noise[equation].iter_mut().zip(next.end_noise[equation]) {
-                for (sum, value) in sums.iter_mut().zip(values) {
-                    *sum += value;
-                }
-            }
+            add_each(&mut self.integral_noise[equation], &next.integral_noise[equation]);
+            add_each(&mut self.end_noise[equation], &next.end_noise[equation]);
             self.rows[equation] += next.rows[equation];
         }
         self.blocks += next.blocks;

@@ -57,12 +57,6 @@ pub(crate) fn proof_word(proof: &Proof) -> &'static str {
 
 /// What it says, and what to do where it says little.
 pub(crate) fn sentence(proof: &Proof) -> String {
-    let named = |which: &dyn Fn(&Case) -> bool| {
-        let mut leaks: Vec<Leak> =
-            proof.cases.iter().filter(|case| which(case)).map(|case| case.leak).collect();
-        leaks.dedup();
-        leaks.iter().map(|leak| leak.label()).collect::<Vec<_>>().join(", ")
-    };
     if proof.is_proven() {
         let clean = if proof.verdict.status == Status::Sound { ", and without it none is" } else { "" };
         return format!("Each leak that was put into this trace is found{clean}.");
@@ -75,7 +69,10 @@ pub(crate) fn sentence(proof: &Proof) -> String {
             wrong.label()
         );
     }
-    let missed = named(&|case| !case.found);
+    let mut missed: Vec<&str> =
+        proof.cases.iter().filter(|case| !case.found).map(|case| case.leak.label()).collect();
+    missed.dedup();
+    let missed = missed.join(", ");
     let why = match &proof.verdict.reasons[..] {
         [first, ..] => format!(" {}.", capital(&first.text)),
         [] => String::new(),
