@@ -32,6 +32,7 @@ fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
         rig: rig.clone(),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

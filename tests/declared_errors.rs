@@ -27,6 +27,7 @@ fn truths(wind: WindCase) -> Vec<Truth> {
         leaks: LEAKS_M3SPA.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

@@ -27,6 +27,7 @@ fn trend(grows: bool, oil: &str, shown: bool) -> LeakTrend {
         leaks: leaks.map(|_| course.within_trace(DURATION_S)),
         oil_temperature: Some(OilTemperature::of(oil, DURATION_S).unwrap()),
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

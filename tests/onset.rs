@@ -26,6 +26,7 @@ fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
         leaks: PerLeak::from_fn(size),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

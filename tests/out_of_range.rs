@@ -35,6 +35,7 @@ fn truths(wind: WindCase, duration_s: f64) -> Vec<Truth> {
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: Default::default(),
         start_s: 30.0,
         warm_up_s: 10.0,

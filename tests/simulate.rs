@@ -23,6 +23,7 @@ fn scenario() -> Scenario {
         leaks: PerLeak::default(),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 20.0,
         warm_up_s: 3.0,

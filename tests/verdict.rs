@@ -119,6 +119,7 @@ fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
         leaks,
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 0.0,
         warm_up_s: 10.0,

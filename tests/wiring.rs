@@ -36,6 +36,7 @@ fn truths(wind: WindCase, internal: f64, external_a: f64, effects: EffectSet<f64
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects,
         start_s: 10.0,
         warm_up_s: 10.0,

@@ -86,6 +86,7 @@ impl Wind {
             rig,
             oil_temperature,
             shut: None,
+            valve_flaws: Vec::new(),
             effects: EffectSet::default(),
             start_s: 5.0,
             warm_up_s: 3.0,

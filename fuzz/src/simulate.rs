@@ -22,6 +22,7 @@ pub fn enter(bytes: &[u8]) {
         onset_s: time(next()).unwrap_or(0.0),
         oil_temperature: next().split_once("->").map(|(from, to)| format!("{from}->{to}")),
         shut: None,
+        valve_flaws: Vec::new(),
         noise: next().parse().unwrap_or(Noise::None),
         bias_share: pitchleak::simulate::share_of_full_scale(next()).unwrap_or(0.0),
         start_s: time(next()),

@@ -11,6 +11,7 @@ use crate::replay::{Replay, ReplayError, replay};
 use crate::report::{EstimateEntry, Leakage, TraceSummary, Verdict};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceReader};
+use crate::valve::ValveSummary;
 use crate::wiring::{Excerpt, Recorded, Wiring, explain, unit_by_scatter};
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
@@ -36,6 +37,9 @@ pub struct CheckReport {
     /// Of a hold test: how much of it is usable, and the smallest leaks that it finds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hold: Option<HoldSummary>,
+    /// Where the valve's flows stand for meters: what they are worth, and the smallest leaks that they find.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub valve: Option<ValveSummary>,
     /// What the trace tells about each leak.
     pub leaks: PerLeak<Reach>,
     /// What the trace tells about the bulk modulus.
@@ -108,13 +112,14 @@ pub fn check<E: From<ReplayError>>(
     let whole = Recorded::new(&records, &rig);
     let found = whole.as_ref().and_then(explain);
     let found = found.or_else(|| unit_by_scatter(&excerpt, &rig));
-    let found = found.filter(|_| replayed.hold.is_none());
+    let found = found.filter(|_| replayed.hold.is_none() && replayed.valve.is_none());
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
         wiring: found.map(|found| found.wiring(&columns, &rig)),
         hold: replayed.hold,
+        valve: replayed.valve,
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),
         bulk_modulus: Reach::new(bulk_modulus, bulk_modulus.std),
         normalised_innovation: replayed.normalised_innovation,

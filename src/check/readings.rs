@@ -33,13 +33,30 @@ struct Channel {
 }
 
 /// What a check tells of, in the order of its table.
-pub const SIGNALS: [Signal; 6] =
-    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
+pub const SIGNALS: [Signal; 8] = [
+    Signal::Position,
+    Signal::PressureA,
+    Signal::PressureB,
+    Signal::FlowA,
+    Signal::FlowB,
+    Signal::Force,
+    Signal::Spool,
+    Signal::Supply,
+];
 
 /// Of each of [`SIGNALS`], SI.
 pub fn values(record: &Record) -> [Option<f64>; SIGNALS.len()] {
-    let s = &record.sample;
-    [Some(s.x_m), Some(s.pa_pa), Some(s.pb_pa), s.qa_m3s, s.qb_m3s, s.force_n]
+    let (s, valve) = (&record.sample, record.valve);
+    [
+        Some(s.x_m),
+        Some(s.pa_pa),
+        Some(s.pb_pa),
+        s.qa_m3s,
+        s.qb_m3s,
+        s.force_n,
+        valve.map(|valve| valve.spool),
+        valve.and_then(|valve| valve.supply_pa),
+    ]
 }
 
 impl Default for Extremes {

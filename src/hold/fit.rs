@@ -6,16 +6,14 @@
 //! (errors in variables by Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
 
 use super::equations::{Known, Normal, Unknowns};
-use super::nodes::{Cooling, LEAST_INFORMATION, RESOLUTION, Search};
+use super::nodes::{Cooling, Search};
 use super::profile::Profile;
 use super::recorder::{Held, LEAST_READINGS, Reading};
+use crate::presence::{Found, LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, Place, RESOLUTION};
 use crate::rig::Rig;
-use crate::units::LPM_PER_M3S;
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
 use pitchleak_core::{Estimate, PerLeak};
 
-/// Unit of the leak coefficients: 1 L/min at 50 bar, in m³/(s·Pa).
-pub(super) const LEAK_UNIT_M3SPA: f64 = 1.0 / LPM_PER_M3S / 50e5;
 /// Rounds in all, and those of them in which κ is held.
 const ROUNDS: usize = 16;
 const ROUNDS_HELD: usize = 4;
@@ -23,20 +21,15 @@ const ROUNDS_HELD: usize = 4;
 const KAPPA_RANGE: [f64; 2] = [0.2, 5.0];
 /// A rig file that knows its oil for certain knows it to this share, and a sensor without noise has this of its full scale.
 const LEAST_SHARE: f64 = 1e-6;
+/// Places of κ at which the leaks are weighed.
+const PLACES: usize = 2000;
 /// A hold's residuals are averaged over so many parts, where noise has gone and errors of the model haven't.
 const PARTS: usize = 10;
 
 /// What the holds say.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
-    /// The likelihood of the leaks at each compressibility.
-    pub profile: Profile,
-    /// κ as the rig file has it, 1/Pa.
-    pub declared_ppa: Estimate<f64>,
-    /// Means of |P_L|, P_A, P_B, Pa.
-    pub pressures_pa: PerLeak<f64>,
-    /// P_A − P_B, Pa.
-    pub load_pressure_pa: f64,
+    pub found: Found,
     pub misfit: Misfit,
     pub usable_s: f64,
 }
@@ -83,19 +76,31 @@ pub(super) fn fit(rig: &Rig, holds: &[&Held]) -> Option<Fit> {
     let share = kappa.std / kappa.value;
     let profile = Profile::new(kappa.value.ln(), share.min(spread), |ln_kappa| {
         let node = search.clone().node(ln_kappa.exp() * declared_ppa)?;
-        Some(node.explained(&cooling)?.widened(worse))
+        Some(cooling.explained(node)?.widened(worse))
     })?;
     let leaks = profile.at(kappa.value.ln()).leaks;
     let misfit = Misfit { of_leak: of_leak(rig, holds, kappa.value * declared_ppa, &leaks), ..misfit };
+    let load_pressure_pa = mean_pressures_pa(holds, |load| load).internal;
     let fit = Fit {
-        profile,
-        declared_ppa: Estimate { value: declared_ppa, std: spread * declared_ppa },
-        pressures_pa,
-        load_pressure_pa: mean_pressures_pa(holds, |load| load).internal,
+        found: Found::new(&grid(&profile, spread), pressures_pa, load_pressure_pa, rig),
         misfit,
         usable_s: holds.iter().map(|held| held.usable_s()).sum(),
     };
     fit.misfit.readings.is_finite().then_some(fit)
+}
+
+/// Places of κ, equally far apart by their logarithms; `relative` is how far the rig file leaves it open.
+fn grid(profile: &Profile, relative: f64) -> Vec<Place> {
+    let [from, to] = profile.range();
+    let least = profile.at(0.5 * (from + to)).squares;
+    let places = (0..=PLACES).map(|k| from + (to - from) * k as f64 / PLACES as f64);
+    places
+        .map(|ln_kappa| {
+            let at = profile.at(ln_kappa);
+            let likelihood = LeakLikelihood { squares: at.squares - least, ..at };
+            Place { kappa: ln_kappa.exp(), ln_prior: -0.5 * (ln_kappa / relative).powi(2), likelihood }
+        })
+        .collect()
 }
 
 fn known(rig: &Rig, declared_ppa: f64) -> Known<'_> {

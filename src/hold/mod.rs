@@ -5,7 +5,7 @@
 //!    2 mm, or the trace.
 //! 2. `fit` finds compressibility and leaks by maximum likelihood (docs/hold-test.md), with the linear equations of `equations`; `nodes` has
 //!    the likelihood of the leaks at one compressibility, `profile` over all of them.
-//! 3. `presence` weighs which leaks there are: none is negative, most cylinders have none.
+//! 3. [`presence`](crate::presence) weighs which leaks there are: none is negative, most cylinders have none.
 //! 4. [`HoldTest`] is what was found, [`HoldTest::report`] the verdict and its words.
 
 mod advice;
@@ -13,12 +13,11 @@ mod equations;
 mod fit;
 mod nodes;
 mod outcome;
-mod presence;
 mod profile;
 mod recorder;
 mod report;
 mod verdict;
 
 pub use advice::advise;
-pub use outcome::{HeldLeak, HoldSummary, HoldTest};
+pub use outcome::{HoldSummary, HoldTest};
 pub use recorder::{EndedBy, Recorder};

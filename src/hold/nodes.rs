@@ -1,18 +1,15 @@
 //! The likelihood of the leaks where the compressibility is known: normal, as the equations are linear in them.
 
 use super::equations::{Equations, Known, Normal, Unknowns};
-use super::fit::{LEAK_UNIT_M3SPA, running_means, solve};
+use super::fit::{running_means, solve};
 use super::recorder::{Held, Reading};
+use crate::presence::{LEAK_UNIT_M3SPA, LeakLikelihood};
 use crate::rig::Rig;
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2};
 use pitchleak_core::PerLeak;
 
 /// Rounds in which the signals follow a node's κ.
 const ROUNDS: usize = 2;
-/// Of a coefficient of 1 L/min at 50 bar: a thousand of them, 1 σ.
-pub(super) const LEAST_INFORMATION: f64 = 1e-6;
-/// … and a share of the best known, below which differences are rounding: constant pressures give two rates for three leaks.
-pub(super) const RESOLUTION: f64 = 1e-13;
 
 /// Oil that was at work, 20 K above the air, cools by this while it is held, 1 σ, K/s: its time constant is an hour. A guess.
 const COOLING_KPS: f64 = 20.0 / 3600.0;
@@ -62,7 +59,7 @@ impl<'a> Search<'a> {
     }
 
     /// The likelihood of the leaks where κ is this.
-    pub fn node(mut self, kappa_ppa: f64) -> Option<Node> {
+    pub fn node(mut self, kappa_ppa: f64) -> Option<LeakLikelihood> {
         let mut normal = self.normal(kappa_ppa);
         for _ in 0..ROUNDS {
             let unknowns = solve(&normal, true)?;
@@ -70,50 +67,7 @@ impl<'a> Search<'a> {
             normal = self.normal(kappa_ppa);
         }
         let information = normal.information.fixed_view::<3, 3>(1, 1).into_owned();
-        Node::new(information, &normal.right.fixed_rows::<3>(1).into_owned(), normal.squares)
-    }
-}
-
-/// At one κ: squares of the residuals are `squares` + (C − `leaks`)ᵀ `information` (C − `leaks`), with the coefficients C in
-/// [`LEAK_UNIT_M3SPA`].
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Node {
-    pub information: Matrix3<f64>,
-    /// Likeliest coefficients, whatever their sign.
-    pub leaks: Vector3<f64>,
-    pub squares: f64,
-}
-
-impl Node {
-    /// From `squares` − 2 `right`ᵀ C + Cᵀ `information` C. A leak that nothing tells of, as the internal one at equal pressures, gets
-    /// next to no information.
-    fn new(information: Matrix3<f64>, right: &Vector3<f64>, squares: f64) -> Option<Self> {
-        let least = LEAST_INFORMATION + RESOLUTION * information.trace();
-        let information = information + Matrix3::identity() * least;
-        let leaks = information.cholesky()?.solve(right);
-        Some(Self { information, leaks, squares: squares - right.dot(&leaks) })
-    }
-
-    /// Where the oil of each chamber may cool.
-    pub fn explained(self, cooling: &Cooling) -> Option<Self> {
-        let columns = self.information.fixed_columns::<2>(1).into_owned();
-        let inner = self.information.fixed_view::<2, 2>(1, 1) + cooling.precision;
-        let information = self.information - columns * inner.try_inverse()? * columns.transpose();
-        Some(Self { information, ..self })
-    }
-
-    /// Where residuals are so many times as large as noise: what isn't explained makes everything less sure.
-    pub fn widened(self, worse: f64) -> Self {
-        Self { information: self.information / worse, squares: self.squares / worse, ..self }
-    }
-
-    /// A sum of nodes, each by its weight.
-    pub fn plus(self, other: &Self, weight: f64) -> Self {
-        Self {
-            information: self.information + other.information * weight,
-            leaks: self.leaks + other.leaks * weight,
-            squares: self.squares + other.squares * weight,
-        }
+        LeakLikelihood::new(information, &normal.right.fixed_rows::<3>(1).into_owned(), normal.squares)
     }
 }
 
@@ -124,6 +78,15 @@ pub(super) struct Cooling {
 }
 
 impl Cooling {
+    /// What is left of a likelihood where the oil of each chamber may cool.
+    pub fn explained(&self, likelihood: LeakLikelihood) -> Option<LeakLikelihood> {
+        let all = likelihood.information;
+        let columns = all.fixed_columns::<2>(1).into_owned();
+        let inner = all.fixed_view::<2, 2>(1, 1) + self.precision;
+        let information = all - columns * inner.try_inverse()? * columns.transpose();
+        Some(LeakLikelihood { information, ..likelihood })
+    }
+
     pub fn of(rig: &Rig, holds: &[&Held], pressures_pa: &PerLeak<f64>) -> Option<Self> {
         let x_m = holds.first()?.readings.first()?.x_m;
         let as_leak = |volume_m3: f64, pressure_pa: f64| {

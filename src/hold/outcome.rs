@@ -1,10 +1,9 @@
 //! What a hold test found.
 
 use super::fit::{Fit, fit, usable};
-use super::presence::{Beliefs, beliefs};
 use super::recorder::{EndedBy, Held, Recorder};
+use crate::presence::FoundLeak;
 use crate::rig::Rig;
-use crate::units::LPM_PER_M3S;
 use pitchleak_core::PerLeak;
 use serde::Serialize;
 
@@ -19,36 +18,16 @@ pub struct HoldSummary {
     pub holds: usize,
     /// Each leak; none where nothing was usable.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub leaks: Option<PerLeak<HeldLeak>>,
-}
-
-/// One leak in a hold test, as a mean over its usable time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct HeldLeak {
-    /// Probability that there is such a leak at all.
-    pub probability: f64,
-    /// The interval that holds its flow with 95 % where there is one, L/min.
-    pub ci95_lpm: [f64; 2],
-    /// The smallest flow that this hold would find, L/min.
-    pub smallest_lpm: f64,
-    /// Mean pressure that drives it, bar: |P_A − P_B|, P_A or P_B.
-    pub pressure_bar: f64,
+    pub leaks: Option<PerLeak<FoundLeak>>,
 }
 
 /// A finished hold test.
 #[derive(Clone, Debug)]
 pub struct HoldTest {
     pub(super) summary: HoldSummary,
-    pub(super) found: Option<Found>,
+    pub(super) fit: Option<Fit>,
     /// Position and both pressures never change by a digit.
     pub(super) is_frozen: bool,
-}
-
-/// What the usable readings say.
-#[derive(Clone, Debug)]
-pub(super) struct Found {
-    pub fit: Fit,
-    pub beliefs: Beliefs,
 }
 
 impl Recorder {
@@ -67,36 +46,19 @@ impl HoldTest {
     fn of(holds: &[Held], rig: &Rig) -> Option<Self> {
         let longest = holds.iter().max_by(|a, b| a.usable_s().total_cmp(&b.usable_s()))?;
         let usable = usable(holds);
-        let found = fit(rig, &usable).filter(|_| !usable.is_empty()).map(|fit| {
-            let beliefs = beliefs(&fit, 1.0 - rig.decision.alpha);
-            Found { fit, beliefs }
-        });
+        let fit = fit(rig, &usable).filter(|_| !usable.is_empty());
         let summary = HoldSummary {
-            usable_s: found.as_ref().map_or(0.0, |found| found.fit.usable_s),
+            usable_s: fit.as_ref().map_or(0.0, |fit| fit.usable_s),
             ended_by: longest.ended_by,
             holds: holds.len(),
-            leaks: found.as_ref().map(Found::leaks),
+            leaks: fit.as_ref().map(|fit| fit.found.leaks()),
         };
-        Some(Self { summary, is_frozen: is_frozen(&usable), found })
+        Some(Self { summary, is_frozen: is_frozen(&usable), fit })
     }
 
     /// How much of it was usable, and what it could find.
     pub fn summary(&self) -> &HoldSummary {
         &self.summary
-    }
-}
-
-impl Found {
-    fn leaks(&self) -> PerLeak<HeldLeak> {
-        self.beliefs.leaks.zip(self.fit.pressures_pa).map(|(belief, pressure_pa)| {
-            let lpm = |coefficient: f64| coefficient * pressure_pa * LPM_PER_M3S;
-            HeldLeak {
-                probability: belief.probability,
-                ci95_lpm: belief.interval.map(lpm),
-                smallest_lpm: lpm(belief.smallest),
-                pressure_bar: pressure_pa / 1e5,
-            }
-        })
     }
 }
 

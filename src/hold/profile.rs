@@ -4,7 +4,7 @@
 //! says in turn how well κ is known. So the likelihood is needed at every κ: it is smooth, and a polynomial through a few
 //! Chebyshev points gives it (Berrut and Trefethen 2004, "Barycentric Lagrange interpolation", SIAM Review 46, eq. 5.4).
 
-use super::nodes::Node;
+use crate::presence::LeakLikelihood;
 use std::f64::consts::PI;
 
 /// The profile reaches this far to either side of the likeliest κ, in its standard deviations.
@@ -16,7 +16,7 @@ const POINTS: usize = 13;
 pub(super) struct Profile {
     middle: f64,
     half_width: f64,
-    nodes: Vec<Node>,
+    nodes: Vec<LeakLikelihood>,
 }
 
 /// Chebyshev points of the second kind on −1..1.
@@ -26,12 +26,12 @@ fn place(index: usize) -> f64 {
 
 impl Profile {
     /// Around the likeliest ln κ and its standard deviation; `node` has the likelihood at a ln κ.
-    pub fn new(middle: f64, std: f64, node: impl Fn(f64) -> Option<Node>) -> Option<Self> {
+    pub fn new(middle: f64, std: f64, node: impl Fn(f64) -> Option<LeakLikelihood>) -> Option<Self> {
         let half_width = REACH * std;
         let nodes: Option<Vec<_>> =
             (0..POINTS).map(|index| node(middle + half_width * place(index))).collect();
         let nodes = nodes?;
-        let is_finite = |node: &Node| {
+        let is_finite = |node: &LeakLikelihood| {
             node.squares.is_finite()
                 && node.information.iter().chain(&node.leaks).all(|number| number.is_finite())
         };
@@ -44,9 +44,9 @@ impl Profile {
     }
 
     /// The likelihood at a ln κ within the range.
-    pub fn at(&self, ln_kappa: f64) -> Node {
+    pub fn at(&self, ln_kappa: f64) -> LeakLikelihood {
         let at = (ln_kappa - self.middle) / self.half_width;
-        let (mut sum, mut all) = (Node::default(), 0.0);
+        let (mut sum, mut all) = (LeakLikelihood::default(), 0.0);
         for (index, node) in self.nodes.iter().enumerate() {
             let off = at - place(index);
             if off.abs() < 1e-12 {
@@ -58,7 +58,7 @@ impl Profile {
             sum = sum.plus(node, weight);
             all += weight;
         }
-        Node::default().plus(&sum, 1.0 / all)
+        LeakLikelihood::default().plus(&sum, 1.0 / all)
     }
 }
 
@@ -68,7 +68,8 @@ mod tests {
 
     #[test]
     fn between_its_points_the_profile_is_the_function() {
-        let node = |x: f64| Some(Node { squares: 3.0 + (2.0 * x).exp(), ..Node::default() });
+        let node =
+            |x: f64| Some(LeakLikelihood { squares: 3.0 + (2.0 * x).exp(), ..LeakLikelihood::default() });
         let profile = Profile::new(0.1, 0.25, node).expect("finite");
         let [from, to] = profile.range();
         assert!((from + 0.9).abs() < 1e-12 && (to - 1.1).abs() < 1e-12);

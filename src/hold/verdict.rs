@@ -1,12 +1,14 @@
 //! What a technician acts on after a hold test.
 
-use super::outcome::{Found, HoldTest};
+use super::fit::Fit;
+use super::outcome::HoldTest;
 use super::recorder::EndedBy;
 use crate::channels::ChannelFaultKind;
-use crate::report::{Reason, ReasonId, Status, Verdict, advice, capital, join, with_interval};
+use crate::presence::{LEAST_DRIVING_PA, told};
+use crate::report::{Reason, ReasonId, Status, Verdict, join};
 use crate::rig::Rig;
 use crate::units::{LPM_PER_M3S, readable};
-use pitchleak_core::{Leak, PerLeak};
+use pitchleak_core::Leak;
 
 /// Misfits beyond so many standard deviations of chance contradict the model …
 const CHANCE_SIGMAS: f64 = 5.0;
@@ -14,28 +16,16 @@ const CHANCE_SIGMAS: f64 = 5.0;
 const LEAST_MISFIT: f64 = 1.5;
 /// A compressibility off by so many of the rig file's standard deviations contradicts it.
 const BULK_MODULUS_SIGMAS: f64 = 3.0;
-/// A leak is ruled out at no less than this pressure: at none, none flows, Pa.
-const LEAST_DRIVING_PA: f64 = 20e5;
-
-/// Below this mean |P_L| zeros of the pressure sensors decide which way oil would pass the piston, Pa.
-const LEAST_LOAD_PA: f64 = 2e5;
-
-/// What a hold test says of each leak.
-struct Sorted {
-    found: Vec<Leak>,
-    excluded: Vec<Leak>,
-    open: Vec<Leak>,
-}
-
 impl HoldTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
         let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
-        let Some(found) = &self.found else {
+        let Some(fit) = &self.fit else {
             return told(Status::NotSure, Vec::new(), vec![self.too_short()], "");
         };
         let sure = 1.0 - rig.decision.alpha;
+        let found = &fit.found;
         let sorted = found.sorted(&threshold_lpm, sure);
-        let contradictions = self.contradictions(found, rig);
+        let contradictions = self.contradictions(fit, rig);
         if !contradictions.is_empty() {
             let apparent = found.apparent(&sorted.found);
             return told(Status::Doubtful, sorted.found, contradictions, &apparent);
@@ -52,11 +42,11 @@ impl HoldTest {
         if !sorted.found.is_empty() {
             told(Status::Leak, sorted.found, Vec::new(), &text)
         } else if found.beliefs.any > sure {
-            told(Status::NotSure, Vec::new(), vec![found.which_way()], &text)
+            told(Status::NotSure, Vec::new(), vec![which_way()], &text)
         } else if sorted.open.is_empty() {
             told(Status::Sound, Vec::new(), Vec::new(), &text)
         } else {
-            told(Status::NotSure, Vec::new(), vec![found.too_little(&sorted.open)], &text)
+            told(Status::NotSure, Vec::new(), vec![fit.too_little(&sorted.open)], &text)
         }
     }
 
@@ -75,7 +65,7 @@ impl HoldTest {
         Reason::new(ReasonId::NotIdentifiable, text, suggestion)
     }
 
-    fn contradictions(&self, found: &Found, rig: &Rig) -> Vec<Reason> {
+    fn contradictions(&self, fit: &Fit, rig: &Rig) -> Vec<Reason> {
         let frozen = || {
             Reason::new(
                 ReasonId::Channel(ChannelFaultKind::Stuck),
@@ -84,9 +74,9 @@ impl HoldTest {
             )
         };
         let mut reasons: Vec<Reason> = self.is_frozen.then(frozen).into_iter().collect();
-        reasons.extend(found.misfit());
-        reasons.extend(found.negative());
-        reasons.extend(found.other_oil(rig));
+        reasons.extend(fit.misfit());
+        reasons.extend(fit.negative());
+        reasons.extend(fit.other_oil(rig));
         reasons
     }
 
@@ -110,61 +100,9 @@ impl HoldTest {
     }
 }
 
-impl Found {
-    fn sorted(&self, threshold_lpm: &PerLeak<f64>, sure: f64) -> Sorted {
-        let is_driven = |leak: Leak| leak != Leak::Internal || self.fit.pressures_pa.internal > LEAST_LOAD_PA;
-        let is_found = |leak: &Leak| is_driven(*leak) && self.beliefs.leaks[*leak].probability >= sure;
-        let (found, others): (Vec<_>, Vec<_>) = Leak::ALL.into_iter().partition(is_found);
-        let (excluded, open) = others
-            .into_iter()
-            .partition(|leak| is_driven(*leak) && self.at_most_lpm(*leak) < threshold_lpm[*leak]);
-        Sorted { found, excluded, open }
-    }
-
-    /// Upper end of a leak's interval, at the pressure that drives it or the least that counts, L/min.
-    fn at_most_lpm(&self, leak: Leak) -> f64 {
-        let driving_pa = self.fit.pressures_pa[leak].max(LEAST_DRIVING_PA);
-        self.beliefs.leaks[leak].interval[1] * driving_pa * LPM_PER_M3S
-    }
-
-    fn flow(&self, leak: Leak) -> String {
-        let to_lpm = self.fit.pressures_pa[leak] * LPM_PER_M3S;
-        let belief = &self.beliefs.leaks[leak];
-        with_interval(belief.mean * to_lpm, Some(belief.std * to_lpm))
-    }
-
-    fn leak(&self, leak: Leak, threshold_lpm: f64) -> String {
-        let (flow, bar) = (self.flow(leak), self.fit.pressures_pa[leak] / 1e5);
-        let most = self.beliefs.leaks[leak].interval[1] * self.fit.pressures_pa[leak] * LPM_PER_M3S;
-        let small = if most < threshold_lpm {
-            format!(" It is below the alarm threshold of {threshold_lpm:.2} L/min.")
-        } else {
-            String::new()
-        };
-        format!("{} leak of {flow} L/min at {bar:.0} bar: {}.{small}", capital(leak.label()), advice(leak))
-    }
-
-    fn none_above(&self, excluded: &[Leak], threshold_lpm: &PerLeak<f64>) -> Option<String> {
-        let most = excluded.iter().map(|leak| self.at_most_lpm(*leak)).fold(0.0, f64::max);
-        let threshold = excluded.iter().map(|leak| threshold_lpm[*leak]).fold(0.0, f64::max);
-        // Rounded up: nothing above it is left.
-        let step = 10f64.powf(most.max(1e-4).log10().floor() - 1.0);
-        let bound = readable(((most / step).ceil() * step).max(1e-4).min(threshold), 2);
-        (!excluded.is_empty()).then(|| format!("No {} leak above {bound} L/min.", join(excluded, "or")))
-    }
-
-    fn apparent(&self, leaks: &[Leak]) -> String {
-        let each = |leak: &Leak| format!("{} of {} L/min", leak.label(), self.flow(*leak));
-        let named: Vec<_> = leaks.iter().map(each).collect();
-        if named.is_empty() {
-            String::new()
-        } else {
-            format!("Until then these apparent leaks stay in doubt: {}.", named.join(", "))
-        }
-    }
-
+impl Fit {
     fn misfit(&self) -> Option<Reason> {
-        let misfit = &self.fit.misfit;
+        let misfit = &self.misfit;
         let worst = misfit.readings.max(misfit.course);
         (misfit.sigmas > CHANCE_SIGMAS * misfit.of_leak && worst > LEAST_MISFIT * misfit.of_leak).then(|| {
             Reason::new(
@@ -179,7 +117,7 @@ impl Found {
     }
 
     fn negative(&self) -> Option<Reason> {
-        (self.beliefs.negative > CHANCE_SIGMAS * CHANCE_SIGMAS).then(|| {
+        (self.found.beliefs.negative > CHANCE_SIGMAS * CHANCE_SIGMAS).then(|| {
             Reason::new(
                 ReasonId::NegativeLeak,
                 "the pressures rise as if oil came in while the ports are shut",
@@ -190,14 +128,14 @@ impl Found {
 
     fn other_oil(&self, rig: &Rig) -> Option<Reason> {
         let (declared, std) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
-        let kappa = self.beliefs.kappa_ppa.value;
-        let off = (kappa * declared - 1.0).abs() * declared;
+        let kappa = self.found.beliefs.kappa.value;
+        let off = (kappa - 1.0).abs() * declared;
         (off > BULK_MODULUS_SIGMAS * std && std > 0.0).then(|| {
             Reason::new(
                 ReasonId::BulkModulusImpossible,
                 format!(
                     "the hold asks for a bulk modulus of {:.2} GPa, and the rig file says {:.2} ± {:.2} GPa",
-                    1e-9 / kappa,
+                    1e-9 * declared / kappa,
                     declared / 1e9,
                     std / 1e9
                 ),
@@ -206,17 +144,9 @@ impl Found {
         })
     }
 
-    fn which_way(&self) -> Reason {
-        Reason::new(
-            ReasonId::Undecided,
-            "oil leaks, but the hold does not tell which way",
-            "hold longer, or again under another load",
-        )
-    }
-
     fn too_little(&self, open: &[Leak]) -> Reason {
         let flat = open.contains(&Leak::Internal)
-            && self.fit.pressures_pa.internal < LEAST_DRIVING_PA
+            && self.found.pressures_pa.internal < LEAST_DRIVING_PA
             && open.len() == 1;
         let suggestion = if flat {
             "P_A and P_B are nearly alike, so that hardly any oil passes the piston: hold under load"
@@ -231,16 +161,14 @@ impl Found {
     }
 }
 
-fn cannot_tell(open: &[Leak]) -> Option<String> {
-    (!open.is_empty()).then(|| format!("This hold cannot tell about {} leaks.", join(open, "and")))
+fn which_way() -> Reason {
+    Reason::new(
+        ReasonId::Undecided,
+        "oil leaks, but the hold does not tell which way",
+        "hold longer, or again under another load",
+    )
 }
 
-/// First why it is in doubt, if it is, then what was found.
-fn told(status: Status, faults: Vec<Leak>, reasons: Vec<Reason>, found: &str) -> Verdict {
-    let sentence = |text: &str| capital(text) + ".";
-    let why = reasons.iter().take(1).flat_map(|reason| {
-        std::iter::once(sentence(&reason.text)).chain(reason.suggestion.as_deref().map(sentence))
-    });
-    let text: Vec<String> = why.chain((!found.is_empty()).then(|| found.to_owned())).collect();
-    Verdict { status, faults, text: text.join(" "), reasons, probability: None, explanations: Vec::new() }
+fn cannot_tell(open: &[Leak]) -> Option<String> {
+    (!open.is_empty()).then(|| format!("This hold cannot tell about {} leaks.", join(open, "and")))
 }

@@ -108,6 +108,7 @@ impl<'a> Draft<'a> {
             schema: ReplayReport::SCHEMA,
             rig: replay.rig.name.clone(),
             hold: None,
+            valve: None,
             estimator: replay.rig.estimator.kind,
             verdict,
             trend: self.trend,

@@ -30,6 +30,7 @@ use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
 use crate::units::LPM_PER_M3S;
+use crate::valve::{CalibrationError, ValveMeter};
 use crate::wiring::{Excerpt, Refused};
 use consistency::Consistency;
 use correction::Correction;
@@ -399,6 +400,9 @@ pub enum ReplayError {
     /// The rig, built by hand, has values with which nothing can be estimated.
     #[error("nothing can be estimated for this rig: {0}")]
     Rig(#[from] RlsError),
+    /// The calibration of the rig's valve can't be used.
+    #[error(transparent)]
+    Valve(#[from] Box<CalibrationError>),
 }
 
 /// Replays a whole trace; `each` sees every record after it was taken in, and whether the estimates are
@@ -417,9 +421,13 @@ pub fn replay<E: From<ReplayError>>(
     let columns = reader.columns(&rig.columns);
     let mut refused = None;
     let mut holds: Option<Recorder> = None;
+    let mut has_spool = false;
+    let mut valve = ValveMeter::of(rig).map_err(|error| ReplayError::from(Box::new(error)))?;
     while next_record(reader, &mut record, &mut refused, || Refused::new(rig, &columns))? {
         let renewed = replay.push(&record);
         Recorder::record(&mut holds, &record, rig);
+        ValveMeter::record(&mut valve, &record);
+        has_spool |= record.valve.is_some();
         if !replay.spikes.left_out() && !replay.is_shut {
             excerpt.add(&record);
         }
@@ -430,6 +438,9 @@ pub fn replay<E: From<ReplayError>>(
     if let Some(hold) = holds.and_then(|holds| holds.finish(rig)) {
         return Ok(hold.report(summary, rig));
     }
+    if let Some(valve) = valve.and_then(|mut valve| valve.finish(rig)) {
+        return Ok(valve.report(summary, rig));
+    }
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());
     let decision = replay.decision();
@@ -438,7 +449,7 @@ pub fn replay<E: From<ReplayError>>(
         wiring => wiring,
     };
     let mut report = replay.report_with(summary, &weighed, decision.as_ref(), wiring);
-    hold::advise(&mut report, reader.quality());
+    hold::advise(&mut report, reader.quality(), has_spool, rig);
     Ok(report)
 }
 

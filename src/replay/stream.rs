@@ -237,7 +237,7 @@ impl Stream {
             wiring => wiring,
         };
         let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
-        hold::advise(&mut report, quality);
+        hold::advise(&mut report, quality, false, self.rig());
         Some(report)
     }
 

@@ -85,7 +85,12 @@ impl Replay {
         decision.leakage.zip(shares).zip(own).map(|((belief, (size_pa, net_pa)), own_m3s)| {
             let mean_lpm = belief.mean_lpm + own_m3s * LPM_PER_M3S;
             let net_share = if size_pa > 0.0 { net_pa / size_pa } else { 1.0 };
-            Leakage { mean_lpm, net_mean_lpm: Some(net_share * mean_lpm), std_lpm: Some(belief.std_lpm) }
+            Leakage {
+                mean_lpm,
+                net_mean_lpm: Some(net_share * mean_lpm),
+                std_lpm: Some(belief.std_lpm),
+                since: None,
+            }
         })
     }
 

@@ -21,6 +21,8 @@ use crate::score::LeakScore;
 use crate::times::Clock;
 use crate::trace::TraceQuality;
 use crate::units::LPM_PER_M3S;
+use crate::valve::ValveSummary;
+use jiff::civil::Date;
 use pitchleak_core::{AlarmState, Estimate, Leak, PerLeak};
 use serde::Serialize;
 
@@ -49,6 +51,9 @@ pub struct ReplayReport {
     /// Of a hold test: how much of it was usable. Its leakages are means over that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hold: Option<HoldSummary>,
+    /// Where the valve's flows stood for meters: what it and they are worth. Its leakages are means since the leaks changed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub valve: Option<ValveSummary>,
     /// What to make of it.
     pub verdict: Verdict,
     /// How fast each leak changes; none where the data don't tell.
@@ -235,13 +240,16 @@ pub struct Leakage {
     pub net_mean_lpm: Option<f64>,
     /// Standard deviation of its error, L/min; none where the estimator gives none.
     pub std_lpm: Option<f64>,
+    /// The flow is what leaks more than on this day, when the valve was calibrated; none where it is absolute.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since: Option<Date>,
 }
 
 impl Leakage {
     /// From a flow in m³/s.
     pub fn new(flow_m3s: Estimate<f64>) -> Self {
         let lpm = flow_m3s.scaled(LPM_PER_M3S);
-        Self { mean_lpm: lpm.value, net_mean_lpm: None, std_lpm: Some(lpm.std) }
+        Self { mean_lpm: lpm.value, net_mean_lpm: None, std_lpm: Some(lpm.std), since: None }
     }
 
     /// The interval that holds the mean with 95 % probability, L/min; without length where nothing is known of its error.

@@ -59,6 +59,7 @@ impl Found {
             estimates: self.estimates,
             leakage: self.leakage,
             hold: None,
+            valve: None,
             changed_at_s: self.changed_at_s,
             trend: self.trends,
             spells: Spell::of(&self.episodes, self.trace.duration_s, 60.0),
@@ -118,7 +119,7 @@ fn found(active: PerLeak<bool>) -> Found {
         external_leak_b_coefficient: entry(0.0, 3e-12).not_identifiable("pressure B hardly moves"),
         bulk_modulus: EstimateEntry::without_spread(0.9e9, EstimateEntry::BULK_MODULUS_UNIT),
     };
-    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None };
+    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None, since: None };
     let leakage = PerLeak {
         internal: lpm(0.4785, 0.0011),
         external_a: lpm(-0.0004, 0.0011),
@@ -340,9 +341,11 @@ fn a_leak_that_grows_says_when_it_matters() {
     assert!(text.contains("it is at 0.10 L/min in 15 min (13 min to 19 min)"), "{text}");
     let mut falling = sound();
     falling.trends.internal = LeakTrend::new(flow, slope.scaled(-1.0), 0.1);
-    falling.leakage.internal = Leakage { mean_lpm: 0.01, std_lpm: Some(1e-3), net_mean_lpm: None };
+    falling.leakage.internal =
+        Leakage { mean_lpm: 0.01, std_lpm: Some(1e-3), net_mean_lpm: None, since: None };
     assert!(falling.verdict().text.contains("internal leak falls by 0.360"), "{}", falling.verdict().text);
-    falling.leakage.internal = Leakage { mean_lpm: 1e-3, std_lpm: Some(1e-3), net_mean_lpm: None };
+    falling.leakage.internal =
+        Leakage { mean_lpm: 1e-3, std_lpm: Some(1e-3), net_mean_lpm: None, since: None };
     assert!(!falling.verdict().text.contains("falls"), "what may be none does not fall");
 }
 

@@ -15,6 +15,7 @@ mod sensing;
 pub mod sensor_fault;
 mod sensor_memory;
 mod span;
+mod valve;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
@@ -29,6 +30,7 @@ pub use sensing::Normal;
 pub use sensing::{Biases, Sensing};
 pub use sensor_fault::{SensorFault, SensorFaults};
 pub use span::{Span, SpanError};
+pub use valve::{ValveFlaw, ValveFlawError, ValveTruth};
 pub use writer::{Columns, Row, TraceLayout, TraceWriter};
 
 use crate::Rig;
@@ -53,6 +55,8 @@ pub struct Scenario {
     pub shut: Option<Span>,
     /// Effects beyond the model.
     pub effects: EffectSet<f64>,
+    /// What the valve of a rig with `[valve]` does beside its data sheet.
+    pub valve_flaws: Vec<ValveFlaw>,
     /// Time of the reference at which the trace begins, s.
     pub start_s: f64,
     /// Time for which the loops run before the trace begins, s.
@@ -80,6 +84,8 @@ pub struct Truth {
     pub leaks_m3s: PerLeak<f64>,
     /// Oil temperature, K, where the scenario has one.
     pub temp_k: Option<f64>,
+    /// The valve, where the rig has `[valve]`.
+    pub valve: Option<ValveTruth>,
     /// Whether both ports are shut, where the scenario has a hold.
     pub is_shut: Option<bool>,
 }
@@ -270,6 +276,9 @@ impl RunningRig {
         let healthy = Model { cylinder: rig.cylinder, fluid: rig.fluid, leaks_m3spa: PerLeak::default() };
         let mut params = EmulatorParams::for_model(healthy)?;
         params.pitch.plant.effects = *effects;
+        if let Some(valve) = valve::of_plant(rig, &scenario.valve_flaws) {
+            params = params.with_pitch_valve(valve);
+        }
         params.internal_step_s = STEP_S;
         let (position_m, load_n) = reference.at(t_s);
         let emulator = Emulator::new(params, position_m, load_n)?;
@@ -318,6 +327,11 @@ impl RunningRig {
             },
             leaks_m3s: reading.leaks_m3s,
             temp_k: scenario.oil_temperature.as_ref().map(|oil| oil.at(t_s)),
+            valve: scenario.rig.valve.as_ref().map(|_| ValveTruth {
+                spool: reading.pitch_spool,
+                command: reading.pitch_command,
+                supply_pa: reading.supply_pa,
+            }),
             is_shut: scenario.shut.map(|shut| shut.contains(t_s)),
         }
     }

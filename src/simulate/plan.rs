@@ -1,13 +1,14 @@
 use super::{
     Biases, EffectSize, EffectsError, Followed, LeakCourse, LeakCourseError, OilTemperature,
-    OilTemperatureError, Recording, Scenario, SensorFault, Span, effects,
+    OilTemperatureError, Recording, Scenario, SensorFault, Span, ValveFlaw, effects,
 };
 use crate::Rig;
 use crate::output::Inputs;
 use crate::reference::ReferenceError;
+use crate::rig::Instruments;
 use crate::units::{self, Dimension, UnitError};
 use crate::wind::{EmulationError, HistoryError};
-use pitchleak_core::{PerLeak, Sensors};
+use pitchleak_core::PerLeak;
 use std::path::Path;
 
 /// Time for which the loops run before a trace begins, s.
@@ -80,13 +81,12 @@ impl std::str::FromStr for Noise {
 }
 
 impl Noise {
-    fn sensors(self, rig: &Rig) -> Sensors<f64> {
-        let accuracy = match self {
-            Self::Rig => return rig.sensors(),
-            Self::None => 0.0,
-            Self::Share(share) => share,
-        };
-        rig.instruments.with_accuracy(accuracy).spread()
+    fn instruments(self, rig: &Rig) -> Instruments {
+        match self {
+            Self::Rig => rig.instruments,
+            Self::None => rig.instruments.with_accuracy(0.0),
+            Self::Share(share) => rig.instruments.with_accuracy(share),
+        }
     }
 }
 
@@ -105,6 +105,8 @@ pub struct Plan {
     pub shut: Option<Span>,
     /// Effects beyond those of the rig file.
     pub effects: Vec<EffectSize>,
+    /// What the valve of a rig with `[valve]` does beside its data sheet.
+    pub valve_flaws: Vec<ValveFlaw>,
     /// Noise of the sensors.
     pub noise: Noise,
     /// Greatest constant offset of each sensor, share of full scale.
@@ -147,6 +149,9 @@ pub enum PlanError {
     /// Leaks that cannot open when they should.
     #[error(transparent)]
     Leak(#[from] LeakCourseError),
+    /// A flaw of a valve of which the rig says nothing.
+    #[error("the rig has no [valve] that could have flaws: give at least its rated_flow and rated_drop")]
+    NoValve,
     /// Impossible oil.
     #[error(transparent)]
     OilTemperature(#[from] OilTemperatureError),
@@ -158,6 +163,9 @@ impl Plan {
     /// # Errors
     /// [`PlanError`].
     pub fn recording(&self, rig: Rig) -> Result<Recording, PlanError> {
+        if !self.valve_flaws.is_empty() && rig.valve.is_none() {
+            return Err(PlanError::NoValve);
+        }
         let reference = self.followed.reference(&rig)?;
         let (begin, end) = reference.span_s().unwrap_or((0.0, f64::INFINITY));
         let start_s = self.start_s.map_or(begin + WARM_UP_S.min(0.5 * (end - begin)), |start| begin + start);
@@ -174,12 +182,13 @@ impl Plan {
         Ok(Recording {
             inputs: self.inputs(&rig),
             followed: self.followed.to_string(),
-            noise: self.noise.sensors(&rig),
+            instruments: self.noise.instruments(&rig),
             biases: Biases::drawn(&rig.instruments, self.bias_share, self.seed),
             sensor_faults: self.sensor_faults.clone(),
             seed: self.seed,
             scenario: Scenario {
                 effects: effects(&rig, &self.effects)?,
+                valve_flaws: self.valve_flaws.clone(),
                 rig,
                 leaks: leaks.map(|leak| leak.within_trace(duration_s)),
                 oil_temperature: oil_temperature.transpose()?,

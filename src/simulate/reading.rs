@@ -1,4 +1,4 @@
-use super::Truth;
+use super::{Truth, ValveTruth};
 use crate::signal::Signal;
 use pitchleak_core::Sample;
 
@@ -11,17 +11,19 @@ pub struct Reading {
     pub sample: Sample<f64>,
     /// Oil temperature, K, where there is a thermometer.
     pub temp_k: Option<f64>,
+    /// Spool, command and supply, where the rig has `[valve]`.
+    pub valve: Option<ValveTruth>,
 }
 
 impl Reading {
     /// The readings `sample` at an instant.
     pub fn at(truth: &Truth, sample: Sample<f64>) -> Self {
-        Self { t_s: truth.t_s, sample, temp_k: truth.temp_k }
+        Self { t_s: truth.t_s, sample, temp_k: truth.temp_k, valve: truth.valve }
     }
 
     /// What a channel shows; none where it shows nothing or is not recorded.
     pub fn get(&self, channel: Signal) -> Option<f64> {
-        let Self { t_s, sample, temp_k } = self;
+        let Self { t_s, sample, temp_k, .. } = self;
         match channel {
             Signal::Time => Some(*t_s),
             Signal::Position => Some(sample.x_m),
@@ -37,7 +39,7 @@ impl Reading {
 
     /// Makes a channel show something else; a channel that every row must have becomes NaN for nothing.
     pub fn set(&mut self, channel: Signal, value: Option<f64>) {
-        let Self { t_s, sample, temp_k } = self;
+        let Self { t_s, sample, temp_k, .. } = self;
         let needed = value.unwrap_or(f64::NAN);
         match channel {
             Signal::Time => *t_s = needed,

@@ -1,3 +1,4 @@
+use super::valve::ValveSensors;
 use super::writer::Columns;
 use super::{
     Biases, Opening, Reading, Row, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
@@ -5,8 +6,9 @@ use super::{
 };
 use crate::output::{self, Inputs, OutputError, OutputFile};
 use crate::reference::AfterEnd;
+use crate::rig::Instruments;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{PerLeak, Sensors};
+use pitchleak_core::PerLeak;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
@@ -20,8 +22,8 @@ pub struct Recording {
     pub followed: String,
     /// What happens.
     pub scenario: Scenario,
-    /// White noise of the sensors.
-    pub noise: Sensors<f64>,
+    /// Data sheets of the sensors, of which the white noise is used.
+    pub instruments: Instruments,
     /// Constant offsets of the sensors.
     pub biases: Biases,
     /// Mistakes of the sensors, in the order in which they happen.
@@ -222,14 +224,17 @@ impl Recording {
         mut done: impl FnMut(f64) -> ControlFlow<()>,
         mut each: impl FnMut(&Row) -> bool,
     ) -> Result<TruthFile, SimulateError> {
-        let Self { scenario, noise, biases, sensor_faults, seed, .. } = self;
-        let mut sensing = Sensing::new(*noise, *biases, *seed);
+        let Self { scenario, instruments, biases, sensor_faults, seed, .. } = self;
+        let mut sensing = Sensing::new(instruments.spread(), *biases, *seed);
         let Scenario { rig, duration_s, .. } = scenario;
         let mut faults = SensorFaults::new(sensor_faults, &rig.instruments, rig.cylinder.stroke_m, *seed);
+        let mut valve_sensors = ValveSensors::of(rig, instruments, &scenario.valve_flaws, *seed);
         let mut totals = Totals::default();
         let mut stopped = false;
         scenario.run_while(*leaks_m3spa, |truth| {
-            let honest = Reading::at(truth, sensing.read(&truth.sample));
+            let valve =
+                valve_sensors.as_mut().and_then(|sensors| sensors.read(truth, truth.t_s / duration_s));
+            let honest = Reading { valve, ..Reading::at(truth, sensing.read(&truth.sample)) };
             let shown = faults.show(&honest);
             if shown.is_some_and(|shown| !each(&Row::new(truth, shown))) {
                 return false;
@@ -249,7 +254,8 @@ impl Recording {
     }
 
     fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
-        let Self { followed, scenario, noise, biases, sensor_faults, seed, .. } = self;
+        let Self { followed, scenario, instruments, biases, sensor_faults, seed, .. } = self;
+        let noise = instruments.spread();
         let leaky = scenario.leaks.zip(*leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
         let onset_s = leaky.map(|(_, (leak, _))| leak.opening.onset_s()).reduce(f64::min).unwrap_or(0.0);
         let count = totals.samples.max(1) as f64;

@@ -52,6 +52,23 @@ const SHUT: Column = Column {
     decimals: 0,
     value: |row| row.is_shut.map_or(f64::NAN, |is| f64::from(u8::from(is))),
 };
+const VALVE: [Column; 3] = [
+    Column {
+        header: "spool_percent",
+        decimals: 5,
+        value: |row| or_nan(row.shown.valve.map(|valve| valve.spool), 100.0),
+    },
+    Column {
+        header: "valve_command_percent",
+        decimals: 5,
+        value: |row| or_nan(row.shown.valve.map(|valve| valve.command), 100.0),
+    },
+    Column {
+        header: "ps_bar",
+        decimals: 5,
+        value: |row| or_nan(row.shown.valve.map(|valve| valve.supply_pa), 1e-5),
+    },
+];
 const LEAKS: [Column; 3] = [
     Column { header: "q_int_lpm", decimals: 6, value: |row| row.leaks_m3s.internal * LPM_PER_M3S },
     Column { header: "q_ext_a_lpm", decimals: 6, value: |row| row.leaks_m3s.external_a * LPM_PER_M3S },
@@ -78,11 +95,16 @@ impl Default for TraceLayout {
 }
 
 impl TraceLayout {
-    /// The columns that a scenario's trace has; the oil's temperature and `shut` only where the scenario says them.
+    /// The columns that a scenario's trace has; the oil's temperature and `shut` only where the scenario says them. A rig with
+    /// `[valve]` has no flow meters.
     pub fn of(scenario: &Scenario) -> Self {
+        let has_valve = scenario.rig.valve.is_some();
+        let is_flow = |column: &Column| matches!(column.header, "qa_lpm" | "qb_lpm");
+        let readings = READINGS.into_iter().filter(|column| !(has_valve && is_flow(column)));
+        let valve = VALVE.into_iter().filter(|_| has_valve);
         let temperature = scenario.oil_temperature.as_ref().map(|_| TEMPERATURE);
         let shut = scenario.shut.map(|_| SHUT);
-        Self(READINGS.into_iter().chain(temperature).chain(shut).chain(LEAKS).collect())
+        Self(readings.chain(valve).chain(temperature).chain(shut).chain(LEAKS).collect())
     }
 
     /// The columns without a row.

@@ -7,6 +7,7 @@ use pitchleak::replay::{EstimateFileError, ReplayError};
 use pitchleak::rig::RigError;
 use pitchleak::simulate::{PlanError, RecordingError};
 use pitchleak::trace::TraceError;
+use pitchleak::valve::CalibrationError;
 use pitchleak_reproduce::ReproduceError;
 use pitchleak_view::figure::FigureError;
 use pitchleak_view::page::PageError;
@@ -34,6 +35,17 @@ pub enum Failure {
     /// A leak that cannot be put into a trace.
     #[error(transparent)]
     Prove(#[from] ProveError),
+    /// A valve that cannot be calibrated.
+    #[error(transparent)]
+    Calibrate(#[from] CalibrationError),
+    /// A hold test that does not show that nothing leaks.
+    #[error("{hold} is no evidence that nothing leaks: {text}")]
+    NoEvidence {
+        /// The trace.
+        hold: String,
+        /// Its verdict.
+        text: String,
+    },
     /// A trace that is read more than once.
     #[error("standard input is read once, and this takes files: give a file")]
     ReadOnce,

@@ -1,5 +1,6 @@
 //! The program `pitchleak`: arguments in, text out, no numerics of its own.
 
+mod calibrate;
 mod check;
 mod columns;
 mod completions;
@@ -50,6 +51,7 @@ enum Command {
     Diagnose(diagnose::Arguments),
     Check(check::Arguments),
     Prove(prove::Arguments),
+    Calibrate(calibrate::Arguments),
     Columns(columns::Arguments),
     Init(init::Arguments),
     Fleet(fleet::Arguments),
@@ -146,6 +148,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Diagnose(arguments) => diagnose::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Prove(arguments) => prove::run(arguments),
+        Command::Calibrate(arguments) => calibrate::run(arguments),
         Command::Columns(arguments) => columns::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),

@@ -4,7 +4,7 @@ use clap::Args;
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
 use pitchleak::simulate::{
-    EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, Span, share_of_full_scale,
+    EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, Span, ValveFlaw, share_of_full_scale,
 };
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
@@ -63,6 +63,11 @@ pub struct Arguments {
     /// Effect beyond the model and its size in SI units; may be given more than once
     #[arg(long, value_name = "ID=VALUE")]
     effect: Vec<EffectSize>,
+
+    /// What the valve of a rig with [valve] does beside its data sheet: "clearance=0.05 L/min" (of each edge), "hysteresis=1 %",
+    /// "drift=0.5 %" (of the spool's zero), "droop=2 bar" (of a supply measured elsewhere); may be given more than once
+    #[arg(long, value_name = "FLAW")]
+    valve: Vec<ValveFlaw>,
 
     /// White noise of every sensor, 3 sigma: `none`, `rig` (as the rig file says), or a share of full scale
     #[arg(long, value_name = "NOISE", default_value = "none")]
@@ -191,6 +196,7 @@ impl Arguments {
             oil_temperature: self.oil_temp.clone(),
             shut: self.shut,
             effects: self.effect.clone(),
+            valve_flaws: self.valve.clone(),
             noise: self.noise,
             bias_share: self.bias,
             sensor_faults: self.fault.clone(),

@@ -65,7 +65,7 @@ fn placed(
 pub fn replay_error(py: Python<'_>, error: &ReplayError) -> PyErr {
     match error {
         ReplayError::Trace(error) => trace_error(py, error),
-        ReplayError::Rig(_) => value_error(error),
+        ReplayError::Rig(_) | ReplayError::Valve(_) => value_error(error),
     }
 }
 

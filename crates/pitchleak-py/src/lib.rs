@@ -1,6 +1,7 @@
 //! The engine for Python: `pitchleak._pitchleak`, under the package `pitchleak`. Data in, JSON and arrays
 //! out; what Python makes of them is in `python/pitchleak`.
 
+mod calibrate;
 mod diagnose;
 mod errors;
 mod estimator;
@@ -22,6 +23,8 @@ use pyo3::prelude::*;
 /// The compiled part of pitchleak.
 #[pymodule(gil_used = false)]
 mod _pitchleak {
+    #[pymodule_export]
+    use crate::calibrate::calibrate;
     #[pymodule_export]
     use crate::diagnose::diagnose;
     #[pymodule_export]

@@ -56,6 +56,7 @@ pub struct Order {
     onset: Quantity,
     oil_temp: Option<Quantity>,
     shut: Option<String>,
+    valve: Vec<String>,
     effects: BTreeMap<String, f64>,
     noise: Quantity,
     bias: Quantity,
@@ -158,6 +159,11 @@ impl Order {
             oil_temperature: self.oil_temp.as_ref().map(Quantity::text),
             shut: self.shut.as_deref().map(span).transpose()?,
             effects: self.effects.iter().map(effect).collect::<PyResult<_>>()?,
+            valve_flaws: self
+                .valve
+                .iter()
+                .map(|flaw| flaw.parse().map_err(|error| value_error(format!("valve: {error}"))))
+                .collect::<PyResult<_>>()?,
             noise: self.noise.parsed("noise")?,
             bias_share: share_of_full_scale(&self.bias.text())
                 .map_err(|error| value_error(format!("bias: {error}")))?,

@@ -105,6 +105,7 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
         leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,

@@ -111,6 +111,7 @@ impl Case {
             pressure: full(self.pressure_full_scale),
             position: full(plant.stroke),
             force: full(10.0 * plant.load),
+            ..rig.instruments
         }
         .with_accuracy(self.accuracy);
         rig

@@ -97,6 +97,7 @@ impl Case {
             pressure: Instrument::of_full_scale(PRESSURE_SCALE),
             position: Instrument::of_full_scale(machine.stroke),
             force: Instrument::of_full_scale(FORCE_SCALE * machine.size.powi(2)),
+            ..rig.instruments
         }
         .with_accuracy(self.accuracy);
         let threshold = THRESHOLD_LPM / LPM * machine.size.powi(3);

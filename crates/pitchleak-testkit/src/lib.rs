@@ -21,6 +21,7 @@ mod noise;
 pub mod rig;
 mod statistics;
 pub mod trace_text;
+pub mod valve;
 #[cfg(feature = "judges")]
 pub mod windy;
 

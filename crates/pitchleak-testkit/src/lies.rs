@@ -255,6 +255,7 @@ fn scenario(wind: WindCase, leaks: PerLeak<LeakCourse>, effects: EffectSet<f64>)
         leaks,
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects,
         start_s: 20.0,
         warm_up_s: 10.0,

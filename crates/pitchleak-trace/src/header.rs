@@ -124,7 +124,7 @@ pub fn parts(header: &str) -> impl Iterator<Item = (&str, &str)> {
 }
 
 /// What the names of columns are called beside the names of the contract, letters and digits only.
-const NAMES: [(Signal, &[&str]); 10] = [
+const NAMES: [(Signal, &[&str]); 14] = [
     (Signal::Time, &["t", "time", "zeit", "elapsedtime", "relativetime", "timesincestart"]),
     (
         Signal::Timestamp,
@@ -162,6 +162,10 @@ const NAMES: [(Signal, &[&str]); 10] = [
     (Signal::FlowA, &["qa", "flowa", "flowratea", "flowintoa", "volumenstroma", "durchflussa"]),
     (Signal::FlowB, &["qb", "flowb", "flowrateb", "flowintob", "volumenstromb", "durchflussb"]),
     (Signal::Force, &["force", "loadforce"]),
+    (Signal::Spool, &["spool", "spoolposition", "valvespool", "valvespoolposition", "schieberweg"]),
+    (Signal::Command, &["valvecommand", "spoolcommand", "ventilsollwert"]),
+    (Signal::Supply, &["ps", "supplypressure", "systempressure", "systemdruck", "versorgungsdruck"]),
+    (Signal::Tank, &["pt", "tankpressure", "tankdruck"]),
     (Signal::Temperature, &["temp", "oiltemperature", "oiltemp", "öltemperatur"]),
 ];
 

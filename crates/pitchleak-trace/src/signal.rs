@@ -25,6 +25,14 @@ pub enum Signal {
     Force,
     /// `temp`: oil temperature.
     Temperature,
+    /// `spool`: position of the valve's spool, positive: supply to A.
+    Spool,
+    /// `valve_command`: what the spool is told, where its position is not measured.
+    Command,
+    /// `ps`: supply pressure at the valve, gauge.
+    Supply,
+    /// `pt`: tank pressure at the valve, gauge.
+    Tank,
     /// `shut`: 1 while both ports are shut between valve and cylinder, else 0: no flow, for certain.
     Shut,
     /// `q_int`: reference flow of the internal leak.
@@ -37,7 +45,7 @@ pub enum Signal {
 
 impl Signal {
     /// Every signal, in the order of the contract's table.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::Time,
         Self::Timestamp,
         Self::Position,
@@ -48,6 +56,10 @@ impl Signal {
         Self::FlowB,
         Self::Force,
         Self::Temperature,
+        Self::Spool,
+        Self::Command,
+        Self::Supply,
+        Self::Tank,
         Self::Shut,
         Self::LeakInternal,
         Self::LeakExternalA,
@@ -67,6 +79,10 @@ impl Signal {
             Self::FlowB => "qb",
             Self::Force => "force",
             Self::Temperature => "temp",
+            Self::Spool => "spool",
+            Self::Command => "valve_command",
+            Self::Supply => "ps",
+            Self::Tank => "pt",
             Self::Shut => "shut",
             Self::LeakInternal => "q_int",
             Self::LeakExternalA => "q_ext_a",
@@ -86,7 +102,8 @@ impl Signal {
             Self::Timestamp | Self::Shut => None,
             Self::Position => Some(Dimension::Length),
             Self::Speed => Some(Dimension::Speed),
-            Self::PressureA | Self::PressureB => Some(Dimension::Pressure),
+            Self::PressureA | Self::PressureB | Self::Supply | Self::Tank => Some(Dimension::Pressure),
+            Self::Spool | Self::Command => Some(Dimension::Share),
             Self::Force => Some(Dimension::Force),
             Self::Temperature => Some(Dimension::Temperature),
             Self::FlowA | Self::FlowB | Self::LeakInternal | Self::LeakExternalA | Self::LeakExternalB => {
@@ -95,7 +112,7 @@ impl Signal {
         }
     }
 
-    /// Whether a sensor of the cylinder reads it.
+    /// Whether a sensor of the cylinder reads it, not one of its valve.
     pub fn is_sensor(self) -> bool {
         use Signal::{FlowA, FlowB, Force, Position, PressureA, PressureB};
         matches!(self, Position | PressureA | PressureB | FlowA | FlowB | Force)

@@ -188,7 +188,7 @@ const TIME: &[Unit] = &[
 ];
 const FREQUENCY: &[Unit] = &[times("Hz", None, 1.0), times("kHz", None, 1e3)];
 const TEMPERATURE: &[Unit] = &[times("K", Some("k"), 1.0), unit_of("°C", Some("c"), 1.0, 1.0, 273.15)];
-const SHARE: &[Unit] = &[times("1", None, 1.0), over("%", None, 1e2)];
+const SHARE: &[Unit] = &[times("1", None, 1.0), over("%", Some("percent"), 1e2)];
 
 impl Dimension {
     /// The accepted units, SI first.
@@ -241,6 +241,7 @@ impl Dimension {
             Self::Flow => "L/min",
             Self::Speed => "mm/s",
             Self::Temperature => "°C",
+            Self::Share => "%",
             other => other.si(),
         };
         self.units().iter().find(|unit| unit.text == text).copied()

@@ -13,7 +13,7 @@ use pitchleak_view::{Palette, Text};
 /// A minute in which the internal leak is seen and nothing is known of external B.
 fn report(status: Status) -> ReplayReport {
     let entry = |value, std| EstimateEntry::new(Estimate { value, std }, EstimateEntry::COEFFICIENT_UNIT);
-    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None };
+    let lpm = |mean_lpm, std| Leakage { mean_lpm, std_lpm: Some(std), net_mean_lpm: None, since: None };
     ReplayReport {
         schema: ReplayReport::SCHEMA,
         verdict: Verdict {
@@ -40,6 +40,7 @@ fn report(status: Status) -> ReplayReport {
             external_b: lpm(0.0, 0.2),
         },
         hold: None,
+        valve: None,
         changed_at_s: None,
         trend: PerLeak::default(),
         spells: Vec::new(),

@@ -53,7 +53,7 @@ impl Declared {
         for spread in [flow_a, flow_b, pressure, position, force] {
             *spread = SensorSpread { noise_std: spread.noise_std / root, ..*spread };
         }
-        let Instruments { flow_a, flow_b, pressure, position, force } = &mut self.instruments;
+        let Instruments { flow_a, flow_b, pressure, position, force, .. } = &mut self.instruments;
         for sheet in [flow_a, flow_b, pressure, position, force] {
             sheet.accuracy /= root;
         }

@@ -18,7 +18,7 @@ fn honest(t_s: f64) -> Reading {
         qb_m3s: Some(-8e-5 * wave(1.1)),
         force_n: Some(2e3 * wave(1.7)),
     };
-    Reading { t_s, sample, temp_k: Some(313.15) }
+    Reading { t_s, sample, temp_k: Some(313.15), valve: None }
 }
 
 /// What is recorded of ten seconds at 100 Hz; none where a row is lost.

@@ -155,6 +155,7 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
         leaks: PerLeak::from_fn(size),
         oil_temperature: None,
         shut: None,
+        valve_flaws: Vec::new(),
         effects: EffectSet::default(),
         start_s: 10.0,
         warm_up_s: 10.0,

@@ -191,7 +191,7 @@ impl Law {
     fn with_biases() -> Self {
         let mut rig = rig();
         let biased = |sheet: &mut Instrument| sheet.bias = BIAS / f64::sqrt(3.0);
-        let Instruments { flow_a, flow_b, pressure, position, force } = &mut rig.instruments;
+        let Instruments { flow_a, flow_b, pressure, position, force, .. } = &mut rig.instruments;
         [flow_a, flow_b, pressure, position, force].into_iter().for_each(biased);
         Self { name: "rls", bias_share: BIAS, bound_rig: rig.clone(), rig }
     }

@@ -133,6 +133,7 @@ impl Run {
             leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
             oil_temperature: None,
             shut: None,
+            valve_flaws: Vec::new(),
             effects: EffectSet::default(),
             start_s: START_S,
             warm_up_s: START_S,

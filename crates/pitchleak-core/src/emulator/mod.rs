@@ -49,6 +49,8 @@ pub struct EmulatorReading<T> {
     pub leaks_m3s: PerLeak<T>,
     /// Supply pressure, Pa.
     pub supply_pa: T,
+    /// Spool of the pitching cylinder's valve, share of the stroke.
+    pub pitch_spool: T,
     /// Valve command of the pitching cylinder, share of the stroke.
     pub pitch_command: T,
     /// Valve command of the load cylinder, share of the stroke.
@@ -95,6 +97,15 @@ impl<T: Real> EmulatorParams<T> {
             internal_step_s: T::lit(1e-4),
         };
         params.check().map(|()| params)
+    }
+
+    /// The same with another valve at the pitching cylinder, and a controller tuned for it.
+    #[must_use]
+    pub fn with_pitch_valve(mut self, valve: Valve<T>) -> Self {
+        let drop = self.supply.relief_pressure_pa / T::lit(3.0);
+        self.pitch.gains = position_gains(&self.pitch.plant.model.cylinder, &valve, drop);
+        self.pitch.valve = valve;
+        self
     }
 
     /// Says whether a rig like this can exist.
@@ -245,6 +256,7 @@ impl<T: Real> Emulator<T> {
             signals: pitch.signals,
             leaks_m3s: self.params.pitch.plant.leaks_m3s(&pitch.signals),
             supply_pa: self.state.supply_pa,
+            pitch_spool: self.state.spools[0],
             pitch_command,
             load_command,
         }

@@ -21,6 +21,8 @@ pub struct Valve<T> {
     pub area_ratio_b: T,
     /// Pressure drop below which an edge turns laminar, Pa.
     pub laminar_drop_pa: T,
+    /// What passes each edge by its clearance, wherever the spool is, m³/(s·Pa).
+    pub clearance_m3spa: T,
 }
 
 /// Flows through the valve at one instant.
@@ -47,6 +49,7 @@ impl<T: Real> Valve<T> {
             underlap: T::lit(0.03),
             area_ratio_b: T::lit(0.746),
             laminar_drop_pa: T::lit(1e5),
+            clearance_m3spa: T::zero(),
         }
     }
 
@@ -59,7 +62,10 @@ impl<T: Real> Valve<T> {
             self.area_ratio_b,
             self.laminar_drop_pa,
         ];
-        positive.iter().all(|v| v.is_finite() && *v > T::zero()) && self.underlap.abs() < T::one()
+        positive.iter().all(|v| v.is_finite() && *v > T::zero())
+            && self.underlap.abs() < T::one()
+            && self.clearance_m3spa.is_finite()
+            && self.clearance_m3spa >= T::zero()
     }
 
     /// Time derivative of spool position and speed for a command (share of the stroke).
@@ -78,11 +84,12 @@ impl<T: Real> Valve<T> {
         let drops_pa = [supply_pa - pa_pa, supply_pa - pb_pa, pa_pa, pb_pa];
         let [from_supply_a, from_supply_b, to_tank_a, to_tank_b] =
             drops_pa.map(|drop| metering(drop, self.laminar_drop_pa));
-        let supply_to_a = extend * from_supply_a;
-        let supply_to_b = retract * self.area_ratio_b * from_supply_b;
+        let [passing_a, passing_b, leaving_a, leaving_b] = drops_pa.map(|drop| self.clearance_m3spa * drop);
+        let supply_to_a = extend * from_supply_a + passing_a;
+        let supply_to_b = retract * self.area_ratio_b * from_supply_b + passing_b;
         ValveFlows {
-            a_m3s: supply_to_a - retract * to_tank_a,
-            b_m3s: supply_to_b - extend * self.area_ratio_b * to_tank_b,
+            a_m3s: supply_to_a - retract * to_tank_a - leaving_a,
+            b_m3s: supply_to_b - extend * self.area_ratio_b * to_tank_b - leaving_b,
             supply_m3s: supply_to_a + supply_to_b,
         }
     }

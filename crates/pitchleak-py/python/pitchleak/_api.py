@@ -1,5 +1,6 @@
 """All that the package offers."""
 
+from ._calibrate import Calibration, calibrate
 from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
 from ._diagnose import Diagnosis, diagnose
 from ._estimator import Estimator
@@ -13,7 +14,7 @@ from ._results import (
     Episode,
     Estimate,
     Estimates,
-    HeldLeak,
+    FoundLeak,
     Hold,
     Leakage,
     OilShare,
@@ -21,16 +22,19 @@ from ._results import (
     ReachTime,
     Reason,
     Score,
+    Since,
     Slope,
     Spell,
     Trace,
     Trend,
+    Valve,
     Verdict,
 )
 from ._simulate import Simulation, simulate
 
 __all__ = [
     "Alarm",
+    "Calibration",
     "ChannelFault",
     "Check",
     "Diagnosis",
@@ -41,7 +45,7 @@ __all__ = [
     "Fleet",
     "FleetLeak",
     "FleetRow",
-    "HeldLeak",
+    "FoundLeak",
     "Hold",
     "Leakage",
     "Linkage",
@@ -59,15 +63,18 @@ __all__ = [
     "RigError",
     "Score",
     "Simulation",
+    "Since",
     "Slope",
     "Spell",
     "Trace",
     "TraceError",
     "TraceWarning",
     "Trend",
+    "Valve",
     "Verdict",
     "Wiring",
     "__version__",
+    "calibrate",
     "check",
     "diagnose",
     "fleet",

@@ -12,7 +12,7 @@ from ._pitchleak import Rig
 from ._raw import Raw
 from ._records import record
 from ._report import LABELS
-from ._results import Hold, PerLeak, Trace
+from ._results import Hold, PerLeak, Trace, Valve
 from ._tabular import Tabular
 
 if TYPE_CHECKING:
@@ -100,6 +100,8 @@ class Check(Raw, Paged, Tabular):
     """About 1 each where model and declared noise explain the trace, far above where they do not."""
     hold: Hold | None = None
     """Of a hold test: how much of it is usable, and the smallest leaks that it finds."""
+    valve: Valve | None = None
+    """Where the valve's flows stood for meters: what they are worth."""
     channels: tuple[ChannelFault, ...] = ()
     """Channels that are dead, stuck, clipped, held or coarse."""
     wiring: Wiring | None = None

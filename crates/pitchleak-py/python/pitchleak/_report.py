@@ -23,6 +23,7 @@ from ._results import (
     Spell,
     Trace,
     Trend,
+    Valve,
     Verdict,
 )
 
@@ -66,6 +67,8 @@ class Report(Raw):
     """About 1 each where model and declared noise explain the trace, far above where they do not."""
     hold: Hold | None = None
     """Of a hold test: how much of it was usable; leakages are means over that."""
+    valve: Valve | None = None
+    """Where the valve's flows stood for meters: what they are worth."""
     changed_at_s: float | None = None
     """When a leak last changed suddenly, s; flows are means since then."""
     raw: dict[str, Any] = field(init=False, default_factory=dict)

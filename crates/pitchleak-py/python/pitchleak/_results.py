@@ -105,6 +105,8 @@ class Leakage:
     """Standard deviation of its error, L/min; None where the estimator gives none."""
     net_mean_lpm: float | None = None
     """Mean with its sign, positive out of the chamber that leaks, L/min."""
+    since: str | None = None
+    """The flow is what leaks more than on this day, when the valve was calibrated; None where it is absolute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,15 +247,15 @@ class Spell:
 
 
 @dataclass(frozen=True, slots=True)
-class HeldLeak:
-    """One leak in a hold test, as a mean over its usable time."""
+class FoundLeak:
+    """One leak in a hold test, or by a valve's flows, as a mean over the usable time."""
 
     probability: float
     """Probability that there is such a leak at all."""
     ci95_lpm: tuple[float, ...]
     """The interval that holds its flow with 95 % where there is one, L/min."""
     smallest_lpm: float
-    """The smallest flow that this hold would find, L/min."""
+    """The smallest flow that this trace would find, L/min."""
     pressure_bar: float
     """Mean pressure that drives it, bar."""
 
@@ -268,8 +270,38 @@ class Hold:
     """What ended the longest: ``trace``, ``pressure`` (5 bar), ``motion`` (2 mm), ``opened`` or ``enough``."""
     holds: int
     """How many there are."""
-    leaks: PerLeak[HeldLeak] | None = None
+    leaks: PerLeak[FoundLeak] | None = None
     """Each leak; None where nothing was usable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """Which calibration of the valve leaks are told against."""
+
+    date: str
+    """Its day."""
+    leaks: str
+    """``zero``: leaks are absolute; ``unknown``: external ones are what leaks more than then."""
+    has_evidence: bool
+    """Whether a hold test showed that nothing leaked; else that was assumed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Valve:
+    """Where there are no flow meters: what the valve's flows are worth."""
+
+    usable_s: float
+    """Time since the leaks changed, s."""
+    spool_range: tuple[float, ...]
+    """Least and greatest position of the spool, shares of its stroke."""
+    clearance_lpm: tuple[float, ...]
+    """What the clearances A-T and B-T may leak by the data sheet, 1 σ, L/min."""
+    scatter: float
+    """What the readings scatter, in the declared noise's standard deviations."""
+    calibrated: Since | None = None
+    """The calibration; None where all rests on the data sheet."""
+    leaks: PerLeak[FoundLeak] | None = None
+    """Each leak; None where the trace is too short."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,6 +102,7 @@ def simulate(
     onset: float | str = 0.0,
     oil_temp: float | str | None = None,
     shut: str | None = None,
+    valve: Sequence[str] = (),
     effects: Mapping[str, float] | None = None,
     noise: float | str = "none",
     bias: float | str = 0.0,
@@ -124,7 +125,8 @@ def simulate(
     ``onset`` (s into the trace; 0: before it begins); it may grow (``"0.1 L/min -> 0.5 L/min @ 10 s..300 s"``),
     begin or end (``"0.5 L/min @ ..200 s"``), come and go (``"0.5 L/min every 60 s for 10 s"``). ``oil_temp``
     (K, ``"45 °C"``, ``"20 °C -> 60 °C @ 0 s..600 s"`` or a CSV file) makes the leaks, which have their size at
-    40 °C, follow the oil's viscosity. ``shut`` (``"5 s..15 s"``) shuts both ports: a hold test. ``effects`` are
+    40 °C, follow the oil's viscosity. ``shut`` (``"5 s..15 s"``) shuts both ports: a hold test. A rig with
+    ``[valve]`` records its spool and supply instead of flows; ``valve`` are its flaws (``"clearance=0.05 L/min"``). ``effects`` are
     sizes by id in SI. ``noise`` is 3 σ of every sensor as a share of full scale, ``"none"`` or ``"rig"``; ``bias``
     the greatest constant offset. ``faults`` are mistakes of the sensors (``"qa dead"``, ``"pa offset 10 bar"``,
     ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see
@@ -149,6 +151,7 @@ def simulate(
         "onset": onset,
         "oil_temp": oil_temp,
         "shut": shut,
+        "valve": [valve] if isinstance(valve, str) else list(valve),
         "effects": dict(effects or {}),
         "noise": noise,
         "bias": bias,

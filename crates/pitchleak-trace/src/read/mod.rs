@@ -31,7 +31,7 @@ pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, LineRead, read as read_line};
 pub use quality::TraceQuality;
-pub use row::{BadRows, Record};
+pub use row::{BadRows, Record, ValveReading};
 pub use stamps::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 pub use validator::{OVERRANGE, RowValidator};

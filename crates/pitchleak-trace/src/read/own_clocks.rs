@@ -14,12 +14,16 @@ use crate::signal::Signal;
 use std::collections::VecDeque;
 
 /// What a row may lack, and is read by a meter.
-const OTHERS: [Signal; 8] = [
+const OTHERS: [Signal; 12] = [
     Signal::FlowA,
     Signal::FlowB,
     Signal::Force,
     Signal::Speed,
     Signal::Temperature,
+    Signal::Spool,
+    Signal::Command,
+    Signal::Supply,
+    Signal::Tank,
     Signal::LeakInternal,
     Signal::LeakExternalA,
     Signal::LeakExternalB,

@@ -67,11 +67,25 @@ pub struct Record {
     pub speed_mps: Option<f64>,
     /// Oil temperature, K.
     pub temperature_k: Option<f64>,
+    /// What the valve between supply and cylinder shows; none where nothing of it was read.
+    #[serde(default)]
+    pub valve: Option<ValveReading>,
     /// Whether both ports are shut between valve and cylinder: then both flows are zero for certain.
     #[serde(default)]
     pub shut: Option<bool>,
     /// Reference flows of the internal, external A and external B leak, m³/s.
     pub leak_m3s: PerLeak<Option<f64>>,
+}
+
+/// What is read of the valve between supply and cylinder.
+#[derive(Clone, Copy, Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct ValveReading {
+    /// Position of the spool, a share of its full stroke, positive: supply to A; its command where the position is not measured.
+    pub spool: f64,
+    /// Supply pressure at the valve, Pa.
+    pub supply_pa: Option<f64>,
+    /// Tank pressure at the valve, Pa.
+    pub tank_pa: Option<f64>,
 }
 
 impl Record {

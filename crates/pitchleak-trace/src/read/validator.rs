@@ -6,7 +6,7 @@ use super::error::TraceFault;
 use super::error::{BadReason, BadRow, Counted};
 use super::quality::TraceQuality;
 use super::row::Row;
-use super::row::{BadRows, Record};
+use super::row::{BadRows, Record, ValveReading};
 use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -170,6 +170,11 @@ fn readings(row: &Row) -> Record {
         },
         speed_mps: reading(Signal::Speed),
         temperature_k: reading(Signal::Temperature),
+        valve: reading(Signal::Spool).or_else(|| reading(Signal::Command)).map(|spool| ValveReading {
+            spool,
+            supply_pa: reading(Signal::Supply),
+            tank_pa: reading(Signal::Tank),
+        }),
         shut: reading(Signal::Shut).map(|shut| shut > 0.5),
         leak_m3s: PerLeak {
             internal: reading(Signal::LeakInternal),
@@ -254,6 +259,8 @@ impl Ranges {
             least: VACUUM_PA - SLACK * sheets.pressure.full_scale,
             most: OVERRANGE * sheets.pressure.full_scale,
         };
+        // No data sheet need be declared of these: as much as any sensor that a rig may have.
+        let valve_pressure = |signal| Range { signal, least: 2.0 * VACUUM_PA, most: 1e9 };
         let both_ways = |signal, full_scale: f64| Range {
             signal,
             least: -OVERRANGE * full_scale,
@@ -270,6 +277,11 @@ impl Ranges {
             Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
             both_ways(Signal::Speed, 100.0),
             Range { signal: Signal::Time, least: -MOST_TIME_S, most: MOST_TIME_S },
+            // A share of the stroke, with what a sensor may read beyond its ends.
+            both_ways(Signal::Spool, 1.0),
+            both_ways(Signal::Command, 1.0),
+            valve_pressure(Signal::Supply),
+            valve_pressure(Signal::Tank),
             Range { signal: Signal::Shut, least: 0.0, most: 1.0 },
             // As much as the largest meter that a rig may have.
             both_ways(Signal::LeakInternal, 10.0),
@@ -306,6 +318,10 @@ impl Ranges {
             Signal::Temperature
             | Signal::Speed
             | Signal::Time
+            | Signal::Spool
+            | Signal::Command
+            | Signal::Supply
+            | Signal::Tank
             | Signal::Shut
             | Signal::LeakInternal
             | Signal::LeakExternalA

@@ -32,6 +32,10 @@ pub struct Instruments {
     pub position: Instrument,
     /// Force sensor, N.
     pub force: Instrument,
+    /// Position sensor of the valve's spool, a share of its stroke.
+    pub spool: Instrument,
+    /// Pressure sensor of the supply, Pa.
+    pub supply: Instrument,
 }
 
 impl Instrument {
@@ -64,22 +68,34 @@ impl Instrument {
             return Ok(None);
         }
         sheet.allow(&["full_scale", "accuracy", "bias", "gain", "drift"])?;
+        let full_scale = sheet.required("full_scale", dimension, full_scale)?;
+        Self::shares(&sheet, full_scale).map(Some)
+    }
+
+    /// The spool's full scale is its stroke.
+    fn read_spool(sensors: &Section<'_>) -> Result<Option<Self>, RigError> {
+        let sheet = sensors.section("spool")?;
+        sheet.allow(&["accuracy", "bias", "gain", "drift"])?;
+        sheet.is_present().then(|| Self::shares(&sheet, 1.0)).transpose()
+    }
+
+    fn shares(sheet: &Section<'_>, full_scale: f64) -> Result<Self, RigError> {
         let share = |key| sheet.quantity(key, Dimension::Share, bound::SHARE);
-        Ok(Some(Self {
-            full_scale: sheet.required("full_scale", dimension, full_scale)?,
+        Ok(Self {
+            full_scale,
             accuracy: share("accuracy")?.unwrap_or(Self::PAPER_ACCURACY),
             bias: share("bias")?.unwrap_or(0.0),
             gain: share("gain")?.unwrap_or(0.0),
             drift: sheet.quantity("drift", Dimension::Share, bound::DRIFT_PER_HOUR)?.unwrap_or(0.0),
-        }))
+        })
     }
 }
 
 impl Instruments {
     /// The same sensors, each with white noise of 3 σ = `accuracy` of its full scale.
     pub fn with_accuracy(mut self, accuracy: f64) -> Self {
-        let Self { flow_a, flow_b, pressure, position, force } = &mut self;
-        for sheet in [flow_a, flow_b, pressure, position, force] {
+        let Self { flow_a, flow_b, pressure, position, force, spool, supply } = &mut self;
+        for sheet in [flow_a, flow_b, pressure, position, force, spool, supply] {
             sheet.accuracy = accuracy;
         }
         self
@@ -95,6 +111,8 @@ impl Instruments {
             pressure: Instrument::of_full_scale(16e6),
             position: Instrument::of_full_scale(cylinder.stroke_m),
             force: Instrument::of_full_scale(10e3),
+            spool: Instrument::of_full_scale(1.0),
+            supply: Instrument::of_full_scale(16e6),
         }
     }
 
@@ -114,9 +132,9 @@ impl Instruments {
         self.flow_a.full_scale.max(self.flow_b.full_scale)
     }
 
-    /// A sensor that the file leaves out is the paper's.
+    /// A sensor that the file leaves out is the paper's; that of the supply is as those of the chambers.
     pub(super) fn read(sensors: &Section<'_>, cylinder: &Cylinder<f64>) -> Result<Self, RigError> {
-        sensors.allow(&["flow", "flow_a", "flow_b", "pressure", "position", "force"])?;
+        sensors.allow(&["flow", "flow_a", "flow_b", "pressure", "position", "force", "spool", "supply"])?;
         let default = Self::paper(cylinder);
         let flow = |key| Instrument::read(sensors, key, Dimension::Flow, bound::FLOW_SCALE);
         let (both, flow_a, flow_b) = (flow("flow")?, flow("flow_a")?, flow("flow_b")?);
@@ -128,14 +146,17 @@ impl Instruments {
             ));
         }
         let other = |key, dimension, full_scale| Instrument::read(sensors, key, dimension, full_scale);
+        let pressure =
+            other("pressure", Dimension::Pressure, bound::PRESSURE_SCALE)?.unwrap_or(default.pressure);
         Ok(Self {
             flow_a: flow_a.or(both).unwrap_or(default.flow_a),
             flow_b: flow_b.or(both).unwrap_or(default.flow_b),
-            pressure: other("pressure", Dimension::Pressure, bound::PRESSURE_SCALE)?
-                .unwrap_or(default.pressure),
+            pressure,
             position: other("position", Dimension::Length, bound::POSITION_SCALE)?
                 .unwrap_or(default.position),
             force: other("force", Dimension::Force, bound::FORCE_SCALE)?.unwrap_or(default.force),
+            spool: Instrument::read_spool(sensors)?.unwrap_or(default.spool),
+            supply: other("supply", Dimension::Pressure, bound::PRESSURE_SCALE)?.unwrap_or(pressure),
         })
     }
 }

@@ -5,6 +5,7 @@ mod document;
 mod effects;
 mod instruments;
 mod settings;
+mod valve;
 mod write;
 
 pub use document::{Fault, Place, RigError};
@@ -14,6 +15,8 @@ pub use settings::{
     ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
     ForeignColumn,
 };
+
+pub use valve::{ValveDrift, ValveSheet};
 
 use crate::units::Dimension;
 use document::{Document, Section};
@@ -45,6 +48,8 @@ pub struct Rig {
     pub csv: CsvSettings,
     /// `[effects]`: what a diagnosis found.
     pub effects: EffectMap,
+    /// `[valve]`: the data sheet of the valve between supply and cylinder.
+    pub valve: Option<ValveSheet>,
     /// What nobody declared.
     pub assumed: Assumed,
 }
@@ -83,6 +88,7 @@ impl Rig {
             columns: ColumnMap::new(),
             csv: CsvSettings::default(),
             effects: EffectMap::new(),
+            valve: None,
             assumed: Assumed::default(),
         }
     }
@@ -130,6 +136,7 @@ impl Rig {
             "columns",
             "csv",
             "effects",
+            "valve",
         ])?;
         let cylinder = read_cylinder(&root.section("cylinder")?)?;
         let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
@@ -144,6 +151,7 @@ impl Rig {
             columns: settings::read_columns(&root.section("columns")?)?,
             csv: CsvSettings::read(&root.section("csv")?)?,
             effects: effects::read(&root.section("effects")?)?,
+            valve: ValveSheet::read(&root.section("valve")?)?,
             assumed: Assumed { rig: false, sensors: !root.section("sensors")?.is_present() },
         })
     }

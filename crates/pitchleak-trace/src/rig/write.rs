@@ -35,12 +35,14 @@ fn toml_text(text: &str) -> String {
 
 fn instrument(key: &str, sheet: &Instrument, dimension: Dimension, scale: Bound) -> String {
     let full_scale = within(sheet.full_scale, dimension, scale);
+    format!("{key} = {{ full_scale = {full_scale}, {} }}\n", shares(sheet))
+}
+
+fn shares(sheet: &Instrument) -> String {
     let [accuracy, bias, gain] =
         [sheet.accuracy, sheet.bias, sheet.gain].map(|share| bound::SHARE.nearest(share));
     let drift = bound::DRIFT_PER_HOUR.nearest(sheet.drift);
-    format!(
-        "{key} = {{ full_scale = {full_scale}, accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?}, drift = {drift:?} }}\n"
-    )
+    format!("accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?}, drift = {drift:?}")
 }
 
 impl Rig {
@@ -73,6 +75,7 @@ impl Rig {
         self.write_columns(&mut out);
         self.write_csv(&mut out);
         self.write_effects(&mut out);
+        self.write_valve(&mut out);
         out
     }
 
@@ -104,6 +107,10 @@ impl Rig {
         out.push_str(&instrument("pressure", &sheets.pressure, Dimension::Pressure, bound::PRESSURE_SCALE));
         out.push_str(&instrument("position", &sheets.position, Dimension::Length, bound::POSITION_SCALE));
         out.push_str(&instrument("force", &sheets.force, Dimension::Force, bound::FORCE_SCALE));
+        if self.valve.is_some() {
+            let supply = instrument("supply", &sheets.supply, Dimension::Pressure, bound::PRESSURE_SCALE);
+            let _ = writeln!(out, "{supply}spool = {{ {} }}", shares(&sheets.spool));
+        }
     }
 
     fn write_settings(&self, out: &mut String) {
@@ -169,6 +176,33 @@ impl Rig {
                 ("decimal", decimal.map(|decimal| toml_text(decimal.name()))),
                 ("time_format", time.as_ref().map(|time| toml_text(&time.kind.to_string()))),
                 ("zone", time.as_ref().and_then(|time| Some(toml_text(&time.zone.as_ref()?.to_string())))),
+            ],
+        );
+    }
+
+    fn write_valve(&self, out: &mut String) {
+        let Some(valve) = &self.valve else { return };
+        let share = |value: f64| Some(format!("{value:?}"));
+        let with = |value, dimension| Some(quantity(value, dimension));
+        out.push_str("\n[valve]\n");
+        put(
+            out,
+            &[
+                ("rated_flow", with(valve.rated_flow_m3s, Dimension::Flow)),
+                ("rated_drop", with(valve.rated_drop_pa, Dimension::Pressure)),
+                ("gain_std", share(valve.gain_std)),
+                ("lap", share(valve.lap)),
+                ("lap_std", share(valve.lap_std)),
+                ("null_leak", share(valve.null_leak)),
+                ("hysteresis", share(valve.hysteresis)),
+                ("spool_lag", with(valve.spool_lag_s, Dimension::Time)),
+                ("drift.gain", share(valve.drift.gain)),
+                ("drift.lap", share(valve.drift.lap)),
+                ("drift.null_leak", share(valve.drift.null_leak)),
+                ("supply", valve.supply_pa.and_then(|pressure| with(pressure, Dimension::Pressure))),
+                ("supply_std", with(valve.supply_std_pa, Dimension::Pressure)),
+                ("tank", with(valve.tank_pa, Dimension::Pressure)),
+                ("calibration", valve.calibration.as_deref().map(toml_text)),
             ],
         );
     }

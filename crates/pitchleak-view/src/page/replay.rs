@@ -4,7 +4,7 @@ use super::chart::{Chart, Charts, Limit, Span};
 use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, trace};
 use super::{Card, Head, History, Page, Section};
-use crate::text::{data_line, hold_line, missing_rig};
+use crate::text::{data_line, hold_line, missing_rig, valve_line};
 use maud::{Markup, html};
 use pitchleak::core::{AlarmState, Leak};
 use pitchleak::report::{
@@ -169,6 +169,8 @@ fn leaks(report: &ReplayReport, rig: &Rig, drawn: &Drawn, charts: &mut Charts) -
     html! {
         @if let Some(hold) = &report.hold {
             p { "Hold test: " (hold_line(hold)) "." }
+        } @else if let Some(valve) = &report.valve {
+            p { "No flow meters, the valve's flows: " (valve_line(valve)) "." }
         } @else {
             (charts.place(chart))
             h3 { "At the end of the trace" }

@@ -3,6 +3,7 @@
 use super::Text;
 use super::check_sketch::CheckSketch;
 use super::replay::{data_line, hold_line, misfit, rig_line};
+use super::valve::valve_line;
 use crate::Palette;
 use pitchleak::check::{CheckReport, Reach};
 use pitchleak::core::PerLeak;
@@ -38,6 +39,9 @@ impl CheckText<'_> {
         let _ = writeln!(out, "rig    {}\n", rig_line(&self.report.rig));
         if let Some(hold) = &self.report.hold {
             let _ = writeln!(out, "This is a hold test: {}.\n", hold_line(hold));
+        }
+        if let Some(valve) = &self.report.valve {
+            let _ = writeln!(out, "No flow meters, the valve's flows: {}.\n", valve_line(valve));
         }
         self.write_readings(&mut out);
         self.write_channels(&mut out);

@@ -9,6 +9,7 @@ pub(crate) mod proof;
 mod replay;
 mod replay_sketch;
 mod replay_terminal;
+mod valve;
 
 pub use check_sketch::CheckSketch;
 pub(crate) use diagnosis::companions;
@@ -17,6 +18,7 @@ pub use fleet::fleet_terminal;
 pub use replay::data_line;
 pub(crate) use replay::{hold_line, misfit, missing_rig, rig_line};
 pub use replay_sketch::ReplaySketch;
+pub(crate) use valve::valve_line;
 
 use crate::Palette;
 

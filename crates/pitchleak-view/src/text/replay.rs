@@ -3,9 +3,11 @@
 use super::Text;
 use super::replay_sketch::ReplaySketch;
 use super::replay_terminal::{write_bars, write_courses};
+use super::valve::valve_line;
 use crate::Palette;
 use pitchleak::core::{AlarmState, Leak};
-use pitchleak::hold::{HeldLeak, HoldSummary};
+use pitchleak::hold::HoldSummary;
+use pitchleak::presence::FoundLeak;
 use pitchleak::report::{
     EstimateEntry, ReasonId, ReplayReport, TraceSummary, Verdict, capital, interval, with_interval,
 };
@@ -50,7 +52,7 @@ pub(crate) fn rig_line(rig: &str) -> String {
 /// How much of a hold test counts, and from which size on it finds each leak.
 pub(crate) fn hold_line(hold: &HoldSummary) -> String {
     let Some(leaks) = &hold.leaks else { return "nothing of it is usable".to_owned() };
-    let smallest = |(leak, held): (Leak, &HeldLeak)| {
+    let smallest = |(leak, held): (Leak, &FoundLeak)| {
         format!("{} leaks from {} L/min", leak.label(), readable(held.smallest_lpm, 2))
     };
     let smallest: Vec<_> = leaks.iter().map(smallest).collect();
@@ -98,8 +100,8 @@ impl ReplayText<'_> {
         self.write_leaks(&mut out);
         if let Some(sketch) = self.sketch {
             write_bars(&mut out, self.report, sketch, self.palette);
-            // What was open before a hold tells nothing of it.
-            if self.report.hold.is_none() {
+            // What the estimator says without flows, or before a hold, is none of it.
+            if self.report.hold.is_none() && self.report.valve.is_none() {
                 write_courses(&mut out, self.report, sketch, self.palette);
             }
         }
@@ -108,9 +110,10 @@ impl ReplayText<'_> {
         self.write_scores(&mut out);
         let _ = writeln!(out, "\ntrace      {}: {}", self.report.trace.path, data_line(&self.report.trace));
         let _ = writeln!(out, "rig        {}", rig_line(&self.report.rig));
-        let _ = match &self.report.hold {
-            Some(hold) => writeln!(out, "hold test  {}", hold_line(hold)),
-            None => writeln!(out, "estimator  {}", self.report.estimator.name()),
+        let _ = match (&self.report.hold, &self.report.valve) {
+            (Some(hold), _) => writeln!(out, "hold test  {}", hold_line(hold)),
+            (_, Some(valve)) => writeln!(out, "valve      {}", valve_line(valve)),
+            _ => writeln!(out, "estimator  {}", self.report.estimator.name()),
         };
         out
     }

@@ -48,6 +48,7 @@ impl Motion {
             leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
             oil_temperature: None,
             shut: None,
+            valve_flaws: Vec::new(),
             effects: EffectSet::default(),
             start_s: 10.0,
             warm_up_s: 10.0,

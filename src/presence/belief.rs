@@ -4,11 +4,10 @@
 //! together with one at B. So each of the eight sets of leaks is weighed by its evidence: a leak of the set is half normal, one outside
 //! is zero. Shares and size are those of docs/explanations.md.
 
-use super::fit::{Fit, LEAK_UNIT_M3SPA};
-use super::nodes::Node;
+use super::likelihood::{LEAK_UNIT_M3SPA, LeakLikelihood};
 use crate::explain::{LEAK_SHARE, Orthant, POINTS, positive_orthant};
 use crate::units::LPM_PER_M3S;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use statrs::function::erf::erfc;
 use std::f64::consts::{PI, SQRT_2};
@@ -20,7 +19,7 @@ const SIZE: f64 = LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 / LEAK_UNIT_M3SPA;
 
 /// What is believed of one leak; coefficients in m³/(s·Pa), where there is such a leak.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub(super) struct Belief {
+pub(crate) struct Belief {
     /// That there is one.
     pub probability: f64,
     pub mean: f64,
@@ -33,25 +32,25 @@ pub(super) struct Belief {
 
 /// What is believed of all leaks, and of the oil.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Beliefs {
+pub(crate) struct Beliefs {
     pub leaks: PerLeak<Belief>,
     /// That oil leaks by whatever way.
     pub any: f64,
-    /// κ, 1/Pa.
-    pub kappa_ppa: Estimate<f64>,
+    /// κ, in the rig file's.
+    pub kappa: Estimate<f64>,
     /// By how much leaks of any sign would explain the readings better than leaks that are none or positive: squares of
     /// residuals in those of the noise.
     pub negative: f64,
 }
 
-/// Weighs the leaks of a fit; `sure` is the probability from which a leak counts as found.
-pub(super) fn beliefs(fit: &Fit, sure: f64) -> Beliefs {
-    let nodes = grid(fit);
+/// Weighs the leaks by their likelihood at some places of κ, which are equally far apart; `sure` is the probability from which a leak
+/// counts as found.
+pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
     let sets: Vec<Vec<usize>> =
         (0..8).map(|members| (0..3).filter(|leak| members >> leak & 1 == 1).collect()).collect();
-    let mut weighed: Vec<Weighed> = sets.iter().flat_map(|members| over_kappa(members, &nodes)).collect();
+    let mut weighed: Vec<Weighed> = sets.iter().flat_map(|members| over_kappa(members, places)).collect();
     let possible = weighed.iter().map(|one| one.squares).fold(f64::INFINITY, f64::min);
-    let any_sign = nodes.iter().map(|place| place.node.squares).fold(f64::INFINITY, f64::min);
+    let any_sign = places.iter().map(|place| place.likelihood.squares).fold(f64::INFINITY, f64::min);
     let largest = weighed.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
     weighed.iter_mut().for_each(|one| one.weight = (one.weight - largest).exp());
     let all: f64 = weighed.iter().map(|one| one.weight).sum();
@@ -59,22 +58,24 @@ pub(super) fn beliefs(fit: &Fit, sure: f64) -> Beliefs {
     let moment = |power: i32| weighed.iter().map(|one| one.weight * one.kappa.powi(power)).sum::<f64>();
     let (mean, square) = (moment(1), moment(2));
     let kappa = Estimate { value: mean, std: (square - mean * mean).max(0.0).sqrt() };
-    let middle = fit.profile.at(mean.ln());
+    let off = |place: &&Place| (place.kappa - mean).abs();
+    let middle = places.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|place| place.likelihood);
+    let information = middle.map_or_else(Matrix3::zeros, |middle| middle.information);
     Beliefs {
         leaks: PerLeak::from_fn(|leak| {
             let own = index(leak);
-            let alone = 1.0 / (middle.information[(own, own)] + SIZE.powi(-2)).sqrt();
+            let alone = 1.0 / (information[(own, own)] + SIZE.powi(-2)).sqrt();
             let smallest = alone * detected_sigmas(alone, sure);
             Belief { smallest: smallest * LEAK_UNIT_M3SPA, ..spread(&weighed, own) }
         }),
         any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
-        kappa_ppa: kappa.scaled(fit.declared_ppa.value),
+        kappa,
         negative: possible - any_sign,
     }
 }
 
 /// Place of a leak among the unknowns.
-pub(super) fn index(leak: Leak) -> usize {
+fn index(leak: Leak) -> usize {
     match leak {
         Leak::Internal => 0,
         Leak::ExternalA => 1,
@@ -82,31 +83,16 @@ pub(super) fn index(leak: Leak) -> usize {
     }
 }
 
-/// Places on the grid of κ, of which those that count are taken, so many at the most.
-const PLACES: usize = 2000;
+/// Of the places so many are taken at the most.
 const TAKEN: usize = 15;
 /// A place counts where its weight is this far below the largest, ln.
 const LEAST_LN_WEIGHT: f64 = -12.0;
 
 /// The likelihood at a κ, in the rig file's, and ln of what was believed of it before.
-struct Place {
-    kappa: f64,
-    ln_prior: f64,
-    node: Node,
-}
-
-fn grid(fit: &Fit) -> Vec<Place> {
-    let [from, to] = fit.profile.range();
-    let relative = fit.declared_ppa.std / fit.declared_ppa.value;
-    let places = (0..=PLACES).map(|k| from + (to - from) * k as f64 / PLACES as f64);
-    let least = fit.profile.at(0.5 * (from + to)).squares;
-    places
-        .map(|ln_kappa| {
-            let node = fit.profile.at(ln_kappa);
-            let ln_prior = -0.5 * (ln_kappa / relative).powi(2);
-            Place { kappa: ln_kappa.exp(), ln_prior, node: Node { squares: node.squares - least, ..node } }
-        })
-        .collect()
+pub(crate) struct Place {
+    pub kappa: f64,
+    pub ln_prior: f64,
+    pub likelihood: LeakLikelihood,
 }
 
 /// One set of leaks that are there, at one κ.
@@ -132,19 +118,19 @@ struct Normal {
 
 impl Normal {
     fn new(members: &[usize], place: &Place) -> Option<Self> {
-        let Place { node, ln_prior, .. } = place;
+        let Place { likelihood, ln_prior, .. } = place;
         let count = members.len();
         let ln_share = count as f64 * LEAK_SHARE.ln() + (3 - count) as f64 * (1.0 - LEAK_SHARE).ln();
-        let pull = node.information * node.leaks;
+        let pull = likelihood.information * likelihood.leaks;
         let precision = DMatrix::from_fn(count, count, |i, j| {
-            node.information[(members[i], members[j])] + if i == j { SIZE.powi(-2) } else { 0.0 }
+            likelihood.information[(members[i], members[j])] + if i == j { SIZE.powi(-2) } else { 0.0 }
         });
         let right = DVector::from_fn(count, |i, _| pull[members[i]]);
         let factor = precision.cholesky()?;
         let mean = factor.solve(&right);
         // Half normal sizes of density 2/(τ √(2π)) at none, times a normal integral over the orthant.
         let ln_det = 2.0 * factor.l().diagonal().map(f64::ln).sum();
-        let squares = node.squares + node.leaks.dot(&pull) - mean.dot(&right);
+        let squares = likelihood.squares + likelihood.leaks.dot(&pull) - mean.dot(&right);
         let ln_size = count as f64 * (2.0 / SIZE).ln();
         let ln_weight = ln_share + ln_prior - 0.5 * squares + ln_size - 0.5 * ln_det;
         Some(Self { mean, covariance: factor.inverse(), squares, ln_weight })
@@ -243,6 +229,6 @@ fn detected_sigmas(std: f64, sure: f64) -> f64 {
 }
 
 /// Standard deviation of the half normal size that a leak has before any reading, m³/(s·Pa).
-pub(super) fn prior_std() -> f64 {
+pub(crate) fn prior_std() -> f64 {
     LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 * (1.0 - 2.0 / std::f64::consts::PI).sqrt()
 }

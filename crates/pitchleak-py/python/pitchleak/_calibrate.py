@@ -1,0 +1,72 @@
+"""A valve's calibration."""
+
+import os
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _inputs, _pitchleak
+from ._inputs import Columns
+from ._pitchleak import Rig
+from ._replay import replay
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What traces of a rig say of its valve."""
+
+    date: str
+    """When it was made."""
+    leaks: str
+    """What was known of the leaks then: ``zero`` or ``unknown``."""
+    seconds: float
+    """Time in the traces, s."""
+    spool_range: tuple[float, float]
+    """Least and greatest position of the spool, shares of its stroke."""
+    scatter: float
+    """What the readings scatter, in the declared noise's standard deviations."""
+    raw: dict[str, Any] = field(repr=False)
+    """Every field of the file."""
+    _toml: str = field(repr=False)
+    _text: str = field(repr=False)
+
+    def save(self, path: _inputs.Path) -> None:
+        """Writes the file that ``[valve] calibration`` names."""
+        with open(os.fspath(path), "w", encoding="utf-8") as file:
+            file.write(self._toml)
+
+    def __str__(self) -> str:
+        return self._text
+
+
+def calibrate(
+    traces: Any,
+    rig: Rig | _inputs.Path | None = None,
+    *,
+    leaks: str,
+    evidence: _inputs.Path | None = None,
+    columns: Columns | None = None,
+) -> Calibration:
+    """Learns the valve of a cylinder without flow meters from one trace or several of it.
+
+    ``leaks`` says what leaked meanwhile: after ``"zero"`` leaks are absolute, after ``"unknown"`` external ones are
+    changes since. ``evidence`` is a hold test that finds none; without it, ``"zero"`` is an assumption.
+
+    Raises ``ValueError`` where the rig has no ``[valve]``, or the traces say nothing of it.
+    """
+    many: Sequence[Any] = traces if isinstance(traces, (list, tuple)) else [traces]
+    if not many:
+        raise ValueError("traces: give one at least")
+    found = _inputs.rig_for(many[0], rig, columns)
+    if evidence is not None:
+        shown = replay(evidence, found, columns=columns)
+        if shown.hold is None or shown.verdict.status != "sound":
+            raise ValueError(f"evidence: {evidence} is no evidence that nothing leaks: {shown.verdict.text}")
+    name = None if evidence is None else os.fspath(evidence)
+    text, shown_text = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, name)
+    raw = tomllib.loads(text)
+    low, high = raw["spool_range"]
+    return Calibration(
+        raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown_text
+    )

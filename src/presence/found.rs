@@ -1,0 +1,238 @@
+//! What was found of the leaks, in words and as a report.
+
+use super::belief::{Belief, Beliefs, Place, prior_std, weigh};
+use crate::hold::HoldSummary;
+use crate::report::{
+    EstimateEntry, Estimates, Leakage, Reason, ReplayReport, Status, TraceSummary, Verdict, advice, capital,
+    join, with_interval,
+};
+use crate::rig::Rig;
+use crate::units::{LPM_PER_M3S, readable};
+use pitchleak_core::{Estimate, Leak, PerLeak};
+use serde::Serialize;
+
+/// A leak is ruled out at no less than this pressure: at none, none flows, Pa.
+pub(crate) const LEAST_DRIVING_PA: f64 = 20e5;
+/// Below this mean |P_L| zeros of the pressure sensors decide which way oil would pass the piston, Pa.
+const LEAST_LOAD_PA: f64 = 2e5;
+/// Standard deviation of a coefficient of which the trace tells next to nothing, in those of what is believed before.
+const UNKNOWN: f64 = 0.5;
+
+/// One leak, as a mean over the usable time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FoundLeak {
+    /// Probability that there is such a leak at all.
+    pub probability: f64,
+    /// The interval that holds its flow with 95 % where there is one, L/min.
+    pub ci95_lpm: [f64; 2],
+    /// The smallest flow that this trace would find, L/min.
+    pub smallest_lpm: f64,
+    /// Mean pressure that drives it, bar: |P_A − P_B|, P_A or P_B.
+    pub pressure_bar: f64,
+}
+
+/// What the readings say of the leaks.
+#[derive(Clone, Debug)]
+pub(crate) struct Found {
+    pub beliefs: Beliefs,
+    /// Means of |P_L|, P_A, P_B, Pa.
+    pub pressures_pa: PerLeak<f64>,
+    /// P_A − P_B, Pa.
+    pub load_pressure_pa: f64,
+    /// What the method itself may be off by, m³/(s·Pa): no smaller leak is found.
+    pub floor_m3spa: PerLeak<f64>,
+}
+
+/// What is said of each leak.
+pub(crate) struct Sorted {
+    pub found: Vec<Leak>,
+    pub excluded: Vec<Leak>,
+    pub open: Vec<Leak>,
+}
+
+impl Found {
+    /// By the likelihood at some places of κ.
+    pub fn new(places: &[Place], pressures_pa: PerLeak<f64>, load_pressure_pa: f64, rig: &Rig) -> Self {
+        let beliefs = weigh(places, 1.0 - rig.decision.alpha);
+        Self { beliefs, pressures_pa, load_pressure_pa, floor_m3spa: PerLeak::default() }
+    }
+
+    /// The same, where κ has this spread and no smaller leaks than `floor_m3spa` are found.
+    pub fn with_oil(mut self, kappa: f64, std: f64, floor_m3spa: PerLeak<f64>) -> Self {
+        self.beliefs.kappa = Estimate { value: kappa, std };
+        Self { floor_m3spa, ..self }
+    }
+
+    /// Each leak.
+    pub fn leaks(&self) -> PerLeak<FoundLeak> {
+        self.beliefs.leaks.zip(self.pressures_pa).zip(self.floor_m3spa).map(
+            |((belief, pressure_pa), floor)| {
+                let lpm = |coefficient: f64| coefficient * pressure_pa * LPM_PER_M3S;
+                FoundLeak {
+                    probability: belief.probability,
+                    ci95_lpm: belief.interval.map(lpm),
+                    smallest_lpm: lpm(belief.smallest.max(floor)),
+                    pressure_bar: pressure_pa / 1e5,
+                }
+            },
+        )
+    }
+
+    /// Which leaks are there for `sure`, and which are below their thresholds.
+    pub fn sorted(&self, threshold_lpm: &PerLeak<f64>, sure: f64) -> Sorted {
+        let is_driven = |leak: Leak| leak != Leak::Internal || self.pressures_pa.internal > LEAST_LOAD_PA;
+        let is_found = |leak: &Leak| {
+            let belief = &self.beliefs.leaks[*leak];
+            is_driven(*leak) && belief.probability >= sure && belief.interval[0] >= self.floor_m3spa[*leak]
+        };
+        let (found, others): (Vec<_>, Vec<_>) = Leak::ALL.into_iter().partition(is_found);
+        let (excluded, open) = others
+            .into_iter()
+            .partition(|leak| is_driven(*leak) && self.at_most_lpm(*leak) < threshold_lpm[*leak]);
+        Sorted { found, excluded, open }
+    }
+
+    /// Upper end of a leak's interval, at the pressure that drives it or the least that counts, L/min.
+    fn at_most_lpm(&self, leak: Leak) -> f64 {
+        let driving_pa = self.pressures_pa[leak].max(LEAST_DRIVING_PA);
+        self.beliefs.leaks[leak].interval[1] * driving_pa * LPM_PER_M3S
+    }
+
+    /// `0.020 ± 0.002`, in L/min.
+    pub fn flow(&self, leak: Leak) -> String {
+        let to_lpm = self.pressures_pa[leak] * LPM_PER_M3S;
+        let belief = &self.beliefs.leaks[leak];
+        with_interval(belief.mean * to_lpm, Some(belief.std * to_lpm))
+    }
+
+    /// A leak that was found, and what to do.
+    pub fn leak(&self, leak: Leak, threshold_lpm: f64) -> String {
+        let (flow, bar) = (self.flow(leak), self.pressures_pa[leak] / 1e5);
+        let most = self.beliefs.leaks[leak].interval[1] * self.pressures_pa[leak] * LPM_PER_M3S;
+        let small = if most < threshold_lpm {
+            format!(" It is below the alarm threshold of {threshold_lpm:.2} L/min.")
+        } else {
+            String::new()
+        };
+        format!("{} leak of {flow} L/min at {bar:.0} bar: {}.{small}", capital(leak.label()), advice(leak))
+    }
+
+    /// What is ruled out.
+    pub fn none_above(&self, excluded: &[Leak], threshold_lpm: &PerLeak<f64>) -> Option<String> {
+        let most = excluded.iter().map(|leak| self.at_most_lpm(*leak)).fold(0.0, f64::max);
+        let threshold = excluded.iter().map(|leak| threshold_lpm[*leak]).fold(0.0, f64::max);
+        // Rounded up: nothing above it is left.
+        let step = 10f64.powf(most.max(1e-4).log10().floor() - 1.0);
+        let bound = readable(((most / step).ceil() * step).max(1e-4).min(threshold), 2);
+        (!excluded.is_empty()).then(|| format!("No {} leak above {bound} L/min.", join(excluded, "or")))
+    }
+
+    /// Leaks that are in doubt.
+    pub fn apparent(&self, leaks: &[Leak]) -> String {
+        let each = |leak: &Leak| format!("{} of {} L/min", leak.label(), self.flow(*leak));
+        let named: Vec<_> = leaks.iter().map(each).collect();
+        if named.is_empty() {
+            String::new()
+        } else {
+            format!("Until then these apparent leaks stay in doubt: {}.", named.join(", "))
+        }
+    }
+
+    fn leakage(&self, leak: Leak) -> Leakage {
+        let (belief, pressure_pa) = (&self.beliefs.leaks[leak], self.pressures_pa[leak]);
+        let flow = Estimate { value: belief.mean * pressure_pa, std: belief.std * pressure_pa };
+        let size = Leakage::new(flow);
+        let against = leak == Leak::Internal && self.load_pressure_pa < 0.0;
+        let net_lpm = if against { -size.mean_lpm } else { size.mean_lpm };
+        Leakage { net_mean_lpm: Some(net_lpm), ..size }
+    }
+}
+
+/// The report on a trace that was judged without flow meters; without `found`, it was too short.
+pub(crate) fn report(
+    trace: TraceSummary,
+    rig: &Rig,
+    found: Option<&Found>,
+    verdict: Verdict,
+    hold: Option<HoldSummary>,
+) -> ReplayReport {
+    let nothing = Leakage { mean_lpm: 0.0, net_mean_lpm: None, std_lpm: None, since: None };
+    ReplayReport {
+        schema: ReplayReport::SCHEMA,
+        rig: rig.name.clone(),
+        estimator: rig.estimator.kind,
+        estimates: estimates(rig, found),
+        leakage: PerLeak::from_fn(|leak| found.map_or(nothing, |found| found.leakage(leak))),
+        flow_meter_offsets: None,
+        normalised_innovation: None,
+        hold,
+        valve: None,
+        verdict,
+        trend: PerLeak::default(),
+        episodes: Vec::new(),
+        spells: Vec::new(),
+        changed_at_s: None,
+        alarms: Vec::new(),
+        score: None,
+        trace,
+    }
+}
+
+fn estimates(rig: &Rig, found: Option<&Found>) -> Estimates {
+    let too_short =
+        |value, unit| EstimateEntry::without_spread(value, unit).not_identifiable("the trace is too short");
+    let leaks = PerLeak::from_fn(|leak| match found {
+        Some(found) => coefficient(&found.beliefs.leaks[leak]),
+        None => too_short(0.0, EstimateEntry::COEFFICIENT_UNIT),
+    });
+    let oil = match found {
+        Some(found) => bulk_modulus(&found.beliefs.kappa, rig),
+        None => too_short(rig.fluid.bulk_modulus_pa, EstimateEntry::BULK_MODULUS_UNIT),
+    };
+    Estimates {
+        internal_leak_coefficient: leaks.internal,
+        external_leak_a_coefficient: leaks.external_a,
+        external_leak_b_coefficient: leaks.external_b,
+        bulk_modulus: oil,
+    }
+}
+
+fn coefficient(belief: &Belief) -> EstimateEntry {
+    let estimate = Estimate { value: belief.mean, std: belief.std };
+    let entry = EstimateEntry {
+        ci95: Some(belief.interval),
+        ..EstimateEntry::new(estimate, EstimateEntry::COEFFICIENT_UNIT)
+    };
+    if belief.std < UNKNOWN * prior_std() {
+        entry
+    } else {
+        entry.not_identifiable("this trace says little about it")
+    }
+}
+
+/// β = 1/κ; the trace tells it where it halves what the rig file leaves open.
+fn bulk_modulus(kappa: &Estimate<f64>, rig: &Rig) -> EstimateEntry {
+    let Estimate { value, std } = *kappa;
+    let declared_pa = rig.fluid.bulk_modulus_pa;
+    let [low, high] = kappa.ci95();
+    let stiffest = if low > 0.0 { declared_pa / low } else { f64::INFINITY };
+    let estimate = Estimate { value: declared_pa / value, std: declared_pa * std / (value * value) };
+    let entry = EstimateEntry {
+        ci95: Some([declared_pa / high, stiffest]),
+        ..EstimateEntry::new(estimate, EstimateEntry::BULK_MODULUS_UNIT)
+    };
+    if std < UNKNOWN * rig.fluid.bulk_modulus_std_pa / declared_pa {
+        return entry;
+    }
+    entry.not_identifiable("this trace says little beyond the rig file")
+}
+
+/// First why it is in doubt, if it is, then what was found.
+pub(crate) fn told(status: Status, faults: Vec<Leak>, reasons: Vec<Reason>, found: &str) -> Verdict {
+    let sentence = |text: &str| capital(text) + ".";
+    let why = reasons.iter().take(1).flat_map(|reason| {
+        std::iter::once(sentence(&reason.text)).chain(reason.suggestion.as_deref().map(sentence))
+    });
+    let text: Vec<String> = why.chain((!found.is_empty()).then(|| found.to_owned())).collect();
+    Verdict { status, faults, text: text.join(" "), reasons, probability: None, explanations: Vec::new() }
+}

@@ -1,0 +1,10 @@
+//! Which leaks there are, where no flow meter tells: by the likelihood of their coefficients, of a hold or of a valve's flows.
+
+mod belief;
+mod found;
+mod likelihood;
+
+pub(crate) use belief::Place;
+pub use found::FoundLeak;
+pub(crate) use found::{Found, LEAST_DRIVING_PA, report, told};
+pub(crate) use likelihood::{LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, RESOLUTION};

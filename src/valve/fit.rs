@@ -1,0 +1,208 @@
+//! Maximum likelihood of the unknowns over the readings of a window.
+//!
+//! Readings stand on both sides of the equations. So signals and unknowns are found in turn: the equations are made linear at the
+//! likeliest signals, which begin as running means, and κ stays where it is for the first rounds: else the noise of the pressures
+//! is taken for compression (Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
+
+use super::edges::{SPOOL, Signals};
+use super::equations::{Known, Node, Rates, Step};
+use super::parts::{Normal, Part};
+use super::unknowns::{Belief, HYSTERESIS, KAPPA, LAPS, ROUNDING, Unknowns};
+use super::whitening::Whitening;
+
+const MOST_ROUNDS: usize = 20;
+/// Rounds in which κ is held, and in which the laps move by no more than this, a share of the stroke: the edges' corners are far
+/// from linear.
+const ROUNDS_HELD: usize = 4;
+const ROUNDS_SLOW: usize = 3;
+const SLOW: f64 = 0.01;
+/// Rounds after which the spool is followed with the hysteresis found, within these multiples of the declared one.
+const ROUNDS_FOLLOWED: [usize; 3] = [5, 8, 11];
+const PLAY_RANGE: [f64; 2] = [0.3, 2.0];
+/// The search is over where no unknown moves by more than this share of its standard deviation.
+const SETTLED: f64 = 0.02;
+/// κ stays within these multiples of the rig file's on its way, and an edge is never sharper than this share of the stroke.
+const KAPPA_RANGE: [f64; 2] = [0.2, 5.0];
+const SHARPEST: f64 = 1e-3;
+/// Signals begin as means over so many readings to either side.
+const REACH: usize = 3;
+/// Fewer readings without a pause tell nothing.
+pub(super) const LEAST_READINGS: usize = 8;
+/// A window is summed up in parts of so many seconds: leaks may change between two of them.
+const PART_S: f64 = 5.0;
+
+/// Readings without a pause, and the likeliest signals.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Run {
+    readings: Vec<Node>,
+    nodes: Vec<Node>,
+}
+
+/// What a window says.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    /// Around which all is linear.
+    pub at: Unknowns,
+    pub parts: Vec<Part>,
+}
+
+impl Run {
+    /// Adds a reading at the end.
+    pub fn push(&mut self, reading: Node) {
+        self.readings.push(reading);
+    }
+
+    /// The readings from one time up to another, s, as a run of its own.
+    pub fn between(&self, from_s: f64, to_s: f64) -> Option<Self> {
+        let readings: Vec<Node> =
+            self.readings.iter().filter(|node| node.t_s >= from_s && node.t_s < to_s).copied().collect();
+        (readings.len() >= LEAST_READINGS).then_some(Self { readings, nodes: Vec::new() })
+    }
+
+    pub fn readings(&self) -> &[Node] {
+        &self.readings
+    }
+
+    /// Signals of readings that are new begin as running means.
+    fn begin(&mut self, half_width: f64) {
+        if self.nodes.len() < self.readings.len() {
+            let known = self.nodes.len().saturating_sub(REACH);
+            let means = follow_spool(&mut self.readings, half_width);
+            self.nodes.truncate(known);
+            self.nodes.extend_from_slice(&means[known..]);
+        }
+    }
+
+    /// Where the spool stands within a hysteresis of this half width.
+    fn follow(&mut self, half_width: f64) {
+        follow_spool(&mut self.readings, half_width);
+        for (node, reading) in self.nodes.iter_mut().zip(&self.readings) {
+            node.spool = reading.spool;
+        }
+    }
+
+    fn whitened<'a>(&self, unknowns: &Unknowns, known: &'a Known) -> Option<Whitening<'a>> {
+        let mut white = Whitening::new(&known.variances, self.nodes.len());
+        let mut last: Option<(&Node, &Node, Rates)> = None;
+        for (reading, node) in self.readings.iter().zip(&self.nodes) {
+            let rates = Rates::at(node, unknowns, known);
+            if let Some((first_reading, first, from)) = &last {
+                let mut step = Step::between([first, node], [from, &rates], unknowns, known);
+                // At the readings themselves, made linear at the signals.
+                step.residual_m3 += step.by_first * (first_reading.signals - first.signals)
+                    + step.by_last * (reading.signals - node.signals);
+                white.push(&step)?;
+            }
+            last = Some((reading, node, rates));
+        }
+        Some(white)
+    }
+
+    /// Moves the signals to the likeliest where the unknowns go by `step`.
+    fn smooth(&mut self, white: &Whitening<'_>, step: &Unknowns) -> Option<()> {
+        let corrections = white.corrections(|one| one.residual + one.by_unknowns * step)?;
+        for ((node, reading), correction) in self.nodes.iter_mut().zip(&self.readings).zip(corrections) {
+            node.signals = reading.signals - correction;
+        }
+        Some(())
+    }
+
+    fn parts(&self, white: &Whitening<'_>) -> Vec<Part> {
+        let mut parts: Vec<Part> = Vec::new();
+        for (step, pair) in white.steps().iter().zip(self.readings.windows(2)) {
+            let [from, to] = pair else { continue };
+            if parts.last().is_none_or(|part| from.t_s >= part.from_s + PART_S) {
+                parts.push(Part::from(from.t_s));
+            }
+            if let Some(part) = parts.last_mut() {
+                part.add(step, [from, to]);
+            }
+        }
+        parts
+    }
+}
+
+/// Fits all runs together after what was believed before, beginning at `unknowns`; `is_cold` where those are the data sheet's. None
+/// where no finite number comes out.
+pub(super) fn fit(
+    runs: &mut [Run],
+    before: &Belief,
+    mut unknowns: Unknowns,
+    is_cold: bool,
+    half_width: f64,
+    known: &Known,
+) -> Option<Fit> {
+    runs.iter_mut().for_each(|run| run.begin(half_width));
+    for round in 0..MOST_ROUNDS {
+        if ROUNDS_FOLLOWED.contains(&round) && half_width > 0.0 {
+            let found =
+                unknowns[HYSTERESIS].abs().clamp(PLAY_RANGE[0] * half_width, PLAY_RANGE[1] * half_width);
+            runs.iter_mut().for_each(|run| run.follow(found));
+        }
+        let held = is_cold && round < ROUNDS_HELD;
+        let mut normal = Normal::prior(before, &unknowns);
+        let mut whites = Vec::with_capacity(runs.len());
+        for run in runs.iter() {
+            let white = run.whitened(&unknowns, known)?;
+            normal.add_steps(white.steps());
+            whites.push(white);
+        }
+        let step = normal.solve(held.then_some(KAPPA))?;
+        let share = if is_cold && round < ROUNDS_SLOW { slow(&step) } else { 1.0 };
+        for (run, white) in runs.iter_mut().zip(&whites) {
+            run.smooth(white, &step)?;
+        }
+        unknowns = bounded(unknowns + step * share);
+        if !held && normal.square(&step) < SETTLED * SETTLED {
+            break;
+        }
+    }
+    let mut parts = Vec::new();
+    for run in runs.iter() {
+        parts.extend(run.parts(&run.whitened(&unknowns, known)?));
+    }
+    Some(Fit { at: unknowns, parts })
+}
+
+fn slow(step: &Unknowns) -> f64 {
+    let most = step.fixed_rows::<4>(LAPS).amax();
+    if most > SLOW { SLOW / most } else { 1.0 }
+}
+
+fn bounded(mut unknowns: Unknowns) -> Unknowns {
+    unknowns[KAPPA] = unknowns[KAPPA].clamp(KAPPA_RANGE[0], KAPPA_RANGE[1]);
+    unknowns[ROUNDING] = unknowns[ROUNDING].abs().max(SHARPEST);
+    unknowns
+}
+
+/// Running means, over less where the run ends.
+fn running_means(readings: &[Node]) -> Vec<Node> {
+    let last = readings.len().saturating_sub(1);
+    let mean = |index: usize| {
+        let reach = REACH.min(index).min(last - index);
+        let part = &readings[index - reach..=index + reach];
+        part.iter().map(|node| node.signals).sum::<Signals>() / part.len() as f64
+    };
+    (0..readings.len()).map(|index| Node { signals: mean(index), ..readings[index] }).collect()
+}
+
+/// Running means with the spool's speed and where it stands within a hysteresis of half this width, which the readings get as well.
+fn follow_spool(readings: &mut [Node], half_width: f64) -> Vec<Node> {
+    let mut means = running_means(readings);
+    let last = readings.len().saturating_sub(1);
+    let mut play = 0.0;
+    for index in 0..readings.len() {
+        let (from, to) = (&means[index.saturating_sub(1)], &means[(index + 1).min(last)]);
+        let span_s = to.t_s - from.t_s;
+        let rise = to.signals[SPOOL] - from.signals[SPOOL];
+        if half_width > 0.0 && index > 0 {
+            let moved = means[index].signals[SPOOL] - means[index - 1].signals[SPOOL];
+            play = f64::clamp(play + moved / half_width, -1.0, 1.0);
+        }
+        let rate_ps = if span_s > 0.0 { rise / span_s } else { 0.0 };
+        for node in [&mut readings[index], &mut means[index]] {
+            (node.spool.rate_ps, node.spool.play) = (rate_ps, play);
+        }
+    }
+    means
+}

@@ -1,0 +1,208 @@
+//! Takes the readings of a trace or a stream, and fits them a window at a time: what is known of the valve goes on from one to the next,
+//! and the leaks do while they stay the same.
+
+use super::calibration::{self, Calibration, CalibrationError, Since};
+use super::edges::{SPOOL, Signals, Spool};
+use super::equations::{Known, Node};
+use super::fit::{LEAST_READINGS, Run, fit};
+use super::parts::{Summary, summary};
+use super::unknowns::{Belief, Unknowns};
+use crate::rig::{Rig, ValveSheet};
+use crate::trace::Record;
+
+/// A window has so many readings at the most: ten minutes at 100 Hz, 15 MB. Less, and the unknowns of the first are too far from linear.
+const MOST_READINGS: usize = 60_000;
+/// Leaks change so often in a window at the most: a search that halves it must end.
+const MOST_CHANGES: usize = 3;
+/// Fewer readings tell nothing.
+const LEAST_WINDOW: usize = 100;
+
+/// The flows of a valve as a meter for leaks.
+#[derive(Clone, Debug)]
+pub struct ValveMeter {
+    known: Known,
+    sheet: ValveSheet,
+    /// Before the window.
+    before: Belief,
+    /// Where the last search ended; none before the first.
+    at: Option<Unknowns>,
+    runs: Vec<Run>,
+    count: usize,
+    /// Least and greatest spool.
+    spool_range: [f64; 2],
+    since: Option<Since>,
+    /// What the windows before this one said.
+    last: Option<Taken>,
+}
+
+/// What a window said.
+#[derive(Clone, Debug)]
+pub(super) struct Taken {
+    pub summary: Summary,
+    /// Around which it is linear.
+    pub at: Unknowns,
+    pub changed_at_s: Option<f64>,
+    /// How often they changed.
+    pub changes: usize,
+    /// Whether noise explains what was before the last change, too.
+    pub was_explained: bool,
+}
+
+impl ValveMeter {
+    /// For a rig with `[valve]`; `before` is what is known of it.
+    pub(super) fn with(rig: &Rig, sheet: &ValveSheet, before: Belief, since: Option<Since>) -> Self {
+        Self {
+            known: Known::of(rig, sheet),
+            sheet: sheet.clone(),
+            before,
+            at: None,
+            runs: Vec::new(),
+            count: 0,
+            spool_range: [f64::INFINITY, f64::NEG_INFINITY],
+            since,
+            last: None,
+        }
+    }
+
+    /// For a rig with `[valve]`, by its calibration or else its data sheet; none for a rig without.
+    ///
+    /// # Errors
+    /// Where the calibration cannot be read, or is of another rig.
+    pub fn of(rig: &Rig) -> Result<Option<Self>, CalibrationError> {
+        let Some(sheet) = rig.valve.as_ref() else { return Ok(None) };
+        let calibration = calibration::of_rig(rig, sheet)?;
+        let belief = calibration.as_ref().and_then(|found| found.belief(rig, sheet));
+        let before = belief.unwrap_or_else(|| Belief::of_sheet(rig, sheet));
+        Ok(Some(Self::with(rig, sheet, before, calibration.as_ref().map(Calibration::since))))
+    }
+
+    pub(super) fn sheet(&self) -> &ValveSheet {
+        &self.sheet
+    }
+
+    pub(super) fn calibrated(&self) -> Option<Since> {
+        self.since
+    }
+
+    /// Least and greatest position of the spool; none where it was never read.
+    pub(super) fn spool_range(&self) -> Option<[f64; 2]> {
+        self.spool_range[0].is_finite().then_some(self.spool_range)
+    }
+
+    /// Takes in a record of a rig that may have a valve; with the first flow of a meter it has no say any more.
+    #[inline]
+    pub fn record(meter: &mut Option<Self>, record: &Record) {
+        if let Some(valve) = meter {
+            if record.sample.qa_m3s.is_some() || record.sample.qb_m3s.is_some() {
+                *meter = None;
+            } else {
+                valve.push(record);
+            }
+        }
+    }
+
+    /// Takes in a record, and says whether it was one of the valve's: with a spool and a supply pressure, the ports open.
+    pub fn push(&mut self, record: &Record) -> bool {
+        let is_apart = record.after_gap || record.shut == Some(true);
+        if is_apart || self.runs.is_empty() {
+            self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
+            self.runs.push(Run::default());
+        }
+        let Some(node) = self.node(record).filter(|_| record.shut != Some(true)) else { return false };
+        let [least, most] = self.spool_range;
+        self.spool_range = [least.min(node.signals[SPOOL]), most.max(node.signals[SPOOL])];
+        if let Some(run) = self.runs.last_mut() {
+            run.push(node);
+            self.count += 1;
+        }
+        if self.count >= MOST_READINGS {
+            self.next_window();
+        }
+        true
+    }
+
+    fn node(&self, record: &Record) -> Option<Node> {
+        let valve = record.valve?;
+        let supply_pa = valve.supply_pa.or(self.sheet.supply_pa)?;
+        let sample = &record.sample;
+        Some(Node {
+            t_s: record.t_s,
+            signals: Signals::from([sample.x_m, sample.pa_pa, sample.pb_pa, valve.spool, supply_pa]),
+            spool: Spool { tank_pa: valve.tank_pa.unwrap_or(self.sheet.tank_pa), ..Spool::default() },
+        })
+    }
+
+    /// What the readings so far say; none where they are too few, or no finite number comes out.
+    pub(super) fn taken(&mut self) -> Option<Taken> {
+        self.window().or_else(|| self.last.clone())
+    }
+
+    /// What the readings of this window say, and those before.
+    fn window(&mut self) -> Option<Taken> {
+        if self.count < LEAST_WINDOW {
+            return None;
+        }
+        let (start, is_cold) = self.at.map_or((self.before.mean, true), |at| (at, false));
+        self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
+        let taken = self.settled(&mut self.runs.clone(), &self.before, start, is_cold, MOST_CHANGES)?;
+        self.at = Some(taken.at);
+        Some(match &self.last {
+            Some(last) if taken.changed_at_s.is_none() => Taken {
+                summary: taken.summary.after(&last.summary),
+                changed_at_s: last.changed_at_s,
+                changes: last.changes,
+                was_explained: last.was_explained,
+                ..taken
+            },
+            _ => taken,
+        })
+    }
+
+    /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
+    fn settled(
+        &self,
+        runs: &mut [Run],
+        before: &Belief,
+        start: Unknowns,
+        is_cold: bool,
+        changes: usize,
+    ) -> Option<Taken> {
+        let fit = fit(runs, before, start, is_cold, self.sheet.hysteresis, &self.known)?;
+        let summary = summary(&fit.parts, before, &fit.at)?;
+        let constant = Taken { summary, at: fit.at, changed_at_s: None, changes: 0, was_explained: true };
+        let since = constant.summary.since;
+        if since == 0 || changes == 0 {
+            return Some(constant);
+        }
+        // Within the part before, or in this one, which are left out.
+        let begins = |part: usize| fit.parts.get(part).map(|part| part.from_s);
+        let changed_at_s = begins(since)?;
+        let until_s = begins(since - 1)?;
+        let from_s = begins(since + 1).filter(|_| since + 2 < fit.parts.len()).unwrap_or(changed_at_s);
+        let part = |from_s: f64, to_s: f64| {
+            runs.iter().filter_map(|run| run.between(from_s, to_s)).collect::<Vec<_>>()
+        };
+        let mut early = part(f64::NEG_INFINITY, until_s);
+        let valve = self.settled(&mut early, before, before.mean, true, changes - 1);
+        let known = valve.as_ref().map_or(before, |taken| &taken.summary.belief).with_new_leaks()?;
+        let now = self.settled(&mut part(from_s, f64::INFINITY), &known, known.mean, true, changes - 1)?;
+        let was_explained =
+            valve.as_ref().is_none_or(|taken| taken.was_explained && taken.summary.is_explained());
+        Some(Taken {
+            changed_at_s: now.changed_at_s.or(Some(changed_at_s)),
+            changes: now.changes + 1 + valve.map_or(0, |taken| taken.changes),
+            was_explained: now.was_explained && was_explained,
+            ..now
+        })
+    }
+
+    /// What the window says becomes what was believed before.
+    fn next_window(&mut self) {
+        if let Some(taken) = self.window() {
+            self.before = taken.summary.belief.clone();
+            self.last = Some(taken);
+        }
+        self.runs.clear();
+        self.count = 0;
+    }
+}

@@ -1,0 +1,122 @@
+//! What is not known of a cylinder and its valve, and what the rig file says of it.
+
+pub(super) use crate::presence::LEAK_UNIT_M3SPA;
+use crate::rig::{Rig, ValveSheet};
+use nalgebra::{SMatrix, SVector};
+
+/// How many there are.
+pub(super) const UNKNOWNS: usize = 23;
+/// C_ip, C_epA, C_epB, in [`LEAK_UNIT_M3SPA`].
+pub(super) const LEAKS: usize = 0;
+/// κ = 1/β, in the rig file's.
+pub(super) const KAPPA: usize = 3;
+/// K₁ … K₄, in the data sheet's.
+pub(super) const GAINS: usize = 4;
+/// d₁ … d₄, shares of the stroke.
+pub(super) const LAPS: usize = 8;
+/// w, a share of the stroke.
+pub(super) const ROUNDING: usize = 12;
+/// c of full openings.
+pub(super) const SATURATION: usize = 13;
+/// What the tank's pressure is off by, bar.
+pub(super) const TANK: usize = 14;
+/// By how much the spool's reading is late, ms.
+pub(super) const LAG: usize = 15;
+/// l₁ … l₄, in [`LEAK_UNIT_M3SPA`].
+pub(super) const CLEARANCES: usize = 16;
+/// Half width of the hysteresis, a share of the stroke.
+pub(super) const HYSTERESIS: usize = 20;
+/// What the supply's pressure is off by, bar.
+pub(super) const SUPPLY: usize = 21;
+/// By how much the supply's pressure drops between its sensor and the valve at the rated flow, bar.
+pub(super) const DROOP: usize = 22;
+
+pub(super) const PA_PER_BAR: f64 = 1e5;
+pub(super) const S_PER_MS: f64 = 1e-3;
+
+pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
+pub(super) type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+
+/// A leak's size before any reading, 1 σ: any that a cylinder may have.
+pub(super) const LEAK_STD: f64 = 100.0;
+/// Edges are rounded off by some hundredths of the stroke, and full openings lack some: guesses, as is the tank's pressure.
+const ROUNDING_USUAL: [f64; 2] = [0.02, 0.01];
+const SATURATION_STD: f64 = 0.05;
+const TANK_STD_BAR: f64 = 1.0;
+const LAG_STD_MS: f64 = 2.0;
+const DROOP_STD_BAR: f64 = 2.0;
+/// Zeros of a pressure sensor that nobody declared, a share of its accuracy: 1 σ.
+const ZERO_SHARE: f64 = 1.0 / 3.0;
+/// Of what is known for certain: rounding.
+pub(super) const CERTAIN: f64 = 1e-6;
+
+/// What is believed of the unknowns: normal, with this mean and inverse covariance.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Belief {
+    pub mean: Unknowns,
+    pub information: Information,
+}
+
+impl Belief {
+    /// By the data sheet alone.
+    pub fn of_sheet(rig: &Rig, sheet: &ValveSheet) -> Self {
+        let (mut mean, mut std) = (Unknowns::zeros(), Unknowns::zeros());
+        let mut set = |place: usize, count: usize, is: f64, spread: f64| {
+            for at in place..place + count {
+                (mean[at], std[at]) = (is, spread.max(CERTAIN));
+            }
+        };
+        set(LEAKS, 3, 0.0, LEAK_STD);
+        set(KAPPA, 1, 1.0, rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa);
+        set(GAINS, 4, 1.0, sheet.gain_std);
+        set(LAPS, 4, sheet.lap, sheet.lap_std);
+        set(ROUNDING, 1, ROUNDING_USUAL[0], ROUNDING_USUAL[1]);
+        set(SATURATION, 1, 0.0, SATURATION_STD);
+        set(TANK, 1, 0.0, TANK_STD_BAR);
+        set(LAG, 1, sheet.spool_lag_s / S_PER_MS, LAG_STD_MS);
+        set(CLEARANCES, 4, 0.0, clearance_std(sheet));
+        set(HYSTERESIS, 1, 0.0, sheet.hysteresis);
+        set(DROOP, 1, 0.0, DROOP_STD_BAR);
+        set(SUPPLY, 1, 0.0, supply_std_pa(rig, sheet) / PA_PER_BAR);
+        Self { mean, information: Information::from_diagonal(&std.map(|std| std.powi(-2))) }
+    }
+
+    /// Where nothing is known of the leaks; what is known of all else stays.
+    pub fn with_new_leaks(&self) -> Option<Self> {
+        Self::of(self.mean, self.covariance()?)
+    }
+
+    /// Of a mean and covariances, those of the leaks aside, of which nothing is known.
+    pub fn of(mut mean: Unknowns, mut covariance: Information) -> Option<Self> {
+        for leak in LEAKS..LEAKS + 3 {
+            mean[leak] = 0.0;
+            covariance.row_mut(leak).fill(0.0);
+            covariance.column_mut(leak).fill(0.0);
+            covariance[(leak, leak)] = LEAK_STD.powi(2);
+        }
+        Some(Self { mean, information: covariance.cholesky()?.inverse() })
+    }
+
+    pub fn covariance(&self) -> Option<Information> {
+        Some(self.information.cholesky()?.inverse())
+    }
+}
+
+/// Half of what the valve leaks at its middle passes each edge, 1 σ, in [`LEAK_UNIT_M3SPA`].
+pub(super) fn clearance_std(sheet: &ValveSheet) -> f64 {
+    0.5 * sheet.null_leak * sheet.rated_flow_m3s / sheet.rated_drop_pa / LEAK_UNIT_M3SPA
+}
+
+/// What the data sheet allows an edge to leak by its clearance, at a pressure, m³/s.
+pub(super) fn clearance_m3s(sheet: &ValveSheet, pressure_pa: f64) -> f64 {
+    clearance_std(sheet) * LEAK_UNIT_M3SPA * pressure_pa
+}
+
+/// A supply that is read is off by its sensor's zero.
+fn supply_std_pa(rig: &Rig, sheet: &ValveSheet) -> f64 {
+    if sheet.supply_pa.is_some() {
+        return sheet.supply_std_pa;
+    }
+    let spread = rig.instruments.supply.spread();
+    spread.bias_std.max(ZERO_SHARE * spread.noise_std)
+}

@@ -1,0 +1,178 @@
+//! What a technician acts on where the valve's flows stood for meters.
+
+use super::calibration::LeaksThen;
+use super::meter::Taken;
+use super::outcome::ValveTest;
+use crate::presence::{LEAST_DRIVING_PA, told};
+use crate::report::{Reason, ReasonId, Status, Verdict, join};
+use crate::rig::Rig;
+use crate::units::{LPM_PER_M3S, readable};
+use pitchleak_core::{Leak, PerLeak};
+
+/// Leaks below zero by so much contradict it.
+const NEGATIVE_SIGMAS: f64 = 5.0;
+/// Leaks that would have to change so often within a window are none (chosen).
+const MOST_CHANGES: usize = 1;
+/// A compressibility off by so many of the rig file's standard deviations contradicts it.
+const BULK_MODULUS_SIGMAS: f64 = 3.0;
+
+impl ValveTest {
+    pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
+        let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        let (Some(found), Some(taken)) = (&self.found, &self.taken) else {
+            return told(Status::NotSure, Vec::new(), vec![too_short()], "");
+        };
+        let sorted = found.sorted(&threshold_lpm, 1.0 - rig.decision.alpha);
+        let contradictions = contradictions(taken, found.beliefs.negative, rig);
+        if !contradictions.is_empty() {
+            let apparent = found.apparent(&sorted.found);
+            return told(Status::Doubtful, sorted.found, contradictions, &apparent);
+        }
+        let mut sentences: Vec<String> = Vec::new();
+        for leak in &sorted.found {
+            sentences.push(found.leak(*leak, threshold_lpm[*leak]));
+            sentences.extend(self.against(*leak));
+        }
+        sentences.extend(found.none_above(&sorted.excluded, &threshold_lpm));
+        if !sorted.found.is_empty() && !sorted.open.is_empty() {
+            sentences
+                .push(format!("The valve's flows cannot tell about {} leaks.", join(&sorted.open, "and")));
+        }
+        sentences.push(self.basis());
+        let text = sentences.join(" ");
+        let (status, reasons) = if !sorted.found.is_empty() {
+            (Status::Leak, Vec::new())
+        } else if sorted.open.is_empty() {
+            (Status::Sound, Vec::new())
+        } else {
+            (Status::NotSure, vec![self.open(&sorted.open)])
+        };
+        told(status, sorted.found, reasons, &text)
+    }
+
+    /// An external leak is told against what the valve's own clearance may leak, or against a calibration.
+    fn against(&self, leak: Leak) -> Option<String> {
+        let (edge, clearance_lpm) = self.edge(leak)?;
+        Some(match self.summary.calibrated {
+            Some(since) if since.leaks == LeaksThen::Unknown => {
+                format!("It is more than on {}: what leaked then is not in it.", since.date)
+            }
+            Some(since) if !since.has_evidence => {
+                format!("That nothing leaked on {}, when the valve was calibrated, is assumed.", since.date)
+            }
+            Some(_) => return None,
+            None => format!(
+                "The valve's {edge} edge would look the same, and its data sheet allows {} L/min: a hold test tells.",
+                readable(clearance_lpm, 2)
+            ),
+        })
+    }
+
+    /// The edge to the tank at a chamber, and what its clearance may leak.
+    fn edge(&self, leak: Leak) -> Option<(&'static str, f64)> {
+        let [a, b] = self.summary.clearance_lpm;
+        match leak {
+            Leak::Internal => None,
+            Leak::ExternalA => Some(("A–T", a)),
+            Leak::ExternalB => Some(("B–T", b)),
+        }
+    }
+
+    /// What the verdict rests on.
+    fn basis(&self) -> String {
+        let time = readable(self.summary.usable_s, 3);
+        let known = match self.summary.calibrated {
+            Some(since) => format!("calibrated on {}", since.date),
+            None => "by its data sheet".to_owned(),
+        };
+        let scatter = self.summary.scatter;
+        let noise = if scatter > 1.2 {
+            format!(" The readings scatter {scatter:.1} times as declared.")
+        } else {
+            String::new()
+        };
+        let since = if self.taken.as_ref().is_some_and(|taken| taken.changes > 0) {
+            " since the leaks changed"
+        } else {
+            ""
+        };
+        format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}")
+    }
+
+    fn open(&self, open: &[Leak]) -> Reason {
+        let leaks: PerLeak<_> = self.summary.leaks.unwrap_or(PerLeak::from_fn(|_| Default::default()));
+        if open == [Leak::Internal] && leaks.internal.pressure_bar * 1e5 < LEAST_DRIVING_PA {
+            return Reason::new(
+                ReasonId::NotIdentifiable,
+                "the valve's flows do not rule out internal leaks",
+                "P_A and P_B are nearly alike, so that hardly any oil passes the piston: record under load",
+            );
+        }
+        let external = open.iter().any(|leak| *leak != Leak::Internal);
+        let remedy = match (external, self.summary.calibrated) {
+            (true, None) => {
+                "the valve's clearances may leak as much: shut both ports for ten seconds (a hold test), or calibrate the valve (`pitchleak calibrate`)"
+            }
+            _ => "record longer, with the piston moving both ways and both pressures changing",
+        };
+        let sizes: Vec<String> = open
+            .iter()
+            .map(|leak| format!("{} up to {} L/min", leak.label(), readable(leaks[*leak].ci95_lpm[1], 2)))
+            .collect();
+        Reason::new(
+            ReasonId::NotIdentifiable,
+            format!("the valve's flows do not rule out {} leaks: {}", join(open, "and"), sizes.join(", ")),
+            remedy,
+        )
+    }
+}
+
+fn too_short() -> Reason {
+    Reason::new(
+        ReasonId::NotIdentifiable,
+        "this trace is too short to tell leaks from the valve's own gains and laps",
+        "record 20 s or more, in motion and both ways",
+    )
+}
+
+const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
+
+fn contradictions(taken: &Taken, negative: f64, rig: &Rig) -> Vec<Reason> {
+    let fit = &taken.summary;
+    let mut reasons = Vec::new();
+    if !(taken.was_explained && fit.is_explained()) || taken.changes > MOST_CHANGES {
+        let what = match taken.changes {
+            0 => format!(
+                "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
+                fit.unlike()
+            ),
+            1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
+            times => format!(
+                "no valve as in [valve] explains this trace: its leaks would have changed {times} times"
+            ),
+        };
+        reasons.push(Reason::new(ReasonId::ModelDoesNotFit, what, LOOK_FOR));
+    }
+    if negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
+        reasons.push(Reason::new(
+            ReasonId::NegativeLeak,
+            "more oil stays in the cylinder than the valve lets in",
+            "compare areas, rated_flow and rated_drop with the data sheets, and check which way the spool counts: + feeds A",
+        ));
+    }
+    let (declared_pa, std_pa) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
+    let kappa = fit.belief.mean[super::unknowns::KAPPA];
+    if std_pa > 0.0 && (kappa - 1.0).abs() * declared_pa > BULK_MODULUS_SIGMAS * std_pa {
+        reasons.push(Reason::new(
+            ReasonId::BulkModulusImpossible,
+            format!(
+                "the trace asks for a bulk modulus of {:.2} GPa, and the rig file says {:.2} ± {:.2} GPa",
+                1e-9 * declared_pa / kappa,
+                declared_pa / 1e9,
+                std_pa / 1e9
+            ),
+            "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil",
+        ));
+    }
+    reasons
+}

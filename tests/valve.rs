@@ -1,0 +1,302 @@
+//! Leaks without flow meters, by the valve's flows, against a plant that shares no code with the program.
+
+use pitchleak::Rig;
+use pitchleak::core::Leak;
+use pitchleak::replay::{ReplayError, replay};
+use pitchleak::report::{ReplayReport, Status};
+use pitchleak::trace::TraceReader;
+use pitchleak::valve::{Calibration, CalibrationError, Calibrator, LeaksThen};
+use pitchleak_testkit::valve::ValveCylinder;
+use pitchleak_testkit::{coverage_bounds, white_noise};
+use rayon::prelude::*;
+use std::io::Cursor;
+
+const WINDS: [f64; 4] = [0.5, 1.0, 1.5, 2.5];
+const RUNS: u64 = 12;
+/// 1 L/min at 50 bar, m³/(s·Pa).
+const UNIT: f64 = 1.0 / 60e3 / 50e5;
+
+/// Other cylinders, motions and noise with `PITCHLEAK_SEED`.
+fn first_seed() -> u64 {
+    std::env::var("PITCHLEAK_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(10_000)
+}
+
+/// Sensors of 0.3 %, a valve of 4 L/min at 35 bar known by its data sheet, and what else `[valve]` says.
+fn rig(valve: &str) -> Rig {
+    let text = format!(
+        r#"
+[cylinder]
+area_a = "12.6 cm^2"
+area_b = "9.4 cm^2"
+stroke = "0.2 m"
+moving_mass = "60 kg"
+dead_volume_a = "50 mL"
+dead_volume_b = "50 mL"
+[fluid]
+bulk_modulus = "0.8 GPa"
+bulk_modulus_std = "0.2 GPa"
+[sensors]
+pressure = {{ full_scale = "160 bar", accuracy = "0.3 %" }}
+position = {{ full_scale = "0.2 m", accuracy = "0.3 %" }}
+spool = {{ accuracy = "0.3 %" }}
+[valve]
+rated_flow = "4 L/min"
+rated_drop = "35 bar"
+tank = "2 bar"
+{valve}"#
+    );
+    Rig::parse(&text, "valve").expect("a rig")
+}
+
+fn reader<'a>(name: &str, text: String, rig: &Rig) -> TraceReader<'a> {
+    TraceReader::from_stream(name, Box::new(Cursor::new(text)), rig).expect("a trace")
+}
+
+fn judged(text: String, rig: &Rig) -> ReplayReport {
+    replay(&mut reader("valve", text, rig), rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report")
+}
+
+/// Reports on traces at 100 Hz of fresh cylinders.
+fn reports(runs: u64, seconds: f64, of: impl Fn(u64) -> ValveCylinder + Sync) -> Vec<ReplayReport> {
+    let rig = rig("");
+    (0..runs).into_par_iter().map(|seed| judged(of(seed).trace(seconds, 100.0, 3e-3), &rig)).collect()
+}
+
+/// A leak is found alone.
+fn is_found(report: &ReplayReport, leak: Leak) -> bool {
+    report.verdict.status == Status::Leak && report.verdict.faults == [leak]
+}
+
+/// Share of the 95 % intervals of a leak's coefficient that hold it; `lpm` at 50 bar.
+fn covered(reports: &[ReplayReport], leak: Leak, lpm: f64) -> f64 {
+    let holds = |report: &&ReplayReport| {
+        let entry = report.estimates.leaks()[leak].clone();
+        let [low, high] = entry.ci95.expect("an interval");
+        (low..=high).contains(&(lpm / 60e3 / 50e5))
+    };
+    reports.iter().filter(holds).count() as f64 / reports.len() as f64
+}
+
+#[test]
+fn an_internal_leak_is_found_whatever_the_valve_is() {
+    let (mut in_20_s, mut in_60_s, mut all) = (0, Vec::new(), 0);
+    let (mut squares, mut bounds) = (0.0, 0.0);
+    for wind in WINDS {
+        let leaking =
+            |seed| ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + seed).leaking(0, 0.02) };
+        in_20_s += reports(RUNS, 20.0, leaking).iter().filter(|one| is_found(one, Leak::Internal)).count();
+        in_60_s.extend(reports(RUNS, 60.0, leaking));
+        all += RUNS as usize;
+    }
+    for report in &in_60_s {
+        let entry = &report.estimates.internal_leak_coefficient;
+        squares += (entry.value / UNIT - 0.02).powi(2);
+        bounds += (entry.std.expect("a spread") / UNIT).powi(2);
+    }
+    let found = in_60_s.iter().filter(|one| is_found(one, Leak::Internal)).count();
+    let [rms, bound] = [squares, bounds].map(|sum| (sum / all as f64).sqrt());
+    let covered = covered(&in_60_s, Leak::Internal, 0.02);
+    println!(
+        "internal 0.02 L/min: {in_20_s} of {all} in 20 s, {found} in 60 s; rms {rms:.5} of {bound:.5}, covered {covered:.3}"
+    );
+    assert!(in_20_s * 100 >= all * 80 && found * 100 >= all * 95, "{in_20_s} {found} of {all}");
+    assert!(rms < 1.3 * bound && covered >= coverage_bounds(0.95, all as u64)[0], "{rms} {bound} {covered}");
+}
+
+#[test]
+fn a_sound_cylinder_has_no_leak_and_its_valve_is_said_to_be_open() {
+    for wind in WINDS {
+        let found = reports(RUNS, 60.0, |seed| ValveCylinder {
+            wind,
+            ..ValveCylinder::drawn(first_seed() + 100 + seed)
+        });
+        let sound = found.iter().filter(|one| one.verdict.status == Status::Sound).count();
+        println!("sound at wind {wind}: {sound} of {RUNS} SOUND");
+        for report in &found {
+            assert!(
+                matches!(report.verdict.status, Status::Sound | Status::NotSure),
+                "{}",
+                report.verdict.text
+            );
+            let internal = report.valve.as_ref().and_then(|valve| valve.leaks).expect("leaks").internal;
+            assert!(internal.ci95_lpm[1] < 0.01, "{}", report.verdict.text);
+            if report.verdict.status == Status::NotSure {
+                assert!(
+                    report.verdict.text.contains("(a hold test), or calibrate"),
+                    "{}",
+                    report.verdict.text
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_external_leak_is_told_beyond_what_the_valves_clearance_may_be() {
+    // 1 σ at 50 bar.
+    let clearance_lpm = 0.5 * 0.02 * 4.0 * 50.0 / 35.0;
+    for (index, leak) in [(1, Leak::ExternalA), (2, Leak::ExternalB)] {
+        let leaking =
+            |lpm: f64| move |seed| ValveCylinder::drawn(first_seed() + 200 + seed).leaking(index, lpm);
+        let large = reports(RUNS, 60.0, leaking(0.4));
+        let found = large.iter().filter(|one| is_found(one, leak)).count();
+        println!("{leak:?} 0.4 L/min: {found} of {RUNS}, covered {:.2}", covered(&large, leak, 0.4));
+        assert!(found as u64 * 100 >= RUNS * 95, "{found}");
+        assert!(covered(&large, leak, 0.4) >= coverage_bounds(0.95, RUNS)[0]);
+        for report in large.iter().filter(|one| is_found(one, leak)) {
+            assert!(report.verdict.text.contains("edge would look the same"), "{}", report.verdict.text);
+        }
+        // No leak, but a clearance of 3.6 σ.
+        let valve_alone = reports(RUNS, 60.0, |seed| {
+            let mut cylinder = ValveCylinder::drawn(first_seed() + 300 + seed);
+            cylinder.valve.clearances_lpm[2 * index - 1] = 3.6 * clearance_lpm;
+            cylinder
+        });
+        let named = valve_alone.iter().filter(|one| one.verdict.status == Status::Leak).count();
+        println!("clearance of 3.6 sigma at {leak:?}: {named} of {RUNS} named a leak");
+        assert_eq!(named, 0);
+    }
+}
+
+/// What nobody declared: no leak is named that is not there.
+#[test]
+fn what_a_valve_does_beside_its_data_sheet_is_no_leak() {
+    type Flaw = fn(&mut ValveCylinder);
+    let worlds: [(&str, Flaw); 11] = [
+        ("hysteresis of 1 %", |one| one.valve.hysteresis = 0.01),
+        ("hysteresis of 0.3 %", |one| one.valve.hysteresis = 0.003),
+        ("null drift of 0.5 %", |one| one.valve.null_drift = 0.005),
+        ("spool read 10 ms late", |one| one.valve.spool_lag_s = 0.01),
+        ("overlap of 3 %", |one| one.valve.laps = [0.03; 4]),
+        ("saturation of 15 %", |one| one.valve.saturation = 0.15),
+        ("supply droops by 2 bar", |one| one.valve.droop_pa = 2e5),
+        ("supply droops by 5 bar", |one| one.valve.droop_pa = 5e5),
+        ("pressure A 10 ms late", |one| one.pressure_lag_s = 0.01),
+        ("accumulator at A", |one| one.accumulator_m3pa = 2e-13),
+        ("dry friction of 600 N", |one| one.dry_n = 600.0),
+    ];
+    for (name, flaw) in worlds {
+        let mut counts = [0; 4];
+        for wind in WINDS {
+            let found = reports(RUNS / 2, 60.0, |seed| {
+                let mut cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + 400 + seed) };
+                flaw(&mut cylinder);
+                cylinder
+            });
+            for report in found {
+                counts[report.verdict.status as usize] += 1;
+                assert_ne!(
+                    report.verdict.status,
+                    Status::Leak,
+                    "{name}, wind {wind}: {}",
+                    report.verdict.text
+                );
+            }
+        }
+        println!("{name}: leak, sound, doubtful, not sure {counts:?}");
+    }
+}
+
+#[test]
+fn a_leak_that_sets_in_is_told_as_it_is_now() {
+    let found = reports(RUNS, 60.0, |seed| ValveCylinder {
+        leaks_from_s: 31.0,
+        ..ValveCylinder::drawn(first_seed() + 500 + seed).leaking(0, 0.2)
+    });
+    let right = found.iter().filter(|one| {
+        let at_s = one.changed_at_s.unwrap_or_default();
+        is_found(one, Leak::Internal) && (25.0..=40.0).contains(&at_s)
+    });
+    let (right, covered) = (right.count() as u64, covered(&found, Leak::Internal, 0.2));
+    println!("sets in: {right} of {RUNS}, covered {covered:.2}");
+    assert!(right * 100 >= RUNS * 80, "{right}");
+}
+
+/// A command instead of the spool's position, with the hysteresis that the data sheet declares.
+#[test]
+fn the_command_stands_in_for_the_spool() {
+    let rig = rig("hysteresis = \"2 %\"\nspool_lag = \"-4 ms\"");
+    let judge = |leak_lpm: f64| {
+        let one = |seed| {
+            let mut cylinder = ValveCylinder::drawn(first_seed() + 600 + seed).leaking(0, leak_lpm);
+            (cylinder.by_command, cylinder.valve.hysteresis) = (true, 0.015);
+            judged(cylinder.trace(60.0, 100.0, 3e-3), &rig)
+        };
+        (0..RUNS).into_par_iter().map(one).collect::<Vec<_>>()
+    };
+    let (sound, leaking) = (judge(0.0), judge(0.05));
+    let named = sound.iter().filter(|one| one.verdict.status == Status::Leak).count();
+    let found = leaking.iter().filter(|one| is_found(one, Leak::Internal)).count();
+    println!("command: sound {named} named, 0.05 internal {found} of {RUNS}, {}", leaking[0].verdict.text);
+    assert_eq!(named, 0);
+    assert!(found as u64 * 100 >= RUNS * 70, "{found}");
+}
+
+fn calibrated(rig: &Rig, text: String, leaks: LeaksThen) -> Result<Calibration, CalibrationError> {
+    let mut calibrator = Calibrator::new(rig, leaks)?;
+    calibrator.read(&mut reader("then", text, rig))?;
+    calibrator.finish(None)
+}
+
+/// A calibrated valve, later, when it has drifted as declared.
+fn later(seed: u64, then: LeaksThen, leaks_then: [f64; 3], leaks_now: [f64; 3]) -> ReplayReport {
+    let base = rig("");
+    let cylinder = ValveCylinder { leaks_lpm: leaks_then, ..ValveCylinder::drawn(first_seed() + 700 + seed) };
+    let text = cylinder.trace(300.0, 100.0, 3e-3);
+    let found = calibrated(&base, text, then).expect("calibrated");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("valve.toml");
+    std::fs::write(&file, found.to_toml().expect("a file")).expect("written");
+    let mut normal = white_noise(80_000 + seed);
+    let mut drift = |std: f64| std * normal.next().unwrap_or_default();
+    let mut now = ValveCylinder { leaks_lpm: leaks_now, seed: 90_000 + seed, ..cylinder };
+    for edge in 0..4 {
+        now.valve.gains[edge] *= 1.0 + drift(0.03);
+        now.valve.laps[edge] += drift(0.001);
+        now.valve.clearances_lpm[edge] = (now.valve.clearances_lpm[edge] + drift(0.1 * 0.057)).max(0.0);
+    }
+    let rig = rig(&format!("calibration = {:?}", file.display().to_string()));
+    judged(now.trace(60.0, 100.0, 3e-3), &rig)
+}
+
+#[test]
+fn after_a_calibration_external_leaks_are_small_or_changes() {
+    let all = |then, leaks_then: [f64; 3], leaks_now: [f64; 3]| {
+        (0..RUNS).into_par_iter().map(|seed| later(seed, then, leaks_then, leaks_now)).collect::<Vec<_>>()
+    };
+    for sound in all(LeaksThen::Zero, [0.0; 3], [0.0; 3]) {
+        assert_eq!(sound.verdict.status, Status::Sound, "{}", sound.verdict.text);
+    }
+    let absolute = all(LeaksThen::Zero, [0.0; 3], [0.0, 0.05, 0.0]);
+    let found = absolute.iter().filter(|one| is_found(one, Leak::ExternalA)).count();
+    println!(
+        "calibrated, A 0.05: {found} of {RUNS}, covered {:.2}",
+        covered(&absolute, Leak::ExternalA, 0.05)
+    );
+    let [least, _] = coverage_bounds(0.95, RUNS);
+    assert!(found as u64 * 100 >= RUNS * 95 && covered(&absolute, Leak::ExternalA, 0.05) >= least, "{found}");
+    assert!(absolute[0].verdict.text.contains("is assumed"), "{}", absolute[0].verdict.text);
+
+    let change = all(LeaksThen::Unknown, [0.0, 0.2, 0.0], [0.0, 0.25, 0.0]);
+    let found = change.iter().filter(|one| is_found(one, Leak::ExternalA)).count();
+    println!("0.05 more than at a leaky calibration: {found} of {RUNS}");
+    assert!(found as u64 * 100 >= RUNS * 95, "{found}");
+    let report = &change[0];
+    assert!(report.leakage.external_a.since.is_some() && report.leakage.internal.since.is_none());
+    assert!(report.verdict.text.contains("It is more than on "), "{}", report.verdict.text);
+}
+
+#[test]
+fn a_calibration_says_what_is_wrong() {
+    let told = |result: Result<_, CalibrationError>| result.map(drop).expect_err("wrong").to_string();
+    let message = told(calibrated(&Rig::paper(), String::new(), LeaksThen::Zero));
+    assert!(message.contains("has no [valve]"), "{message}");
+    let rig = rig("");
+    let flows = "t_s,x_mm,pa_bar,pb_bar,qa_lpm\n0,1,20,20,0\n0.01,1,20,20,0\n".to_owned();
+    let message = told(calibrated(&rig, flows, LeaksThen::Zero));
+    assert!(message.contains("`spool_percent`"), "{message}");
+    let changing = ValveCylinder { leaks_from_s: 40.0, ..ValveCylinder::drawn(1).leaking(0, 0.3) };
+    let text = changing.trace(90.0, 100.0, 3e-3);
+    let message = told(calibrated(&rig, text, LeaksThen::Unknown));
+    assert!(message.starts_with("a leak changed"), "{message}");
+}
