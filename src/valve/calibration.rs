@@ -1,9 +1,7 @@
 //! A valve's calibration: what traces of this rig say of its edges, kept in a file for later traces.
 
 use super::meter::ValveMeter;
-use super::unknowns::{
-    Belief, CERTAIN, CLEARANCES, GAINS, Information, KAPPA, LAPS, LEAKS, UNKNOWNS, Unknowns, clearance_std,
-};
+use super::unknowns::{Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAKS, UNKNOWNS, Unknowns};
 use crate::rig::{Rig, ValveSheet};
 use crate::trace::{Record, TraceError, TraceReader};
 use jiff::Zoned;
@@ -263,15 +261,7 @@ impl Calibration {
             let (i, j) = (i.max(j), i.min(j));
             self.covariance[i][j]
         });
-        let mut change = Unknowns::zeros();
-        for edge in 0..4 {
-            change[GAINS + edge] = sheet.drift.gain * self.mean[GAINS + edge];
-            change[LAPS + edge] = sheet.drift.lap;
-            change[CLEARANCES + edge] = sheet.drift.null_leak * clearance_std(sheet);
-        }
-        change[KAPPA] = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
-        let spread = covariance + Information::from_diagonal(&change.map(|std| std * std));
-        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), spread)
+        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), covariance)?.later(rig, sheet, 1.0)
     }
 }
 

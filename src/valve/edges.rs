@@ -1,8 +1,8 @@
 //! The flows over a valve's four edges, and how they change with readings and unknowns.
 //!
 //! ```text
-//! Q_A = k_v [K₁ o(u − d₁) √(P_S − P_A) − K₂ o(−u − d₂) √(P_A − P_T)] + l₁ (P_S − P_A) − l₂ (P_A − P_T)
-//! Q_B = k_v [K₃ o(−u − d₃) √(P_S − P_B) − K₄ o(u − d₄) √(P_B − P_T)] + l₃ (P_S − P_B) − l₄ (P_B − P_T)
+//! Q_A = k_v [K₁ o(u − d₁) √(P_S − P_A) − K₂ o(−u − d₂) √(P_A − P_T)] + l₁ (P_S − P_A) − l₂ P_A
+//! Q_B = k_v [K₃ o(−u − d₃) √(P_S − P_B) − K₄ o(u − d₄) √(P_B − P_T)] + l₃ (P_S − P_B) − l₄ P_B
 //! o(s) = ½ (√(s² + w²) + s) (1 − c u²)
 //! ```
 //!
@@ -95,26 +95,29 @@ impl Edge {
         let (root, root_slope) = metering(drop_pa);
         let edge_gain = self.sign * gain * unknowns[GAINS + self.index];
         let clearance = self.sign * unknowns[CLEARANCES + self.index] * LEAK_UNIT_M3SPA;
-        flow.m3s += edge_gain * opening * root + clearance * drop_pa;
-        let by_drop = edge_gain * opening * root_slope + clearance;
+        // To the tank as to the outside: where its pressure is found anew at each look, the two would seem to differ.
+        let passing_pa = if into { drop_pa } else { at[self.chamber] };
+        flow.m3s += edge_gain * opening * root + clearance * passing_pa;
+        let by_drop = edge_gain * opening * root_slope;
         let by_spool = edge_gain * by_u * root;
         flow.by_signals[SPOOL] += by_spool;
         flow.by_unknowns[LAG] += by_spool * spool.rate_ps * S_PER_MS;
         flow.by_unknowns[HYSTERESIS] -= by_spool * spool.play;
         if into {
-            flow.by_signals[PS] += by_drop;
-            flow.by_signals[self.chamber] -= by_drop;
-            flow.by_unknowns[SUPPLY] += by_drop * PA_PER_BAR;
-            flow.by_unknowns[DROOP] -= by_drop * drawn * PA_PER_BAR;
+            let by_supply = by_drop + clearance;
+            flow.by_signals[PS] += by_supply;
+            flow.by_signals[self.chamber] -= by_supply;
+            flow.by_unknowns[SUPPLY] += by_supply * PA_PER_BAR;
+            flow.by_unknowns[DROOP] -= by_supply * drawn * PA_PER_BAR;
         } else {
-            flow.by_signals[self.chamber] += by_drop;
+            flow.by_signals[self.chamber] += by_drop + clearance;
             flow.by_unknowns[TANK] -= by_drop * PA_PER_BAR;
         }
         flow.by_unknowns[GAINS + self.index] += self.sign * gain * opening * root;
         flow.by_unknowns[LAPS + self.index] += edge_gain * by_lap * root;
         flow.by_unknowns[ROUNDING] += edge_gain * by_rounding * root;
         flow.by_unknowns[SATURATION] += edge_gain * by_saturation * root;
-        flow.by_unknowns[CLEARANCES + self.index] += self.sign * LEAK_UNIT_M3SPA * drop_pa;
+        flow.by_unknowns[CLEARANCES + self.index] += self.sign * LEAK_UNIT_M3SPA * passing_pa;
     }
 
     /// o, and its slopes by u, d, w and c.

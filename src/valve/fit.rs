@@ -59,6 +59,14 @@ impl Run {
         (readings.len() >= LEAST_READINGS).then_some(Self { readings, nodes: Vec::new() })
     }
 
+    /// Time that it spans, s.
+    pub fn seconds(&self) -> f64 {
+        match self.readings.as_slice() {
+            [first, .., last] => last.t_s - first.t_s,
+            _ => 0.0,
+        }
+    }
+
     pub fn readings(&self) -> &[Node] {
         &self.readings
     }

@@ -12,6 +12,8 @@ use crate::trace::Record;
 
 /// A window has so many readings at the most: ten minutes at 100 Hz, 15 MB. Less, and the unknowns of the first are too far from linear.
 const MOST_READINGS: usize = 60_000;
+/// A valve changes in so long as `drift` declares, s: a day (chosen).
+const DRIFT_S: f64 = 86_400.0;
 /// Leaks change so often in a window at the most: a search that halves it must end.
 const MOST_CHANGES: usize = 3;
 /// Fewer readings tell nothing.
@@ -21,6 +23,7 @@ const LEAST_WINDOW: usize = 100;
 #[derive(Clone, Debug)]
 pub struct ValveMeter {
     known: Known,
+    rig: Rig,
     sheet: ValveSheet,
     /// Before the window.
     before: Belief,
@@ -53,6 +56,7 @@ impl ValveMeter {
     pub(super) fn with(rig: &Rig, sheet: &ValveSheet, before: Belief, since: Option<Since>) -> Self {
         Self {
             known: Known::of(rig, sheet),
+            rig: rig.clone(),
             sheet: sheet.clone(),
             before,
             at: None,
@@ -199,7 +203,9 @@ impl ValveMeter {
     /// What the window says becomes what was believed before.
     fn next_window(&mut self) {
         if let Some(taken) = self.window() {
-            self.before = taken.summary.belief.clone();
+            let seconds = self.runs.iter().map(Run::seconds).sum::<f64>();
+            let later = taken.summary.belief.later(&self.rig, &self.sheet, (seconds / DRIFT_S).sqrt());
+            self.before = later.unwrap_or_else(|| taken.summary.belief.clone());
             self.last = Some(taken);
         }
         self.runs.clear();

@@ -86,6 +86,21 @@ impl Belief {
         Self::of(self.mean, self.covariance()?)
     }
 
+    /// Some time later: the valve may have changed by this share of what `drift` declares, 1 σ, and the oil of what the rig file leaves
+    /// open.
+    pub fn later(&self, rig: &Rig, sheet: &ValveSheet, share: f64) -> Option<Self> {
+        let mut change = Unknowns::zeros();
+        for edge in 0..4 {
+            change[GAINS + edge] = sheet.drift.gain * self.mean[GAINS + edge];
+            change[LAPS + edge] = sheet.drift.lap;
+            change[CLEARANCES + edge] = sheet.drift.null_leak * clearance_std(sheet);
+        }
+        change[KAPPA] = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+        let spread =
+            self.covariance()? + Information::from_diagonal(&change.map(|std| (share * std).powi(2)));
+        Some(Self { mean: self.mean, information: spread.cholesky()?.inverse() })
+    }
+
     /// Of a mean and covariances, those of the leaks aside, of which nothing is known.
     pub fn of(mut mean: Unknowns, mut covariance: Information) -> Option<Self> {
         for leak in LEAKS..LEAKS + 3 {

@@ -84,6 +84,24 @@ const BLANKS: [Blank; 12] = [
     ),
 ];
 
+/// Where a valve's spool stands for flow meters.
+const VALVE_BLANKS: [Blank; 4] = [
+    blank("valve", "rated_flow", "4 L/min", "data sheet of the valve: flow over one fully open edge …"),
+    blank(
+        "valve",
+        "rated_drop",
+        "35 bar",
+        "… at this drop over it; often half of the drop over the whole valve",
+    ),
+    blank(
+        "valve",
+        "null_leak",
+        "2 %",
+        "optional: what the whole valve leaks at its middle, of rated_flow; 1 to 7 %",
+    ),
+    blank("valve", "supply", "100 bar", "only where no column has the supply's pressure"),
+];
+
 /// What a trace needs before it says anything.
 const NEEDED: [Signal; 6] =
     [Signal::Time, Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB];
@@ -95,7 +113,9 @@ pub fn template(rig: &Rig, lines: &[ProposedLine], given: &[Signal]) -> String {
                        # away and write yours, with its unit. What stands behind the second `#` says where it is found.\n"
             .to_owned();
     let mut section = "";
-    for blank in &BLANKS {
+    let has_valve = gives(lines, given, Signal::Spool) || gives(lines, given, Signal::Command);
+    let valve = VALVE_BLANKS.iter().filter(|_| has_valve);
+    for blank in BLANKS.iter().chain(valve) {
         if blank.section != section {
             section = blank.section;
             let _ = writeln!(out, "\n[{section}]");

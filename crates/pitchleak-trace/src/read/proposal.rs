@@ -100,6 +100,22 @@ const WORDS: [(Signal, &[&str]); 5] = [
 const SIDE_A: &[&str] = &["a", "1", "head", "cap", "bore", "piston", "kolben", "blind"];
 const SIDE_B: &[&str] = &["b", "2", "rod", "annulus", "ring", "stange"];
 
+const SUPPLY: &[&str] = &["supply", "system", "pump", "versorgung", "versorgungs"];
+const TANK: &[&str] = &["tank", "return", "reservoir", "rücklauf"];
+const SPOOL: &[&str] = &["spool", "schieber"];
+const VALVE: &[&str] = &["valve", "servovalve", "ventil"];
+const COMMAND: &[&str] = &["command", "cmd", "setpoint", "soll", "sollwert", "demand", "reference"];
+
+/// A spool's position, or what it is told.
+fn of_the_valve(words: &[String]) -> Option<Signal> {
+    let says = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    match (says(SPOOL), says(VALVE), says(COMMAND)) {
+        (true, _, true) | (_, true, true) => Some(Signal::Command),
+        (true, _, false) => Some(Signal::Spool),
+        _ => None,
+    }
+}
+
 /// Words of a column that holds no reading of a sensor: what a reading is worth, what was wanted, what counts or scales.
 const NO_READINGS: &[&str] = &[
     "validity",
@@ -202,6 +218,11 @@ pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<
 
 fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal> {
     let words = words(column.header);
+    if let Some(signal) = of_the_valve(&words) {
+        // A spool in millimetres needs its stroke: only a person knows that.
+        let found = column.unit(Dimension::Share)?;
+        return Some(Proposal { signal, column: column.named(found), why: Why::Name });
+    }
     if !may_be_a_reading(&words) {
         return None;
     }
@@ -215,6 +236,8 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
         (Signal::PressureA | Signal::FlowA, true, false) => quantity,
         (Signal::PressureA, false, true) => Signal::PressureB,
         (Signal::FlowA, false, true) => Signal::FlowB,
+        (Signal::PressureA, false, false) if says(SUPPLY) => Signal::Supply,
+        (Signal::PressureA, false, false) if says(TANK) => Signal::Tank,
         (Signal::PressureA | Signal::FlowA, ..) => return None,
         _ => quantity,
     };
@@ -398,6 +421,22 @@ mod tests {
             found,
             "t = { name = \"CH0\", unit = \"ms\" }; x = { name = \"CH1\", unit = \"mm\" }; pa = { name = \"CH2\", unit = \"bar\" }; \
              pb = { name = \"CH3\", unit = \"bar\" }; qa = { name = \"CH4\", unit = \"L/min\" }"
+        );
+    }
+
+    #[test]
+    fn a_valves_columns_are_proposed_where_their_unit_says_what_they_are() {
+        let headers =
+            ["Spool actual [%]", "Servo valve setpoint (%)", "Pump pressure [bar]", "Tank pressure [bar]"];
+        let cells: [&[&str]; 4] = [&["-3", "4"], &["-2", "5"], &["160", "161"], &["2", "2.1"]];
+        assert_eq!(
+            proposed(&headers, &cells),
+            [
+                "spool = { name = \"Spool actual [%]\", unit = \"%\" }",
+                "valve_command = { name = \"Servo valve setpoint (%)\", unit = \"%\" }",
+                "ps = { name = \"Pump pressure [bar]\", unit = \"bar\" }",
+                "pt = { name = \"Tank pressure [bar]\", unit = \"bar\" }",
+            ]
         );
     }
 

@@ -218,3 +218,45 @@ fn small_flow_meters_have_alarms_within_their_range() {
     );
     assert_eq!(Rig::parse(&rig.to_toml(), "rig.toml").unwrap(), rig);
 }
+
+const VALVE: &str = r#"
+[cylinder]
+area_a = "12.6 cm^2"
+area_b = "9.4 cm^2"
+stroke = "0.2 m"
+moving_mass = "20 kg"
+[fluid]
+bulk_modulus = "0.8 GPa"
+[sensors]
+pressure = { full_scale = "16 MPa", accuracy = "0.5 %" }
+spool = { accuracy = "0.3 %" }
+[valve]
+rated_flow = "4 L/min"
+rated_drop = "35 bar"
+drift = { gain = "1 %" }
+supply = "100 bar"
+calibration = "valve.toml"
+"#;
+
+#[test]
+fn a_valve_is_read_and_written() {
+    let rig = Rig::parse(VALVE, "valve").expect("a rig");
+    let valve = rig.valve.clone().expect("a valve");
+    assert!((valve.rated_flow_m3s - 4.0 / 60e3).abs() < 1e-18 && (valve.rated_drop_pa - 35e5).abs() < 1e-6);
+    assert!((valve.supply_std_pa - 10e5).abs() < 1e-6, "a tenth of the supply");
+    assert!((valve.drift.gain - 0.01).abs() < 1e-15 && (valve.drift.null_leak - 0.1).abs() < 1e-15);
+    assert_eq!(rig.instruments.supply, rig.instruments.pressure, "as the chambers' sensors");
+    assert_eq!(Rig::parse(&rig.to_toml(), "valve").expect("its own text"), rig);
+    assert_eq!(Rig::parse(&rig.to_toml_over(VALVE), "valve").expect("its own text"), rig);
+
+    let wrong = [
+        ("rated_drop = \"35 bar\"", "rated_drop = \"35 mm\"", "valve.rated_drop"),
+        ("rated_flow = \"4 L/min\"", "", "valve.rated_flow"),
+        ("spool = { accuracy", "spool = { full_scale = 1, accuracy", "sensors.spool.full_scale"),
+        ("supply = \"100 bar\"", "shut = \"below 1 %\"", "valve.shut"),
+    ];
+    for (is, becomes, key) in wrong {
+        let message = Rig::parse(&VALVE.replace(is, becomes), "valve").expect_err(becomes).to_string();
+        assert!(message.contains(key), "{message}");
+    }
+}
