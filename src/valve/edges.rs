@@ -141,6 +141,7 @@ fn metering(drop_pa: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::unknowns::UNKNOWNS;
     use super::*;
 
     /// Slopes against differences, at openings of either side and near the middle.
@@ -163,27 +164,24 @@ mod tests {
                     "{what} at {u}: {slope} {difference}"
                 );
             };
-            for chamber in 0..2 {
-                for signal in 0..5 {
-                    let step = [1e-4, 10.0, 10.0, 1e-6, 10.0][signal];
+            for (chamber, flow) in flows_at.iter().enumerate() {
+                for (signal, step) in [1e-4, 10.0, 10.0, 1e-6, 10.0].into_iter().enumerate() {
                     let moved = [-step, step].map(|step| {
                         let mut moved = at;
                         moved[signal] += step;
                         flows(&moved, &spool, &unknowns, gain, rated)[chamber].m3s
                     });
-                    check(flows_at[chamber].by_signals[signal], moved, step, signal);
+                    check(flow.by_signals[signal], moved, step, signal);
                 }
-                for unknown in GAINS..UNKNOWNS_HERE {
+                for unknown in GAINS..UNKNOWNS {
                     let moved = [-1e-6, 1e-6].map(|step| {
                         let mut moved = unknowns;
                         moved[unknown] += step;
                         flows(&at, &spool, &moved, gain, rated)[chamber].m3s
                     });
-                    check(flows_at[chamber].by_unknowns[unknown], moved, 1e-6, 100 + unknown);
+                    check(flow.by_unknowns[unknown], moved, 1e-6, 100 + unknown);
                 }
             }
         }
     }
-
-    const UNKNOWNS_HERE: usize = super::super::unknowns::UNKNOWNS;
 }
