@@ -6,6 +6,7 @@ use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
 use pitchleak::trace::TraceReader;
 use pitchleak::valve::{Calibration, CalibrationError, Calibrator, LeaksThen};
+use pitchleak_testkit::rig::with_valve;
 use pitchleak_testkit::valve::ValveCylinder;
 use pitchleak_testkit::{coverage_bounds, white_noise};
 use rayon::prelude::*;
@@ -21,31 +22,8 @@ fn first_seed() -> u64 {
     std::env::var("PITCHLEAK_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(10_000)
 }
 
-/// Sensors of 0.3 %, a valve of 4 L/min at 35 bar known by its data sheet, and what else `[valve]` says.
 fn rig(valve: &str) -> Rig {
-    let text = format!(
-        r#"
-[cylinder]
-area_a = "12.6 cm^2"
-area_b = "9.4 cm^2"
-stroke = "0.2 m"
-moving_mass = "60 kg"
-dead_volume_a = "50 mL"
-dead_volume_b = "50 mL"
-[fluid]
-bulk_modulus = "0.8 GPa"
-bulk_modulus_std = "0.2 GPa"
-[sensors]
-pressure = {{ full_scale = "160 bar", accuracy = "0.3 %" }}
-position = {{ full_scale = "0.2 m", accuracy = "0.3 %" }}
-spool = {{ accuracy = "0.3 %" }}
-[valve]
-rated_flow = "4 L/min"
-rated_drop = "35 bar"
-tank = "2 bar"
-{valve}"#
-    );
-    Rig::parse(&text, "valve").expect("a rig")
+    Rig::parse(&with_valve(valve), "valve").expect("a rig")
 }
 
 fn reader<'a>(name: &str, text: String, rig: &Rig) -> TraceReader<'a> {

@@ -8,10 +8,10 @@ use super::order::{Order, Turn};
 use super::weighing::Weighing;
 use crate::Rig;
 use crate::explain::Decision;
-use crate::replay::{Stream, Taken};
+use crate::replay::{ReplayError, Stream, Taken};
 use crate::report::ReplayReport;
 use crate::trace::{BadReason, BadRows, LineLayout};
-use pitchleak_core::{AlarmState, RlsError};
+use pitchleak_core::AlarmState;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -58,7 +58,7 @@ fn id(reason: BadReason) -> &'static str {
 const OUT_OF_RANGE: &str = "out_of_range";
 
 impl Cylinder {
-    pub(super) fn new(rig: &Rig) -> Result<Self, RlsError> {
+    pub(super) fn new(rig: &Rig) -> Result<Self, ReplayError> {
         let stream = Stream::new(rig, BadRows::Skip)?;
         Ok(Self {
             stream,

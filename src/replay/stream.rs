@@ -1,5 +1,5 @@
-use super::Replay;
 use super::state::{self, RestoreError};
+use super::{Replay, ReplayError};
 use crate::explain::Decision;
 use crate::hold::{self, Recorder};
 use crate::report::{ReplayReport, TraceSummary};
@@ -9,8 +9,8 @@ use crate::trace::{
     BadRow, BadRows, LineLayout, LineRead, Record, RowValidator, TraceError, TraceFault, TraceReader,
     read_line,
 };
+use crate::valve::ValveStream;
 use crate::wiring::{Refused, Running, Wiring};
-use pitchleak_core::RlsError;
 
 /// What became of a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +38,12 @@ pub struct Stream {
     /// From the first shut port on.
     #[serde(default)]
     holds: Option<Recorder>,
+    /// Of a rig whose valve is calibrated, until a flow is read.
+    #[serde(default)]
+    valve: Option<ValveStream>,
+    /// Whether a valve's spool was ever read.
+    #[serde(default)]
+    has_spool: bool,
     /// Where time stamps count from, ns since 1970, for a caller that reads them: it is saved with the rest.
     pub epoch_ns: Option<i64>,
 }
@@ -89,8 +95,8 @@ impl Stream {
     /// A stream for a rig.
     ///
     /// # Errors
-    /// As [`Replay::new`].
-    pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, RlsError> {
+    /// As [`Replay::new`], and where the calibration of the rig's valve cannot be used.
+    pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, ReplayError> {
         Ok(Self {
             replay: Replay::new(rig)?.forgetting(),
             evidence: Running::default(),
@@ -98,6 +104,8 @@ impl Stream {
             bad_rows,
             refused: None,
             holds: None,
+            valve: ValveStream::of(rig).map_err(Box::new)?,
+            has_spool: false,
             epoch_ns: None,
         })
     }
@@ -134,6 +142,8 @@ impl Stream {
     /// Takes in one record; says whether the estimates are new.
     fn push(&mut self, record: &Record) -> bool {
         let renewed = self.replay.push(record);
+        let judged = ValveStream::record(&mut self.valve, record, &self.replay.rig, &mut self.replay.alarms);
+        self.has_spool |= record.valve.is_some();
         Recorder::record(&mut self.holds, record, &self.replay.rig);
         self.holds.iter_mut().for_each(Recorder::keep_last);
         if self.refused.as_ref().is_some_and(|refused| refused.is_over(record.t_s)) {
@@ -145,7 +155,7 @@ impl Stream {
         if !self.replay.spikes.left_out() && !self.replay.is_shut {
             self.evidence.add(record, &self.replay.rig);
         }
-        renewed
+        renewed || judged
     }
 
     /// Takes in one line of a live feed, the `line`th: its cells, as `layout` names them.
@@ -231,13 +241,17 @@ impl Stream {
     /// The report with a decision that was made before.
     pub(crate) fn report_as(&self, name: &str, decision: Option<&Decision>) -> Option<ReplayReport> {
         let (summary, quality) = (self.summary(name)?, self.validator.as_ref()?.quality());
+        if let Some(test) = self.valve.as_ref().and_then(|valve| valve.test(self.rig())) {
+            let report = test.report(summary, self.rig());
+            return Some(ReplayReport { alarms: self.replay.alarms.clone(), ..report });
+        }
         let weighed = self.replay.last_stretch();
         let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
             None => self.replay.wiring_so_far(&weighed, &self.evidence),
             wiring => wiring,
         };
         let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
-        hold::advise(&mut report, quality, false, self.rig());
+        hold::advise(&mut report, quality, self.has_spool, self.rig());
         Some(report)
     }
 

@@ -20,7 +20,7 @@ pub enum LeaksThen {
 }
 
 /// Which calibration leaks are told against.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Since {
     /// Its day.
     pub date: Date,
@@ -261,7 +261,11 @@ impl Calibration {
             let (i, j) = (i.max(j), i.min(j));
             self.covariance[i][j]
         });
-        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), covariance)?.later(rig, sheet, 1.0)
+        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), covariance)?.later(
+            rig,
+            sheet,
+            f64::INFINITY,
+        )
     }
 }
 

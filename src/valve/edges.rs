@@ -28,11 +28,13 @@ pub(super) const PS: usize = 4;
 const LAMINAR_PA: f64 = 1e4;
 
 /// What is known of an instant beside its readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Spool {
     /// Of the spool, 1/s.
+    #[serde(skip)]
     pub rate_ps: f64,
     /// Where the spool stands within its hysteresis: −1 after it went down, 1 after it went up.
+    #[serde(skip)]
     pub play: f64,
     /// Tank pressure as recorded or declared, Pa.
     pub tank_pa: f64,

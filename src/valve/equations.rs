@@ -61,7 +61,7 @@ impl Known {
 }
 
 /// A node of the trace: signals on their way to the likeliest, and what goes with them.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Node {
     pub t_s: f64,
     pub signals: Signals,

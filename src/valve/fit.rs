@@ -32,9 +32,10 @@ pub(super) const LEAST_READINGS: usize = 8;
 const PART_S: f64 = 5.0;
 
 /// Readings without a pause, and the likeliest signals.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Run {
     readings: Vec<Node>,
+    #[serde(skip)]
     nodes: Vec<Node>,
 }
 

@@ -5,24 +5,30 @@ use super::calibration::{self, Calibration, CalibrationError, Since};
 use super::edges::{SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{LEAST_READINGS, Run, fit};
-use super::parts::{Summary, summary};
+use super::parts::{CHANGED, Summary, summary};
 use super::unknowns::{Belief, Unknowns};
 use crate::rig::{Rig, ValveSheet};
 use crate::trace::Record;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 /// A window has so many readings at the most: ten minutes at 100 Hz, 15 MB. Less, and the unknowns of the first are too far from linear.
 const MOST_READINGS: usize = 60_000;
-/// A valve changes in so long as `drift` declares, s: a day (chosen).
-const DRIFT_S: f64 = 86_400.0;
 /// Leaks change so often in a window at the most: a search that halves it must end.
 const MOST_CHANGES: usize = 3;
+/// Changes are counted together within so long, s: a window of a file at 100 Hz (chosen).
+const CHANGES_COUNT_S: f64 = 600.0;
+/// Variance of a leak that is rounding, in its unit's square.
+const LEAST_SPREAD: f64 = 1e-12;
+
+/// Leaks that would have to change oftener than this within a window are none (chosen).
+const SO_MANY_CHANGES: usize = 1;
 /// Fewer readings tell nothing.
 const LEAST_WINDOW: usize = 100;
 
 /// The flows of a valve as a meter for leaks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ValveMeter {
-    known: Known,
     rig: Rig,
     sheet: ValveSheet,
     /// Before the window.
@@ -31,6 +37,8 @@ pub struct ValveMeter {
     at: Option<Unknowns>,
     runs: Vec<Run>,
     count: usize,
+    /// … and spans so many seconds at the most.
+    window_s: f64,
     /// Least and greatest spool.
     spool_range: [f64; 2],
     since: Option<Since>,
@@ -39,29 +47,66 @@ pub struct ValveMeter {
 }
 
 /// What a window said.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Taken {
     pub summary: Summary,
     /// Around which it is linear.
     pub at: Unknowns,
     pub changed_at_s: Option<f64>,
+    /// Leaks changed in it, somewhere: what it says of the valve is not believed.
+    is_mixed: bool,
     /// How often they changed.
     pub changes: usize,
     /// Whether noise explains what was before the last change, too.
     pub was_explained: bool,
 }
 
+impl Taken {
+    /// Whether noise explains what is left, and the leaks change no oftener than leaks do.
+    pub fn is_explained(&self) -> bool {
+        self.was_explained && self.summary.is_explained() && self.changes <= SO_MANY_CHANGES
+    }
+
+    /// With what went before. Changes count for as long as a window of a file is.
+    fn after(self, last: &Self, begin_s: f64) -> Self {
+        let is_recent = last.changed_at_s.is_none_or(|changed_s| begin_s - changed_s < CHANGES_COUNT_S);
+        let before = if is_recent { last.changes } else { last.changes.min(1) };
+        if self.changed_at_s.is_some() {
+            let changes = if is_recent { before + self.changes } else { self.changes };
+            return Self { changes, ..self };
+        }
+        // A window amid which leaks changed says nothing of how well the model fits.
+        let summary = if last.is_mixed { self.summary } else { self.summary.after(&last.summary) };
+        Self {
+            summary,
+            changed_at_s: last.changed_at_s,
+            changes: before,
+            was_explained: last.was_explained || !is_recent,
+            ..self
+        }
+    }
+}
+
+/// By how much leaks have moved beyond what was known of them: squares in those of what they may by chance.
+fn moved(before: &Belief, after: &Belief) -> Option<f64> {
+    let (was, wide) = before.leaks()?;
+    let (is, narrow) = after.leaks()?;
+    let off = is - was;
+    let spread = (wide - narrow).symmetric_part() + Matrix3::identity() * LEAST_SPREAD;
+    Some(off.dot(&spread.cholesky()?.solve(&off)))
+}
+
 impl ValveMeter {
     /// For a rig with `[valve]`; `before` is what is known of it.
     pub(super) fn with(rig: &Rig, sheet: &ValveSheet, before: Belief, since: Option<Since>) -> Self {
         Self {
-            known: Known::of(rig, sheet),
             rig: rig.clone(),
             sheet: sheet.clone(),
             before,
             at: None,
             runs: Vec::new(),
             count: 0,
+            window_s: f64::INFINITY,
             spool_range: [f64::INFINITY, f64::NEG_INFINITY],
             since,
             last: None,
@@ -119,10 +164,35 @@ impl ValveMeter {
             run.push(node);
             self.count += 1;
         }
-        if self.count >= MOST_READINGS {
+        if self.count >= MOST_READINGS || self.spans_s(node.t_s) >= self.window_s {
             self.next_window();
+            let mut next = Run::default();
+            next.push(node);
+            (self.runs, self.count) = (vec![next], 1);
         }
         true
+    }
+
+    /// Time since the window began, s.
+    fn spans_s(&self, t_s: f64) -> f64 {
+        let first = self.runs.iter().find_map(|run| run.readings().first());
+        first.map_or(0.0, |first| t_s - first.t_s)
+    }
+
+    /// The same, a window for each so many seconds.
+    #[must_use]
+    pub(super) fn every(self, window_s: f64) -> Self {
+        Self { window_s, ..self }
+    }
+
+    /// Whether a window ended with the last reading.
+    pub(super) fn has_ended(&self) -> bool {
+        self.count == 1 && self.last.is_some()
+    }
+
+    /// What the windows that have ended say.
+    pub(super) fn last(&self) -> Option<&Taken> {
+        self.last.as_ref()
     }
 
     fn node(&self, record: &Record) -> Option<Node> {
@@ -148,18 +218,17 @@ impl ValveMeter {
         }
         let (start, is_cold) = self.at.map_or((self.before.mean, true), |at| (at, false));
         self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
-        let taken = self.settled(&mut self.runs.clone(), &self.before, start, is_cold, MOST_CHANGES)?;
+        let mut taken = self.settled(&mut self.runs.clone(), &self.before, start, is_cold, MOST_CHANGES)?;
         self.at = Some(taken.at);
-        Some(match &self.last {
-            Some(last) if taken.changed_at_s.is_none() => Taken {
-                summary: taken.summary.after(&last.summary),
-                changed_at_s: last.changed_at_s,
-                changes: last.changes,
-                was_explained: last.was_explained,
-                ..taken
-            },
-            _ => taken,
-        })
+        let Some(last) = &self.last else { return Some(taken) };
+        let begin_s = self.runs.first()?.readings().first()?.t_s;
+        let limit = CHANGED * taken.summary.noise.max(1.0);
+        if taken.changes == 0 && moved(&self.before, &taken.summary.belief).is_some_and(|far| far > limit) {
+            let before = self.before.with_new_leaks()?;
+            taken = self.settled(&mut self.runs.clone(), &before, taken.at, false, 0)?;
+            (taken.changed_at_s, taken.changes, taken.is_mixed) = (Some(begin_s), 1, true);
+        }
+        Some(taken.after(last, begin_s))
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
@@ -171,9 +240,17 @@ impl ValveMeter {
         is_cold: bool,
         changes: usize,
     ) -> Option<Taken> {
-        let fit = fit(runs, before, start, is_cold, self.sheet.hysteresis, &self.known)?;
+        let known = Known::of(&self.rig, &self.sheet);
+        let fit = fit(runs, before, start, is_cold, self.sheet.hysteresis, &known)?;
         let summary = summary(&fit.parts, before, &fit.at)?;
-        let constant = Taken { summary, at: fit.at, changed_at_s: None, changes: 0, was_explained: true };
+        let constant = Taken {
+            summary,
+            at: fit.at,
+            changed_at_s: None,
+            is_mixed: false,
+            changes: 0,
+            was_explained: true,
+        };
         let since = constant.summary.since;
         if since == 0 || changes == 0 {
             return Some(constant);
@@ -204,8 +281,11 @@ impl ValveMeter {
     fn next_window(&mut self) {
         if let Some(taken) = self.window() {
             let seconds = self.runs.iter().map(Run::seconds).sum::<f64>();
-            let later = taken.summary.belief.later(&self.rig, &self.sheet, (seconds / DRIFT_S).sqrt());
-            self.before = later.unwrap_or_else(|| taken.summary.belief.clone());
+            let known = if taken.is_mixed { self.before.with_new_leaks() } else { None };
+            let known = known.unwrap_or_else(|| taken.summary.belief.clone());
+            let later = known.later(&self.rig, &self.sheet, seconds);
+            self.before = later.unwrap_or(known);
+            self.at = self.at.filter(|_| !taken.is_mixed);
             self.last = Some(taken);
         }
         self.runs.clear();

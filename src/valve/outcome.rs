@@ -9,12 +9,16 @@ use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::units::LPM_PER_M3S;
 use nalgebra::{Matrix3, Vector3};
-use pitchleak_core::{Leak, PerLeak};
+use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 
 /// Below this an internal leak is within what valves differ from any model of them, m³/(s·Pa), 0.005 L/min at 50 bar: the droop of a supply that is measured
 /// elsewhere looked like it, and no residual told (trials of undeclared effects, docs/valve.md).
 const INTERNAL_FLOOR_M3SPA: f64 = 0.005 * LEAK_UNIT_M3SPA;
+
+/// In a stream nothing is said before so many parts with the same leaks: of fewer, none tells whether noise explains them (chosen by
+/// hysteresis and drift that set in).
+const LEAST_PARTS: usize = 6;
 
 /// What the valve's flows and the trace are worth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,9 +50,19 @@ pub struct ValveTest {
 impl ValveMeter {
     /// What the readings so far say of a rig; none where there was none of the valve.
     pub fn finish(&mut self, rig: &Rig) -> Option<ValveTest> {
-        let spool_range = self.spool_range()?;
+        self.spool_range()?;
         let taken = self.taken();
-        let fit = taken.as_ref().map(|Taken { summary, .. }| summary);
+        self.test(taken, rig)
+    }
+
+    /// What the windows that have ended say of a rig; none where there was nothing of the valve.
+    pub(super) fn so_far(&self, rig: &Rig) -> Option<ValveTest> {
+        self.test(self.last().filter(|taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained()).cloned(), rig)
+    }
+
+    fn test(&self, taken: Option<Taken>, rig: &Rig) -> Option<ValveTest> {
+        let spool_range = self.spool_range()?;
+        let fit = taken.as_ref().map(|taken| &taken.summary);
         let found = fit.and_then(|fit| found(fit, rig));
         let pressures_pa = fit.map(|fit| fit.pressures.sizes_pa()).unwrap_or_default();
         let clearance = |pressure_pa: f64| clearance_m3s(self.sheet(), pressure_pa) * LPM_PER_M3S;
@@ -64,10 +78,15 @@ impl ValveMeter {
     }
 }
 
+/// By how much what noise does not explain widens each leak's standard deviation.
+fn widening(fit: &Summary) -> [f64; 3] {
+    fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt())
+}
+
 /// Which leaks there are, widened by what noise does not explain.
 fn found(fit: &Summary, rig: &Rig) -> Option<Found> {
     let covariance = fit.belief.covariance()?;
-    let wider = fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt());
+    let wider = widening(fit);
     let leaks = Matrix3::from_fn(|i, j| covariance[(LEAKS + i, LEAKS + j)] * wider[i] * wider[j]);
     let likelihood = LeakLikelihood {
         information: leaks.cholesky()?.inverse(),
@@ -85,6 +104,26 @@ impl ValveTest {
     /// What the valve's flows and the trace are worth.
     pub fn summary(&self) -> &ValveSummary {
         &self.summary
+    }
+
+    /// Whether a valve as declared, its leaks and noise explain the readings.
+    pub(super) fn is_explained(&self) -> bool {
+        self.taken.as_ref().is_some_and(Taken::is_explained)
+    }
+
+    /// Flows of the leaks, whatever their sign, m³/s; none where too little was read.
+    pub(super) fn flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
+        let fit = &self.taken.as_ref()?.summary;
+        let (mean, covariance) = fit.belief.leaks()?;
+        let wider = widening(fit);
+        let at = |i: usize| Estimate { value: mean[i], std: wider[i] * covariance[(i, i)].sqrt() };
+        let coefficients = PerLeak { internal: at(0), external_a: at(1), external_b: at(2) };
+        let pressures_pa = fit.pressures.sizes_pa();
+        Some(
+            coefficients
+                .zip(pressures_pa)
+                .map(|(one, pressure_pa)| one.scaled(LEAK_UNIT_M3SPA * pressure_pa)),
+        )
     }
 
     /// The report on a trace without flow meters.

@@ -7,6 +7,7 @@ use super::unknowns::{Belief, Information, LEAK_STD, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use nalgebra::SMatrix;
 use pitchleak_core::PerLeak;
+use serde::{Deserialize, Serialize};
 
 /// Normal equations Λ δ = η of a step from the unknowns of the moment.
 #[derive(Clone, Debug)]
@@ -79,7 +80,7 @@ pub(super) struct Part {
 }
 
 /// Sums over time of |P_L|, P_A, P_B and of P_L, Pa s.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Pressures {
     sizes_pas: PerLeak<f64>,
     load_pas: f64,
@@ -135,7 +136,7 @@ impl Part {
 }
 
 /// What the parts say together, the leaks from one of them on.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Summary {
     pub belief: Belief,
     /// Place of the first part with these leaks.
@@ -167,12 +168,14 @@ impl Summary {
     /// With what went before, where the leaks were the same.
     #[must_use]
     pub fn after(self, before: &Self) -> Self {
-        let [was, is] = [before, &self].map(|one| one.parts as f64 / (before.parts + self.parts) as f64);
+        // What is long ago says little of how well the model fits now.
+        let kept = before.parts.min(MOST_PARTS);
+        let [was, is] = [kept, self.parts].map(|parts| parts as f64 / (kept + self.parts).max(1) as f64);
         let course = [0, 1, 2].map(|leak| was * before.course[leak] + is * self.course[leak]);
         Self {
             noise: was * before.noise + is * self.noise,
             course,
-            parts: before.parts + self.parts,
+            parts: kept + self.parts,
             pressures: before.pressures.plus(&self.pressures),
             ..self
         }
@@ -188,11 +191,13 @@ fn most_by_chance(parts: usize) -> f64 {
 type Both = SMatrix<f64, { UNKNOWNS + 3 }, { UNKNOWNS + 3 }>;
 type BothRight = SMatrix<f64, { UNKNOWNS + 3 }, 1>;
 /// Leaks have changed where that explains so much more, in squares of the noise: of three leaks, one in a million by chance.
-const CHANGED: f64 = 30.7;
+pub(super) const CHANGED: f64 = 30.7;
 /// Parts of a trace that differ by more than one in ten thousand sound ones would contradict the model, in standard deviations.
 const CHANCE_SIGMAS: f64 = 3.7;
 /// A scatter beyond this is no noise of these sensors.
 const MOST_SCATTER: f64 = 3.0;
+/// So many parts before count for how well noise explains a stream: ten minutes (chosen).
+const MOST_PARTS: usize = 120;
 /// Leaks are known from so many parts on.
 const LEAST_PARTS: usize = 2;
 

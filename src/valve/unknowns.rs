@@ -2,7 +2,7 @@
 
 pub(super) use crate::presence::LEAK_UNIT_M3SPA;
 use crate::rig::{Rig, ValveSheet};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// How many there are.
 pub(super) const UNKNOWNS: usize = 23;
@@ -47,11 +47,15 @@ const LAG_STD_MS: f64 = 2.0;
 const DROOP_STD_BAR: f64 = 2.0;
 /// Zeros of a pressure sensor that nobody declared, a share of its accuracy: 1 σ.
 const ZERO_SHARE: f64 = 1.0 / 3.0;
+/// Gains, clearances and oil change in so long as is declared, s: a day; the spool's zero, which follows the oil's temperature, in ten
+/// minutes. Chosen.
+const DRIFT_S: f64 = 86_400.0;
+const NULL_DRIFT_S: f64 = 600.0;
 /// Of what is known for certain: rounding.
 pub(super) const CERTAIN: f64 = 1e-6;
 
 /// What is believed of the unknowns: normal, with this mean and inverse covariance.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Belief {
     pub mean: Unknowns,
     pub information: Information,
@@ -86,18 +90,17 @@ impl Belief {
         Self::of(self.mean, self.covariance()?)
     }
 
-    /// Some time later: the valve may have changed by this share of what `drift` declares, 1 σ, and the oil of what the rig file leaves
-    /// open.
-    pub fn later(&self, rig: &Rig, sheet: &ValveSheet, share: f64) -> Option<Self> {
+    /// So many seconds later: the valve may have changed as `drift` declares, 1 σ, and the oil by what the rig file leaves open.
+    pub fn later(&self, rig: &Rig, sheet: &ValveSheet, seconds: f64) -> Option<Self> {
+        let [share, of_null] = [DRIFT_S, NULL_DRIFT_S].map(|whole_s| (seconds / whole_s).min(1.0).sqrt());
         let mut change = Unknowns::zeros();
         for edge in 0..4 {
-            change[GAINS + edge] = sheet.drift.gain * self.mean[GAINS + edge];
-            change[LAPS + edge] = sheet.drift.lap;
-            change[CLEARANCES + edge] = sheet.drift.null_leak * clearance_std(sheet);
+            change[GAINS + edge] = share * sheet.drift.gain * self.mean[GAINS + edge];
+            change[LAPS + edge] = of_null * sheet.drift.lap;
+            change[CLEARANCES + edge] = share * sheet.drift.null_leak * clearance_std(sheet);
         }
-        change[KAPPA] = rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
-        let spread =
-            self.covariance()? + Information::from_diagonal(&change.map(|std| (share * std).powi(2)));
+        change[KAPPA] = share * rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
+        let spread = self.covariance()? + Information::from_diagonal(&change.map(|std| std * std));
         Some(Self { mean: self.mean, information: spread.cholesky()?.inverse() })
     }
 
@@ -110,6 +113,12 @@ impl Belief {
             covariance[(leak, leak)] = LEAK_STD.powi(2);
         }
         Some(Self { mean, information: covariance.cholesky()?.inverse() })
+    }
+
+    /// Means and covariances of the leaks.
+    pub fn leaks(&self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+        let covariance = self.covariance()?.fixed_view::<3, 3>(LEAKS, LEAKS).into_owned();
+        Some((self.mean.fixed_rows::<3>(LEAKS).into_owned(), covariance))
     }
 
     pub fn covariance(&self) -> Option<Information> {

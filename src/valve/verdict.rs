@@ -11,8 +11,6 @@ use pitchleak_core::{Leak, PerLeak};
 
 /// Leaks below zero by so much contradict it.
 const NEGATIVE_SIGMAS: f64 = 5.0;
-/// Leaks that would have to change so often within a window are none (chosen).
-const MOST_CHANGES: usize = 1;
 /// A compressibility off by so many of the rig file's standard deviations contradicts it.
 const BULK_MODULUS_SIGMAS: f64 = 3.0;
 
@@ -140,7 +138,7 @@ const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pre
 fn contradictions(taken: &Taken, negative: f64, rig: &Rig) -> Vec<Reason> {
     let fit = &taken.summary;
     let mut reasons = Vec::new();
-    if !(taken.was_explained && fit.is_explained()) || taken.changes > MOST_CHANGES {
+    if !taken.is_explained() {
         let what = match taken.changes {
             0 => format!(
                 "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",

@@ -49,9 +49,7 @@ def test_a_leak_is_found_by_the_valves_flows_and_a_calibration_tells_external_on
     assert "changes since today" in str(calibration)
     calibration.save(tmp_path / "valve.toml")
     calibrated = rig(tmp_path, 'calibration = "valve.toml"\n')
-    now = pl.simulate(
-        21, calibrated, noise="rig", seed=4, valve="clearance=0.02 L/min", leak_external_a="0.1 L/min"
-    )
+    now = pl.simulate(21, calibrated, noise="rig", seed=4, valve="clearance=0.02 L/min", leak_external_a="0.1 L/min")
     external = pl.replay(now.columns, calibrated)
     assert external.verdict.faults == ("external_a",)
     assert external.leakage.external_a.since == calibration.date and external.leakage.internal.since is None

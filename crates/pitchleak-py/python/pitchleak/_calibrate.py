@@ -67,6 +67,4 @@ def calibrate(
     text, shown_text = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, name)
     raw = tomllib.loads(text)
     low, high = raw["spool_range"]
-    return Calibration(
-        raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown_text
-    )
+    return Calibration(raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown_text)

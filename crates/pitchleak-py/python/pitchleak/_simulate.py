@@ -126,7 +126,8 @@ def simulate(
     begin or end (``"0.5 L/min @ ..200 s"``), come and go (``"0.5 L/min every 60 s for 10 s"``). ``oil_temp``
     (K, ``"45 °C"``, ``"20 °C -> 60 °C @ 0 s..600 s"`` or a CSV file) makes the leaks, which have their size at
     40 °C, follow the oil's viscosity. ``shut`` (``"5 s..15 s"``) shuts both ports: a hold test. A rig with
-    ``[valve]`` records its spool and supply instead of flows; ``valve`` are its flaws (``"clearance=0.05 L/min"``). ``effects`` are
+    ``[valve]`` records its spool and supply instead of flows; ``valve`` are its flaws
+    (``"clearance=0.05 L/min"``). ``effects`` are
     sizes by id in SI. ``noise`` is 3 σ of every sensor as a share of full scale, ``"none"`` or ``"rig"``; ``bias``
     the greatest constant offset. ``faults`` are mistakes of the sensors (``"qa dead"``, ``"pa offset 10 bar"``,
     ``"qa drift 1 %/h"``, ``"swap qa qb"``, ``"t in ms"``, …: see

@@ -5,7 +5,7 @@ use super::document::{RigError, Section};
 use crate::units::Dimension;
 
 /// The valve between supply and cylinder, of four edges: supply to A, A to tank, supply to B, B to tank.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ValveSheet {
     /// Flow over one fully open edge …
     pub rated_flow_m3s: f64,
@@ -36,7 +36,7 @@ pub struct ValveSheet {
 }
 
 /// By how much a valve changes after its calibration, 1 σ: shares of each edge's gain, of the stroke, and of `null_leak`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ValveDrift {
     /// Of each edge's gain.
     pub gain: f64,
