@@ -57,7 +57,10 @@ impl ValveMeter {
 
     /// What the windows that have ended say of a rig; none where there was nothing of the valve.
     pub(super) fn so_far(&self, rig: &Rig) -> Option<ValveTest> {
-        self.test(self.last().filter(|taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained()).cloned(), rig)
+        self.test(
+            self.last().filter(|taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained()).cloned(),
+            rig,
+        )
     }
 
     fn test(&self, taken: Option<Taken>, rig: &Rig) -> Option<ValveTest> {
