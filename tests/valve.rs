@@ -13,9 +13,13 @@ use rayon::prelude::*;
 use std::io::Cursor;
 
 const WINDS: [f64; 4] = [0.5, 1.0, 1.5, 2.5];
-const RUNS: u64 = 12;
 /// 1 L/min at 50 bar, m³/(s·Pa).
 const UNIT: f64 = 1.0 / 60e3 / 50e5;
+
+/// Cylinders of each kind: six, or `PITCHLEAK_RUNS`.
+fn runs() -> u64 {
+    std::env::var("PITCHLEAK_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(6)
+}
 
 /// Other cylinders, motions and noise with `PITCHLEAK_SEED`.
 fn first_seed() -> u64 {
@@ -62,9 +66,9 @@ fn an_internal_leak_is_found_whatever_the_valve_is() {
     for wind in WINDS {
         let leaking =
             |seed| ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + seed).leaking(0, 0.02) };
-        in_20_s += reports(RUNS, 20.0, leaking).iter().filter(|one| is_found(one, Leak::Internal)).count();
-        in_60_s.extend(reports(RUNS, 60.0, leaking));
-        all += RUNS as usize;
+        in_20_s += reports(runs(), 20.0, leaking).iter().filter(|one| is_found(one, Leak::Internal)).count();
+        in_60_s.extend(reports(runs(), 60.0, leaking));
+        all += runs() as usize;
     }
     for report in &in_60_s {
         let entry = &report.estimates.internal_leak_coefficient;
@@ -84,12 +88,12 @@ fn an_internal_leak_is_found_whatever_the_valve_is() {
 #[test]
 fn a_sound_cylinder_has_no_leak_and_its_valve_is_said_to_be_open() {
     for wind in WINDS {
-        let found = reports(RUNS, 60.0, |seed| ValveCylinder {
+        let found = reports(runs(), 60.0, |seed| ValveCylinder {
             wind,
             ..ValveCylinder::drawn(first_seed() + 100 + seed)
         });
         let sound = found.iter().filter(|one| one.verdict.status == Status::Sound).count();
-        println!("sound at wind {wind}: {sound} of {RUNS} SOUND");
+        println!("sound at wind {wind}: {sound} of {} SOUND", runs());
         for report in &found {
             assert!(
                 matches!(report.verdict.status, Status::Sound | Status::NotSure),
@@ -116,22 +120,22 @@ fn an_external_leak_is_told_beyond_what_the_valves_clearance_may_be() {
     for (index, leak) in [(1, Leak::ExternalA), (2, Leak::ExternalB)] {
         let leaking =
             |lpm: f64| move |seed| ValveCylinder::drawn(first_seed() + 200 + seed).leaking(index, lpm);
-        let large = reports(RUNS, 60.0, leaking(0.4));
+        let large = reports(runs(), 60.0, leaking(0.4));
         let found = large.iter().filter(|one| is_found(one, leak)).count();
-        println!("{leak:?} 0.4 L/min: {found} of {RUNS}, covered {:.2}", covered(&large, leak, 0.4));
-        assert!(found as u64 * 100 >= RUNS * 95, "{found}");
-        assert!(covered(&large, leak, 0.4) >= coverage_bounds(0.95, RUNS)[0]);
+        println!("{leak:?} 0.4 L/min: {found} of {}, covered {:.2}", runs(), covered(&large, leak, 0.4));
+        assert!(found as u64 * 100 >= runs() * 95, "{found}");
+        assert!(covered(&large, leak, 0.4) >= coverage_bounds(0.95, runs())[0]);
         for report in large.iter().filter(|one| is_found(one, leak)) {
             assert!(report.verdict.text.contains("edge would look the same"), "{}", report.verdict.text);
         }
         // No leak, but a clearance of 3.6 σ.
-        let valve_alone = reports(RUNS, 60.0, |seed| {
+        let valve_alone = reports(runs(), 60.0, |seed| {
             let mut cylinder = ValveCylinder::drawn(first_seed() + 300 + seed);
             cylinder.valve.clearances_lpm[2 * index - 1] = 3.6 * clearance_lpm;
             cylinder
         });
         let named = valve_alone.iter().filter(|one| one.verdict.status == Status::Leak).count();
-        println!("clearance of 3.6 sigma at {leak:?}: {named} of {RUNS} named a leak");
+        println!("clearance of 3.6 sigma at {leak:?}: {named} of {} named a leak", runs());
         assert_eq!(named, 0);
     }
 }
@@ -156,7 +160,7 @@ fn what_a_valve_does_beside_its_data_sheet_is_no_leak() {
     for (name, flaw) in worlds {
         let mut counts = [0; 4];
         for wind in WINDS {
-            let found = reports(RUNS / 2, 60.0, |seed| {
+            let found = reports(runs() / 2, 60.0, |seed| {
                 let mut cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + 400 + seed) };
                 flaw(&mut cylinder);
                 cylinder
@@ -177,7 +181,7 @@ fn what_a_valve_does_beside_its_data_sheet_is_no_leak() {
 
 #[test]
 fn a_leak_that_sets_in_is_told_as_it_is_now() {
-    let found = reports(RUNS, 60.0, |seed| ValveCylinder {
+    let found = reports(runs(), 60.0, |seed| ValveCylinder {
         leaks_from_s: 31.0,
         ..ValveCylinder::drawn(first_seed() + 500 + seed).leaking(0, 0.2)
     });
@@ -186,8 +190,8 @@ fn a_leak_that_sets_in_is_told_as_it_is_now() {
         is_found(one, Leak::Internal) && (25.0..=40.0).contains(&at_s)
     });
     let (right, covered) = (right.count() as u64, covered(&found, Leak::Internal, 0.2));
-    println!("sets in: {right} of {RUNS}, covered {covered:.2}");
-    assert!(right * 100 >= RUNS * 80, "{right}");
+    println!("sets in: {right} of {}, covered {covered:.2}", runs());
+    assert!(right * 100 >= runs() * 80, "{right}");
 }
 
 /// A command instead of the spool's position, with the hysteresis that the data sheet declares.
@@ -200,14 +204,18 @@ fn the_command_stands_in_for_the_spool() {
             (cylinder.by_command, cylinder.valve.hysteresis) = (true, 0.015);
             judged(cylinder.trace(60.0, 100.0, 3e-3), &rig)
         };
-        (0..RUNS).into_par_iter().map(one).collect::<Vec<_>>()
+        (0..runs()).into_par_iter().map(one).collect::<Vec<_>>()
     };
     let (sound, leaking) = (judge(0.0), judge(0.05));
     let named = sound.iter().filter(|one| one.verdict.status == Status::Leak).count();
     let found = leaking.iter().filter(|one| is_found(one, Leak::Internal)).count();
-    println!("command: sound {named} named, 0.05 internal {found} of {RUNS}, {}", leaking[0].verdict.text);
+    println!(
+        "command: sound {named} named, 0.05 internal {found} of {}, {}",
+        runs(),
+        leaking[0].verdict.text
+    );
     assert_eq!(named, 0);
-    assert!(found as u64 * 100 >= RUNS * 70, "{found}");
+    assert!(found as u64 * 100 >= runs() * 70, "{found}");
 }
 
 fn calibrated(rig: &Rig, text: String, leaks: LeaksThen) -> Result<Calibration, CalibrationError> {
@@ -240,7 +248,7 @@ fn later(seed: u64, then: LeaksThen, leaks_then: [f64; 3], leaks_now: [f64; 3]) 
 #[test]
 fn after_a_calibration_external_leaks_are_small_or_changes() {
     let all = |then, leaks_then: [f64; 3], leaks_now: [f64; 3]| {
-        (0..RUNS).into_par_iter().map(|seed| later(seed, then, leaks_then, leaks_now)).collect::<Vec<_>>()
+        (0..runs()).into_par_iter().map(|seed| later(seed, then, leaks_then, leaks_now)).collect::<Vec<_>>()
     };
     for sound in all(LeaksThen::Zero, [0.0; 3], [0.0; 3]) {
         assert_eq!(sound.verdict.status, Status::Sound, "{}", sound.verdict.text);
@@ -248,17 +256,21 @@ fn after_a_calibration_external_leaks_are_small_or_changes() {
     let absolute = all(LeaksThen::Zero, [0.0; 3], [0.0, 0.05, 0.0]);
     let found = absolute.iter().filter(|one| is_found(one, Leak::ExternalA)).count();
     println!(
-        "calibrated, A 0.05: {found} of {RUNS}, covered {:.2}",
+        "calibrated, A 0.05: {found} of {}, covered {:.2}",
+        runs(),
         covered(&absolute, Leak::ExternalA, 0.05)
     );
-    let [least, _] = coverage_bounds(0.95, RUNS);
-    assert!(found as u64 * 100 >= RUNS * 95 && covered(&absolute, Leak::ExternalA, 0.05) >= least, "{found}");
+    let [least, _] = coverage_bounds(0.95, runs());
+    assert!(
+        found as u64 * 100 >= runs() * 95 && covered(&absolute, Leak::ExternalA, 0.05) >= least,
+        "{found}"
+    );
     assert!(absolute[0].verdict.text.contains("is assumed"), "{}", absolute[0].verdict.text);
 
     let change = all(LeaksThen::Unknown, [0.0, 0.2, 0.0], [0.0, 0.25, 0.0]);
     let found = change.iter().filter(|one| is_found(one, Leak::ExternalA)).count();
-    println!("0.05 more than at a leaky calibration: {found} of {RUNS}");
-    assert!(found as u64 * 100 >= RUNS * 95, "{found}");
+    println!("0.05 more than at a leaky calibration: {found} of {}", runs());
+    assert!(found as u64 * 100 >= runs() * 95, "{found}");
     let report = &change[0];
     assert!(report.leakage.external_a.since.is_some() && report.leakage.internal.since.is_none());
     assert!(report.verdict.text.contains("It is more than on "), "{}", report.verdict.text);

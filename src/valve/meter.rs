@@ -24,7 +24,7 @@ const LEAST_SPREAD: f64 = 1e-12;
 /// Leaks that would have to change oftener than this within a window are none (chosen).
 const SO_MANY_CHANGES: usize = 1;
 /// Fewer readings tell nothing.
-const LEAST_WINDOW: usize = 100;
+const LEAST_WINDOW: usize = 50;
 
 /// The flows of a valve as a meter for leaks.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -164,7 +164,8 @@ impl ValveMeter {
             run.push(node);
             self.count += 1;
         }
-        if self.count >= MOST_READINGS || self.spans_s(node.t_s) >= self.window_s {
+        let is_timed = self.window_s.is_finite();
+        if self.count >= MOST_READINGS || is_timed && self.seconds() >= self.window_s {
             self.next_window();
             let mut next = Run::default();
             next.push(node);
@@ -173,10 +174,9 @@ impl ValveMeter {
         true
     }
 
-    /// Time since the window began, s.
-    fn spans_s(&self, t_s: f64) -> f64 {
-        let first = self.runs.iter().find_map(|run| run.readings().first());
-        first.map_or(0.0, |first| t_s - first.t_s)
+    /// Time that the window's readings span, s.
+    fn seconds(&self) -> f64 {
+        self.runs.iter().map(Run::seconds).sum()
     }
 
     /// The same, a window for each so many seconds.
@@ -280,10 +280,9 @@ impl ValveMeter {
     /// What the window says becomes what was believed before.
     fn next_window(&mut self) {
         if let Some(taken) = self.window() {
-            let seconds = self.runs.iter().map(Run::seconds).sum::<f64>();
             let known = if taken.is_mixed { self.before.with_new_leaks() } else { None };
             let known = known.unwrap_or_else(|| taken.summary.belief.clone());
-            let later = known.later(&self.rig, &self.sheet, seconds);
+            let later = known.later(&self.rig, &self.sheet, self.seconds());
             self.before = later.unwrap_or(known);
             self.at = self.at.filter(|_| !taken.is_mixed);
             self.last = Some(taken);
