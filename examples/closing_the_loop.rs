@@ -25,19 +25,14 @@ fn worn_spot() -> Result<(Rig, Vec<Series>), Box<dyn Error>> {
         EffectConstants { spot_position_m: 0.09, spot_width_m: 0.01, ..EffectConstants::default() };
     effects.set(Effect::PositionDependentLeak, 1e-11, constants)?;
     let history = History::of(&Wind::BuiltIn(WindCase::Mps21))?;
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
     let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m)?,
         leaks: PerLeak { internal: 5e-12, external_a: 1e-12, external_b: 0.0 }
             .map(|leak| LeakSize::Coefficient(leak).into()),
-        rig: rig.clone(),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,
-        duration_s: 60.0,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig.clone(), reference)
     };
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 1);
     let mut series = Series::default();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Leak, PerLeak, Rls, RlsSettings, Sample, Sensors};
+use pitchleak::core::{Leak, PerLeak, Rls, RlsSettings, Sample, Sensors};
 use pitchleak::simulate::{LeakCourse, LeakSize, Scenario, Truth};
 use pitchleak::units::LPM_PER_M3S;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -21,18 +21,11 @@ type Wrong = fn(&mut Sample<f64>, [f64; 2], f64);
 fn truths(wind: WindCase) -> Vec<Truth> {
     let history = History::of(&Wind::BuiltIn(wind)).unwrap();
     let rig = Rig::paper();
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
     let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig,
         leaks: LEAKS_M3SPA.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
         duration_s: DURATION_S,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig, reference)
     };
     scenario.collect(LEAKS_M3SPA).unwrap()
 }

@@ -40,21 +40,17 @@ fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Signals<f64>) -
     }
     let rig = rig();
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 7);
+    let reference = Reference::of(
+        wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
+        wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
+    );
     let scenario = Scenario {
-        rig,
-        reference: Reference::of(
-            wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
-            wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
-        ),
         leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
         effects,
         start_s: 4.0,
         warm_up_s: 2.0,
         duration_s: 40.0,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig, reference)
     };
     let mut series = Series::default();
     let leaks = scenario.leak_coefficients().expect("given");
@@ -155,19 +151,8 @@ fn an_effect_that_other_samples_do_not_have_is_not_believed() {
 /// In this wind, through these sensors.
 fn in_wind(wind: WindCase, effects: EffectSet<f64>, duration_s: f64, sensors: &Rig, seed: u64) -> Series {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
-    let scenario = Scenario {
-        rig: Rig::paper(),
-        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
-        leaks: PerLeak::default(),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects,
-        start_s: 0.0,
-        warm_up_s: 10.0,
-        duration_s,
-        sample_rate_hz: 100.0,
-    };
+    let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
+    let scenario = Scenario { effects, start_s: 0.0, duration_s, ..Scenario::new(Rig::paper(), reference) };
     let mut sensing = Sensing::new(sensors.sensors(), Biases::default(), seed);
     let mut series = Series::default();
     let push = |truth: &Truth| series.push(truth.t_s, &sensing.read(&truth.sample), None);

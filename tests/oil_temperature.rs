@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, PerLeak};
+use pitchleak::core::PerLeak;
 use pitchleak::replay::Replay;
 use pitchleak::report::{LeakTrend, TraceSummary};
 use pitchleak::simulate::{Biases, LeakCourse, OilTemperature, Scenario, Sensing};
@@ -21,18 +21,12 @@ fn trend(grows: bool, oil: &str, shown: bool) -> LeakTrend {
     let history = History::of(&Wind::BuiltIn(WindCase::Mps13)).unwrap();
     let leaks = PerLeak { internal: INTERNAL_M3SPA, ..PerLeak::default() };
     let course: LeakCourse = if grows { "0 L/min -> 0.5 L/min" } else { "0.5 L/min" }.parse().unwrap();
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
     let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig: rig.clone(),
         leaks: leaks.map(|_| course.within_trace(DURATION_S)),
         oil_temperature: Some(OilTemperature::of(oil, DURATION_S).unwrap()),
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
         duration_s: DURATION_S,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig.clone(), reference)
     };
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 1);
     let mut replay = Replay::new(&rig).unwrap();

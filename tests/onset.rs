@@ -1,7 +1,7 @@
 //! Alarms, as README and docs/reproduction.md claim them: a leak that opens is found soon and named alone, and a sound
 //! cylinder raises none.
 
-use pitchleak::core::{EffectSet, Leak, PerLeak};
+use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::Replay;
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
@@ -20,18 +20,12 @@ fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
         let size = LeakSize::MeanFlow(if which == leak { size_lpm * LPM } else { 0.0 });
         LeakCourse::from_onset(size, ONSET_S)
     };
+    let reference = Emulation::paper().reference(&history, rig().cylinder.stroke_m).expect("fits");
     let scenario = Scenario {
-        rig: rig(),
-        reference: Emulation::paper().reference(&history, rig().cylinder.stroke_m).expect("fits"),
         leaks: PerLeak::from_fn(size),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
         duration_s: ONSET_S + 15.0,
         sample_rate_hz: SAMPLE_RATE_HZ,
+        ..Scenario::new(rig(), reference)
     };
     let open = Scenario { start_s: 10.0 + ONSET_S, duration_s: 60.0, ..scenario.clone() };
     scenario.collect(open.leak_coefficients().expect("within reach")).expect("runs")

@@ -29,18 +29,12 @@ fn truths(wind: WindCase, duration_s: f64) -> Vec<Truth> {
     let history = History::of(&Wind::BuiltIn(wind)).unwrap();
     let rig = rig(0.003);
     let leaks = PerLeak { internal: 8e-12, external_a: 0.0, external_b: 0.0 };
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
     let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig,
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: Default::default(),
         start_s: 30.0,
-        warm_up_s: 10.0,
         duration_s,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig, reference)
     };
     scenario.collect(leaks).unwrap()
 }

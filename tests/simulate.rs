@@ -17,19 +17,8 @@ fn lpm(flow: f64) -> f64 {
 
 fn scenario() -> Scenario {
     let history = History::of(&Wind::BuiltIn(WindCase::Mps21)).expect("is built in");
-    Scenario {
-        rig: Rig::paper(),
-        reference: Emulation::paper().reference(&history, 0.2).expect("fits"),
-        leaks: PerLeak::default(),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 20.0,
-        warm_up_s: 3.0,
-        duration_s: 4.0,
-        sample_rate_hz: 100.0,
-    }
+    let reference = Emulation::paper().reference(&history, 0.2).expect("fits");
+    Scenario { start_s: 20.0, warm_up_s: 3.0, duration_s: 4.0, ..Scenario::new(Rig::paper(), reference) }
 }
 
 fn external_a(leak: LeakCourse) -> PerLeak<LeakCourse> {

@@ -221,7 +221,7 @@ fn the_command_stands_in_for_the_spool() {
 fn calibrated(rig: &Rig, text: String, leaks: LeaksThen) -> Result<Calibration, CalibrationError> {
     let mut calibrator = Calibrator::new(rig, leaks)?;
     calibrator.read(&mut reader("then", text, rig))?;
-    calibrator.finish(None)
+    calibrator.finish()
 }
 
 /// A calibrated valve, later, when it has drifted as declared.

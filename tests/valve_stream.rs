@@ -31,7 +31,7 @@ fn calibrated(cylinder: &ValveCylinder) -> (Rig, TempDir) {
     calibrator.read(&mut reader).expect("rows");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("valve.toml");
-    let found = calibrator.finish(None).expect("calibrated");
+    let found = calibrator.finish().expect("calibrated");
     std::fs::write(&file, found.to_toml().expect("a file")).expect("written");
     (rig(&format!("calibration = {:?}", file.display().to_string())), folder)
 }

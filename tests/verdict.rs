@@ -1,7 +1,7 @@
 //! The verdict on traces whose sensors lie: is each kind of reason given where it should be, and none where nothing is
 //! wrong?
 
-use pitchleak::core::{EffectSet, Leak, PerLeak};
+use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
 use pitchleak::simulate::{Scenario, Truth};
@@ -113,19 +113,8 @@ fn a_leak_that_grew_and_stays_is_a_leak_and_no_zero() {
 fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let leaks = PerLeak { external_a: course.parse().expect("a course"), ..PerLeak::default() };
-    let scenario = Scenario {
-        rig: rig(1e-2),
-        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
-        leaks,
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 0.0,
-        warm_up_s: 10.0,
-        duration_s,
-        sample_rate_hz: 100.0,
-    };
+    let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
+    let scenario = Scenario { leaks, start_s: 0.0, duration_s, ..Scenario::new(rig(1e-2), reference) };
     scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs")
 }
 

@@ -30,18 +30,12 @@ fn truths(wind: WindCase, internal: f64, external_a: f64, effects: EffectSet<f64
     let history = History::of(&Wind::BuiltIn(wind)).unwrap();
     let rig = rig(0.003);
     let leaks = PerLeak { internal, external_a, external_b: 0.0 };
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
     let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap(),
-        rig,
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
         effects,
-        start_s: 10.0,
-        warm_up_s: 10.0,
         duration_s: 30.0,
-        sample_rate_hz: 100.0,
+        ..Scenario::new(rig, reference)
     };
     scenario.collect(leaks).unwrap()
 }

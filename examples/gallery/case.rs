@@ -80,18 +80,14 @@ impl Wind {
         let mut rig = Rig::paper();
         rig.instruments = rig.instruments.with_accuracy(ACCURACY);
         let history = History::of(&pitchleak::wind::Wind::BuiltIn(WindCase::Mps21))?;
+        let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
         let scenario = Scenario {
-            reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m)?,
             leaks: leaks.map(|leak| LeakSize::Coefficient(leak).into()),
-            rig,
             oil_temperature,
-            shut: None,
-            valve_flaws: Vec::new(),
-            effects: EffectSet::default(),
             start_s: 5.0,
             warm_up_s: 3.0,
             duration_s: DURATION_S,
-            sample_rate_hz: 100.0,
+            ..Scenario::new(rig, reference)
         };
         let (sound, declared) = (recorded(&scenario)?, Declared::of(&scenario.rig));
         let collinearity = Collinearity::of(std::slice::from_ref(&sound), &declared, &[constants()]);

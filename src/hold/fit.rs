@@ -9,10 +9,12 @@ use super::equations::{Known, Normal, Unknowns};
 use super::nodes::{Cooling, Search};
 use super::profile::Profile;
 use super::recorder::{Held, LEAST_READINGS, Reading};
-use crate::presence::{Found, LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, Place, RESOLUTION};
+use crate::presence::{
+    Found, LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, Place, Pressures, RESOLUTION,
+};
 use crate::rig::Rig;
 use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
-use pitchleak_core::{Estimate, PerLeak};
+use pitchleak_core::Estimate;
 
 /// Rounds in all, and those of them in which κ is held.
 const ROUNDS: usize = 16;
@@ -70,8 +72,8 @@ pub(super) fn fit(rig: &Rig, holds: &[&Held]) -> Option<Fit> {
     }
     let normal = search.normal(kappa.value * declared_ppa);
     let misfit = misfit(&search.innovations(&solve(&normal, true)?));
-    let pressures_pa = mean_pressures_pa(holds, |load| load.abs());
-    let cooling = Cooling::of(rig, holds, &pressures_pa)?;
+    let pressures = pressures(holds);
+    let cooling = Cooling::of(rig, holds, &pressures.sizes_pa())?;
     let worse = misfit.readings.max(misfit.course).max(1.0);
     let share = kappa.std / kappa.value;
     let profile = Profile::new(kappa.value.ln(), share.min(spread), |ln_kappa| {
@@ -80,9 +82,8 @@ pub(super) fn fit(rig: &Rig, holds: &[&Held]) -> Option<Fit> {
     })?;
     let leaks = profile.at(kappa.value.ln()).leaks;
     let misfit = Misfit { of_leak: of_leak(rig, holds, kappa.value * declared_ppa, &leaks), ..misfit };
-    let load_pressure_pa = mean_pressures_pa(holds, |load| load).internal;
     let fit = Fit {
-        found: Found::new(&grid(&profile, spread), pressures_pa, load_pressure_pa, rig),
+        found: Found::new(&grid(&profile, spread), &pressures, rig),
         misfit,
         usable_s: holds.iter().map(|held| held.usable_s()).sum(),
     };
@@ -180,19 +181,13 @@ pub(super) fn running_means(readings: &[Reading]) -> Vec<Reading> {
     means
 }
 
-/// Means over time of P_L, as `size` has it, P_A and P_B, Pa.
-fn mean_pressures_pa(holds: &[&Held], size: impl Fn(f64) -> f64) -> PerLeak<f64> {
-    let (mut sum, mut time_s) = (PerLeak::<f64>::default(), 0.0);
+fn pressures(holds: &[&Held]) -> Pressures {
+    let mut sums = Pressures::default();
     for pair in holds.iter().flat_map(|held| held.readings.windows(2)) {
         let [from, to] = pair else { continue };
-        let step_s = to.t_s - from.t_s;
-        let [a_pa, b_pa] = [0.5 * (from.pa_pa + to.pa_pa), 0.5 * (from.pb_pa + to.pb_pa)];
-        sum.internal += step_s * size(a_pa - b_pa);
-        sum.external_a += step_s * a_pa;
-        sum.external_b += step_s * b_pa;
-        time_s += step_s;
+        sums.add(to.t_s - from.t_s, [from.pa_pa, to.pa_pa], [from.pb_pa, to.pb_pa]);
     }
-    sum.map(|sum| sum / f64::max(time_s, f64::MIN_POSITIVE))
+    sums
 }
 
 fn misfit(innovations: &[Vec<Vector2<f64>>]) -> Misfit {

@@ -4,50 +4,31 @@ use super::fit::Fit;
 use super::outcome::HoldTest;
 use super::recorder::EndedBy;
 use crate::channels::ChannelFaultKind;
-use crate::presence::{LEAST_DRIVING_PA, told};
+use crate::presence::{Wording, told};
 use crate::report::{Reason, ReasonId, Status, Verdict, join};
 use crate::rig::Rig;
-use crate::units::{LPM_PER_M3S, readable};
+use crate::units::readable;
 use pitchleak_core::Leak;
 
 /// Misfits beyond so many standard deviations of chance contradict the model …
 const CHANCE_SIGMAS: f64 = 5.0;
 /// … where the residuals' squares are as large beside the declared noise's: sensors are a little worse than declared now and then.
 const LEAST_MISFIT: f64 = 1.5;
-/// A compressibility off by so many of the rig file's standard deviations contradicts it.
-const BULK_MODULUS_SIGMAS: f64 = 3.0;
+
 impl HoldTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
-        let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         let Some(fit) = &self.fit else {
             return told(Status::NotSure, Vec::new(), vec![self.too_short()], "");
         };
-        let sure = 1.0 - rig.decision.alpha;
-        let found = &fit.found;
-        let sorted = found.sorted(&threshold_lpm, sure);
-        let contradictions = self.contradictions(fit, rig);
-        if !contradictions.is_empty() {
-            let apparent = found.apparent(&sorted.found);
-            return told(Status::Doubtful, sorted.found, contradictions, &apparent);
-        }
-        let usable = self.usable();
-        let mut sentences: Vec<String> =
-            sorted.found.iter().map(|leak| found.leak(*leak, threshold_lpm[*leak])).collect();
-        sentences.extend(found.none_above(&sorted.excluded, &threshold_lpm));
-        if !sorted.found.is_empty() {
-            sentences.extend(cannot_tell(&sorted.open));
-        }
-        sentences.push(usable);
-        let text = sentences.join(" ");
-        if !sorted.found.is_empty() {
-            told(Status::Leak, sorted.found, Vec::new(), &text)
-        } else if found.beliefs.any > sure {
-            told(Status::NotSure, Vec::new(), vec![which_way()], &text)
-        } else if sorted.open.is_empty() {
-            told(Status::Sound, Vec::new(), Vec::new(), &text)
-        } else {
-            told(Status::NotSure, Vec::new(), vec![fit.too_little(&sorted.open)], &text)
-        }
+        let leaks_somehow = fit.found.beliefs.any > 1.0 - rig.decision.alpha;
+        let wording = Wording {
+            teller: "This hold",
+            beside: &|_| None,
+            basis: self.usable(),
+            undecided: leaks_somehow.then(which_way),
+            open: &|open| fit.too_little(open),
+        };
+        fit.found.verdict(rig, self.contradictions(fit, rig), &wording)
     }
 
     fn too_short(&self) -> Reason {
@@ -76,7 +57,7 @@ impl HoldTest {
         let mut reasons: Vec<Reason> = self.is_frozen.then(frozen).into_iter().collect();
         reasons.extend(fit.misfit());
         reasons.extend(fit.negative());
-        reasons.extend(fit.other_oil(rig));
+        reasons.extend(fit.found.other_oil(rig, "hold"));
         reasons
     }
 
@@ -126,29 +107,8 @@ impl Fit {
         })
     }
 
-    fn other_oil(&self, rig: &Rig) -> Option<Reason> {
-        let (declared, std) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
-        let kappa = self.found.beliefs.kappa.value;
-        let off = (kappa - 1.0).abs() * declared;
-        (off > BULK_MODULUS_SIGMAS * std && std > 0.0).then(|| {
-            Reason::new(
-                ReasonId::BulkModulusImpossible,
-                format!(
-                    "the hold asks for a bulk modulus of {:.2} GPa, and the rig file says {:.2} ± {:.2} GPa",
-                    1e-9 * declared / kappa,
-                    declared / 1e9,
-                    std / 1e9
-                ),
-                "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil",
-            )
-        })
-    }
-
     fn too_little(&self, open: &[Leak]) -> Reason {
-        let flat = open.contains(&Leak::Internal)
-            && self.found.pressures_pa.internal < LEAST_DRIVING_PA
-            && open.len() == 1;
-        let suggestion = if flat {
+        let suggestion = if self.found.is_flat(open) {
             "P_A and P_B are nearly alike, so that hardly any oil passes the piston: hold under load"
         } else {
             "hold longer, and under more pressure"
@@ -167,8 +127,4 @@ fn which_way() -> Reason {
         "oil leaks, but the hold does not tell which way",
         "hold longer, or again under another load",
     )
-}
-
-fn cannot_tell(open: &[Leak]) -> Option<String> {
-    (!open.is_empty()).then(|| format!("This hold cannot tell about {} leaks.", join(open, "and")))
 }

@@ -1,10 +1,11 @@
 //! What was found of the leaks, in words and as a report.
 
 use super::belief::{Belief, Beliefs, Place, prior_std, weigh};
+use super::pressures::Pressures;
 use crate::hold::HoldSummary;
 use crate::report::{
-    EstimateEntry, Estimates, Leakage, Reason, ReplayReport, Status, TraceSummary, Verdict, advice, capital,
-    join, with_interval,
+    EstimateEntry, Estimates, Leakage, Reason, ReasonId, ReplayReport, Status, TraceSummary, Verdict, advice,
+    capital, join, with_interval,
 };
 use crate::rig::Rig;
 use crate::units::{LPM_PER_M3S, readable};
@@ -12,7 +13,7 @@ use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 
 /// A leak is ruled out at no less than this pressure: at none, none flows, Pa.
-pub(crate) const LEAST_DRIVING_PA: f64 = 20e5;
+const LEAST_DRIVING_PA: f64 = 20e5;
 /// Below this mean |P_L| zeros of the pressure sensors decide which way oil would pass the piston, Pa.
 const LEAST_LOAD_PA: f64 = 2e5;
 /// Standard deviation of a coefficient of which the trace tells next to nothing, in those of what is believed before.
@@ -44,17 +45,38 @@ pub(crate) struct Found {
 }
 
 /// What is said of each leak.
-pub(crate) struct Sorted {
-    pub found: Vec<Leak>,
-    pub excluded: Vec<Leak>,
-    pub open: Vec<Leak>,
+struct Sorted {
+    found: Vec<Leak>,
+    excluded: Vec<Leak>,
+    open: Vec<Leak>,
 }
+
+/// How one method words its verdict.
+pub(crate) struct Wording<'a> {
+    /// Who tells, or cannot.
+    pub teller: &'a str,
+    /// What goes with a leak that was found.
+    pub beside: &'a dyn Fn(Leak) -> Option<String>,
+    /// What the verdict rests on.
+    pub basis: String,
+    /// Why nothing is sure although oil leaks by some way or other.
+    pub undecided: Option<Reason>,
+    /// Why these leaks stay open.
+    pub open: &'a dyn Fn(&[Leak]) -> Reason,
+}
+
+/// A compressibility off by so many of the rig file's standard deviations contradicts it.
+const BULK_MODULUS_SIGMAS: f64 = 3.0;
 
 impl Found {
     /// By the likelihood at some places of κ.
-    pub fn new(places: &[Place], pressures_pa: PerLeak<f64>, load_pressure_pa: f64, rig: &Rig) -> Self {
-        let beliefs = weigh(places, 1.0 - rig.decision.alpha);
-        Self { beliefs, pressures_pa, load_pressure_pa, floor_m3spa: PerLeak::default() }
+    pub fn new(places: &[Place], pressures: &Pressures, rig: &Rig) -> Self {
+        Self {
+            beliefs: weigh(places, 1.0 - rig.decision.alpha),
+            pressures_pa: pressures.sizes_pa(),
+            load_pressure_pa: pressures.load_pa(),
+            floor_m3spa: PerLeak::default(),
+        }
     }
 
     /// The same, where κ has this spread and no smaller leaks than `floor_m3spa` are found.
@@ -78,8 +100,59 @@ impl Found {
         )
     }
 
+    /// The verdict, where the readings contradict what is declared by `contradictions`.
+    pub fn verdict(&self, rig: &Rig, contradictions: Vec<Reason>, wording: &Wording<'_>) -> Verdict {
+        let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        let Sorted { found, excluded, open } = self.sorted(&threshold_lpm, 1.0 - rig.decision.alpha);
+        if !contradictions.is_empty() {
+            let apparent = self.apparent(&found);
+            return told(Status::Doubtful, found, contradictions, &apparent);
+        }
+        let mut sentences: Vec<String> = Vec::new();
+        for leak in &found {
+            sentences.push(self.leak(*leak, threshold_lpm[*leak]));
+            sentences.extend((wording.beside)(*leak));
+        }
+        sentences.extend(self.none_above(&excluded, &threshold_lpm));
+        if !found.is_empty() && !open.is_empty() {
+            sentences.push(format!("{} cannot tell about {} leaks.", wording.teller, join(&open, "and")));
+        }
+        sentences.push(wording.basis.clone());
+        let (status, reasons) = match &wording.undecided {
+            _ if !found.is_empty() => (Status::Leak, Vec::new()),
+            Some(undecided) => (Status::NotSure, vec![undecided.clone()]),
+            None if open.is_empty() => (Status::Sound, Vec::new()),
+            None => (Status::NotSure, vec![(wording.open)(&open)]),
+        };
+        told(status, found, reasons, &sentences.join(" "))
+    }
+
+    /// Says so where `teller` asks for another oil than the rig file's.
+    pub fn other_oil(&self, rig: &Rig, teller: &str) -> Option<Reason> {
+        let (declared_pa, std_pa) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
+        let kappa = self.beliefs.kappa.value;
+        let off_pa = (kappa - 1.0).abs() * declared_pa;
+        (off_pa > BULK_MODULUS_SIGMAS * std_pa && std_pa > 0.0).then(|| {
+            Reason::new(
+                ReasonId::BulkModulusImpossible,
+                format!(
+                    "the {teller} asks for a bulk modulus of {:.2} GPa, and the rig file says {:.2} ± {:.2} GPa",
+                    1e-9 * declared_pa / kappa,
+                    declared_pa / 1e9,
+                    std_pa / 1e9
+                ),
+                "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil",
+            )
+        })
+    }
+
+    /// Whether the pressures hardly differ, so that an internal leak alone stays open.
+    pub fn is_flat(&self, open: &[Leak]) -> bool {
+        open == [Leak::Internal] && self.pressures_pa.internal < LEAST_DRIVING_PA
+    }
+
     /// Which leaks are there for `sure`, and which are below their thresholds.
-    pub fn sorted(&self, threshold_lpm: &PerLeak<f64>, sure: f64) -> Sorted {
+    fn sorted(&self, threshold_lpm: &PerLeak<f64>, sure: f64) -> Sorted {
         let is_driven = |leak: Leak| leak != Leak::Internal || self.pressures_pa.internal > LEAST_LOAD_PA;
         let is_found = |leak: &Leak| {
             let belief = &self.beliefs.leaks[*leak];
@@ -99,14 +172,14 @@ impl Found {
     }
 
     /// `0.020 ± 0.002`, in L/min.
-    pub fn flow(&self, leak: Leak) -> String {
+    fn flow(&self, leak: Leak) -> String {
         let to_lpm = self.pressures_pa[leak] * LPM_PER_M3S;
         let belief = &self.beliefs.leaks[leak];
         with_interval(belief.mean * to_lpm, Some(belief.std * to_lpm))
     }
 
     /// A leak that was found, and what to do.
-    pub fn leak(&self, leak: Leak, threshold_lpm: f64) -> String {
+    fn leak(&self, leak: Leak, threshold_lpm: f64) -> String {
         let (flow, bar) = (self.flow(leak), self.pressures_pa[leak] / 1e5);
         let most = self.beliefs.leaks[leak].interval[1] * self.pressures_pa[leak] * LPM_PER_M3S;
         let small = if most < threshold_lpm {
@@ -118,7 +191,7 @@ impl Found {
     }
 
     /// What is ruled out.
-    pub fn none_above(&self, excluded: &[Leak], threshold_lpm: &PerLeak<f64>) -> Option<String> {
+    fn none_above(&self, excluded: &[Leak], threshold_lpm: &PerLeak<f64>) -> Option<String> {
         let most = excluded.iter().map(|leak| self.at_most_lpm(*leak)).fold(0.0, f64::max);
         let threshold = excluded.iter().map(|leak| threshold_lpm[*leak]).fold(0.0, f64::max);
         // Rounded up: nothing above it is left.
@@ -128,7 +201,7 @@ impl Found {
     }
 
     /// Leaks that are in doubt.
-    pub fn apparent(&self, leaks: &[Leak]) -> String {
+    fn apparent(&self, leaks: &[Leak]) -> String {
         let each = |leak: &Leak| format!("{} of {} L/min", leak.label(), self.flow(*leak));
         let named: Vec<_> = leaks.iter().map(each).collect();
         if named.is_empty() {

@@ -3,8 +3,10 @@
 mod belief;
 mod found;
 mod likelihood;
+mod pressures;
 
 pub(crate) use belief::Place;
 pub use found::FoundLeak;
-pub(crate) use found::{Found, LEAST_DRIVING_PA, report, told};
+pub(crate) use found::{Found, Wording, report, told};
 pub(crate) use likelihood::{LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, RESOLUTION};
+pub(crate) use pressures::Pressures;

@@ -126,6 +126,23 @@ const CALIBRATION_ACCURACY: f64 = 0.01;
 const CALIBRATION_RUNS: usize = 12;
 
 impl Scenario {
+    /// A minute of a sound rig, 100 samples a second, from 10 s into what it follows on, the loops run in for 10 s.
+    pub fn new(rig: Rig, reference: Reference) -> Self {
+        Self {
+            rig,
+            reference,
+            leaks: PerLeak::default(),
+            oil_temperature: None,
+            shut: None,
+            effects: EffectSet::default(),
+            valve_flaws: Vec::new(),
+            start_s: 10.0,
+            warm_up_s: 10.0,
+            duration_s: 60.0,
+            sample_rate_hz: 100.0,
+        }
+    }
+
     /// Coefficients of the leaks at their largest: as given, or found so that the mean |flow| over the run, its
     /// first minute where it is longer, is as given to 1 % while they are open all the time. A leak takes
     /// pressure away, so this takes some runs.

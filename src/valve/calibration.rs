@@ -2,6 +2,7 @@
 
 use super::meter::ValveMeter;
 use super::unknowns::{Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAKS, UNKNOWNS, Unknowns};
+use crate::report::{ReplayReport, Status};
 use crate::rig::{Rig, ValveSheet};
 use crate::trace::{Record, TraceError, TraceReader};
 use jiff::Zoned;
@@ -17,6 +18,20 @@ pub enum LeaksThen {
     Zero,
     /// There may be any: later external leaks are changes since.
     Unknown,
+}
+
+impl LeaksThen {
+    /// Each by its name, as the file has it.
+    pub const NAMES: [&'static str; 2] = ["zero", "unknown"];
+
+    /// By one of [`Self::NAMES`].
+    pub fn by_name(name: &str) -> Option<Self> {
+        [Self::Zero, Self::Unknown]
+            .into_iter()
+            .zip(Self::NAMES)
+            .find(|(_, own)| *own == name)
+            .map(|(then, _)| then)
+    }
 }
 
 /// Which calibration leaks are told against.
@@ -87,6 +102,14 @@ pub enum CalibrationError {
         /// When, s.
         at_s: f64,
     },
+    /// A trace that was to show that nothing leaks does not.
+    #[error("{trace} is no evidence that nothing leaks: {text}")]
+    NoEvidence {
+        /// The trace's name.
+        trace: String,
+        /// Its verdict.
+        text: String,
+    },
     /// The file cannot be read.
     #[error("{}: {source}", file.display())]
     Read {
@@ -126,6 +149,7 @@ pub struct Calibrator {
     leaks: LeaksThen,
     meter: ValveMeter,
     traces: Vec<String>,
+    evidence: Option<String>,
 }
 
 impl Calibrator {
@@ -136,7 +160,7 @@ impl Calibrator {
     pub fn new(rig: &Rig, leaks: LeaksThen) -> Result<Self, CalibrationError> {
         let sheet = rig.valve.clone().ok_or_else(|| CalibrationError::NoValve { rig: rig.name.clone() })?;
         let meter = ValveMeter::with(rig, &sheet, before(rig, &sheet, leaks), None);
-        Ok(Self { rig: rig.clone(), sheet, leaks, meter, traces: Vec::new() })
+        Ok(Self { rig: rig.clone(), sheet, leaks, meter, traces: Vec::new(), evidence: None })
     }
 
     /// Takes in a trace of this rig.
@@ -154,11 +178,24 @@ impl Calibrator {
         if rows > 0 { Ok(()) } else { Err(CalibrationError::NoSpool { trace: reader.name().to_owned() }) }
     }
 
-    /// What the traces say; `evidence` names a hold test that shows that nothing leaked.
+    /// Rests the calibration on a hold test that shows that nothing leaks.
+    ///
+    /// # Errors
+    /// [`CalibrationError::NoEvidence`].
+    pub fn rest_on(&mut self, hold: &ReplayReport) -> Result<(), CalibrationError> {
+        let trace = hold.trace.path.clone();
+        if hold.hold.is_none() || hold.verdict.status != Status::Sound {
+            return Err(CalibrationError::NoEvidence { trace, text: hold.verdict.text.clone() });
+        }
+        self.evidence = Some(trace);
+        Ok(())
+    }
+
+    /// What the traces say.
     ///
     /// # Errors
     /// [`CalibrationError::Nothing`], [`CalibrationError::LeakChanged`].
-    pub fn finish(mut self, evidence: Option<String>) -> Result<Calibration, CalibrationError> {
+    pub fn finish(mut self) -> Result<Calibration, CalibrationError> {
         let taken = self.meter.taken().ok_or(CalibrationError::Nothing)?;
         if let Some(at_s) = taken.changed_at_s {
             return Err(CalibrationError::LeakChanged { at_s });
@@ -169,7 +206,7 @@ impl Calibrator {
             schema: SCHEMA.to_owned(),
             date: Zoned::now().date(),
             leaks: self.leaks,
-            evidence,
+            evidence: self.evidence,
             rig: rig_hash(&self.rig, &self.sheet),
             seconds: taken.summary.pressures.time_s,
             spool_range: self.meter.spool_range().ok_or(CalibrationError::Nothing)?,

@@ -15,6 +15,7 @@ use super::unknowns::{
     SATURATION, SUPPLY, TANK, Unknowns,
 };
 use nalgebra::SVector;
+use pitchleak_core::{metering, metering_slope};
 
 /// Readings at one instant: x in m, P_A, P_B in Pa, spool as a share of its stroke, P_S in Pa.
 pub(super) type Signals = SVector<f64, 5>;
@@ -94,7 +95,7 @@ impl Edge {
         let tank_pa = spool.tank_pa + unknowns[TANK] * PA_PER_BAR;
         let into = self.sign > 0.0;
         let drop_pa = if into { supply_pa - at[self.chamber] } else { at[self.chamber] - tank_pa };
-        let (root, root_slope) = metering(drop_pa);
+        let (root, root_slope) = (metering(drop_pa, LAMINAR_PA), metering_slope(drop_pa, LAMINAR_PA));
         let edge_gain = self.sign * gain * unknowns[GAINS + self.index];
         let clearance = self.sign * unknowns[CLEARANCES + self.index] * LEAK_UNIT_M3SPA;
         // To the tank as to the outside: where its pressure is found anew at each look, the two would seem to differ.
@@ -132,13 +133,6 @@ impl Edge {
         let by_u = self.opens * by_s * full - 2.0 * open * c * u;
         (open * full, by_u, -by_s * full, 0.5 * w / root * full, -open * u * u)
     }
-}
-
-/// sign(Δ) √|Δ| with a finite slope at zero, Δ (Δ² + p²)^(−1/4), and its slope.
-fn metering(drop_pa: f64) -> (f64, f64) {
-    let square = drop_pa * drop_pa + LAMINAR_PA * LAMINAR_PA;
-    let quarter = square.sqrt().sqrt();
-    (drop_pa / quarter, (0.5 * drop_pa * drop_pa + LAMINAR_PA * LAMINAR_PA) / (square * quarter))
 }
 
 #[cfg(test)]

@@ -31,11 +31,15 @@ pub(super) const LEAST_READINGS: usize = 8;
 /// A window is summed up in parts of so many seconds: leaks may change between two of them.
 const PART_S: f64 = 5.0;
 
-/// Readings without a pause, and the likeliest signals.
+/// Readings without a pause.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Run {
     readings: Vec<Node>,
-    #[serde(skip)]
+}
+
+/// A run on its way to the likeliest signals.
+struct Smoothed {
+    readings: Vec<Node>,
     nodes: Vec<Node>,
 }
 
@@ -57,7 +61,7 @@ impl Run {
     pub fn between(&self, from_s: f64, to_s: f64) -> Option<Self> {
         let readings: Vec<Node> =
             self.readings.iter().filter(|node| node.t_s >= from_s && node.t_s < to_s).copied().collect();
-        (readings.len() >= LEAST_READINGS).then_some(Self { readings, nodes: Vec::new() })
+        (readings.len() >= LEAST_READINGS).then_some(Self { readings })
     }
 
     /// Time that it spans, s.
@@ -71,15 +75,14 @@ impl Run {
     pub fn readings(&self) -> &[Node] {
         &self.readings
     }
+}
 
-    /// Signals of readings that are new begin as running means.
-    fn begin(&mut self, half_width: f64) {
-        if self.nodes.len() < self.readings.len() {
-            let known = self.nodes.len().saturating_sub(REACH);
-            let means = follow_spool(&mut self.readings, half_width);
-            self.nodes.truncate(known);
-            self.nodes.extend_from_slice(&means[known..]);
-        }
+impl Smoothed {
+    /// Signals begin as running means.
+    fn begin(run: &Run, half_width: f64) -> Self {
+        let mut readings = run.readings.clone();
+        let nodes = follow_spool(&mut readings, half_width);
+        Self { readings, nodes }
     }
 
     /// Where the spool stands within a hysteresis of this half width.
@@ -134,14 +137,14 @@ impl Run {
 /// Fits all runs together after what was believed before, beginning at `unknowns`; `is_cold` where those are the data sheet's. None
 /// where no finite number comes out.
 pub(super) fn fit(
-    runs: &mut [Run],
+    runs: &[Run],
     before: &Belief,
     mut unknowns: Unknowns,
     is_cold: bool,
     half_width: f64,
     known: &Known,
 ) -> Option<Fit> {
-    runs.iter_mut().for_each(|run| run.begin(half_width));
+    let mut runs: Vec<Smoothed> = runs.iter().map(|run| Smoothed::begin(run, half_width)).collect();
     for round in 0..MOST_ROUNDS {
         if ROUNDS_FOLLOWED.contains(&round) && half_width > 0.0 {
             let found =
@@ -151,7 +154,7 @@ pub(super) fn fit(
         let held = is_cold && round < ROUNDS_HELD;
         let mut normal = Normal::prior(before, &unknowns);
         let mut whites = Vec::with_capacity(runs.len());
-        for run in runs.iter() {
+        for run in &runs {
             let white = run.whitened(&unknowns, known)?;
             normal.add_steps(white.steps());
             whites.push(white);
@@ -167,7 +170,7 @@ pub(super) fn fit(
         }
     }
     let mut parts = Vec::new();
-    for run in runs.iter() {
+    for run in &runs {
         parts.extend(run.parts(&run.whitened(&unknowns, known)?));
     }
     Some(Fit { at: unknowns, parts })

@@ -142,7 +142,7 @@ impl ValveMeter {
     #[inline]
     pub fn record(meter: &mut Option<Self>, record: &Record) {
         if let Some(valve) = meter {
-            if record.sample.qa_m3s.is_some() || record.sample.qb_m3s.is_some() {
+            if record.has_flow() {
                 *meter = None;
             } else {
                 valve.push(record);
@@ -218,14 +218,14 @@ impl ValveMeter {
         }
         let (start, is_cold) = self.at.map_or((self.before.mean, true), |at| (at, false));
         self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
-        let mut taken = self.settled(&mut self.runs.clone(), &self.before, start, is_cold, MOST_CHANGES)?;
+        let mut taken = self.settled(&self.runs, &self.before, start, is_cold, MOST_CHANGES)?;
         self.at = Some(taken.at);
         let Some(last) = &self.last else { return Some(taken) };
         let begin_s = self.runs.first()?.readings().first()?.t_s;
         let limit = CHANGED * taken.summary.noise.max(1.0);
         if taken.changes == 0 && moved(&self.before, &taken.summary.belief).is_some_and(|far| far > limit) {
             let before = self.before.with_new_leaks()?;
-            taken = self.settled(&mut self.runs.clone(), &before, taken.at, false, 0)?;
+            taken = self.settled(&self.runs, &before, taken.at, false, 0)?;
             (taken.changed_at_s, taken.changes, taken.is_mixed) = (Some(begin_s), 1, true);
         }
         Some(taken.after(last, begin_s))
@@ -234,7 +234,7 @@ impl ValveMeter {
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
     fn settled(
         &self,
-        runs: &mut [Run],
+        runs: &[Run],
         before: &Belief,
         start: Unknowns,
         is_cold: bool,
@@ -263,10 +263,10 @@ impl ValveMeter {
         let part = |from_s: f64, to_s: f64| {
             runs.iter().filter_map(|run| run.between(from_s, to_s)).collect::<Vec<_>>()
         };
-        let mut early = part(f64::NEG_INFINITY, until_s);
-        let valve = self.settled(&mut early, before, before.mean, true, changes - 1);
+        let early = part(f64::NEG_INFINITY, until_s);
+        let valve = self.settled(&early, before, before.mean, true, changes - 1);
         let known = valve.as_ref().map_or(before, |taken| &taken.summary.belief).with_new_leaks()?;
-        let now = self.settled(&mut part(from_s, f64::INFINITY), &known, known.mean, true, changes - 1)?;
+        let now = self.settled(&part(from_s, f64::INFINITY), &known, known.mean, true, changes - 1)?;
         let was_explained =
             valve.as_ref().is_none_or(|taken| taken.was_explained && taken.summary.is_explained());
         Some(Taken {

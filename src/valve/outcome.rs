@@ -12,8 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 
-/// Below this an internal leak is within what valves differ from any model of them, m³/(s·Pa), 0.005 L/min at 50 bar: the droop of a supply that is measured
-/// elsewhere looked like it, and no residual told (trials of undeclared effects, docs/valve.md).
+/// Below this an internal leak is within what valves differ from any model of them, m³/(s·Pa), 0.005 L/min at 50 bar: some effects
+/// that nobody declared look like it, and no residual tells (docs/valve.md).
 const INTERNAL_FLOOR_M3SPA: f64 = 0.005 * LEAK_UNIT_M3SPA;
 
 /// In a stream nothing is said before so many parts with the same leaks: of fewer, none tells whether noise explains them (chosen by
@@ -98,7 +98,7 @@ fn found(fit: &Summary, rig: &Rig) -> Option<Found> {
     };
     let kappa = fit.belief.mean[KAPPA];
     let place = Place { kappa, ln_prior: 0.0, likelihood };
-    let found = Found::new(&[place], fit.pressures.sizes_pa(), fit.pressures.load_pa(), rig);
+    let found = Found::new(&[place], &fit.pressures, rig);
     let floor_m3spa = PerLeak { internal: INTERNAL_FLOOR_M3SPA, ..PerLeak::default() };
     Some(found.with_oil(kappa, covariance[(KAPPA, KAPPA)].sqrt(), floor_m3spa))
 }

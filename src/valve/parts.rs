@@ -5,8 +5,8 @@ use super::edges::{PA, PB};
 use super::equations::{Node, Slopes};
 use super::unknowns::{Belief, Information, LEAK_STD, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
+use crate::presence::Pressures;
 use nalgebra::SMatrix;
-use pitchleak_core::PerLeak;
 use serde::{Deserialize, Serialize};
 
 /// Normal equations Λ δ = η of a step from the unknowns of the moment.
@@ -79,43 +79,6 @@ pub(super) struct Part {
     pub pressures: Pressures,
 }
 
-/// Sums over time of |P_L|, P_A, P_B and of P_L, Pa s.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Pressures {
-    sizes_pas: PerLeak<f64>,
-    load_pas: f64,
-    pub time_s: f64,
-}
-
-impl Pressures {
-    fn add(&mut self, [from, to]: [&Node; 2]) {
-        let step_s = to.t_s - from.t_s;
-        let [a_pa, b_pa] = [PA, PB].map(|at| 0.5 * (from.signals[at] + to.signals[at]));
-        let sizes = PerLeak { internal: (a_pa - b_pa).abs(), external_a: a_pa, external_b: b_pa };
-        self.sizes_pas = self.sizes_pas.zip(sizes).map(|(sum, size)| sum + step_s * size);
-        self.load_pas += step_s * (a_pa - b_pa);
-        self.time_s += step_s;
-    }
-
-    pub fn plus(&self, other: &Self) -> Self {
-        Self {
-            sizes_pas: self.sizes_pas.zip(other.sizes_pas).map(|(a, b)| a + b),
-            load_pas: self.load_pas + other.load_pas,
-            time_s: self.time_s + other.time_s,
-        }
-    }
-
-    /// Means of |P_L|, P_A, P_B, Pa.
-    pub fn sizes_pa(&self) -> PerLeak<f64> {
-        self.sizes_pas.map(|sum| sum / self.time_s.max(f64::MIN_POSITIVE))
-    }
-
-    /// Mean of P_L, Pa.
-    pub fn load_pa(&self) -> f64 {
-        self.load_pas / self.time_s.max(f64::MIN_POSITIVE)
-    }
-}
-
 impl Part {
     pub fn from(from_s: f64) -> Self {
         Self { from_s, normal: Normal::none(), squares: 0.0, count: 0.0, pressures: Pressures::default() }
@@ -125,7 +88,9 @@ impl Part {
         self.normal.add_step(step);
         self.squares += step.residual.norm_squared();
         self.count += 2.0;
-        self.pressures.add(nodes);
+        let [from, to] = nodes;
+        let [a_pa, b_pa] = [PA, PB].map(|at| [from.signals[at], to.signals[at]]);
+        self.pressures.add(to.t_s - from.t_s, a_pa, b_pa);
     }
 
     fn normal(&self) -> Normal {
@@ -205,23 +170,16 @@ const LEAST_PARTS: usize = 2;
 pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<Summary> {
     let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
     let prior = Normal::prior(before, at);
-    let mut since = 0;
-    let mut best = split(&normals, &prior, at, 0)?;
     let noise = parts.iter().map(|part| part.squares).sum::<f64>()
         / parts.iter().map(|part| part.count).sum::<f64>().max(1.0);
-    // From what is left with constant leaks, one change after the other.
-    loop {
-        let later = (since + LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
-            .filter_map(|place| split(&normals, &prior, at, place).map(|found| (place, found)))
-            .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
-        match later {
-            Some((place, found)) if found.gain > best.gain + CHANGED * noise.max(1.0) => {
-                (since, best) = (place, found);
-            }
-            _ => break,
-        }
-    }
-    let own = &parts[since.min(parts.len())..];
+    let constant = split(&normals, &prior, at, 0)?;
+    let least = constant.gain + CHANGED * noise.max(1.0);
+    let changed = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
+        .filter_map(|place| split(&normals, &prior, at, place).map(|found| (place, found)))
+        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
+        .filter(|(_, found)| found.gain > least);
+    let (since, best) = changed.unwrap_or((0, constant));
+    let own = &parts[since..];
     let count: f64 = own.iter().map(|part| part.count).sum();
     let moved = best.step;
     let left = |part: &Part, normal: &Normal| {

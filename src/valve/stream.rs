@@ -39,7 +39,7 @@ impl ValveStream {
     /// has ended, and adds the alarms that changed with it.
     pub fn record(valve: &mut Option<Self>, record: &Record, rig: &Rig, alarms: &mut Vec<Alarm>) -> bool {
         let Some(stream) = valve else { return false };
-        if record.sample.qa_m3s.is_some() || record.sample.qb_m3s.is_some() {
+        if record.has_flow() {
             *valve = None;
             return false;
         }

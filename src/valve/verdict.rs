@@ -3,49 +3,28 @@
 use super::calibration::LeaksThen;
 use super::meter::Taken;
 use super::outcome::ValveTest;
-use crate::presence::{LEAST_DRIVING_PA, told};
+use crate::presence::{Found, Wording, told};
 use crate::report::{Reason, ReasonId, Status, Verdict, join};
 use crate::rig::Rig;
-use crate::units::{LPM_PER_M3S, readable};
-use pitchleak_core::{Leak, PerLeak};
+use crate::units::readable;
+use pitchleak_core::Leak;
 
 /// Leaks below zero by so much contradict it.
 const NEGATIVE_SIGMAS: f64 = 5.0;
-/// A compressibility off by so many of the rig file's standard deviations contradicts it.
-const BULK_MODULUS_SIGMAS: f64 = 3.0;
 
 impl ValveTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
-        let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         let (Some(found), Some(taken)) = (&self.found, &self.taken) else {
             return told(Status::NotSure, Vec::new(), vec![too_short()], "");
         };
-        let sorted = found.sorted(&threshold_lpm, 1.0 - rig.decision.alpha);
-        let contradictions = contradictions(taken, found.beliefs.negative, rig);
-        if !contradictions.is_empty() {
-            let apparent = found.apparent(&sorted.found);
-            return told(Status::Doubtful, sorted.found, contradictions, &apparent);
-        }
-        let mut sentences: Vec<String> = Vec::new();
-        for leak in &sorted.found {
-            sentences.push(found.leak(*leak, threshold_lpm[*leak]));
-            sentences.extend(self.against(*leak));
-        }
-        sentences.extend(found.none_above(&sorted.excluded, &threshold_lpm));
-        if !sorted.found.is_empty() && !sorted.open.is_empty() {
-            sentences
-                .push(format!("The valve's flows cannot tell about {} leaks.", join(&sorted.open, "and")));
-        }
-        sentences.push(self.basis());
-        let text = sentences.join(" ");
-        let (status, reasons) = if !sorted.found.is_empty() {
-            (Status::Leak, Vec::new())
-        } else if sorted.open.is_empty() {
-            (Status::Sound, Vec::new())
-        } else {
-            (Status::NotSure, vec![self.open(&sorted.open)])
+        let wording = Wording {
+            teller: "The valve's flows",
+            beside: &|leak| self.against(leak),
+            basis: self.basis(),
+            undecided: None,
+            open: &|open| self.open(found, open),
         };
-        told(status, sorted.found, reasons, &text)
+        found.verdict(rig, contradictions(taken, found, rig), &wording)
     }
 
     /// An external leak is told against what the valve's own clearance may leak, or against a calibration.
@@ -97,9 +76,8 @@ impl ValveTest {
         format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}")
     }
 
-    fn open(&self, open: &[Leak]) -> Reason {
-        let leaks: PerLeak<_> = self.summary.leaks.unwrap_or(PerLeak::from_fn(|_| Default::default()));
-        if open == [Leak::Internal] && leaks.internal.pressure_bar * 1e5 < LEAST_DRIVING_PA {
+    fn open(&self, found: &Found, open: &[Leak]) -> Reason {
+        if found.is_flat(open) {
             return Reason::new(
                 ReasonId::NotIdentifiable,
                 "the valve's flows do not rule out internal leaks",
@@ -113,6 +91,7 @@ impl ValveTest {
             }
             _ => "record longer, with the piston moving both ways and both pressures changing",
         };
+        let leaks = found.leaks();
         let sizes: Vec<String> = open
             .iter()
             .map(|leak| format!("{} up to {} L/min", leak.label(), readable(leaks[*leak].ci95_lpm[1], 2)))
@@ -135,7 +114,7 @@ fn too_short() -> Reason {
 
 const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
 
-fn contradictions(taken: &Taken, negative: f64, rig: &Rig) -> Vec<Reason> {
+fn contradictions(taken: &Taken, found: &Found, rig: &Rig) -> Vec<Reason> {
     let fit = &taken.summary;
     let mut reasons = Vec::new();
     if !taken.is_explained() {
@@ -151,26 +130,13 @@ fn contradictions(taken: &Taken, negative: f64, rig: &Rig) -> Vec<Reason> {
         };
         reasons.push(Reason::new(ReasonId::ModelDoesNotFit, what, LOOK_FOR));
     }
-    if negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
+    if found.beliefs.negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
         reasons.push(Reason::new(
             ReasonId::NegativeLeak,
             "more oil stays in the cylinder than the valve lets in",
             "compare areas, rated_flow and rated_drop with the data sheets, and check which way the spool counts: + feeds A",
         ));
     }
-    let (declared_pa, std_pa) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
-    let kappa = fit.belief.mean[super::unknowns::KAPPA];
-    if std_pa > 0.0 && (kappa - 1.0).abs() * declared_pa > BULK_MODULUS_SIGMAS * std_pa {
-        reasons.push(Reason::new(
-            ReasonId::BulkModulusImpossible,
-            format!(
-                "the trace asks for a bulk modulus of {:.2} GPa, and the rig file says {:.2} ± {:.2} GPa",
-                1e-9 * declared_pa / kappa,
-                declared_pa / 1e9,
-                std_pa / 1e9
-            ),
-            "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil",
-        ));
-    }
+    reasons.extend(found.other_oil(rig, "trace"));
     reasons
 }

@@ -1,10 +1,10 @@
 use crate::failure::Failure;
 use crate::{Outcome, output};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pitchleak::Rig;
 use pitchleak::output::{Inputs, OutputFile};
 use pitchleak::replay::{ReplayError, replay};
-use pitchleak::report::Status;
 use pitchleak::trace::TraceReader;
 use pitchleak::valve::{Calibrator, LeaksThen};
 use pitchleak_view::Text;
@@ -29,8 +29,8 @@ pub struct Arguments {
     rig: Option<PathBuf>,
 
     /// What leaked while they were recorded: after `zero` leaks are absolute, after `unknown` external ones are changes since
-    #[arg(long, value_name = "LEAKS", value_enum)]
-    leaks: Then,
+    #[arg(long, value_name = "LEAKS", value_parser = leaks_then())]
+    leaks: LeaksThen,
 
     /// A hold test that finds no leak; without one, `--leaks zero` is an assumption
     #[arg(long, value_name = "HOLD")]
@@ -41,47 +41,33 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Then {
-    Zero,
-    Unknown,
+fn leaks_then() -> impl TypedValueParser<Value = LeaksThen> {
+    PossibleValuesParser::new(LeaksThen::NAMES)
+        .try_map(|name| LeaksThen::by_name(&name).ok_or("neither zero nor unknown"))
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let first = arguments.traces.first().map_or(Path::new("-"), PathBuf::as_path);
-    let mut rig = match &arguments.rig {
+    let rig = match &arguments.rig {
         Some(rig) => Rig::load(rig)?,
         None => Rig::beside(first)?,
-    };
-    // What is calibrated anew does not rest on the calibration before.
-    if let Some(valve) = &mut rig.valve {
-        valve.calibration = None;
     }
-    let evidence = arguments.evidence.as_deref().map(|hold| passed(hold, &rig)).transpose()?;
+    .uncalibrated();
     let read = arguments.traces.iter().chain(&arguments.evidence).map(PathBuf::as_path).chain(rig.file());
     let mut file = OutputFile::create(&arguments.out, &Inputs::of(read))?;
-    let leaks = match arguments.leaks {
-        Then::Zero => LeaksThen::Zero,
-        Then::Unknown => LeaksThen::Unknown,
-    };
-    let mut calibrator = Calibrator::new(&rig, leaks)?;
+    let mut calibrator = Calibrator::new(&rig, arguments.leaks)?;
+    if let Some(hold) = &arguments.evidence {
+        let mut reader = TraceReader::open(hold, &rig)?;
+        calibrator.rest_on(&replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?)?;
+    }
     for path in &arguments.traces {
         calibrator.read(&mut TraceReader::open(path, &rig)?)?;
     }
-    let found = calibrator.finish(evidence)?;
+    let found = calibrator.finish()?;
     let text = found.to_toml()?;
     file.write_all(text.as_bytes()).map_err(|source| file.error(source))?;
     file.finish()?;
     output::print(&found.to_text(&output::palette()))?;
     output::print(&format!("\nIn {}: [valve] calibration = \"{}\"\n", rig.name, arguments.out.display()))?;
     Ok(Outcome::Done)
-}
-
-/// The name of a hold test that found no leak.
-fn passed(hold: &Path, rig: &Rig) -> Result<String, Failure> {
-    let name = hold.display().to_string();
-    let mut reader = TraceReader::open(hold, rig)?;
-    let report = replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(()))?;
-    let is_passed = report.hold.is_some() && report.verdict.status == Status::Sound;
-    if is_passed { Ok(name) } else { Err(Failure::NoEvidence { hold: name, text: report.verdict.text }) }
 }

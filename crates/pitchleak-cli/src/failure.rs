@@ -38,14 +38,6 @@ pub enum Failure {
     /// A valve that cannot be calibrated.
     #[error(transparent)]
     Calibrate(#[from] CalibrationError),
-    /// A hold test that does not show that nothing leaks.
-    #[error("{hold} is no evidence that nothing leaks: {text}")]
-    NoEvidence {
-        /// The trace.
-        hold: String,
-        /// Its verdict.
-        text: String,
-    },
     /// A trace that is read more than once.
     #[error("standard input is read once, and this takes files: give a file")]
     ReadOnce,

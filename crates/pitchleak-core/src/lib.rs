@@ -110,7 +110,8 @@ pub use filter::{
 };
 pub use model::{
     ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, Leak, LeakPressures, Linkage,
-    LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, signed_root,
+    LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope,
+    signed_root,
 };
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};

@@ -1,6 +1,8 @@
 use crate::errors::{trace_error, value_error};
 use crate::rig::Rig;
+use crate::signals::Stopped;
 use crate::source::Source;
+use pitchleak::replay::replay;
 use pitchleak::valve::{CalibrationError, Calibrator, LeaksThen};
 use pitchleak_view::{Palette, Text};
 use pyo3::prelude::*;
@@ -12,21 +14,24 @@ pub fn calibrate(
     traces: Vec<Source<'_>>,
     rig: &Rig,
     leaks: &str,
-    evidence: Option<String>,
+    evidence: Option<Source<'_>>,
 ) -> PyResult<(String, String)> {
-    let leaks = match leaks {
-        "zero" => LeaksThen::Zero,
-        "unknown" => LeaksThen::Unknown,
-        other => return Err(value_error(format!("leaks: `{other}` is neither zero nor unknown"))),
-    };
+    let leaks = LeaksThen::by_name(leaks)
+        .ok_or_else(|| value_error(format!("leaks: `{leaks}` is neither zero nor unknown")))?;
     let told = |error: CalibrationError| match &error {
         CalibrationError::Trace(error) => trace_error(py, error),
         error => value_error(error),
     };
-    let mut calibrator = Calibrator::new(&rig.0, leaks).map_err(told)?;
-    for trace in traces {
-        trace.read(py, &rig.0, false, |mut reader| Ok(calibrator.read(&mut reader)))?.map_err(told)?;
+    let rig = rig.0.uncalibrated();
+    let mut calibrator = Calibrator::new(&rig, leaks).map_err(told)?;
+    if let Some(hold) = evidence {
+        let report = hold
+            .read(py, &rig, false, |mut reader| replay(&mut reader, &rig, |_, _, _| Ok::<_, Stopped>(())))?;
+        calibrator.rest_on(&report).map_err(told)?;
     }
-    let found = calibrator.finish(evidence).map_err(told)?;
+    for trace in traces {
+        trace.read(py, &rig, false, |mut reader| Ok(calibrator.read(&mut reader)))?.map_err(told)?;
+    }
+    let found = calibrator.finish().map_err(told)?;
     Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN)))
 }

@@ -62,6 +62,8 @@ def test_what_is_wrong_is_said(tmp_path: Path) -> None:
         pl.calibrate(trace, leaks="zero")
     with pytest.raises(ValueError, match="spool_percent"):
         pl.calibrate(trace, plain, leaks="zero")
+    with pytest.raises(ValueError, match="is no evidence that nothing leaks"):
+        pl.calibrate(trace, plain, leaks="zero", evidence=trace)
     with pytest.raises(ValueError, match="neither zero nor unknown"):
         pl.calibrate(trace, plain, leaks="none")
     with pytest.raises(ValueError, match="droop=2 bar"):

@@ -99,18 +99,15 @@ pub fn truth(excitation: Excitation, ailment: Ailment, size: f64) -> Option<Vec<
     if let Ailment::Known(effect) = ailment {
         effects.set(effect, size, constants()).ok()?;
     }
+    let reference = reference(excitation);
     let scenario = Scenario {
-        rig: rig(1e-2),
-        reference: reference(excitation),
         leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
         effects,
         start_s: 5.0,
         warm_up_s: 3.0,
         duration_s: DURATION_S,
         sample_rate_hz: SAMPLE_RATE_HZ,
+        ..Scenario::new(rig(1e-2), reference)
     };
     let mut truths = scenario.collect(scenario.leak_coefficients().ok()?).ok()?;
     for truth in &mut truths {

@@ -249,19 +249,8 @@ pub fn opening(wind: WindCase, leak: Leak, size_lpm: f64) -> Vec<Truth> {
 
 fn scenario(wind: WindCase, leaks: PerLeak<LeakCourse>, effects: EffectSet<f64>) -> Scenario {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
-    Scenario {
-        rig: rig(1e-2),
-        reference: Emulation::paper().reference(&history, 0.2).expect("fits the rig"),
-        leaks,
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects,
-        start_s: 20.0,
-        warm_up_s: 10.0,
-        duration_s: DURATION_S,
-        sample_rate_hz: 100.0,
-    }
+    let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
+    Scenario { leaks, effects, start_s: 20.0, duration_s: DURATION_S, ..Scenario::new(rig(1e-2), reference) }
 }
 
 fn effects(leaking: Leaking) -> EffectSet<f64> {

@@ -1,7 +1,7 @@
 //! A minute of the paper's rig in turbulent wind, as its sensors read it.
 
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Leak, PerLeak, Sample};
+use pitchleak::core::{Leak, PerLeak, Sample};
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing};
 use pitchleak::units::LPM_PER_M3S;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -16,19 +16,8 @@ pub fn minute(wind: WindCase, leak: Option<(Leak, f64)>, seed: u64) -> Vec<(f64,
     let size_lpm = |which| leak.filter(|(leak, _)| *leak == which).map_or(0.0, |(_, size_lpm)| size_lpm);
     let size = |which| LeakCourse::from(LeakSize::MeanFlow(size_lpm(which) / LPM_PER_M3S));
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), seed);
-    let scenario = Scenario {
-        reference: Emulation::paper().reference(&history, rig.cylinder.stroke_m).expect("fits the rig"),
-        rig,
-        leaks: PerLeak::from_fn(size),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
-        duration_s: 60.0,
-        sample_rate_hz: 100.0,
-    };
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).expect("fits the rig");
+    let scenario = Scenario { leaks: PerLeak::from_fn(size), ..Scenario::new(rig, reference) };
     let truths = scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs");
     truths.iter().map(|truth| (truth.t_s, sensing.read(&truth.sample))).collect()
 }

@@ -4,7 +4,7 @@ use super::counted::map_counted;
 use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, rig};
 use super::{Law, Progress};
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Leak, PerLeak, RlsError};
+use pitchleak::core::{Leak, PerLeak, RlsError};
 use pitchleak::replay::Replay;
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
@@ -150,17 +150,10 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
         LeakCourse::from_onset(size, ONSET_S)
     };
     let scenario = Scenario {
-        rig: rig.clone(),
-        reference,
         leaks: PerLeak::from_fn(size),
-        oil_temperature: None,
-        shut: None,
-        valve_flaws: Vec::new(),
-        effects: EffectSet::default(),
-        start_s: 10.0,
-        warm_up_s: 10.0,
         duration_s: ONSET_S + WATCH_S,
         sample_rate_hz: SAMPLE_RATE_HZ,
+        ..Scenario::new(rig.clone(), reference)
     };
     // The mean is taken where the leak is open.
     let open = Scenario { start_s: 10.0 + ONSET_S, ..scenario.clone() };

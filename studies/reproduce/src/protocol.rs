@@ -1,7 +1,7 @@
 //! The paper's experiment (Section IV), and what stands here for what it does not print.
 
 use pitchleak::Rig;
-use pitchleak::core::{Cylinder, EffectSet, FilterError, PerLeak, RlsError, Sample};
+use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError, Sample};
 use pitchleak::output::OutputError;
 use pitchleak::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use pitchleak::units::LPM_PER_BAR;
@@ -128,17 +128,12 @@ impl Run {
         let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
         let wind_curve = reference.wind_mps.clone();
         let scenario = Scenario {
-            rig,
-            reference,
             leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
-            oil_temperature: None,
-            shut: None,
-            valve_flaws: Vec::new(),
-            effects: EffectSet::default(),
             start_s: START_S,
             warm_up_s: START_S,
             duration_s: WINDOW_S * WINDOWS as f64,
             sample_rate_hz: SAMPLE_RATE_HZ,
+            ..Scenario::new(rig, reference)
         };
         let truths = scenario.collect(leaks_m3spa)?;
         let wind_at = |truth: &Truth| wind_curve.as_ref().map_or(f64::NAN, |c| c.at(START_S + truth.t_s));

@@ -16,6 +16,6 @@ pub use estimate::{Estimate, LeakPressures};
 pub use gas::{ATMOSPHERE_PA, LEAST_ABSOLUTE_PA};
 pub use leak::{Leak, PerLeak};
 pub use linkage::{Linkage, LinkageError};
-pub use orifice::{metering, signed_root};
+pub use orifice::{metering, metering_slope, signed_root};
 pub use sample::Sample;
 pub use sensors::{SensorSpread, Sensors};

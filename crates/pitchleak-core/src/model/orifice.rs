@@ -20,9 +20,19 @@ pub fn metering<T: Real>(difference_pa: T, laminar_pa: T) -> T {
     difference_pa / (size.sqrt() * (T::one() + share * share).sqrt().sqrt())
 }
 
+/// Slope of [`metering`] by the difference.
+#[inline]
+pub fn metering_slope<T: Real>(difference_pa: T, laminar_pa: T) -> T {
+    let size = difference_pa.abs().max(laminar_pa);
+    let (own, laminar) = (difference_pa / size, laminar_pa / size);
+    let (own, laminar) = (own * own, laminar * laminar);
+    let square = own + laminar;
+    (own * T::lit(0.5) + laminar) / (square * square.sqrt().sqrt() * size.sqrt())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::signed_root;
+    use super::{metering, metering_slope, signed_root};
 
     #[test]
     fn is_the_root_at_metering_pressures_and_smooth_at_zero() {
@@ -32,5 +42,15 @@ mod tests {
         }
         assert!((signed_root(1.0_f64) - 1.0 / 2e4_f64.sqrt()).abs() < 1e-9);
         assert!(signed_root(f64::MAX).is_finite());
+    }
+
+    #[test]
+    fn its_slope_is_that_of_its_differences() {
+        for p in [-3e6, -2e4, -7.0, 0.0, 9e3, 1e4, 5e6_f64] {
+            let step = 1.0 + 1e-5 * p.abs();
+            let rise = metering(p + step, 1e4) - metering(p - step, 1e4);
+            let slope = metering_slope(p, 1e4);
+            assert!((rise / (2.0 * step) / slope - 1.0).abs() < 1e-6, "{p}: {slope}");
+        }
     }
 }

@@ -9,7 +9,6 @@ from typing import Any
 from . import _inputs, _pitchleak
 from ._inputs import Columns
 from ._pitchleak import Rig
-from ._replay import replay
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ def calibrate(
     rig: Rig | _inputs.Path | None = None,
     *,
     leaks: str,
-    evidence: _inputs.Path | None = None,
+    evidence: Any = None,
     columns: Columns | None = None,
 ) -> Calibration:
     """Learns the valve of a cylinder without flow meters from one trace or several of it.
@@ -59,12 +58,8 @@ def calibrate(
     if not many:
         raise ValueError("traces: give one at least")
     found = _inputs.rig_for(many[0], rig, columns)
-    if evidence is not None:
-        shown = replay(evidence, found, columns=columns)
-        if shown.hold is None or shown.verdict.status != "sound":
-            raise ValueError(f"evidence: {evidence} is no evidence that nothing leaks: {shown.verdict.text}")
-    name = None if evidence is None else os.fspath(evidence)
-    text, shown_text = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, name)
+    hold = None if evidence is None else _inputs.source(evidence, found)
+    text, shown = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, hold)
     raw = tomllib.loads(text)
     low, high = raw["spool_range"]
-    return Calibration(raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown_text)
+    return Calibration(raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown)

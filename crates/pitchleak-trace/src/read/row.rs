@@ -89,6 +89,12 @@ pub struct ValveReading {
 }
 
 impl Record {
+    /// Whether a flow meter read anything.
+    #[inline]
+    pub fn has_flow(&self) -> bool {
+        self.sample.qa_m3s.is_some() || self.sample.qb_m3s.is_some()
+    }
+
     /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
     #[inline]
     pub fn step_s(&self) -> f64 {

@@ -102,6 +102,13 @@ impl Rig {
         }
     }
 
+    /// The same without its valve's calibration: a new one does not rest on it.
+    #[must_use]
+    pub fn uncalibrated(&self) -> Self {
+        let valve = self.valve.clone().map(|sheet| ValveSheet { calibration: None, ..sheet });
+        Self { valve, ..self.clone() }
+    }
+
     /// The rig for a trace: `rig.toml` beside it, else the built-in one. Beside standard input (`-`)
     /// there is nothing.
     pub fn beside(trace: &Path) -> Result<Self, RigError> {

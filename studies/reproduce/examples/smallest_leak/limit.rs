@@ -2,7 +2,7 @@
 
 use crate::Failure;
 use pitchleak::Rig;
-use pitchleak::core::{EffectSet, Estimate, Leak, PerLeak, Rls, RlsSettings, Sample, SensorSpread, Sensors};
+use pitchleak::core::{Estimate, Leak, PerLeak, Rls, RlsSettings, Sample, SensorSpread, Sensors};
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, SimulateError, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_reproduce::cramer_rao::{CramerRao, CramerRaoModel, PARAMETERS};
@@ -43,17 +43,10 @@ impl Motion {
         let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
         let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).expect("fits the rig");
         let scenario = Scenario {
-            rig: rig.clone(),
-            reference,
             leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
-            oil_temperature: None,
-            shut: None,
-            valve_flaws: Vec::new(),
-            effects: EffectSet::default(),
-            start_s: 10.0,
-            warm_up_s: 10.0,
             duration_s: STEP_S * f64::from(SIMULATED),
             sample_rate_hz: rate_hz,
+            ..Scenario::new(rig.clone(), reference)
         };
         Ok(Self { rig, rate_hz, truths: scenario.collect(LEAKS)? })
     }
