@@ -224,8 +224,14 @@ fn calibrated(rig: &Rig, text: String, leaks: LeaksThen) -> Result<Calibration, 
     calibrator.finish()
 }
 
-/// A calibrated valve, later, when it has drifted as declared.
-fn later(seed: u64, then: LeaksThen, leaks_then: [f64; 3], leaks_now: [f64; 3]) -> ReplayReport {
+/// A calibrated valve, later, when it has drifted as declared; `seen` is what is recorded then.
+fn later(
+    seed: u64,
+    then: LeaksThen,
+    leaks_then: [f64; 3],
+    leaks_now: [f64; 3],
+    seen: impl Fn(String) -> String,
+) -> ReplayReport {
     let base = rig("");
     let cylinder = ValveCylinder { leaks_lpm: leaks_then, ..ValveCylinder::drawn(first_seed() + 700 + seed) };
     let text = cylinder.trace(300.0, 100.0, 3e-3);
@@ -242,13 +248,16 @@ fn later(seed: u64, then: LeaksThen, leaks_then: [f64; 3], leaks_now: [f64; 3]) 
         now.valve.clearances_lpm[edge] = (now.valve.clearances_lpm[edge] + drift(0.1 * 0.057)).max(0.0);
     }
     let rig = rig(&format!("calibration = {:?}", file.display().to_string()));
-    judged(now.trace(60.0, 100.0, 3e-3), &rig)
+    judged(seen(now.trace(60.0, 100.0, 3e-3)), &rig)
 }
 
 #[test]
 fn after_a_calibration_external_leaks_are_small_or_changes() {
     let all = |then, leaks_then: [f64; 3], leaks_now: [f64; 3]| {
-        (0..runs()).into_par_iter().map(|seed| later(seed, then, leaks_then, leaks_now)).collect::<Vec<_>>()
+        (0..runs())
+            .into_par_iter()
+            .map(|seed| later(seed, then, leaks_then, leaks_now, |text| text))
+            .collect::<Vec<_>>()
     };
     for sound in all(LeaksThen::Zero, [0.0; 3], [0.0; 3]) {
         assert_eq!(sound.verdict.status, Status::Sound, "{}", sound.verdict.text);
@@ -289,4 +298,71 @@ fn a_calibration_says_what_is_wrong() {
     let text = changing.trace(90.0, 100.0, 3e-3);
     let message = told(calibrated(&rig, text, LeaksThen::Unknown));
     assert!(message.starts_with("a leak changed"), "{message}");
+}
+
+/// A trace without one of its columns.
+fn without(column: &str, text: &str) -> String {
+    let place = text.lines().next().and_then(|head| head.split(',').position(|name| name == column));
+    let place = place.expect("a column");
+    let kept = |line: &str| {
+        let cells = line.split(',').enumerate().filter(|(at, _)| *at != place).map(|(_, cell)| cell);
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    };
+    text.lines().map(kept).collect()
+}
+
+#[test]
+fn one_chamber_pressure_may_be_missing_after_a_calibration() {
+    for (column, unread) in [("pa_bar", Leak::ExternalA), ("pb_bar", Leak::ExternalB)] {
+        let other = if unread == Leak::ExternalA { Leak::ExternalB } else { Leak::ExternalA };
+        for (leak, lpm) in
+            [(None, 0.0), (Some(Leak::Internal), 0.05), (Some(other), 0.1), (Some(unread), 0.4)]
+        {
+            let mut leaks = [0.0; 3];
+            leak.iter().for_each(|leak| leaks[*leak as usize] = lpm);
+            let one = |seed| later(seed, LeaksThen::Zero, [0.0; 3], leaks, |text| without(column, &text));
+            let reports: Vec<_> = (0..runs()).into_par_iter().map(one).collect();
+            let count =
+                |of: &dyn Fn(&ReplayReport) -> bool| reports.iter().filter(|one| of(one)).count() as u64;
+            let found = count(&|one| leak.is_some_and(|leak| is_found(one, leak)));
+            let false_leaks = count(&|one| {
+                one.verdict.status == Status::Leak
+                    && one.verdict.faults.iter().any(|fault| Some(*fault) != leak)
+            });
+            let sound = count(&|one| one.verdict.status == Status::Sound);
+            println!(
+                "without {column}, {leaks:?}: {found} of {} named, {sound} SOUND, {false_leaks} false",
+                runs()
+            );
+            // Of the leak at the chamber without a sensor nothing is said.
+            assert_eq!((false_leaks, sound), (0, 0));
+            if let Some(leak) = leak.filter(|leak| *leak != unread) {
+                let is_told = |one: &&ReplayReport| one.estimates.leaks()[leak].ci95.is_some();
+                let told: Vec<_> = reports.iter().filter(is_told).cloned().collect();
+                let held = covered(&told, leak, lpm);
+                println!("  held {held:.2} of {}", told.len());
+                let [least, _] = coverage_bounds(0.95, told.len() as u64);
+                assert!(found * 100 >= runs() * 50 && held >= least, "{found} {held}");
+            }
+            let tells = |report: &ReplayReport| report.verdict.text.contains(" is not measured");
+            assert_eq!(count(&|one| tells(one) || one.verdict.status == Status::Doubtful), runs());
+        }
+    }
+}
+
+/// By the data sheet alone a missing pressure leaves nothing to be told, and no valve is calibrated without it.
+#[test]
+fn without_a_chamber_pressure_and_a_calibration_nothing_is_told() {
+    let rig = rig("");
+    let text =
+        without("pb_bar", &ValveCylinder::drawn(first_seed()).leaking(0, 0.2).trace(60.0, 100.0, 3e-3));
+    let report = judged(text.clone(), &rig);
+    assert_eq!(report.verdict.status, Status::NotSure);
+    assert!(
+        report.verdict.text.starts_with("P_B is not measured, and by its data sheet"),
+        "{}",
+        report.verdict.text
+    );
+    let message = calibrated(&rig, text, LeaksThen::Unknown).expect_err("no pressure").to_string();
+    assert!(message.contains("no column for pressure B"), "{message}");
 }

@@ -100,7 +100,7 @@ pub fn check<E: From<ReplayError>>(
     let columns = reader.columns(&rig.columns);
     let replayed = replay(reader, &rig, |replay, record, renewed| {
         extremes.add(record);
-        if !replay.is_shut() {
+        if !replay.rests() {
             monitor.add(record);
             excerpt.add(record);
         }

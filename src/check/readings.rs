@@ -49,8 +49,8 @@ pub fn values(record: &Record) -> [Option<f64>; SIGNALS.len()] {
     let (s, valve) = (&record.sample, record.valve);
     [
         Some(s.x_m),
-        Some(s.pa_pa),
-        Some(s.pb_pa),
+        Some(s.pa_pa).filter(|reading| !reading.is_nan()),
+        Some(s.pb_pa).filter(|reading| !reading.is_nan()),
         s.qa_m3s,
         s.qb_m3s,
         s.force_n,

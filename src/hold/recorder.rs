@@ -106,6 +106,9 @@ impl Recorder {
 
     /// Takes in one record. An empty cell of `shut` says that nothing changed.
     pub fn push(&mut self, record: &Record) {
+        if !record.has_both_pressures() {
+            return;
+        }
         let is_shut = record.shut.unwrap_or(self.was_shut);
         self.was_shut |= is_shut;
         if !is_shut {

@@ -15,7 +15,7 @@ use std::f64::consts::{PI, SQRT_2};
 /// Size of a leak that a cylinder may have, half normal, at 50 bar, L/min. A guess: that of docs/explanations.md for a meter of 20 L/min.
 const LEAK_SIZE_LPM: f64 = 1.0;
 /// In [`LEAK_UNIT_M3SPA`].
-const SIZE: f64 = LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 / LEAK_UNIT_M3SPA;
+pub(crate) const SIZE: f64 = LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 / LEAK_UNIT_M3SPA;
 
 /// What is believed of one leak; coefficients in m³/(s·Pa), where there is such a leak.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -68,6 +68,13 @@ pub(crate) struct Wording<'a> {
 /// A compressibility off by so many of the rig file's standard deviations contradicts it.
 const BULK_MODULUS_SIGMAS: f64 = 3.0;
 
+impl Belief {
+    /// Whether hardly more is known of a leak than before any reading.
+    fn is_untold(&self) -> bool {
+        self.std >= UNKNOWN * prior_std()
+    }
+}
+
 impl Found {
     /// By the likelihood at some places of κ.
     pub fn new(places: &[Place], pressures: &Pressures, rig: &Rig) -> Self {
@@ -213,6 +220,9 @@ impl Found {
 
     fn leakage(&self, leak: Leak) -> Leakage {
         let (belief, pressure_pa) = (&self.beliefs.leaks[leak], self.pressures_pa[leak]);
+        if belief.is_untold() {
+            return UNTOLD;
+        }
         let flow = Estimate { value: belief.mean * pressure_pa, std: belief.std * pressure_pa };
         let size = Leakage::new(flow);
         let against = leak == Leak::Internal && self.load_pressure_pa < 0.0;
@@ -220,6 +230,9 @@ impl Found {
         Leakage { net_mean_lpm: Some(net_lpm), ..size }
     }
 }
+
+/// What is not told is no number that anyone should act on.
+const UNTOLD: Leakage = Leakage { mean_lpm: 0.0, net_mean_lpm: None, std_lpm: None, since: None };
 
 /// The report on a trace that was judged without flow meters; without `found`, it was too short.
 pub(crate) fn report(
@@ -229,13 +242,12 @@ pub(crate) fn report(
     verdict: Verdict,
     hold: Option<HoldSummary>,
 ) -> ReplayReport {
-    let nothing = Leakage { mean_lpm: 0.0, net_mean_lpm: None, std_lpm: None, since: None };
     ReplayReport {
         schema: ReplayReport::SCHEMA,
         rig: rig.name.clone(),
         estimator: rig.estimator.kind,
         estimates: estimates(rig, found),
-        leakage: PerLeak::from_fn(|leak| found.map_or(nothing, |found| found.leakage(leak))),
+        leakage: PerLeak::from_fn(|leak| found.map_or(UNTOLD, |found| found.leakage(leak))),
         flow_meter_offsets: None,
         normalised_innovation: None,
         hold,
@@ -252,15 +264,16 @@ pub(crate) fn report(
 }
 
 fn estimates(rig: &Rig, found: Option<&Found>) -> Estimates {
-    let too_short =
-        |value, unit| EstimateEntry::without_spread(value, unit).not_identifiable("the trace is too short");
+    let untold = |value, unit| {
+        EstimateEntry::without_spread(value, unit).not_identifiable("this trace does not tell it")
+    };
     let leaks = PerLeak::from_fn(|leak| match found {
         Some(found) => coefficient(&found.beliefs.leaks[leak]),
-        None => too_short(0.0, EstimateEntry::COEFFICIENT_UNIT),
+        None => untold(0.0, EstimateEntry::COEFFICIENT_UNIT),
     });
     let oil = match found {
         Some(found) => bulk_modulus(&found.beliefs.kappa, rig),
-        None => too_short(rig.fluid.bulk_modulus_pa, EstimateEntry::BULK_MODULUS_UNIT),
+        None => untold(rig.fluid.bulk_modulus_pa, EstimateEntry::BULK_MODULUS_UNIT),
     };
     Estimates {
         internal_leak_coefficient: leaks.internal,
@@ -276,11 +289,7 @@ fn coefficient(belief: &Belief) -> EstimateEntry {
         ci95: Some(belief.interval),
         ..EstimateEntry::new(estimate, EstimateEntry::COEFFICIENT_UNIT)
     };
-    if belief.std < UNKNOWN * prior_std() {
-        entry
-    } else {
-        entry.not_identifiable("this trace says little about it")
-    }
+    if belief.is_untold() { entry.not_identifiable("this trace says little about it") } else { entry }
 }
 
 /// β = 1/κ; the trace tells it where it halves what the rig file leaves open.

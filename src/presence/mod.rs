@@ -6,6 +6,7 @@ mod likelihood;
 mod pressures;
 
 pub(crate) use belief::Place;
+pub(crate) use belief::SIZE as LEAK_SIZE;
 pub use found::FoundLeak;
 pub(crate) use found::{Found, Wording, report, told};
 pub(crate) use likelihood::{LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, RESOLUTION};

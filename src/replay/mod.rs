@@ -120,7 +120,7 @@ pub struct Replay {
     oil: OilTemperature,
     statistic: Box<Statistic>,
     /// Whether the ports are shut: a hold is for [`hold`](crate::hold), not for this estimator.
-    is_shut: bool,
+    rests: bool,
     /// Time of the last record, s.
     end_s: f64,
     /// Of the last block, in its own standard deviations.
@@ -149,7 +149,7 @@ impl Replay {
             spikes: Spikes::new(&rig.sensors()),
             oil: OilTemperature::default(),
             statistic: Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors())),
-            is_shut: false,
+            rests: false,
             end_s: 0.0,
             innovation: None,
             rig: rig.clone(),
@@ -170,13 +170,17 @@ impl Replay {
     #[inline]
     pub fn push(&mut self, record: &Record) -> bool {
         self.end_s = record.t_s;
+        if !record.has_both_pressures() {
+            self.rests = true;
+            return false;
+        }
         if let Some(is_shut) = record.shut
-            && is_shut != self.is_shut
+            && is_shut != self.rests
         {
-            self.is_shut = is_shut;
+            self.rests = is_shut;
             return self.open_or_shut(record);
         }
-        if self.is_shut {
+        if self.rests {
             return false;
         }
         self.push_open(record)
@@ -185,7 +189,7 @@ impl Replay {
     /// Takes in a record at which the ports are shut or opened: what passes while they are shut is not in its flows.
     #[cold]
     fn open_or_shut(&mut self, record: &Record) -> bool {
-        !self.is_shut && self.push_open(&Record { after_gap: true, ..*record })
+        !self.rests && self.push_open(&Record { after_gap: true, ..*record })
     }
 
     /// Takes in a record of open ports.
@@ -349,8 +353,8 @@ impl Replay {
     }
 
     /// Whether both ports are shut: such records are for [`crate::hold`].
-    pub fn is_shut(&self) -> bool {
-        self.is_shut
+    pub fn rests(&self) -> bool {
+        self.rests
     }
 
     /// Whether the last record was left out as a spike.
@@ -428,7 +432,7 @@ pub fn replay<E: From<ReplayError>>(
         Recorder::record(&mut holds, &record, rig);
         ValveMeter::record(&mut valve, &record);
         has_spool |= record.valve.is_some();
-        if !replay.spikes.left_out() && !replay.is_shut {
+        if !replay.spikes.left_out() && !replay.rests {
             excerpt.add(&record);
         }
         each(&replay, &record, renewed)?;

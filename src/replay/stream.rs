@@ -152,7 +152,7 @@ impl Stream {
         if let Some(refused) = &mut self.refused {
             refused.add(record);
         }
-        if !self.replay.spikes.left_out() && !self.replay.is_shut {
+        if !self.replay.spikes.left_out() && !self.replay.rests {
             self.evidence.add(record, &self.replay.rig);
         }
         renewed || judged
@@ -222,7 +222,7 @@ impl Stream {
 
     /// The same of the hold that goes on, as far as it is.
     pub fn hold_so_far(&self, name: &str) -> Option<ReplayReport> {
-        let holds = self.holds.as_ref().filter(|_| self.replay.is_shut)?;
+        let holds = self.holds.as_ref().filter(|_| self.replay.rests)?;
         let hold = holds.clone().finish(self.rig())?;
         Some(hold.report(self.summary(name)?, self.rig()))
     }

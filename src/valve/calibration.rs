@@ -1,7 +1,9 @@
 //! A valve's calibration: what traces of this rig say of its edges, kept in a file for later traces.
 
 use super::meter::ValveMeter;
-use super::unknowns::{Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAKS, UNKNOWNS, Unknowns};
+use super::unknowns::{
+    Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAKS, UNKNOWNS, Unknowns,
+};
 use crate::report::{ReplayReport, Status};
 use crate::rig::{Rig, ValveSheet};
 use crate::trace::{Record, TraceError, TraceReader};
@@ -168,6 +170,7 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::Trace`], [`CalibrationError::NoSpool`].
     pub fn read(&mut self, reader: &mut TraceReader<'_>) -> Result<(), CalibrationError> {
+        reader.need_both_pressures(&self.rig.columns)?;
         let mut record = Record::default();
         let (mut is_first, mut rows) = (true, 0);
         while reader.next_record(&mut record)? {
@@ -298,7 +301,7 @@ impl Calibration {
             let (i, j) = (i.max(j), i.min(j));
             self.covariance[i][j]
         });
-        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), covariance)?.later(
+        Belief::of(Unknowns::from_iterator(self.mean.iter().copied()), covariance, [LEAK_STD; 3])?.later(
             rig,
             sheet,
             f64::INFINITY,

@@ -30,6 +30,8 @@ pub(super) struct Known {
     pub rated_m3s: f64,
     /// Variances of the readings.
     pub variances: Signals,
+    /// So many numbers a step tells beside the signals.
+    pub told: f64,
 }
 
 /// A sensor without noise has this of its full scale: rounding.
@@ -56,6 +58,7 @@ impl Known {
                 variance(&sheets.spool),
                 supply,
             ]),
+            told: 2.0,
         }
     }
 }

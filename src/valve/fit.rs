@@ -8,9 +8,13 @@ use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
 use super::parts::{Normal, Part};
 use super::unknowns::{Belief, HYSTERESIS, KAPPA, LAPS, ROUNDING, Unknowns};
+use super::unread;
 use super::whitening::Whitening;
 
 const MOST_ROUNDS: usize = 20;
+/// … and where a pressure is not measured: it and the chamber's own leak are known by their product, and half steps settle after the first.
+const MOST_ROUNDS_UNREAD: usize = 40;
+const ROUNDS_WHOLE: usize = 6;
 /// Rounds in which κ is held, and in which the laps move by no more than this, a share of the stroke: the edges' corners are far
 /// from linear.
 const ROUNDS_HELD: usize = 4;
@@ -39,6 +43,9 @@ pub(super) struct Run {
 
 /// A run on its way to the likeliest signals.
 struct Smoothed {
+    known: Known,
+    /// The chamber whose pressure is not measured.
+    unread: Option<usize>,
     readings: Vec<Node>,
     nodes: Vec<Node>,
 }
@@ -49,6 +56,8 @@ pub(super) struct Fit {
     /// Around which all is linear.
     pub at: Unknowns,
     pub parts: Vec<Part>,
+    /// Whether the search came to an end.
+    pub is_settled: bool,
 }
 
 impl Run {
@@ -78,11 +87,19 @@ impl Run {
 }
 
 impl Smoothed {
-    /// Signals begin as running means.
-    fn begin(run: &Run, half_width: f64) -> Self {
+    /// Signals begin as running means, a pressure that is not measured where the valve brings it.
+    fn begin(run: &Run, half_width: f64, unknowns: &Unknowns, known: &Known) -> Self {
         let mut readings = run.readings.clone();
-        let nodes = follow_spool(&mut readings, half_width);
-        Self { readings, nodes }
+        let mut nodes = follow_spool(&mut readings, half_width);
+        let unread = readings.first().and_then(|first| unread::chamber(&first.signals));
+        let Some(chamber) = unread else {
+            return Self { known: known.clone(), unread, readings, nodes };
+        };
+        unread::course(chamber, &mut nodes, unknowns, known);
+        for (reading, node) in readings.iter_mut().zip(&nodes) {
+            reading.signals[chamber] = node.signals[chamber];
+        }
+        Self { known: known.clone().without(chamber), unread, readings, nodes }
     }
 
     /// Where the spool stands within a hysteresis of this half width.
@@ -93,8 +110,9 @@ impl Smoothed {
         }
     }
 
-    fn whitened<'a>(&self, unknowns: &Unknowns, known: &'a Known) -> Option<Whitening<'a>> {
-        let mut white = Whitening::new(&known.variances, self.nodes.len());
+    fn whitened(&self, unknowns: &Unknowns) -> Option<Whitening> {
+        let known = &self.known;
+        let mut white = Whitening::new(known.variances, self.nodes.len());
         let mut last: Option<(&Node, &Node, Rates)> = None;
         for (reading, node) in self.readings.iter().zip(&self.nodes) {
             let rates = Rates::at(node, unknowns, known);
@@ -111,23 +129,24 @@ impl Smoothed {
     }
 
     /// Moves the signals to the likeliest where the unknowns go by `step`.
-    fn smooth(&mut self, white: &Whitening<'_>, step: &Unknowns) -> Option<()> {
+    fn smooth(&mut self, white: &Whitening, step: &Unknowns) -> Option<()> {
         let corrections = white.corrections(|one| one.residual + one.by_unknowns * step)?;
         for ((node, reading), correction) in self.nodes.iter_mut().zip(&self.readings).zip(corrections) {
             node.signals = reading.signals - correction;
+            self.unread.iter().for_each(|chamber| unread::bound(*chamber, &mut node.signals));
         }
         Some(())
     }
 
-    fn parts(&self, white: &Whitening<'_>) -> Vec<Part> {
+    fn parts(&self, white: &Whitening) -> Vec<Part> {
         let mut parts: Vec<Part> = Vec::new();
-        for (step, pair) in white.steps().iter().zip(self.readings.windows(2)) {
+        for (step, pair) in white.steps().iter().zip(self.nodes.windows(2)) {
             let [from, to] = pair else { continue };
             if parts.last().is_none_or(|part| from.t_s >= part.from_s + PART_S) {
                 parts.push(Part::from(from.t_s));
             }
             if let Some(part) = parts.last_mut() {
-                part.add(step, [from, to]);
+                part.add(step, [from, to], self.known.told);
             }
         }
         parts
@@ -144,8 +163,12 @@ pub(super) fn fit(
     half_width: f64,
     known: &Known,
 ) -> Option<Fit> {
-    let mut runs: Vec<Smoothed> = runs.iter().map(|run| Smoothed::begin(run, half_width)).collect();
-    for round in 0..MOST_ROUNDS {
+    let mut runs: Vec<Smoothed> =
+        runs.iter().map(|run| Smoothed::begin(run, half_width, &unknowns, known)).collect();
+    let is_unread = runs.iter().any(|run| run.unread.is_some());
+    let most_rounds = if is_unread { MOST_ROUNDS_UNREAD } else { MOST_ROUNDS };
+    let mut is_settled = false;
+    for round in 0..most_rounds {
         if ROUNDS_FOLLOWED.contains(&round) && half_width > 0.0 {
             let found =
                 unknowns[HYSTERESIS].abs().clamp(PLAY_RANGE[0] * half_width, PLAY_RANGE[1] * half_width);
@@ -155,25 +178,31 @@ pub(super) fn fit(
         let mut normal = Normal::prior(before, &unknowns);
         let mut whites = Vec::with_capacity(runs.len());
         for run in &runs {
-            let white = run.whitened(&unknowns, known)?;
+            let white = run.whitened(&unknowns)?;
             normal.add_steps(white.steps());
             whites.push(white);
         }
         let step = normal.solve(held.then_some(KAPPA))?;
-        let share = if is_cold && round < ROUNDS_SLOW { slow(&step) } else { 1.0 };
+        let share = match round {
+            0..ROUNDS_SLOW if is_cold => slow(&step),
+            ROUNDS_WHOLE.. if is_unread => 0.5,
+            _ => 1.0,
+        };
         for (run, white) in runs.iter_mut().zip(&whites) {
-            run.smooth(white, &step)?;
+            run.smooth(white, &(step * share))?;
         }
-        unknowns = bounded(unknowns + step * share);
-        if !held && normal.square(&step) < SETTLED * SETTLED {
+        let next = bounded(unknowns + step * share);
+        is_settled = !held && normal.square(&((next - unknowns) / share)) < SETTLED * SETTLED;
+        unknowns = next;
+        if is_settled {
             break;
         }
     }
     let mut parts = Vec::new();
     for run in &runs {
-        parts.extend(run.parts(&run.whitened(&unknowns, known)?));
+        parts.extend(run.parts(&run.whitened(&unknowns)?));
     }
-    Some(Fit { at: unknowns, parts })
+    Some(Fit { at: unknowns, parts, is_settled })
 }
 
 fn slow(step: &Unknowns) -> f64 {

@@ -2,14 +2,17 @@
 //! and the leaks do while they stay the same.
 
 use super::calibration::{self, Calibration, CalibrationError, Since};
-use super::edges::{SPOOL, Signals, Spool};
+use super::edges::{PA, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{LEAST_READINGS, Run, fit};
 use super::parts::{CHANGED, Summary, summary};
-use super::unknowns::{Belief, Unknowns};
+use super::unknowns::{Belief, LEAKS, Unknowns};
+use super::unread;
 use crate::rig::{Rig, ValveSheet};
+use crate::signal::Signal;
 use crate::trace::Record;
 use nalgebra::Matrix3;
+use pitchleak_core::Leak;
 use serde::{Deserialize, Serialize};
 
 /// A window has so many readings at the most: ten minutes at 100 Hz, 15 MB. Less, and the unknowns of the first are too far from linear.
@@ -41,6 +44,8 @@ pub struct ValveMeter {
     window_s: f64,
     /// Least and greatest spool.
     spool_range: [f64; 2],
+    /// The chamber whose pressure is not measured.
+    unread: Option<usize>,
     since: Option<Since>,
     /// What the windows before this one said.
     last: Option<Taken>,
@@ -55,6 +60,8 @@ pub(super) struct Taken {
     pub changed_at_s: Option<f64>,
     /// Leaks changed in it, somewhere: what it says of the valve is not believed.
     is_mixed: bool,
+    /// Whether the search for it came to an end.
+    is_settled: bool,
     /// How often they changed.
     pub changes: usize,
     /// Whether noise explains what was before the last change, too.
@@ -108,6 +115,7 @@ impl ValveMeter {
             count: 0,
             window_s: f64::INFINITY,
             spool_range: [f64::INFINITY, f64::NEG_INFINITY],
+            unread: None,
             since,
             last: None,
         }
@@ -138,6 +146,31 @@ impl ValveMeter {
         self.spool_range[0].is_finite().then_some(self.spool_range)
     }
 
+    /// Goes on without the pressure of a chamber.
+    #[inline]
+    fn lose(&mut self, chamber: Option<usize>) {
+        let Some(chamber) = chamber else { return };
+        self.unread = Some(chamber);
+        if let Some(before) = self.before.clone().without_pressure_at(LEAKS + chamber) {
+            self.before = before;
+        }
+    }
+
+    /// Whether what it says of leaks is worth anything: without one of the pressures a calibrated valve's, where the search settled.
+    pub(super) fn can_tell(&self, taken: &Taken) -> bool {
+        self.unread.is_none() || self.since.is_some() && taken.is_settled
+    }
+
+    /// The leak at the chamber whose pressure is not measured, which nothing tells of.
+    pub(super) fn untold(&self) -> Option<Leak> {
+        self.unread.map(|chamber| if chamber == PA { Leak::ExternalA } else { Leak::ExternalB })
+    }
+
+    /// The chamber pressure that is not measured.
+    pub(super) fn unread(&self) -> Option<Signal> {
+        self.unread.map(|chamber| if chamber == PA { Signal::PressureA } else { Signal::PressureB })
+    }
+
     /// Takes in a record of a rig that may have a valve; with the first flow of a meter it has no say any more.
     #[inline]
     pub fn record(meter: &mut Option<Self>, record: &Record) {
@@ -160,6 +193,9 @@ impl ValveMeter {
         let Some(node) = self.node(record).filter(|_| record.shut != Some(true)) else { return false };
         let [least, most] = self.spool_range;
         self.spool_range = [least.min(node.signals[SPOOL]), most.max(node.signals[SPOOL])];
+        if self.unread.is_none() {
+            self.lose(unread::chamber(&node.signals));
+        }
         if let Some(run) = self.runs.last_mut() {
             run.push(node);
             self.count += 1;
@@ -248,6 +284,7 @@ impl ValveMeter {
             at: fit.at,
             changed_at_s: None,
             is_mixed: false,
+            is_settled: fit.is_settled,
             changes: 0,
             was_explained: true,
         };

@@ -17,6 +17,7 @@ mod outcome;
 mod parts;
 mod stream;
 mod unknowns;
+mod unread;
 mod verdict;
 mod whitening;
 

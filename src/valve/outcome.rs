@@ -3,10 +3,11 @@
 use super::calibration::{LeaksThen, Since};
 use super::meter::{Taken, ValveMeter};
 use super::parts::Summary;
-use super::unknowns::{KAPPA, LEAK_UNIT_M3SPA, LEAKS, clearance_m3s};
+use super::unknowns::{KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_m3s};
 use crate::presence::{self, Found, FoundLeak, LeakLikelihood, Place};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
+use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
 use nalgebra::{Matrix3, Vector3};
 use pitchleak_core::{Estimate, Leak, PerLeak};
@@ -31,10 +32,13 @@ pub struct ValveSummary {
     pub clearance_lpm: [f64; 2],
     /// What the readings scatter, in the declared noise's standard deviations.
     pub scatter: f64,
+    /// The chamber pressure that is not measured, `pa` or `pb`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unread: Option<&'static str>,
     /// The calibration that it rests on; none where the data sheet does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrated: Option<Since>,
-    /// Each leak; none where the trace is too short.
+    /// Each leak; none where the trace does not tell of leaks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub leaks: Option<PerLeak<FoundLeak>>,
 }
@@ -45,6 +49,8 @@ pub struct ValveTest {
     pub(super) summary: ValveSummary,
     pub(super) found: Option<Found>,
     pub(super) taken: Option<Taken>,
+    /// The leak at a chamber whose pressure is not measured.
+    untold: Option<Leak>,
 }
 
 impl ValveMeter {
@@ -66,7 +72,9 @@ impl ValveMeter {
     fn test(&self, taken: Option<Taken>, rig: &Rig) -> Option<ValveTest> {
         let spool_range = self.spool_range()?;
         let fit = taken.as_ref().map(|taken| &taken.summary);
-        let found = fit.and_then(|fit| found(fit, rig));
+        let untold = self.untold();
+        let told = taken.as_ref().filter(|taken| self.can_tell(taken));
+        let found = told.and_then(|taken| found(&taken.summary, untold, rig));
         let pressures_pa = fit.map(|fit| fit.pressures.sizes_pa()).unwrap_or_default();
         let clearance = |pressure_pa: f64| clearance_m3s(self.sheet(), pressure_pa) * LPM_PER_M3S;
         let summary = ValveSummary {
@@ -74,10 +82,11 @@ impl ValveMeter {
             spool_range,
             clearance_lpm: [clearance(pressures_pa.external_a), clearance(pressures_pa.external_b)],
             scatter: fit.map_or(1.0, |fit| fit.noise.sqrt()),
+            unread: self.unread().map(Signal::name),
             calibrated: self.calibrated(),
             leaks: found.as_ref().map(Found::leaks),
         };
-        Some(ValveTest { summary, found, taken })
+        Some(ValveTest { summary, found, taken, untold })
     }
 }
 
@@ -86,16 +95,22 @@ fn widening(fit: &Summary) -> [f64; 3] {
     fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt())
 }
 
-/// Which leaks there are, widened by what noise does not explain.
-fn found(fit: &Summary, rig: &Rig) -> Option<Found> {
-    let covariance = fit.belief.covariance()?;
+/// Means and covariances of the leaks, widened by what noise does not explain; of one that is untold they say nothing.
+fn leaks(fit: &Summary, untold: Option<Leak>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let (mean, covariance) = fit.belief.leaks()?;
     let wider = widening(fit);
-    let leaks = Matrix3::from_fn(|i, j| covariance[(LEAKS + i, LEAKS + j)] * wider[i] * wider[j]);
-    let likelihood = LeakLikelihood {
-        information: leaks.cholesky()?.inverse(),
-        leaks: Vector3::from(fit.belief.mean.fixed_rows::<3>(LEAKS)),
-        squares: 0.0,
-    };
+    let mut covariance = Matrix3::from_fn(|i, j| covariance[(i, j)] * wider[i] * wider[j]);
+    if let Some(leak) = untold {
+        covariance[(leak as usize, leak as usize)] += LEAK_STD * LEAK_STD;
+    }
+    Some((mean, covariance))
+}
+
+/// Which leaks there are.
+fn found(fit: &Summary, untold: Option<Leak>, rig: &Rig) -> Option<Found> {
+    let covariance = fit.belief.covariance()?;
+    let (leaks, spread) = leaks(fit, untold)?;
+    let likelihood = LeakLikelihood { information: spread.cholesky()?.inverse(), leaks, squares: 0.0 };
     let kappa = fit.belief.mean[KAPPA];
     let place = Place { kappa, ln_prior: 0.0, likelihood };
     let found = Found::new(&[place], &fit.pressures, rig);
@@ -117,9 +132,8 @@ impl ValveTest {
     /// Flows of the leaks, whatever their sign, m³/s; none where too little was read.
     pub(super) fn flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
         let fit = &self.taken.as_ref()?.summary;
-        let (mean, covariance) = fit.belief.leaks()?;
-        let wider = widening(fit);
-        let at = |i: usize| Estimate { value: mean[i], std: wider[i] * covariance[(i, i)].sqrt() };
+        let (mean, covariance) = leaks(fit, self.untold)?;
+        let at = |i: usize| Estimate { value: mean[i], std: covariance[(i, i)].sqrt() };
         let coefficients = PerLeak { internal: at(0), external_a: at(1), external_b: at(2) };
         let pressures_pa = fit.pressures.sizes_pa();
         Some(

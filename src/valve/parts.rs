@@ -3,7 +3,7 @@
 
 use super::edges::{PA, PB};
 use super::equations::{Node, Slopes};
-use super::unknowns::{Belief, Information, LEAK_STD, LEAKS, UNKNOWNS, Unknowns};
+use super::unknowns::{Belief, Information, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use crate::presence::Pressures;
 use nalgebra::SMatrix;
@@ -84,10 +84,11 @@ impl Part {
         Self { from_s, normal: Normal::none(), squares: 0.0, count: 0.0, pressures: Pressures::default() }
     }
 
-    pub fn add(&mut self, step: &WhiteStep, nodes: [&Node; 2]) {
+    /// A step between two nodes, which tells so many numbers beside the signals.
+    pub fn add(&mut self, step: &WhiteStep, nodes: [&Node; 2], told: f64) {
         self.normal.add_step(step);
         self.squares += step.residual.norm_squared();
-        self.count += 2.0;
+        self.count += told;
         let [from, to] = nodes;
         let [a_pa, b_pa] = [PA, PB].map(|at| [from.signals[at], to.signals[at]]);
         self.pressures.add(to.t_s - from.t_s, a_pa, b_pa);
@@ -169,13 +170,12 @@ const LEAST_PARTS: usize = 2;
 /// Sums up the parts of a window around the unknowns `at`; none where they say no finite number.
 pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<Summary> {
     let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
-    let prior = Normal::prior(before, at);
     let noise = parts.iter().map(|part| part.squares).sum::<f64>()
         / parts.iter().map(|part| part.count).sum::<f64>().max(1.0);
-    let constant = split(&normals, &prior, at, 0)?;
+    let constant = split(&normals, before, at, 0)?;
     let least = constant.gain + CHANGED * noise.max(1.0);
     let changed = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
-        .filter_map(|place| split(&normals, &prior, at, place).map(|found| (place, found)))
+        .filter_map(|place| split(&normals, before, at, place).map(|found| (place, found)))
         .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
         .filter(|(_, found)| found.gain > least);
     let (since, best) = changed.unwrap_or((0, constant));
@@ -189,7 +189,7 @@ pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<
     let covariance = best.information.cholesky()?.inverse();
     let course = course(&normals[since..], &moved, &covariance);
     Some(Summary {
-        belief: Belief { mean: at + moved, information: best.information },
+        belief: Belief { mean: at + moved, information: best.information, leak_std: before.leak_std },
         since,
         noise: squares / count.max(1.0),
         course,
@@ -206,7 +206,7 @@ struct Split {
     gain: f64,
 }
 
-fn split(normals: &[Normal], prior: &Normal, at: &Unknowns, place: usize) -> Option<Split> {
+fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Option<Split> {
     let (mut information, mut right) = (Both::zeros(), BothRight::zeros());
     // What was believed before is of the leaks before, which stand last.
     let early = |unknown: usize| {
@@ -220,7 +220,7 @@ fn split(normals: &[Normal], prior: &Normal, at: &Unknowns, place: usize) -> Opt
             right[to(j)] += normal.right[j];
         }
     };
-    let mut first = prior.clone();
+    let mut first = Normal::prior(before, at);
     normals[..place].iter().for_each(|normal| first.add(normal));
     let mut second = Normal::none();
     normals[place..].iter().for_each(|normal| second.add(normal));
@@ -230,11 +230,11 @@ fn split(normals: &[Normal], prior: &Normal, at: &Unknowns, place: usize) -> Opt
         add(&first, &early);
     }
     add(&second, &|unknown| unknown);
-    for leak in 0..3 {
-        let (free, old) = (LEAKS + leak, UNKNOWNS + leak);
+    for (leak, std) in before.leak_std.into_iter().enumerate() {
+        let (free, old, known) = (LEAKS + leak, UNKNOWNS + leak, std.powi(-2));
         if place > 0 {
-            information[(free, free)] += LEAK_STD.powi(-2);
-            right[free] -= at[free] * LEAK_STD.powi(-2);
+            information[(free, free)] += known;
+            right[free] -= at[free] * known;
         } else {
             information[(old, old)] += 1.0;
         }

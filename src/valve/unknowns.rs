@@ -1,5 +1,6 @@
 //! What is not known of a cylinder and its valve, and what the rig file says of it.
 
+use crate::presence::LEAK_SIZE;
 pub(super) use crate::presence::LEAK_UNIT_M3SPA;
 use crate::rig::{Rig, ValveSheet};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -59,6 +60,8 @@ pub(super) const CERTAIN: f64 = 1e-6;
 pub(super) struct Belief {
     pub mean: Unknowns,
     pub information: Information,
+    /// Each leak's size before any reading, 1 σ.
+    pub leak_std: [f64; 3],
 }
 
 impl Belief {
@@ -82,12 +85,19 @@ impl Belief {
         set(HYSTERESIS, 1, 0.0, sheet.hysteresis);
         set(DROOP, 1, 0.0, DROOP_STD_BAR);
         set(SUPPLY, 1, 0.0, supply_std_pa(rig, sheet) / PA_PER_BAR);
-        Self { mean, information: Information::from_diagonal(&std.map(|std| std.powi(-2))) }
+        let information = Information::from_diagonal(&std.map(|std| std.powi(-2)));
+        Self { mean, information, leak_std: [LEAK_STD; 3] }
+    }
+
+    /// Where the pressure at a leak is not measured: the two are told as their product, and a leak is no larger than leaks are.
+    pub fn without_pressure_at(mut self, leak: usize) -> Option<Self> {
+        self.leak_std[leak] = LEAK_SIZE;
+        self.with_new_leaks()
     }
 
     /// Where nothing is known of the leaks; what is known of all else stays.
     pub fn with_new_leaks(&self) -> Option<Self> {
-        Self::of(self.mean, self.covariance()?)
+        Self::of(self.mean, self.covariance()?, self.leak_std)
     }
 
     /// So many seconds later: the valve may have changed as `drift` declares, 1 σ, and the oil by what the rig file leaves open.
@@ -101,18 +111,18 @@ impl Belief {
         }
         change[KAPPA] = share * rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
         let spread = self.covariance()? + Information::from_diagonal(&change.map(|std| std * std));
-        Some(Self { mean: self.mean, information: spread.cholesky()?.inverse() })
+        Some(Self { information: spread.cholesky()?.inverse(), ..self.clone() })
     }
 
-    /// Of a mean and covariances, those of the leaks aside, of which nothing is known.
-    pub fn of(mut mean: Unknowns, mut covariance: Information) -> Option<Self> {
-        for leak in LEAKS..LEAKS + 3 {
+    /// Of a mean and covariances, those of the leaks aside, of which only their sizes are known.
+    pub fn of(mut mean: Unknowns, mut covariance: Information, leak_std: [f64; 3]) -> Option<Self> {
+        for (leak, std) in (LEAKS..).zip(leak_std) {
             mean[leak] = 0.0;
             covariance.row_mut(leak).fill(0.0);
             covariance.column_mut(leak).fill(0.0);
-            covariance[(leak, leak)] = LEAK_STD.powi(2);
+            covariance[(leak, leak)] = std * std;
         }
-        Some(Self { mean, information: covariance.cholesky()?.inverse() })
+        Some(Self { mean, information: covariance.cholesky()?.inverse(), leak_std })
     }
 
     /// Means and covariances of the leaks.

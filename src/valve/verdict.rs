@@ -15,7 +15,7 @@ const NEGATIVE_SIGMAS: f64 = 5.0;
 impl ValveTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
         let (Some(found), Some(taken)) = (&self.found, &self.taken) else {
-            return told(Status::NotSure, Vec::new(), vec![too_short()], "");
+            return told(Status::NotSure, Vec::new(), vec![self.cannot_tell()], "");
         };
         let wording = Wording {
             teller: "The valve's flows",
@@ -25,6 +25,18 @@ impl ValveTest {
             open: &|open| self.open(found, open),
         };
         found.verdict(rig, contradictions(taken, found, rig), &wording)
+    }
+
+    fn cannot_tell(&self) -> Reason {
+        match self.unread() {
+            Some(name) if self.summary.calibrated.is_none() => uncalibrated_without(name),
+            Some(name) => Reason::new(
+                ReasonId::NotIdentifiable,
+                format!("{name} is not measured, and this trace does not tell it well enough to find leaks"),
+                "measure both chamber pressures, or record longer, with the piston moving both ways",
+            ),
+            None => too_short(),
+        }
     }
 
     /// An external leak is told against what the valve's own clearance may leak, or against a calibration.
@@ -73,7 +85,12 @@ impl ValveTest {
         } else {
             ""
         };
-        format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}")
+        let unread = self.unread().map(|name| format!(" {name} is not measured.")).unwrap_or_default();
+        format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}{unread}")
+    }
+
+    fn unread(&self) -> Option<&'static str> {
+        self.summary.unread.map(|name| if name == "pa" { "P_A" } else { "P_B" })
     }
 
     fn open(&self, found: &Found, open: &[Leak]) -> Reason {
@@ -86,6 +103,7 @@ impl ValveTest {
         }
         let external = open.iter().any(|leak| *leak != Leak::Internal);
         let remedy = match (external, self.summary.calibrated) {
+            _ if self.summary.unread.is_some() => "measure both chamber pressures",
             (true, None) => {
                 "the valve's clearances may leak as much: shut both ports for ten seconds (a hold test), or calibrate the valve (`pitchleak calibrate`)"
             }
@@ -102,6 +120,16 @@ impl ValveTest {
             remedy,
         )
     }
+}
+
+fn uncalibrated_without(name: &str) -> Reason {
+    Reason::new(
+        ReasonId::NotIdentifiable,
+        format!(
+            "{name} is not measured, and by its data sheet alone the valve does not tell it well enough to find leaks"
+        ),
+        "measure both chamber pressures, or calibrate the valve while they are (`pitchleak calibrate`)",
+    )
 }
 
 fn too_short() -> Reason {

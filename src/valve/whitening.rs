@@ -16,13 +16,13 @@ pub(super) struct WhiteStep {
 }
 
 /// Whitens the steps of a stretch in the order of time.
-pub(super) struct Whitening<'a> {
-    variances: &'a Signals,
+pub(super) struct Whitening {
+    variances: Signals,
     steps: Vec<WhiteStep>,
 }
 
-impl<'a> Whitening<'a> {
-    pub fn new(variances: &'a Signals, count: usize) -> Self {
+impl Whitening {
+    pub fn new(variances: Signals, count: usize) -> Self {
         Self { variances, steps: Vec::with_capacity(count) }
     }
 
@@ -69,7 +69,7 @@ impl<'a> Whitening<'a> {
             corrections[index + 1] += step.by_last.transpose() * pull;
             carried = step.below.transpose() * pull;
         }
-        corrections.iter_mut().for_each(|one| *one = one.component_mul(self.variances));
+        corrections.iter_mut().for_each(|one| *one = one.component_mul(&self.variances));
         Some(corrections)
     }
 }

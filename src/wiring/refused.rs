@@ -82,6 +82,9 @@ impl Refused {
 
     /// Takes in a row.
     pub fn add(&mut self, record: &Record) {
+        if !record.has_both_pressures() {
+            return;
+        }
         self.rows += 1;
         let readings = readings(&record.sample);
         if self.channels.iter().zip(readings).any(|(channel, reading)| channel.is_absurd(reading)) {

@@ -50,6 +50,9 @@ def test_a_leak_is_found_by_the_valves_flows_and_a_calibration_tells_external_on
     calibration.save(tmp_path / "valve.toml")
     calibrated = rig(tmp_path, 'calibration = "valve.toml"\n')
     now = pl.simulate(21, calibrated, noise="rig", seed=4, valve="clearance=0.02 L/min", leak_external_a="0.1 L/min")
+    without_pb = {name: column for name, column in now.columns.items() if name != "pb_bar"}
+    blind = pl.replay(without_pb, calibrated)
+    assert blind.valve is not None and blind.valve.unread == "pb"
     external = pl.replay(now.columns, calibrated)
     assert external.verdict.faults == ("external_a",)
     assert external.leakage.external_a.since == calibration.date and external.leakage.internal.since is None

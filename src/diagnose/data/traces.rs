@@ -47,6 +47,7 @@ impl Traces {
         rig: &Rig,
         mut each: impl FnMut() -> Result<(), E>,
     ) -> Result<(), E> {
+        reader.need_both_pressures(&rig.columns)?;
         let columns = reader.columns(&rig.columns);
         let mut own = Series { name: reader.name().to_owned(), columns, ..Series::default() };
         let (mut piece, mut count, mut t_s, mut in_piece) = (Series::default(), None, 0.0, 0);

@@ -298,10 +298,12 @@ class Valve:
     """What the clearances A-T and B-T may leak by the data sheet, 1 σ, L/min."""
     scatter: float
     """What the readings scatter, in the declared noise's standard deviations."""
+    unread: str | None = None
+    """The chamber pressure that is not measured, ``pa`` or ``pb``: of the leak at its chamber nothing is told."""
     calibrated: Since | None = None
     """The calibration; None where all rests on the data sheet."""
     leaks: PerLeak[FoundLeak] | None = None
-    """Each leak; None where the trace is too short."""
+    """Each leak; None where the trace does not tell of leaks."""
 
 
 @dataclass(frozen=True, slots=True)

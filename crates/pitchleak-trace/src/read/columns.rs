@@ -98,6 +98,17 @@ impl Layout {
         self.header_of(signal).is_some()
     }
 
+    /// The chamber pressure that is not measured: the one a trace without flows may lack where its valve is recorded.
+    pub(super) fn unread(&self) -> Option<Signal> {
+        let has_any = |signals: [Signal; 2]| signals.into_iter().any(|signal| self.has(signal));
+        let is_valves = has_any([Signal::Spool, Signal::Command]) && !has_any([Signal::FlowA, Signal::FlowB]);
+        match [Signal::PressureA, Signal::PressureB].map(|signal| self.has(signal)) {
+            [true, false] if is_valves => Some(Signal::PressureB),
+            [false, true] if is_valves => Some(Signal::PressureA),
+            _ => None,
+        }
+    }
+
     /// As [`has`](Self::has), where a timestamp is as good as a time.
     fn gives(&self, signal: Signal) -> bool {
         self.has(signal) || (signal == Signal::Time && self.has(Signal::Timestamp))
@@ -176,21 +187,31 @@ impl Layout {
     pub(super) fn check(&self, map: &ColumnMap, required: &[(Signal, &str)]) -> Result<(), TraceFault> {
         self.check_doubled()?;
         for &(signal, words) in required {
-            if self.gives(signal) {
+            if self.gives(signal) || self.unread() == Some(signal) {
                 continue;
             }
-            let mut headers: Vec<_> = self.columns.iter().map(|column| column.header.as_str()).collect();
-            if headers.is_empty() {
-                headers.push("no column");
-            }
-            return Err(TraceFault::MissingColumn {
-                signal: words.to_owned(),
-                accepted: accepted(signal, map),
-                found: shorten(&headers.join(", "), 160),
-                hint: String::new(),
-            });
+            return Err(self.without(signal, words, map));
         }
         Ok(())
+    }
+
+    /// Whether both chamber pressures are measured.
+    pub(super) fn check_pressures(&self, map: &ColumnMap) -> Result<(), TraceFault> {
+        let unread = REQUIRED.into_iter().find(|(signal, _)| self.unread() == Some(*signal));
+        unread.map_or(Ok(()), |(signal, words)| Err(self.without(signal, words, map)))
+    }
+
+    fn without(&self, signal: Signal, words: &str, map: &ColumnMap) -> TraceFault {
+        let mut headers: Vec<_> = self.columns.iter().map(|column| column.header.as_str()).collect();
+        if headers.is_empty() {
+            headers.push("no column");
+        }
+        TraceFault::MissingColumn {
+            signal: words.to_owned(),
+            accepted: accepted(signal, map),
+            found: shorten(&headers.join(", "), 160),
+            hint: String::new(),
+        }
     }
 }
 

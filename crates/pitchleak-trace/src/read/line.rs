@@ -84,6 +84,7 @@ pub fn read(
     let mut epoch = Epoch::since(*epoch_ns, layout.time.clone());
     let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
     *epoch_ns = epoch.first_ns();
+    row.stand_in(validator.unread());
     let bad = match read {
         Ok(()) => match NEEDED.into_iter().find(|signal| row.get(*signal).is_nan()) {
             None => validator.check(&row, layout, record),

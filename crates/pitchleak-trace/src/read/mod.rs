@@ -201,6 +201,14 @@ impl<'a> TraceReader<'a> {
         self
     }
 
+    /// Refuses a trace without one of the chamber pressures; `map` is the one it was read with.
+    ///
+    /// # Errors
+    /// Where one is not measured.
+    pub fn need_both_pressures(&self, map: &ColumnMap) -> Result<(), TraceError> {
+        self.rows.layout().check_pressures(map).map_err(|fault| self.error(fault))
+    }
+
     /// The trace as the user named it.
     pub fn name(&self) -> &str {
         &self.name

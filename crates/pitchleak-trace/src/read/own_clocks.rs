@@ -68,6 +68,8 @@ impl OwnClock {
 /// Rows of a source, each with its position and both pressures.
 pub(super) struct OwnClocks<'a> {
     source: Box<dyn RowSource + Send + 'a>,
+    /// The pressure that is not measured.
+    unread: Option<Signal>,
     /// The last row that was whole as it was read.
     before: Row,
     /// Rows read ahead, in the order of time; none where all before was whole.
@@ -85,7 +87,15 @@ impl<'a> OwnClocks<'a> {
     pub(super) fn of(source: Box<dyn RowSource + Send + 'a>) -> Self {
         let clocks = [OwnClock::default(); Signal::ALL.len()];
         let (before, held) = (Row::empty(), VecDeque::new());
-        Self { source, before, held, counts: [0; NEEDED.len()], clocks, behind: None, then: None }
+        let unread = source.layout().unread();
+        Self { source, unread, before, held, counts: [0; NEEDED.len()], clocks, behind: None, then: None }
+    }
+
+    #[inline(always)]
+    fn read(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
+        let next = self.source.next_row(row);
+        row.stand_in(self.unread);
+        next
     }
 
     /// Begins to look ahead: at the first row that lacks a reading.
@@ -137,7 +147,7 @@ impl<'a> OwnClocks<'a> {
                 break;
             }
             let mut row = Row::empty();
-            match self.source.next_row(&mut row) {
+            match self.read(&mut row) {
                 Ok(Next::Row) => self.push(row),
                 Ok(Next::Bad(bad)) => return Some(Next::Bad(bad)),
                 end => self.then = Some(end),
@@ -283,7 +293,7 @@ impl RowSource for OwnClocks<'_> {
     #[inline]
     fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
         if self.held.is_empty() && self.behind.is_none() && self.then.is_none() {
-            match self.source.next_row(row)? {
+            match self.read(row)? {
                 Next::Row if row.has_needed() => {
                     self.before.clone_from(row);
                     return Ok(Next::Row);

@@ -61,7 +61,7 @@ pub struct Record {
     /// The trace pauses before this record, or its clock begins anew: nothing is known of the time
     /// between.
     pub after_gap: bool,
-    /// The readings.
+    /// The readings. A chamber pressure that is not measured is NaN: beside a valve one may be missing.
     pub sample: Sample<f64>,
     /// Piston speed, m/s.
     pub speed_mps: Option<f64>,
@@ -93,6 +93,12 @@ impl Record {
     #[inline]
     pub fn has_flow(&self) -> bool {
         self.sample.qa_m3s.is_some() || self.sample.qb_m3s.is_some()
+    }
+
+    /// Whether both chamber pressures were read. Where one is not, the valve alone tells of leaks.
+    #[inline]
+    pub fn has_both_pressures(&self) -> bool {
+        !(self.sample.pa_pa + self.sample.pb_pa).is_nan()
     }
 
     /// Time that this record's reading stands for, s: none after a gap, as the first record stands for none.
@@ -135,6 +141,14 @@ impl Row {
     #[inline(always)]
     pub(super) fn has_needed(&self) -> bool {
         !NEEDED.into_iter().map(|signal| self.get(signal)).sum::<f64>().is_nan()
+    }
+
+    /// Makes a row whole that lacks a pressure which is not measured; its record has none.
+    #[inline(always)]
+    pub(super) fn stand_in(&mut self, unread: Option<Signal>) {
+        if let Some(signal) = unread {
+            self.set(signal, 0.0);
+        }
     }
 
     /// Takes what it lacks from another row.

@@ -629,3 +629,32 @@ fn shut_is_zero_or_one() {
         assert!(warnings.contains("7 is outside what is possible (0 to 1)"), "{warnings}");
     }
 }
+
+#[test]
+fn beside_a_valve_one_chamber_pressure_may_be_missing() {
+    let rig = Rig::paper();
+    let open =
+        |text: &'static str| TraceReader::from_stream("one", Box::new(std::io::Cursor::new(text)), &rig);
+    let text = "t_s,x_m,pa_pa,spool_percent,ps_pa\n0,0.1,5e6,10,1e7\n0.01,,5e6,10,1e7\n0.02,0.1,5e6,10,1e7\n";
+    let mut reader = open(text).unwrap();
+    assert!(
+        reader
+            .need_both_pressures(&rig.columns)
+            .unwrap_err()
+            .to_string()
+            .contains("no column for pressure B")
+    );
+    let mut record = Record::default();
+    // A row for each reading of the position.
+    for _ in 0..2 {
+        assert!(reader.next_record(&mut record).unwrap());
+        assert!(record.sample.pb_pa.is_nan() && record.sample.pa_pa > 4.9e6 && !record.has_both_pressures());
+        assert!((record.sample.x_m - 0.1).abs() < 1e-12);
+    }
+    assert!(!reader.next_record(&mut record).unwrap() && reader.quality().skipped == 0);
+    for header in
+        ["t_s,x_m,pa_pa,spool_percent,qa_m3s\n0,0.1,5e6,10,0\n", "t_s,x_m,spool_percent\n0,0.1,10\n"]
+    {
+        assert!(open(header).is_err(), "{header}");
+    }
+}

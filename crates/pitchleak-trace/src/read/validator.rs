@@ -21,6 +21,9 @@ pub struct RowValidator {
     clock: Clock,
     bad_rows: BadRows,
     quality: TraceQuality,
+    /// The chamber pressure that is not measured.
+    #[serde(default)]
+    unread: Option<Signal>,
     /// The last row, if it was refused as out of range.
     #[serde(skip)]
     refused: Option<Record>,
@@ -39,6 +42,7 @@ impl RowValidator {
             clock: Clock::default(),
             bad_rows: BadRows::Skip,
             quality,
+            unread: layout.unread(),
             refused: None,
         }
     }
@@ -46,6 +50,10 @@ impl RowValidator {
     /// Whether it holds rows against what `rig` may read.
     pub fn is_for(&self, rig: &Rig) -> bool {
         self.ranges == Ranges::of(rig)
+    }
+
+    pub(super) fn unread(&self) -> Option<Signal> {
+        self.unread
     }
 
     /// What was noticed so far.
@@ -91,7 +99,7 @@ impl RowValidator {
     #[inline]
     pub(super) fn check(&mut self, row: &Row, layout: &Layout, record: &mut Record) -> Option<BadRow> {
         if let Some(signal) = self.ranges.broken_by(row) {
-            self.refused = signal.is_sensor().then(|| readings(row));
+            self.refused = signal.is_sensor().then(|| self.readings(row));
             let detail = match row.get(signal) {
                 value if value.is_finite() => self.ranges.describe(signal, value, layout.unit_of(signal)),
                 _ => BadReason::OutOfRange.text().to_owned(),
@@ -118,9 +126,20 @@ impl RowValidator {
                 return Some(bad_cell(row, layout, Signal::Time, BadReason::TimeBack, detail));
             }
         };
-        *record = Record { dt_s, after_gap, ..readings(row) };
+        *record = Record { dt_s, after_gap, ..self.readings(row) };
         self.quality.count_row(record);
         None
+    }
+
+    #[inline]
+    fn readings(&self, row: &Row) -> Record {
+        let mut record = readings(row);
+        match self.unread {
+            Some(Signal::PressureA) => record.sample.pa_pa = f64::NAN,
+            Some(Signal::PressureB) => record.sample.pb_pa = f64::NAN,
+            _ => {}
+        }
+        record
     }
 
     #[cold]

@@ -16,11 +16,13 @@ pub(crate) fn valve_line(valve: &ValveSummary) -> String {
         None => "by its data sheet".to_owned(),
     };
     let head = format!("{basis}; spool from {least} to {most} %");
-    let Some(leaks) = &valve.leaks else { return format!("{head}; too short to tell of leaks") };
+    let Some(leaks) = &valve.leaks else { return format!("{head}; tells of no leaks") };
     let smallest = |(leak, found): (Leak, &FoundLeak)| {
         format!("{} leaks from {} L/min", leak.label(), readable(found.smallest_lpm, 2))
     };
-    let smallest: Vec<_> = leaks.iter().map(smallest).collect();
+    // Of the leak at a chamber whose pressure is not measured nothing is told.
+    let untold = valve.unread.map(|name| if name == "pa" { Leak::ExternalA } else { Leak::ExternalB });
+    let smallest: Vec<_> = leaks.iter().filter(|(leak, _)| Some(*leak) != untold).map(smallest).collect();
     format!("{head}; finds {} on", smallest.join(", "))
 }
 
