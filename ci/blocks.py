@@ -90,8 +90,11 @@ def workplace(folder: Path) -> dict[str, str]:
     for blade, trace in (("B1", "healthy"), ("B2", "internal"), ("B3", "external_a")):
         (folder / f"farm/T7/{blade}").mkdir(parents=True)
         shutil.copy(traces / "rig.toml", folder / f"farm/T7/{blade}")
-        for date in ("05-01", "05-15", "06-01"):
-            shutil.copy(traces / f"{trace}.csv.gz", folder / f"farm/T7/{blade}/2026-{date}.csv.gz")
+        rows = gzip.decompress((traces / f"{trace}.csv.gz").read_bytes()).splitlines(keepends=True)
+        for number, date in enumerate(("05-01", "05-15", "06-01")):
+            # Each day a little shorter: of copies only one would count.
+            day = gzip.compress(b"".join(rows[: len(rows) - 100 * number]))
+            (folder / f"farm/T7/{blade}/2026-{date}.csv.gz").write_bytes(day)
     tools = folder / ".tools"
     tools.mkdir()
     for name, script in (("cargo", CARGO), ("pip", "#!/bin/sh\n")):

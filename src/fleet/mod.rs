@@ -1,20 +1,27 @@
 //! Many traces of many cylinders: each judged as a replay judges it, on all cores, a row for each.
 //!
 //! [`FleetTrace::find`] says which traces there are, of which cylinder, recorded when, with which rig file; [`judge_all`]
-//! replays them; [`FleetTable`] is the table for other programs, [`FleetReport`] JSON and text for people. A file that
-//! can't be read is a row with its error, so that nothing is lost.
+//! replays them; [`FleetCylinder`] is what the traces of a cylinder say together; [`FleetTable`] is the table for other
+//! programs, [`FleetReport`] JSON and text for people. A file that can't be read is a row with its error, so that nothing
+//! is lost.
 
+mod beside;
+mod cylinder;
+mod doubles;
 mod errors;
 mod identity;
 mod judge;
 mod report;
 mod rig_table;
 mod row;
+mod standing;
 mod table;
 mod traces;
 mod trend;
 mod write;
 
+pub use beside::Beside;
+pub use cylinder::{CylinderLeak, FleetCylinder};
 pub use errors::FleetError;
 pub use identity::TraceIdentity;
 pub use judge::{Stopped, judge, judge_all, judge_opened};

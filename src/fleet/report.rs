@@ -1,10 +1,9 @@
-//! What was found of a fleet, and in which order it asks for somebody.
+//! What was found of a fleet.
 
-use super::{CylinderTrend, FleetRow, LongTrend};
+use super::{Beside, CylinderTrend, FleetCylinder, FleetRow, LongTrend};
 use crate::report::Status;
 use pitchleak_core::Leak;
 use serde::Serialize;
-use std::collections::HashSet;
 
 /// What was found of a fleet, as `fleet --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -17,13 +16,17 @@ pub struct FleetReport<'a> {
     pub cylinders: usize,
     /// Traces by what was found.
     pub counts: Counts,
+    /// Cylinders by how they are now.
+    pub cylinder_counts: Counts,
+    /// What the traces of each cylinder say together, the worst first.
+    pub by_cylinder: Vec<FleetCylinder>,
     /// How leaks change over the traces of a cylinder, where there are three or more with dates.
     pub trends: Vec<CylinderTrend>,
     /// A row per cylinder and trace.
     pub rows: &'a [FleetRow],
 }
 
-/// Traces by what was found.
+/// Traces, or cylinders, by what was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Oil leaks.
@@ -34,16 +37,16 @@ pub struct Counts {
     pub doubtful: usize,
     /// The trace says too little.
     pub not_sure: usize,
-    /// The trace could not be judged.
+    /// The trace, or no trace of the cylinder, could be judged.
     pub error: usize,
 }
 
 impl Counts {
-    /// Counts rows.
-    pub fn of<'a>(rows: impl IntoIterator<Item = &'a FleetRow>) -> Self {
+    /// Counts verdicts; none is an error.
+    pub fn of(verdicts: impl IntoIterator<Item = Option<Status>>) -> Self {
         let mut counts = Self::default();
-        for row in rows {
-            *match row.status {
+        for status in verdicts {
+            *match status {
                 Some(Status::Leak) => &mut counts.leak,
                 Some(Status::Sound) => &mut counts.sound,
                 Some(Status::Doubtful) => &mut counts.doubtful,
@@ -61,14 +64,15 @@ impl<'a> FleetReport<'a> {
 
     /// The report on `rows`.
     pub fn of(rows: &'a [FleetRow]) -> Self {
-        let counts = Counts::of(rows);
-        let cylinders = rows.iter().map(|row| row.cylinder.as_str()).collect::<HashSet<_>>().len();
+        let by_cylinder = FleetCylinder::all(rows);
         Self {
             schema: Self::SCHEMA,
             traces: rows.len(),
-            cylinders,
-            counts,
-            trends: CylinderTrend::all(rows),
+            cylinders: by_cylinder.len(),
+            counts: Counts::of(rows.iter().map(|row| row.status)),
+            cylinder_counts: Counts::of(by_cylinder.iter().map(|cylinder| cylinder.status)),
+            trends: CylinderTrend::all(&by_cylinder),
+            by_cylinder,
             rows,
         }
     }
@@ -81,18 +85,25 @@ impl<'a> FleetReport<'a> {
         serde_json::to_string_pretty(self)
     }
 
-    /// The traces that ask for somebody, the worst first.
-    pub fn worst(&self) -> Vec<&'a FleetRow> {
-        let urgency = |row: &FleetRow| match row.status {
-            Some(Status::Leak) => 0,
-            Some(Status::Doubtful) => 1,
-            Some(Status::NotSure) => 2,
-            None => 3,
-            Some(Status::Sound) => 4,
-        };
-        let mut worst: Vec<_> = self.rows.iter().filter(|row| row.status != Some(Status::Sound)).collect();
-        worst.sort_by(|a, b| urgency(a).cmp(&urgency(b)).then(b.worst_lpm().total_cmp(&a.worst_lpm())));
-        worst
+    /// The cylinders that ask for somebody, the worst first.
+    pub fn worst(&self) -> impl Iterator<Item = &FleetCylinder> {
+        self.by_cylinder.iter().filter(|cylinder| cylinder.status != Some(Status::Sound))
+    }
+
+    /// The traces that could not be judged.
+    pub fn failed(&self) -> impl Iterator<Item = &'a FleetRow> {
+        self.rows.iter().filter(|row| row.error.is_some())
+    }
+
+    /// The leaks that differ from those of the cylinder's siblings and do not stand, the surest first.
+    pub fn differing(&self) -> Vec<(&FleetCylinder, Leak, &Beside)> {
+        let mut differing = Vec::new();
+        for cylinder in &self.by_cylinder {
+            let known = cylinder.leaks.iter();
+            differing.extend(known.filter_map(|(leak, of)| Some((cylinder, leak, of.differing()?))));
+        }
+        differing.sort_by(|(_, _, a), (_, _, b)| a.p_value.total_cmp(&b.p_value));
+        differing
     }
 
     /// The leaks that grow from trace to trace beyond doubt, the fastest first, with their cylinders.

@@ -104,6 +104,46 @@ fn each_file_is_read_once_and_what_is_none_is_told() {
 }
 
 #[test]
+fn a_copy_counts_once_and_is_told() {
+    let farm = farm();
+    let day = |name: &str| farm.path().join("T7").join(name);
+    fs::create_dir_all(day("backup")).unwrap();
+    fs::copy(day("B1/rig.toml"), day("backup/rig.toml")).unwrap();
+    fs::copy(day("B1/2026-05-01.csv"), day("backup/old.csv")).unwrap();
+    fs::hard_link(day("backup/old.csv"), day("backup/older.csv")).unwrap();
+    // As long as its model, with another last digit; and the same bytes on another machine.
+    let text = fs::read_to_string(day("B1/2026-05-02.csv")).unwrap();
+    let other = text.trim_end().trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    fs::write(
+        day("B1/2026-05-03.csv"),
+        format!("{}{}\n", &text[..other], "7".repeat(text.trim_end().len() - other)),
+    )
+    .unwrap();
+    fs::create_dir(day("B4")).unwrap();
+    fs::write(day("B4/rig.toml"), PAPER.replace("stroke = \"0.2 m\"", "stroke = \"0.3 m\"")).unwrap();
+    fs::copy(day("B1/2026-05-01.csv"), day("B4/2026-05-01.csv")).unwrap();
+    let traces = FleetTrace::find(&pattern(&farm, "**/*.csv"), &FleetRig::Beside).unwrap();
+    let names: Vec<_> = traces
+        .iter()
+        .map(|trace| trace.path.strip_prefix(farm.path().join("T7")).unwrap().to_str().unwrap())
+        .collect();
+    let expected = [
+        "B1/2026-05-01.csv",
+        "B1/2026-05-02.csv",
+        "B1/2026-05-03.csv",
+        "B2/2026-05-01.csv",
+        "B2/2026-05-02.csv",
+        "B4/2026-05-01.csv",
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(traces[0].copies, [day("backup/old.csv"), day("backup/older.csv")]);
+    let told: Vec<_> = FleetTrace::doubles(&traces).collect();
+    assert!(told.len() == 2 && told[0].contains("old.csv is a copy of"), "{told:?}");
+    let inputs = FleetTrace::inputs(&traces, &FleetRig::Beside);
+    assert!(FleetFile::create(&day("backup/old.csv"), &inputs).is_err());
+}
+
+#[test]
 fn a_table_says_which_rig_and_whose_trace() {
     let farm = farm();
     let table = farm.path().join("rigs.csv");

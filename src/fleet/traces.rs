@@ -1,6 +1,6 @@
 //! Which traces there are, and what is known of each before it is read.
 
-use super::{FleetError, RigTable, TraceIdentity};
+use super::{FleetError, RigTable, TraceIdentity, doubles};
 use crate::Rig;
 use crate::output::{Inputs, identity};
 use std::collections::{HashMap, HashSet};
@@ -14,6 +14,8 @@ pub struct FleetTrace {
     pub path: PathBuf,
     /// Its other names among those given, by links: it is judged once.
     pub other_names: Vec<PathBuf>,
+    /// Files of the same bytes for the same rig: they count as this one.
+    pub copies: Vec<PathBuf>,
     /// Whose it is, and from when.
     pub identity: TraceIdentity,
     /// The rig file; none for the built-in rig.
@@ -74,7 +76,7 @@ impl FleetTrace {
                 Some(file) => shelf.load(file),
                 None => Ok(shelf.paper()),
             };
-            Ok(Self { path, other_names, identity, rig_file, rig })
+            Ok(Self { path, other_names, copies: Vec::new(), identity, rig_file, rig })
         };
         let found: Vec<Result<Self, PathBuf>> = paths.into_iter().map(trace).collect();
         let mut without = found.iter().filter_map(|found| found.as_ref().err());
@@ -84,7 +86,7 @@ impl FleetTrace {
                 trace: trace.display().to_string(),
                 others: without.count(),
             }),
-            _ => Ok(found.into_iter().flatten().collect()),
+            _ => Ok(doubles::merge(found.into_iter().flatten().collect())),
         }
     }
 
@@ -92,7 +94,25 @@ impl FleetTrace {
     pub fn inputs(traces: &[Self], rigs: &FleetRig) -> Inputs {
         let table = if let FleetRig::Table(file) = rigs { Some(file) } else { None };
         let rig_files: HashSet<_> = traces.iter().filter_map(|trace| trace.rig_file.as_ref()).collect();
-        Inputs::of(traces.iter().map(|trace| &trace.path).chain(rig_files).chain(table))
+        let named = traces.iter().flat_map(|Self { path, other_names, copies, .. }| {
+            std::iter::once(path).chain(other_names).chain(copies)
+        });
+        Inputs::of(named.chain(rig_files).chain(table))
+    }
+
+    /// A sentence for each file that is judged as another of `traces`.
+    pub fn doubles(traces: &[Self]) -> impl Iterator<Item = String> {
+        traces.iter().flat_map(|trace| {
+            let Self { path, identity, .. } = trace;
+            let say = move |what| {
+                move |other: &PathBuf| {
+                    let (other, first, cylinder) = (other.display(), path.display(), &identity.cylinder);
+                    format!("{other} is {what} {first}: judged once, as a trace of {cylinder}")
+                }
+            };
+            let links = trace.other_names.iter().map(say("the same file as"));
+            links.chain(trace.copies.iter().map(say("a copy of")))
+        })
     }
 }
 

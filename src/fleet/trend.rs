@@ -1,13 +1,12 @@
 //! A leak's course over the traces of days and months.
 
-use super::FleetRow;
+use super::{FleetCylinder, FleetRow};
 use crate::report::{LeakTrend, Status, with_interval};
 use crate::units::S_PER_DAY;
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
-use std::collections::HashMap;
 
 const H_PER_MONTH: f64 = 24.0 * 30.0;
 
@@ -51,25 +50,22 @@ pub struct Point {
 }
 
 impl CylinderTrend {
-    /// The trends of every cylinder that has one, in the order in which the cylinders come. Traces whose verdict is
-    /// doubtful are left out: their figures can't be believed.
-    pub fn all(rows: &[FleetRow]) -> Vec<Self> {
-        let mut order = Vec::new();
-        let mut by_cylinder: HashMap<&str, Vec<&FleetRow>> = HashMap::new();
-        for row in rows {
-            let own = by_cylinder.entry(&row.cylinder).or_default();
-            if own.is_empty() {
-                order.push(row.cylinder.as_str());
-            }
-            own.push(row);
-        }
-        let trend = |cylinder: &str| {
-            let own = by_cylinder.get(cylinder)?;
-            let leaks = PerLeak::from_fn(|leak| LongTrend::of(own, leak));
+    /// Those of every cylinder that has one, in the order in which the cylinders come.
+    pub(super) fn all(cylinders: &[FleetCylinder]) -> Vec<Self> {
+        let mut order: Vec<_> = cylinders.iter().collect();
+        order.sort_by_key(|cylinder| cylinder.rows.iter().min());
+        let trend = |cylinder: &FleetCylinder| {
+            let leaks = PerLeak::from_fn(|leak| cylinder.leaks[leak].trend);
             let any = leaks.iter().any(|(_, trend)| trend.is_some());
-            any.then(|| Self { cylinder: cylinder.to_owned(), leaks })
+            any.then(|| Self { cylinder: cylinder.cylinder.clone(), leaks })
         };
         order.into_iter().filter_map(trend).collect()
+    }
+
+    /// Of each leak, from one cylinder's traces. Those whose verdict is doubtful are left out: their figures can't be
+    /// believed.
+    pub(super) fn of<'a>(rows: impl Iterator<Item = &'a FleetRow> + Clone) -> PerLeak<Option<LongTrend>> {
+        PerLeak::from_fn(|leak| LongTrend::of(rows.clone(), leak))
     }
 }
 
@@ -94,8 +90,8 @@ impl LongTrend {
         format!("{} L/min a month over {} traces{reached}", with_interval(value, Some(std)), self.traces)
     }
 
-    fn of(rows: &[&FleetRow], leak: Leak) -> Option<Self> {
-        let mut points: Vec<_> = rows.iter().filter_map(|row| Point::of(row, leak)).collect();
+    fn of<'a>(rows: impl Iterator<Item = &'a FleetRow>, leak: Leak) -> Option<Self> {
+        let mut points: Vec<_> = rows.filter_map(|row| Point::of(row, leak)).collect();
         points.sort_by_key(|point| point.at);
         let (first, last) = (points.first()?, points.last()?);
         let days = |point: &Point| last.at.duration_until(point.at).as_secs_f64() / S_PER_DAY;
@@ -117,17 +113,19 @@ impl LongTrend {
 impl Point {
     /// None where the row tells nothing of this leak, or not when.
     pub fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
-        let found = row.leaks?[leak];
-        let std = found.std_lpm.filter(|std| *std > 0.0)?;
+        let flow = believed(row, leak)?;
         let half = jiff::SignedDuration::try_from_secs_f64(row.duration_s? / 2.0).ok()?;
         let at = row.begins?.checked_add(half).ok()?;
-        let believed = found.identifiable && row.status != Some(Status::Doubtful);
-        believed.then_some(Self {
-            at,
-            flow: Estimate { value: found.mean_lpm, std },
-            threshold_lpm: found.threshold_lpm,
-        })
+        Some(Self { at, flow, threshold_lpm: row.leaks?[leak].threshold_lpm })
     }
+}
+
+/// The flow of a leak that a trace pins down without doubt, L/min.
+pub(super) fn believed(row: &FleetRow, leak: Leak) -> Option<Estimate<f64>> {
+    let found = row.leaks?[leak];
+    let std = found.std_lpm.filter(|std| *std > 0.0)?;
+    let is_believed = found.identifiable && row.status != Some(Status::Doubtful);
+    is_believed.then_some(Estimate { value: found.mean_lpm, std })
 }
 
 /// y = level + slope·t.

@@ -10,7 +10,7 @@ use pitchleak_view::text::fleet_terminal;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-/// Judge the traces of many cylinders on all cores: a row per cylinder and trace
+/// Judge the traces of many cylinders on all cores: how each cylinder is, and a row per cylinder and trace
 ///
 /// A trace that can't be read is reported and stands in the table with its error. The exit status is then 2, once all
 /// others are judged.
@@ -34,26 +34,26 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
 
-    /// Print counts and rows as JSON (schema pitchleak.fleet/1)
+    /// Print cylinders, counts and rows as JSON (schema pitchleak.fleet/1)
     #[arg(long)]
     json: bool,
+
+    /// Exit with status 1 if a fault of a cylinder is found that no later trace excludes
+    #[arg(long)]
+    fail_on_fault: bool,
 }
 
 const EXAMPLES: &str = "\
 Examples:
   pitchleak fleet 'farm/**/*.csv.gz' --out fleet.parquet
   pitchleak fleet 'logs/2026-05-*.csv' --rig rigs.csv --out may.csv
-  pitchleak fleet farm/T7/*/*.csv --json | jq '.rows[] | select(.status == \"leak\") | .cylinder'";
+  pitchleak fleet farm/T7/*/*.csv --json | jq '.by_cylinder[] | select(.status == \"leak\") | .cylinder'
+  pitchleak fleet 'farm/**/*.csv' --fail-on-fault || echo 'somebody has to go there'";
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let rigs = FleetRig::from_file(arguments.rig.clone());
     let traces = FleetTrace::find(&arguments.traces, &rigs)?;
-    for trace in &traces {
-        for other in &trace.other_names {
-            let (other, first) = (other.display(), trace.path.display());
-            output::complain("note", &format!("{other} is the same file as {first}: judged once"));
-        }
-    }
+    output::warn(&FleetTrace::doubles(&traces).collect::<Vec<_>>());
     let inputs = FleetTrace::inputs(&traces, &rigs);
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
@@ -80,7 +80,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     } else {
         report.to_text(&output::palette())
     })?;
+    let fault = arguments.fail_on_fault && report.by_cylinder.iter().any(|one| !one.faults.is_empty());
     match report.counts.error {
+        0 if fault => Ok(Outcome::FaultFound),
         0 => Ok(Outcome::Done),
         errors => Err(Failure::NotJudged { errors, traces: rows.len() }),
     }

@@ -72,8 +72,59 @@ fn a_bad_file_is_told_and_the_others_are_judged() {
     assert!(complaints.starts_with("error: B1/broken.csv: no column for"), "{complaints}");
     assert!(complaints.ends_with("error: 1 of 3 traces could not be judged\n"), "{complaints}");
     let text = String::from_utf8(done.stdout).unwrap();
-    assert!(text.starts_with("3 traces of 3 cylinders: 1 leak, 1 sound,"), "{text}");
+    let counts =
+        "3 cylinders: 1 leak, 1 sound, 0 doubtful, 0 not sure, 1 not judged (3 traces, 1 not judged)\n";
+    assert!(text.starts_with(counts), "{text}");
     assert!(fs::read(farm.path().join("fleet.parquet")).unwrap().starts_with(b"PAR1"));
+}
+
+#[test]
+fn many_days_of_a_cylinder_are_one_line_and_one_fault() {
+    let farm = farm();
+    for day in 2..5 {
+        let motion = Motion::sines(PerLeak { internal: 1.2e-11, external_a: 0.0, external_b: 0.0 });
+        let path = farm.path().join(format!("B2/2026-05-0{day}.csv"));
+        fs::write(path, file(&motion.rows(2900 + day))).unwrap();
+    }
+    let done = fleet(farm.path(), &["*/*.csv", "--fail-on-fault"]);
+    let text = String::from_utf8(done.stdout).unwrap();
+    assert_eq!(done.status.code(), Some(1), "{text}");
+    let lines: Vec<_> = text.lines().collect();
+    assert_eq!(lines[0], "2 cylinders: 1 leak, 1 sound, 0 doubtful, 0 not sure (5 traces)");
+    assert!(
+        lines[2].starts_with("LEAK      B2  internal 1.") && lines[2].ends_with("since 2026-05-01 or before")
+    );
+    assert_eq!(lines.iter().filter(|line| line.contains("LEAK")).count(), 1, "{text}");
+    let done = fleet(farm.path(), &["*/*.csv", "--json"]);
+    assert_eq!(done.status.code(), Some(0));
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let worst = &report["by_cylinder"][0];
+    assert_eq!((&worst["cylinder"], &worst["since"]), (&"B2".into(), &"2026-05-01T00:00:00Z".into()));
+    assert_eq!((&report["cylinders"], &report["cylinder_counts"]["leak"]), (&2.into(), &1.into()));
+    assert_eq!((&report["traces"], &report["counts"]["leak"]), (&5.into(), &4.into()));
+    // The leak is gone: nobody has to go there any more.
+    fs::write(farm.path().join("B2/2026-05-06.csv"), file(&Motion::sines(PerLeak::default()).rows(2999)))
+        .unwrap();
+    assert_eq!(fleet(farm.path(), &["*/*.csv", "--fail-on-fault"]).status.code(), Some(0));
+    fs::write(farm.path().join("B1/broken.csv"), "a,b\n1,2\n").unwrap();
+    assert_eq!(fleet(farm.path(), &["*/*.csv", "--fail-on-fault"]).status.code(), Some(2));
+}
+
+#[test]
+fn links_and_copies_are_told_and_judged_once() {
+    let farm = farm();
+    let name = |name: &str| farm.path().join(name);
+    fs::hard_link(name("B2/2026-05-01.csv"), name("B2/linked.csv")).unwrap();
+    fs::copy(name("B2/2026-05-01.csv"), name("B2/copied.csv")).unwrap();
+    let done = fleet(farm.path(), &["*/*.csv", "--out", "fleet.csv"]);
+    assert_eq!(done.status.code(), Some(0));
+    let told = String::from_utf8(done.stderr).unwrap();
+    let expected = [
+        "warning: B2/linked.csv is the same file as B2/2026-05-01.csv: judged once, as a trace of B2",
+        "warning: B2/copied.csv is a copy of B2/2026-05-01.csv: judged once, as a trace of B2",
+    ];
+    assert_eq!(told.lines().collect::<Vec<_>>(), expected);
+    assert_eq!(fs::read_to_string(name("fleet.csv")).unwrap().lines().count(), 3);
 }
 
 #[test]

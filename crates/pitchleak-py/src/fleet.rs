@@ -108,7 +108,7 @@ pub fn fleet_row(
 /// Traces by status, and `error`, as JSON.
 #[pyfunction]
 pub fn fleet_counts(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
-    serde_json::to_string(&Counts::of(rows.iter().map(|row| &row.0))).map_err(value_error)
+    serde_json::to_string(&Counts::of(rows.iter().map(|row| row.0.status))).map_err(value_error)
 }
 
 /// Rows as columns: header, kind (`numbers`, `texts`, `times`, `counts`, `flags`), values. Numbers are an array with NaN for

@@ -27,6 +27,11 @@ impl Ink {
     fn number(self) -> u8 {
         self as u8
     }
+
+    /// Its class in the style sheet.
+    pub(super) fn class(self) -> String {
+        format!("ink-{}", self.number())
+    }
 }
 
 impl Serialize for Ink {

@@ -1,21 +1,21 @@
-//! The page of a fleet: who asks for somebody, which leaks grow, and every trace in a row.
+//! The page of a fleet: what to do first, the cylinders with their traces, which leaks grow.
 
 use super::chart::{Chart, Charts, Limit, Line};
 use super::history::ink;
-use super::machine::{facts, short};
-use super::{Card, Head, Page, Section, Tone};
+use super::machine::facts;
+use super::{Card, Head, Page, Section, Tone, cylinders};
 use crate::envelope::Range;
 use jiff::Timestamp;
 use maud::{Markup, html};
 use pitchleak::core::Leak;
-use pitchleak::fleet::{Counts, FleetLeak, FleetReport, FleetRow, LongTrend, count};
-use pitchleak::report::{Status, advice, capital, with_interval};
+use pitchleak::fleet::{Counts, FleetLeak, FleetReport, LongTrend, count};
+use pitchleak::report::{Status, advice, capital};
 use pitchleak::units::S_PER_DAY;
 use std::collections::BTreeMap;
 
-/// Rows that a page shows of each table: beyond, the table that `--out` writes is the place to look.
-const MOST_ROWS: usize = 1000;
-/// Traces named on the first screen.
+/// Lines of a list: beyond, JSON is the place to look.
+const MOST_LINES: usize = 1000;
+/// Cylinders named on the first screen.
 const MOST_NAMED: usize = 8;
 /// Growing leaks that are drawn.
 const MOST_DRAWN: usize = 8;
@@ -24,29 +24,19 @@ impl Page {
     /// The report of a fleet.
     pub fn of_fleet(report: &FleetReport<'_>) -> Self {
         let mut charts = Charts::default();
-        let worst = report.worst();
         let growing = report.growing();
         let sections = vec![
-            Section {
-                id: "worst",
-                title: "Who asks for somebody",
-                body: table(&worst, "Nobody: every trace is sound."),
-            },
+            Section { id: "cylinders", title: "Cylinders, worst first", body: cylinders::cards(report) },
             Section { id: "growing", title: "Leaks that grow", body: trends(report, &growing, &mut charts) },
-            Section {
-                id: "all",
-                title: "Every trace",
-                body: table(&report.rows.iter().collect::<Vec<_>>(), "There is none."),
-            },
             Section { id: "made", title: "How this was made", body: made(report) },
         ];
-        let subject = count(report.traces, "trace");
-        Self { kind: "fleet", subject, head: head(report, &worst, &growing), sections, charts }
+        let subject = count(report.cylinders, "cylinder");
+        Self { kind: "fleet", subject, head: head(report, &growing), sections, charts }
     }
 }
 
-fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) -> Head {
-    let Counts { leak, sound, doubtful, not_sure, error } = report.counts;
+fn head(report: &FleetReport<'_>, growing: &[Growing<'_>]) -> Head {
+    let Counts { leak, sound, doubtful, not_sure, error } = report.cylinder_counts;
     let unsure = doubtful + not_sure + error;
     let (word, tone) = match (leak, unsure) {
         (0, 0) => ("ALL SOUND".to_owned(), Tone::Sound),
@@ -56,7 +46,7 @@ fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) 
     };
     let mut sentence = format!(
         "{}: {leak} with a leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
-        count(report.traces, "trace")
+        count(report.cylinders, "cylinder")
     );
     if error > 0 {
         sentence += &format!(", and {error} could not be judged");
@@ -67,100 +57,63 @@ fn head(report: &FleetReport<'_>, worst: &[&FleetRow], growing: &[Growing<'_>]) 
         count => format!(". {count} leaks grow from trace to trace beyond doubt."),
     }
     .as_str();
-    let named =
-        |status: &'static [Option<Status>]| worst.iter().filter(move |row| status.contains(&row.status));
-    let leaks = named(&[Some(Status::Leak)]);
-    let open = named(&[Some(Status::Doubtful), Some(Status::NotSure), None]);
     Head {
         word,
         tone,
         sentence,
-        data: count(report.cylinders, "cylinder"),
-        cards: vec![
-            Card {
-                title: "What to do first",
-                body: html! {
-                    @if leak == 0 { p { "No trace shows a leak." } }
-                    ol { @for row in leaks.clone().take(MOST_NAMED) {
-                        li { strong { bdi { (row.cylinder) } } ": " (found(row)) @if let Some(leak) = row.faults.first() { "; " (advice(*leak)) } "." }
-                    } }
-                    @if leak > MOST_NAMED { p { "… and " (leak - MOST_NAMED) " more, below." } }
-                },
-            },
-            Card {
-                title: "What these traces do not tell",
-                body: html! {
-                    @if unsure == 0 { p { "Nothing is open: every trace is judged, and every verdict is sure." } }
-                    ul { @for row in open.take(MOST_NAMED) { li { strong { bdi { (row.cylinder) } } ": " (found(row)) "." } } }
-                    @if unsure > MOST_NAMED { p { "… and " (unsure - MOST_NAMED) " more, below." } }
-                },
-            },
-            Card {
-                title: "Leaks that grow fastest",
-                body: html! {
-                    @if growing.is_empty() { p { "None beyond doubt; it takes three dated traces of a cylinder." } }
-                    ul { @for (cylinder, leak, long) in growing.iter().take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ", " (leak.label()) ": " (long.rate()) "." } } }
-                },
-            },
-        ],
+        data: count(report.traces, "trace"),
+        cards: vec![to_do(report), open(report), early(report, growing)],
     }
 }
 
-/// What a row's verdict rests on.
-fn found(row: &FleetRow) -> String {
-    if let Some(error) = &row.error {
-        return error.clone();
-    }
-    if row.status != Some(Status::Leak) {
-        return row.reasons.iter().map(|id| id.replace('_', " ")).collect::<Vec<_>>().join(", ");
-    }
-    let flow = |leak: &Leak| Some(format!("{} {} L/min", leak.label(), interval(&row.leaks?[*leak])));
-    row.faults.iter().filter_map(flow).collect::<Vec<_>>().join(", ")
-}
-
-fn interval(leak: &FleetLeak) -> String {
-    with_interval(leak.mean_lpm, leak.std_lpm)
-}
-
-fn table(rows: &[&FleetRow], none: &str) -> Markup {
-    if rows.is_empty() {
-        return html! { p { (none) } };
-    }
-    html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "cylinder" } th scope="col" { "verdict" }
-                @for leak in Leak::ALL { th .number scope="col" { (leak.label()) ", L/min" } }
-                th scope="col" { "begins" } th .number scope="col" { "minutes" } th scope="col" { "trace" } th scope="col" { "because" }
+fn to_do(report: &FleetReport<'_>) -> Card {
+    let leak = report.cylinder_counts.leak;
+    let leaks = report.worst().filter(|cylinder| cylinder.status == Some(Status::Leak));
+    Card {
+        title: "What to do first",
+        body: html! {
+            @if leak == 0 { p { "No cylinder leaks." } }
+            ol { @for cylinder in leaks.take(MOST_NAMED) {
+                li { strong { bdi { (cylinder.cylinder) } } ": " (cylinders::found(cylinder, report)) @if let Some(leak) = cylinder.faults.first() { "; " (advice(*leak)) } "." }
             } }
-            tbody { @for row in rows.iter().take(MOST_ROWS) { (line(row)) } }
-        } }
-        @if rows.len() > MOST_ROWS { p { "… and " (rows.len() - MOST_ROWS) " more: the table that " code { "--out" } " writes has all." } }
+            @if leak > MOST_NAMED { p { "… and " (leak - MOST_NAMED) " more, below." } }
+        },
     }
 }
 
-fn line(row: &FleetRow) -> Markup {
-    let tone = row.status.map_or(Tone::Caution, Tone::from);
-    html! {
-        tr {
-            th scope="row" { bdi { (row.cylinder) } }
-            td class=(tone.class()) { (row.word()) }
-            @for leak in Leak::ALL {
-                td .number { @match row.leaks.map(|leaks| leaks[leak]) {
-                    Some(leak) if leak.identifiable => (interval(&leak)),
-                    _ => "–",
-                } }
+fn open(report: &FleetReport<'_>) -> Card {
+    let Counts { doubtful, not_sure, .. } = report.cylinder_counts;
+    let (unsure, failed) = (doubtful + not_sure, report.counts.error);
+    let is_open = |status: Option<Status>| matches!(status, Some(Status::Doubtful | Status::NotSure));
+    let cylinders = report.worst().filter(|cylinder| is_open(cylinder.status));
+    let errors = report.failed().filter_map(|row| Some((&row.cylinder, row.error.as_ref()?)));
+    Card {
+        title: "What these traces do not tell",
+        body: html! {
+            @if unsure + failed == 0 { p { "Nothing is open: every trace is judged, and every cylinder's verdict is sure." } }
+            ul {
+                @for cylinder in cylinders.take(MOST_NAMED) { li { strong { bdi { (cylinder.cylinder) } } ": " (cylinders::found(cylinder, report)) "." } }
+                @for (cylinder, error) in errors.take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ": " (error) "." } }
             }
-            td { (row.begins.map_or_else(|| "–".to_owned(), day)) }
-            td .number { (row.duration_s.map_or_else(|| "–".to_owned(), |s| short(s / 60.0))) }
-            td { bdi { (row.path) } }
-            td { @if row.status != Some(Status::Leak) && row.status != Some(Status::Sound) { (found(row)) } }
-        }
+            @if unsure > MOST_NAMED { p { "… and " (unsure - MOST_NAMED) " more, below." } }
+            @if failed > 0 { p { (count(failed, "trace")) " could not be judged." } }
+        },
     }
 }
 
-fn day(at: Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M").to_string()
+fn early(report: &FleetReport<'_>, growing: &[Growing<'_>]) -> Card {
+    let differing = report.differing();
+    Card {
+        title: "Leaks that grow, or differ from the siblings'",
+        body: html! {
+            @if growing.is_empty() { p { "None grows beyond doubt; it takes three dated traces of a cylinder." } }
+            ul { @for (cylinder, leak, long) in growing.iter().take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ", " (leak.label()) ": " (long.rate()) "." } } }
+            @if differing.is_empty() { p { "None below its alarm level is more than its siblings' by more than chance; it takes a second trace of a turbine." } }
+            ul { @for (cylinder, leak, beside) in differing.iter().take(MOST_NAMED) {
+                li { strong { bdi { (cylinder.cylinder) } } ", " (leak.label()) ": " (beside.text()) "." }
+            } }
+        },
+    }
 }
 
 /// Cylinder, leak and trend of one that grows beyond doubt.
@@ -178,7 +131,7 @@ fn trends(report: &FleetReport<'_>, growing: &[Growing<'_>], charts: &mut Charts
     html! {
         div .pair { (body) }
         @if growing.len() > MOST_DRAWN {
-            ul { @for (cylinder, leak, long) in growing.iter().skip(MOST_DRAWN).take(MOST_ROWS) { li { bdi { (cylinder) } ", " (leak.label()) ": " (long.rate()) } } }
+            ul { @for (cylinder, leak, long) in growing.iter().skip(MOST_DRAWN).take(MOST_LINES) { li { bdi { (cylinder) } ", " (leak.label()) ": " (long.rate()) } } }
         }
     }
 }
@@ -208,7 +161,7 @@ fn course(report: &FleetReport<'_>, (cylinder, leak, _): Growing<'_>) -> Chart {
     Chart {
         title: format!("{}: {} leak", cylinder, leak.label()),
         unit: "L/min",
-        x_label: format!("days since {}", day(first)),
+        x_label: format!("days since {}", cylinders::moment(first)),
         lines: vec![Line {
             x: Some(x),
             dots: true,

@@ -6,6 +6,8 @@
 
 pub mod chart;
 mod check;
+mod course;
+mod cylinders;
 mod diagnose;
 mod fleet;
 mod history;

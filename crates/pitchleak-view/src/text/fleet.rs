@@ -1,18 +1,18 @@
-//! A fleet in short for people: how many of which verdict, the traces that ask for somebody, the leaks that grow.
+//! A fleet in short for people: how many cylinders are how, those that ask for somebody, the leaks that differ or grow.
 
 use super::Text;
 use super::fleet_sketch::{Bars, CELLS, course_of};
 use crate::Palette;
 use pitchleak::core::Leak;
-use pitchleak::fleet::{Counts, FleetReport, FleetRow, count};
-use pitchleak::report::Status;
+use pitchleak::fleet::{Counts, FleetCylinder, FleetReport, count};
+use pitchleak::report::{Status, with_interval};
 use std::fmt::Write;
 
-/// Lines of single traces in the text.
+/// Lines of a kind in the text.
 const LINES: usize = 20;
 
 impl Text for FleetReport<'_> {
-    /// How many of which verdict, and a line for each trace that asks for somebody, the worst first.
+    /// How many cylinders are how, and a line for each that asks for somebody, the worst first.
     fn to_text(&self, palette: &Palette) -> String {
         FleetText { report: self, palette, draws: false }.text()
     }
@@ -32,36 +32,72 @@ struct FleetText<'a> {
 
 impl FleetText<'_> {
     fn text(&self) -> String {
-        let Counts { leak, sound, doubtful, not_sure, error } = self.report.counts;
+        let Counts { leak, sound, doubtful, not_sure, error } = self.report.cylinder_counts;
         let mut text = format!(
-            "{} of {}: {leak} leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
-            count(self.report.traces, "trace"),
+            "{}: {leak} leak, {sound} sound, {doubtful} doubtful, {not_sure} not sure",
             count(self.report.cylinders, "cylinder")
         );
         if error > 0 {
             let _ = write!(text, ", {error} not judged");
         }
-        text.push('\n');
+        let _ = write!(text, " ({}", count(self.report.traces, "trace"));
+        if self.report.counts.error > 0 {
+            let _ = write!(text, ", {} not judged", self.report.counts.error);
+        }
+        text.push_str(")\n");
         self.write_worst(&mut text);
+        self.write_failed(&mut text);
+        self.write_differing(&mut text);
         self.write_trends(&mut text);
         text
     }
 
     fn write_worst(&self, text: &mut String) {
-        let worst = self.report.worst();
+        // A cylinder without any verdict stands below, by its traces.
+        let worst: Vec<_> = self.report.worst().filter(|cylinder| cylinder.status.is_some()).collect();
         let (shown, more) = worst.split_at(worst.len().min(LINES));
         let bars = Bars::of(shown).filter(|_| self.draws);
         if !shown.is_empty() {
             text.push('\n');
         }
         text.push_str(&bars.as_ref().map_or_else(String::new, |bars| bars.legend(self.palette)));
-        for row in shown {
-            let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(row));
-            text.push_str(&line(row, &bar, self.palette));
+        for cylinder in shown {
+            let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(cylinder));
+            text.push_str(&self.line(cylinder, &bar));
         }
-        if !more.is_empty() {
-            let _ = writeln!(text, "… and {} more", more.len());
+        write_more(text, more.len());
+    }
+
+    fn write_failed(&self, text: &mut String) {
+        let (colour, reset) = self.palette.caution();
+        let failed: Vec<_> = self.report.failed().filter_map(|row| row.error.as_ref()).collect();
+        if !failed.is_empty() {
+            text.push('\n');
         }
+        for error in failed.iter().take(LINES) {
+            let _ = writeln!(text, "{colour}ERROR{reset}     {error}");
+        }
+        write_more(text, failed.len().saturating_sub(LINES));
+    }
+
+    fn write_differing(&self, text: &mut String) {
+        let differing = self.report.differing();
+        if !differing.is_empty() {
+            text.push('\n');
+        }
+        for (cylinder, leak, beside) in differing.iter().take(LINES) {
+            let (name, leak, said) = (&cylinder.cylinder, leak.label(), beside.text());
+            let _ = writeln!(text, "DIFFERS   {name}  {leak} {said}");
+        }
+        write_more(text, differing.len().saturating_sub(LINES));
+    }
+
+    fn line(&self, cylinder: &FleetCylinder, bar: &str) -> String {
+        let word = cylinder.word();
+        let (colour, reset) =
+            cylinder.status.map_or(self.palette.caution(), |status| self.palette.verdict(status));
+        let found = found(cylinder, self.report);
+        format!("{colour}{word:<8}{reset}  {bar}{}  {found}\n", cylinder.cylinder)
     }
 
     fn write_trends(&self, text: &mut String) {
@@ -77,34 +113,29 @@ impl FleetText<'_> {
             };
             let _ = writeln!(text, "GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate());
         }
-        if growing.len() > LINES {
-            let _ = writeln!(text, "… and {} more", growing.len() - LINES);
-        }
+        write_more(text, growing.len().saturating_sub(LINES));
     }
 }
 
-fn line(row: &FleetRow, bar: &str, palette: &Palette) -> String {
-    let word = row.word();
-    let (colour, reset) = row.status.map_or(palette.caution(), |status| palette.verdict(status));
-    let found = match (&row.error, row.status) {
-        (Some(error), _) => error.clone(),
-        (None, Some(Status::Leak)) => leaks(row),
-        (None, _) => row.reasons.join(", "),
-    };
-    let place = match &row.error {
-        // Names the file by itself.
-        Some(_) => String::new(),
-        None if row.path.starts_with(&row.cylinder) => format!("{}  ", row.path),
-        None => format!("{}  {}  ", row.cylinder, row.path),
-    };
-    format!("{colour}{word:<8}{reset}  {bar}{place}{found}\n")
+fn write_more(text: &mut String, more: usize) {
+    if more > 0 {
+        let _ = writeln!(text, "… and {more} more");
+    }
 }
 
-fn leaks(row: &FleetRow) -> String {
+/// What the verdict on a cylinder rests on, since when, and whether its latest trace says otherwise.
+pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> String {
     let flow = |leak: &Leak| {
-        let of = row.leaks.map(|leaks| leaks[*leak])?;
-        let spread = of.ci95.map_or_else(String::new, |[low, high]| format!(" ± {:.3}", (high - low) / 2.0));
-        Some(format!("{} {:.3}{spread} L/min", leak.label(), of.mean_lpm))
+        let flow = cylinder.leaks[*leak].flow?;
+        Some(format!("{} {} L/min", leak.label(), with_interval(flow.mean_lpm, flow.std_lpm)))
     };
-    row.faults.iter().filter_map(flow).collect::<Vec<_>>().join(", ")
+    let leaks = || cylinder.faults.iter().filter_map(flow).collect();
+    let is_leak = cylinder.status == Some(Status::Leak);
+    let mut found: Vec<String> = if is_leak { leaks() } else { cylinder.reasons.clone() };
+    found.extend(cylinder.since_text());
+    let latest = cylinder.latest.and_then(|place| report.rows.get(place)).and_then(|row| row.status);
+    if let Some(latest) = latest.filter(|latest| is_leak && *latest != Status::Leak) {
+        found.push(format!("its latest trace is {}", latest.id()));
+    }
+    found.join(", ")
 }

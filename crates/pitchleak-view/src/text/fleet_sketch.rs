@@ -6,7 +6,7 @@ use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
 use crate::spark::course;
 use pitchleak::core::Leak;
-use pitchleak::fleet::{FleetReport, FleetRow, Point};
+use pitchleak::fleet::{FleetCylinder, FleetReport, Point};
 
 /// Cells of a bar or a course.
 pub(super) const CELLS: usize = 20;
@@ -18,8 +18,8 @@ pub(super) struct Bars {
 
 impl Bars {
     /// None where no line tells of a leak.
-    pub(super) fn of(rows: &[&FleetRow]) -> Option<Self> {
-        let bars: Vec<Bar> = rows.iter().filter_map(|row| bar(row)).collect();
+    pub(super) fn of(cylinders: &[&FleetCylinder]) -> Option<Self> {
+        let bars: Vec<Bar> = cylinders.iter().filter_map(|cylinder| bar(cylinder)).collect();
         scale(&bars).map(|ends| Self { ends })
     }
 
@@ -33,17 +33,16 @@ impl Bars {
         )
     }
 
-    /// Blank where the row tells of no leak.
-    pub(super) fn text(&self, row: &FleetRow) -> String {
-        let text = bar(row).map_or_else(String::new, |bar| bar.text(self.ends, CELLS));
+    /// Blank where the cylinder has no leak to act on.
+    pub(super) fn text(&self, cylinder: &FleetCylinder) -> String {
+        let text = bar(cylinder).map_or_else(String::new, |bar| bar.text(self.ends, CELLS));
         format!("{text:<CELLS$}  ")
     }
 }
 
 /// Of the largest leak to act on.
-fn bar(row: &FleetRow) -> Option<Bar> {
-    let leaks = row.leaks?;
-    let leaks = row.faults.iter().map(|leak| leaks[*leak]);
+fn bar(cylinder: &FleetCylinder) -> Option<Bar> {
+    let leaks = cylinder.faults.iter().filter_map(|leak| cylinder.leaks[*leak].flow);
     let worst = leaks.max_by(|a, b| a.mean_lpm.total_cmp(&b.mean_lpm))?;
     let value = worst.mean_lpm;
     Some(Bar {

@@ -15,6 +15,7 @@ pub use check_sketch::CheckSketch;
 pub(crate) use diagnosis::companions;
 pub use diagnosis::sentence;
 pub use fleet::fleet_terminal;
+pub(crate) use fleet::found;
 pub use replay::data_line;
 pub(crate) use replay::{hold_line, misfit, missing_rig, rig_line};
 pub use replay_sketch::ReplaySketch;

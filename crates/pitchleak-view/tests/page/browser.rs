@@ -111,6 +111,21 @@ fn assert_open_to_all(page: &str) {
     }
 }
 
+/// Opens whatever is folded, and leaves how far the page is wider than its window.
+const SURVEYOR: &str = r#"
+  document.querySelectorAll("details").forEach((one) => { one.open = true; });
+  document.documentElement.dataset.beyond = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+"#;
+
+/// On a laptop and on a phone nobody has to scroll sideways but within a table.
+fn assert_fits(page: &str) {
+    let page = with_script(page, SURVEYOR);
+    for window in ["--window-size=1366,768", "--window-size=390,844"] {
+        let (document, _) = visit(&page, &[window]);
+        assert_eq!(left(&document, "beyond"), Some("0"), "{window}");
+    }
+}
+
 fn assert_cursor_and_zoom_work(page: &str) {
     let page = with_script(page, &format!("{{{VISITOR}}}"));
     let (document, log) = visit(&page, &["--window-size=1280,4000"]);
@@ -147,7 +162,9 @@ fn a_diagnosis() {
 #[test]
 #[ignore = "needs chromium"]
 fn a_fleet() {
-    assert_opens(&made::fleet());
+    let page = made::fleet();
+    assert_opens(&page);
+    assert_fits(&page);
 }
 
 #[test]

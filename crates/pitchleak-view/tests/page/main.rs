@@ -128,9 +128,12 @@ fn a_page_of_a_fleet_says_who_asks_for_somebody_and_what_grows() {
     let page = fleet();
     assert_complete_in_itself(&page);
     let parts = [
-        "6 LEAKS</h1>",
+        "1 LEAK</h1>",
         "1 could not be judged",
         "One leak grows",
+        "since 2025-06-15 or before; oil leaves",
+        "<summary>6 traces: 6 leak</summary>",
+        "<svg class=\"course\"",
         "0.30",
         "internal leak",
         "days since",
@@ -140,6 +143,9 @@ fn a_page_of_a_fleet_says_who_asks_for_somebody_and_what_grows() {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("<img"));
+    let (_, first) = page.split_once("What to do first").expect("a card");
+    let (first, _) = first.split_once("</ol>").expect("a list");
+    assert_eq!(first.matches("<li>").count(), 1, "each cylinder once");
 }
 
 #[test]
