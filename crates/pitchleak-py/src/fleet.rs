@@ -54,17 +54,23 @@ impl FleetRow {
 /// Path, cylinder, begin and rig file (None: the built-in rig) of each trace that paths and patterns name.
 type Found = Vec<(OsString, String, Option<String>, Option<OsString>)>;
 
-/// The traces that there are. `rigs` is a rig file for all or a table of them.
+/// The traces that there are, and a sentence for each file that is judged as another of them. `rigs` is a rig file for all
+/// or a table of them.
 #[pyfunction]
-pub fn fleet_traces(py: Python<'_>, patterns: Vec<String>, rigs: Option<PathBuf>) -> PyResult<Found> {
+pub fn fleet_traces(
+    py: Python<'_>,
+    patterns: Vec<String>,
+    rigs: Option<PathBuf>,
+) -> PyResult<(Found, Vec<String>)> {
     let found = py.detach(|| FleetTrace::find(&patterns, &FleetRig::from_file(rigs)));
     let found = found.map_err(|error| fleet_error(py, &error))?;
+    let doubles = FleetTrace::doubles(&found).collect();
     let one = |FleetTrace { path, identity, rig_file, .. }| {
         let TraceIdentity { cylinder, begins } = identity;
         let begins = begins.map(|begins| begins.to_string());
         (path.into_os_string(), cylinder, begins, rig_file.map(PathBuf::into_os_string))
     };
-    Ok(found.into_iter().map(one).collect())
+    Ok((found.into_iter().map(one).collect(), doubles))
 }
 
 /// Judges one trace. A trace that can't be read is a row too.
@@ -136,6 +142,12 @@ pub fn fleet_table<'py>(
         Ok((name.clone(), kind, values))
     };
     table.columns().iter().map(column).collect()
+}
+
+/// What the traces of each cylinder say together, the worst first, as JSON.
+#[pyfunction]
+pub fn fleet_cylinders(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
+    serde_json::to_string(&FleetReport::of(&cloned(&rows)).by_cylinder).map_err(value_error)
 }
 
 /// Trends by cylinder as JSON.

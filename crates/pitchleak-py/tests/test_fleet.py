@@ -141,7 +141,7 @@ def test_as_tables(found, tmp_path):
 
 
 def test_a_notebook_shows_it(found):
-    assert "4 traces of 4 cylinders" in repr(found)
+    assert "4 cylinders: 3 leak, 1 sound" in repr(found) and "(4 traces)" in repr(found)
     html = found._repr_html_()
     assert "L/min" in html and "LEAK" in html
     axes = found.plot()
@@ -190,6 +190,37 @@ def test_many_days_make_a_trend():
     assert "GROWS     grows  internal by 0." in str(out)
     axes = out.plot("grows")
     assert len(axes.get_legend().get_texts()) == 3
+
+
+def test_cylinders_are_those_of_the_program(farm, found, program):
+    raw = json.loads(program("fleet", f"{farm}/**/*.csv", "--json"))
+    assert list(found.cylinders) == [entry["cylinder"] for entry in raw["by_cylinder"]]
+    assert found.cylinder_counts == raw["cylinder_counts"]
+    for entry, one in zip(raw["by_cylinder"], found.cylinders.values(), strict=True):
+        assert (one.status, list(one.faults), one.since) == (entry["status"], entry["faults"], entry["since"])
+        row = found.rows[one.latest]
+        assert (row.cylinder, row.status, one.rows) == (one.cylinder, one.status, (one.latest,))
+        assert one.leaks.internal.flow == row.leaks.internal
+        assert one.leaks.internal.stands == ("internal" in one.faults)
+
+
+def test_many_days_of_a_cylinder_are_one():
+    out = months()
+    assert (len(out), sorted(out.cylinders)) == (40, ["grows", "stays"])
+    assert out.cylinder_counts["leak"] == 2 and out.counts["leak"] > 20
+    grows = out.cylinders["grows"]
+    assert grows.since > grows.other_until > "2026-05-01"
+    assert grows.counts["leak"] + grows.counts["sound"] + grows.counts["not_sure"] == grows.traces == 20
+    assert grows.leaks.internal.trend == out.trends["grows"].internal
+    assert out.rows[grows.rows[-1]].begins.startswith("2026-05-20")
+
+
+def test_copies_count_once_and_are_told(farm, tmp_path):
+    (tmp_path / "T1").mkdir()
+    for name in ("a.csv", "b.csv"):
+        shutil.copy(farm / "T1/B1/2026-05-01.csv", tmp_path / "T1" / name)
+    with pytest.warns(pl.TraceWarning, match=r"b\.csv is a copy of .*a\.csv: judged once, as a trace of .*T1/a"):
+        assert len(pl.fleet(tmp_path / "T1/*.csv", progress=False)) == 1
 
 
 def test_a_fleet_pickles(found):

@@ -4,7 +4,7 @@ from ._calibrate import Calibration, calibrate
 from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
 from ._diagnose import Diagnosis, diagnose
 from ._estimator import Estimator
-from ._fleet import Fleet, FleetLeak, FleetRow, LongTrend, fleet
+from ._fleet import Beside, CylinderLeak, Fleet, FleetCylinder, FleetLeak, FleetRow, LongTrend, fleet
 from ._inputs import TraceWarning
 from ._pitchleak import Linkage, Rig, RigError, TraceError, __version__
 from ._replay import Replay, Replays, replay
@@ -34,15 +34,18 @@ from ._simulate import Simulation, simulate
 
 __all__ = [
     "Alarm",
+    "Beside",
     "Calibration",
     "ChannelFault",
     "Check",
+    "CylinderLeak",
     "Diagnosis",
     "Episode",
     "Estimate",
     "Estimates",
     "Estimator",
     "Fleet",
+    "FleetCylinder",
     "FleetLeak",
     "FleetRow",
     "FoundLeak",

@@ -111,6 +111,68 @@ class LongTrend:
     grow beyond doubt."""
 
 
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """How much more one leak of a cylinder is than those of its siblings (docs/fleet.md)."""
+
+    siblings: int
+    """How many siblings it is compared with."""
+    more_lpm: float
+    """How much more it leaks than they do in the mean, L/min; negative where it leaks less."""
+    std_lpm: float
+    """Standard deviation of that, L/min; 1.96 of them are the half of the 95 % interval."""
+    p_value: float
+    """How probable so large a difference is where there is none, times the number of comparisons."""
+    differs: bool
+    """Whether it leaks more than its siblings by more than chance explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class CylinderLeak:
+    """One leak of a cylinder, over its traces."""
+
+    stands: bool
+    """Whether it is a leak to act on that no later trace excluded."""
+    since: str | None
+    """Begin of the first trace that showed it, with none since that excluded it, ISO 8601."""
+    other_until: str | None
+    """Begin of the last trace before that excluded it."""
+    flow: FleetLeak | None
+    """Its flow: of a leak that stands in the last trace that shows it, of another in the last that pins it down."""
+    trend: LongTrend | None
+    """How it changes from trace to trace, and when it is at its threshold."""
+    beside: Beside | None
+    """How it differs from that of the cylinder's siblings; None without any, or without a second trace."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetCylinder:
+    """What the traces of one cylinder say together (docs/fleet.md)."""
+
+    cylinder: str
+    """Its name."""
+    status: Status | None
+    """How it is now: a leak stands until a trace excludes it; None where no trace could be judged."""
+    faults: tuple[Leak, ...]
+    """Leaks to act on."""
+    reasons: tuple[str, ...]
+    """Ids of the reasons of a status in doubt, first things first."""
+    since: str | None
+    """Begin of the first trace of the unbroken run that the status lasts, ISO 8601; None without dates."""
+    other_until: str | None
+    """Begin of the last trace before that said otherwise; None where it was so from the first on."""
+    latest: int | None
+    """Place in :attr:`Fleet.rows` of the latest trace that could be judged."""
+    traces: int
+    """Number of its traces."""
+    counts: dict[str, int]
+    """Its traces by status, and ``error``."""
+    leaks: PerLeak[CylinderLeak]
+    """Each leak."""
+    rows: tuple[int, ...]
+    """Places of its traces in :attr:`Fleet.rows`, by their begin; those without come first."""
+
+
 class Fleet(Paged, Tabular):
     """What was found of many cylinders. As a table: a row per cylinder and trace, with the columns of ``pitchleak fleet
     --out`` (docs/fleet.md). Fleets of different days are put together by ``+``."""
@@ -132,12 +194,26 @@ class Fleet(Paged, Tabular):
         return counts
 
     @cached_property
+    def cylinders(self) -> dict[str, FleetCylinder]:
+        """What the traces of each cylinder say together, by its name, the worst first."""
+        entries = json.loads(_pitchleak.fleet_cylinders(self._rows))
+        return {e["cylinder"]: record(FleetCylinder, e) for e in entries}
+
+    @property
+    def cylinder_counts(self) -> dict[str, int]:
+        """Cylinders by status, and ``error``."""
+        counts = dict.fromkeys(self.counts, 0)
+        for cylinder in self.cylinders.values():
+            counts[cylinder.status or "error"] += 1
+        return counts
+
+    @cached_property
     def trends(self) -> dict[str, PerLeak[LongTrend | None]]:
         """How leaks change over the traces of a cylinder, by cylinder; None for a leak that fewer than three dated
         traces pin down without doubt."""
 
         def long(raw: dict[str, Any] | None) -> LongTrend | None:
-            return None if raw is None else record(LongTrend, raw | {"from_": raw["from"]})
+            return None if raw is None else record(LongTrend, raw)
 
         entries = json.loads(_pitchleak.fleet_trends(self._rows))
         return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in entries}
@@ -226,22 +302,21 @@ class Fleet(Paged, Tabular):
         return f"<Fleet: {str(self).partition(chr(10))[0]}>"
 
     def _repr_html_(self) -> str:
-        shown = sorted((row for row in self.rows if row.status != "sound"), key=_urgency)
+        shown = [one for one in self.cylinders.values() if one.status != "sound"]
         rows = []
-        for row in shown[:50]:
-            flows = ["–"] * 3
-            if row.leaks is not None:
-                flows = [_html.number(leak.mean_lpm, leak.std_lpm) for _, leak in row.leaks.items()]
-            word = "ERROR" if row.status is None else row.status.replace("_", " ").upper()
-            why = row.error or ", ".join(row.faults or row.reasons)
-            rows.append((row.cylinder, (row.begins or "–")[:10], word, *flows, why))
-        headers = ("cylinder", "day", "verdict", *(f"{label}, L/min" for label in LABELS.values()), "why")
+        for one in shown[:50]:
+            flows = [leak.flow for _, leak in one.leaks.items()]
+            numbers = ["–" if flow is None else _html.number(flow.mean_lpm, flow.std_lpm) for flow in flows]
+            word = "ERROR" if one.status is None else one.status.replace("_", " ").upper()
+            why = ", ".join(one.faults or one.reasons) or self.rows[one.rows[-1]].error or ""
+            rows.append((one.cylinder, (one.since or "–")[:10], word, *numbers, why))
+        headers = ("cylinder", "since", "verdict", *(f"{label}, L/min" for label in LABELS.values()), "why")
         more = f"and {len(shown) - 50} more in doubt or leaking" if len(shown) > 50 else ""
         return _html.page(repr(self)[1:-1], *([_html.table(headers, rows)] if rows else []), footer=more)
 
     def plot(self, cylinder: str | None = None, ax: "Axes | None" = None) -> "Axes":
         """Draws the leaks of one cylinder over its traces, with 95 % intervals and the lines of :attr:`trends` (needs
-        matplotlib); where none is named, that with the largest leak. Traces without a date stand in their order, those
+        matplotlib); where none is named, the worst. Traces without a date stand in their order, those
         in doubt are hollow. Returns the axes.
         """
         cylinder = self._worst() if cylinder is None else cylinder
@@ -279,18 +354,11 @@ class Fleet(Paged, Tabular):
     def _worst(self) -> str:
         if not self.rows:
             raise ValueError("no trace")
-        return min(self.rows, key=_urgency).cylinder
+        return next(iter(self.cylinders))
 
 
 def _column(kind: str, values: Any) -> Any:
     return values.view("datetime64[ms]") if kind == "times" else values
-
-
-def _urgency(row: FleetRow) -> tuple[int, float]:
-    """The worst has the least."""
-    order = ("leak", "doubtful", "not_sure", None, "sound")
-    flows = [getattr(row.leaks, leak).mean_lpm or 0.0 for leak in row.faults] if row.leaks else []
-    return order.index(row.status), -max(flows, default=0.0)
 
 
 def _middle(row: FleetRow) -> np.datetime64:
@@ -334,7 +402,7 @@ def fleet(
     as :func:`replay` takes it. ``rigs`` is a :class:`Rig` or a rig file for all, a table of rig files (``.csv``,
     docs/fleet.md), or rigs by the names of the cylinders; left out, it is ``rig.toml`` beside each file, else the
     built-in one. ``columns`` names foreign columns as for :func:`replay`. A trace that can't be used becomes a row with
-    its ``error``, and a :class:`TraceWarning` says so.
+    its ``error``, and a :class:`TraceWarning` says so. Links and copies of a file count once, with a warning each.
 
     ``map`` is any map, and says where the work is done: the builtin ``map``, that of a process pool, ``joblib``'s in a
     lambda, a Dask client's; futures are waited for. Left out, it is all cores of this machine. ``progress`` is True
@@ -377,7 +445,8 @@ def _jobs(traces: Any, rigs: Rigs | None, columns: _inputs.Columns | None) -> li
         return [_named_job(cylinder, data, _rig_of(cylinder, rigs), columns) for cylinder, data in named]
     patterns = [traces] if _inputs.is_path(traces) else list(traces)
     file = os.fspath(rigs) if isinstance(rigs, (str, os.PathLike)) else None
-    found = _pitchleak.fleet_traces([os.fspath(pattern) for pattern in patterns], file)
+    found, doubles = _pitchleak.fleet_traces([os.fspath(pattern) for pattern in patterns], file)
+    _inputs.warn(doubles)
     one = rigs if isinstance(rigs, Rig) else None
     jobs = [_Job(path, cylinder, begins, one or beside, columns) for path, cylinder, begins, beside in found]
     if not isinstance(rigs, Mapping):
@@ -387,7 +456,7 @@ def _jobs(traces: Any, rigs: Rigs | None, columns: _inputs.Columns | None) -> li
 
 def _named_job(cylinder: str, data: Any, rig: Rig | str | None, columns: _inputs.Columns | None) -> _Job:
     if rig is None and _inputs.is_path(data):
-        ((path, _, begins, beside),) = _pitchleak.fleet_traces([os.fspath(data)], None)
+        ((path, _, begins, beside),), _ = _pitchleak.fleet_traces([os.fspath(data)], None)
         return _Job(path, cylinder, begins, beside, columns)
     return _Job(data, cylinder, None, rig, columns)
 

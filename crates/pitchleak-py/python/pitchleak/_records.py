@@ -14,11 +14,13 @@ _Convert: TypeAlias = Callable[[Any], Any] | None
 
 
 def record(cls: type[T], data: Mapping[str, Any]) -> T:
-    """``data`` as a dataclass: unknown keys are left out, missing ones take the field's default."""
+    """``data`` as a dataclass: unknown keys are left out, missing ones take the field's default. What would be a
+    word of Python's has an underscore behind it as a field (``from_``)."""
     known = {}
     for name, convert in _fields(typing.cast(Hashable, cls)):
-        if name in data:
-            value = data[name]
+        key = name.removesuffix("_")
+        if key in data:
+            value = data[key]
             known[name] = value if convert is None or value is None else convert(value)
     return cls(**known)
 

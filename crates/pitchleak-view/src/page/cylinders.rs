@@ -3,13 +3,13 @@
 use super::Tone;
 use super::course::Scale;
 use super::history::ink;
-use super::machine::short;
+use super::machine::{prose, short};
 use crate::text;
 use jiff::Timestamp;
 use maud::{Markup, html};
 use pitchleak::core::Leak;
 use pitchleak::fleet::{Counts, FleetCylinder, FleetLeak, FleetReport, FleetRow, count};
-use pitchleak::report::{Status, capital, with_interval};
+use pitchleak::report::{capital, with_interval};
 use std::collections::HashMap;
 
 /// Cylinders that a page shows: beyond, JSON is the place to look.
@@ -129,7 +129,7 @@ fn traces(cylinder: &FleetCylinder, report: &FleetReport<'_>, shown: usize) -> M
             thead { tr {
                 th scope="col" { "begins" } th scope="col" { "verdict" }
                 @for leak in Leak::ALL { th .number scope="col" { (leak.label()) ", L/min" } }
-                th .number scope="col" { "minutes" } th scope="col" { "trace" } th scope="col" { "because" }
+                th .number scope="col" { "minutes" } th scope="col" { "trace" }
             } }
             tbody { @for row in rows.take(shown) { (line(row)) } }
         } }
@@ -150,17 +150,19 @@ fn line(row: &FleetRow) -> Markup {
                 } }
             }
             td .number { (row.duration_s.map_or_else(|| "–".to_owned(), |s| short(s / 60.0))) }
-            td { bdi { (row.path) } }
-            td { (because(row)) }
+            td { (said(row)) }
         }
     }
 }
 
-fn because(row: &FleetRow) -> String {
-    match (&row.error, row.status) {
-        (Some(error), _) => error.clone(),
-        (None, Some(Status::Leak | Status::Sound)) => String::new(),
-        (None, _) => row.reasons.iter().map(|id| id.replace('_', " ")).collect::<Vec<_>>().join(", "),
+/// Which file it is, and why its verdict is in doubt, or there is none.
+fn said(row: &FleetRow) -> Markup {
+    let reasons = row.reasons.iter().map(|id| id.replace('_', " ")).collect::<Vec<_>>().join(", ");
+    match &row.error {
+        Some(error) if error.contains(&row.path) => prose(error),
+        Some(error) => html! { bdi { (row.path) } ": " (prose(error)) },
+        None if reasons.is_empty() => html! { bdi { (row.path) } },
+        None => html! { bdi { (row.path) } ": " (reasons) },
     }
 }
 

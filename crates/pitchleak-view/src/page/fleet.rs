@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Charts, Limit, Line};
 use super::history::ink;
-use super::machine::facts;
+use super::machine::{facts, prose};
 use super::{Card, Head, Page, Section, Tone, cylinders};
 use crate::envelope::Range;
 use jiff::Timestamp;
@@ -93,7 +93,7 @@ fn open(report: &FleetReport<'_>) -> Card {
             @if unsure + failed == 0 { p { "Nothing is open: every trace is judged, and every cylinder's verdict is sure." } }
             ul {
                 @for cylinder in cylinders.take(MOST_NAMED) { li { strong { bdi { (cylinder.cylinder) } } ": " (cylinders::found(cylinder, report)) "." } }
-                @for (cylinder, error) in errors.take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ": " (error) "." } }
+                @for (cylinder, error) in errors.take(MOST_NAMED) { li { strong { bdi { (cylinder) } } ": " (prose(error)) "." } }
             }
             @if unsure > MOST_NAMED { p { "… and " (unsure - MOST_NAMED) " more, below." } }
             @if failed > 0 { p { (count(failed, "trace")) " could not be judged." } }
