@@ -60,6 +60,11 @@ pub struct CylinderLeak {
 }
 
 impl CylinderLeak {
+    /// Since when it is there, by days, for people; none without dates, or where it does not stand.
+    pub fn since_text(&self) -> Option<String> {
+        since_text(self.since, self.other_until)
+    }
+
     /// How it differs from that of the siblings, where that is news: beyond chance, and no leak to act on yet.
     pub fn differing(&self) -> Option<&Beside> {
         self.beside.as_ref().filter(|beside| beside.differs && !self.stands)
@@ -137,9 +142,7 @@ impl FleetCylinder {
 
     /// Since when it is so, by days, for people; none without dates.
     pub fn since_text(&self) -> Option<String> {
-        let day = self.since?.strftime("%Y-%m-%d");
-        let or_before = if self.other_until.is_none() { " or before" } else { "" };
-        Some(format!("since {day}{or_before}"))
+        since_text(self.since, self.other_until)
     }
 
     /// The largest flow among the leaks to act on, L/min.
@@ -152,6 +155,12 @@ impl FleetCylinder {
     fn urgency(&self) -> (usize, bool) {
         (urgency(self.status), !self.leaks.iter().any(|(_, leak)| leak.differing().is_some()))
     }
+}
+
+fn since_text(since: Option<Timestamp>, other_until: Option<Timestamp>) -> Option<String> {
+    let day = since?.strftime("%Y-%m-%d");
+    let or_before = if other_until.is_none() { " or before" } else { "" };
+    Some(format!("since {day}{or_before}"))
 }
 
 fn urgency(status: Option<Status>) -> usize {
@@ -353,6 +362,10 @@ mod tests {
         assert_eq!(told, [("T7/B2", Leak::Internal)]);
         let beside = report.by_cylinder[0].leaks.internal.beside.unwrap();
         assert!((beside.more_lpm - 0.04).abs() < 1e-9 && beside.siblings == 2, "{beside:?}");
+        // Alike: even odds, times fifteen comparisons.
+        let alike = report.by_cylinder.iter().find(|one| one.cylinder == "T8/B1").unwrap();
+        let p_value = alike.leaks.internal.beside.unwrap().p_value;
+        assert!((p_value - 1.0).abs() < 1e-12, "{p_value}");
         assert!(
             report.by_cylinder.iter().filter(|one| one.cylinder == "alone").all(|one| one
                 .leaks

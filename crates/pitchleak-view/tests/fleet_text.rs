@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jiff::Timestamp;
-use pitchleak::core::PerLeak;
+use pitchleak::core::{Leak, PerLeak};
 use pitchleak::fleet::{FleetReport, FleetRig, FleetRow, FleetTrace, judge_all};
 use pitchleak::report::Status;
 use pitchleak_testkit::Motion;
@@ -69,6 +69,14 @@ fn a_leaking_cylinder_is_one_line_that_says_since_when_and_what_its_latest_trace
     assert!(line.starts_with("LEAK      T7/B1  internal 1."), "{text}");
     assert!(line.ends_with(" L/min, since 2026-05-02, its latest trace is doubtful"), "{text}");
     assert_eq!(text.lines().count(), 3, "{text}");
+    let mut both = FleetRow { begins: day(4), ..rows[0].clone() };
+    both.faults.push(Leak::ExternalB);
+    let text = FleetReport::of(&[&days[..], &[both]].concat()).to_text(&Palette::PLAIN);
+    let line = text.lines().nth(2).unwrap();
+    assert!(
+        line.contains(" L/min since 2026-05-02, external B ") && line.ends_with("since 2026-05-04"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::Text;
 use super::fleet_sketch::{Bars, CELLS, course_of};
 use crate::Palette;
 use pitchleak::core::Leak;
-use pitchleak::fleet::{Counts, FleetCylinder, FleetReport, count};
+use pitchleak::fleet::{Counts, CylinderLeak, FleetCylinder, FleetReport, count};
 use pitchleak::report::{Status, with_interval};
 use std::fmt::Write;
 
@@ -125,14 +125,18 @@ fn write_more(text: &mut String, more: usize) {
 
 /// What the verdict on a cylinder rests on, since when, and whether its latest trace says otherwise.
 pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> String {
-    let flow = |leak: &Leak| {
-        let flow = cylinder.leaks[*leak].flow?;
-        Some(format!("{} {} L/min", leak.label(), with_interval(flow.mean_lpm, flow.std_lpm)))
+    let leaks = || cylinder.faults.iter().map(|leak| (leak, &cylinder.leaks[*leak]));
+    let at_once = leaks().all(|(_, of)| of.since == cylinder.since);
+    let flow = |(leak, of): (&Leak, &CylinderLeak)| {
+        let flow = of.flow?;
+        let since =
+            of.since_text().filter(|_| !at_once).map_or_else(String::new, |since| format!(" {since}"));
+        Some(format!("{} {} L/min{since}", leak.label(), with_interval(flow.mean_lpm, flow.std_lpm)))
     };
-    let leaks = || cylinder.faults.iter().filter_map(flow).collect();
     let is_leak = cylinder.status == Some(Status::Leak);
-    let mut found: Vec<String> = if is_leak { leaks() } else { cylinder.reasons.clone() };
-    found.extend(cylinder.since_text());
+    let mut found: Vec<String> =
+        if is_leak { leaks().filter_map(flow).collect() } else { cylinder.reasons.clone() };
+    found.extend(cylinder.since_text().filter(|_| at_once || !is_leak));
     let latest = cylinder.latest.and_then(|place| report.rows.get(place)).and_then(|row| row.status);
     if let Some(latest) = latest.filter(|latest| is_leak && *latest != Status::Leak) {
         found.push(format!("its latest trace is {}", latest.id()));
