@@ -12,7 +12,6 @@ what it wrote since the begin, and how often it told of what; at the end every a
 
 import argparse
 import collections
-import itertools
 import json
 import pathlib
 import re
@@ -52,7 +51,7 @@ class Day(Service):
     """The service, and all that it says."""
 
     def __init__(self, folder):
-        self.alarms, self.notices = {}, collections.Counter()
+        self.alarms, self.notices = collections.Counter(), collections.Counter()
         super().__init__(folder, 10)
         self.client.subscribe([("pitchleak/+/alarm", 1), ("pitchleak/+/notice/#", 1)])
 
@@ -61,7 +60,6 @@ class Day(Service):
         if "/notice/" in message.topic:
             self.notices[message.topic] += 1
         elif "/alarm" in message.topic:
-            self.alarms.setdefault(said["id"], 0)
             self.alarms[said["id"]] += 1
 
     def written_mb(self):
@@ -75,9 +73,10 @@ def send_an_hour(service, hours, begin_s, due, speed):
         time.sleep(max(0.0, due - time.monotonic()))
         due += 1 / speed
         rows = slice(second * RATE_HZ, (second + 1) * RATE_HZ)
-        for cylinder in (*SOUND, LEAKING):
-            names, cells = hours[cylinder == LEAKING]
-            service.send(cylinder, message(names, cells[rows], begin_s + second))
+        for cylinders, (names, cells) in zip((SOUND, (LEAKING,)), hours, strict=True):
+            said = message(names, cells[rows], begin_s + second)
+            for cylinder in cylinders:
+                service.send(cylinder, said)
     return due
 
 
@@ -91,7 +90,7 @@ def main():
         service = Day(folder)
         try:
             begun = due = time.monotonic()
-            for hour in itertools.islice(itertools.count(), arguments.hours):
+            for hour in range(arguments.hours):
                 kinds = ([], ["--leak-internal", "0.3 L/min"])
                 hours = [simulated_hour(folder, hour % len(WINDS), leak) for leak in kinds]
                 due = max(due, time.monotonic())

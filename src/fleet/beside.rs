@@ -1,17 +1,14 @@
 //! A cylinder beside its siblings: the blades of one turbine move alike, in the same oil and weather, so that one whose leak
 //! differs is told long before it reaches a threshold.
 
+use super::scatter::Scatter;
 use super::standing::Answer;
-use super::trend::believed;
 use super::{FleetCylinder, FleetRow, count};
 use crate::report::with_interval;
 use pitchleak_core::{Estimate, Leak};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::HashMap;
 
-/// A turbine has three blades, with a cylinder or two each. A folder with more cylinders is no turbine.
-const MOST_CYLINDERS: usize = 6;
 /// How often a fleet without any difference has one told.
 const FALSE_ALARM: f64 = 0.05;
 
@@ -51,7 +48,7 @@ impl Beside {
             for leak in Leak::ALL {
                 let flows = |at: &usize| {
                     let flows: Vec<_> = of_now(cylinders.get(*at)?, rows, leak)
-                        .filter_map(|row| believed(row, leak))
+                        .filter_map(|row| row.estimate(leak))
                         .collect();
                     (!flows.is_empty()).then_some((*at, flows))
                 };
@@ -99,7 +96,10 @@ fn families(cylinders: &[FleetCylinder]) -> Vec<Vec<usize>> {
             families.entry(turbine).or_default().push(at);
         }
     }
-    families.into_values().filter(|family| (2..=MOST_CYLINDERS).contains(&family.len())).collect()
+    families
+        .into_values()
+        .filter(|family| (2..=FleetCylinder::MOST_OF_A_TURBINE).contains(&family.len()))
+        .collect()
 }
 
 struct Difference {
@@ -138,28 +138,24 @@ impl Levels {
     }
 }
 
-/// Of each cylinder from the mean of the others. None where no cylinder has a second trace: then nobody knows what traces
-/// scatter. The scatter's variance is by moments (DerSimonian & Laird 1986), the spread with the weighted residual, never
-/// below 1 (Knapp & Hartung 2003), as in a cylinder's trend.
+/// Of each cylinder from the mean of the others. None where no cylinder has a second trace.
 fn differences(flows: &[Vec<Estimate<f64>>]) -> Vec<Difference> {
-    let freedom = flows.iter().map(|own| own.len() - 1).sum::<usize>() as f64;
-    let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else { return Vec::new() };
+    let freedom = flows.iter().map(|own| own.len() - 1).sum();
+    let Some(scatter) = Scatter::with_freedom(freedom) else { return Vec::new() };
     if flows.len() < 2 {
         return Vec::new();
     }
     let apart = Levels::of(flows, 0.0);
-    let scatter = ((apart.residual - freedom) / apart.free_weight).max(0.0);
-    let Levels { means, weights, residual, .. } = Levels::of(flows, scatter);
-    let inflation = (residual / freedom).max(1.0);
+    let variance = scatter.variance(apart.residual, apart.free_weight);
+    let Levels { means, weights, residual, .. } = Levels::of(flows, variance);
+    let inflation = scatter.inflation(residual);
     let siblings = means.len() - 1;
     let (sum, variance) = (means.iter().sum::<f64>(), weights.iter().map(|w| w.recip()).sum::<f64>());
-    let normal95 = Estimate { value: 0.0, std: 1.0 }.half_width95();
-    let width = student.inverse_cdf(0.975) / normal95;
     let difference = |(mean, weight): (&f64, &f64)| {
         let more = mean - (sum - mean) / siblings as f64;
         let own = weight.recip();
         let std = ((own + (variance - own) / (siblings as f64).powi(2)) * inflation).sqrt();
-        Difference { siblings, more, std: std * width, chance: student.sf(more / std) }
+        Difference { siblings, more, std: std * scatter.width(), chance: scatter.chance(more / std) }
     };
     means.iter().zip(&weights).map(difference).collect()
 }

@@ -72,6 +72,9 @@ impl CylinderLeak {
 }
 
 impl FleetCylinder {
+    /// A turbine has three blades, with a cylinder or two each: a folder with more cylinders is none.
+    pub const MOST_OF_A_TURBINE: usize = 6;
+
     /// The cylinders of `rows`, the worst first.
     pub fn all(rows: &[FleetRow]) -> Vec<Self> {
         let mut places: Vec<Vec<usize>> = Vec::new();
@@ -209,13 +212,12 @@ impl<'a> Traces<'a> {
         let shows = |row: &&FleetRow| answer(row) == Answer::Yes && row.begins.is_some() == dated;
         let undated = self.all().any(|row| row.begins.is_none() && answer(row) == Answer::Yes);
         let stands = dated || undated;
-        let says = |row: &&FleetRow| {
-            let pinned = row.leaks.is_some_and(|leaks| leaks[leak].identifiable);
-            pinned && row.status != Some(Status::Doubtful)
+        let flow = if stands {
+            self.all().rfind(shows).and_then(|row| row.leaks).map(|leaks| leaks[leak])
+        } else {
+            self.all().rev().find_map(|row| row.pinned(leak))
         };
-        let row = if stands { self.all().rfind(shows) } else { self.all().rfind(says) };
         let (since, other_until) = when.unwrap_or_default();
-        let flow = row.and_then(|row| row.leaks).map(|leaks| leaks[leak]);
         CylinderLeak { stands, since, other_until, flow, trend, beside: None }
     }
 }

@@ -14,6 +14,7 @@ mod judge;
 mod report;
 mod rig_table;
 mod row;
+mod scatter;
 mod standing;
 mod table;
 mod traces;

@@ -132,10 +132,17 @@ impl FleetRow {
         self.status.map_or("ERROR", Status::word)
     }
 
-    /// The largest flow among the leaks to act on, L/min.
-    pub fn worst_lpm(&self) -> f64 {
-        let flow = |leak: &Leak| self.leaks.map_or(0.0, |leaks| leaks[*leak].mean_lpm);
-        self.faults.iter().map(flow).fold(0.0, f64::max)
+    /// A leak that the trace pins down without doubt.
+    pub fn pinned(&self, leak: Leak) -> Option<FleetLeak> {
+        let found = self.leaks?[leak];
+        (found.identifiable && self.status != Some(Status::Doubtful)).then_some(found)
+    }
+
+    /// Its flow, L/min, where it comes with a standard deviation.
+    pub(super) fn estimate(&self, leak: Leak) -> Option<Estimate<f64>> {
+        let found = self.pinned(leak)?;
+        let std = found.std_lpm.filter(|std| *std > 0.0)?;
+        Some(Estimate { value: found.mean_lpm, std })
     }
 }
 

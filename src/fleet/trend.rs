@@ -1,12 +1,12 @@
 //! A leak's course over the traces of days and months.
 
+use super::scatter::Scatter;
 use super::{FleetCylinder, FleetRow};
-use crate::report::{LeakTrend, Status, with_interval};
+use crate::report::{LeakTrend, with_interval};
 use crate::units::S_PER_DAY;
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 const H_PER_MONTH: f64 = 24.0 * 30.0;
 
@@ -113,19 +113,11 @@ impl LongTrend {
 impl Point {
     /// None where the row tells nothing of this leak, or not when.
     pub fn of(row: &FleetRow, leak: Leak) -> Option<Self> {
-        let flow = believed(row, leak)?;
+        let flow = row.estimate(leak)?;
         let half = jiff::SignedDuration::try_from_secs_f64(row.duration_s? / 2.0).ok()?;
         let at = row.begins?.checked_add(half).ok()?;
         Some(Self { at, flow, threshold_lpm: row.leaks?[leak].threshold_lpm })
     }
-}
-
-/// The flow of a leak that a trace pins down without doubt, L/min.
-pub(super) fn believed(row: &FleetRow, leak: Leak) -> Option<Estimate<f64>> {
-    let found = row.leaks?[leak];
-    let std = found.std_lpm.filter(|std| *std > 0.0)?;
-    let is_believed = found.identifiable && row.status != Some(Status::Doubtful);
-    is_believed.then_some(Estimate { value: found.mean_lpm, std })
 }
 
 /// y = level + slope·t.
@@ -184,21 +176,16 @@ impl Sums {
 }
 
 impl Line {
-    /// Regression with a scatter between traces beside their own errors: its variance by moments (DerSimonian & Laird
-    /// 1986, "Meta-analysis in clinical trials"), the intervals by Student's t and the weighted residual, never below 1 (Knapp
-    /// & Hartung 2003, "Improved tests for a random effects meta-regression with a single covariate"). The standard
-    /// deviations are such that 1.96 of them are the half of the 95 % interval.
+    /// Regression with a scatter between traces beside their own errors; 1.96 of its standard deviations are the half of
+    /// the 95 % interval.
     fn through(points: &[(f64, Estimate<f64>)]) -> Option<Self> {
-        let freedom = points.len().checked_sub(2).filter(|freedom| *freedom > 0)? as f64;
+        let scatter = Scatter::with_freedom(points.len().checked_sub(2)?)?;
         let own: Vec<_> = points.iter().map(|(_, y)| y.std.powi(-2)).collect();
         let sums = Sums::of(points, &own)?;
-        let excess = sums.residual(points, &own) - freedom;
-        let variance = (excess / sums.free_weight(points, &own)).max(0.0);
+        let variance = scatter.variance(sums.residual(points, &own), sums.free_weight(points, &own));
         let weights: Vec<_> = points.iter().map(|(_, y)| (y.std.powi(2) + variance).recip()).collect();
         let sums = Sums::of(points, &weights)?;
-        let t = StudentsT::new(0.0, 1.0, freedom).ok()?.inverse_cdf(0.975);
-        let unit = Estimate { value: 0.0, std: 1.0 };
-        let inflation = (sums.residual(points, &weights) / freedom).max(1.0).sqrt() * t / unit.half_width95();
+        let inflation = scatter.inflation(sums.residual(points, &weights)).sqrt() * scatter.width();
         let std = |of: f64| (of / sums.determinant()).sqrt() * inflation;
         Some(Self {
             level: Estimate { value: sums.level, std: std(sums.tt) },

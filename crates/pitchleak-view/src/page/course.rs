@@ -3,9 +3,8 @@
 use super::history::ink;
 use crate::envelope::{Envelopes, Row, Spot};
 use maud::{Markup, html};
-use pitchleak::core::{Leak, PerLeak};
-use pitchleak::fleet::{FleetCylinder, FleetReport, FleetRow};
-use pitchleak::report::Status;
+use pitchleak::core::Leak;
+use pitchleak::fleet::{FleetCylinder, FleetLeak, FleetReport, FleetRow};
 use pitchleak::units::S_PER_DAY;
 use std::fmt::Write;
 
@@ -76,8 +75,7 @@ impl Scale {
         let mut points = Envelopes::<3>::of_at_most(MOST_POINTS);
         for (number, row) in traces(cylinder, report).enumerate() {
             let t = self.from_s.zip(begin_s(row)).map_or(number as f64, |(from, begin)| begin - from);
-            let leaks = row.leaks.filter(|_| row.status != Some(Status::Doubtful));
-            points.add(t, &Leak::ALL.map(|leak| spot(leaks?, leak)));
+            points.add(t, &Leak::ALL.map(|leak| row.pinned(leak).map(spot)));
         }
         points.rows()
     }
@@ -106,10 +104,9 @@ impl Scale {
     }
 }
 
-fn spot(leaks: PerLeak<pitchleak::fleet::FleetLeak>, leak: Leak) -> Option<Spot> {
-    let found = leaks[leak];
+fn spot(found: FleetLeak) -> Spot {
     let [low, high] = found.ci95.unwrap_or([found.mean_lpm; 2]);
-    found.identifiable.then_some(Spot { low, value: found.mean_lpm, high })
+    Spot { low, value: found.mean_lpm, high }
 }
 
 fn traces<'a>(cylinder: &'a FleetCylinder, report: &FleetReport<'a>) -> impl Iterator<Item = &'a FleetRow> {

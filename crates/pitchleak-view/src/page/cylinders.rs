@@ -16,8 +16,6 @@ use std::collections::HashMap;
 const MOST_CARDS: usize = 300;
 /// Traces that it shows of all cylinders together: beyond, the table that `--out` writes is.
 const MOST_ROWS: usize = 2000;
-/// Cards beside each other: beyond, the worst stands first.
-const MOST_BESIDE: usize = 6;
 
 /// What the verdict on a cylinder rests on, in words.
 pub fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> String {
@@ -61,7 +59,8 @@ fn by_turbine<'a>(report: &'a FleetReport<'_>) -> Vec<(&'a str, Vec<&'a FleetCyl
             None => turbines.push((name, vec![cylinder])),
         }
     }
-    for (_, own) in turbines.iter_mut().filter(|(_, own)| own.len() <= MOST_BESIDE) {
+    // In a folder that is no turbine, the worst stands first.
+    for (_, own) in turbines.iter_mut().filter(|(_, own)| own.len() <= FleetCylinder::MOST_OF_A_TURBINE) {
         own.sort_by(|a, b| a.cylinder.cmp(&b.cylinder));
     }
     turbines
