@@ -36,6 +36,14 @@ pub enum FleetError {
         /// How many more there are.
         others: usize,
     },
+    /// A file of the table that grows can't be read.
+    #[error("{file}: {why}")]
+    Nights {
+        /// Its path.
+        file: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The rig file of all traces.
     #[error(transparent)]
     Rig(#[from] RigError),

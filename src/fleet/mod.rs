@@ -2,7 +2,7 @@
 //!
 //! [`FleetTrace::find`] says which traces there are, of which cylinder, recorded when, with which rig file; [`judge_all`]
 //! replays them; [`FleetCylinder`] is what the traces of a cylinder say together; [`FleetTable`] is the table for other
-//! programs, [`FleetReport`] JSON and text for people. A file that can't be read is a row with its error, so that nothing
+//! programs, [`FleetNights`] one that grows, [`FleetReport`] JSON and text for people. A file that can't be read is a row with its error, so that nothing
 //! is lost.
 
 mod beside;
@@ -11,6 +11,7 @@ mod doubles;
 mod errors;
 mod identity;
 mod judge;
+mod nights;
 mod report;
 mod rig_table;
 mod row;
@@ -26,6 +27,7 @@ pub use cylinder::{CylinderLeak, FleetCylinder};
 pub use errors::FleetError;
 pub use identity::TraceIdentity;
 pub use judge::{Stopped, judge, judge_all, judge_opened};
+pub use nights::FleetNights;
 pub use report::{Counts, FleetReport, count};
 pub use rig_table::RigTable;
 pub use row::{FleetLeak, FleetRow};

@@ -64,6 +64,13 @@ impl FleetTable {
         Self { columns }
     }
 
+    /// With one more column at its end; `values` are as many as the rows.
+    #[must_use]
+    pub(super) fn with_texts(mut self, name: &str, values: Vec<String>) -> Self {
+        self.columns.push((name.to_owned(), FleetColumn::Texts(values.into_iter().map(Some).collect())));
+        self
+    }
+
     /// Headers and columns.
     pub fn columns(&self) -> &[(String, FleetColumn)] {
         &self.columns

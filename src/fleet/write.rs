@@ -8,6 +8,15 @@ use std::path::Path;
 #[cfg(feature = "parquet")]
 mod parquet;
 
+#[cfg(feature = "parquet")]
+pub(super) use parquet::texts;
+
+/// Reading back needs what writing does.
+#[cfg(not(feature = "parquet"))]
+pub(super) fn texts<const N: usize>(_: std::fs::File, _: [&str; N]) -> io::Result<Vec<[String; N]>> {
+    Err(io::Error::other("Parquet needs a build with the cargo feature `parquet`"))
+}
+
 /// What a table is written as.
 #[cfg(feature = "parquet")]
 pub(super) const FORMATS: &str = ".parquet, .csv or .csv.gz";

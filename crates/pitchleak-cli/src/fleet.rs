@@ -2,7 +2,7 @@ use crate::failure::Failure;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::fleet::{
-    FleetFile, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
+    FleetFile, FleetNights, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,
 };
 use pitchleak_view::Text;
 use pitchleak_view::page::{Page, PageFile};
@@ -30,6 +30,11 @@ pub struct Arguments {
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
 
+    /// Keep a table that grows in this folder (Parquet, by day): only traces that are new or changed since the last run
+    /// are read, and those of all nights are reported
+    #[arg(long, value_name = "FOLDER")]
+    table: Option<PathBuf>,
+
     /// Write the result as a page for a browser: .html, complete in itself
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -47,6 +52,7 @@ const EXAMPLES: &str = "\
 Examples:
   pitchleak fleet 'farm/**/*.csv.gz' --out fleet.parquet
   pitchleak fleet 'logs/2026-05-*.csv' --rig rigs.csv --out may.csv
+  pitchleak fleet 'farm/**/*.csv.gz' --table nights/ --report farm.html   # each night: what is new
   pitchleak fleet farm/T7/*/*.csv --json | jq '.by_cylinder[] | select(.status == \"leak\") | .cylinder'
   pitchleak fleet 'farm/**/*.csv' --fail-on-fault || echo 'somebody has to go there'";
 
@@ -57,6 +63,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let inputs = FleetTrace::inputs(&traces, &rigs);
     let file = arguments.out.as_ref().map(|path| FleetFile::create(path, &inputs)).transpose()?;
     let page = arguments.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
+    let nights = arguments.table.as_deref().map(FleetNights::open).transpose()?;
+    let (traces, seen) = match &nights {
+        Some(nights) => nights.news(traces),
+        None => (traces, Vec::new()),
+    };
     let bar = output::bar(traces.len() as u64, "{bar:40} {pos}/{len} traces, {eta} left");
     let judged = |row: &FleetRow| {
         bar.inc(1);
@@ -64,8 +75,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             bar.suspend(|| output::complain("error", error));
         }
     };
-    let rows = judge_all(&traces, judged, &AtomicBool::new(false)).map_err(|Stopped| Failure::Interrupted)?;
+    let mut rows =
+        judge_all(&traces, judged, &AtomicBool::new(false)).map_err(|Stopped| Failure::Interrupted)?;
     bar.finish_and_clear();
+    if let Some(nights) = nights {
+        rows = nights.add(seen, rows)?;
+    }
     if let Some(file) = file {
         file.write(&FleetTable::of(&rows))?;
     }

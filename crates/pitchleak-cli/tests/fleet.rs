@@ -111,6 +111,60 @@ fn many_days_of_a_cylinder_are_one_line_and_one_fault() {
 }
 
 #[test]
+fn a_second_night_reads_what_is_new_and_reports_all() {
+    let farm = farm();
+    let night = || {
+        let done = fleet(farm.path(), &["*/*.csv", "--table", "nights", "--json"]);
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice::<Value>(&done.stdout).unwrap()
+    };
+    let parts =
+        |day: &str| fs::read_dir(farm.path().join(format!("nights/day={day}"))).map_or(0, Iterator::count);
+    let first = night();
+    assert_eq!(parts("2026-05-01"), 1);
+    // Nothing is new: nothing is read, although a file is no trace any more, and nothing is written.
+    let leaking = farm.path().join("B2/2026-05-01.csv");
+    let (text, time) = (fs::read(&leaking).unwrap(), fs::metadata(&leaking).unwrap().modified().unwrap());
+    fs::write(&leaking, vec![b'x'; text.len()]).unwrap();
+    fs::File::options().write(true).open(&leaking).unwrap().set_modified(time).unwrap();
+    let second = night();
+    assert_eq!((&second["by_cylinder"], parts("2026-05-01")), (&first["by_cylinder"], 1));
+    // A new day and a changed file are read; a file that is gone stays in the table.
+    fs::write(farm.path().join("B1/2026-05-02.csv"), &text).unwrap();
+    fs::remove_file(&leaking).unwrap();
+    let sound = fs::read_to_string(farm.path().join("B1/2026-05-01.csv")).unwrap();
+    fs::write(farm.path().join("B1/2026-05-01.csv"), sound + "\n").unwrap();
+    let third = night();
+    assert_eq!((parts("2026-05-01"), parts("2026-05-02")), (2, 1));
+    assert_eq!((&third["traces"], &third["cylinder_counts"]["leak"]), (&3.into(), &2.into()));
+    let of_gone = |report: &Value| {
+        let rows = report["rows"].as_array().unwrap();
+        rows.iter().find(|row| row["path"] == "B2/2026-05-01.csv").unwrap().clone()
+    };
+    assert_eq!(of_gone(&third)["leaks"], of_gone(&second)["leaks"]);
+    // A changed rig changes what its traces say.
+    fs::write(farm.path().join("B1/rig.toml"), format!("{PAPER}\n[decision]\nalpha = 0.04\n")).unwrap();
+    night();
+    assert_eq!((parts("2026-05-01"), parts("2026-05-02")), (3, 2));
+}
+
+#[test]
+fn a_damaged_night_is_named_and_a_trace_that_failed_is_tried_again() {
+    let farm = farm();
+    fs::write(farm.path().join("B1/broken.csv"), "a,b\n1,2\n").unwrap();
+    for _ in 0..2 {
+        let done = fleet(farm.path(), &["*/*.csv", "--table", "nights"]);
+        assert_eq!(done.status.code(), Some(2));
+        assert!(String::from_utf8(done.stderr).unwrap().starts_with("error: B1/broken.csv: no column for"));
+    }
+    fs::write(farm.path().join("nights/day=2026-05-01/night-0001.parquet"), "PAR1").unwrap();
+    let done = fleet(farm.path(), &["*/*.csv", "--table", "nights"]);
+    let complaint = String::from_utf8(done.stderr).unwrap();
+    assert_eq!(done.status.code(), Some(2));
+    assert!(complaint.starts_with("error: nights/day=2026-05-01/night-0001.parquet: "), "{complaint}");
+}
+
+#[test]
 fn links_and_copies_are_told_and_judged_once() {
     let farm = farm();
     let name = |name: &str| farm.path().join(name);

@@ -7,8 +7,8 @@ use crate::source::Source;
 use crate::table::{NAME, NOT_A_TIME};
 use numpy::PyArray1;
 use pitchleak::fleet::{
-    Counts, FleetColumn, FleetError, FleetFile, FleetReport, FleetRig, FleetRow as Row, FleetTable,
-    FleetTrace, TraceIdentity, judge_opened,
+    Counts, FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetReport, FleetRig,
+    FleetRow as Row, FleetTable, FleetTrace, TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
 use pitchleak::trace::TraceReader;
@@ -108,6 +108,37 @@ pub fn fleet_row(
         (Ok(row), _) => Ok(FleetRow(row)),
         (Err(_), Some(error)) => Err(error),
         (Err(_), None) => Err(Stopped::interrupted()),
+    }
+}
+
+/// The table of all nights so far in a folder.
+#[pyclass(module = "pitchleak._pitchleak")]
+pub struct FleetNights(Option<Nights>);
+
+#[pymethods]
+impl FleetNights {
+    #[new]
+    fn new(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
+        let nights = py.detach(|| Nights::open(&folder));
+        Ok(Self(Some(nights.map_err(|error| fleet_error(py, &error))?)))
+    }
+
+    /// What `add` is to be told of a trace that is new or changed; None where a night has judged it.
+    fn new_as(&self, trace: PathBuf, rig: Option<&Rig>) -> Option<String> {
+        self.0.as_ref()?.new_as(&trace, rig.map(|rig| &rig.0))
+    }
+
+    /// Writes this night's rows, once, and gives those of all nights.
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        seen: Vec<String>,
+        rows: Vec<PyRef<'_, FleetRow>>,
+    ) -> PyResult<Vec<FleetRow>> {
+        let rows = cloned(&rows);
+        let Some(nights) = self.0.take() else { return Ok(Vec::new()) };
+        let all = py.detach(|| nights.add(seen, rows)).map_err(|error| fleet_error(py, &error))?;
+        Ok(all.into_iter().map(FleetRow).collect())
     }
 }
 

@@ -69,6 +69,25 @@ def with_joblib(work, items):
     return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(item) for item in items)
 
 
+def test_a_table_grows_by_what_is_new(farm, found, program, tmp_path):
+    nights, asked = tmp_path / "nights", []
+
+    def counted(function, jobs):
+        asked.append(len(jobs))
+        return map(function, jobs)
+
+    first = pl.fleet(f"{farm}/T1/**/*.csv", table=nights, map=counted)
+    again = pl.fleet(f"{farm}/**/*.csv", table=nights, map=counted)
+    assert asked == [2, 2] and len(first.rows) == 2
+    assert sorted(again.table["internal_lpm"]) == pytest.approx(sorted(found.table["internal_lpm"]), rel=1e-14)
+    # The program knows what Python has judged; any reader reads it.
+    assert len(json.loads(program("fleet", f"{farm}/**/*.csv", "--table", nights, "--json"))["rows"]) == 4
+    assert len(list(nights.glob("day=*/*.parquet"))) == 2
+    assert sorted(pd.read_parquet(nights)["cylinder"]) == sorted(found.table["cylinder"])
+    with pytest.raises(TypeError, match="^table: takes traces that are files, `B1` is data in memory"):
+        pl.fleet({"B1": read_columns(TRACES[0])}, table=nights)
+
+
 def test_any_map_makes_the_same_rows(farm, found):
     def fleet(map):
         return pl.fleet(f"{farm}/**/*.csv", map=map, progress=False)

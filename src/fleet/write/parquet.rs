@@ -1,4 +1,4 @@
-//! Parquet: one row group, Snappy, every column optional.
+//! Parquet: one row group, Snappy, every column optional; and texts read back.
 
 use crate::fleet::{FleetColumn, FleetTable};
 use crate::output::OutputFile;
@@ -6,19 +6,38 @@ use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Phy
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::Type;
+use std::fs::File;
 use std::io;
 use std::sync::Arc;
 
 pub(super) fn write(table: &FleetTable, file: &mut OutputFile) -> io::Result<()> {
-    write_all(table, file).map_err(|error| match error {
+    write_all(table, file).map_err(of_file)
+}
+
+/// The columns of these names, a row each; one that is not there, or has no text, is empty.
+pub(in crate::fleet) fn texts<const N: usize>(file: File, names: [&str; N]) -> io::Result<Vec<[String; N]>> {
+    let reader = SerializedFileReader::new(file).map_err(of_file)?;
+    let rows = reader.get_row_iter(None).map_err(of_file)?;
+    let named = |row: parquet::record::Row| {
+        names.map(|name| match row.get_column_iter().find(|(column, _)| *column == name) {
+            Some((_, parquet::record::Field::Str(text))) => text.clone(),
+            _ => String::new(),
+        })
+    };
+    rows.map(|row| row.map(named).map_err(of_file)).collect()
+}
+
+fn of_file(error: ParquetError) -> io::Error {
+    match error {
         ParquetError::External(source) => match source.downcast::<io::Error>() {
             Ok(source) => *source,
             Err(other) => io::Error::other(other),
         },
         other => io::Error::other(other),
-    })
+    }
 }
 
 fn write_all(table: &FleetTable, file: &mut OutputFile) -> Result<(), ParquetError> {

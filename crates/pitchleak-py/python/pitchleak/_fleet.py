@@ -393,6 +393,7 @@ def fleet(
     rigs: Rigs | None = None,
     *,
     columns: _inputs.Columns | None = None,
+    table: _inputs.Path | None = None,
     map: Map | None = None,
     progress: Progress = True,
 ) -> Fleet:
@@ -403,6 +404,9 @@ def fleet(
     docs/fleet.md), or rigs by the names of the cylinders; left out, it is ``rig.toml`` beside each file, else the
     built-in one. ``columns`` names foreign columns as for :func:`replay`. A trace that can't be used becomes a row with
     its ``error``, and a :class:`TraceWarning` says so. Links and copies of a file count once, with a warning each.
+
+    ``table`` is the folder of a table that grows (Parquet, by day): only files that are new or changed since the calls
+    before are read, and the fleet is that of all nights.
 
     ``map`` is any map, and says where the work is done: the builtin ``map``, that of a process pool, ``joblib``'s in a
     lambda, a Dask client's; futures are waited for. Left out, it is all cores of this machine. ``progress`` is True
@@ -416,17 +420,36 @@ def fleet(
     (['T1/B1', 'T1/B2'], ['sound', 'leak'])
     """
     jobs = _jobs(traces, rigs, columns)
+    nights = None if table is None else _pitchleak.FleetNights(os.fspath(table))
+    jobs, seen = (jobs, []) if nights is None else _news(jobs, nights)
     if map is None:
         rows = on_all_cores(_judge, jobs, progress, "trace")
     else:
         rows = _gathered(map(_judge, jobs), len(jobs), progress)
-    done = Fleet(rows)
+    done = Fleet(rows if nights is None else nights.add(seen, rows))
     failed = [row for row in rows if row.error is not None]
     if failed:
         _inputs.warn(
             [f"{len(failed)} of {len(rows)} traces could not be judged, the first for this: {failed[0].error}"]
         )
     return done
+
+
+def _news(jobs: list[_Job], nights: _pitchleak.FleetNights) -> tuple[list[_Job], list[str]]:
+    """The jobs whose trace no night has judged as it is now, and what each was seen as."""
+    news, seen = [], []
+    for job in jobs:
+        if not _inputs.is_path(job.data):
+            raise TypeError(f"table: takes traces that are files, `{job.cylinder}` is data in memory")
+        try:
+            rig = _inputs.rig_for(None, job.rig, job.columns)
+        except (OSError, RigError, TraceError):
+            rig = None
+        new = nights.new_as(os.fspath(job.data), rig)
+        if new is not None:
+            news.append(job)
+            seen.append(new)
+    return news, seen
 
 
 def _gathered(results: Iterable[Any], count: int, progress: Progress) -> list[_pitchleak.FleetRow]:

@@ -17,6 +17,7 @@ _Residuals: TypeAlias = list[tuple[str, list[float], list[float]]]
 
 __all__ = [
     "Estimator",
+    "FleetNights",
     "FleetRow",
     "Layout",
     "Linkage",
@@ -203,6 +204,11 @@ class Stop:
     def set(self) -> None: ...
 
 @final
+class FleetNights:
+    def __new__(cls, folder: _Path) -> Self: ...
+    def new_as(self, trace: _Path, rig: Rig | None) -> str | None: ...
+    def add(self, seen: Sequence[str], rows: Sequence[FleetRow]) -> list[FleetRow]: ...
+
 class FleetRow:
     @staticmethod
     def failed(cylinder: str, begins: str | None, path: str, error: str) -> FleetRow: ...
