@@ -84,7 +84,7 @@ def test_a_table_grows_by_what_is_new(farm, found, program, tmp_path):
     assert len(json.loads(program("fleet", f"{farm}/**/*.csv", "--table", nights, "--json"))["rows"]) == 4
     assert len(list(nights.glob("day=*/*.parquet"))) == 2
     assert sorted(pd.read_parquet(nights)["cylinder"]) == sorted(found.table["cylinder"])
-    with pytest.raises(TypeError, match="^table: takes traces that are files, `B1` is data in memory"):
+    with pytest.raises(TypeError, match=r"^table: takes traces that are files, `B1`"):
         pl.fleet({"B1": read_columns(TRACES[0])}, table=nights)
 
 
