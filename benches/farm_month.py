@@ -34,6 +34,9 @@ RIG = pl.Rig.paper().replace(
 # The built-in winds are a minute longer.
 LAST_START_S = 225
 
+# A leak grows to this size and stays: much more, and the supply no longer holds the blade.
+LARGEST_LPM = 1.0
+
 
 @dataclass(frozen=True)
 class Blade:
@@ -47,7 +50,7 @@ class Blade:
 
     def lpm(self, day):
         """The leak's flow on a day, L/min."""
-        return max(0.0, self.lpm_per_day * (day - self.begins_day))
+        return min(max(0.0, self.lpm_per_day * (day - self.begins_day)), LARGEST_LPM)
 
     def due(self, days):
         """The first day on which it is above its threshold; None where there is none."""
@@ -100,7 +103,7 @@ def main():
             found = pl.fleet(f"{folder}/**/*.csv.gz", table=folder / "nights", progress=False)
             wall = time.perf_counter() - start
             for cylinder, state in found.cylinders.items():
-                for leak in state.faults:
+                for leak in state.faults if state.status == "leak" else ():
                     told.setdefault((cylinder.removeprefix(f"{folder}/"), leak), day)
             counts = ", ".join(f"{count} {status}" for status, count in found.cylinder_counts.items() if count)
             print(

@@ -58,7 +58,7 @@ fn found(records: &[Record], rig: &Rig) -> Vec<(&'static str, ChannelFaultKind, 
     monitor
         .faults(rig)
         .into_iter()
-        .map(|fault| (fault.channel, fault.kind, fault.from_s, fault.to_s))
+        .map(|fault| (fault.channel.name(), fault.kind, fault.from_s, fault.to_s))
         .collect()
 }
 

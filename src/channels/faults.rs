@@ -79,7 +79,7 @@ impl Judged {
     }
 
     fn fault(&self, kind: ChannelFaultKind, (from_s, to_s): (f64, f64), text: String) -> ChannelFault {
-        ChannelFault { channel: self.signal.name(), kind, from_s, to_s, text, suggestion: suggestion(kind) }
+        ChannelFault { channel: self.signal, kind, from_s, to_s, text, suggestion: suggestion(kind) }
     }
 
     fn reading(&self, value: f64) -> String {

@@ -49,7 +49,7 @@ impl ChannelFaultKind {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelFault {
     /// Name of the signal, as in the column headers.
-    pub channel: &'static str,
+    pub channel: Signal,
     /// What is wrong.
     #[serde(rename = "id")]
     pub kind: ChannelFaultKind,

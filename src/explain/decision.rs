@@ -9,9 +9,11 @@ use super::sizes::{mended, sentence};
 use super::table::{Entry, LEAK_SHARE};
 use crate::report::Status;
 use crate::rig::Rig;
+use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Mass of mistakes of wiring above which the readings can't be trusted: as likely as not.
 pub const WIRING_DOUBT: f64 = 0.5;
@@ -55,6 +57,8 @@ pub struct Explained {
     pub cause: String,
     /// Whether it is a mistake of wiring, sign or unit.
     pub wiring: bool,
+    /// Sensors that err where it is true.
+    pub sensors: Vec<Signal>,
     /// What to do about it.
     pub remedy: Option<String>,
     /// Lines for `[columns]` or the rig file that mend it.
@@ -325,6 +329,7 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>, rig: &Rig) ->
         text: words.join(", and "),
         cause: words.join(", and "),
         wiring: hypothesis.wiring.is_some(),
+        sensors: unusual().flat_map(|entry| entry.sensors()).collect::<BTreeSet<_>>().into_iter().collect(),
         remedy: (!remedies.is_empty()).then(|| remedies.join(" ")),
         columns: hypothesis
             .wiring

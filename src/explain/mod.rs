@@ -16,6 +16,7 @@ mod pass;
 mod posterior;
 mod raw_products;
 mod readings;
+mod sensors;
 mod sizes;
 mod still;
 mod table;

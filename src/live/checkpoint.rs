@@ -16,7 +16,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Name and version of the saved form: gzip, which has a checksum, of CBOR: this, the cylinder's name, and its state.
-const SCHEMA: &str = "pitchleak.watch/4";
+const SCHEMA: &str = "pitchleak.watch/5";
 /// Folder of the states, in the folder that is given.
 const CYLINDERS: &str = "cylinders";
 /// Whose process has the folder for itself.

@@ -60,7 +60,7 @@ impl Replay {
     pub(super) fn channel_faults(&self, channels: &ChannelMonitor) -> Vec<ChannelFault> {
         let reads_force = self.rig.estimator.kind == EstimatorKind::Paper;
         let mut faults = channels.faults(&self.rig);
-        faults.retain(|fault| reads_force || fault.channel != Signal::Force.name());
+        faults.retain(|fault| reads_force || fault.channel != Signal::Force);
         faults
     }
 

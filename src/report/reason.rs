@@ -4,6 +4,7 @@ use super::Findings;
 use super::statement::{interval, join};
 use crate::channels::ChannelFaultKind;
 use crate::explain::{Decision, Explained, MISFIT_DOUBT, WIRING_DOUBT};
+use crate::signal::Signal;
 use crate::units::readable;
 use crate::wiring::HOW_WIRED;
 use pitchleak_core::Leak;
@@ -80,20 +81,27 @@ pub struct Reason {
     pub text: String,
     /// What to check, or to record, without a full stop.
     pub suggestion: Option<String>,
+    /// Sensors that it speaks against.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<Signal>,
 }
 
 impl Reason {
     pub(crate) fn new(id: ReasonId, text: impl Into<String>, suggestion: impl Into<String>) -> Self {
-        Self { id, text: text.into(), suggestion: Some(suggestion.into()) }
+        Self { id, text: text.into(), suggestion: Some(suggestion.into()), sensors: Vec::new() }
+    }
+
+    fn against(self, sensors: &[Signal]) -> Self {
+        Self { sensors: sensors.to_vec(), ..self }
     }
 }
 
 /// What contradicts the model or the sensors, the likeliest cause first.
 pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
-    let channels = findings
-        .channels
-        .iter()
-        .map(|fault| Reason::new(ReasonId::Channel(fault.kind), fault.text.clone(), fault.suggestion));
+    let channels = findings.channels.iter().map(|fault| {
+        Reason::new(ReasonId::Channel(fault.kind), fault.text.clone(), fault.suggestion)
+            .against(&[fault.channel])
+    });
     let wiring = wiring(findings);
     let misfit = findings.decision.filter(|_| wiring.is_none()).and_then(model_does_not_fit);
     channels.chain([wiring, mostly_bad_rows(findings), misfit].into_iter().flatten()).collect()
@@ -102,7 +110,8 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
 /// The mistake of wiring that explains the trace, with the lines that mend it.
 fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     if let Some(found) = findings.wiring {
-        return Some(Reason::new(ReasonId::Wiring, found.suggestion.clone(), found.remedy(HOW_WIRED)));
+        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), found.remedy(HOW_WIRED));
+        return Some(reason.against(&found.sensors));
     }
     let decision = findings.decision.filter(|decision| decision.wiring > WIRING_DOUBT)?;
     let best = decision.explanations.iter().find(|one| one.wiring)?;
@@ -116,7 +125,7 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
         )
     };
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);
-    Some(Reason::new(ReasonId::Wiring, text, mend))
+    Some(Reason::new(ReasonId::Wiring, text, mend).against(&best.sensors))
 }
 
 /// What the trace says too little of.
@@ -196,7 +205,8 @@ fn undecided(findings: &Findings<'_>, decision: &Decision, leak: Leak) -> Reason
             ReasonId::OffsetOrLeak,
             format!("{text}, or {} ({:.0} %)", other.cause, 100.0 * other.probability),
             other.remedy.clone().unwrap_or_else(|| RECORD.to_owned()).trim_end_matches('.').to_owned(),
-        ),
+        )
+        .against(&other.sensors),
         None => Reason::new(
             ReasonId::Undecided,
             format!("{text}: {} L/min", interval(&findings.leakage[leak])),

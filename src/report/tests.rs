@@ -1,6 +1,7 @@
 use super::*;
 use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::explain::{Belief, Decision, Explained, Note};
+use crate::signal::Signal;
 use crate::times::{Clock, TimeFormat, Zone};
 use crate::wiring::Wiring;
 
@@ -105,6 +106,7 @@ fn explained(id: &str, cause: &str, probability: f64) -> Explained {
         text: cause.to_owned(),
         cause: cause.to_owned(),
         wiring: id.starts_with("exchanged"),
+        sensors: Vec::new(),
         remedy: None,
         columns: vec!["qa = \"qb\"".to_owned()],
         cannot_be_told_from: Vec::new(),
@@ -197,8 +199,12 @@ fn a_leak_that_is_likely_and_not_sure_says_what_else_it_may_be() {
             leakage: PerLeak { internal: 0.4, ..PerLeak::default() },
             ..explained("internal", "", 0.6)
         },
-        explained("flow_zero_a", "flow meter A's zero is off", 0.4),
+        Explained {
+            sensors: vec![Signal::FlowA],
+            ..explained("flow_zero_a", "flow meter A's zero is off", 0.4)
+        },
     ];
+    assert_eq!(close.verdict().reasons[0].sensors, [Signal::FlowA]);
     assert_eq!(close.judged(), (Status::NotSure, vec!["offset_or_leak"]));
     let text = close.verdict().text;
     assert!(text.contains("with 60 %, or flow meter A's zero is off (40 %)."), "{text}");
@@ -278,7 +284,7 @@ fn a_mistake_of_wiring_that_is_likelier_than_not_is_named_with_its_lines() {
 #[test]
 fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
     let stuck = ChannelFault {
-        channel: "pa",
+        channel: Signal::PressureA,
         kind: ChannelFaultKind::Stuck,
         from_s: 10.0,
         to_s: 60.0,
@@ -290,12 +296,15 @@ fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
         residual_before: Some(29.0),
         residual_after: Some(1.0),
         columns: vec!["qa = \"qb_lpm\"".to_owned()],
+        sensors: vec![Signal::FlowA, Signal::FlowB],
         alternatives: Vec::new(),
     };
     let mut doubtful = Found { channels: vec![stuck], wiring: Some(wiring), ..found(INTERNAL) };
     doubtful.trace.skipped = 7000;
     doubtful.decision.as_mut().unwrap().misfit = 3.0;
     assert_eq!(doubtful.judged().1, ["channel_stuck", "wiring", "mostly_bad_rows"]);
+    let sensors: Vec<_> = doubtful.verdict().reasons.into_iter().map(|reason| reason.sensors).collect();
+    assert_eq!(sensors, [vec![Signal::PressureA], vec![Signal::FlowA, Signal::FlowB], vec![]]);
     let text = doubtful.verdict().text;
     assert!(text.starts_with("Pa reads 50 bar from 10 s to 60 s. Check the sensor."), "{text}");
     let wiring = &doubtful.verdict().reasons[1];

@@ -63,6 +63,8 @@ pub struct Wiring {
     pub residual_after: Option<f64>,
     /// Lines for `[columns]` of the rig file that mend the first; none where the recording has to be mended.
     pub columns: Vec<String>,
+    /// Sensors whose readings carry the first.
+    pub sensors: Vec<Signal>,
     /// Mistakes that explain the trace as well.
     pub alternatives: Vec<String>,
 }
@@ -133,6 +135,7 @@ impl Explanation {
             residual_before: residuals.map(|(before, _)| before),
             residual_after: residuals.map(|(_, after)| after),
             columns: self.mistakes.first().map_or_else(Vec::new, |mistake| mistake.mending(columns, rig)),
+            sensors: self.mistakes.first().map_or_else(Vec::new, |mistake| mistake.sensors()),
             alternatives,
         }
     }
@@ -201,6 +204,21 @@ impl Mistake {
             (mended.text != now.text).then_some(mended.text)
         });
         unit.map_or_else(String::new, |unit| format!(" ({unit})"))
+    }
+
+    /// The sensors whose readings carry it.
+    fn sensors(self) -> Vec<Signal> {
+        match self {
+            Self::Exchanged(exchange) => exchange.pairs().iter().flat_map(|(a, b)| [*a, *b]).collect(),
+            Self::Sign(readings)
+            | Self::Size(readings)
+            | Self::Scaled(readings, _)
+            | Self::Absolute(readings)
+            | Self::Zero(readings, _)
+            | Self::Late(readings, _) => readings.signals().to_vec(),
+            Self::OtherEnd => Readings::Position.signals().to_vec(),
+            Self::Zeros(_) => Readings::Flows.signals().to_vec(),
+        }
     }
 
     /// The lines of `[columns]` that mend it; none where a column cannot say it.

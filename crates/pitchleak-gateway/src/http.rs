@@ -11,6 +11,7 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use pitchleak_view::page::drawing::{self, Drawing};
 use sha2::{Digest as _, Sha256};
 use std::convert::Infallible;
 use std::net::SocketAddr;
@@ -31,11 +32,18 @@ const LONGEST_HEAD: usize = 8192;
 /// The page: one file, without a word to anybody but us.
 const PAGE: &str = include_str!("page.html");
 
+/// The page with the drawing of a cylinder that the reports have.
+fn page() -> String {
+    let svg = Drawing::default().svg().into_string();
+    PAGE.replace("<!-- drawing -->", &svg).replace("/* drawing.css */", drawing::STYLE)
+}
+
 /// What is told.
 struct Told {
     metrics: Arc<Metrics>,
     /// Between two checkpoints.
     every: Duration,
+    page: String,
     /// What the page may do: run its own script, and ask us.
     policy: String,
 }
@@ -47,7 +55,8 @@ pub fn start(address: SocketAddr, metrics: Arc<Metrics>, every: Duration) -> Res
     listener.set_nonblocking(true).map_err(failed)?;
     let bound = listener.local_addr().map_err(failed)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-    let told = Arc::new(Told { metrics, every, policy: policy(PAGE) });
+    let page = page();
+    let told = Arc::new(Told { metrics, every, policy: policy(&page), page });
     let run = move || {
         runtime.block_on(async {
             if let Ok(listener) = TcpListener::from_std(listener) {
@@ -89,7 +98,7 @@ impl Told {
         let trouble = self.metrics.trouble(self.every);
         let board = &self.metrics.board;
         let (status, kind, body) = match (request.method(), request.uri().path()) {
-            (&Method::GET, "/") => (StatusCode::OK, "text/html; charset=utf-8", PAGE.to_owned()),
+            (&Method::GET, "/") => (StatusCode::OK, "text/html; charset=utf-8", self.page.clone()),
             (&Method::GET, "/cylinders") => {
                 (StatusCode::OK, "application/json", board.lines(trouble.as_deref()))
             }
@@ -190,11 +199,12 @@ mod tests {
 
     #[test]
     fn the_page_runs_nothing_but_its_own_script() {
-        assert_eq!((PAGE.matches("<script>").count(), PAGE.matches("<style>").count()), (1, 1));
+        let page = page();
+        assert_eq!((page.matches("<script>").count(), page.matches("<style>").count()), (1, 1));
         for lure in ["<script ", "src=", "href=", "url(", "@import", "innerHTML", " style=", " on"] {
-            let found = PAGE.split_inclusive('>').any(|piece| piece.contains('<') && piece.contains(lure));
+            let found = page.split_inclusive('>').any(|piece| piece.contains('<') && piece.contains(lure));
             assert!(!found || lure == " on", "{lure}");
         }
-        assert!(!PAGE.contains("innerHTML"));
+        assert!(!page.contains("innerHTML"));
     }
 }

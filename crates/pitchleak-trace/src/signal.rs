@@ -6,40 +6,58 @@ use crate::units::Dimension;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Signal {
     /// `t`: time.
+    #[serde(rename = "t")]
     Time,
     /// `timestamp`: time in ISO 8601, instead of `t`.
+    #[serde(rename = "timestamp")]
     Timestamp,
     /// `x`: piston position from the A end.
+    #[serde(rename = "x")]
     Position,
     /// `v`: piston speed.
+    #[serde(rename = "v")]
     Speed,
     /// `pa`: pressure of the piston-side chamber, gauge.
+    #[serde(rename = "pa")]
     PressureA,
     /// `pb`: pressure of the rod-side chamber, gauge.
+    #[serde(rename = "pb")]
     PressureB,
     /// `qa`: flow into the piston-side chamber.
+    #[serde(rename = "qa")]
     FlowA,
     /// `qb`: flow into the rod-side chamber.
+    #[serde(rename = "qb")]
     FlowB,
     /// `force`: load force against extension.
+    #[serde(rename = "force")]
     Force,
     /// `temp`: oil temperature.
+    #[serde(rename = "temp")]
     Temperature,
     /// `spool`: position of the valve's spool, positive: supply to A.
+    #[serde(rename = "spool")]
     Spool,
     /// `valve_command`: what the spool is told, where its position is not measured.
+    #[serde(rename = "valve_command")]
     Command,
     /// `ps`: supply pressure at the valve, gauge.
+    #[serde(rename = "ps")]
     Supply,
     /// `pt`: tank pressure at the valve, gauge.
+    #[serde(rename = "pt")]
     Tank,
     /// `shut`: 1 while both ports are shut between valve and cylinder, else 0: no flow, for certain.
+    #[serde(rename = "shut")]
     Shut,
     /// `q_int`: reference flow of the internal leak.
+    #[serde(rename = "q_int")]
     LeakInternal,
     /// `q_ext_a`: reference flow of the external leak at A.
+    #[serde(rename = "q_ext_a")]
     LeakExternalA,
     /// `q_ext_b`: reference flow of the external leak at B.
+    #[serde(rename = "q_ext_b")]
     LeakExternalB,
 }
 

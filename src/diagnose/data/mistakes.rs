@@ -24,7 +24,7 @@ pub(crate) fn channel_faults(traces: &[Series], declared: &Declared) -> Vec<Chan
 /// A flow that is never less than exactly nothing, or never more, piles up there whenever the piston stands: that is no end of a range.
 fn is_no_flow(series: &Series, fault: &ChannelFault) -> bool {
     let flow = [(Signal::FlowA, &series.qa_m3s), (Signal::FlowB, &series.qb_m3s)];
-    let own = flow.into_iter().find(|(signal, _)| signal.name() == fault.channel);
+    let own = flow.into_iter().find(|(signal, _)| *signal == fault.channel);
     own.filter(|_| fault.kind == ChannelFaultKind::Clipped).is_some_and(|(_, values)| {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -85,7 +85,7 @@ mod tests {
     fn a_coarse_meter_fails_by_itself_and_a_sound_one_or_one_without_flow_does_not() {
         let quantum = 30.0 * declared().sensors.flow_a.noise_std;
         let coarse = with_flow_a(|q| (q / quantum).round() * quantum);
-        assert!(coarse.iter().any(|fault| fault.channel == Signal::FlowA.name()), "{coarse:?}");
+        assert!(coarse.iter().any(|fault| fault.channel == Signal::FlowA), "{coarse:?}");
         assert_eq!(with_flow_a(|q| q), []);
         assert_eq!(with_flow_a(|q| q.max(0.0)), []);
     }

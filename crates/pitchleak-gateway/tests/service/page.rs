@@ -66,6 +66,8 @@ fn the_page_shows_the_worst_first_and_shuts_nobody_out() {
         let (leaks, sound) = (document.find("LEAK</span>T7/B2"), document.find("SOUND</span>T7/B1"));
         assert!(leaks.is_some() && leaks < sound, "{document}");
         assert!(document.contains("1 leak, 1 sound"), "{document}");
+        assert!(document.contains("class=\"leak leaks\" data-leak=\"internal\""), "{document}");
+        assert!(document.contains("L/min, above its alarm level; external A leak 0."), "{document}");
     }
 
     let Some(axe) = axe() else {

@@ -117,7 +117,7 @@ pub fn channels(faults: &[ChannelFault], wiring: Option<&Wiring>) -> Markup {
                     tbody {
                         @for fault in faults {
                             tr {
-                                th scope="row" { (fault.channel) }
+                                th scope="row" { (fault.channel.name()) }
                                 td { (short(fault.from_s)) " to " (short(fault.to_s)) }
                                 td { (fault.text) }
                                 td { (fault.suggestion) }

@@ -9,6 +9,7 @@ mod check;
 mod course;
 mod cylinders;
 mod diagnose;
+pub mod drawing;
 mod fleet;
 mod history;
 pub mod machine;
@@ -33,8 +34,13 @@ const SCRIPT: &str = concat!(
     "\n",
     include_str!("assets/print.js")
 );
-const STYLE: &str =
-    concat!(include_str!("assets/uplot/uPlot.min.css"), "\n", include_str!("assets/page.css"));
+const STYLE: &str = concat!(
+    include_str!("assets/uplot/uPlot.min.css"),
+    "\n",
+    include_str!("assets/page.css"),
+    "\n",
+    include_str!("assets/drawing.css")
+);
 const UPLOT_LICENCE: &str = include_str!("assets/uplot/LICENSE");
 
 /// A report for people, as an HTML page.

@@ -1,6 +1,7 @@
 //! The page of a replay.
 
 use super::chart::{Chart, Charts, Limit, Span};
+use super::drawing::Drawing;
 use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, trace};
 use super::{Card, Head, History, Page, Section};
@@ -40,8 +41,9 @@ fn head(report: &ReplayReport, rig: &Rig) -> Head {
         data: data_line(&report.trace),
         cards: vec![
             Card { title: "What to do", body: to_do(report) },
-            Card { title: "What this trace does not tell", body: open(report) },
             Card { title: "Leaks at the end, L/min (95 %)", body: brief(report, rig) },
+            Card { title: "What explains the trace", body: explanations(report) },
+            Card { title: "What this trace does not tell", body: open(report) },
         ],
     }
 }
@@ -97,6 +99,61 @@ fn open(report: &ReplayReport) -> Markup {
     }
 }
 
+/// Explanations that are shown, best first.
+const MOST_EXPLANATIONS: usize = 5;
+
+/// Their probabilities as bars.
+fn explanations(report: &ReplayReport) -> Markup {
+    let all = &report.verdict.explanations;
+    let shown = &all[..all.len().min(MOST_EXPLANATIONS)];
+    let rest = 1.0 - shown.iter().map(|one| one.probability).sum::<f64>();
+    html! {
+        @if shown.is_empty() {
+            p { "Nothing was weighed: " (unweighed(report)) "." }
+        } @else {
+            table .weighed {
+                tbody {
+                    @for one in shown {
+                        tr {
+                            td .number { (percent(one.probability)) }
+                            td {
+                                (probability_bar(one.probability))
+                                (capital(&one.text))
+                            }
+                        }
+                    }
+                    @if rest >= 0.005 {
+                        tr { td .number { (percent(rest)) } td { (probability_bar(rest)) "Anything else" } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn unweighed(report: &ReplayReport) -> &'static str {
+    if report.hold.is_some() || report.valve.is_some() {
+        "explanations are of traces with flow meters"
+    } else if report.estimator.name() == "rls" {
+        "the trace is too short, or nothing explains it at all"
+    } else {
+        "the paper's law knows no uncertainty"
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+fn probability_bar(share: f64) -> Markup {
+    html! {
+        svg .probability viewBox="0 0 100 4" preserveAspectRatio="none" aria-hidden="true" {
+            rect .whole width="100" height="4" {}
+            rect .share width=(format!("{:.1}", 100.0 * share)) height="4" {}
+        }
+    }
+}
+
 /// The leaks as bars on a common scale.
 fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
     let ends = |leak: Leak| {
@@ -107,6 +164,7 @@ fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
     let all = Leak::ALL.into_iter().filter(known).flat_map(ends).filter(|end| end.is_finite());
     let (low, high) = all.fold((0.0_f64, 0.0_f64), |(low, high), end| (low.min(end), high.max(end)));
     html! {
+        (Drawing::of(report, rig).svg())
         table {
             tbody {
                 @for leak in Leak::ALL {
