@@ -5,9 +5,11 @@ mod calibrate;
 mod diagnose;
 mod errors;
 mod estimator;
+mod explanations;
 mod fleet;
 mod linkage;
 mod page;
+mod prove;
 mod replay;
 mod reproduce;
 mod rig;
@@ -32,6 +34,8 @@ mod _pitchleak {
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
+    use crate::explanations::explanations;
+    #[pymodule_export]
     use crate::fleet::{
         FleetNights, FleetRow, fleet_counts, fleet_cylinders, fleet_json, fleet_page, fleet_row, fleet_save,
         fleet_table, fleet_text, fleet_traces, fleet_trends,
@@ -40,6 +44,8 @@ mod _pitchleak {
     use crate::linkage::Linkage;
     #[pymodule_export]
     use crate::page::{check_page, replay_page, write_page};
+    #[pymodule_export]
+    use crate::prove::prove;
     #[pymodule_export]
     use crate::replay::{check, over_time, replay};
     #[pymodule_export]

@@ -91,6 +91,11 @@ impl Signals {
         if self.due() { self.ask(tell) } else { Ok(()) }
     }
 
+    /// As [`heed`](Self::heed), for long work that is no records.
+    pub fn heed_now(&mut self) -> Result<(), Stopped> {
+        self.ask(|_| Ok(()))
+    }
+
     #[inline]
     fn due(&mut self) -> bool {
         self.records += 1;

@@ -21,7 +21,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    fn si(&self, name: &str, dimension: Dimension) -> PyResult<f64> {
+    pub fn si(&self, name: &str, dimension: Dimension) -> PyResult<f64> {
         let value = match self {
             Self::Si(value) => Ok(*value),
             Self::Text(text) => units::parse(text, dimension),

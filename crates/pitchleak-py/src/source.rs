@@ -22,19 +22,31 @@ impl Source<'_> {
         strict: bool,
         work: impl FnOnce(TraceReader<'_>) -> Result<T, Stopped> + Send,
     ) -> PyResult<T> {
+        self.read_again(py, rig, strict, |open| work(open()?))
+    }
+
+    /// Gives `work` what opens the trace, as often as it likes, with the interpreter released.
+    pub fn read_again<T: Send>(
+        &self,
+        py: Python<'_>,
+        rig: &Rig,
+        strict: bool,
+        work: impl for<'a> FnOnce(&'a dyn Fn() -> Result<TraceReader<'a>, Stopped>) -> Result<T, Stopped> + Send,
+    ) -> PyResult<T> {
         let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
         let done = match self {
-            Self::Path(path) => py.detach(|| {
-                let reader = TraceReader::open(path, rig)?;
-                work(reader.with_bad_rows(bad_rows))
-            }),
+            Self::Path(path) => {
+                py.detach(|| work(&|| Ok(TraceReader::open(path, rig)?.with_bad_rows(bad_rows))))
+            }
             Self::Table(table) => {
                 let table = table.get();
                 let lent = table.lend(py)?;
                 let batches = table.slices(&lent)?;
                 py.detach(|| {
-                    let reader = TraceReader::from_table(NAME, table.layout(), batches, rig)?;
-                    work(reader.since(table.first_ns()).with_bad_rows(bad_rows))
+                    work(&|| {
+                        let reader = TraceReader::from_table(NAME, table.layout(), batches.clone(), rig)?;
+                        Ok(reader.since(table.first_ns()).with_bad_rows(bad_rows))
+                    })
                 })
             }
         };

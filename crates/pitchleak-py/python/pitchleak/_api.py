@@ -4,9 +4,11 @@ from ._calibrate import Calibration, calibrate
 from ._check import ChannelFault, Check, Reach, Reading, Wiring, check
 from ._diagnose import Diagnosis, diagnose
 from ._estimator import Estimator
+from ._explanations import Explanation, explanations
 from ._fleet import Beside, CylinderLeak, Fleet, FleetCylinder, FleetLeak, FleetRow, LongTrend, fleet
 from ._inputs import TraceWarning
 from ._pitchleak import Linkage, Rig, RigError, TraceError, __version__
+from ._prove import LeastLeak, Proof, PutIn, prove
 from ._replay import Replay, Replays, replay
 from ._reproduce import Reproduction, reproduce
 from ._results import (
@@ -14,6 +16,7 @@ from ._results import (
     Episode,
     Estimate,
     Estimates,
+    Explained,
     FoundLeak,
     Hold,
     Leakage,
@@ -44,6 +47,8 @@ __all__ = [
     "Estimate",
     "Estimates",
     "Estimator",
+    "Explained",
+    "Explanation",
     "Fleet",
     "FleetCylinder",
     "FleetLeak",
@@ -51,10 +56,13 @@ __all__ = [
     "FoundLeak",
     "Hold",
     "Leakage",
+    "LeastLeak",
     "Linkage",
     "LongTrend",
     "OilShare",
     "PerLeak",
+    "Proof",
+    "PutIn",
     "Reach",
     "ReachTime",
     "Reading",
@@ -80,7 +88,9 @@ __all__ = [
     "calibrate",
     "check",
     "diagnose",
+    "explanations",
     "fleet",
+    "prove",
     "replay",
     "reproduce",
     "simulate",

@@ -1,10 +1,15 @@
 """What replay and estimator find: the fields of ``pitchleak replay --json``."""
 
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from . import _html
+from ._picture import axes_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -131,6 +136,30 @@ class Reason:
     """What was seen."""
     suggestion: str | None
     """What to check, or to record."""
+    sensors: tuple[str, ...] = ()
+    """Signals that it speaks against, as in the column headers: ``("qa", "qb")``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """An explanation of a trace, and how probable it is."""
+
+    id: str
+    """Ids of what it is made of, joined by ``+``; :func:`explanations` lists them."""
+    probability: float
+    """Posterior probability."""
+    text: str
+    """In words, leaks first."""
+    leakage: PerLeak[float]
+    """Mean leaks under it, L/min."""
+    sensors: tuple[str, ...] = ()
+    """Signals whose sensors err where it is true."""
+    remedy: str | None = None
+    """What to do about it."""
+    columns: tuple[str, ...] = ()
+    """Lines for ``[columns]`` or the rig file that mend it."""
+    cannot_be_told_from: tuple[str, ...] = ()
+    """Ids that no trace of these readings tells it from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +175,10 @@ class Verdict:
     """In a few sentences."""
     reasons: tuple[Reason, ...] = ()
     """Why the status is ``doubtful`` or ``not_sure``, first things first; empty where it is sure."""
+    probability: PerLeak[float] | None = None
+    """That each leak is above its alarm's threshold now; None where there is too little to weigh."""
+    explanations: tuple[Explained, ...] = ()
+    """What explains the trace, best first, down to 1 %."""
 
     @property
     def sure(self) -> bool:
@@ -160,9 +193,24 @@ class Verdict:
     def __str__(self) -> str:
         return f"{self.word}  {self.text}"
 
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws how probable each explanation is, the best on top (needs matplotlib). Returns the axes."""
+        best = self.explanations[:8]
+        axes = axes_for(ax, 0.8 + 0.4 * max(len(best), 1))
+        axes.barh([textwrap.fill(one.text, 60) for one in best], [100 * one.probability for one in best])
+        axes.invert_yaxis()
+        axes.set_xlim(0, 100)
+        axes.set_xlabel("probability, %")
+        return axes
+
     def _repr_html_(self) -> str:
         reasons = _html.table(("why", "check"), [(reason.text, reason.suggestion or "") for reason in self.reasons])
-        return _html.page(str(self), *([reasons] if self.reasons else []))
+        weighed = _html.table(
+            ("probability", "explanation"),
+            [(f"{one.probability:.0%}", one.text) for one in self.explanations],
+        )
+        parts = [*([reasons] if self.reasons else []), *([weighed] if self.explanations else [])]
+        return _html.page(str(self), *parts)
 
 
 @dataclass(frozen=True, slots=True)
