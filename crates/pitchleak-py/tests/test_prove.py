@@ -76,6 +76,13 @@ def test_explanations_have_their_probabilities():
     assert best.text in verdict._repr_html_()
 
 
+def test_a_leak_is_found_by_its_name(trace):
+    leakage = pl.replay(trace, RIG).leakage
+    assert leakage["external_a"] is leakage.external_a
+    with pytest.raises(KeyError, match="'external' is no leak: internal, external_a or external_b"):
+        leakage["external"]
+
+
 def test_every_explanation_is_listed(program):
     listed = {one.id: one for one in pl.explanations()}
     assert listed["exchanged_flows"].kind == "wiring" and 0 < listed["flow_lag"].share < 1

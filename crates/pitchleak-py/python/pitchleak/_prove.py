@@ -107,11 +107,15 @@ class Proof(Raw, Paged, Tabular):
         axes = axes_for(ax)
         most = max((case.put_in_lpm for case in self.cases), default=1.0)
         axes.plot([0.0, most], [0.0, most], color="0.7", linewidth=0.8, zorder=0)
-        for leak, label in LABELS.items():
+        for shift, (leak, label) in zip((-0.01, 0.0, 0.01), LABELS.items(), strict=True):
             cases = [case for case in self.cases if case.leak == leak]
+            if not cases:
+                continue
             half = [1.96 * (case.std_lpm or 0.0) for case in cases]
             flows = [case.found_lpm for case in cases]
-            axes.errorbar([case.put_in_lpm for case in cases], flows, half, fmt="o", markersize=4, label=label)
+            axes.errorbar(
+                [case.put_in_lpm + shift * most for case in cases], flows, half, fmt="o", markersize=4, label=label
+            )
         axes.set_xlabel("put in, L/min")
         axes.set_ylabel("found, L/min")
         legend_beside(axes, "leak, 95 %")

@@ -32,6 +32,13 @@ class PerLeak(Generic[T]):
     external_b: T
     """Out of chamber B."""
 
+    def __getitem__(self, leak: Leak) -> T:
+        """What is known of this leak: ``found.leakage["internal"]`` is ``found.leakage.internal``."""
+        if leak not in ("internal", "external_a", "external_b"):
+            raise KeyError(f"{leak!r} is no leak: internal, external_a or external_b")
+        value: T = getattr(self, leak)
+        return value
+
     def items(self) -> Iterator[tuple[Leak, T]]:
         """Names and values."""
         yield "internal", self.internal
