@@ -58,6 +58,34 @@ fn assert_complete_in_itself(page: &str) {
     assert!(page.contains("Permission is hereby granted, free of charge"), "the licence of uPlot is missing");
 }
 
+/// What the head line says is what the drawing shows.
+#[test]
+fn a_leak_is_drawn_where_it_is() {
+    let page = replayed(TRACE, &rig());
+    for drawn in [
+        "leak leaks\" data-leak=\"external_a",
+        "leak below\" data-leak=\"internal",
+        "sensor \" data-sensor=\"qa",
+    ] {
+        assert!(page.contains(&format!("class=\"{drawn}\"")), "{drawn}");
+    }
+    assert!(page.contains("aria-label=\"The cylinder: internal leak 0.00"));
+}
+
+#[test]
+fn meters_that_are_exchanged_are_marked_and_no_leak_is_drawn() {
+    let exchanged = "[columns]\nqa = { name = \"qb_lpm\", unit = \"L/min\" }\nqb = { name = \"qa_lpm\", unit = \"L/min\" }\n";
+    let rig = Rig::parse(&format!("{}\n{exchanged}", rig().to_toml()), "rig").expect("a rig");
+    let page = replayed(TRACE, &rig);
+    for drawn in [
+        "leak unknown\" data-leak=\"external_a",
+        "sensor suspected\" data-sensor=\"qa",
+        "sensor \" data-sensor=\"pa",
+    ] {
+        assert!(page.contains(&format!("class=\"{drawn}\"")), "{drawn}");
+    }
+}
+
 #[test]
 fn a_page_of_a_replay_has_all_its_parts() {
     let page = replayed(TRACE, &rig());
