@@ -10,6 +10,7 @@ import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import cloudpickle
+import fsspec
 import numpy as np
 import pandas as pd
 import polars
@@ -18,6 +19,7 @@ import pyarrow.compute as arrow
 import pyarrow.parquet
 import pytest
 from conftest import ROOT, TRACES, read_columns
+from fsspec.generic import rsync
 
 import pitchleak as pl
 
@@ -86,6 +88,25 @@ def test_a_table_grows_by_what_is_new(farm, found, program, tmp_path):
     assert sorted(pd.read_parquet(nights)["cylinder"]) == sorted(found.table["cylinder"])
     with pytest.raises(TypeError, match=r"^table: takes traces that are files, `B1`"):
         pl.fleet({"B1": read_columns(TRACES[0])}, table=nights)
+
+
+def test_a_bucket_is_mirrored_and_each_night_reads_what_is_new(farm, found, tmp_path):
+    """As docs/fleet.md says: a file that is there already stays as it is, and so is not read again."""
+    bucket, asked = fsspec.filesystem("memory"), []
+
+    def counted(function, jobs):
+        asked.append(len(jobs))
+        return map(function, jobs)
+
+    def night(turbine):
+        bucket.put(f"{farm}/{turbine}/", f"/bucket/{turbine}/", recursive=True)
+        rsync("memory://bucket", f"file://{tmp_path}/mirror")
+        return pl.fleet(f"{tmp_path}/mirror/**/*.csv", table=tmp_path / "nights", map=counted)
+
+    turbines = sorted(path.name for path in farm.iterdir() if path.is_dir())
+    nights = [night(turbine) for turbine in turbines]
+    assert asked == [2, 2]
+    assert sorted(nights[-1].table["internal_lpm"]) == pytest.approx(sorted(found.table["internal_lpm"]), rel=1e-14)
 
 
 def test_any_map_makes_the_same_rows(farm, found):
