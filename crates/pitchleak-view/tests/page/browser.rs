@@ -126,6 +126,28 @@ fn assert_fits(page: &str) {
     }
 }
 
+/// Leaves whether the legend is there on the first screen, and what is in it beside the second chart.
+const READER: &str = r#"
+  const legend = document.getElementById("legend");
+  setTimeout(() => {
+    document.documentElement.dataset.above = legend.hidden;
+    document.querySelectorAll(".chart")[1].scrollIntoView({ block: "center" });
+    dispatchEvent(new Event("scroll")); // Without a screen there are no frames, and so no such event.
+    setTimeout(() => {
+      const seen = [...legend.querySelectorAll(".group:not([hidden]) button:not([hidden])")];
+      document.documentElement.dataset.seen = seen.map((button) => button.children[1].textContent).join(", ");
+    }, 500);
+  }, 500);
+"#;
+
+/// A bar that stands over every screen has only what the screen has.
+fn assert_legend_is_of_charts_in_sight(page: &str) {
+    let (document, log) = visit(&with_script(page, &format!("{{{READER}}}")), &["--window-size=1280,420"]);
+    assert!(!log.contains("CONSOLE"), "{log}");
+    assert_eq!(left(&document, "above"), Some("true"));
+    assert_eq!(left(&document, "seen"), Some("x"));
+}
+
 fn assert_cursor_and_zoom_work(page: &str) {
     let page = with_script(page, &format!("{{{VISITOR}}}"));
     let (document, log) = visit(&page, &["--window-size=1280,4000"]);
@@ -145,6 +167,7 @@ fn a_replay() {
     let page = made::replayed(made::TRACE, &made::rig());
     assert_opens(&page);
     assert_cursor_and_zoom_work(&page);
+    assert_legend_is_of_charts_in_sight(&page);
 }
 
 #[test]

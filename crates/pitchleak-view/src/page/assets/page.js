@@ -198,8 +198,19 @@
     plots.push(u);
   };
 
-  // The legend: every line's value under the cursor, a button to hide it.
+  // The legend: every line's value under the cursor, a button to hide it; of the charts in sight alone.
   const readouts = [];
+  const buttons = [];
+  const inSight = (u) => {
+    const { top, bottom } = u.root.getBoundingClientRect();
+    return bottom > 0 && top < innerHeight;
+  };
+  const tidy = () => {
+    const seen = new Set(plots.filter(inSight));
+    for (const { button, drawn } of buttons) button.hidden = !drawn.some(([u]) => seen.has(u));
+    for (const group of legend.querySelectorAll(".group")) group.hidden = !group.querySelector("button:not([hidden])");
+    legend.hidden = seen.size === 0;
+  };
   const show = (u) => {
     const at = u.cursor.idx;
     clock.textContent = at == null ? "point at a chart" : clocked ? clockText(u.data[0][at], 1) : `${(u.data[0][at] / second).toFixed(2)} ${unitOfTime}`;
@@ -225,6 +236,7 @@
         button.append(element("span", "", `swatch ink-${line.ink}`), element("span", line.name), value);
         const drawn = [[plot, n]];
         known.set(`${line.name} ${line.ink}`, drawn);
+        buttons.push({ button, drawn });
         if (!line.dashed) readouts.push({ value, plot, n });
         button.addEventListener("click", () => {
           const visible = button.getAttribute("aria-pressed") !== "true";
@@ -269,7 +281,9 @@
   document.querySelectorAll(".chart").forEach((place) => draw(place, data.charts[Number(place.dataset.chart)]));
   if (plots.length) {
     fillLegend();
-    legend.hidden = false;
+    tidy();
+    addEventListener("scroll", tidy, { passive: true });
+    addEventListener("resize", tidy);
     const [closer, wider, all] = legend.querySelectorAll(".tools button");
     closer.addEventListener("click", () => zoom(0.5));
     wider.addEventListener("click", () => zoom(2));
