@@ -123,7 +123,8 @@ impl Drawing {
     fn leak(&self, leak: Leak, place: &str, (x, anchor): (u16, &str)) -> Markup {
         let Flow { state, share, text } = &self.leaks[leak];
         let [class, _] = state.names();
-        let width = (AT_ALARM * share).clamp(WIDTHS[0], WIDTHS[1]);
+        let known = if *state == Known::Unknown { 0.0 } else { *share };
+        let width = (AT_ALARM * known).clamp(WIDTHS[0], WIDTHS[1]);
         html! {
             g class={ "leak " (class) } data-leak=(leak.id()) {
                 g transform=(place) { path transform={ "scale(1 " (format!("{width:.1}")) ")" } d="M0-.5H.72V-1.2L1 0 .72 1.2V.5H0Z" {} }
@@ -195,7 +196,7 @@ mod tests {
         let leaks = PerLeak {
             internal: flow(Known::Leaks, 2.0, "0.200 ± 0.010"),
             external_a: flow(Known::Below, 0.1, "0.010 ± 0.010"),
-            external_b: Flow::default(),
+            external_b: flow(Known::Unknown, 3.0, "not known"),
         };
         Drawing { leaks, suspected: vec![Signal::FlowB], absent: vec![Signal::PressureA] }
     }
@@ -209,6 +210,7 @@ mod tests {
         assert!(arrow("external_a").starts_with(
             "><g transform=\"translate(117 127) scale(-60 1)\"><path transform=\"scale(1 1.0)\""
         ));
+        assert!(!svg.contains("scale(1 15.0)"), "a flow that nobody knows has no size");
         assert!(svg.contains("class=\"leak unknown\" data-leak=\"external_b\""), "{svg}");
     }
 
