@@ -4,6 +4,7 @@
 use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
+use pitchleak::rig::Odds;
 use pitchleak::simulate::{Scenario, Truth};
 use pitchleak::trace::TraceReader;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -135,4 +136,25 @@ fn honest_traces_stay_sure() {
             assert_eq!((report.verdict.status, report.verdict.reasons.len()), (status, 0), "{name}");
         }
     });
+}
+
+/// A plant whose meters' zeros are off in one of two recordings says so: among sizes that the trace leaves open, the zero
+/// gains as much as its prior odds do.
+#[test]
+fn odds_of_the_rig_file_move_the_posterior_by_as_much() {
+    let truths = truths(WindCase::Mps13, None);
+    let (trace, _) = recorded(&truths, &lie(&[]), 3e-3, 1);
+    let of = |odds: Odds| {
+        let mut rig = rig(3e-3);
+        rig.decision.odds = odds;
+        let stream = Box::new(Cursor::new(trace.clone()));
+        let mut reader = TraceReader::from_stream("trace", stream, &rig).unwrap();
+        let report = replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap();
+        let explanations = report.verdict.explanations;
+        let at = |id: &str| explanations.iter().find(|one| one.id == id).map_or(0.0, |one| one.probability);
+        at("flow_zeros") / at("sound")
+    };
+    let (usual, given) = (of(Odds::default()), of(Odds::new([("flow_zeros", 0.5)])));
+    // The table has 20 % against 80 %.
+    assert!((given / usual / 4.0 - 1.0).abs() < 0.05, "{usual} {given}");
 }

@@ -118,7 +118,7 @@ pub struct Decision {
 /// Explains a trace; `None` where there is too little of it. Leaks are uncertain by `doubts_m3s` beside what the trace
 /// leaves open.
 pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>) -> Option<Decision> {
-    let tables = Tables::new();
+    let tables = Tables::new(&rig.decision.odds);
     let mut statistic = Box::new(statistic.clone());
     statistic.close();
     let weighed = weigh(&statistic, rig, &tables, doubts_m3s)?;

@@ -11,6 +11,7 @@ mod hypothesis;
 mod independence;
 mod leak_sample;
 mod mended;
+mod odds;
 mod orthant;
 mod pass;
 mod posterior;

@@ -3,10 +3,11 @@
 use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
 use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes};
+use super::odds::Prior;
 use super::raw_products::{RawProducts, Statistic};
 use super::readings::{Mistake, Of, Readings};
 use super::table::{self, Entry, USUAL};
-use crate::rig::Rig;
+use crate::rig::{Odds, Rig};
 use pitchleak_core::continuity::CHANNELS;
 use pitchleak_core::{Leak, PerLeak};
 
@@ -21,14 +22,15 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    pub fn new() -> Self {
+    pub fn new(odds: &Odds) -> Self {
+        let prior = Prior::new(odds);
         Self {
-            zeros: table::zeros(),
-            departures: table::departures(),
-            pressures: table::pressures(),
-            wanders: table::wanders(),
-            mistakes: table::mistakes(),
-            courses: table::courses(),
+            zeros: prior.of(table::zeros()),
+            departures: prior.of(table::departures()),
+            pressures: prior.of(table::pressures()),
+            wanders: table::wanders(&prior),
+            mistakes: prior.of(table::mistakes()),
+            courses: prior.of(table::courses()),
         }
     }
 

@@ -5,6 +5,7 @@
 //! (docs/explanations.md): a factor of five in the shares moves one or two verdicts in a hundred.
 
 use super::columns::{Column, Course};
+use super::odds::Prior;
 use super::readings::{Mistake, Of};
 
 /// Shares of explanations, by how often an engineer meets them. Guesses.
@@ -141,12 +142,12 @@ pub(super) const USUAL: [(Column, Course, f64); 11] = [
     (Column::DeadVolumeB, Course::Constant, USUAL_DEAD_VOLUME),
 ];
 
-/// All that is weighed: a line for each choice of each kind.
+/// All that is weighed: a line for each choice of each kind, with its share of the kind.
 pub fn explanations() -> Vec<Entry> {
     let of_leaks = pressures();
     let known = |entry: &Entry| of_leaks.iter().any(|other| other.id == entry.id);
     let departures = departures().into_iter().filter(|entry| !known(entry));
-    let wander = wanders().into_iter().skip(1).map(|(_, share)| share).sum();
+    let wander = WANDERS.iter().map(|(_, share)| share).sum();
     let wander = Entry::new("wandering_zeros", Kind::Wander, wander, "the flow meters' zeros wander");
     let mut all: Vec<Entry> =
         courses().into_iter().chain(zeros()).chain(departures).chain(pressures()).chain([wander]).collect();
@@ -155,6 +156,11 @@ pub fn explanations() -> Vec<Entry> {
             Some(entry) => entry.share += mistake.share,
             None => all.push(mistake),
         }
+    }
+    let of_kinds = all.clone();
+    for entry in all.iter_mut().filter(|entry| !matches!(entry.kind, Kind::Wander | Kind::Wiring)) {
+        let others = of_kinds.iter().filter(|other| other.kind == entry.kind);
+        entry.share /= others.map(|other| other.share).sum::<f64>();
     }
     all
 }
@@ -191,9 +197,15 @@ pub(super) fn courses() -> Vec<Entry> {
     ]
 }
 
-/// Zeros that wander from segment to segment, share of full scale.
-pub(super) fn wanders() -> Vec<(f64, f64)> {
-    vec![(0.0, 0.94), (0.003, 0.03), (0.01, 0.02), (0.03, 0.01)]
+/// Zeros that wander from segment to segment, share of full scale, and their prior shares. Guesses.
+const WANDERS: [(f64, f64); 3] = [(0.003, 0.03), (0.01, 0.02), (0.03, 0.01)];
+
+/// Zeros that wander or, first, do not.
+pub(super) fn wanders(prior: &Prior<'_>) -> Vec<(f64, f64)> {
+    let factor = prior.factor(Kind::Wander, "wandering_zeros");
+    let wandering = WANDERS.map(|(size, share)| (size, factor * share));
+    let steady = 1.0 - wandering.iter().map(|(_, share)| share).sum::<f64>();
+    std::iter::once((0.0, steady)).chain(wandering).collect()
 }
 
 /// One thing of sensors or rig that is not as declared.

@@ -27,6 +27,8 @@ pub(super) const FORCE_SCALE: Bound = Bound::between(0.1, 1e9);
 pub(super) const SHARE: Bound = Bound::from_zero(1.0);
 /// What may speak against a sure verdict.
 pub(super) const ALPHA: Bound = Bound::between(1e-6, 0.5);
+/// How often an explanation is true: never certain, nor impossible.
+pub(super) const ODDS: Bound = Bound::between(1e-9, 0.99);
 /// Shares of full scale in an hour: a recording of seconds may drift by a percent.
 pub(super) const DRIFT_PER_HOUR: Bound = Bound::from_zero(1e3);
 /// Times that an estimator remembers or gathers for, s.
@@ -75,6 +77,10 @@ impl Bound {
     /// The value allowed that is next to `value`; the least for a NaN.
     pub(super) fn nearest(self, value: f64) -> f64 {
         if value > self.least { value.min(self.most) } else { self.least }
+    }
+
+    pub(super) fn most(self) -> f64 {
+        self.most
     }
 
     pub(super) fn text(self, dimension: Dimension) -> String {

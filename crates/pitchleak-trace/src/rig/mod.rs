@@ -4,6 +4,7 @@ mod bound;
 mod document;
 mod effects;
 mod instruments;
+mod odds;
 mod settings;
 mod valve;
 mod write;
@@ -11,6 +12,7 @@ mod write;
 pub use document::{Fault, Place, RigError};
 pub use effects::{EffectMap, EffectValue};
 pub use instruments::{Instrument, Instruments};
+pub use odds::{EXPLANATIONS, Odds};
 pub use settings::{
     ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
     ForeignColumn,

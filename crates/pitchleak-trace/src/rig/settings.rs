@@ -4,6 +4,7 @@ use super::bound;
 use super::document::Section;
 use super::document::{Fault, RigError};
 use super::instruments::Instruments;
+use super::odds::Odds;
 use crate::header;
 use crate::signal::Signal;
 use crate::times::{TimeFormat, TimeKind, Zone};
@@ -144,24 +145,27 @@ pub(super) fn read_alarms(
 }
 
 /// `[decision]`: when a verdict is sure.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DecisionSettings {
     /// α: a verdict is sure where at most this probability speaks against it.
     pub alpha: f64,
+    /// How often explanations are true before any data.
+    pub odds: Odds,
 }
 
 impl Default for DecisionSettings {
     /// 5 %, as of intervals; chosen.
     fn default() -> Self {
-        Self { alpha: 0.05 }
+        Self { alpha: 0.05, odds: Odds::default() }
     }
 }
 
 impl DecisionSettings {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
-        section.allow(&["alpha"])?;
+        section.allow(&["alpha", "odds"])?;
         let alpha = section.quantity("alpha", Dimension::Share, bound::ALPHA)?;
-        Ok(alpha.map_or_else(Self::default, |alpha| Self { alpha }))
+        let odds = Odds::read(&section.section("odds")?)?;
+        Ok(Self { alpha: alpha.unwrap_or(Self::default().alpha), odds })
     }
 }
 

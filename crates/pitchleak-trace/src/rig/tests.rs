@@ -115,6 +115,15 @@ fn errors_name_file_line_key_and_the_values_allowed() {
             "missing key `columns.pa.unit`: one of pa, kpa, mpa, bar",
         ),
         (declared() + "[effects]\nmagic = 1", "unknown key `effects.magic`"),
+        (declared() + "[decision]\nodds = { flow_zeroo = 0.1 }", "unknown key `decision.odds.flow_zeroo`"),
+        (
+            declared() + "[decision]\nodds = { flow_lag = \"120 %\" }",
+            "`decision.odds.flow_lag` is 1.2; it must be",
+        ),
+        (
+            declared() + "[decision]\nodds = { flow_lag = 0.6, area_a = 0.6 }",
+            "1.200 together with the others of its kind",
+        ),
         (String::new(), "rig.toml: missing key `cylinder.area_a`"),
     ];
     for (text, expected) in cases {
@@ -259,4 +268,14 @@ fn a_valve_is_read_and_written() {
         let message = Rig::parse(&VALVE.replace(is, becomes), "valve").expect_err(becomes).to_string();
         assert!(message.contains(key), "{message}");
     }
+}
+
+#[test]
+fn odds_are_read_by_name_for_both_chambers_at_once_and_written_as_they_were_read() {
+    let text = declared() + "[decision]\nodds = { flow_zero = \"1 %\", unit_x = 1e-4 }";
+    let rig = Rig::parse(&text, "rig.toml").unwrap();
+    let odds: Vec<_> = rig.decision.odds.iter().collect();
+    assert_eq!(odds, [("flow_zero_a", 0.005), ("flow_zero_b", 0.005), ("unit_x", 1e-4)]);
+    let again = Rig::parse(&rig.to_toml(), "rig.toml").unwrap();
+    assert_eq!(again.decision, rig.decision);
 }

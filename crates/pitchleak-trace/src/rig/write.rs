@@ -150,6 +150,11 @@ impl Rig {
         if self.decision != DecisionSettings::default() {
             let alpha = bound::ALPHA.nearest(self.decision.alpha);
             let _ = write!(out, "\n[decision]\nalpha = {alpha:?}\n");
+            let odds: Vec<String> =
+                self.decision.odds.iter().map(|(id, share)| format!("{id} = {share:?}")).collect();
+            if !odds.is_empty() {
+                let _ = writeln!(out, "odds = {{ {} }}", odds.join(", "));
+            }
         }
     }
 

@@ -1,0 +1,134 @@
+//! `[decision] odds`: how often an explanation is true before any data, where the rig file knows better than the table.
+
+use super::bound;
+use super::document::{Fault, RigError, Section};
+use crate::units::Dimension;
+use std::collections::BTreeMap;
+
+/// Prior probabilities of explanations, each within its kind.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Odds(BTreeMap<&'static str, f64>);
+
+impl Odds {
+    /// Of these explanations. Those that the list lacks are left out.
+    pub fn new(shares: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
+        let within = |(id, share)| kind(id).map(|_| (id, bound::ODDS.nearest(share)));
+        Self(shares.into_iter().filter_map(within).collect())
+    }
+
+    /// The share given to an explanation.
+    pub fn share(&self, id: &str) -> Option<f64> {
+        self.0.get(id).copied()
+    }
+
+    /// All that are given, by id.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.0.iter().map(|(id, share)| (*id, *share))
+    }
+
+    /// Whether none is given.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// A name without its `_a` or `_b` is both, in equal parts.
+    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
+        let mut own = Self::default();
+        for key in section.keys() {
+            let ids = named(key);
+            if ids.is_empty() {
+                let allowed = "an id of `pitchleak explanations`".to_owned();
+                return Err(section.fail(key, Fault::UnknownKey { key: section.path(key), allowed }));
+            }
+            let share = section.required(key, Dimension::Share, bound::ODDS)?;
+            let part = share / ids.len() as f64;
+            for id in ids {
+                own.0.insert(id, bound::ODDS.nearest(part));
+            }
+            let sum = kind(key).map_or(0.0, |kind| own.sum(kind));
+            if sum > bound::ODDS.most() {
+                let with = format!("{sum:.3} together with the others of its kind");
+                return Err(section.impossible(key, &with, &bound::ODDS.text(Dimension::Share)));
+            }
+        }
+        Ok(own)
+    }
+
+    fn sum(&self, ids: &[&str]) -> f64 {
+        self.iter().filter(|(id, _)| ids.contains(id)).map(|(_, share)| share).sum()
+    }
+}
+
+fn named(key: &str) -> Vec<&'static str> {
+    let all = EXPLANATIONS.iter().flat_map(|(_, ids)| ids.iter().copied());
+    match all.clone().find(|id| *id == key) {
+        Some(id) => vec![id],
+        None => all.filter(|id| *id == format!("{key}_a") || *id == format!("{key}_b")).collect(),
+    }
+}
+
+/// The ids of the kind that has an explanation.
+fn kind(key: &str) -> Option<&'static [&'static str]> {
+    let has = |ids: &&[&str]| named(key).first().is_some_and(|id| ids.contains(id));
+    EXPLANATIONS.iter().map(|(_, ids)| *ids).find(has)
+}
+
+/// What `pitchleak explanations` lists: each kind is one choice.
+pub const EXPLANATIONS: [(&str, &[&str]); 5] = [
+    ("course", &["constant", "cracking", "orifice", "growing", "sudden", "wandering", "creeping"]),
+    ("zeros", &["zeros_usual", "flow_zeros", "flow_zero_a", "flow_zero_b", "flow_zeros_gross"]),
+    (
+        "departure",
+        &[
+            "as_declared",
+            "flow_lag",
+            "flow_lag_a",
+            "flow_lag_b",
+            "flow_lag_gross",
+            "flow_gain_a",
+            "flow_gain_b",
+            "flow_gain",
+            "flow_drift_a",
+            "flow_drift_b",
+            "area_a",
+            "area_b",
+            "position_gain",
+            "position_zero",
+            "dead_volume_a",
+            "dead_volume_b",
+            "bulk_modulus",
+            "flow_lag_and_gains",
+            "pressure_zero_gross_a",
+            "pressure_zero_gross_b",
+            "pressure_zero_a",
+            "pressure_zero_b",
+            "pressure_gain_a",
+            "pressure_gain_b",
+        ],
+    ),
+    ("wander", &["wandering_zeros"]),
+    (
+        "wiring",
+        &[
+            "exchanged_flows",
+            "exchanged_pressures",
+            "exchanged_chambers",
+            "exchanged_turned_flows",
+            "sign_qa",
+            "sign_qb",
+            "sign_flows",
+            "other_end",
+            "absolute_pressures",
+            "areas_exchanged",
+            "unit_flows",
+            "unit_pressures",
+            "unit_qa",
+            "unit_qb",
+            "unit_pa",
+            "unit_pb",
+            "unit_x",
+            "unit_area_a",
+            "unit_area_b",
+        ],
+    ),
+];
