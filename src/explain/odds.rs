@@ -5,7 +5,7 @@ use super::table::{Entry, Kind, explanations};
 use crate::rig::Odds;
 
 /// Factors on the table's shares.
-pub(super) struct Prior<'o> {
+pub(crate) struct Prior<'o> {
     odds: &'o Odds,
     /// Shares of the table, each kind's of 1.
     usual: Vec<Entry>,

@@ -2,8 +2,8 @@
 //!
 //! [`FleetTrace::find`] says which traces there are, of which cylinder, recorded when, with which rig file; [`judge_all`]
 //! replays them; [`FleetCylinder`] is what the traces of a cylinder say together; [`FleetTable`] is the table for other
-//! programs, [`FleetNights`] one that grows, [`FleetReport`] JSON and text for people. A file that can't be read is a row with its error, so that nothing
-//! is lost.
+//! programs, [`FleetNights`] one that grows, [`FleetReport`] JSON and text for people, [`FleetOdds`] how often each explanation is
+//! true. A file that can't be read is a row with its error, so that nothing is lost.
 
 mod beside;
 mod cylinder;
@@ -12,6 +12,7 @@ mod errors;
 mod identity;
 mod judge;
 mod nights;
+mod odds;
 mod report;
 mod rig_table;
 mod row;
@@ -28,9 +29,10 @@ pub use errors::FleetError;
 pub use identity::TraceIdentity;
 pub use judge::{Stopped, judge, judge_all, judge_opened};
 pub use nights::FleetNights;
+pub use odds::{FleetOdds, LearntShare};
 pub use report::{Counts, FleetReport, count};
 pub use rig_table::RigTable;
-pub use row::{FleetLeak, FleetRow};
+pub use row::{FleetExplanation, FleetLeak, FleetRow};
 pub use table::{FleetColumn, FleetTable};
 pub use traces::{FleetRig, FleetTrace};
 pub use trend::{CylinderTrend, LongTrend, Point};

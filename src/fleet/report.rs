@@ -1,6 +1,6 @@
 //! What was found of a fleet.
 
-use super::{Beside, CylinderTrend, FleetCylinder, FleetRow, LongTrend};
+use super::{Beside, CylinderTrend, FleetCylinder, FleetOdds, FleetRow, LongTrend};
 use crate::report::Status;
 use pitchleak_core::Leak;
 use serde::Serialize;
@@ -22,6 +22,8 @@ pub struct FleetReport<'a> {
     pub by_cylinder: Vec<FleetCylinder>,
     /// How leaks change over the traces of a cylinder, where there are three or more with dates.
     pub trends: Vec<CylinderTrend>,
+    /// How often explanations are true in this fleet; where asked for.
+    pub odds: Option<FleetOdds>,
     /// A row per cylinder and trace.
     pub rows: &'a [FleetRow],
 }
@@ -73,8 +75,15 @@ impl<'a> FleetReport<'a> {
             cylinder_counts: Counts::of(by_cylinder.iter().map(|cylinder| cylinder.status)),
             trends: CylinderTrend::all(&by_cylinder),
             by_cylinder,
+            odds: None,
             rows,
         }
+    }
+
+    /// With the odds that its traces teach.
+    #[must_use]
+    pub fn with_odds(self) -> Self {
+        Self { odds: Some(FleetOdds::learn(self.rows)), ..self }
     }
 
     /// JSON.

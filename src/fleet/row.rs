@@ -1,12 +1,14 @@
 //! One cylinder and trace.
 
 use super::TraceIdentity;
+use crate::explain::Explained;
 use crate::report::{LeakTrend, ReplayReport, Status};
 use crate::rig::Rig;
 use crate::units::LPM_PER_M3S;
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What one trace says of a cylinder: the report of its replay in short, or why it failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +27,12 @@ pub struct FleetRow {
     pub faults: Vec<Leak>,
     /// Ids of the reasons of a verdict in doubt, first things first.
     pub reasons: Vec<String>,
+    /// What explains the trace, best first, down to 1 %; none without a posterior.
+    #[serde(default)]
+    pub explanations: Vec<FleetExplanation>,
+    /// `[decision] odds` that it was judged with.
+    #[serde(default)]
+    pub odds: BTreeMap<String, f64>,
     /// Flows and their trends.
     pub leaks: Option<PerLeak<FleetLeak>>,
     /// Times at which an alarm was raised.
@@ -43,6 +51,15 @@ pub struct FleetRow {
     pub warnings: Vec<String>,
     /// Why the trace could not be judged.
     pub error: Option<String>,
+}
+
+/// An explanation of a trace that is left.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FleetExplanation {
+    /// Ids of what it is made of, joined by `+`.
+    pub id: String,
+    /// Posterior probability.
+    pub probability: f64,
 }
 
 /// One leak of a cylinder.
@@ -75,6 +92,8 @@ impl FleetRow {
             status: Some(report.verdict.status),
             faults: report.verdict.faults.clone(),
             reasons: report.verdict.reasons.iter().map(|reason| reason.id.name().to_owned()).collect(),
+            explanations: report.verdict.explanations.iter().map(FleetExplanation::of).collect(),
+            odds: rig.decision.odds.iter().map(|(id, share)| (id.to_owned(), share)).collect(),
             leaks: Some(PerLeak::from_fn(|leak| FleetLeak::of(report, rig, leak))),
             alarms: raised.count() as u64,
             samples: trace.samples,
@@ -97,6 +116,8 @@ impl FleetRow {
             status: None,
             faults: Vec::new(),
             reasons: Vec::new(),
+            explanations: Vec::new(),
+            odds: BTreeMap::new(),
             leaks: None,
             alarms: 0,
             samples: 0,
@@ -143,6 +164,17 @@ impl FleetRow {
         let found = self.pinned(leak)?;
         let std = found.std_lpm.filter(|std| *std > 0.0)?;
         Some(Estimate { value: found.mean_lpm, std })
+    }
+}
+
+impl FleetExplanation {
+    fn of(explained: &Explained) -> Self {
+        Self { id: explained.id.clone(), probability: explained.probability }
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        format!("{} {:.2}", self.id, self.probability)
     }
 }
 

@@ -1,6 +1,6 @@
 //! A fleet's rows as columns: what CSV, Parquet and data frames hold.
 
-use super::{FleetLeak, FleetRow};
+use super::{FleetExplanation, FleetLeak, FleetRow};
 use jiff::Timestamp;
 use pitchleak_core::{Leak, PerLeak};
 
@@ -39,6 +39,9 @@ impl FleetTable {
             FleetColumn::Numbers(rows.iter().map(|row| number(row).filter(|n| n.is_finite())).collect())
         };
         let faults = |row: &FleetRow| row.faults.iter().map(|leak| leak.id()).collect::<Vec<_>>().join(", ");
+        let explanations = |row: &FleetRow| {
+            row.explanations.iter().map(FleetExplanation::text).collect::<Vec<_>>().join(", ")
+        };
         let mut columns: Vec<(String, FleetColumn)> = vec![
             ("cylinder".into(), texts(&|row| Some(row.cylinder.clone()))),
             ("path".into(), texts(&|row| Some(row.path.clone()))),
@@ -52,6 +55,7 @@ impl FleetTable {
             columns.extend(leak_columns(rows, leak));
         }
         columns.extend([
+            ("explanations".to_owned(), texts(&|row| Some(explanations(row)))),
             ("alarms".to_owned(), counts(|row| row.alarms)),
             ("samples".to_owned(), counts(|row| row.samples)),
             ("skipped".to_owned(), counts(|row| row.skipped)),

@@ -43,6 +43,10 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
 
+    /// Learn from all traces how often each explanation is true, as `[decision] odds` for the rig files
+    #[arg(long)]
+    odds: bool,
+
     /// Exit with status 1 if a fault of a cylinder is found that no later trace excludes
     #[arg(long)]
     fail_on_fault: bool,
@@ -53,6 +57,7 @@ Examples:
   pitchleak fleet 'farm/**/*.csv.gz' --out fleet.parquet
   pitchleak fleet 'logs/2026-05-*.csv' --rig rigs.csv --out may.csv
   pitchleak fleet 'farm/**/*.csv.gz' --table nights/ --report farm.html   # each night: what is new
+  pitchleak fleet 'farm/**/*.csv.gz' --table nights/ --odds               # lines for the rig files
   pitchleak fleet farm/T7/*/*.csv --json | jq '.by_cylinder[] | select(.status == \"leak\") | .cylinder'
   pitchleak fleet 'farm/**/*.csv' --fail-on-fault || echo 'somebody has to go there'";
 
@@ -85,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         file.write(&FleetTable::of(&rows))?;
     }
     let report = FleetReport::of(&rows);
+    let report = if arguments.odds { report.with_odds() } else { report };
     if let Some(page) = page {
         page.finish(&Page::of_fleet(&report))?;
     }

@@ -63,6 +63,27 @@ fn a_fleet_is_judged_as_replay_judges_each() {
 }
 
 #[test]
+fn the_odds_that_a_fleet_teaches_go_into_a_rig_file() {
+    let farm = farm();
+    let odds = |arguments: &[&str]| {
+        let done = fleet(farm.path(), &[&["*/*.csv", "--odds"], arguments].concat());
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8(done.stdout).unwrap()
+    };
+    let text = odds(&[]);
+    let (_, lines) = text.split_once("odds learnt from 2 cylinders, for the rig files\n").unwrap();
+    let json: Value = serde_json::from_str(&odds(&["--json"])).unwrap();
+    let constant = json["odds"]["shares"].as_array().unwrap().iter().find(|one| one["id"] == "constant");
+    assert!(constant.unwrap()["cylinders"].as_f64().unwrap() > 0.5, "one cylinder leaks: {json}");
+    for blade in ["B1", "B2"] {
+        fs::write(farm.path().join(blade).join("rig.toml"), PAPER.to_owned() + lines).unwrap();
+    }
+    let again: Value = serde_json::from_str(&odds(&["--json"])).unwrap();
+    assert!(again["rows"][0]["odds"]["zeros_usual"].as_f64().unwrap() > 0.7, "{again}");
+    assert_eq!(again["counts"], json["counts"]);
+}
+
+#[test]
 fn a_bad_file_is_told_and_the_others_are_judged() {
     let farm = farm();
     fs::write(farm.path().join("B1/broken.csv"), "a,b\n1,2\n").unwrap();

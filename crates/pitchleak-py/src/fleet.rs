@@ -7,7 +7,7 @@ use crate::source::Source;
 use crate::table::{NAME, NOT_A_TIME};
 use numpy::PyArray1;
 use pitchleak::fleet::{
-    Counts, FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetReport, FleetRig,
+    Counts, FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetOdds, FleetReport, FleetRig,
     FleetRow as Row, FleetTable, FleetTrace, TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
@@ -185,6 +185,13 @@ pub fn fleet_cylinders(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
 #[pyfunction]
 pub fn fleet_trends(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
     serde_json::to_string(&FleetReport::of(&cloned(&rows)).trends).map_err(value_error)
+}
+
+/// How often each explanation is true in the fleet: as JSON, and as lines of a rig file.
+#[pyfunction]
+pub fn fleet_odds(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<(String, Option<String>)> {
+    let odds = FleetOdds::learn(&cloned(&rows));
+    Ok((serde_json::to_string(&odds).map_err(value_error)?, odds.to_toml()))
 }
 
 /// Counts, trends and rows as JSON.

@@ -37,8 +37,8 @@ mod _pitchleak {
     use crate::explanations::explanations;
     #[pymodule_export]
     use crate::fleet::{
-        FleetNights, FleetRow, fleet_counts, fleet_cylinders, fleet_json, fleet_page, fleet_row, fleet_save,
-        fleet_table, fleet_text, fleet_traces, fleet_trends,
+        FleetNights, FleetRow, fleet_counts, fleet_cylinders, fleet_json, fleet_odds, fleet_page, fleet_row,
+        fleet_save, fleet_table, fleet_text, fleet_traces, fleet_trends,
     };
     #[pymodule_export]
     use crate::linkage::Linkage;

@@ -66,6 +66,19 @@ def test_rows_are_what_replay_says(found):
     assert [row.cylinder[-5:] for row in found.rows] == ["T1/B1", "T1/B2", "T2/B1", "T2/B2"]
 
 
+def test_a_fleet_teaches_odds(farm, found, program, tmp_path):
+    raw = json.loads(program("fleet", f"{farm}/**/*.csv", "--odds", "--json"))["odds"]
+    assert [(one.id, one.share) for one in found.odds.shares] == [(one["id"], one["share"]) for one in raw["shares"]]
+    assert found.odds.cylinders == 4
+    assert found.rows[0].explanations[0].probability > 0.5
+    rig = tmp_path / "rig.toml"
+    rig.write_text((ROOT / "data" / "traces" / "rig.toml").read_text() + str(found.odds))
+    taught = pl.fleet(f"{farm}/T1/B1/*.csv", rig, progress=False)
+    assert taught.rows[0].odds["as_declared"] == pytest.approx(
+        next(one.share for one in found.odds.shares if one.id == "as_declared"), abs=1e-4
+    )
+
+
 def with_joblib(work, items):
     joblib = pytest.importorskip("joblib")
     return joblib.Parallel(n_jobs=2)(joblib.delayed(work)(item) for item in items)

@@ -49,6 +49,16 @@ class FleetLeak:
 
 
 @dataclass(frozen=True, slots=True)
+class FleetExplanation:
+    """An explanation of a trace that is left."""
+
+    id: str
+    """What it is made of, ids of :func:`explanations` and leaks, joined by ``+``."""
+    probability: float
+    """Posterior probability."""
+
+
+@dataclass(frozen=True, slots=True)
 class FleetRow:
     """What is known of a cylinder from one trace, or why nothing is."""
 
@@ -66,6 +76,10 @@ class FleetRow:
     """Leaks to act on."""
     reasons: tuple[str, ...]
     """Ids of the reasons of a verdict in doubt, first things first."""
+    explanations: tuple[FleetExplanation, ...]
+    """What explains the trace, best first, down to 1 %."""
+    odds: dict[str, float]
+    """``[decision] odds`` that it was judged with."""
     leaks: PerLeak[FleetLeak] | None
     """Flows and their trends."""
     alarms: int
@@ -173,6 +187,35 @@ class FleetCylinder:
     """Places of its traces in :attr:`Fleet.rows`, by their begin; those without come first."""
 
 
+@dataclass(frozen=True, slots=True)
+class LearntShare:
+    """How often an explanation is true in a fleet."""
+
+    id: str
+    """Its name in ``[decision] odds``; one without ``_a`` or ``_b`` is both."""
+    share: float
+    """In how many cylinders of one, the table's share included."""
+    table: float
+    """By the table of :func:`explanations`."""
+    cylinders: float
+    """In how many cylinders it was met, as far as the verdicts tell."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetOdds:
+    """How often explanations are true in a fleet; as text the lines of a rig file that say so (docs/fleet.md)."""
+
+    cylinders: int
+    """Cylinders that were learnt from."""
+    shares: tuple[LearntShare, ...]
+    """What was met; the others keep the table's proportions in what is left."""
+    lines: str
+    """Lines for the rig file; empty where nothing was met."""
+
+    def __str__(self) -> str:
+        return self.lines.rstrip()
+
+
 class Fleet(Paged, Tabular):
     """What was found of many cylinders. As a table: a row per cylinder and trace, with the columns of ``pitchleak fleet
     --out`` (docs/fleet.md). Fleets of different days are put together by ``+``."""
@@ -217,6 +260,12 @@ class Fleet(Paged, Tabular):
 
         entries = json.loads(_pitchleak.fleet_trends(self._rows))
         return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in entries}
+
+    @cached_property
+    def odds(self) -> FleetOdds:
+        """How often each explanation is true in this fleet, learnt from its traces."""
+        odds, lines = _pitchleak.fleet_odds(self._rows)
+        return record(FleetOdds, json.loads(odds) | {"lines": lines or ""})
 
     @property
     def table(self) -> Mapping[str, Any]:

@@ -79,7 +79,7 @@ impl Bound {
         if value > self.least { value.min(self.most) } else { self.least }
     }
 
-    pub(super) fn most(self) -> f64 {
+    pub(super) const fn most(self) -> f64 {
         self.most
     }
 

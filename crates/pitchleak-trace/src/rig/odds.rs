@@ -10,9 +10,13 @@ use std::collections::BTreeMap;
 pub struct Odds(BTreeMap<&'static str, f64>);
 
 impl Odds {
+    /// The most that explanations of one kind may have together.
+    pub const MOST: f64 = bound::ODDS.most();
+
     /// Of these explanations. Those that the list lacks are left out.
-    pub fn new(shares: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
-        let within = |(id, share)| kind(id).map(|_| (id, bound::ODDS.nearest(share)));
+    pub fn new<'a>(shares: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        let known = |id: &str| EXPLANATIONS.iter().flat_map(|(_, ids)| *ids).copied().find(|one| *one == id);
+        let within = |(id, share)| Some((known(id)?, bound::ODDS.nearest(share)));
         Self(shares.into_iter().filter_map(within).collect())
     }
 

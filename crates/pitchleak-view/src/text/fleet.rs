@@ -49,6 +49,7 @@ impl FleetText<'_> {
         self.write_failed(&mut text);
         self.write_differing(&mut text);
         self.write_trends(&mut text);
+        self.write_odds(&mut text);
         text
     }
 
@@ -114,6 +115,16 @@ impl FleetText<'_> {
             let _ = writeln!(text, "GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate());
         }
         write_more(text, growing.len().saturating_sub(LINES));
+    }
+
+    fn write_odds(&self, text: &mut String) {
+        let Some(odds) = &self.report.odds else { return };
+        let lines = odds.to_toml().unwrap_or_else(|| "none: no trace tells what explains it\n".to_owned());
+        let _ = write!(
+            text,
+            "\nodds learnt from {}, for the rig files\n{lines}",
+            count(odds.cylinders, "cylinder")
+        );
     }
 }
 
