@@ -65,11 +65,13 @@ impl<V> PerEquation<V> {
 
 impl PerEquation<f64> {
     /// `f` of each value.
+    #[inline]
     pub(crate) fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self { chamber_a: f(self.chamber_a), chamber_b: f(self.chamber_b), force: f(self.force) }
     }
 
     /// `f` of each value and that of `other`.
+    #[inline]
     pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self {
             chamber_a: f(self.chamber_a, other.chamber_a),

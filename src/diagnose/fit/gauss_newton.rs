@@ -90,9 +90,13 @@ impl<'a> Fit<'a> {
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
     pub(crate) fn vacated(&self, term: usize) -> Self {
         let (structure, at) = self.left_by(&[term]);
-        let every: Vec<usize> = (0..self.problem.terms.len()).collect();
-        let vacated =
-            Self::with_columns(&every, self.problem, structure, (at, self.solved()), self.equation_error);
+        let vacated = Self::around(
+            &self.problem.every_place(),
+            self.problem,
+            structure,
+            (at, self.solved()),
+            self.equation_error,
+        );
         Self { equation_error: self.equation_error, ..vacated }
     }
 
@@ -105,20 +109,8 @@ impl<'a> Fit<'a> {
         old.iter().fold((self.structure.clone(), self.solved()), gone)
     }
 
-    /// One linearisation and its solution, with the columns of all that could be fitted.
+    /// One linearisation and its solution, with the columns of some terms, all that are fitted among them, and the noise taken elsewhere.
     fn around(
-        problem: &'a Problem<'a>,
-        structure: Structure,
-        at: Linearisation,
-        assumed_error: PerEquation<f64>,
-    ) -> Self {
-        let every: Vec<usize> = (0..problem.terms.len()).collect();
-        Self::with_columns(&every, problem, structure, (at.clone(), at), assumed_error)
-    }
-
-    /// As [`around`](Self::around), with the columns of some terms alone, all that are fitted among them, and the noise
-    /// taken elsewhere.
-    fn with_columns(
         places: &[usize],
         problem: &'a Problem<'a>,
         structure: Structure,
@@ -128,6 +120,17 @@ impl<'a> Fit<'a> {
         let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
         let weak_form =
             WeakForm::new(problem.traces, &problem.sensors, (at, noise_at), columns, assumed_error);
+        Self::solving(weak_form, columns, problem, structure.clone(), assumed_error)
+    }
+
+    /// The solution of a weak form with these columns.
+    fn solving(
+        weak_form: WeakForm<'a>,
+        columns: Columns<'_>,
+        problem: &'a Problem<'a>,
+        structure: Structure,
+        assumed_error: PerEquation<f64>,
+    ) -> Self {
         let WeakForm { at, rows, whitening, .. } = &weak_form;
         let mut shared = weak_form.shared_noise(&problem.white, columns);
         if assumed_error != PerEquation::default() {
@@ -169,7 +172,7 @@ impl<'a> Fit<'a> {
         progress: Progress<'_>,
     ) -> Self {
         let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
-            Self::with_columns(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
+            Self::around(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
         };
         let mut fit = round(at, assumed_error);
         for _ in 1..MOST_ROUNDS {
@@ -179,7 +182,13 @@ impl<'a> Fit<'a> {
             progress();
             fit = round(fit.solved(), fit.equation_error);
         }
-        Self::around(problem, structure, fit.weak_form.at, fit.assumed_error)
+        let columns = Columns {
+            terms: &problem.terms,
+            constants: &structure.constants,
+            places: &problem.every_place(),
+        };
+        let weak_form = fit.weak_form.with_columns(columns);
+        Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and

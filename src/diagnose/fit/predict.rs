@@ -160,7 +160,7 @@ impl Fit<'_> {
         let rows = self.rows();
         let sensitivities = self.weak_form.at_share(&self.problem.declared, share);
         let noise = self.weak_form.noise_with(&sensitivities, self.equation_error);
-        let white = Whitening::new(rows, &noise).whiten(&residual(rows, &self.bounded));
+        let white = Whitening::new(&noise).whiten(&residual(rows, &self.bounded));
         let own = rows.entries.iter().zip(white);
         own.filter(|(entry, _)| entry.equation == equation && rows.counts(entry))
             .map(|(entry, v)| if sensitivities[entry.row][equation].is_unresolved() { f64::NAN } else { v })

@@ -57,6 +57,11 @@ impl<'a> Problem<'a> {
         &self.start.model.cylinder
     }
 
+    /// The places of all terms.
+    pub(super) fn every_place(&self) -> Vec<usize> {
+        (0..self.terms.len()).collect()
+    }
+
     /// The place of a term.
     pub(crate) fn place(&self, term: Term) -> Option<usize> {
         self.terms.iter().position(|one| *one == term)

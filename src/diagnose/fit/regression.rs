@@ -6,7 +6,7 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{
     BISECTIONS, CHANCE_SIGMA, COLLINEAR_RIDGE, FOLDS, MOST_NOISE_SHARE, PIECES,
 };
-use crate::diagnose::weak_form::{NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
+use crate::diagnose::weak_form::{Covariances, NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
@@ -348,15 +348,16 @@ pub(super) fn equation_error(
     let residual = residual(rows, solution);
     let counts =
         PerEquation::from_fn(|equation| regression.innovations(rows, solution, equation).len().max(1) as f64);
-    let levels = |equation_error: PerEquation<f64>| {
-        let white = Whitening::new(rows, &weak_form.noise(equation_error)).whiten(&residual);
+    let levels = |covariances: &Covariances, equation_error: PerEquation<f64>| {
+        let white = Whitening::of(covariances, &equation_error).whiten(&residual);
         let mut squares = PerEquation::<f64>::default();
         for (entry, e) in rows.entries.iter().zip(&white).filter(|(entry, _)| rows.counts(entry)) {
             squares[entry.equation] += e * e;
         }
         squares.zip(counts, |sum, count| sum / count)
     };
-    let sensors_only = levels(PerEquation::default());
+    let covariances = |equation_error| Covariances::of(&weak_form.noise(equation_error));
+    let sensors_only = levels(&covariances(PerEquation::default()), PerEquation::default());
     let mut high = PerEquation::from_fn(|equation| {
         let by_chance = CHANCE_SIGMA * (2.0 / counts[equation]).sqrt();
         if sensors_only[equation] <= 1.0 + by_chance {
@@ -371,10 +372,11 @@ pub(super) fn equation_error(
     if high.iter().all(|(_, error)| *error <= 0.0) {
         return high;
     }
+    let covariances = covariances(high);
     let mut low = PerEquation::<f64>::default();
     for _ in 0..BISECTIONS {
         let middle = low.zip(high, |low, high| (low + high) / 2.0);
-        let level = levels(middle);
+        let level = levels(&covariances, middle);
         for equation in Equation::ALL {
             let end = if level[equation] > 1.0 { &mut low } else { &mut high };
             end[equation] = middle[equation];

@@ -74,9 +74,10 @@ impl Linearisation {
         seen: &Signals<f64>,
         felt: &Signals<f64>,
     ) -> PerEquation<f64> {
-        let mut unit = PerEquation::from(self.unit_term(term, seen, constants));
-        unit.force = if in_force { self.unit_term(term, felt, constants).force_n } else { 0.0 };
-        unit
+        let of_chambers =
+            if term.is_force() { Terms::default() } else { self.unit_term(term, seen, constants) };
+        let force = if in_force { self.unit_term(term, felt, constants).force_n } else { 0.0 };
+        PerEquation { force, ..PerEquation::from(of_chambers) }
     }
 
     /// What one unit of a term adds to [`Self::residual`] at corrected readings: a sensor's error also spoils what
@@ -88,12 +89,13 @@ impl Linearisation {
         constants: &EffectConstants<f64>,
     ) -> Terms<f64> {
         let own = term.unit_term(at, &self.model, constants);
-        let step = DERIVATIVE_STEP * term.usual_size();
-        let Some((above, below)) = term.read(step, at).zip(term.read(-step, at)) else { return own };
         let is_physical = |kind| kind != EffectKind::Sensor;
-        if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) || is_same(&above, at) {
+        if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) {
             return own;
         }
+        let step = DERIVATIVE_STEP * term.usual_size();
+        let above = term.read(step, at).filter(|above| !is_same(above, at));
+        let Some((above, below)) = above.zip(term.read(-step, at)) else { return own };
         let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);
         own.plus(-0.5 / step, known(&above).plus(-1.0, known(&below)))
     }

@@ -9,7 +9,7 @@ mod shared_noise;
 mod terms;
 
 pub(crate) use linearisation::Linearisation;
-pub(crate) use noise::{NoiseModel, Whitening};
+pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
 pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
 pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
@@ -57,7 +57,7 @@ impl<'a> WeakForm<'a> {
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
-        let whitening = Whitening::new(&rows, &noise);
+        let whitening = Whitening::new(&noise);
         Self {
             traces,
             sensors,
@@ -69,6 +69,14 @@ impl<'a> WeakForm<'a> {
             sensitivities,
             whitening,
         }
+    }
+
+    /// The same with other columns.
+    #[must_use]
+    pub(crate) fn with_columns(mut self, columns: Columns<'_>) -> Self {
+        let rows = Rows::build(self.traces, &self.motions, &Integrand::of(&self.at, columns), BLOCK_S);
+        self.rows.columns = rows.at_places(columns.places, columns.terms.len()).columns;
+        self
     }
 
     /// The noise of these rows, had the equations this error.

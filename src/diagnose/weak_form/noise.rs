@@ -7,7 +7,7 @@
 
 use super::integrals::{QUINTIC, QUINTIC_UNIT};
 use super::linearisation::Linearisation;
-use super::rows::{Row, Rows};
+use super::rows::{Entry, Row, Rows};
 use super::sensitivity::Sensitivity;
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::{Equation, PerEquation};
@@ -42,11 +42,12 @@ pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
     let weight = |pattern: &[f64; 6], i: isize| {
         pattern.iter().zip(0_isize..).map(|(share, place)| share * step(i + 2 - place)).sum::<f64>()
     };
-    let products = |shift: isize| {
-        patterns
-            .map(|a| patterns.map(|b| (-3..3 * m + 3).map(|i| weight(&a, i) * weight(&b, i - shift)).sum()))
+    let weights = patterns.map(|pattern| (-3..3 * m + 3).map(|i| weight(&pattern, i)).collect::<Vec<f64>>());
+    let products = |shift: usize| {
+        let product = |a: &[f64], b: &[f64]| a.iter().skip(shift).zip(b).map(|(a, b)| a * b).sum::<f64>();
+        std::array::from_fn(|one| std::array::from_fn(|other| product(&weights[one], &weights[other])))
     };
-    TestFunctionWeights { own: products(0), next: products(m) }
+    TestFunctionWeights { own: products(0), next: products(samples) }
 }
 
 /// What the covariance needs of the rows.
@@ -90,11 +91,7 @@ impl NoiseModel<'_> {
 
     /// Variance of one row of an equation, as if all of it were white in the flow or force.
     pub(crate) fn white_variance(&self, row: usize, equation: Equation) -> f64 {
-        let own = &self.rows.rows[row];
-        self.as_white(
-            own,
-            self.covariance((row, equation), (row, equation), test_function_weights(own.samples)),
-        )
+        self.as_white(&self.rows.rows[row], self.own_variance(row, equation))
     }
 
     /// The white flow or force whose variance makes this variance of a row.
@@ -105,27 +102,25 @@ impl NoiseModel<'_> {
 
     /// Standard deviation of a chamber's row as a mean flow, m³/s.
     pub(crate) fn mean_flow_std(&self, row: usize, equation: Equation) -> f64 {
-        let own = &self.rows.rows[row];
-        self.covariance((row, equation), (row, equation), test_function_weights(own.samples)).sqrt()
-            / own.block_s
+        self.own_variance(row, equation).sqrt() / self.rows.rows[row].block_s
     }
 
-    /// Covariance of two entries of the same row, or of neighbours.
-    fn covariance(
+    fn own_variance(&self, row: usize, equation: Equation) -> f64 {
+        let own = &self.rows.rows[row];
+        let weights = test_function_weights(own.samples).own;
+        let sensitivity = self.sensitivity(row, equation);
+        let step_s = own.block_s / own.samples as f64;
+        self.sensors_covariance((&sensitivity, &sensitivity), &weights, step_s)
+            + weights[0][0] * step_s * step_s * self.equation_error[equation]
+    }
+
+    /// What the sensors bring to the covariance of two entries that weigh samples so.
+    fn sensors_covariance(
         &self,
-        (row_a, a): (usize, Equation),
-        (row_b, b): (usize, Equation),
-        functions: TestFunctionWeights,
+        (first, second): (&Sensitivity, &Sensitivity),
+        weights: &Products,
+        step_s: f64,
     ) -> f64 {
-        if (a == Equation::Force) != (b == Equation::Force) {
-            return 0.0;
-        }
-        let row = &self.rows.rows[row_a];
-        let step_s = row.block_s / row.samples as f64;
-        let weights = if row_a == row_b { functions.own } else { functions.next };
-        // `weights` are of a row and the next.
-        let (first, second) = if row_a < row_b { ((row_a, a), (row_b, b)) } else { ((row_b, b), (row_a, a)) };
-        let (first, second) = (self.sensitivity(first.0, first.1), self.sensitivity(second.0, second.1));
         let steps = [step_s, 1.0, 1.0 / step_s];
         let mut sum = 0.0;
         for (place, channel) in Channel::ALL.into_iter().enumerate() {
@@ -136,28 +131,81 @@ impl NoiseModel<'_> {
                     of_channel += one * other * weights[k][l] * steps[k] * steps[l];
                 }
             }
-            let noise_factor = first.noise_factor[place] * second.noise_factor[place];
-            sum +=
-                of_channel * noise_factor * channel.noise_std(self.sensors, &self.at.model.cylinder).powi(2);
+            if of_channel != 0.0 {
+                let noise_factor = first.noise_factor[place] * second.noise_factor[place];
+                let std = channel.noise_std(self.sensors, &self.at.model.cylinder);
+                sum += of_channel * noise_factor * std.powi(2);
+            }
         }
-        let error = if a == b { self.equation_error[a] } else { 0.0 };
-        sum + weights[0][0] * step_s * step_s * error
-    }
-
-    /// Covariance of the `i`th entry and the `j`th, which stands before it or is the same.
-    pub(crate) fn between(&self, i: usize, j: usize, functions: TestFunctionWeights) -> f64 {
-        let rows = self.rows;
-        let (a, b) = (rows.entries[i], rows.entries[j]);
-        if rows.rows[a.row].stretch != rows.rows[b.row].stretch || a.row - b.row > 1 {
-            return 0.0;
-        }
-        let value = self.covariance((a.row, a.equation), (b.row, b.equation), functions);
-        if i == j && !rows.counts(&a) { value * IGNORED } else { value }
+        sum
     }
 }
 
 /// Entries to the left of the diagonal that can be correlated: three of the row before, two of the own.
 const BAND: usize = 5;
+
+/// Covariances of an entry with itself and with those before it, by their distance.
+struct Line {
+    sensors: [f64; BAND + 1],
+    /// By an error of its equation of variance one.
+    error: [f64; BAND + 1],
+    equation: Equation,
+    counts: bool,
+}
+
+impl Line {
+    fn covariance(&self, distance: usize, equation_error: &PerEquation<f64>) -> f64 {
+        let value = self.sensors[distance] + self.error[distance] * equation_error[self.equation];
+        if distance == 0 && !self.counts { value * IGNORED } else { value }
+    }
+}
+
+/// Covariances of all entries, for any error of the equations that the sensitivities were held for.
+pub(crate) struct Covariances(Vec<Line>);
+
+impl Covariances {
+    pub(crate) fn of(noise: &NoiseModel<'_>) -> Self {
+        let rows = noise.rows;
+        let held = |row: usize| PerEquation::from_fn(|equation| noise.sensitivity(row, equation));
+        let mut known = (0, TestFunctionWeights::default());
+        let mut last: Option<(usize, [PerEquation<Sensitivity>; 2])> = None;
+        let of_entry = |(i, own): (usize, &Entry)| {
+            let row = &rows.rows[own.row];
+            if known.0 != row.samples {
+                known = (row.samples, test_function_weights(row.samples));
+            }
+            // Of the row before, and the own.
+            let (_, sensitivities) = match last.take() {
+                Some(same) if same.0 == own.row => last.insert(same),
+                Some((_, [_, before])) => last.insert((own.row, [before, held(own.row)])),
+                None => last.insert((own.row, [PerEquation::default(), held(own.row)])),
+            };
+            let step_s = row.block_s / row.samples as f64;
+            let mut line = Line {
+                sensors: [0.0; BAND + 1],
+                error: [0.0; BAND + 1],
+                equation: own.equation,
+                counts: rows.counts(own),
+            };
+            for (distance, other) in rows.entries[..=i].iter().rev().take(BAND + 1).enumerate() {
+                let rows_apart = own.row - other.row;
+                let is_force = |entry: &Entry| entry.equation == Equation::Force;
+                let are_apart = rows_apart > 1 || rows.rows[other.row].stretch != row.stretch;
+                if are_apart || is_force(own) != is_force(other) {
+                    continue;
+                }
+                let weights = if rows_apart == 0 { &known.1.own } else { &known.1.next };
+                let pair = (&sensitivities[1 - rows_apart][other.equation], &sensitivities[1][own.equation]);
+                line.sensors[distance] = noise.sensors_covariance(pair, weights, step_s);
+                if own.equation == other.equation {
+                    line.error[distance] = weights[0][0] * step_s * step_s;
+                }
+            }
+            line
+        };
+        Self(rows.entries.iter().enumerate().map(of_entry).collect())
+    }
+}
 
 /// Σ = L Lᵀ, banded; `factor[i][d]` is L_{i,i−d}.
 pub(crate) struct Whitening {
@@ -165,17 +213,17 @@ pub(crate) struct Whitening {
 }
 
 impl Whitening {
-    pub(crate) fn new(rows: &Rows, noise: &NoiseModel<'_>) -> Self {
-        let mut factor: Vec<[f64; BAND + 1]> = Vec::with_capacity(rows.entries.len());
-        let mut known = (0, TestFunctionWeights::default());
-        for (i, entry) in rows.entries.iter().enumerate() {
-            let samples = rows.rows[entry.row].samples;
-            if known.0 != samples {
-                known = (samples, test_function_weights(samples));
-            }
+    pub(crate) fn new(noise: &NoiseModel<'_>) -> Self {
+        Self::of(&Covariances::of(noise), &noise.equation_error)
+    }
+
+    /// Where the equations have this error.
+    pub(crate) fn of(Covariances(lines): &Covariances, equation_error: &PerEquation<f64>) -> Self {
+        let mut factor: Vec<[f64; BAND + 1]> = Vec::with_capacity(lines.len());
+        for (i, own) in lines.iter().enumerate() {
             let mut line = [0.0; BAND + 1];
             for d in (0..=BAND.min(i)).rev() {
-                let covariance = noise.between(i, i - d, known.1);
+                let covariance = own.covariance(d, equation_error);
                 // L_{i,j} = (Σ_{i,j} − Σ_{l<j} L_{i,l} L_{j,l}) / L_{j,j}
                 let done: f64 = (1..=BAND - d)
                     .filter(|e| i >= d + e)
@@ -237,12 +285,15 @@ mod whitening_tests {
         let (sensors, sensitivities) = (&declared.sensors, sensitivities.as_slice());
         let noise = NoiseModel { at: &at, sensors, equation_error, rows: &rows, sensitivities };
         let n = rows.entries.len();
-        let functions = test_function_weights(rows.rows[0].samples);
-        let dense = DMatrix::from_fn(n, n, |i, j| noise.between(i.max(j), i.min(j), functions));
+        let Covariances(lines) = Covariances::of(&noise);
+        let between = |i: usize, j: usize| {
+            if i - j <= BAND { lines[i].covariance(i - j, &equation_error) } else { 0.0 }
+        };
+        let dense = DMatrix::from_fn(n, n, |i, j| between(i.max(j), i.min(j)));
         let factor = dense.cholesky().expect("a covariance");
         let v: Vec<f64> = white_noise(1).take(n).collect();
         let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");
-        let white = Whitening::new(&rows, &noise).whiten(&v);
+        let white = Whitening::new(&noise).whiten(&v);
         let worst = white.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(n > 100 && worst < 1e-9 * expected.amax(), "{worst} of {}", expected.amax());
     }

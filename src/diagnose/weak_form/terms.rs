@@ -151,6 +151,15 @@ impl Term {
         }
     }
 
+    /// Whether it is a force alone.
+    pub(super) fn is_force(self) -> bool {
+        match self {
+            Self::Effect(effect) => effect.spec().kind == EffectKind::Force,
+            Self::Product(one, other) => Self::Effect(one).is_force() || Self::Effect(other).is_force(),
+            _ => false,
+        }
+    }
+
     /// The signals whose noise the column shares with the residual: the channel, and whether its value (0) or
     /// its rate (1). The others' columns are quiet against what they vary.
     pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {

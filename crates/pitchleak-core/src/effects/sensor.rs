@@ -13,6 +13,13 @@ impl<T: Real> Distortion<T> {
     pub fn none() -> Self {
         Self { scale: Signals::default(), shift: Signals::default() }
     }
+
+    /// What the sensors show of the truth.
+    #[inline(always)]
+    fn read(&self, value: T, truth: &Signals<T>) -> Signals<T> {
+        let scaled = truth.zip(self.scale, |signal, gain| signal * (T::one() + value * gain));
+        scaled.zip(self.shift, |signal, more| signal + value * more)
+    }
 }
 
 /// Readings in proportion to the truth.
@@ -31,9 +38,9 @@ pub(super) fn known<T: Real>(flow: T) -> T {
 }
 
 /// What the sensors show of the truth.
+#[inline]
 pub(super) fn read<T: Real>(effect: Effect, value: T, truth: &Signals<T>) -> Signals<T> {
-    let Distortion { scale, shift } = effect.distortion(truth);
-    truth.zip(scale, |signal, gain| signal * (T::one() + value * gain)).zip(shift, |s, more| s + value * more)
+    effect.distortion(truth).read(value, truth)
 }
 
 /// The truth behind a reading: [`read`] undone.
@@ -47,7 +54,8 @@ pub(super) fn correct<T: Real>(effect: Effect, value: T, reading: &Signals<T>) -
 /// What one unit of a sensor effect adds, to first order, to the declared model's residual when
 /// that is computed from the readings.
 pub(super) fn unit_term<T: Real>(effect: Effect, at: &Signals<T>, model: &Model<T>) -> Terms<T> {
-    model.misread(T::lit(effect.spec().default_size), |value| read(effect, value, at))
+    let distortion = effect.distortion(at);
+    model.misread(T::lit(effect.spec().default_size), |value| distortion.read(value, at))
 }
 
 /// The dynamic form of [`Effect::FlowMeterLag`] and [`Effect::PressureLagA`]: τ y' + y = u by backward Euler,

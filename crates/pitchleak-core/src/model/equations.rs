@@ -119,6 +119,7 @@ impl<T: Real> Model<T> {
 impl<T: Real> Model<T> {
     /// What one unit of a misreading adds to [`Self::residual`], to first order; `read` says what the sensors show with so much of it. The
     /// residual is quadratic in the signals: the central difference is exact whatever its step, where readings are linear in their error.
+    #[inline]
     pub fn misread(&self, step: T, read: impl Fn(T) -> Signals<T>) -> Terms<T> {
         let (above, below) = (self.residual(&read(step)), self.residual(&read(-step)));
         above.zip(below, |above, below| (above - below) / (step + step))
@@ -145,6 +146,7 @@ impl<T: Real> Terms<T> {
 
 impl<T: Real> Signals<T> {
     /// Each signal of `self` with its partner of `other` through `f`.
+    #[inline]
     pub fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
         Self {
             x_m: f(self.x_m, other.x_m),
