@@ -290,6 +290,7 @@
     all.addEventListener("click", whole);
     if (!timed().length) { legend.querySelector(".tools").hidden = true; clock.hidden = true; }
   }
+  reach(); // At once: the observer waits for a frame, and a reader may come before it.
   new ResizeObserver(() => { fit(); reach(); }).observe(document.body);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   matchMedia("print").addEventListener("change", redraw);
