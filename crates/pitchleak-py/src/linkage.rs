@@ -1,6 +1,7 @@
 use crate::errors::value_error;
 use numpy::{IntoPyArray, PyReadonlyArrayDyn, ndarray::ArrayViewD};
 use pitchleak::core::{Linkage as Core, LinkageError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
@@ -21,10 +22,33 @@ use pyo3::types::{PyDict, PyTuple};
 pub struct Linkage(Core<f64>);
 
 /// A number, or numbers in an array.
-#[derive(FromPyObject)]
 pub enum Values<'py> {
     Number(f64),
     Array(PyReadonlyArrayDyn<'py, f64>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Values<'py> {
+    type Error = PyErr;
+
+    /// Lists, and arrays of other numbers, are made arrays of f64.
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(number) = given.extract() {
+            return Ok(Self::Number(number));
+        }
+        if let Ok(array) = given.extract() {
+            return Ok(Self::Array(array));
+        }
+        let numpy = given.py().import("numpy")?;
+        let array = numpy.call_method1("asarray", (given,))?;
+        let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+        if !["i", "u", "f"].contains(&kind.as_str()) {
+            let kind = given.get_type().name()?.to_string();
+            return Err(PyTypeError::new_err(format!(
+                "{kind} is none; give a number or an array of numbers, angles in rad, positions in m"
+            )));
+        }
+        Ok(Self::Array(array.call_method1("astype", ("float64",))?.extract()?))
+    }
 }
 
 type Function = fn(&Core<f64>, f64) -> Result<f64, LinkageError>;

@@ -16,6 +16,8 @@ const KEYS: [(&str, &[&str]); 3] = [
 ];
 /// The accuracy of every sensor.
 const ACCURACY: &str = "accuracy";
+/// Arguments whose texts are names, not quantities.
+const OF_NAMES: [&str; 4] = ["columns", "csv", "name", "estimator"];
 /// Arguments that say how a trace is read, and nothing of the cylinder.
 const OF_THE_TRACE: [&str; 2] = ["columns", "csv"];
 
@@ -27,7 +29,7 @@ pub fn rig(arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Rig> {
     let rig = read(&arguments.put_into(Table::new())?, &name)?;
     match accuracy {
         None => Ok(rig),
-        Some(accuracy) => read(&with_accuracy(table(&rig)?, &accuracy)?, &name),
+        Some(accuracy) => read(&with_accuracy(table(&rig)?, &accuracy, &name)?, &name),
     }
 }
 
@@ -39,7 +41,7 @@ pub fn replaced(rig: &Rig, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Ri
     let name = name.unwrap_or_else(|| rig.name.clone() + if same { "" } else { ", changed" });
     let mut table = table(rig)?;
     if let Some(accuracy) = arguments.take(ACCURACY) {
-        table = with_accuracy(table, &accuracy)?;
+        table = with_accuracy(table, &accuracy, &name)?;
     }
     read(&arguments.put_into(table)?, &name)
 }
@@ -111,13 +113,28 @@ fn section<'a>(rig: &'a mut Table, name: &str) -> PyResult<&'a mut Table> {
     section.as_table_mut().ok_or_else(|| PyTypeError::new_err(format!("`{name}` must be a dict")))
 }
 
-fn with_accuracy(mut rig: Table, accuracy: &Value) -> PyResult<Table> {
+/// The same with this accuracy for every sensor; what is wrong with it is told of the argument, not of the first sensor.
+fn with_accuracy(mut rig: Table, accuracy: &Value, name: &str) -> PyResult<Table> {
+    if accuracy.is_table() {
+        return Err(PyTypeError::new_err(
+            "`accuracy`: dict is no quantity; give one share for all sensors, such as \"0.5 %\"",
+        ));
+    }
     for (_, sheet) in section(&mut rig, "sensors")?.iter_mut() {
         if let Value::Table(sheet) = sheet {
             sheet.insert(ACCURACY.to_owned(), accuracy.clone());
         }
     }
-    Ok(rig)
+    match parsed(&rig, name) {
+        Err(EngineRigError::Content { fault: Fault::Impossible { key, value, allowed }, .. })
+            if key.ends_with(".accuracy") =>
+        {
+            Err(RigError::new_err(format!(
+                "`{ACCURACY}` is {value}; it must be {allowed}, such as \"0.5 %\""
+            )))
+        }
+        _ => Ok(rig),
+    }
 }
 
 /// As TOML has it; none for None.
@@ -129,7 +146,7 @@ fn value(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
         return Ok(Some(Value::Boolean(flag.is_true())));
     }
     if let Ok(text) = given.extract::<String>() {
-        return Ok(Some(Value::String(text)));
+        return with_unit(argument, text).map(|text| Some(Value::String(text)));
     }
     if let Ok(entries) = given.cast::<PyMapping>() {
         let mut table = Table::new();
@@ -143,12 +160,28 @@ fn value(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
     given.extract().map(|number| Some(Value::Float(number))).map_err(|_| no_quantity(argument, given))
 }
 
+/// A quantity as a text has its unit: a number alone, `"12.6"`, would be in SI, which is not what was meant.
+fn with_unit(argument: &str, text: String) -> PyResult<String> {
+    let root = argument.split('.').next().unwrap_or(argument);
+    let is_bare = text.trim().parse::<f64>().is_ok_and(|number| number != 0.0);
+    if !is_bare || OF_NAMES.contains(&root) {
+        return Ok(text);
+    }
+    Err(RigError::new_err(format!(
+        "`{argument}`: \"{text}\" has no unit; write it (\"12.6 cm^2\", \"0.5 %\", …), or give a number in SI"
+    )))
+}
+
 fn no_quantity(argument: &str, given: &Bound<'_, PyAny>) -> PyErr {
     let kind = given.get_type();
     let kind = kind.name().map_or_else(|_| "this".to_owned(), |name| name.to_string());
-    PyTypeError::new_err(format!(
-        "`{argument}`: {kind} is no quantity; give a number in SI, or a text with its unit such as \"12.6 cm^2\""
-    ))
+    let is_key = argument == ACCURACY || KEYS[..2].iter().any(|(_, keys)| keys.contains(&argument));
+    let wanted = if argument.contains('.') || is_key {
+        "is no quantity; give a number in SI, or a text with its unit such as \"12.6 cm^2\""
+    } else {
+        "is none; give a dict of what stands in this section of a rig file"
+    };
+    PyTypeError::new_err(format!("`{argument}`: {kind} {wanted}"))
 }
 
 /// All that a rig is, as its file has it.
@@ -156,8 +189,12 @@ fn table(rig: &Rig) -> PyResult<Table> {
     rig.to_toml().parse().map_err(value_error)
 }
 
+fn parsed(table: &Table, name: &str) -> Result<Rig, EngineRigError> {
+    Rig::parse(&table.to_string(), name)
+}
+
 fn read(table: &Table, name: &str) -> PyResult<Rig> {
-    Rig::parse(&table.to_string(), name).map_err(|error| match error {
+    parsed(table, name).map_err(|error| match error {
         EngineRigError::Content { fault: Fault::UnknownKey { key, allowed }, .. } if !key.contains('.') => {
             let sections = allowed.split(", ").filter(|section| KEYS.iter().all(|(name, _)| name != section));
             let keys = KEYS.iter().flat_map(|(_, keys)| keys.iter().copied());

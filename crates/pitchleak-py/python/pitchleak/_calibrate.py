@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from . import _inputs, _pitchleak
+from . import _arguments, _inputs, _pitchleak
 from ._inputs import Columns
 from ._pitchleak import Rig
 
@@ -54,6 +54,7 @@ def calibrate(
 
     Raises ``ValueError`` where the rig has no ``[valve]``, or the traces say nothing of it.
     """
+    leaks = _arguments.word("leaks", leaks, "zero or unknown")
     many: Sequence[Any] = traces if isinstance(traces, (list, tuple)) else [traces]
     if not many:
         raise ValueError("traces: give one at least")

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._page import Paged, same
 from ._picture import axes_for
 from ._pitchleak import Rig
@@ -177,6 +177,7 @@ def check(
     >>> pl.check(trace.columns).leaks.external_a.identifiable
     True
     """
+    strict = _arguments.flag("strict", strict)
     rig = _inputs.rig_for(data, rig, columns)
     source = _inputs.source(data, rig)
     report, text = _pitchleak.check(source, rig, strict)

@@ -1,5 +1,6 @@
 """Columns of any kind as numpy arrays, without a copy where they are plain float64 already."""
 
+from datetime import UTC
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,8 @@ def nanoseconds(name: str, values: Any) -> Nanoseconds:
     if hasattr(values, "dt") and getattr(values.dt, "tz", None) is not None:
         values = values.dt.tz_convert("UTC").dt.tz_localize(None)
     array = _one_dimensional(name, _to_numpy(values))
+    if array.dtype == object:
+        array = _in_utc(name, array)
     if array.dtype.kind in "OUT":
         try:
             array = array.astype("datetime64[ns]")
@@ -41,6 +44,23 @@ def nanoseconds(name: str, values: Any) -> Nanoseconds:
     times = array.astype("datetime64[ns]")
     # numpy wraps around beyond the years 1678 to 2262.
     return np.ascontiguousarray(np.where(times.astype(array.dtype) == array, times, _NOT_A_TIME)).view(np.int64)
+
+
+def _in_utc(name: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Times that each have a zone in UTC, where numpy would warn of each; others as they are."""
+    zoned = [getattr(value, "tzinfo", None) is not None for value in array]
+    if not any(zoned):
+        return array
+    for row, (value, has_zone) in enumerate(zip(array, zoned, strict=True)):
+        if not has_zone and value == value and value is not None:
+            raise ValueError(
+                f"column `{name}`, row {row}: a time without a zone among times with one; give all one zone"
+            )
+    utc = [
+        value.astimezone(UTC).replace(tzinfo=None) if has_zone else None
+        for value, has_zone in zip(array, zoned, strict=True)
+    ]
+    return np.array(utc, object)
 
 
 def _to_numpy(values: Any) -> npt.NDArray[Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._check import Wiring
 from ._gaps import broken, people_time
 from ._page import Paged
@@ -344,10 +344,11 @@ def diagnose(
     >>> found.effects[0].id
     'viscous_friction'
     """
+    strict = _arguments.flag("strict", strict)
     train = list(data) if isinstance(data, (list, tuple)) else [data]
     judged_on = list(test) if isinstance(test, (list, tuple)) else [test]
     if not train:
-        raise ValueError("no trace to fit")
+        raise ValueError("data: no trace to fit")
     rig = _inputs.rig_for(train[0], rig, columns)
     fitted = [_inputs.source(trace, rig) for trace in train]
     judged = [_inputs.source(trace, rig) for trace in judged_on]

@@ -2,7 +2,7 @@
 
 from typing import Any, Self
 
-from . import _inputs, _pitchleak
+from . import _arguments, _inputs, _pitchleak
 from ._pitchleak import Rig
 from ._report import Report, parse
 
@@ -38,6 +38,9 @@ class Estimator(_pitchleak.Estimator):
         estimator: str | None = None,
         strict: bool = False,
     ) -> Self:
+        if estimator is not None:
+            estimator = _arguments.word("estimator", estimator, "rls or paper")
+        strict = _arguments.flag("strict", strict)
         return super().__new__(cls, _inputs.rig_for(None, rig, columns), estimator=estimator, strict=strict)
 
     def extend(self, data: Any) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._page import Paged
 from ._parallel import on_all_cores
 from ._picture import axes_for, legend_beside
@@ -431,6 +431,8 @@ def _judge(job: _Job, stop: Stop | None = None) -> _pitchleak.FleetRow:
     try:
         rig = _inputs.rig_for(None, job.rig, job.columns)
         source = _inputs.source(job.data, rig)
+    except TypeError as error:
+        raise TypeError(f"cylinder `{job.cylinder}`: {error}") from None
     except (OSError, RigError, TraceError) as error:
         path = str(job.data) if _inputs.is_path(job.data) else "data"
         return _pitchleak.FleetRow.failed(job.cylinder, job.begins, path, str(error))
@@ -468,8 +470,10 @@ def fleet(
     >>> found.table["cylinder"], found.table["status"]
     (['T1/B1', 'T1/B2'], ['sound', 'leak'])
     """
+    if map is not None and not callable(map):
+        raise TypeError(f"map: {_arguments.kind(map)} is none; give a function such as the builtin map")
     jobs = _jobs(traces, rigs, columns)
-    nights = None if table is None else _pitchleak.FleetNights(os.fspath(table))
+    nights = None if table is None else _pitchleak.FleetNights(_arguments.path("table", table))
     jobs, seen = (jobs, []) if nights is None else _news(jobs, nights)
     if map is None:
         rows = on_all_cores(_judge, jobs, progress, "trace")
@@ -512,18 +516,34 @@ def _gathered(results: Iterable[Any], count: int, progress: Progress) -> list[_p
 
 
 def _jobs(traces: Any, rigs: Rigs | None, columns: _inputs.Columns | None) -> list[_Job]:
+    if rigs is not None and not isinstance(rigs, (Rig, str, os.PathLike, Mapping)):
+        raise TypeError(f"rigs: {_arguments.kind(rigs)} is none; give a Rig, a file, or rigs by the names of cylinders")
     if isinstance(traces, Mapping):
         named = ((str(cylinder), data) for cylinder, data in traces.items())
         return [_named_job(cylinder, data, _rig_of(cylinder, rigs), columns) for cylinder, data in named]
-    patterns = [traces] if _inputs.is_path(traces) else list(traces)
+    patterns = _patterns(traces)
     file = os.fspath(rigs) if isinstance(rigs, (str, os.PathLike)) else None
-    found, doubles = _pitchleak.fleet_traces([os.fspath(pattern) for pattern in patterns], file)
+    found, doubles = _pitchleak.fleet_traces(patterns, file)
     _inputs.warn(doubles)
     one = rigs if isinstance(rigs, Rig) else None
     jobs = [_Job(path, cylinder, begins, one or beside, columns) for path, cylinder, begins, beside in found]
     if not isinstance(rigs, Mapping):
         return jobs
     return [replace(job, rig=_rig_of(job.cylinder, rigs)) for job in jobs]
+
+
+def _patterns(traces: Any) -> list[str]:
+    allowed = "give paths or patterns, or data by the names of its cylinders, such as {'T1/B1': frame}"
+    if _inputs.is_path(traces):
+        return [os.fspath(traces)]
+    # A table iterates over the names of its columns.
+    if not isinstance(traces, Iterable) or hasattr(traces, "columns"):
+        raise TypeError(f"traces: {_arguments.kind(traces)} is none; {allowed}")
+    patterns = list(traces)
+    for pattern in patterns:
+        if not _inputs.is_path(pattern):
+            raise TypeError(f"traces: {_arguments.kind(pattern)} in a list is none; {allowed}")
+    return [os.fspath(pattern) for pattern in patterns]
 
 
 def _named_job(cylinder: str, data: Any, rig: Rig | str | None, columns: _inputs.Columns | None) -> _Job:

@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from . import _arguments
 from ._tabular import optional
 
 
 def split(data: Any, by: str) -> dict[Hashable, Any]:
     """Parts in the order in which they first occur, without the column ``by``."""
+    _arguments.word("group", by, "the name of one column")
     library = type(data).__module__.partition(".")[0]
     if library == "polars" and hasattr(data, "collect"):
         data = data.collect()
@@ -31,7 +33,9 @@ def split(data: Any, by: str) -> dict[Hashable, Any]:
         return _split(names, codes, lambda rows: {name: values[rows] for name, values in arrays.items()})
     if hasattr(data, "__arrow_c_stream__"):
         return _split_arrow(optional("pyarrow", "arrow").table(data), by)
-    raise TypeError(f"{type(data).__name__} has no groups: give a data frame, an Arrow table or a dict of arrays")
+    raise TypeError(
+        f"group: {type(data).__name__} has no groups; give a data frame, an Arrow table or a dict of arrays"
+    )
 
 
 def _split_arrow(table: Any, by: str) -> dict[Hashable, Any]:

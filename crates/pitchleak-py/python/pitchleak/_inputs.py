@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
+from . import _arguments
 from ._arrow import from_arrow, from_polars
 from ._collected import collected
 from ._columns import nanoseconds, numbers
@@ -56,7 +57,7 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
         return _from_columns(data, rig, first_ns)
     if type(data).__module__.partition(".")[0] == "polars" and type(data).__name__ == "DataFrame":
         return from_polars(data, rig, first_ns)
-    if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
+    if _is_arrow(data):
         return from_arrow(data, rig, first_ns)
     raise TypeError(f"{type(data).__name__} is no trace: give a data frame, an Arrow table, a dict of arrays or a path")
 
@@ -64,7 +65,9 @@ def source(data: Any, rig: Rig, first_ns: int | None = None) -> Source:
 def rig_for(data: Any, rig: Rig | Path | None, columns: Columns | None = None) -> Rig:
     """The rig given, else the one beside a file, else the built-in one; with ``columns``."""
     found = _rig_for(data, rig)
-    return found if columns is None else found.replace(columns=columns)
+    if columns is None:
+        return found
+    return found.replace(columns=_arguments.entries("columns", columns, "{'pa': 'Head pressure [bar]'}"))
 
 
 def _rig_for(data: Any, rig: Rig | Path | None) -> Rig:
@@ -75,6 +78,12 @@ def _rig_for(data: Any, rig: Rig | Path | None) -> Rig:
     if rig is not None:
         raise TypeError(f"`rig`: {type(rig).__name__} is none; give a pitchleak.Rig or the path of a rig file")
     return Rig.beside(data) if is_path(data) else Rig.paper()
+
+
+def _is_arrow(data: Any) -> bool:
+    """A column alone has the interface, too, and is no table."""
+    has = hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__")
+    return has and type(data).__name__ not in ("Series", "ChunkedArray")
 
 
 def _is_pandas(data: Any) -> bool:

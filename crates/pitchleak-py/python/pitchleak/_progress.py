@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
+from . import _arguments
+
 Progress: TypeAlias = bool | Callable[[float, float], Any]
 """True: a bar where tqdm is installed and somebody watches. False: silence. A function is called with what is done and
 the whole, which is NaN where nobody knows it."""
@@ -16,7 +18,7 @@ def shown(progress: Progress, unit: str) -> Iterator[Callable[[float, float], An
     if callable(progress):
         yield progress
         return
-    bar = _bar(unit) if progress else None
+    bar = _bar(unit) if _arguments.flag("progress", progress, "True, False or a function") else None
     if bar is None:
         yield lambda done, whole: None
         return

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._page import Paged
 from ._picture import axes_for, legend_beside
 from ._pitchleak import Rig
@@ -159,8 +159,9 @@ def prove(
     >>> pl.prove(trace.columns, leak_internal="0.5 L/min").proven
     True
     """
-    given = (leak_internal, leak_external_a, leak_external_b)
-    sizes = [[size] if isinstance(size, (int, float, str)) else list(size) for size in given]
+    given = {"leak_internal": leak_internal, "leak_external_a": leak_external_a, "leak_external_b": leak_external_b}
+    sizes = [_flows(name, flows) for name, flows in given.items()]
+    strict = _arguments.flag("strict", strict)
     rig = _inputs.rig_for(data, rig, columns)
     source = _inputs.source(data, rig)
     text_json, text, html = _pitchleak.prove(source, rig, strict, sizes)
@@ -171,3 +172,8 @@ def prove(
         object.__setattr__(proof, name, value)
     _inputs.warn(proof.trace.warnings)
     return proof
+
+
+def _flows(name: str, given: Any) -> list[float | str]:
+    many = given if isinstance(given, (list, tuple)) else [given]
+    return [_arguments.flow(name, one, "0.3 L/min") for one in many]

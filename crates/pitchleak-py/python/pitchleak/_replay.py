@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._gaps import broken, people_time
 from ._groups import split
 from ._page import Paged, same
@@ -236,6 +236,9 @@ def replay(
     >>> out.table["t_s"].shape
     (2000,)
     """
+    if estimator is not None:
+        estimator = _arguments.word("estimator", estimator, "rls or paper")
+    strict = _arguments.flag("strict", strict)
     if group is not None:
         return _many(split(data, group), rig, columns, estimator, strict, progress)
     if isinstance(data, (list, tuple)):

@@ -1,12 +1,11 @@
 """Reproduce: the paper's experiment again."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._page import Paged
 from ._picture import axes_for, legend_beside
 from ._progress import Progress, shown
@@ -117,10 +116,9 @@ def reproduce(seeds: int = 56, *, out: _inputs.Path | None = None, progress: Pro
     >>> len(table.rows)
     32
     """
-    if seeds < 1:
-        raise ValueError("seeds: at least 1")
+    seeds = _arguments.count("seeds", seeds, 1)
     with shown(progress, "") as at:
-        report, text, page = _pitchleak.reproduce(seeds, None if out is None else os.fspath(out), at)
+        report, text, page = _pitchleak.reproduce(seeds, None if out is None else _arguments.path("out", out), at)
     raw = json.loads(report)
     result = record(Reproduction, raw)
     object.__setattr__(result, "raw", raw)

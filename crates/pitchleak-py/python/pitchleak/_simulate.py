@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from . import _html, _inputs, _pitchleak
+from . import _arguments, _html, _inputs, _pitchleak
 from ._gaps import broken
 from ._picture import figure_for, legend_beside
 from ._pitchleak import Rig
@@ -143,29 +143,29 @@ def simulate(
     (200, ['t_s', 'x_mm', 'pa_bar', 'pb_bar'])
     """
     order = {
-        "wind": None if wind is None else str(wind),
-        "position": position,
-        "load": load,
-        "leak_internal": leak_internal,
-        "leak_external_a": leak_external_a,
-        "leak_external_b": leak_external_b,
-        "onset": onset,
-        "oil_temp": oil_temp,
-        "shut": shut,
-        "valve": [valve] if isinstance(valve, str) else list(valve),
-        "effects": dict(effects or {}),
-        "noise": noise,
-        "bias": bias,
-        "faults": [faults] if isinstance(faults, str) else list(faults),
-        "seed": seed,
-        "duration": duration,
-        "start": start,
-        "sample_rate": sample_rate,
-        "load_scale": load_scale,
-        "position_scale": position_scale,
-        "blade_inertia": blade_inertia,
+        "wind": None if wind is None else _wind(wind),
+        "position": _given("position", position, "100 mm", or_file=True),
+        "load": _given("load", load, "2 kN", or_file=True),
+        "leak_internal": _leak("leak_internal", leak_internal),
+        "leak_external_a": _leak("leak_external_a", leak_external_a),
+        "leak_external_b": _leak("leak_external_b", leak_external_b),
+        "onset": _arguments.quantity("onset", onset, "20 s"),
+        "oil_temp": _given("oil_temp", oil_temp, "45 °C", or_file=True),
+        "shut": None if shut is None else _arguments.word("shut", shut, "a text such as '5 s..15 s'"),
+        "valve": _arguments.words("valve", valve, "clearance=0.05 L/min"),
+        "effects": _sizes({} if effects is None else effects),
+        "noise": _share("noise", noise),
+        "bias": _share("bias", bias),
+        "faults": _arguments.words("faults", faults, "qa dead"),
+        "seed": _arguments.count("seed", seed, 0),
+        "duration": _given("duration", duration, "60 s"),
+        "start": _given("start", start, "10 s"),
+        "sample_rate": _arguments.quantity("sample_rate", sample_rate, "100 Hz"),
+        "load_scale": _factor("load_scale", load_scale),
+        "position_scale": _factor("position_scale", position_scale),
+        "blade_inertia": _factor("blade_inertia", blade_inertia),
     }
-    path = None if out is None else os.fspath(out)
+    path = None if out is None else _arguments.path("out", out)
     with shown(progress, "") as at:
         truth, warnings, columns = _pitchleak.simulate(order, _inputs.rig_for(None, rig), path, at)
     _inputs.warn(warnings)
@@ -174,3 +174,37 @@ def simulate(
     object.__setattr__(result, "raw", raw)
     object.__setattr__(result, "columns", dict(columns))
     return result
+
+
+def _wind(value: Any) -> str:
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    speed = _arguments.number("wind", value, "5, 13, 21 or 30 (m/s), or a path")
+    return f"{speed:g}"
+
+
+def _given(name: str, value: Any, example: str, or_file: bool = False) -> float | str | None:
+    """A quantity that may be left out; where it may be a file, the engine tells a number without a unit."""
+    if value is None or (or_file and isinstance(value, str)):
+        return value
+    return _arguments.quantity(name, value, example)
+
+
+def _leak(name: str, value: Any) -> float | str:
+    return _arguments.flow(name, value, "0.5 L/min")
+
+
+def _share(name: str, value: Any) -> float | str:
+    """The engine tells a share that is none."""
+    if isinstance(value, str):
+        return value
+    return _arguments.number(name, value, "a share of full scale, such as '1 %'")
+
+
+def _factor(name: str, value: Any) -> float | None:
+    return None if value is None else _arguments.number(name, value)
+
+
+def _sizes(effects: Any) -> dict[str, float]:
+    given = _arguments.entries("effects", effects, "{'viscous_friction': 3000.0}")
+    return {name: _arguments.number(f"effects: {name}", size, "its size in SI") for name, size in given.items()}

@@ -328,7 +328,24 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
         let name = name.to_owned();
         columns.insert(signal, ForeignColumn { name, unit, scale, offset, format, zone });
     }
+    each_its_own(section, &columns)?;
     Ok(columns)
+}
+
+/// Two signals of one kind are two columns; but the command of a valve may stand for its spool.
+fn each_its_own(section: &Section<'_>, columns: &ColumnMap) -> Result<(), RigError> {
+    let may_share = |signal: &Signal| matches!(signal, Signal::Spool | Signal::Command);
+    let own: Vec<_> = columns.iter().filter(|(signal, _)| !may_share(signal)).collect();
+    for (at, (signal, column)) in own.iter().enumerate() {
+        let same = |(other, its): &&(&Signal, &ForeignColumn)| {
+            other.dimension() == signal.dimension() && its == column
+        };
+        if let Some((other, _)) = own[..at].iter().find(same) {
+            let allowed = format!("another column than that of `{}`", other.name());
+            return Err(section.impossible(signal.name(), &column.name, &allowed));
+        }
+    }
+    Ok(())
 }
 
 /// `pa = "Head pressure [bar]"`.

@@ -114,6 +114,10 @@ fn errors_name_file_line_key_and_the_values_allowed() {
             declared() + "[columns]\npa = { name = \"p\" }",
             "missing key `columns.pa.unit`: one of pa, kpa, mpa, bar",
         ),
+        (
+            declared() + "[columns]\npa = \"p [bar]\"\npb = \"p [bar]\"",
+            "`columns.pb` is p [bar]; it must be another column than that of `pa`",
+        ),
         (declared() + "[effects]\nmagic = 1", "unknown key `effects.magic`"),
         (declared() + "[decision]\nodds = { flow_zeroo = 0.1 }", "unknown key `decision.odds.flow_zeroo`"),
         (
