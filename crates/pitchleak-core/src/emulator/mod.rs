@@ -1,6 +1,8 @@
 //! The rig of the paper's Section III (Fig. 2): a pitching cylinder under position control and,
 //! back to back with it, a load cylinder under force control, both on one supply.
 
+#[cfg(test)]
+mod accuracy;
 mod controller;
 mod state;
 
@@ -224,6 +226,17 @@ impl<T: Real> Emulator<T> {
         position_reference_m: T,
         load_reference_n: T,
     ) -> Result<(), PlantError> {
+        self.step_finer(1, step_s, position_reference_m, load_reference_n)
+    }
+
+    /// [`step`](Self::step) with each step of the integration divided `finer` times more.
+    fn step_finer(
+        &mut self,
+        finer: u32,
+        step_s: T,
+        position_reference_m: T,
+        load_reference_n: T,
+    ) -> Result<(), PlantError> {
         let ticks = (step_s / self.params.internal_step_s).ceil().max(T::one());
         let count = ticks.to_u32().filter(|n| *n <= 100_000_000).ok_or(PlantError::Step)?;
         if !(step_s.is_finite() && step_s > T::zero()) {
@@ -241,7 +254,7 @@ impl<T: Real> Emulator<T> {
             self.load_reference_n = number_or_zero(self.load_reference_n + load_slope * tick);
             let pressures = self.state.pressures(&self.params);
             self.control(tick, speed_reference, &pressures);
-            self.integrate(tick, pressures);
+            self.integrate(finer, tick, pressures);
         }
         self.position_reference_m = position_goal;
         self.load_reference_n = load_goal;
@@ -285,12 +298,13 @@ impl<T: Real> Emulator<T> {
         self.commands = [pitch_command, load_command];
     }
 
-    fn integrate(&mut self, tick: T, pressures: Pressures<T>) {
+    fn integrate(&mut self, finer: u32, tick: T, pressures: Pressures<T>) {
         let (params, commands) = (&self.params, self.commands);
         let (count, step) = substeps(tick, self.state.fastest_rate_ps(params, &pressures));
         // Of the first look at the first state; of all others they are worked out.
         let mut known = Some(pressures);
-        for _ in 0..count {
+        let step = step / T::lit(f64::from(finer));
+        for _ in 0..count * finer {
             let raw = rk4_step(&self.state.to_array(), step, |_, y| {
                 let state = State::from_array(*y);
                 let pressures = known.take().unwrap_or_else(|| state.pressures(params));

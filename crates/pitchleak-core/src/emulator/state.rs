@@ -105,22 +105,25 @@ impl<T: Real> State<T> {
         ]
     }
 
-    /// Rate of the fastest motion at the state's pressures, 1/s.
+    /// Rate of the fastest motion at the state's pressures, 1/s: of the mass on the springs of both cylinders and their
+    /// oil, or of the supply line. The valves join the two: a flow through them empties one and fills the other.
     pub fn fastest_rate_ps(&self, params: &EmulatorParams<T>, pressures: &Pressures<T>) -> T {
         let [pitch_spool, load_spool] = self.spools;
         let axes = [
             (&params.pitch, self.pitch, pitch_spool, pressures.pitch_pa),
             (&params.load, self.load(params), load_spool, pressures.load_pa),
         ];
-        let mut conductance = params.supply.relief_slope_m3spa;
-        let mut rate = T::zero();
+        let mut valves_m3spa = T::zero();
+        let (mut springs_ps2, mut brakes_ps) = (T::zero(), T::zero());
         for (axis, cylinder, spool, (pa_pa, pb_pa)) in axes {
             let (at_a, at_b) = axis.valve.conductances_m3spa(spool, self.supply_pa, pa_pa, pb_pa);
-            conductance += at_a + at_b;
-            rate += axis.plant.fastest_rate_under(&cylinder, (pa_pa, pb_pa))
-                + axis.plant.filling_ps(&cylinder, at_a, at_b);
+            let (spring_ps2, drag_ps) = axis.plant.stiffness(&cylinder, (pa_pa, pb_pa));
+            valves_m3spa += at_a + at_b;
+            springs_ps2 += spring_ps2;
+            brakes_ps += drag_ps + axis.plant.filling_ps(&cylinder, at_a, at_b);
         }
-        rate + conductance / params.supply.compliance_m3pa
+        let (relief, compliance) = (params.supply.relief_slope_m3spa, params.supply.compliance_m3pa);
+        (relief / compliance).max(springs_ps2.sqrt() + brakes_ps) + valves_m3spa / compliance
     }
 
     /// `self` brought back to what can exist, or `last` where a number was lost.

@@ -14,10 +14,7 @@ pub fn signed_root<T: Real>(difference_pa: T) -> T {
 /// [`signed_root`] with the transition at `laminar_pa`.
 #[inline]
 pub fn metering<T: Real>(difference_pa: T, laminar_pa: T) -> T {
-    let size = difference_pa.abs().max(laminar_pa);
-    let share = difference_pa.abs().min(laminar_pa) / size;
-    // (Δp² + p_t²)^{1/4} without squaring a large number
-    difference_pa / (size.sqrt() * (T::one() + share * share).sqrt().sqrt())
+    difference_pa / (difference_pa * difference_pa + laminar_pa * laminar_pa).sqrt().sqrt()
 }
 
 /// Slope of [`metering`] by the difference.

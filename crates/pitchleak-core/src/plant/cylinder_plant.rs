@@ -7,7 +7,7 @@ use crate::{Model, PerLeak, Real, Signals, Terms, rk4_step};
 pub(crate) const STATES: usize = 4;
 
 /// Largest step times rate that RK4 is given (its stability limit is 2.78).
-const STEP_RATE: f64 = 1.0;
+const STEP_RATE: f64 = 1.4;
 const MOST_SUBSTEPS: u32 = 256;
 
 /// The pitching cylinder of eq. (1)–(2) with end stops, cavitation and whatever effects are on.
@@ -219,11 +219,13 @@ impl<T: Real> CylinderPlant<T> {
 
     /// Rate of the fastest motion near a state, 1/s.
     pub(crate) fn fastest_rate_ps(&self, state: &CylinderState<T>) -> T {
-        self.fastest_rate_under(state, self.pressures_pa(state))
+        let (spring_ps2, drag_ps) = self.stiffness(state, self.pressures_pa(state));
+        spring_ps2.sqrt() + drag_ps
     }
 
-    /// [`fastest_rate_ps`](Self::fastest_rate_ps) where the pressures P_A, P_B of the state are known already.
-    pub(crate) fn fastest_rate_under(&self, state: &CylinderState<T>, (pa_pa, pb_pa): (T, T)) -> T {
+    /// Springs and drags on the mass near a state with these pressures P_A, P_B: the square of the rate at which oil and end
+    /// stop swing it, 1/s², and the rate at which friction and end stop brake it, 1/s.
+    pub(crate) fn stiffness(&self, state: &CylinderState<T>, (pa_pa, pb_pa): (T, T)) -> (T, T) {
         let cylinder = &self.model.cylinder;
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let bulk = self.model.fluid.bulk_modulus_pa;
@@ -237,7 +239,7 @@ impl<T: Real> CylinderPlant<T> {
         };
         let drag = (friction(slow) - friction(-slow)).abs() / (slow + slow);
         let (stop_spring, stop_drag) = self.end_stop.near(state.x_m, cylinder.stroke_m);
-        ((oil_spring + stop_spring) / mass).sqrt() + (drag + stop_drag) / mass
+        ((oil_spring + stop_spring) / mass, (drag + stop_drag) / mass)
     }
 
     /// Rate at which conductances at A and B, m³/(s·Pa), fill their chambers, 1/s.

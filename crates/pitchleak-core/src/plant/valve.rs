@@ -97,7 +97,12 @@ impl<T: Real> Valve<T> {
     /// Upper bounds of dQ/dP at ports A and B, m³/(s·Pa): how stiff the valve is.
     pub(crate) fn conductances_m3spa(&self, spool: T, supply_pa: T, pa_pa: T, pb_pa: T) -> (T, T) {
         let (extend, retract) = self.edges(spool);
-        let slope = |drop: T| drop.abs().max(self.laminar_drop_pa).sqrt().recip();
+        // From twice the laminar drop on, a root's slope is 0.50 to 0.57 of that of the laminar edge there.
+        let slope = |drop: T| {
+            let most =
+                if drop.abs() > self.laminar_drop_pa + self.laminar_drop_pa { T::lit(0.6) } else { T::one() };
+            most * drop.abs().max(self.laminar_drop_pa).sqrt().recip()
+        };
         (
             extend * slope(supply_pa - pa_pa) + retract * slope(pa_pa),
             self.area_ratio_b * (retract * slope(supply_pa - pb_pa) + extend * slope(pb_pa)),
