@@ -75,11 +75,49 @@ const LEAKS: [Column; 3] = [
     Column { header: "q_ext_b_lpm", decimals: 6, value: |row| row.leaks_m3s.external_b * LPM_PER_M3S },
 ];
 
+/// Up to here each number of units is a double of its own.
+const MOST_UNITS: f64 = 9e15;
+
 impl Column {
     /// The double nearest to the rounded decimal number: what a reader of its text gets.
     fn rounded(&self, row: &Row) -> f64 {
-        let scale = 10f64.powi(self.decimals as i32);
-        ((self.value)(row) * scale).round() / scale
+        self.units(row) / self.scale()
+    }
+
+    /// The value in units of its last decimal.
+    fn units(&self, row: &Row) -> f64 {
+        ((self.value)(row) * self.scale()).round()
+    }
+
+    fn scale(&self) -> f64 {
+        10f64.powi(self.decimals as i32)
+    }
+
+    /// Its text, digit by digit: a third of the time that formatting a float takes, and the same.
+    fn write(&self, row: &Row, out: &mut impl Write) -> io::Result<()> {
+        let units = self.units(row);
+        if units.is_nan() {
+            return Ok(());
+        }
+        if units.abs() > MOST_UNITS {
+            return write!(out, "{:.*}", self.decimals, units / self.scale());
+        }
+        let (mut text, mut at, mut rest) = ([0; 24], 24, units.abs() as u64);
+        let mut digits = 0;
+        while rest > 0 || digits <= self.decimals {
+            if digits == self.decimals && digits > 0 {
+                at -= 1;
+                text[at] = b'.';
+            }
+            at -= 1;
+            text[at] = b'0' + (rest % 10) as u8;
+            (rest, digits) = (rest / 10, digits + 1);
+        }
+        if units.is_sign_negative() {
+            at -= 1;
+            text[at] = b'-';
+        }
+        out.write_all(&text[at..])
     }
 }
 
@@ -146,19 +184,42 @@ impl<W: Write> TraceWriter<W> {
     /// Where the output cannot be written to.
     pub fn row(&mut self, row: &Row) -> io::Result<()> {
         for (index, column) in self.layout.0.iter().enumerate() {
-            let (value, decimals) = (column.rounded(row), column.decimals);
-            let comma = if index > 0 { "," } else { "" };
-            match index {
-                _ if value.is_nan() => write!(self.out, "{comma}")?,
-                0 => write!(self.out, "{value}")?,
-                _ => write!(self.out, "{comma}{value:.decimals$}")?,
+            if index > 0 {
+                self.out.write_all(b",")?;
+                column.write(row, &mut self.out)?;
+                continue;
+            }
+            let time_s = column.rounded(row);
+            if !time_s.is_nan() {
+                write!(self.out, "{time_s}")?;
             }
         }
-        writeln!(self.out)
+        self.out.write_all(b"\n")
     }
 
     /// The output, to be finished by the caller.
     pub fn into_inner(self) -> W {
         self.out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Signs of nothing, carries, no decimals, more digits than a double has.
+    #[test]
+    fn digits_are_those_of_the_formatter() {
+        let values = [0.0, -0.0, -1e-9, 9.999_999_7, -0.05, 123_456.789, 4e9, -7e14, 3e300, 0.1 + 0.2];
+        for decimals in [0, 3, 5, 6, 9] {
+            for value in values {
+                let column = Column { header: "", decimals, value: |row| row.leaks_m3s.internal };
+                let leaks_m3s = PerLeak { internal: value, ..PerLeak::default() };
+                let row = Row { shown: Reading::default(), is_shut: None, leaks_m3s };
+                let mut text = Vec::new();
+                column.write(&row, &mut text).unwrap();
+                assert_eq!(String::from_utf8(text).unwrap(), format!("{:.decimals$}", column.rounded(&row)));
+            }
+        }
     }
 }
