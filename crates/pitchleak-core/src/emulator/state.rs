@@ -123,7 +123,10 @@ impl<T: Real> State<T> {
             brakes_ps += drag_ps + axis.plant.filling_ps(&cylinder, at_a, at_b);
         }
         let (relief, compliance) = (params.supply.relief_slope_m3spa, params.supply.compliance_m3pa);
-        (relief / compliance).max(springs_ps2.sqrt() + brakes_ps) + valves_m3spa / compliance
+        // λ² + b λ + ω² + d f = 0 of a spring with brakes b = d + f: a pair of |λ|² ≤ ω² + b²/4, or two that are less than b.
+        let half_ps = brakes_ps / T::lit(2.0);
+        let mass_ps = (springs_ps2 + half_ps * half_ps).sqrt().max(brakes_ps);
+        (relief / compliance).max(mass_ps) + valves_m3spa / compliance
     }
 
     /// `self` brought back to what can exist, or `last` where a number was lost.
