@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn nothing_in_a_chamber_is_no_number_of_the_series() {
-        assert_eq!(ln_of_quotient(0.0_f64, 1e-4), f64::NEG_INFINITY);
+        assert!(ln_of_quotient(0.0_f64, 1e-4) < f64::MIN);
         assert!(ln_of_quotient(f64::NAN, 1e-4).is_nan());
     }
 }
