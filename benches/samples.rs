@@ -10,6 +10,7 @@ use pitchleak::core::{
 };
 use pitchleak::explain::{Statistic, explain};
 use pitchleak::replay::{ReplayError, replay};
+use pitchleak::told::Told;
 use pitchleak::trace::{Record, TableLayout, TraceReader};
 
 const SAMPLES: usize = 10_000;
@@ -117,7 +118,9 @@ fn decision(c: &mut Criterion) {
     }
     let mut group = c.benchmark_group("per decision");
     group.sample_size(20);
-    group.bench_function("posterior", |b| b.iter(|| explain(&statistic, &rig, PerLeak::default())));
+    group.bench_function("posterior", |b| {
+        b.iter(|| explain(&statistic, &rig, PerLeak::default(), &Told::default()))
+    });
 }
 
 fn data(name: &str) -> String {

@@ -43,6 +43,7 @@ pub mod replay;
 pub mod report;
 pub mod score;
 pub mod simulate;
+pub mod told;
 pub mod valve;
 pub mod viscosity;
 pub mod wind;

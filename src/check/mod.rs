@@ -12,7 +12,7 @@ use crate::report::{EstimateEntry, Leakage, TraceSummary, Verdict};
 use crate::rig::{EstimatorKind, Rig};
 use crate::trace::{Record, TraceReader};
 use crate::valve::ValveSummary;
-use crate::wiring::{Excerpt, Recorded, Wiring, explain, unit_by_scatter};
+use crate::wiring::Wiring;
 use pitchleak_core::{Estimate, PerLeak};
 use readings::Extremes;
 use serde::Serialize;
@@ -96,28 +96,20 @@ pub fn check<E: From<ReplayError>>(
     rig.estimator.kind = EstimatorKind::Rls;
     let mut extremes = Extremes::default();
     let mut monitor = ChannelMonitor::default();
-    let mut excerpt = Excerpt::default();
-    let columns = reader.columns(&rig.columns);
     let replayed = replay(reader, &rig, |replay, record, renewed| {
         extremes.add(record);
         if !replay.rests() {
             monitor.add(record);
-            excerpt.add(record);
         }
         each(replay, record, renewed)
     })?;
     let reach = |(entry, leakage): (&EstimateEntry, Leakage)| Reach::new(entry, leakage.std_lpm);
     let bulk_modulus = &replayed.estimates.bulk_modulus;
-    let records = excerpt.records();
-    let whole = Recorded::new(&records, &rig);
-    let found = whole.as_ref().and_then(explain);
-    let found = found.or_else(|| unit_by_scatter(&excerpt, &rig));
-    let found = found.filter(|_| replayed.hold.is_none() && replayed.valve.is_none());
     Ok(CheckReport {
         schema: CheckReport::SCHEMA,
         readings: extremes.readings(),
         channels: monitor.faults(&rig),
-        wiring: found.map(|found| found.wiring(&columns, &rig)),
+        wiring: replayed.wiring,
         hold: replayed.hold,
         valve: replayed.valve,
         leaks: replayed.estimates.leaks().zip(replayed.leakage).map(reach),

@@ -5,8 +5,9 @@ use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
 use super::hypothesis::{CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, State, Subset, subsets};
 use super::mended::Mended;
+use super::mistakes::ln_wired;
 use super::pass::Pass;
-use super::table::{self, Entry, USUAL};
+use super::table::{Entry, USUAL};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
 const BEYOND_WANDERING: f64 = 2.0;
@@ -16,6 +17,8 @@ const STATES_WITH_PAIRS: usize = 3;
 const STATES_WITH_COURSES: usize = 5;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
+/// Compressibility, as its declared one's share more: no oil is stiffer than without end, and with so much air it is foam. Chosen.
+const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -1.0..=5.0;
 
 /// How each leak goes, as far as it is there.
 type Leaks = [Option<LeakCourse>; 3];
@@ -25,7 +28,8 @@ pub(super) struct Scored<'a> {
     pub hypothesis: Hypothesis<'a>,
     pub ln_posterior: f64,
     ln_likelihood: f64,
-    scales: [f64; 2],
+    /// Noise scales s² of both equations.
+    pub scales: [f64; 2],
     /// Among the equations of this mistake of wiring, or the declared.
     pub wiring: usize,
 }
@@ -175,15 +179,14 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
-        let whole = self.pass.products.whole();
+        let whole = self.pass.products.whole().quiet();
         let columns = steady_columns();
-        let ln_wired = table::ln_wired(&tables.mistakes);
+        let ln_wired = ln_wired(&tables.mistakes);
         let mut kept = Vec::new();
-        for entry in tables.mistakes.iter().filter(|entry| self.pass.tells(entry)) {
-            let Some(mistake) = entry.mistake else { continue };
+        for (entry, mistake, ln_told) in self.pass.mistakes() {
             let equations = self.pass.equations(&whole, Some(entry), &columns);
             let mended = Mended::new(equations, self.declared, mistake, scales);
-            let ln_prior = entry.share.ln() - ln_wired + mended.ln_measure;
+            let ln_prior = entry.share.ln() - ln_wired + ln_told + mended.ln_measure;
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
             kept.push(mended);
         }
@@ -228,7 +231,7 @@ struct Mistaken<'a> {
 impl<'a> Scored<'a> {
     fn new(equations: &NormalEquations, hypothesis: Hypothesis<'a>) -> Self {
         let Fit { ln_evidence, ln_likelihood, scales, means, .. } = fit(equations, &hypothesis.free);
-        let ln_posterior = if has_impossible_gain(equations, &hypothesis, &means) {
+        let ln_posterior = if is_impossible(equations, &hypothesis, &means) {
             f64::NEG_INFINITY
         } else {
             ln_evidence + hypothesis.ln_prior
@@ -237,12 +240,25 @@ impl<'a> Scored<'a> {
     }
 }
 
-fn has_impossible_gain(equations: &NormalEquations, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
-    let gains =
-        [Column::GainA, Column::GainB, Column::Gains, Column::AreaA, Column::AreaB, Column::PositionGain];
-    let places = gains.map(|gain| equations.place(gain, Course::Constant));
-    let mut free = hypothesis.free.iter().zip(means);
-    free.any(|(free, mean)| mean.abs() > MOST_GAIN && places.contains(&Some(free.column)))
+const GAINS: [Column; 8] = [
+    Column::GainA,
+    Column::GainB,
+    Column::Gains,
+    Column::AreaA,
+    Column::AreaB,
+    Column::PositionGain,
+    Column::PressureGainA,
+    Column::PressureGainB,
+];
+
+fn is_impossible(equations: &NormalEquations, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
+    let places = GAINS.map(|gain| equations.place(gain, Course::Constant));
+    let compressibility = equations.place(Column::Compressibility, Course::Constant);
+    hypothesis.free.iter().zip(means).any(|(free, mean)| {
+        let place = Some(free.column);
+        mean.abs() > MOST_GAIN && places.contains(&place)
+            || place == compressibility && !COMPRESSIBILITY.contains(mean)
+    })
 }
 
 /// All that is free beside a mistake of wiring.

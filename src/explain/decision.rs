@@ -3,13 +3,15 @@
 use super::hypothesis::{LeakCourse, State};
 use super::leak_sample::Weighed;
 use super::pass::Tables;
-use super::posterior::weigh;
+use super::posterior::{Posterior, weigh};
 use super::raw_products::Statistic;
+use super::readings::{Mistake, Of};
 use super::sizes::{mended, sentence};
 use super::table::{Entry, LEAK_SHARE};
 use crate::report::Status;
 use crate::rig::Rig;
 use crate::signal::Signal;
+use crate::told::Told;
 use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::{Deserialize, Serialize};
@@ -57,6 +59,9 @@ pub struct Explained {
     pub cause: String,
     /// Whether it is a mistake of wiring, sign or unit.
     pub wiring: bool,
+    /// Which mistake; none where it is none, and of what was read back.
+    #[serde(skip)]
+    pub mistake: Option<Mistake>,
     /// Sensors that err where it is true.
     pub sensors: Vec<Signal>,
     /// What to do about it.
@@ -113,16 +118,78 @@ pub struct Decision {
     pub wander: f64,
     /// Probability of a mistake of wiring, sign or unit.
     pub wiring: f64,
+    /// Size of the residual in standard deviations of the declared noise, under the best explanation with the wiring as
+    /// declared and under the best without; none where there is none.
+    pub residuals: [Option<f64>; 2],
 }
 
 /// Explains a trace; `None` where there is too little of it. Leaks are uncertain by `doubts_m3s` beside what the trace
 /// leaves open.
-pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>) -> Option<Decision> {
+pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told: &Told) -> Option<Decision> {
     let tables = Tables::new(&rig.decision.odds);
     let mut statistic = Box::new(statistic.clone());
     statistic.close();
-    let weighed = weigh(&statistic, rig, &tables, doubts_m3s)?;
-    Some(decide(&weighed, rig))
+    let Posterior { weighed, residuals } = weigh(&statistic, rig, &tables, doubts_m3s, told)?;
+    let decision = Decision { residuals, ..decide(&weighed, rig) };
+    let decision = decision.with_sizes(&tables, told);
+    Some(match told.lost_sign() {
+        Some((of, ln_ratio)) => decision.with_lost_sign(&tables, of, ln_ratio),
+        None => decision,
+    })
+}
+
+impl Decision {
+    /// A flow that seems to count the other way and is never negative may as well have lost its sign.
+    fn with_sizes(mut self, tables: &Tables, told: &Told) -> Self {
+        for at in 0..self.explanations.len() {
+            let one = &mut self.explanations[at];
+            let Some(Mistake::Sign(of)) = one.mistake else { continue };
+            let lost = [of, Of::Flows].into_iter().filter(|lost| told.is_unsigned(*lost));
+            let lost: BTreeSet<Of> = lost.collect();
+            one.probability /= (1 + lost.len()) as f64;
+            let probability = one.probability;
+            self.explanations.extend(lost.into_iter().filter_map(|of| lost_sign(tables, of, probability)));
+        }
+        self
+    }
+
+    /// Beside the explanation that flows lost their signs, so many times likelier than that they have them.
+    fn with_lost_sign(mut self, tables: &Tables, of: Of, ln_ratio: f64) -> Self {
+        let Some(found) = lost_sign(tables, of, 1.0) else { return self };
+        let share =
+            tables.mistakes.iter().find(|entry| entry.mistake == found.mistake).map_or(0.0, |e| e.share);
+        let probability = 1.0 / (1.0 + (-share.ln() - ln_ratio).exp());
+        let left = 1.0 - probability;
+        self.explanations.iter_mut().for_each(|one| one.probability *= left);
+        self.notes.iter_mut().for_each(|note| note.probability *= left);
+        self.explanations.push(Explained { probability, ..found });
+        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        self.explanations.retain(|one| one.probability >= LEAST_LISTED);
+        self.wiring = probability + left * self.wiring;
+        if self.wiring > WIRING_DOUBT {
+            self.status = Status::Doubtful;
+        }
+        self
+    }
+}
+
+/// Flows that lost their signs, so probable.
+fn lost_sign(tables: &Tables, of: Of, probability: f64) -> Option<Explained> {
+    let mistake = Some(Mistake::LostSign(of));
+    let entry = tables.mistakes.iter().find(|entry| entry.mistake == mistake)?;
+    Some(Explained {
+        id: entry.id.to_owned(),
+        probability,
+        text: entry.text.to_owned(),
+        cause: entry.text.to_owned(),
+        wiring: true,
+        mistake,
+        sensors: entry.sensors(),
+        remedy: Some(entry.remedy.to_owned()),
+        columns: Vec::new(),
+        cannot_be_told_from: Vec::new(),
+        leakage: PerLeak::default(),
+    })
 }
 
 fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
@@ -167,6 +234,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         misfit,
         wander,
         wiring,
+        residuals: [None; 2],
     }
 }
 
@@ -294,7 +362,8 @@ fn listed(weighed: &[Weighed<'_>], rig: &Rig) -> Vec<Explained> {
             LPM_PER_M3S * mean
         };
         let leakage = PerLeak { internal: at(0), external_a: at(1), external_b: at(2) };
-        match out.iter_mut().find(|known| known.id == id) {
+        let mistake = one.hypothesis.wiring.and_then(|entry| entry.mistake);
+        match out.iter_mut().find(|known| known.id == id && known.mistake == mistake) {
             Some(known) => {
                 let sum = known.probability + one.probability;
                 known.leakage = known
@@ -329,16 +398,10 @@ fn explained(id: String, one: &Weighed<'_>, leakage: PerLeak<f64>, rig: &Rig) ->
         text: words.join(", and "),
         cause: words.join(", and "),
         wiring: hypothesis.wiring.is_some(),
+        mistake: hypothesis.wiring.and_then(|entry| entry.mistake),
         sensors: unusual().flat_map(|entry| entry.sensors()).collect::<BTreeSet<_>>().into_iter().collect(),
         remedy: (!remedies.is_empty()).then(|| remedies.join(" ")),
-        columns: hypothesis
-            .wiring
-            .and_then(|entry| entry.mends)
-            .into_iter()
-            .flat_map(str::lines)
-            .map(str::to_owned)
-            .chain(unusual().flat_map(|entry| mended(entry, &one.found, rig)))
-            .collect(),
+        columns: unusual().flat_map(|entry| mended(entry, &one.found, rig)).collect(),
         cannot_be_told_from: unusual().flat_map(|entry| entry.alike).map(|id| (*id).to_owned()).collect(),
         leakage,
     }

@@ -22,6 +22,8 @@ pub(super) struct Mended {
     pub equations: NormalEquations,
     /// ln of what that changes of the evidence.
     pub ln_measure: f64,
+    /// The noise's unit, in that of the readings as declared, squared.
+    pub unit: [f64; EQUATIONS],
     /// Noise scales of the readings' own scatter, as far as the best explanation as declared leaves it; 0 where nothing is
     /// known of it.
     left: [f64; EQUATIONS],
@@ -52,11 +54,14 @@ impl Mended {
                 ln_measure +=
                     mended.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder[equation].ln());
             }
-            ln_noise += ln_scale_prior(own_scatter / other) - ln_scale_prior((scatter / other).max(1.0));
+            // A clock scales no reading.
+            let sheet = if matches!(mistake, Mistake::Clock(_)) { own } else { other };
+            ln_noise += ln_scale_prior(own_scatter / sheet) - ln_scale_prior((scatter / other).max(1.0));
         }
         Self {
             equations: mended.measured_by(louder, scattered.map(|scale| scale.max(1.0))),
             ln_measure: ln_measure.min(0.0) + ln_noise,
+            unit: louder,
             left,
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! docs/explanations.md has the equations; the table of explanations is data.
 
+mod beside;
 mod candidates;
 mod columns;
 mod decision;
@@ -11,12 +12,14 @@ mod hypothesis;
 mod independence;
 mod leak_sample;
 mod mended;
+mod mistakes;
 mod odds;
 mod orthant;
 mod pass;
 mod posterior;
 mod raw_products;
 mod readings;
+mod scatter;
 mod sensors;
 mod sizes;
 mod still;

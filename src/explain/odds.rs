@@ -42,7 +42,8 @@ impl<'o> Prior<'o> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::{departures, ln_wired, mistakes, wanders};
+    use super::super::mistakes::{ln_wired, mistakes};
+    use super::super::table::{departures, wanders};
     use super::*;
     use crate::rig::EXPLANATIONS;
 

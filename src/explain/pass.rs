@@ -3,11 +3,14 @@
 use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
 use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes};
+use super::mistakes;
 use super::odds::Prior;
 use super::raw_products::{RawProducts, Statistic};
-use super::readings::{Mistake, Of, Readings};
+use super::readings::{Mistake, Readings};
+use super::scatter;
 use super::table::{self, Entry, USUAL};
 use crate::rig::{Odds, Rig};
+use crate::told::Told;
 use pitchleak_core::continuity::CHANNELS;
 use pitchleak_core::{Leak, PerLeak};
 
@@ -29,7 +32,7 @@ impl Tables {
             departures: prior.of(table::departures()),
             pressures: prior.of(table::pressures()),
             wanders: table::wanders(&prior),
-            mistakes: prior.of(table::mistakes()),
+            mistakes: prior.of(mistakes::mistakes()),
             courses: prior.of(table::courses()),
         }
     }
@@ -47,6 +50,8 @@ pub(super) struct Pass<'a, 's> {
     pub rig: &'s Rig,
     pub tables: &'a Tables,
     pub found_m3s: PerLeak<f64>,
+    /// What tells mistakes of wiring beside the statistic.
+    pub told: Told,
     /// Spreads of the leaks beside what the trace leaves open.
     pub doubts_m3s: PerLeak<f64>,
     pub sizes: Sizes,
@@ -72,6 +77,7 @@ impl<'a, 's> Pass<'a, 's> {
             rig,
             tables,
             found_m3s,
+            told: Told::default(),
             doubts_m3s: PerLeak::default(),
             sizes: Sizes {
                 seepage: rig.alarms.threshold_m3s.map(|fault| table::USUAL_SEEPAGE * fault / full_scale_m3s),
@@ -81,7 +87,7 @@ impl<'a, 's> Pass<'a, 's> {
             },
             segments: statistic.segments().len(),
             full_scale_m3s,
-            scatter: scatter(statistic, rig),
+            scatter: over_sheet(statistic, rig),
         }
     }
 
@@ -152,25 +158,19 @@ impl<'a, 's> Pass<'a, 's> {
         others.into_iter().chain(sudden).collect()
     }
 
-    /// Whether these readings tell a mistake: without any scatter they are of every unit.
-    pub fn tells(&self, entry: &Entry) -> bool {
-        let Some(Mistake::Factor(of, _)) = entry.mistake else { return true };
+    /// Mistakes that these readings may carry, with what tells their odds beside the equations, ln.
+    pub fn mistakes(&self) -> impl Iterator<Item = (&'a Entry, Mistake, f64)> {
         let scatter = self.statistic.scatter();
-        let has = |channel: usize| scatter[channel].is_some_and(|std| std > 0.0);
-        match of {
-            Of::Position => has(0),
-            Of::PressureA => has(1),
-            Of::PressureB => has(2),
-            Of::Pressures => has(1) && has(2),
-            Of::FlowA => has(3),
-            Of::FlowB => has(4),
-            Of::Flows => has(3) && has(4),
-        }
+        self.tables.mistakes.iter().filter_map(move |entry| {
+            let mistake = entry.mistake.filter(|mistake| self.told.allows(*mistake, self.rig))?;
+            let by_scatter = scatter::ln_odds(&scatter, mistake, self.rig);
+            Some((entry, mistake, self.told.ln_odds(mistake) + by_scatter))
+        })
     }
 }
 
 /// Scatter of flows and of the position over the declared noise.
-fn scatter(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
+fn over_sheet(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
     let sensors = rig.sensors();
     let found: [Option<f64>; CHANNELS] = statistic.scatter();
     let over = |found: Option<f64>, declared: f64| match found {

@@ -8,6 +8,7 @@ use super::leak_sample::{Weighed, cut};
 use super::pass::{Pass, Tables};
 use super::raw_products::{RawProducts, Statistic};
 use crate::rig::Rig;
+use crate::told::Told;
 use pitchleak_core::PerLeak;
 
 /// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
@@ -23,29 +24,39 @@ const MISFIT_WORTH: f64 = 10.0;
 /// Rows of an equation below which nothing can be said.
 const LEAST_ROWS: f64 = 8.0;
 
+/// Explanations, best first.
+pub(super) struct Posterior<'a> {
+    pub weighed: Vec<Weighed<'a>>,
+    /// Size of the residual in standard deviations of the declared noise, under the best explanation with the wiring as
+    /// declared and under the best without.
+    pub residuals: [Option<f64>; 2],
+}
+
 /// Weighs the whole table; `None` where there is too little to weigh.
 pub(super) fn weigh<'a>(
     statistic: &Statistic,
     rig: &Rig,
     tables: &'a Tables,
     doubts_m3s: PerLeak<f64>,
-) -> Option<Vec<Weighed<'a>>> {
+    told: &Told,
+) -> Option<Posterior<'a>> {
     let rows: f64 =
         (0..2).map(|c| statistic.segments().iter().map(|s| s.rows(c)).sum::<f64>()).fold(0.0, f64::max);
     if rows < LEAST_ROWS {
         return None;
     }
     let products = RawProducts::of(statistic, rig);
-    let (first, inflation) = look(&Pass::new(statistic, &products, rig, tables, PerLeak::default()));
+    let pass = Pass::new(statistic, &products, rig, tables, PerLeak::default());
+    let (first, inflation) = look(&Pass { told: *told, ..pass });
     let mean_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
     let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
     let is_sound = mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least);
     let found_m3s = if is_sound { PerLeak::default() } else { mean_m3s };
     let products = products.worth(inflation);
-    let last = Pass { doubts_m3s, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
+    let last = Pass { doubts_m3s, told: *told, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
     let declared = last.equations(last.products, None, &last.columns());
-    let weighed = weigh_all(&last, &declared, LEAST_LN);
-    (!weighed.is_empty()).then_some(weighed)
+    let posterior = weigh_all(&last, &declared, LEAST_LN);
+    (!posterior.weighed.is_empty()).then_some(posterior)
 }
 
 /// Mean of C P: of a leak that opens at a pressure more than what flows, as a sensor's zero acts through C.
@@ -57,7 +68,7 @@ fn mean_level(weighed: &[Weighed<'_>], leak: usize) -> f64 {
 fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
     let columns = pass.columns();
     let declared = pass.equations(pass.products, None, &columns);
-    let weighed = weigh_all(pass, &declared, FIRST_LOOK_LN);
+    let Posterior { weighed, .. } = weigh_all(pass, &declared, FIRST_LOOK_LN);
     let inflation = weighed.first().map_or([1.0; 2], |best| {
         let coloured = if best.hypothesis.wiring.is_some() {
             [1.0; 2]
@@ -74,13 +85,20 @@ fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
 }
 
 /// All explanations, as far as they are within `least_ln` of the best.
-fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64) -> Vec<Weighed<'a>> {
+fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64) -> Posterior<'a> {
     let mut candidates = Candidates::with_constant_leaks(pass, declared);
     candidates.add_courses(LEAST_LN);
     let mended = candidates.add_mistakes(LEAST_LN);
     let equations: Vec<&NormalEquations> =
         std::iter::once(declared).chain(mended.iter().map(|mended| &mended.equations)).collect();
-    mix(pass, &equations, candidates.best_first(), least_ln)
+    let all = candidates.best_first();
+    let residual = |is: &dyn Fn(&Scored<'_>) -> bool| {
+        let best = all.iter().find(|one| is(one) && one.ln_posterior.is_finite())?;
+        let unit = best.wiring.checked_sub(1).and_then(|at| mended.get(at)).map_or([1.0; 2], |own| own.unit);
+        Some((best.scales[0] * unit[0]).max(best.scales[1] * unit[1]).sqrt())
+    };
+    let residuals = [residual(&|one| one.wiring == 0), residual(&|one| one.wiring > 0)];
+    Posterior { weighed: mix(pass, &equations, all, least_ln), residuals }
 }
 
 /// Cuts leaks at zero, best first, until what follows cannot matter.

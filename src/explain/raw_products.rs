@@ -16,6 +16,8 @@ pub type Statistic = ContinuityStatistic<f64, SEGMENTS>;
 const END_READINGS: f64 = 7.0;
 
 const LEAST_TIME_S: f64 = 1e-9;
+/// Readings scatter by so much of their sheet's noise at the least.
+const LEAST_SCATTER: f64 = 0.01;
 
 /// Of a whole trace.
 pub(super) struct RawProducts {
@@ -29,6 +31,8 @@ pub(super) struct SegmentProducts {
     pub noise: [Vec<f64>; EQUATIONS],
     /// The same of noise as the readings scatter, where that is not as declared.
     pub scattered: [Vec<f64>; EQUATIONS],
+    /// The same of the smaller of both, sensor by sensor.
+    pub quiet: [Vec<f64>; EQUATIONS],
     pub rows: [f64; EQUATIONS],
     pub begin_s: f64,
     pub time_s: f64,
@@ -47,6 +51,7 @@ impl RawProducts {
     pub fn of(statistic: &Statistic, rig: &Rig) -> Self {
         let noise_of = NoiseOf::declared(rig);
         let scattered = noise_of.scattered(&statistic.scatter());
+        let quiet = noise_of.quieter(&scattered);
         let mut total_s = 0.0;
         let mut segments = Vec::new();
         for segment in statistic.segments() {
@@ -54,6 +59,7 @@ impl RawProducts {
                 gram: [0, 1].map(|equation| dense(|i, j| segment.product(equation, i, j))),
                 noise: [0, 1].map(|equation| noise_of.products(segment, equation)),
                 scattered: [0, 1].map(|equation| scattered.products(segment, equation)),
+                quiet: [0, 1].map(|equation| quiet.products(segment, equation)),
                 rows: [0, 1].map(|equation| segment.rows(equation)),
                 begin_s: total_s,
                 time_s: segment.time_s(),
@@ -72,6 +78,7 @@ impl RawProducts {
                 segment.gram[equation].iter_mut().for_each(|product| *product /= inflation);
                 segment.noise[equation].iter_mut().for_each(|product| *product /= inflation);
                 segment.scattered[equation].iter_mut().for_each(|product| *product /= inflation);
+                segment.quiet[equation].iter_mut().for_each(|product| *product /= inflation);
                 segment.rows[equation] /= inflation;
             }
         }
@@ -91,12 +98,21 @@ impl RawProducts {
             gram: [0, 1].map(|equation| sum(&|segment| &segment.gram[equation])),
             noise: [0, 1].map(|equation| sum(&|segment| &segment.noise[equation])),
             scattered: [0, 1].map(|equation| sum(&|segment| &segment.scattered[equation])),
+            quiet: [0, 1].map(|equation| sum(&|segment| &segment.quiet[equation])),
             rows: [0, 1].map(|equation| self.segments.iter().map(|segment| segment.rows[equation]).sum()),
             begin_s: 0.0,
             time_s: self.total_s,
             pressures_pa: self.mean_pressures_pa(0),
         };
         Self { segments: vec![whole], total_s: self.total_s }
+    }
+
+    /// With the noise that readings in whatever unit have at the most: the sheet's is too much for those in a larger one.
+    pub fn quiet(mut self) -> Self {
+        for segment in &mut self.segments {
+            segment.noise = std::mem::take(&mut segment.quiet);
+        }
+        self
     }
 
     /// Mean size of the pressures across the leaks from a segment on, Pa.
@@ -147,14 +163,29 @@ impl NoiseOf {
         }
     }
 
-    /// With the channels' own scatter (x, P_A, P_B, Q_A, Q_B) where that is known.
+    /// With the channels' own scatter (x, P_A, P_B, Q_A, Q_B) where that is known: readings that have none are computed,
+    /// and count as a hundredth of the sheet's.
     fn scattered(&self, scatter: &[Option<f64>; CHANNELS]) -> Self {
         let [x, pa, pb, qa, qb] = *scatter;
+        let of = |found: Option<f64>, declared: f64| {
+            found.map_or(declared, |found| found.max(LEAST_SCATTER * declared))
+        };
+        let mpa = |std_pa: Option<f64>| std_pa.map(|std_pa| 1e-6 * std_pa);
         Self {
-            flow: [qa.unwrap_or(self.flow[0]), qb.unwrap_or(self.flow[1])],
-            pressure_mpa: [(pa, 0), (pb, 1)]
-                .map(|(std_pa, c)| std_pa.map_or(self.pressure_mpa[c], |std_pa| 1e-6 * std_pa)),
-            position: x.unwrap_or(self.position),
+            flow: [of(qa, self.flow[0]), of(qb, self.flow[1])],
+            pressure_mpa: [of(mpa(pa), self.pressure_mpa[0]), of(mpa(pb), self.pressure_mpa[1])],
+            position: of(x, self.position),
+            ..*self
+        }
+    }
+
+    /// The smaller of both, sensor by sensor.
+    fn quieter(&self, other: &Self) -> Self {
+        let least = |one: [f64; 2], other: [f64; 2]| [one[0].min(other[0]), one[1].min(other[1])];
+        Self {
+            flow: least(self.flow, other.flow),
+            pressure_mpa: least(self.pressure_mpa, other.pressure_mpa),
+            position: self.position.min(other.position),
             ..*self
         }
     }

@@ -2,9 +2,10 @@
 
 use pitchleak_core::continuity::{RAW_SUMS, RawSum};
 use pitchleak_core::{ATMOSPHERE_PA, Cylinder, PerLeak};
+use serde::{Deserialize, Serialize};
 
 /// Which readings a mistake concerns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Of {
     /// Q_A.
     FlowA,
@@ -23,7 +24,7 @@ pub enum Of {
 }
 
 /// A mistake of wiring, sign, unit or geometry, which no small error is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Mistake {
     /// Q_A and Q_B are exchanged.
     FlowsExchanged,
@@ -37,8 +38,12 @@ pub enum Mistake {
     FlowsExchangedAndTurned,
     /// x counts from the B end.
     OtherEnd,
+    /// Only the size of a flow was recorded. No linear map says so: it is [told](super::Told) beside the statistic.
+    LostSign(Of),
     /// Readings are so many times too large.
     Factor(Of, f64),
+    /// Times are so many times too large.
+    Clock(f64),
     /// Pressures are absolute.
     Absolute(Of),
     /// The declared areas are exchanged.
@@ -75,6 +80,18 @@ const PRESSURE_B: [RawSum; 5] = [
     RawSum::StorageAOfB,
     RawSum::StorageB,
 ];
+/// Integrals over time, and over time squared.
+const OVER_TIME: [RawSum; 8] = [
+    RawSum::ResidualA,
+    RawSum::ResidualB,
+    RawSum::PressureA,
+    RawSum::PressureB,
+    RawSum::Time,
+    RawSum::RootInternal,
+    RawSum::RootA,
+    RawSum::RootB,
+];
+const OVER_AGE: [RawSum; 3] = [RawSum::AgedPressureA, RawSum::AgedPressureB, RawSum::AgedTime];
 /// Volume times change of pressure, and that change: of V_A, then of V_B.
 const STORAGE: [[(RawSum, RawSum); 2]; 2] = [
     [(RawSum::StorageA, RawSum::PressureChangeA), (RawSum::StorageAOfB, RawSum::PressureChangeB)],
@@ -108,10 +125,15 @@ impl Readings {
             }
             Mistake::FlowsExchangedAndTurned => {
                 self.exchange(&FLOW_A, &FLOW_B);
-                self.scale(Of::Flows, -1.0, dead_m3);
+                self.scale(Of::Flows, -1.0, cylinder);
             }
-            Mistake::Sign(of) => self.scale(of, -1.0, dead_m3),
-            Mistake::Factor(of, factor) => self.scale(of, 1.0 / factor, dead_m3),
+            Mistake::Sign(of) => self.scale(of, -1.0, cylinder),
+            Mistake::LostSign(_) => {}
+            Mistake::Factor(of, factor) => self.scale(of, 1.0 / factor, cylinder),
+            Mistake::Clock(factor) => {
+                self.multiply(&OVER_TIME, 1.0 / factor);
+                self.multiply(&OVER_AGE, 1.0 / (factor * factor));
+            }
             Mistake::Absolute(of) => self.subtract_atmosphere(of),
             Mistake::OtherEnd => self.turn_position(dead_m3),
             Mistake::AreasExchanged => {
@@ -153,7 +175,7 @@ impl Readings {
         }
     }
 
-    fn scale(&mut self, of: Of, by: f64, dead_m3: [f64; 2]) {
+    fn scale(&mut self, of: Of, by: f64, cylinder: &Cylinder<f64>) {
         match of {
             Of::FlowA => self.multiply(&FLOW_A, by),
             Of::FlowB => self.multiply(&FLOW_B, by),
@@ -169,24 +191,26 @@ impl Readings {
             }
             Of::Position => {
                 self.multiply(&[RawSum::Travel], by);
-                self.scale_volume(0, by, dead_m3);
-                self.scale_volume(1, by, dead_m3);
+                let Cylinder { dead_volume_a_m3, dead_volume_b_m3, area_b_m2, stroke_m, .. } = *cylinder;
+                self.scale_volume(0, by, dead_volume_a_m3);
+                // Chamber B has what of the stroke is left.
+                self.scale_volume(1, by, dead_volume_b_m3 + area_b_m2 * stroke_m);
             }
         }
     }
 
-    /// The swept part of a volume is so many times what was recorded.
-    fn scale_volume(&mut self, side: usize, by: f64, dead_m3: [f64; 2]) {
+    /// What a volume has beside `fixed_m3` is so many times what was recorded.
+    fn scale_volume(&mut self, side: usize, by: f64, fixed_m3: f64) {
         for (storage, change) in STORAGE[side] {
             let change = self.sums[change as usize];
             for (coefficient, of_change) in self.sums[storage as usize].iter_mut().zip(change) {
-                *coefficient = by * (*coefficient - dead_m3[side] * of_change) + dead_m3[side] * of_change;
+                *coefficient = by * (*coefficient - fixed_m3 * of_change) + fixed_m3 * of_change;
             }
         }
     }
 
     fn set_area(&mut self, side: usize, area_m2: f64, dead_m3: [f64; 2]) {
-        self.scale_volume(side, area_m2 / self.area_m2[side], dead_m3);
+        self.scale_volume(side, area_m2 / self.area_m2[side], dead_m3[side]);
         self.area_m2[side] = area_m2;
     }
 
@@ -225,7 +249,7 @@ impl Mistake {
     /// ln by which mending multiplies the density of both flows, given position and pressures.
     pub(super) fn ln_jacobian(self) -> f64 {
         match self {
-            Self::Factor(Of::Flows, factor) => -2.0 * factor.ln(),
+            Self::Factor(Of::Flows, factor) | Self::Clock(factor) => -2.0 * factor.ln(),
             Self::Factor(Of::FlowA | Of::FlowB, factor) => -factor.ln(),
             _ => 0.0,
         }

@@ -41,12 +41,13 @@ impl Column {
 }
 
 impl Mistake {
-    fn sensors(self) -> &'static [Signal] {
+    pub(crate) fn sensors(self) -> &'static [Signal] {
         match self {
             Self::FlowsExchanged | Self::FlowsExchangedAndTurned => Of::Flows.sensors(),
             Self::PressuresExchanged => Of::Pressures.sensors(),
             Self::ChambersExchanged => &[Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB],
-            Self::Sign(of) | Self::Factor(of, _) | Self::Absolute(of) => of.sensors(),
+            Self::Sign(of) | Self::LostSign(of) | Self::Factor(of, _) | Self::Absolute(of) => of.sensors(),
+            Self::Clock(_) => &[Signal::Time],
             Self::OtherEnd => Of::Position.sensors(),
             Self::AreasExchanged | Self::Area(..) => &[],
         }
@@ -54,7 +55,7 @@ impl Mistake {
 }
 
 impl Of {
-    fn sensors(self) -> &'static [Signal] {
+    pub(crate) fn sensors(self) -> &'static [Signal] {
         match self {
             Self::FlowA => &[Signal::FlowA],
             Self::FlowB => &[Signal::FlowB],

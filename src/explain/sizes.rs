@@ -13,7 +13,9 @@ pub(super) type Found = (Column, Estimate<f64>);
 
 /// An entry's sentence with the sizes of its columns.
 pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
-    if let Some(Mistake::Factor(_, factor) | Mistake::Area(_, factor)) = entry.mistake {
+    if let Some(Mistake::Factor(_, factor) | Mistake::Area(_, factor) | Mistake::Clock(factor)) =
+        entry.mistake
+    {
         let (times, way) = if factor > 1.0 { (factor, "large") } else { (1.0 / factor, "small") };
         return format!("{}: {} times too {way}", entry.text, (100.0 * times).round() / 100.0);
     }

@@ -5,8 +5,9 @@
 //! (docs/explanations.md): a factor of five in the shares moves one or two verdicts in a hundred.
 
 use super::columns::{Column, Course};
+use super::mistakes::mistakes;
 use super::odds::Prior;
-use super::readings::{Mistake, Of};
+use super::readings::Mistake;
 
 /// Shares of explanations, by how often an engineer meets them. Guesses.
 mod share {
@@ -16,10 +17,6 @@ mod share {
     pub const RARE: f64 = 0.01;
     /// Two at once.
     pub const VERY_RARE: f64 = 0.002;
-    /// Two wires exchanged, or a sign turned: each, once in a thousand recordings.
-    pub const EXCHANGED: f64 = 0.001;
-    /// All other mistakes of wiring, unit and geometry together.
-    pub const WIRING: f64 = 0.005;
 }
 
 /// Prior probability of each leak. A guess.
@@ -97,7 +94,7 @@ impl Kind {
 }
 
 impl Entry {
-    fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
+    pub(super) fn new(id: &'static str, kind: Kind, share: f64, text: &'static str) -> Self {
         Self { id, kind, share, free: Vec::new(), mistake: None, text, remedy: "", mends: None, alike: &[] }
     }
 
@@ -116,7 +113,7 @@ impl Entry {
         self
     }
 
-    fn remedy(mut self, remedy: &'static str, mends: Option<&'static str>) -> Self {
+    pub(super) fn remedy(mut self, remedy: &'static str, mends: Option<&'static str>) -> Self {
         (self.remedy, self.mends) = (remedy, mends);
         self
     }
@@ -296,110 +293,4 @@ pub(super) fn pressures() -> Vec<Entry> {
         entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),
         entry("pressure_gain_b", "the gain of pressure sensor B is off").free(C::PressureGainB, 0.05),
     ]
-}
-
-/// Mistakes of wiring, sign, unit and geometry, of equal shares.
-pub(super) fn mistakes() -> Vec<Entry> {
-    const WIRES: &str = "Look at the wiring and the columns' names.";
-    let mut all: Vec<(&'static str, Mistake, &'static str, Option<&'static str>)> = vec![
-        (
-            "exchanged_flows",
-            Mistake::FlowsExchanged,
-            "qa and qb are exchanged",
-            Some("qa = \"qb\"\nqb = \"qa\""),
-        ),
-        (
-            "exchanged_pressures",
-            Mistake::PressuresExchanged,
-            "pa and pb are exchanged",
-            Some("pa = \"pb\"\npb = \"pa\""),
-        ),
-        (
-            "exchanged_chambers",
-            Mistake::ChambersExchanged,
-            "the chambers A and B are exchanged",
-            Some("qa = \"qb\"\nqb = \"qa\"\npa = \"pb\"\npb = \"pa\""),
-        ),
-        (
-            "exchanged_turned_flows",
-            Mistake::FlowsExchangedAndTurned,
-            "qa and qb are exchanged, and count the other way",
-            None,
-        ),
-        (
-            "sign_qa",
-            Mistake::Sign(Of::FlowA),
-            "qa counts the other way, or lost its sign",
-            Some("qa = { name = \"qa\", scale = -1.0 }"),
-        ),
-        (
-            "sign_qb",
-            Mistake::Sign(Of::FlowB),
-            "qb counts the other way, or lost its sign",
-            Some("qb = { name = \"qb\", scale = -1.0 }"),
-        ),
-        ("sign_flows", Mistake::Sign(Of::Flows), "qa and qb count the other way, or lost their signs", None),
-        ("other_end", Mistake::OtherEnd, "x counts from the B end", None),
-        ("absolute_pressures", Mistake::Absolute(Of::Pressures), "the pressures are absolute", None),
-        ("areas_exchanged", Mistake::AreasExchanged, "the areas A and B are exchanged", None),
-    ];
-    for factor in FACTORS {
-        all.extend([
-            ("unit_flows", Mistake::Factor(Of::Flows, factor), "qa and qb are in another unit", None),
-            ("unit_pressures", Mistake::Factor(Of::Pressures, factor), "pa and pb are in another unit", None),
-        ]);
-    }
-    for factor in SLIPS {
-        all.extend([
-            ("unit_qa", Mistake::Factor(Of::FlowA, factor), "qa is in another unit", None),
-            ("unit_qb", Mistake::Factor(Of::FlowB, factor), "qb is in another unit", None),
-            ("unit_pa", Mistake::Factor(Of::PressureA, factor), "pa is in another unit", None),
-            ("unit_pb", Mistake::Factor(Of::PressureB, factor), "pb is in another unit", None),
-            ("unit_x", Mistake::Factor(Of::Position, factor), "x is in another unit", None),
-            ("unit_area_a", Mistake::Area(0, factor), "area A is in another unit", None),
-            ("unit_area_b", Mistake::Area(1, factor), "area B is in another unit", None),
-        ]);
-    }
-    let others = all.iter().filter(|(id, ..)| !is_exchange(id)).count().max(1) as f64;
-    all.into_iter()
-        .map(|(id, mistake, text, mends)| {
-            (
-                id,
-                mistake,
-                text,
-                mends,
-                if is_exchange(id) { share::EXCHANGED } else { share::WIRING / others },
-            )
-        })
-        .map(|(id, mistake, text, mends, share)| Entry {
-            mistake: Some(mistake),
-            ..Entry::new(id, Kind::Wiring, share, text).remedy(WIRES, mends)
-        })
-        .collect()
-}
-
-/// Factors between units of flow and of pressure that people log: L/min, m³/h, gal/min, L/s; bar, psi, MPa; and a slipped
-/// decimal point.
-const FACTORS: [f64; 10] = [
-    10.0,
-    0.1,
-    60.0,
-    1.0 / 60.0,
-    3.785_411_784,
-    1.0 / 3.785_411_784,
-    50.0 / 3.0,
-    0.06,
-    14.503_77,
-    1.0 / 14.503_77,
-];
-/// A slipped decimal point, and a diameter for a radius.
-const SLIPS: [f64; 4] = [10.0, 0.1, 4.0, 0.25];
-
-fn is_exchange(id: &str) -> bool {
-    id.starts_with("exchanged") || id.starts_with("sign")
-}
-
-/// ln prior probability of as declared wiring.
-pub(super) fn ln_wired(mistakes: &[Entry]) -> f64 {
-    (1.0 - mistakes.iter().map(|mistake| mistake.share).sum::<f64>()).ln()
 }

@@ -243,6 +243,7 @@ pub(crate) fn report(
     hold: Option<HoldSummary>,
 ) -> ReplayReport {
     ReplayReport {
+        wiring: None,
         schema: ReplayReport::SCHEMA,
         rig: rig.name.clone(),
         estimator: rig.estimator.kind,

@@ -111,6 +111,7 @@ impl<'a> Draft<'a> {
             valve: None,
             estimator: replay.rig.estimator.kind,
             verdict,
+            wiring: None,
             trend: self.trend,
             spells: Spell::of(&self.episodes, self.trace.duration_s, replay.end_s),
             episodes: self.episodes,

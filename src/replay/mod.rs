@@ -28,10 +28,11 @@ use crate::explain::{Decision, Statistic, explain};
 use crate::hold::{self, Recorder};
 use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
+use crate::told::Beside;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
 use crate::units::LPM_PER_M3S;
 use crate::valve::{CalibrationError, ValveMeter};
-use crate::wiring::{Excerpt, Refused};
+use crate::wiring::Refused;
 use consistency::Consistency;
 use correction::Correction;
 use effect_uncertainty::{EffectUncertainty, added_std};
@@ -119,6 +120,8 @@ pub struct Replay {
     spikes: Spikes,
     oil: OilTemperature,
     statistic: Box<Statistic>,
+    /// What tells mistakes of wiring beside it.
+    evidence: Beside,
     /// Whether the ports are shut: a hold is for [`hold`](crate::hold), not for this estimator.
     rests: bool,
     /// Time of the last record, s.
@@ -149,6 +152,7 @@ impl Replay {
             spikes: Spikes::new(&rig.sensors()),
             oil: OilTemperature::default(),
             statistic: Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors())),
+            evidence: Beside::default(),
             rests: false,
             end_s: 0.0,
             innovation: None,
@@ -226,6 +230,7 @@ impl Replay {
         self.oil.add(record);
         if self.knows_noise() {
             self.statistic.push(record.step_s(), &record.sample);
+            self.evidence.add(record, &self.rig);
         }
         let update = self.estimator.update(record);
         match update {
@@ -253,7 +258,9 @@ impl Replay {
 
     /// What explains the records so far; none where they are too few.
     pub fn decision(&self) -> Option<Decision> {
-        self.knows_noise().then(|| explain(&self.statistic, &self.rig, self.effect_doubts_m3s())).flatten()
+        let told = self.evidence.told(&self.rig);
+        let explain = || explain(&self.statistic, &self.rig, self.effect_doubts_m3s(), &told);
+        self.knows_noise().then(explain).flatten()
     }
 
     /// What the uncertainty of the rig file's effects adds to the leaks' spreads, m³/s.
@@ -267,7 +274,7 @@ impl Replay {
     fn forgetting(mut self) -> Self {
         let fresh = Statistic::new(&self.rig.cylinder, &self.rig.fluid, &self.rig.sensors());
         *self.statistic = fresh.forgetting(HORIZON_S);
-        self
+        Self { evidence: self.evidence.forgetting(), ..self }
     }
 
     /// Weighs whether model and noise explain a block.
@@ -420,7 +427,6 @@ pub fn replay<E: From<ReplayError>>(
     mut each: impl FnMut(&Replay, &Record, bool) -> Result<(), E>,
 ) -> Result<ReplayReport, E> {
     let mut replay = Replay::new(rig).map_err(ReplayError::from)?;
-    let mut excerpt = Excerpt::default();
     let mut record = Record::default();
     let columns = reader.columns(&rig.columns);
     let mut refused = None;
@@ -432,9 +438,6 @@ pub fn replay<E: From<ReplayError>>(
         Recorder::record(&mut holds, &record, rig);
         ValveMeter::record(&mut valve, &record);
         has_spool |= record.valve.is_some();
-        if !replay.spikes.left_out() && !replay.rests {
-            excerpt.add(&record);
-        }
         each(&replay, &record, renewed)?;
     }
     let summary =
@@ -447,9 +450,9 @@ pub fn replay<E: From<ReplayError>>(
     }
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());
-    let decision = replay.decision();
+    let decision = replay.decision().map(|decision| decision.read_by(&columns, rig));
     let wiring = match refused.as_ref().and_then(Refused::wiring) {
-        None => replay.wiring(decision.as_ref(), &weighed, &excerpt, &columns),
+        None => replay.wiring(decision.as_ref(), &weighed, &columns),
         wiring => wiring,
     };
     let mut report = replay.report_with(summary, &weighed, decision.as_ref(), wiring);

@@ -10,7 +10,7 @@ use crate::trace::{
     read_line,
 };
 use crate::valve::ValveStream;
-use crate::wiring::{Refused, Running, Wiring};
+use crate::wiring::{Refused, Wiring};
 
 /// What became of a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,6 @@ pub enum Taken {
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 pub struct Stream {
     replay: Replay,
-    evidence: Running,
     validator: Option<RowValidator>,
     bad_rows: BadRows,
     /// While rows are refused as out of range.
@@ -99,7 +98,6 @@ impl Stream {
     pub fn new(rig: &Rig, bad_rows: BadRows) -> Result<Self, ReplayError> {
         Ok(Self {
             replay: Replay::new(rig)?.forgetting(),
-            evidence: Running::default(),
             validator: None,
             bad_rows,
             refused: None,
@@ -151,9 +149,6 @@ impl Stream {
         }
         if let Some(refused) = &mut self.refused {
             refused.add(record);
-        }
-        if !self.replay.spikes.left_out() && !self.replay.rests {
-            self.evidence.add(record, &self.replay.rig);
         }
         renewed || judged
     }
@@ -229,7 +224,7 @@ impl Stream {
 
     /// What explains the last twenty minutes or so; none where they say too little.
     pub fn decision(&self) -> Option<Decision> {
-        self.replay.decision()
+        self.replay.decision().map(|decision| decision.read_by(&self.rig().columns, self.rig()))
     }
 
     /// The report as it stands, its verdict held against the last twenty minutes or so; `name` is the trace's. None before the
@@ -247,7 +242,7 @@ impl Stream {
         }
         let weighed = self.replay.last_stretch();
         let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
-            None => self.replay.wiring_so_far(&weighed, &self.evidence),
+            None => self.replay.wiring(decision, &weighed, &self.rig().columns),
             wiring => wiring,
         };
         let mut report = self.replay.report_with(summary, &weighed, decision, wiring);

@@ -34,7 +34,7 @@ impl Replay {
     ) -> ReplayReport {
         let draft = Draft::new(self, weighed, decision, trace);
         let verdict = draft.verdict(wiring.as_ref());
-        draft.report(verdict)
+        ReplayReport { wiring, ..draft.report(verdict) }
     }
 
     /// How the leak flows change at the pressures of [`leakage`](Self::leakage).

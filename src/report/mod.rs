@@ -22,6 +22,7 @@ use crate::times::Clock;
 use crate::trace::TraceQuality;
 use crate::units::LPM_PER_M3S;
 use crate::valve::ValveSummary;
+use crate::wiring::Wiring;
 use jiff::civil::Date;
 use pitchleak_core::{AlarmState, Estimate, Leak, PerLeak};
 use serde::Serialize;
@@ -56,6 +57,9 @@ pub struct ReplayReport {
     pub valve: Option<ValveSummary>,
     /// What to make of it.
     pub verdict: Verdict,
+    /// The mistake of wiring that explains the trace, if any does; `check` tells it by itself.
+    #[serde(skip)]
+    pub wiring: Option<Wiring>,
     /// How fast each leak changes; none where the data don't tell.
     pub trend: PerLeak<Option<LeakTrend>>,
     /// Every leak that the trace showed, in the order of time.

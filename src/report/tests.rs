@@ -59,6 +59,7 @@ impl Found {
             normalised_innovation: None,
             estimates: self.estimates,
             leakage: self.leakage,
+            wiring: None,
             hold: None,
             valve: None,
             changed_at_s: self.changed_at_s,
@@ -96,6 +97,7 @@ fn decision(active: PerLeak<bool>) -> Decision {
         misfit: 1.0,
         wander: 0.0,
         wiring: 0.0,
+        residuals: [None; 2],
     }
 }
 
@@ -106,6 +108,7 @@ fn explained(id: &str, cause: &str, probability: f64) -> Explained {
         text: cause.to_owned(),
         cause: cause.to_owned(),
         wiring: id.starts_with("exchanged"),
+        mistake: None,
         sensors: Vec::new(),
         remedy: None,
         columns: vec!["qa = \"qb\"".to_owned()],

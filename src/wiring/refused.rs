@@ -1,22 +1,23 @@
 //! Rows that the reader refuses because no sensor of the rig reads so much: which unit, or slipped decimal point, would bring
 //! them within its range. Evidence for people; nothing is read otherwise because of it.
 
-use super::blocks::Gatherer;
-use super::explanation::{Evidence, Explanation, Wiring};
-use super::force::{ForceSums, Scaled};
-use super::mistake::Mistake;
-use super::noise::RunningScatter;
-use super::readings::Readings;
-use super::{APART, MOST_ALIKE, POSSIBLE_SHARE};
+use super::Wiring;
+use crate::explain::{Mistake, Of};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
+use crate::told::{ForceSums, Gatherer, Scaled};
 use crate::trace::{OVERRANGE, Record};
-use crate::units::Dimension;
+use crate::units::{Dimension, readable};
 use pitchleak_core::Sample;
 use serde::{Deserialize, Serialize};
 
 /// Fewer rows say nothing.
 const LEAST_ROWS: u64 = 100;
+/// Share of the readings that must be possible on the rig.
+const POSSIBLE_SHARE: f64 = 0.99;
+/// Twice the log-likelihood that parts two units that can be told apart, and how many that can't be may be named.
+const APART: f64 = 25.0;
+const MOST_ALIKE: usize = 4;
 /// Mended readings reach this share of full scale at the least and at the most.
 const SHARE_OF_FULL_SCALE: std::ops::RangeInclusive<f64> = 0.005..=1.3;
 /// What is beyond so many times full scale is no sensor's reading in any unit.
@@ -43,7 +44,6 @@ pub struct Refused {
     last_refused_s: f64,
     gatherer: Gatherer,
     force: ForceSums,
-    scatter: RunningScatter,
 }
 
 /// One channel's readings.
@@ -55,6 +55,14 @@ struct Channel {
     extremes: Option<[f64; 2]>,
     /// How many times too large readings in another unit would be, and how many readings are possible then.
     factors: Vec<(f64, u64)>,
+}
+
+/// A unit that may be another one than the column says.
+struct Suspect {
+    mistake: Mistake,
+    of: Of,
+    factor: f64,
+    force: Option<Scaled>,
 }
 
 impl Refused {
@@ -70,7 +78,6 @@ impl Refused {
             last_refused_s: 0.0,
             gatherer: Gatherer::default(),
             force: ForceSums::default(),
-            scatter: RunningScatter::default(),
         }
     }
 
@@ -95,8 +102,7 @@ impl Refused {
         }
         let dt_s = self.last_s.replace(record.t_s).map_or(0.0, |last_s| record.t_s - last_s);
         let after_gap = !(0.0..=LONGEST_STEP_S).contains(&dt_s);
-        self.scatter.add(record);
-        let block = self.gatherer.add(&Record { dt_s, after_gap, ..*record }, &self.rig.cylinder);
+        let block = self.gatherer.add(&Record { dt_s, after_gap, ..*record });
         block.into_iter().for_each(|block| self.force.add(&block));
     }
 
@@ -115,43 +121,61 @@ impl Refused {
         [self.refused, self.rows]
     }
 
-    /// The unit, or the slipped decimal point, that brings within range what most rows were refused for, in words.
+    /// The unit, or the slipped decimal point, that brings within range what most rows were refused for, beside others that
+    /// the rows do not tell from it; `None` where none does, or too many.
     pub fn wiring(&self) -> Option<Wiring> {
-        self.explanation().map(|found| found.wiring(&self.rig.columns, &self.rig))
-    }
-
-    /// That unit, and others that the rows do not tell from it; `None` where none does, or too many.
-    fn explanation(&self) -> Option<Explanation> {
         if self.rows < LEAST_ROWS || 2 * self.refused <= self.rows {
             return None;
         }
-        let mut found: Vec<(Mistake, Option<Scaled>)> = self
-            .candidates()
-            .into_iter()
-            .map(|(readings, factor)| (Mistake::Scaled(readings, factor), self.force_with(readings, factor)))
-            .collect();
+        let mut found: Vec<Suspect> =
+            self.candidates().into_iter().map(|(of, factor)| self.suspect(of, factor)).collect();
         self.keep_balanced(&mut found);
-        let ratios = self.scatter.ratios(&self.rig);
-        if found.len() > 1 && found.iter().any(|(mistake, _)| ratios.betrays(*mistake).is_some()) {
-            found.retain(|(mistake, _)| ratios.betrays(*mistake).is_some());
+        let columns = &self.rig.columns;
+        let mut names: Vec<String> =
+            found.iter().map(|one| one.mistake.text() + &one.mistake.unit_text(columns)).collect();
+        let first = found.first().filter(|_| found.len() <= MOST_ALIKE)?;
+        let mut suggestion = self.within_range(first, names.first()?)?;
+        if names.len() > 1 {
+            suggestion += &format!("; cannot be told apart: {}", names.join(", "));
         }
-        let (first, force) = found.first()?;
-        let Mistake::Scaled(readings, factor) = first else { return None };
-        let evidence = Evidence::Range {
-            refused: self.refused,
-            rows: self.rows,
-            extremes: self.extremes(*readings, *factor)?,
-            force: force.as_ref().filter(|force| force.balances()).map(Scaled::left_n),
-        };
-        let mistakes: Vec<_> = found.iter().map(|(mistake, _)| *mistake).collect();
-        (mistakes.len() <= MOST_ALIKE).then_some(Explanation { mistakes, evidence })
+        Some(Wiring {
+            suggestion,
+            residual_before: None,
+            residual_after: None,
+            columns: first.mistake.mending(columns, &self.rig),
+            sensors: first.mistake.sensors().to_vec(),
+            alternatives: names.split_off(1),
+        })
+    }
+
+    fn suspect(&self, of: Of, factor: f64) -> Suspect {
+        Suspect { mistake: Mistake::Factor(of, factor), of, factor, force: self.force_with(of, factor) }
+    }
+
+    /// The evidence in words; `name` is what mends it.
+    fn within_range(&self, one: &Suspect, name: &str) -> Option<String> {
+        let unit = one.of.sensors().first()?.dimension().and_then(Dimension::for_people);
+        let extremes = self.extremes(one.of, one.factor)?;
+        let [least, most] = extremes.map(|value| unit.map_or(value, |unit| unit.from_si(value)));
+        let balanced = one.force.as_ref().filter(|force| force.balances()).map(Scaled::left_n);
+        let forces = balanced.map_or_else(String::new, |[before, after]| {
+            format!(", and balance the load force to {after:.0} N of {before:.0} N")
+        });
+        Some(format!(
+            "with {name} they are {} to {} {}, which the rig allows{forces}; as they stand {} of {} rows are out of range",
+            readable(least, 3),
+            readable(most, 3),
+            unit.map_or("", |unit| unit.text),
+            self.refused,
+            self.rows
+        ))
     }
 
     /// Factors on the readings that are out of range and, if need be, on their twin, that bring all within range.
-    fn candidates(&self) -> Vec<(Readings, f64)> {
-        use Readings::{FlowA, FlowB, Flows, Position, PressureA, PressureB, Pressures};
+    fn candidates(&self) -> Vec<(Of, f64)> {
+        use Of::{FlowA, FlowB, Flows, Position, PressureA, PressureB, Pressures};
         let beyond = |at: &usize| 2 * self.channels[*at].beyond > self.channels[*at].readings;
-        let groups: &[Readings] = match (0..CHANNELS.len()).filter(beyond).collect::<Vec<_>>()[..] {
+        let groups: &[Of] = match (0..CHANNELS.len()).filter(beyond).collect::<Vec<_>>()[..] {
             [0] => &[Position],
             [1] => &[PressureA, Pressures],
             [2] => &[PressureB, Pressures],
@@ -162,40 +186,39 @@ impl Refused {
             _ => &[],
         };
         let mut found = Vec::new();
-        for readings in groups {
-            let scaled = |at: usize| readings.signals().contains(&CHANNELS[at]);
+        for of in groups {
+            let scaled = |at: usize| of.sensors().contains(&CHANNELS[at]);
             let Some(first) = (0..CHANNELS.len()).find(|at| scaled(*at)) else { continue };
             for (factor, _) in &self.channels[first].factors {
                 let is_possible = |(at, channel): (usize, &Channel)| {
                     channel.is_possible(if scaled(at) { *factor } else { 1.0 })
                 };
                 if self.channels.iter().enumerate().all(is_possible) {
-                    found.push((*readings, *factor));
+                    found.push((*of, *factor));
                 }
             }
         }
         found
     }
 
-    fn force_with(&self, readings: Readings, factor: f64) -> Option<Scaled> {
-        let of = |signal| if readings.signals().contains(&signal) { factor } else { 1.0 };
-        let factors = [Signal::PressureA, Signal::PressureB].map(of);
+    fn force_with(&self, of: Of, factor: f64) -> Option<Scaled> {
+        let by = |signal| if of.sensors().contains(&signal) { factor } else { 1.0 };
+        let factors = [Signal::PressureA, Signal::PressureB].map(by);
         factors.iter().any(|factor| *factor > 1.0).then(|| self.force.scaled(&self.rig, factors))?
     }
 
     /// Where the load force balances the pressures with some factors, the others go.
-    fn keep_balanced(&self, found: &mut Vec<(Mistake, Option<Scaled>)>) {
-        let left = |force: &Option<Scaled>| force.as_ref().filter(|f| f.balances()).map(Scaled::deviance);
-        let best = found.iter().filter_map(|(_, force)| left(force)).min_by(f64::total_cmp);
-        let Some(best) = best else { return };
-        found.retain(|(_, force)| left(force).is_some_and(|deviance| deviance <= best + APART));
-        found.sort_by(|(_, a), (_, b)| left(a).partial_cmp(&left(b)).unwrap_or(std::cmp::Ordering::Equal));
+    fn keep_balanced(&self, found: &mut Vec<Suspect>) {
+        let left = |one: &Suspect| one.force.as_ref().filter(|force| force.balances()).map(Scaled::deviance);
+        let Some(best) = found.iter().filter_map(left).min_by(f64::total_cmp) else { return };
+        found.retain(|one| left(one).is_some_and(|deviance| deviance <= best + APART));
+        found.sort_by(|a, b| left(a).partial_cmp(&left(b)).unwrap_or(std::cmp::Ordering::Equal));
     }
 
     /// Least and largest reading once they are divided by `factor`, SI.
-    fn extremes(&self, readings: Readings, factor: f64) -> Option<[f64; 2]> {
+    fn extremes(&self, of: Of, factor: f64) -> Option<[f64; 2]> {
         let own = CHANNELS.iter().zip(&self.channels);
-        own.filter(|(signal, _)| readings.signals().contains(signal))
+        own.filter(|(signal, _)| of.sensors().contains(signal))
             .filter_map(|(_, channel)| channel.extremes)
             .reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
             .map(|extremes| extremes.map(|value| value / factor))

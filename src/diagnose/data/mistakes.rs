@@ -3,8 +3,11 @@
 use super::declared::Declared;
 use super::series::Series;
 use crate::channels::{ChannelFault, ChannelFaultKind};
+use crate::explain::{Mistake, Statistic, explain};
 use crate::signal::Signal;
-use crate::wiring::{Excerpt, Mistake, Recorded, Wiring, explain};
+use crate::told::Beside;
+use crate::wiring::Wiring;
+use pitchleak_core::PerLeak;
 
 /// The faults that the channels of these traces show, each kind once per channel.
 pub(crate) fn channel_faults(traces: &[Series], declared: &Declared) -> Vec<ChannelFault> {
@@ -35,7 +38,7 @@ fn is_no_flow(series: &Series, fault: &ChannelFault) -> bool {
 /// A mistake that explains the traces.
 pub(crate) struct Miswired {
     pub(crate) wiring: Wiring,
-    /// No effect could do the same: not so for a delay or a pressure's zero, which sensors have too.
+    /// No effect could do the same: not so for a pressure's zero, which sensors have too.
     pub(crate) is_beyond_effects: bool,
 }
 
@@ -46,15 +49,19 @@ pub(crate) fn miswired(traces: &[Series], declared: &Declared) -> Option<Miswire
         return None;
     }
     let rig = declared.rig();
-    let mut excerpt = Excerpt::default();
-    traces.iter().flat_map(Series::records).for_each(|record| excerpt.add(&record));
-    let records = excerpt.records();
-    let found = explain(&Recorded::new(&records, &rig)?)?;
-    let is_like_an_effect = |one: &Mistake| matches!(one, Mistake::Late(..) | Mistake::Absolute(_));
+    let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+    let mut evidence = Beside::default();
+    for record in traces.iter().flat_map(Series::records) {
+        statistic.push(record.step_s(), &record.sample);
+        evidence.add(&record, &rig);
+    }
+    let decision = explain(&statistic, &rig, PerLeak::default(), &evidence.told(&rig))?;
     let columns = traces.first().map(|series| series.columns.clone()).unwrap_or_default();
+    let is_absolute = |mistake: Mistake| matches!(mistake, Mistake::Absolute(_));
+    let first = decision.explanations.iter().find_map(|one| one.mistake);
     Some(Miswired {
-        wiring: found.wiring(&columns, &rig),
-        is_beyond_effects: !found.mistakes.iter().any(is_like_an_effect),
+        wiring: Wiring::of(&decision, &columns, &rig)?,
+        is_beyond_effects: !first.is_some_and(is_absolute),
     })
 }
 

@@ -6,6 +6,7 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::explain::{Decision, Explained, Statistic, explain};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{Leakage, ReasonId, ReplayReport};
+use pitchleak::told::Beside;
 use pitchleak::trace::{Record, TraceError, TraceReader};
 use std::io::Cursor;
 
@@ -123,12 +124,15 @@ impl VerdictGiver for Explain {
 
 fn explained(trace: &[u8], rig: &Rig) -> Result<Option<(Decision, f64)>, TraceError> {
     let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+    let mut evidence = Beside::default();
     let mut reader = TraceReader::from_stream("trace", Box::new(Cursor::new(trace.to_vec())), rig)?;
     let mut record = Record::default();
     while reader.next_record(&mut record)? {
         statistic.push(record.step_s(), &record.sample);
+        evidence.add(&record, rig);
     }
-    Ok(explain(&statistic, rig, PerLeak::default()).map(|decision| (decision, record.t_s)))
+    let decision = explain(&statistic, rig, PerLeak::default(), &evidence.told(rig));
+    Ok(decision.map(|decision| (decision, record.t_s)))
 }
 
 fn of_decision(decision: &Decision, end_s: f64) -> Given {

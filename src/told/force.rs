@@ -5,9 +5,7 @@
 //! noise, whatever its size. Where P_A + P_B is steady, exchanged pressures look like a load force of the wrong sign but for
 //! the mean: (P_A + P_B)(A_A − A_B), which no sensor's zero is.
 
-use super::blocks::Block;
-use super::priors::UNDECLARED_ZERO_SHARE;
-use super::{CONTRAST, LEAST_DROP};
+use super::block::Block;
 use crate::rig::Rig;
 use pitchleak_core::Cylinder;
 use serde::{Deserialize, Serialize};
@@ -19,10 +17,19 @@ const FREE: usize = 4;
 const DEGENERATE: f64 = 1e-9;
 /// Fewer blocks say nothing: ten seconds.
 const LEAST_BLOCKS: u32 = 40;
+/// A zero of a pressure or force sensor that nobody declared wrong, share of full scale, 1 σ. A guess.
+const UNDECLARED_ZERO_SHARE: f64 = 0.01;
+/// Blocks that follow each other are worth so much less than independent ones: friction is no noise. Chosen.
+const INDEPENDENT: f64 = 0.25;
+/// How often a force column is one as declared, of another sign or unit, and none at all. Guesses.
+const FORCE_SHARES: [f64; 3] = [0.9, 0.09, 0.01];
+/// A unit of the pressures is told where it leaves so many times less, and this of twice the log-likelihood. Chosen.
+const CONTRAST: f64 = 4.0;
+const LEAST_DROP: f64 = 60.0;
 
 /// Sums over blocks, in constant memory.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub(super) struct ForceSums {
+pub(crate) struct ForceSums {
     /// Of the products of any two terms.
     products: [[f64; TERMS]; TERMS],
     blocks: u32,
@@ -32,13 +39,11 @@ pub(super) struct ForceSums {
 impl ForceSums {
     /// Takes in the next block; one without a load force says nothing.
     pub fn add(&mut self, block: &Block) {
-        let mean = |integral: f64| integral / block.time_s;
-        let speed_mps = mean(block.travel_m);
+        let speed_mps = block.speed_mps;
         let last_mps = std::mem::replace(&mut self.last_speed_mps, speed_mps);
-        let Some(force) = block.force else { return };
-        let acceleration = if block.follows { mean(speed_mps - last_mps) } else { 0.0 };
-        let [pa, pb] = [&block.a, &block.b].map(|chamber| mean(chamber.pressure));
-        let terms = [1.0, speed_mps, speed_mps.signum(), acceleration, mean(force), pa, pb];
+        let [_, Some(pa), Some(pb), .., Some(force)] = block.means else { return };
+        let acceleration = if block.follows { (speed_mps - last_mps) / block.time_s } else { 0.0 };
+        let terms = [1.0, speed_mps, speed_mps.signum(), acceleration, force, pa, pb];
         for (row, term) in self.products.iter_mut().zip(terms) {
             for (sum, other) in row.iter_mut().zip(terms) {
                 *sum += term * other;
@@ -47,22 +52,22 @@ impl ForceSums {
         self.blocks = self.blocks.saturating_add(1);
     }
 
-    /// Of all these stretches.
-    pub fn of<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
-        parts.fold(Self::default(), |mut all, part| {
-            for (row, other) in all.products.iter_mut().zip(&part.products) {
-                row.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
-            }
-            all.blocks = all.blocks.saturating_add(part.blocks);
-            all
-        })
+    /// Of both stretches.
+    pub fn with(&self, other: &Self) -> Self {
+        let mut both = *self;
+        for (row, other) in both.products.iter_mut().zip(&other.products) {
+            row.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+        }
+        both.blocks = both.blocks.saturating_add(other.blocks);
+        both
     }
 
     /// The balance with P_A and P_B divided by `factors`; `None` of too few blocks, or without a load force that changes.
     pub fn scaled(&self, rig: &Rig, [by_a, by_b]: [f64; 2]) -> Option<Scaled> {
         let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
         let ([[load, of_a, of_b], ..], weights) = (self.left(), [area_a_m2 / by_a, -area_b_m2 / by_b]);
-        let Left { as_read, without, zeros: [zero, _], .. } = Left::of(self, weights, zero_std_n(rig));
+        let Left { as_read, without, zeros: [zero, _], .. } =
+            Left::of(self.left(), self.means(), weights, zero_std_n(rig));
         let slope = (weights[0] * of_a + weights[1] * of_b) / load;
         (self.blocks >= LEAST_BLOCKS && load > 0.0).then(|| Scaled {
             as_read,
@@ -98,7 +103,7 @@ impl ForceSums {
 
 /// The balance with pressures that are divided by factors.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scaled {
+pub(crate) struct Scaled {
     as_read: f64,
     without: f64,
     /// By how much the load force would have to be larger.
@@ -137,41 +142,51 @@ impl Scaled {
 struct Left {
     /// Sum of squares with the load force as it is read, N², …
     as_read: f64,
-    /// … times any factor, …
+    /// … that of the force where the pressures' is any times it, …
     with_any_factor: f64,
-    /// … and without it.
+    /// … that of the pressures, and of the force, alone.
     without: f64,
+    force: f64,
     /// How far its zero is off as the load force is read, and times that factor, standard deviations.
     zeros: [f64; 2],
 }
 
 impl Left {
     /// With these weights of P_A and P_B, m²; `zero_std` is by how far the sensors' zeros may be off together, N.
-    fn of(sums: &ForceSums, [a, b]: [f64; 2], zero_std: f64) -> Self {
-        let ([[ff, fa, fb], [_, aa, ab], [_, _, bb]], [f, pa, pb]) = (sums.left(), sums.means());
+    fn of(
+        [[ff, fa, fb], [_, aa, ab], [_, _, bb]]: [[f64; TERMS - FREE]; TERMS - FREE],
+        [f, pa, pb]: [f64; TERMS - FREE],
+        [a, b]: [f64; 2],
+        zero_std: f64,
+    ) -> Self {
         let (square, product) = (a * a * aa + 2.0 * a * b * ab + b * b * bb, a * fa + b * fb);
+        let factor = product / square.max(f64::MIN_POSITIVE);
         Self {
             as_read: (square - 2.0 * product + ff).max(0.0),
-            with_any_factor: (square - product * product / ff).max(0.0),
+            with_any_factor: (ff - product * factor).max(0.0),
             without: square,
-            zeros: [1.0, product / ff].map(|factor| (a * pa + b * pb - factor * f) / zero_std),
+            force: ff,
+            zeros: [1.0, factor]
+                .map(|factor| (factor * (a * pa + b * pb) - f) / (zero_std * 1.0_f64.max(factor.abs()))),
         }
     }
 
-    /// Whether the load force, as it is read, explains these pressures, and the `other` ones not by any factor, as its sign or
-    /// unit may be wrong, too, unless with a zero that no sensor has. The noise is the residual: twice the
-    /// log-likelihood ratio is n ln of the sums' ratio.
-    fn explains_better_than(&self, other: &Self, blocks: u32) -> bool {
-        let exceeds = |square: f64| {
-            let ratio = square / self.as_read.max(f64::MIN_POSITIVE);
-            ratio >= CONTRAST && f64::from(blocks) * ratio.ln() >= LEAST_DROP
-        };
-        let ([own, _], [_, others]) = (self.zeros, other.zeros);
-        exceeds(self.without)
-            && exceeds(other.as_read)
-            && (exceeds(other.with_any_factor) || others * others - own * own >= LEAST_DROP)
+    /// Of a force that is as declared, of another sign or unit, or none; its noise is the residual, and so many blocks
+    /// are independent.
+    fn ln_likelihood(&self, blocks: f64) -> f64 {
+        let squares = [self.as_read, self.with_any_factor, self.force];
+        let zeros = [self.zeros[0], self.zeros[1], 0.0];
+        let each = [0, 1, 2].map(|at: usize| {
+            let square = squares[at].max(LEAST_SHARE * self.force).max(f64::MIN_POSITIVE);
+            FORCE_SHARES[at].ln() - 0.5 * (blocks * square.ln() + zeros[at] * zeros[at])
+        });
+        let most = each.into_iter().fold(f64::MIN, f64::max);
+        most + each.into_iter().map(|ln| (ln - most).exp()).sum::<f64>().ln()
     }
 }
+
+/// What is left of a force without noise counts as this share of the forces' own square.
+const LEAST_SHARE: f64 = 1e-4;
 
 /// By how far the sensors' zeros may be off together, 1 σ, N.
 fn zero_std_n(rig: &Rig) -> f64 {
@@ -180,37 +195,40 @@ fn zero_std_n(rig: &Rig) -> f64 {
     UNDECLARED_ZERO_SHARE * pressures_n.hypot(rig.instruments.force.full_scale)
 }
 
-/// What the force balance says of the pressures.
-pub(crate) struct ForceBalance {
-    declared: Left,
-    exchanged: Left,
-    blocks: u32,
+/// What the load force says of the pressures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceBalance {
+    /// Products of F, P_A and P_B that the free terms leave, and their means.
+    left: [[f64; TERMS - FREE]; TERMS - FREE],
+    means: [f64; TERMS - FREE],
+    /// By how far the sensors' zeros may be off together, 1 σ, N.
+    zero_std_n: f64,
+    /// Independent blocks.
+    worth: f64,
+    area_m2: [f64; 2],
 }
 
 impl ForceBalance {
-    /// By these sums; `None` of too few, or without a load force that changes.
+    /// By these sums; none of too few blocks, or without a load force that changes.
     pub(super) fn of(sums: &ForceSums, rig: &Rig) -> Option<Self> {
-        let ([[load, ..], ..], blocks) = (sums.left(), sums.blocks);
-        let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
-        let of = |weights| Left::of(sums, weights, zero_std_n(rig));
-        (blocks >= LEAST_BLOCKS && load > 0.0).then(|| Self {
-            declared: of([area_a_m2, -area_b_m2]),
-            exchanged: of([-area_b_m2, area_a_m2]),
-            blocks,
+        let left = sums.left();
+        (sums.blocks >= LEAST_BLOCKS && left[0][0] > 0.0).then(|| Self {
+            left,
+            means: sums.means(),
+            zero_std_n: zero_std_n(rig),
+            worth: INDEPENDENT * f64::from(sums.blocks),
+            area_m2: [rig.cylinder.area_a_m2, rig.cylinder.area_b_m2],
         })
     }
 
-    /// Whether it holds with the pressures as they are read alone.
-    pub fn holds(&self) -> bool {
-        self.declared.explains_better_than(&self.exchanged, self.blocks)
+    /// ln of how much likelier the force is where P_A and P_B are `by` times those read, or exchanged, than as they are.
+    pub fn ln_ratio(&self, by: [f64; 2], exchanged: bool) -> f64 {
+        let [a, b] = self.area_m2;
+        let weights = if exchanged { [-b, a] } else { [a * by[0], -b * by[1]] };
+        self.ln_likelihood(weights) - self.ln_likelihood([a, -b])
     }
 
-    /// Whether it holds with the pressures exchanged alone: the root mean square of the residual as they are read and
-    /// exchanged, N.
-    pub fn holds_exchanged(&self) -> Option<[f64; 2]> {
-        let rms = |square: f64| (square / f64::from(self.blocks)).sqrt();
-        self.exchanged
-            .explains_better_than(&self.declared, self.blocks)
-            .then(|| [rms(self.declared.as_read), rms(self.exchanged.as_read)])
+    fn ln_likelihood(&self, weights: [f64; 2]) -> f64 {
+        Left::of(self.left, self.means, weights, self.zero_std_n).ln_likelihood(self.worth)
     }
 }

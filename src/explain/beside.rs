@@ -1,0 +1,91 @@
+//! What is [told](crate::told) beside the statistic, of the table's mistakes.
+
+use super::readings::{Mistake, Of};
+use crate::rig::Rig;
+use crate::told::Told;
+use pitchleak_core::ATMOSPHERE_PA;
+
+/// Readings reach at the most so many times full scale. Chosen.
+const MOST_OF_FULL_SCALE: f64 = 1.5;
+/// A position may be so far beyond the stroke's ends, share of it. Chosen.
+const BEYOND_STROKE: f64 = 0.05;
+/// Readings that reach over less than so many standard deviations of their noise say nothing. Chosen.
+const CONTENT_SIGMAS: f64 = 12.0;
+
+impl Told {
+    /// ln by which the odds of a mistake change.
+    pub(super) fn ln_odds(&self, mistake: Mistake) -> f64 {
+        let ratio = |by: [f64; 2], exchanged| self.force.map_or(0.0, |force| force.ln_ratio(by, exchanged));
+        match mistake {
+            Mistake::PressuresExchanged | Mistake::ChambersExchanged => ratio([1.0; 2], true),
+            Mistake::Factor(Of::PressureA, factor) => ratio([1.0 / factor, 1.0], false),
+            Mistake::Factor(Of::PressureB, factor) => ratio([1.0, 1.0 / factor], false),
+            Mistake::Factor(Of::Pressures, factor) => ratio([1.0 / factor; 2], false),
+            _ => 0.0,
+        }
+    }
+
+    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges, and are more than noise.
+    pub(super) fn allows(&self, mistake: Mistake, rig: &Rig) -> bool {
+        match mistake {
+            Mistake::Factor(of, factor) => of.channels().iter().all(|channel| {
+                self.extremes[*channel]
+                    .is_none_or(|extremes| allows(*channel, extremes.map(|value| value / factor), rig))
+            }),
+            Mistake::LostSign(_) => false,
+            _ => true,
+        }
+    }
+
+    /// The flows that lost their signs, and the ln likelihood ratio of that: a flow that is never negative while the piston moves
+    /// both ways has lost it, too, where the other one has.
+    pub(super) fn lost_sign(&self) -> Option<(Of, f64)> {
+        let (of, ln_ratio) = match self.signs.map(|sign| sign.ln_lost) {
+            [Some(a), Some(b)] => (Of::Flows, a.max(b)),
+            [Some(a), None] => (Of::FlowA, a),
+            [None, Some(b)] => (Of::FlowB, b),
+            [None, None] => return None,
+        };
+        (ln_ratio > 0.0).then_some((of, ln_ratio))
+    }
+
+    /// Whether these flows were never negative: of such one that seems to count the other way may have lost its sign.
+    pub(super) fn is_unsigned(&self, of: Of) -> bool {
+        let [a, b] = self.signs.map(|sign| sign.is_unsigned);
+        match of {
+            Of::FlowA => a,
+            Of::FlowB => b,
+            Of::Flows => a && b,
+            _ => false,
+        }
+    }
+}
+
+fn allows(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
+    let (sheets, sensors) = (&rig.instruments, rig.sensors());
+    let pressure = [-ATMOSPHERE_PA, MOST_OF_FULL_SCALE * sheets.pressure.full_scale];
+    let flow = |full_scale: f64| [-MOST_OF_FULL_SCALE * full_scale, MOST_OF_FULL_SCALE * full_scale];
+    let stroke_m = rig.cylinder.stroke_m;
+    let (range, noise_std) = match channel {
+        0 => ([-BEYOND_STROKE * stroke_m, (1.0 + BEYOND_STROKE) * stroke_m], sensors.position.noise_std),
+        1 | 2 => (pressure, sensors.pressure.noise_std),
+        3 => (flow(sheets.flow_a.full_scale), sensors.flow_a.noise_std),
+        _ => (flow(sheets.flow_b.full_scale), sensors.flow_b.noise_std),
+    };
+    range[0] <= least && most <= range[1] && most - least >= CONTENT_SIGMAS * noise_std
+}
+
+impl Of {
+    /// Among x, P_A, P_B, Q_A and Q_B.
+    pub(super) fn channels(self) -> &'static [usize] {
+        match self {
+            Self::Position => &[0],
+            Self::PressureA => &[1],
+            Self::PressureB => &[2],
+            Self::Pressures => &[1, 2],
+            Self::FlowA => &[3],
+            Self::FlowB => &[4],
+            Self::Flows => &[3, 4],
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The unit of readings by their scatter alone, which the equations don't tell at rest.
+//!
+//! Either a data sheet tells the noise of all sensors exactly, or of none: with r the scatter over the sheet's,
+//! p(r) = w Π N(ln r; 0, σ_exact²) + (1 − w) Π N(ln r; 0, σ_wide²) over the channels. A mistake by a factor f divides its channels' r
+//! by f. So it takes all other sensors to be as their sheets say before one of them is believed to be in another unit.
+
+use super::readings::Mistake;
+use crate::rig::Rig;
+use pitchleak_core::continuity::CHANNELS;
+
+/// How often a data sheet tells the noise exactly. A guess.
+const EXACT_SHARE: f64 = 0.2;
+/// Spread of ln r where it does, and where it does not. Guesses.
+const EXACT: f64 = 0.06;
+const WIDE: f64 = 1.0;
+/// Readings that scatter less are rounded or computed, and tell no unit.
+const LEAST_RATIO: f64 = 1e-3;
+
+/// ln by which the scatter changes the odds of `mistake`.
+pub(super) fn ln_odds(scatter: &[Option<f64>; CHANNELS], mistake: Mistake, rig: &Rig) -> f64 {
+    let Mistake::Factor(of, factor) = mistake else { return 0.0 };
+    let sensors = rig.sensors();
+    let sheets = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
+    let mut ln_ratios = [0.0; CHANNELS];
+    for ((ln_ratio, scatter), sheet) in ln_ratios.iter_mut().zip(scatter).zip(sheets) {
+        let ratio = scatter.map_or(0.0, |std| std / sheet.noise_std);
+        if !(ratio.is_finite() && ratio > LEAST_RATIO) {
+            return 0.0;
+        }
+        *ln_ratio = ratio.ln();
+    }
+    let as_read = ln_density(&ln_ratios);
+    of.channels().iter().for_each(|channel| ln_ratios[*channel] -= factor.ln());
+    ln_density(&ln_ratios) - as_read
+}
+
+fn ln_density(ln_ratios: &[f64; CHANNELS]) -> f64 {
+    let normal = |std: f64| -> f64 {
+        ln_ratios.iter().map(|ln_ratio| -0.5 * (ln_ratio / std).powi(2) - std.ln()).sum()
+    };
+    let (exact, wide) = (EXACT_SHARE.ln() + normal(EXACT), (1.0 - EXACT_SHARE).ln() + normal(WIDE));
+    let most = exact.max(wide);
+    most + ((exact - most).exp() + (wide - most).exp()).ln()
+}
