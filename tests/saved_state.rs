@@ -61,10 +61,10 @@ fn interrupted_anywhere_it_goes_on_to_the_last_bit() {
 #[test]
 fn another_version_is_named_and_what_is_none_is_not() {
     let mut state = streams()[0].save().unwrap();
-    let version = b"\x71pitchleak.state/".len();
+    let version = b"\x72pitchleak.state/".len();
     state[version] = b'0';
     assert!(
-        matches!(Stream::restore(&state), Err(RestoreError::Version(name)) if name == "pitchleak.state/0")
+        matches!(Stream::restore(&state), Err(RestoreError::Version(name)) if name == "pitchleak.state/00")
     );
     state[version] = b'\x1b';
     assert!(matches!(Stream::restore(&state), Err(RestoreError::Content(_))));
@@ -95,7 +95,7 @@ fn nothing_missing_and_nothing_more_is_read() {
         }
         assert!(matches!(Stream::restore(&[&saved[..], b"\0"].concat()), Err(RestoreError::Checksum)));
         assert!(matches!(Stream::restore(&[&saved[..], &saved[..]].concat()), Err(RestoreError::Checksum)));
-        let older = [b"\x71pitchleak.state/3", &saved[18..]].concat();
+        let older = [b"\x71pitchleak.state/3", &saved[19..]].concat();
         assert!(
             matches!(Stream::restore(&older), Err(RestoreError::Version(version)) if version.ends_with('3'))
         );

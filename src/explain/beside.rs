@@ -9,8 +9,6 @@ use pitchleak_core::ATMOSPHERE_PA;
 const MOST_OF_FULL_SCALE: f64 = 1.5;
 /// A position may be so far beyond the stroke's ends, share of it. Chosen.
 const BEYOND_STROKE: f64 = 0.05;
-/// Readings that reach over less than so many standard deviations of their noise say nothing. Chosen.
-const CONTENT_SIGMAS: f64 = 12.0;
 
 impl Told {
     /// ln by which the odds of a mistake change.
@@ -25,7 +23,7 @@ impl Told {
         }
     }
 
-    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges, and are more than noise.
+    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges.
     pub(super) fn allows(&self, mistake: Mistake, rig: &Rig) -> bool {
         match mistake {
             Mistake::Factor(of, factor) => of.channels().iter().all(|channel| {
@@ -62,17 +60,16 @@ impl Told {
 }
 
 fn allows(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
-    let (sheets, sensors) = (&rig.instruments, rig.sensors());
-    let pressure = [-ATMOSPHERE_PA, MOST_OF_FULL_SCALE * sheets.pressure.full_scale];
+    let sheets = &rig.instruments;
     let flow = |full_scale: f64| [-MOST_OF_FULL_SCALE * full_scale, MOST_OF_FULL_SCALE * full_scale];
     let stroke_m = rig.cylinder.stroke_m;
-    let (range, noise_std) = match channel {
-        0 => ([-BEYOND_STROKE * stroke_m, (1.0 + BEYOND_STROKE) * stroke_m], sensors.position.noise_std),
-        1 | 2 => (pressure, sensors.pressure.noise_std),
-        3 => (flow(sheets.flow_a.full_scale), sensors.flow_a.noise_std),
-        _ => (flow(sheets.flow_b.full_scale), sensors.flow_b.noise_std),
+    let range = match channel {
+        0 => [-BEYOND_STROKE * stroke_m, (1.0 + BEYOND_STROKE) * stroke_m],
+        1 | 2 => [-ATMOSPHERE_PA, MOST_OF_FULL_SCALE * sheets.pressure.full_scale],
+        3 => flow(sheets.flow_a.full_scale),
+        _ => flow(sheets.flow_b.full_scale),
     };
-    range[0] <= least && most <= range[1] && most - least >= CONTENT_SIGMAS * noise_std
+    range[0] <= least && most <= range[1]
 }
 
 impl Of {

@@ -7,6 +7,7 @@ use super::hypothesis::{CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, 
 use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::pass::Pass;
+use super::scatter::ln_ratios;
 use super::table::{Entry, USUAL};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
@@ -17,8 +18,9 @@ const STATES_WITH_PAIRS: usize = 3;
 const STATES_WITH_COURSES: usize = 5;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
-/// Compressibility, as its declared one's share more: no oil is stiffer than without end, and with so much air it is foam. Chosen.
-const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -1.0..=5.0;
+/// Compressibility beyond the declared one, as its share: no oil is four times as stiff as its sheet says, and with six times its
+/// compressibility it is foam. Chosen.
+const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -0.75..=5.0;
 
 /// How each leak goes, as far as it is there.
 type Leaks = [Option<LeakCourse>; 3];
@@ -179,13 +181,14 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
-        let whole = self.pass.products.whole().quiet();
+        let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
         let mut kept = Vec::new();
+        let scatters = ln_ratios(&self.pass.statistic.scatter(), self.pass.rig).is_some();
         for (entry, mistake, ln_told) in self.pass.mistakes() {
             let equations = self.pass.equations(&whole, Some(entry), &columns);
-            let mended = Mended::new(equations, self.declared, mistake, scales);
+            let mended = Mended::new(equations, self.declared, mistake, scales, scatters);
             let ln_prior = entry.share.ln() - ln_wired + ln_told + mended.ln_measure;
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
             kept.push(mended);

@@ -1,7 +1,7 @@
 //! Normal equations of the columns of all explanations, from the statistic.
 
 use super::columns::{Column, Course, PerChamber, Scales};
-use super::raw_products::RawProducts;
+use super::raw_products::{RawProducts, SegmentProducts};
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 use std::collections::HashMap;
 
@@ -39,8 +39,13 @@ impl<'a> Square<'a> {
 type Sparse = Vec<(usize, f64)>;
 
 impl NormalEquations {
-    /// Of `columns`, the first of which is the left side.
-    pub fn new(products: &RawProducts, scales: &Scales<'_>, columns: &[(Column, Course)]) -> Self {
+    /// Of `columns`, the first of which is the left side; `noise_of` is what their noise is taken to be in a segment.
+    pub fn new(
+        products: &RawProducts,
+        scales: &Scales<'_>,
+        columns: &[(Column, Course)],
+        noise_of: fn(&SegmentProducts) -> &[Vec<f64>; EQUATIONS],
+    ) -> Self {
         let size = columns.len();
         let mut own = Self {
             size,
@@ -58,7 +63,8 @@ impl NormalEquations {
                 columns.iter().map(|(column, course)| combine(&kinds[column], shares(course))).collect();
             for equation in 0..EQUATIONS {
                 accumulate(&mut own.gram[equation], &sparse, &segment.gram[equation]);
-                accumulate(&mut own.noise[equation], &sparse, &segment.noise[equation]);
+                accumulate(&mut own.noise[equation], &sparse, &noise_of(segment)[equation]);
+                own.left_noise[equation][0] += square(&sparse[0], &segment.noise[equation]);
                 own.left_noise[equation][1] += square(&sparse[0], &segment.scattered[equation]);
                 own.rows[equation] += segment.rows[equation];
             }
@@ -102,7 +108,7 @@ impl NormalEquations {
     /// Columns that are mostly noise are zero. The left side's noise is what the residual is measured by.
     fn silence(&mut self, columns: &[(Column, Course)]) {
         for equation in 0..EQUATIONS {
-            self.left_noise[equation][0] = std::mem::take(&mut self.noise[equation][0]);
+            self.noise[equation][0] = 0.0;
             for (place, (column, _)) in columns.iter().enumerate().skip(1) {
                 let is_leak = matches!(column, Column::LeakInternal | Column::LeakA | Column::LeakB);
                 let power = self.gram(equation).row(place)[place];

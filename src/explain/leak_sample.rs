@@ -35,10 +35,17 @@ pub(super) struct Weighed<'a> {
     pub weights: Vec<f64>,
 }
 
+/// What an explanation is weighed by: its equations, and the noise scales that the readings' own scatter makes in them.
+#[derive(Clone, Copy)]
+pub(super) struct Weighing<'e> {
+    pub equations: &'e NormalEquations,
+    pub loudness: [f64; 2],
+}
+
 /// An explanation and its fit.
 struct Fitted<'e, 'a> {
     pass: &'e Pass<'a, 'e>,
-    equations: &'e NormalEquations,
+    weighing: Weighing<'e>,
     hypothesis: Hypothesis<'a>,
     fit: Fit,
 }
@@ -47,12 +54,12 @@ struct Fitted<'e, 'a> {
 /// where it is less probable than that by more than `least_ln`.
 pub(super) fn cut<'a>(
     pass: &Pass<'a, '_>,
-    equations: &NormalEquations,
+    weighing: Weighing<'_>,
     Scored { hypothesis, ln_posterior, .. }: Scored<'a>,
     best: f64,
     least_ln: f64,
 ) -> Option<(f64, Weighed<'a>)> {
-    let fit = fit(equations, &hypothesis.free);
+    let fit = fit(weighing.equations, &hypothesis.free);
     let means: Vec<f64> = hypothesis.positive.iter().map(|&i| fit.means[i]).collect();
     let covariance = fit.covariance(&hypothesis.positive);
     let heights = means.iter().enumerate().map(|(i, mean)| mean / covariance[i][i].sqrt());
@@ -63,7 +70,7 @@ pub(super) fn cut<'a>(
     let count = if ln_posterior < best - LITTLE_LN { FEW_POINTS } else { POINTS };
     let orthant = positive_orthant(&means, &covariance, count);
     let ln = ln_posterior + orthant.ln_probability;
-    Some((ln, Fitted { pass, equations, hypothesis, fit }.weighed(orthant)))
+    Some((ln, Fitted { pass, weighing, hypothesis, fit }.weighed(orthant)))
 }
 
 impl<'a> Fitted<'_, 'a> {
@@ -100,7 +107,7 @@ impl<'a> Fitted<'_, 'a> {
 
     /// Where a steady column stands among the free parameters.
     fn place(&self, column: Column) -> Option<usize> {
-        let place = self.equations.place(column, Course::Constant)?;
+        let place = self.weighing.equations.place(column, Course::Constant)?;
         self.hypothesis.free.iter().position(|free| free.column == place)
     }
 
@@ -115,7 +122,7 @@ impl<'a> Fitted<'_, 'a> {
 
     /// Noise scales over the scatter of the readings themselves: louder sensors are no doubt about the model.
     fn misfits(&self) -> [f64; 2] {
-        [0, 1].map(|c| self.fit.scales[c].sqrt() / self.pass.scatter[c])
+        [0, 1].map(|c| (self.fit.scales[c] / self.weighing.loudness[c]).sqrt())
     }
 
     /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of pressure sensors.

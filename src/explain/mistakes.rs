@@ -12,15 +12,10 @@ const OTHERS: f64 = 0.005;
 /// An entry's id, what it is, and how it is told.
 type Row = (&'static str, Mistake, &'static str);
 
-const EXCHANGES: [Row; 10] = [
+const EXCHANGES: [Row; 9] = [
     ("exchanged_flows", Mistake::FlowsExchanged, "qa and qb are exchanged"),
     ("exchanged_pressures", Mistake::PressuresExchanged, "pa and pb are exchanged"),
     ("exchanged_chambers", Mistake::ChambersExchanged, "the chambers A and B are exchanged"),
-    (
-        "exchanged_turned_flows",
-        Mistake::FlowsExchangedAndTurned,
-        "qa and qb are exchanged, and count the other way",
-    ),
     ("sign_qa", Mistake::Sign(Of::FlowA), "qa counts the other way"),
     ("sign_qb", Mistake::Sign(Of::FlowB), "qb counts the other way"),
     ("sign_flows", Mistake::Sign(Of::Flows), "qa and qb count the other way"),
@@ -29,7 +24,12 @@ const EXCHANGES: [Row; 10] = [
     ("lost_sign_flows", Mistake::LostSign(Of::Flows), "qa and qb lost their signs"),
 ];
 
-const ODD: [Row; 5] = [
+const ODD: [Row; 6] = [
+    (
+        "exchanged_turned_flows",
+        Mistake::FlowsExchangedAndTurned,
+        "qa and qb are exchanged, and count the other way",
+    ),
     ("other_end", Mistake::OtherEnd, "x counts from the B end"),
     ("absolute_pressures", Mistake::Absolute(Of::Pressures), "the pressures are absolute"),
     ("absolute_pa", Mistake::Absolute(Of::PressureA), "pa is absolute"),

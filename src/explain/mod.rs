@@ -19,7 +19,7 @@ mod pass;
 mod posterior;
 mod raw_products;
 mod readings;
-mod scatter;
+pub(crate) mod scatter;
 mod sensors;
 mod sizes;
 mod still;

@@ -5,13 +5,13 @@ use super::equations::NormalEquations;
 use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes};
 use super::mistakes;
 use super::odds::Prior;
-use super::raw_products::{RawProducts, Statistic};
+use super::raw_products::{RawProducts, SegmentProducts, Statistic};
 use super::readings::{Mistake, Readings};
 use super::scatter;
 use super::table::{self, Entry, USUAL};
 use crate::rig::{Odds, Rig};
 use crate::told::Told;
-use pitchleak_core::continuity::CHANNELS;
+use pitchleak_core::continuity::{CHANNELS, EQUATIONS};
 use pitchleak_core::{Leak, PerLeak};
 
 /// The table as it is weighed.
@@ -97,7 +97,12 @@ impl<'a, 's> Pass<'a, 's> {
         mistake: Option<&Entry>,
         columns: &[(Column, Course)],
     ) -> NormalEquations {
-        NormalEquations::new(products, &self.scales(mistake), columns)
+        // The sheet's noise is too much for columns in a larger unit.
+        let noise_of: fn(&SegmentProducts) -> &[Vec<f64>; EQUATIONS] = match mistake {
+            Some(_) => |segment| &segment.quiet,
+            None => |segment| &segment.noise,
+        };
+        NormalEquations::new(products, &self.scales(mistake), columns, noise_of)
     }
 
     pub fn scales(&self, mistake: Option<&Entry>) -> Scales<'s> {

@@ -4,7 +4,8 @@ use super::candidates::{Candidates, Scored};
 use super::equations::NormalEquations;
 use super::evidence::fit;
 use super::independence::inflation;
-use super::leak_sample::{Weighed, cut};
+use super::leak_sample::{Weighed, Weighing, cut};
+use super::mended::Mended;
 use super::pass::{Pass, Tables};
 use super::raw_products::{RawProducts, Statistic};
 use crate::rig::Rig;
@@ -89,8 +90,10 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     let mut candidates = Candidates::with_constant_leaks(pass, declared);
     candidates.add_courses(LEAST_LN);
     let mended = candidates.add_mistakes(LEAST_LN);
-    let equations: Vec<&NormalEquations> =
-        std::iter::once(declared).chain(mended.iter().map(|mended| &mended.equations)).collect();
+    let as_declared =
+        Weighing { equations: declared, loudness: pass.scatter.map(|scatter| scatter * scatter) };
+    let weighings: Vec<Weighing<'_>> =
+        std::iter::once(as_declared).chain(mended.iter().map(Mended::weighing)).collect();
     let all = candidates.best_first();
     let residual = |is: &dyn Fn(&Scored<'_>) -> bool| {
         let best = all.iter().find(|one| is(one) && one.ln_posterior.is_finite())?;
@@ -98,13 +101,13 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
         Some((best.scales[0] * unit[0]).max(best.scales[1] * unit[1]).sqrt())
     };
     let residuals = [residual(&|one| one.wiring == 0), residual(&|one| one.wiring > 0)];
-    Posterior { weighed: mix(pass, &equations, all, least_ln), residuals }
+    Posterior { weighed: mix(pass, &weighings, all, least_ln), residuals }
 }
 
 /// Cuts leaks at zero, best first, until what follows cannot matter.
 fn mix<'a>(
     pass: &Pass<'a, '_>,
-    equations: &[&NormalEquations],
+    weighings: &[Weighing<'_>],
     all: Vec<Scored<'a>>,
     least_ln: f64,
 ) -> Vec<Weighed<'a>> {
@@ -114,8 +117,8 @@ fn mix<'a>(
         if !scored.ln_posterior.is_finite() || scored.ln_posterior < best - least_ln {
             break;
         }
-        let Some(equations) = equations.get(scored.wiring) else { continue };
-        let Some((ln, weighed)) = cut(pass, equations, scored, best, least_ln) else { continue };
+        let Some(weighing) = weighings.get(scored.wiring) else { continue };
+        let Some((ln, weighed)) = cut(pass, *weighing, scored, best, least_ln) else { continue };
         best = best.max(ln);
         kept.push((ln, weighed));
     }

@@ -107,14 +107,6 @@ impl RawProducts {
         Self { segments: vec![whole], total_s: self.total_s }
     }
 
-    /// With the noise that readings in whatever unit have at the most: the sheet's is too much for those in a larger one.
-    pub fn quiet(mut self) -> Self {
-        for segment in &mut self.segments {
-            segment.noise = std::mem::take(&mut segment.quiet);
-        }
-        self
-    }
-
     /// Mean size of the pressures across the leaks from a segment on, Pa.
     pub fn mean_pressures_pa(&self, from: usize) -> PerLeak<f64> {
         let later = || self.segments.iter().skip(from);

@@ -13,25 +13,32 @@ const EXACT_SHARE: f64 = 0.2;
 /// Spread of ln r where it does, and where it does not. Guesses.
 const EXACT: f64 = 0.06;
 const WIDE: f64 = 1.0;
-/// Readings that scatter less are rounded or computed, and tell no unit.
-const LEAST_RATIO: f64 = 1e-3;
+/// Readings that scatter less, in that of their sheet, are computed, and their noise tells no unit.
+const LEAST_RATIO: f64 = 0.01;
 
 /// ln by which the scatter changes the odds of `mistake`.
-pub(super) fn ln_odds(scatter: &[Option<f64>; CHANNELS], mistake: Mistake, rig: &Rig) -> f64 {
-    let Mistake::Factor(of, factor) = mistake else { return 0.0 };
+pub(crate) fn ln_odds(scatter: &[Option<f64>; CHANNELS], mistake: Mistake, rig: &Rig) -> f64 {
+    let (Mistake::Factor(of, factor), Some(mut ln_ratios)) = (mistake, ln_ratios(scatter, rig)) else {
+        return 0.0;
+    };
+    let as_read = ln_density(&ln_ratios);
+    of.channels().iter().for_each(|channel| ln_ratios[*channel] -= factor.ln());
+    ln_density(&ln_ratios) - as_read
+}
+
+/// ln of each channel's scatter over its sheet's; none where one is computed.
+pub(super) fn ln_ratios(scatter: &[Option<f64>; CHANNELS], rig: &Rig) -> Option<[f64; CHANNELS]> {
     let sensors = rig.sensors();
     let sheets = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
     let mut ln_ratios = [0.0; CHANNELS];
     for ((ln_ratio, scatter), sheet) in ln_ratios.iter_mut().zip(scatter).zip(sheets) {
         let ratio = scatter.map_or(0.0, |std| std / sheet.noise_std);
         if !(ratio.is_finite() && ratio > LEAST_RATIO) {
-            return 0.0;
+            return None;
         }
         *ln_ratio = ratio.ln();
     }
-    let as_read = ln_density(&ln_ratios);
-    of.channels().iter().for_each(|channel| ln_ratios[*channel] -= factor.ln());
-    ln_density(&ln_ratios) - as_read
+    Some(ln_ratios)
 }
 
 fn ln_density(ln_ratios: &[f64; CHANNELS]) -> f64 {

@@ -67,6 +67,7 @@ pub(super) fn settle(segments: &mut [SegmentProducts]) {
                     &mut segment.gram[equation],
                     &mut segment.noise[equation],
                     &mut segment.scattered[equation],
+                    &mut segment.quiet[equation],
                 ] {
                     maps.iter().for_each(|(place, truly)| replace(products, *place, truly));
                 }

@@ -28,11 +28,11 @@ pub enum RestoreError {
 }
 
 /// Name and version of the saved form, …
-const SCHEMA: &str = "pitchleak.state/9";
+const SCHEMA: &str = "pitchleak.state/10";
 /// … which begins every state as a text of CBOR.
-const HEAD: &[u8] = b"\x71pitchleak.state/9";
-/// The head of a saved state of any version.
-const ANY_HEAD: &[u8] = b"\x71pitchleak.state/";
+const HEAD: &[u8] = b"\x72pitchleak.state/10";
+/// The heads of saved states of any version: of one digit, and of two.
+const ANY_HEADS: [(&[u8], usize); 2] = [(b"\x71pitchleak.state/", 1), (b"\x72pitchleak.state/", 2)];
 /// Bytes of the checksum at the end: CRC-32 of all before it, little-endian. It finds every single wrong bit and every
 /// burst of up to 32.
 const CHECKSUM: usize = 4;
@@ -86,9 +86,10 @@ fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
 
 /// What else begins so, or doesn't.
 fn foreign(bytes: &[u8]) -> RestoreError {
-    match bytes.strip_prefix(ANY_HEAD).and_then(|rest| rest.first()) {
-        Some(version) if version.is_ascii_digit() => {
-            RestoreError::Version(format!("pitchleak.state/{}", char::from(*version)))
+    let version = ANY_HEADS.iter().find_map(|(head, digits)| bytes.strip_prefix(*head)?.get(..*digits));
+    match version.and_then(|version| std::str::from_utf8(version).ok()) {
+        Some(version) if version.bytes().all(|digit| digit.is_ascii_digit()) => {
+            RestoreError::Version(format!("pitchleak.state/{version}"))
         }
         _ => RestoreError::Content("it begins with other bytes".to_owned()),
     }

@@ -2,13 +2,14 @@
 //! them within its range. Evidence for people; nothing is read otherwise because of it.
 
 use super::Wiring;
-use crate::explain::{Mistake, Of};
+use crate::explain::{Mistake, Of, scatter::ln_odds};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::told::{ForceSums, Gatherer, Scaled};
 use crate::trace::{OVERRANGE, Record};
 use crate::units::{Dimension, readable};
 use pitchleak_core::Sample;
+use pitchleak_core::continuity::Scatter;
 use serde::{Deserialize, Serialize};
 
 /// Fewer rows say nothing.
@@ -17,6 +18,8 @@ const LEAST_ROWS: u64 = 100;
 const POSSIBLE_SHARE: f64 = 0.99;
 /// Twice the log-likelihood that parts two units that can be told apart, and how many that can't be may be named.
 const APART: f64 = 25.0;
+/// The same of ln odds by the scatter alone: twenty to one.
+const LN_APART: f64 = 3.0;
 const MOST_ALIKE: usize = 4;
 /// Mended readings reach this share of full scale at the least and at the most.
 const SHARE_OF_FULL_SCALE: std::ops::RangeInclusive<f64> = 0.005..=1.3;
@@ -44,6 +47,7 @@ pub struct Refused {
     last_refused_s: f64,
     gatherer: Gatherer,
     force: ForceSums,
+    scatter: [Scatter<f64>; CHANNELS.len()],
 }
 
 /// One channel's readings.
@@ -78,6 +82,7 @@ impl Refused {
             last_refused_s: 0.0,
             gatherer: Gatherer::default(),
             force: ForceSums::default(),
+            scatter: Default::default(),
         }
     }
 
@@ -102,6 +107,9 @@ impl Refused {
         }
         let dt_s = self.last_s.replace(record.t_s).map_or(0.0, |last_s| record.t_s - last_s);
         let after_gap = !(0.0..=LONGEST_STEP_S).contains(&dt_s);
+        for (scatter, reading) in self.scatter.iter_mut().zip(readings) {
+            scatter.add(reading, after_gap);
+        }
         let block = self.gatherer.add(&Record { dt_s, after_gap, ..*record });
         block.into_iter().for_each(|block| self.force.add(&block));
     }
@@ -130,6 +138,7 @@ impl Refused {
         let mut found: Vec<Suspect> =
             self.candidates().into_iter().map(|(of, factor)| self.suspect(of, factor)).collect();
         self.keep_balanced(&mut found);
+        self.keep_as_loud(&mut found);
         let columns = &self.rig.columns;
         let mut names: Vec<String> =
             found.iter().map(|one| one.mistake.text() + &one.mistake.unit_text(columns)).collect();
@@ -213,6 +222,14 @@ impl Refused {
         let Some(best) = found.iter().filter_map(left).min_by(f64::total_cmp) else { return };
         found.retain(|one| left(one).is_some_and(|deviance| deviance <= best + APART));
         found.sort_by(|a, b| left(a).partial_cmp(&left(b)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+
+    /// Where one unit makes the scatter far likelier than others, those go.
+    fn keep_as_loud(&self, found: &mut Vec<Suspect>) {
+        let scatter = self.scatter.map(|scatter| scatter.std());
+        let ln = |one: &Suspect| ln_odds(&scatter, one.mistake, &self.rig);
+        let best = found.iter().map(ln).fold(f64::MIN, f64::max);
+        found.retain(|one| ln(one) > best - LN_APART);
     }
 
     /// Least and largest reading once they are divided by `factor`, SI.

@@ -9,6 +9,7 @@
 use super::block_sums::{Block, BlockSums, MPA_PER_PA, RAW_SUMS, RawSum};
 use super::change::{SEGMENT_BLOCKS, Waiting};
 use super::clocks::{self, Clocks, Next, Readings};
+use super::scatter::Scatter;
 use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS, Whitener};
 use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
 
@@ -18,8 +19,6 @@ const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
 const DIFFERENCE_SIGMAS: f64 = 3.0;
 /// Keeps pressures that do not change solvable; numerical.
 const DESCRIPTION_RIDGE: f64 = 1e-4;
-/// Mean size of a third difference of white noise of unit standard deviation: √(20 · 2/π).
-const THIRD_DIFFERENCE: f64 = 3.568_248_232;
 
 /// The statistic, in at most `S` segments.
 #[derive(Clone, Debug)]
@@ -74,36 +73,6 @@ pub struct Segment<T> {
     blocks: u32,
     time_s: T,
     pressure_time: PerLeak<T>,
-}
-
-/// Mean size of the third differences of a channel's readings.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Scatter<T> {
-    last: [T; 3],
-    known: u32,
-    sum: T,
-    count: T,
-}
-
-impl<T: Real> Scatter<T> {
-    fn add(&mut self, reading: Option<T>, after_gap: bool) {
-        if after_gap {
-            self.known = 0;
-        }
-        let Some(now) = reading else { return };
-        let [one, two, three] = self.last;
-        if self.known >= 3 {
-            self.sum += (now - T::lit(3.0) * (one - two) - three).abs();
-            self.count += T::one();
-        }
-        self.last = [now, one, two];
-        self.known = self.known.saturating_add(1);
-    }
-
-    fn std(&self) -> Option<T> {
-        (self.count > T::zero()).then(|| self.sum / (self.count * T::lit(THIRD_DIFFERENCE)))
-    }
 }
 
 impl<T: Real> Default for Segment<T> {

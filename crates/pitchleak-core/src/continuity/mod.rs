@@ -52,6 +52,7 @@ mod integrals;
 mod moving_average;
 mod noise;
 mod pressure_means;
+mod scatter;
 mod weights;
 mod whitening;
 
@@ -63,5 +64,6 @@ pub use integrals::{ChamberIntegrals, Integrals, Measured, Step};
 pub use moving_average::MovingAverage;
 pub use noise::{NoiseStd, PressureNoise};
 pub use pressure_means::PressureMeans;
+pub use scatter::Scatter;
 pub use weights::Weights;
 pub use whitening::{COLUMNS, EQUATIONS, VOLUME_POWERS};
