@@ -111,5 +111,8 @@ fn mistakes_are_named(outcomes: &[Outcome]) {
     let sum = |of: fn(&Outcome) -> usize| outcomes.iter().filter(own).map(of).sum::<usize>();
     let (doubts, named, misnamed) = (sum(|one| one.in_doubt), sum(|one| one.named), sum(|one| one.misnamed));
     assert!(named as f64 >= NAMED * doubts as f64, "of {doubts} mistakes in doubt {named} are named");
+    for one in outcomes.iter().filter(own).filter(|one| one.misnamed > 0) {
+        println!("misnamed: {}", key(one));
+    }
     assert!(misnamed <= slack(doubts), "of {doubts} mistakes in doubt {misnamed} are called another");
 }

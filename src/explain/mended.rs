@@ -5,8 +5,8 @@
 //! sheet is no mistake. Where the declared noise and the scatter differ, the smaller change counts.
 //!
 //! A unit makes the noise of its readings another one by just its factor, so its rows stay in the sheet's noise, and how
-//! loud they are with and without it is taken off: only what is left beyond the readings' own scatter tells. A fit as
-//! declared that falls far below that scatter has explained noise, which is held against no unit.
+//! loud they are with and without it is taken off: only what is left beyond the readings' own scatter tells. What fits
+//! gain below that scatter is explained noise, and tells for neither side more than the noise itself differs.
 
 use super::equations::NormalEquations;
 use super::evidence::ln_scale_prior;
@@ -27,14 +27,109 @@ pub(super) struct Mended {
     pub equations: NormalEquations,
     /// ln of what that changes of the evidence.
     pub ln_measure: f64,
-    /// The noise's unit, in that of the sheet for readings without the mistake, squared.
-    pub unit: [f64; EQUATIONS],
-    /// Noise scales that the readings' own scatter makes, at least 1 in the sheet's noise.
-    loudness: [f64; EQUATIONS],
+    measures: [Measure; EQUATIONS],
+}
+
+/// One equation's noise in its left side: by the sheet and as the readings scatter, mended and as declared.
+struct Noise {
+    own: f64,
+    own_scatter: f64,
+    other: f64,
+    scatter: f64,
+}
+
+/// How one equation is measured.
+#[derive(Clone, Copy)]
+struct Measure {
+    /// How many rows it has.
+    rows: f64,
+    /// Their unit, in the noise as declared, squared; …
+    unit: f64,
+    /// … the same in the sheet's noise for readings without the mistake.
+    unit_of_sheet: f64,
+    /// How much more the readings scatter than the unit.
+    scattered: f64,
     /// Noise scales below which a fit has explained noise by chance; 0 where nothing is known of it.
-    left: [f64; EQUATIONS],
-    /// ln of what the best explanation as declared gained by that.
-    ln_declared: f64,
+    left: f64,
+    /// ln of what the best explanation as declared gained by that, and the most that is taken back on either side; none of
+    /// what is no unit.
+    declared: Option<(f64, f64)>,
+    /// ln of what the noise changes of the evidence.
+    ln_noise: f64,
+}
+
+impl Default for Measure {
+    fn default() -> Self {
+        Self {
+            rows: 0.0,
+            unit: 1.0,
+            unit_of_sheet: 1.0,
+            scattered: 1.0,
+            left: 0.0,
+            declared: None,
+            ln_noise: 0.0,
+        }
+    }
+}
+
+impl Noise {
+    /// None where an equation has no rows.
+    fn of(mended: &NormalEquations, declared: &NormalEquations, equation: usize) -> Option<Self> {
+        let ([own, own_scatter], [other, scatter]) =
+            (mended.left_noise(equation), declared.left_noise(equation));
+        let is_there = [own, own_scatter, other, scatter].iter().all(|noise| *noise > 0.0);
+        is_there.then_some(Self { own, own_scatter, other, scatter })
+    }
+
+    /// How many times louder the rows are without the mistake, squared: the smaller change counts.
+    fn louder(&self) -> f64 {
+        (self.own / self.other).min(self.own_scatter / self.scatter)
+    }
+
+    /// Of readings in another unit; `scale` is that of the best explanation as declared.
+    fn measure_unit(&self, rows: f64, scale: f64) -> Measure {
+        let ln_louder = 0.5 * rows * self.louder().ln();
+        let scattered = self.own_scatter / self.other;
+        Measure {
+            rows,
+            scattered,
+            left: scattered,
+            declared: Some((ln_below(rows, scale, self.scatter / self.other), ln_louder.abs())),
+            ln_noise: ln_louder,
+            ..Measure::default()
+        }
+    }
+
+    /// Of any other mistake: it turns noise into other noise, which by chance may be smaller. A clock scales no reading.
+    fn measure(&self, rows: f64, scale: f64, is_clock: bool) -> Measure {
+        let unit = self.louder();
+        let sheet = if is_clock { self.own } else { self.other };
+        let scattered = self.own_scatter / (self.other * unit);
+        let chance = 1.0 + CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt();
+        Measure {
+            rows,
+            unit,
+            unit_of_sheet: unit * self.other / sheet,
+            scattered,
+            left: (scale * self.other / self.scatter).min(chance) * scattered,
+            declared: None,
+            ln_noise: ln_scale_prior(self.own_scatter / sheet)
+                - ln_scale_prior((self.scatter / self.other).max(1.0)),
+        }
+    }
+}
+
+impl Measure {
+    /// ln of what is taken back from a fit of this noise scale, and from the best one as declared.
+    fn ln_chance(&self, scale: f64) -> f64 {
+        let gained = ln_below(self.rows, scale, self.left);
+        self.declared.map_or(-gained, |(declared, most)| (declared - gained).clamp(-most, most))
+    }
+
+    /// Noise scale that the readings' own scatter makes, at least the sheet's.
+    fn loudness(&self) -> f64 {
+        (self.scattered * self.unit_of_sheet).max(1.0) / self.unit_of_sheet
+    }
 }
 
 impl Mended {
@@ -46,67 +141,40 @@ impl Mended {
         scales: [f64; EQUATIONS],
         scatters: bool,
     ) -> Self {
-        let ln_jacobian = mistake.ln_jacobian();
-        let (mut louder, mut scattered, mut left) = ([1.0; EQUATIONS], [1.0; EQUATIONS], [0.0; EQUATIONS]);
-        let (mut ln_measure, mut ln_noise) = (0.0, 0.0);
-        let (mut unit, mut loudness, mut ln_declared) = ([1.0; EQUATIONS], [1.0; EQUATIONS], 0.0);
         let is_unit = scatters && matches!(mistake, Mistake::Factor(..));
-        let mut rows = [1.0; EQUATIONS];
-        for equation in 0..EQUATIONS {
-            let ([own, own_scatter], [other, scatter]) =
-                (mended.left_noise(equation), declared.left_noise(equation));
-            if [own, own_scatter, other, scatter].iter().any(|noise| *noise <= 0.0) {
-                continue;
-            }
-            louder[equation] = (own / other).min(own_scatter / scatter);
-            if !is_unit {
-                rows[equation] = louder[equation];
-            }
-            scattered[equation] = own_scatter / (other * rows[equation]);
-            let by_chance = CHANCE_SIGMAS * (2.0 / declared.rows[equation].max(1.0)).sqrt();
-            left[equation] = scattered[equation];
-            if is_unit {
-                if scales[equation] < (1.0 - by_chance) * scatter / other {
-                    ln_declared += ln_below(declared.rows[equation], scales[equation], scatter / other);
-                }
-            } else {
-                left[equation] *= (scales[equation] * other / scatter).min(1.0 + by_chance);
-            }
-            if equation == BALANCE {
-                ln_measure +=
-                    mended.rows[equation] * (ln_jacobian / EQUATIONS as f64 - 0.5 * louder[equation].ln());
-            }
-            // A clock scales no reading.
-            let sheet = if matches!(mistake, Mistake::Clock(_)) { own } else { other };
-            unit[equation] = rows[equation] * other / sheet;
-            loudness[equation] = (own_scatter / sheet).max(1.0) / unit[equation];
-            ln_noise += if is_unit {
-                0.5 * mended.rows[equation] * louder[equation].ln()
-            } else {
-                ln_scale_prior(own_scatter / sheet) - ln_scale_prior((scatter / other).max(1.0))
-            };
-        }
+        let is_clock = matches!(mistake, Mistake::Clock(_));
+        let noises = [0, 1].map(|equation| Noise::of(&mended, declared, equation));
+        let measure = |equation: usize| {
+            let (rows, scale) = (mended.rows[equation], scales[equation]);
+            noises[equation].as_ref().map_or_else(Measure::default, |noise| {
+                if is_unit { noise.measure_unit(rows, scale) } else { noise.measure(rows, scale, is_clock) }
+            })
+        };
+        let measures = [0, 1].map(measure);
+        let per_row = |noise: &Noise| mistake.ln_jacobian() / EQUATIONS as f64 - 0.5 * noise.louder().ln();
+        let ln_density = noises[BALANCE].as_ref().map_or(0.0, |noise| mended.rows[BALANCE] * per_row(noise));
         Self {
-            equations: mended.measured_by(rows, scattered.map(|scale| scale.max(1.0))),
-            ln_measure: ln_measure.min(0.0) + ln_noise,
-            unit,
-            loudness,
-            left,
-            ln_declared,
+            ln_measure: ln_density.min(0.0) + measures.iter().map(|own| own.ln_noise).sum::<f64>(),
+            equations: mended
+                .measured_by(measures.map(|own| own.unit), measures.map(|own| own.scattered.max(1.0))),
+            measures,
         }
     }
 
     /// What its explanations are weighed by.
     pub fn weighing(&self) -> Weighing<'_> {
-        Weighing { equations: &self.equations, loudness: self.loudness }
+        Weighing { equations: &self.equations, loudness: self.measures.map(|own| own.loudness()) }
     }
 
-    /// ln of what is taken back from a fit whose noise scales are below what the readings' own scatter leaves as declared: a
-    /// mistake turns noise into other noise, which by chance may be smaller. Where units are weighed it is taken back from
-    /// what is held against them, too.
+    /// The larger residual, in the sheet's noise for readings without the mistake, of a fit of these noise scales.
+    pub fn residual(&self, scales: [f64; EQUATIONS]) -> f64 {
+        let each = self.measures.iter().zip(scales).map(|(own, scale)| scale * own.unit_of_sheet);
+        each.fold(0.0, f64::max).sqrt()
+    }
+
+    /// ln of what is taken back from a fit whose noise scales are below what the readings' own scatter leaves.
     pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
-        let one = |c: usize| ln_below(self.equations.rows[c], scales[c], self.left[c]);
-        self.ln_declared - (0..EQUATIONS).map(one).sum::<f64>()
+        self.measures.iter().zip(scales).map(|(own, scale)| own.ln_chance(scale)).sum()
     }
 }
 

@@ -97,8 +97,8 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     let all = candidates.best_first();
     let residual = |is: &dyn Fn(&Scored<'_>) -> bool| {
         let best = all.iter().find(|one| is(one) && one.ln_posterior.is_finite())?;
-        let unit = best.wiring.checked_sub(1).and_then(|at| mended.get(at)).map_or([1.0; 2], |own| own.unit);
-        Some((best.scales[0] * unit[0]).max(best.scales[1] * unit[1]).sqrt())
+        let own = best.wiring.checked_sub(1).and_then(|at| mended.get(at));
+        Some(own.map_or(best.scales[0].max(best.scales[1]).sqrt(), |own| own.residual(best.scales)))
     };
     let residuals = [residual(&|one| one.wiring == 0), residual(&|one| one.wiring > 0)];
     Posterior { weighed: mix(pass, &weighings, all, least_ln), residuals }
