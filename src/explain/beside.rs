@@ -23,13 +23,16 @@ impl Told {
         }
     }
 
-    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges.
+    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges. What never changes has no
+    /// unit that could be told: it may as well be stuck.
     pub(super) fn allows(&self, mistake: Mistake, rig: &Rig) -> bool {
         match mistake {
             Mistake::Factor(of, factor) => of.channels().iter().all(|channel| {
-                self.extremes[*channel]
-                    .is_none_or(|extremes| allows(*channel, extremes.map(|value| value / factor), rig))
+                self.extremes[*channel].is_none_or(|[least, most]| {
+                    least < most && allows(*channel, [least / factor, most / factor], rig)
+                })
             }),
+            Mistake::OtherEnd => self.extremes[0].is_none_or(|[least, most]| least < most),
             Mistake::LostSign(_) => false,
             _ => true,
         }

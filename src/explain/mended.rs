@@ -101,10 +101,12 @@ impl Noise {
     }
 
     /// Of any other mistake: it turns noise into other noise, which by chance may be smaller. A clock scales no reading.
+    /// Readings better than their sheet may be so once mended, too.
     fn measure(&self, rows: f64, scale: f64, is_clock: bool) -> Measure {
         let unit = self.louder();
         let sheet = if is_clock { self.own } else { self.other };
         let scattered = self.own_scatter / (self.other * unit);
+        let as_usual = (self.own_scatter / sheet).clamp((self.scatter / self.other).min(1.0), 1.0);
         let chance = 1.0 + CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt();
         Measure {
             rows,
@@ -113,7 +115,7 @@ impl Noise {
             scattered,
             left: (scale * self.other / self.scatter).min(chance) * scattered,
             declared: None,
-            ln_noise: ln_scale_prior(self.own_scatter / sheet)
+            ln_noise: ln_scale_prior(self.own_scatter / sheet / as_usual)
                 - ln_scale_prior((self.scatter / self.other).max(1.0)),
         }
     }

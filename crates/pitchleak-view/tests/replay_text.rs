@@ -40,6 +40,7 @@ fn report(status: Status) -> ReplayReport {
             external_b: lpm(0.0, 0.2),
         },
         hold: None,
+        wiring: None,
         valve: None,
         changed_at_s: None,
         trend: PerLeak::default(),
