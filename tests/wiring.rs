@@ -183,7 +183,10 @@ fn the_right_mistake_is_named_and_no_other() {
         total.wrong += tally.wrong;
     }
     println!("{total:?} of {} runs\n{text}", table.len() * runs.len());
-    assert!(total.named * 100 >= total.evidence * 80 && 100 * total.wrong as usize <= table.len() * runs.len(), "{total:?}");
+    assert!(
+        total.named * 100 >= total.evidence * 80 && 100 * total.wrong as usize <= table.len() * runs.len(),
+        "{total:?}"
+    );
     let snapshot = std::fs::read_to_string("data/wiring-snapshot.csv").unwrap();
     assert!(text == snapshot, "data/wiring-snapshot.csv says otherwise; it is now\n{text}");
 }

@@ -2,6 +2,7 @@
 
 use super::readings::{Mistake, Of};
 use crate::rig::Rig;
+use crate::signal::Signal;
 use crate::told::Told;
 use pitchleak_core::ATMOSPHERE_PA;
 
@@ -9,6 +10,12 @@ use pitchleak_core::ATMOSPHERE_PA;
 const MOST_OF_FULL_SCALE: f64 = 1.5;
 /// A position may be so far beyond the stroke's ends, share of it. Chosen.
 const BEYOND_STROKE: f64 = 0.05;
+
+/// The channels of [`Told::extremes`].
+const CHANNELS: [Signal; 5] =
+    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB];
+/// Means of a constant differ by less.
+const ROUNDING: f64 = 1e-12;
 
 impl Told {
     /// ln by which the odds of a mistake change.
@@ -23,19 +30,27 @@ impl Told {
         }
     }
 
-    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges. What never changes has no
-    /// unit that could be told: it may as well be stuck.
+    /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges. What never changes tells of
+    /// no mistake: it may as well be stuck.
     pub(super) fn allows(&self, mistake: Mistake, rig: &Rig) -> bool {
+        if mistake.sensors().iter().any(|sensor| self.is_constant(*sensor)) {
+            return false;
+        }
         match mistake {
             Mistake::Factor(of, factor) => of.channels().iter().all(|channel| {
-                self.extremes[*channel].is_none_or(|[least, most]| {
-                    least < most && allows(*channel, [least / factor, most / factor], rig)
-                })
+                self.extremes[*channel]
+                    .is_none_or(|extremes| allows(*channel, extremes.map(|value| value / factor), rig))
             }),
-            Mistake::OtherEnd => self.extremes[0].is_none_or(|[least, most]| least < most),
             Mistake::LostSign(_) => false,
             _ => true,
         }
+    }
+
+    fn is_constant(&self, sensor: Signal) -> bool {
+        let channel = CHANNELS.iter().position(|own| *own == sensor);
+        channel
+            .and_then(|channel| self.extremes[channel])
+            .is_some_and(|[least, most]| most - least <= ROUNDING * least.abs().max(most.abs()))
     }
 
     /// The flows that lost their signs, and the ln likelihood ratio of that: a flow that is never negative while the piston moves

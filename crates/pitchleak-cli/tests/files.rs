@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+use pitchleak::core::PerLeak;
+use pitchleak_testkit::Motion;
+use pitchleak_testkit::trace_text::file;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -285,7 +288,9 @@ fn the_true_obstacle_is_told_first() {
     let folder = tempfile::tempdir().unwrap();
     let header = "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm";
     let row = |t_s: f64, i: f64| format!("{t_s:.2},{}", plain(i).split_once(',').unwrap().1);
-    write(folder.path(), "once_a_second.csv", header, |i| row(i, i));
+    let seconds: Vec<String> =
+        Motion::sines(PerLeak::default()).rows(20_000).into_iter().step_by(100).collect();
+    std::fs::write(folder.path().join("once_a_second.csv"), file(&seconds)).unwrap();
     write(folder.path(), "shuffled.csv", header, |i| row((7919.0 * i) % 200.0 * 0.01, i));
     let cases = [
         ("once_a_second.csv", "not_sure", "Readings come every 1 s"),
