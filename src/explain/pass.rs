@@ -57,8 +57,8 @@ pub(super) struct Pass<'a, 's> {
     pub sizes: Sizes,
     pub segments: usize,
     pub full_scale_m3s: f64,
-    /// Scatter of the readings over the declared noise, at least 1: of flows, and of the position.
-    pub scatter: [f64; 2],
+    /// Scatter of the readings over the declared noise, at least 1: of flows, of the position, and of pressures.
+    pub scatter: [f64; 3],
 }
 
 impl<'a, 's> Pass<'a, 's> {
@@ -102,7 +102,19 @@ impl<'a, 's> Pass<'a, 's> {
             Some(_) => |segment| &segment.quiet,
             None => |segment| &segment.noise,
         };
-        NormalEquations::new(products, &self.scales(mistake), columns, noise_of)
+        let equations = NormalEquations::new(products, &self.scales(mistake), columns, noise_of);
+        if mistake.is_some() { equations } else { self.with_columns_of_their_own_noise(equations) }
+    }
+
+    /// A fit takes all noise to be louder by one scale. Where the flows alone are, the columns' noise is not.
+    fn with_columns_of_their_own_noise(&self, equations: NormalEquations) -> NormalEquations {
+        let [_, position, pressures] = self.scatter;
+        let of_columns = position.max(pressures).powi(2);
+        let louder = [0, 1].map(|equation| {
+            let [sheet, scattered] = equations.left_noise(equation);
+            if sheet > 0.0 { (scattered / sheet / of_columns).max(1.0) } else { 1.0 }
+        });
+        equations.measured_by([1.0; EQUATIONS], louder)
     }
 
     pub fn scales(&self, mistake: Option<&Entry>) -> Scales<'s> {
@@ -174,8 +186,8 @@ impl<'a, 's> Pass<'a, 's> {
     }
 }
 
-/// Scatter of flows and of the position over the declared noise.
-fn over_sheet(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
+/// Scatter of flows, of the position and of pressures over the declared noise.
+fn over_sheet(statistic: &Statistic, rig: &Rig) -> [f64; 3] {
     let sensors = rig.sensors();
     let found: [Option<f64>; CHANNELS] = statistic.scatter();
     let over = |found: Option<f64>, declared: f64| match found {
@@ -185,5 +197,6 @@ fn over_sheet(statistic: &Statistic, rig: &Rig) -> [f64; 2] {
     [
         over(found[3], sensors.flow_a.noise_std).max(over(found[4], sensors.flow_b.noise_std)),
         over(found[0], sensors.position.noise_std),
+        over(found[1], sensors.pressure.noise_std).max(over(found[2], sensors.pressure.noise_std)),
     ]
 }

@@ -91,7 +91,7 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     candidates.add_courses(LEAST_LN);
     let mended = candidates.add_mistakes(LEAST_LN);
     let as_declared =
-        Weighing { equations: declared, loudness: pass.scatter.map(|scatter| scatter * scatter) };
+        Weighing { equations: declared, loudness: [pass.scatter[0].powi(2), pass.scatter[1].powi(2)] };
     let weighings: Vec<Weighing<'_>> =
         std::iter::once(as_declared).chain(mended.iter().map(Mended::weighing)).collect();
     let all = candidates.best_first();
