@@ -38,7 +38,7 @@ pub enum Mistake {
     FlowsExchangedAndTurned,
     /// x counts from the B end.
     OtherEnd,
-    /// Only the size of a flow was recorded. No linear map says so: it is [told](super::Told) beside the statistic.
+    /// Only the size of a flow was recorded. No linear map says so: it is [told](crate::told) beside the statistic.
     LostSign(Of),
     /// Readings are so many times too large.
     Factor(Of, f64),
