@@ -6,7 +6,8 @@
 //!
 //! A unit makes the noise of its readings another one by just its factor, so its rows stay in the sheet's noise, and how
 //! loud they are with and without it is taken off: only what is left beyond the readings' own scatter tells. What fits
-//! gain below that scatter is explained noise, and tells for neither side more than the noise itself differs.
+//! gain below that scatter is explained noise, what they lose above it is chance as far as a sum of squares varies: both tell
+//! for neither side more than the noise itself differs.
 
 use super::equations::NormalEquations;
 use super::evidence::ln_scale_prior;
@@ -51,8 +52,8 @@ struct Measure {
     scattered: f64,
     /// Noise scales below which a fit has explained noise by chance; 0 where nothing is known of it.
     left: f64,
-    /// ln of what the best explanation as declared gained by that, and the most that is taken back on either side; none of
-    /// what is no unit.
+    /// ln of what the best explanation as declared gained or lost by chance, and the most that is taken back on either side;
+    /// none of what is no unit.
     declared: Option<(f64, f64)>,
     /// ln of what the noise changes of the evidence.
     ln_noise: f64,
@@ -94,7 +95,7 @@ impl Noise {
             rows,
             scattered,
             left: scattered,
-            declared: Some((ln_below(rows, scale, self.scatter / self.other), ln_louder.abs())),
+            declared: Some((ln_by_chance(rows, scale, self.scatter / self.other), ln_louder.abs())),
             ln_noise: ln_louder,
             ..Measure::default()
         }
@@ -107,7 +108,7 @@ impl Noise {
         let sheet = if is_clock { self.own } else { self.other };
         let scattered = self.own_scatter / (self.other * unit);
         let as_usual = (self.own_scatter / sheet).clamp((self.scatter / self.other).min(1.0), 1.0);
-        let chance = 1.0 + CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt();
+        let chance = most_by_chance(rows);
         Measure {
             rows,
             unit,
@@ -124,8 +125,11 @@ impl Noise {
 impl Measure {
     /// ln of what is taken back from a fit of this noise scale, and from the best one as declared.
     fn ln_chance(&self, scale: f64) -> f64 {
-        let gained = ln_below(self.rows, scale, self.left);
-        self.declared.map_or(-gained, |(declared, most)| (declared - gained).clamp(-most, most))
+        let gained = || ln_by_chance(self.rows, scale, self.left);
+        self.declared.map_or_else(
+            || -ln_below(self.rows, scale, self.left),
+            |(declared, most)| (declared - gained()).clamp(-most, most),
+        )
     }
 
     /// Noise scale that the readings' own scatter makes, at least the sheet's.
@@ -183,4 +187,14 @@ impl Mended {
 /// ln of what a noise scale below `left` gains.
 fn ln_below(rows: f64, scale: f64, left: f64) -> f64 {
     if left > scale { 0.5 * rows * (left / scale).ln() } else { 0.0 }
+}
+
+/// The same, less what one above it loses as far as that is chance.
+fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
+    if left > 0.0 { 0.5 * rows * (left / scale).max(1.0 / most_by_chance(rows)).ln() } else { 0.0 }
+}
+
+/// A noise scale over what it truly is.
+fn most_by_chance(rows: f64) -> f64 {
+    1.0 + CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt()
 }
