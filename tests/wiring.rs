@@ -250,6 +250,21 @@ fn the_load_force_tells_exchanged_pressures_at_rest() {
     }
 }
 
+/// What a sum of squares varies by grows with a trace in its likelihood: twenty minutes in calm wind accuse nobody.
+#[test]
+fn a_long_calm_accuses_nobody() {
+    let rig = rig(0.001);
+    let history = History::of(&Wind::BuiltIn(WindCase::Mps5)).unwrap();
+    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
+    let minutes =
+        Scenario { duration_s: 1200.0, sample_rate_hz: 20.0, ..Scenario::new(rig.clone(), reference) };
+    let truths = minutes.collect(PerLeak::default()).unwrap();
+    for seed in 0..12 {
+        let decision = decision(&records(&truths, &rig, seed), &rig);
+        assert!(decision.wiring < 0.5, "{seed}: {:#?}", decision.explanations);
+    }
+}
+
 /// Right columns, whatever else is the matter: no mistake is ever named.
 #[test]
 fn right_columns_are_never_accused() {
