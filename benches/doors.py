@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Do all doors say the same? `check`, `replay` and `watch` of the same drawn traces: the share of equal statuses.
 
-    cargo build --release -p pitchleak-cli && python benches/doors.py [--traces 120] [--seed 1]
+    cargo build --release -p pitchleak-cli && pip install . && python benches/doors.py [--traces 120] [--seed 1]
 
 A trace is 20 to 300 s of one of the four winds at 20, 50 or 100 Hz, sound or with one leak of 0.2 or 0.5 L/min, half of
 them with a sensor or wire that errs.
@@ -17,24 +17,10 @@ import subprocess
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
+import pitchleak as pl
+
 PROGRAM = pathlib.Path(__file__).parent.parent / "target/release/pitchleak"
 DOORS = ("replay", "check", "watch")
-RIG = """
-[cylinder]
-area_a = "12.6 cm^2"
-area_b = "9.4 cm^2"
-stroke = "0.2 m"
-moving_mass = "20 kg"
-
-[fluid]
-bulk_modulus = "0.8 GPa"
-
-[sensors]
-flow = {{ full_scale = "20 L/min", accuracy = "{0}" }}
-pressure = {{ full_scale = "16 MPa", accuracy = "{0}" }}
-position = {{ full_scale = "0.2 m", accuracy = "{0}" }}
-force = {{ full_scale = "10 kN", accuracy = "{0}" }}
-"""
 LEAKS = ("internal", "external-a", "external-b")
 ERRORS = (
     "qa gain 5 %", "qb offset 1 %", "qa offset 0.3 %", "pb offset 4 bar", "qa held 100 ms", "qb drift 0.3 L/min/h",
@@ -52,7 +38,8 @@ def draw(chance):
         arguments += [f"--leak-{leak}", f"{chance.choice((0.2, 0.5))} L/min"]
     if chance.random() < 0.5:
         arguments += ["--fault", chance.choice(ERRORS)]
-    return [*arguments, "--seed", str(chance.randrange(1 << 31))], RIG.format(chance.choice(("0.1 %", "0.3 %", "1 %")))
+    rig = pl.Rig.paper().replace(accuracy=chance.choice(("0.1 %", "0.3 %", "1 %")))
+    return [*arguments, "--seed", str(chance.randrange(1 << 31))], rig.to_toml()
 
 
 def status(door, trace):
@@ -66,8 +53,8 @@ def status(door, trace):
                 text=True,
             )
         said = [json.loads(line) for line in done.stdout.splitlines()]
-        last = [line for line in said if "verdict" in line or "status" in line]
-        return last[-1].get("status") or last[-1]["verdict"]["status"] if last else done.stderr.strip()
+        statuses = [one["status"] for one in said if one["type"] == "estimate"]
+        return statuses[-1] if statuses else done.stderr.strip()
     done = subprocess.run([PROGRAM, door, "--json", "-q", trace], capture_output=True, text=True)
     return json.loads(done.stdout)["verdict"]["status"] if done.stdout else done.stderr.strip()
 

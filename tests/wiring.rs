@@ -26,17 +26,22 @@ fn rig(accuracy: f64) -> Rig {
     rig
 }
 
-/// Half a minute of this wind.
-fn truths(wind: WindCase, internal: f64, external_a: f64, effects: EffectSet<f64>) -> Vec<Truth> {
+/// A sound cylinder in this wind.
+fn scenario(wind: WindCase) -> Scenario {
     let history = History::of(&Wind::BuiltIn(wind)).unwrap();
     let rig = rig(0.003);
-    let leaks = PerLeak { internal, external_a, external_b: 0.0 };
     let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
+    Scenario::new(rig, reference)
+}
+
+/// Half a minute of this wind.
+fn truths(wind: WindCase, internal: f64, external_a: f64, effects: EffectSet<f64>) -> Vec<Truth> {
+    let leaks = PerLeak { internal, external_a, external_b: 0.0 };
     let scenario = Scenario {
         leaks: leaks.map(|size| LeakCourse::from_onset(LeakSize::Coefficient(size), 0.0)),
         effects,
         duration_s: 30.0,
-        ..Scenario::new(rig, reference)
+        ..scenario(wind)
     };
     scenario.collect(leaks).unwrap()
 }
@@ -254,10 +259,7 @@ fn the_load_force_tells_exchanged_pressures_at_rest() {
 #[test]
 fn a_long_calm_accuses_nobody() {
     let rig = rig(0.001);
-    let history = History::of(&Wind::BuiltIn(WindCase::Mps5)).unwrap();
-    let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m).unwrap();
-    let minutes =
-        Scenario { duration_s: 1200.0, sample_rate_hz: 20.0, ..Scenario::new(rig.clone(), reference) };
+    let minutes = Scenario { duration_s: 1200.0, sample_rate_hz: 20.0, ..scenario(WindCase::Mps5) };
     let truths = minutes.collect(PerLeak::default()).unwrap();
     for seed in 0..12 {
         let decision = decision(&records(&truths, &rig, seed), &rig);

@@ -3,7 +3,7 @@
 use super::readings::{Mistake, Of};
 use crate::rig::Rig;
 use crate::signal::Signal;
-use crate::told::Told;
+use crate::told::{CHANNELS, Told};
 use pitchleak_core::ATMOSPHERE_PA;
 
 /// Readings reach at the most so many times full scale. Chosen.
@@ -11,9 +11,6 @@ const MOST_OF_FULL_SCALE: f64 = 1.5;
 /// A position may be so far beyond the stroke's ends, share of it. Chosen.
 const BEYOND_STROKE: f64 = 0.05;
 
-/// The channels of [`Told::extremes`].
-const CHANNELS: [Signal; 5] =
-    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB];
 /// Means of a constant differ by less.
 const ROUNDING: f64 = 1e-12;
 
@@ -37,9 +34,9 @@ impl Told {
             return false;
         }
         match mistake {
-            Mistake::Factor(of, factor) => of.channels().iter().all(|channel| {
-                self.extremes[*channel]
-                    .is_none_or(|extremes| allows(*channel, extremes.map(|value| value / factor), rig))
+            Mistake::Factor(of, factor) => of.channels().all(|channel| {
+                self.extremes[channel]
+                    .is_none_or(|extremes| allows(channel, extremes.map(|value| value / factor), rig))
             }),
             Mistake::LostSign(_) => false,
             _ => true,
@@ -47,10 +44,8 @@ impl Told {
     }
 
     fn is_constant(&self, sensor: Signal) -> bool {
-        let channel = CHANNELS.iter().position(|own| *own == sensor);
-        channel
-            .and_then(|channel| self.extremes[channel])
-            .is_some_and(|[least, most]| most - least <= ROUNDING * least.abs().max(most.abs()))
+        let extremes = channel(sensor).and_then(|channel| self.extremes[channel]);
+        extremes.is_some_and(|[least, most]| most - least <= ROUNDING * least.abs().max(most.abs()))
     }
 
     /// The flows that lost their signs, and the ln likelihood ratio of that: a flow that is never negative while the piston moves
@@ -91,16 +86,12 @@ fn allows(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
 }
 
 impl Of {
-    /// Among x, P_A, P_B, Q_A and Q_B.
-    pub(super) fn channels(self) -> &'static [usize] {
-        match self {
-            Self::Position => &[0],
-            Self::PressureA => &[1],
-            Self::PressureB => &[2],
-            Self::Pressures => &[1, 2],
-            Self::FlowA => &[3],
-            Self::FlowB => &[4],
-            Self::Flows => &[3, 4],
-        }
+    /// Their places among x, P_A, P_B, Q_A and Q_B.
+    pub(super) fn channels(self) -> impl Iterator<Item = usize> {
+        self.sensors().iter().filter_map(|sensor| channel(*sensor))
     }
+}
+
+fn channel(sensor: Signal) -> Option<usize> {
+    CHANNELS.iter().position(|own| *own == sensor)
 }

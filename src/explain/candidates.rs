@@ -7,7 +7,6 @@ use super::hypothesis::{CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, 
 use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::pass::Pass;
-use super::scatter::ln_ratios;
 use super::table::{Entry, USUAL};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
@@ -185,7 +184,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
         let mut kept = Vec::new();
-        let scatters = ln_ratios(&self.pass.statistic.scatter(), self.pass.rig).is_some();
+        let scatters = self.pass.over_sheet.all_scatter();
         for (entry, mistake, ln_told) in self.pass.mistakes() {
             let equations = self.pass.equations(&whole, Some(entry), &columns);
             let mended = Mended::new(equations, self.declared, mistake, scales, scatters);

@@ -7,11 +7,11 @@ use super::mistakes;
 use super::odds::Prior;
 use super::raw_products::{RawProducts, SegmentProducts, Statistic};
 use super::readings::{Mistake, Readings};
-use super::scatter;
+use super::scatter::{Louder, OverSheet};
 use super::table::{self, Entry, USUAL};
 use crate::rig::{Odds, Rig};
 use crate::told::Told;
-use pitchleak_core::continuity::{CHANNELS, EQUATIONS};
+use pitchleak_core::continuity::EQUATIONS;
 use pitchleak_core::{Leak, PerLeak};
 
 /// The table as it is weighed.
@@ -57,8 +57,7 @@ pub(super) struct Pass<'a, 's> {
     pub sizes: Sizes,
     pub segments: usize,
     pub full_scale_m3s: f64,
-    /// Scatter of the readings over the declared noise, at least 1: of flows, of the position, and of pressures.
-    pub scatter: [f64; 3],
+    pub over_sheet: OverSheet,
 }
 
 impl<'a, 's> Pass<'a, 's> {
@@ -87,7 +86,7 @@ impl<'a, 's> Pass<'a, 's> {
             },
             segments: statistic.segments().len(),
             full_scale_m3s,
-            scatter: over_sheet(statistic, rig),
+            over_sheet: OverSheet::of(statistic.scatter(), rig),
         }
     }
 
@@ -108,7 +107,7 @@ impl<'a, 's> Pass<'a, 's> {
 
     /// A fit takes all noise to be louder by one scale. Where the flows alone are, the columns' noise is not.
     fn with_columns_of_their_own_noise(&self, equations: NormalEquations) -> NormalEquations {
-        let [_, position, pressures] = self.scatter;
+        let Louder { position, pressures, .. } = self.over_sheet.louder();
         let of_columns = position.max(pressures).powi(2);
         let louder = [0, 1].map(|equation| {
             let [sheet, scattered] = equations.left_noise(equation);
@@ -177,26 +176,9 @@ impl<'a, 's> Pass<'a, 's> {
 
     /// Mistakes that these readings may carry, with what tells their odds beside the equations, ln.
     pub fn mistakes(&self) -> impl Iterator<Item = (&'a Entry, Mistake, f64)> {
-        let scatter = self.statistic.scatter();
-        self.tables.mistakes.iter().filter_map(move |entry| {
+        self.tables.mistakes.iter().filter_map(|entry| {
             let mistake = entry.mistake.filter(|mistake| self.told.allows(*mistake, self.rig))?;
-            let by_scatter = scatter::ln_odds(&scatter, mistake, self.rig);
-            Some((entry, mistake, self.told.ln_odds(mistake) + by_scatter))
+            Some((entry, mistake, self.told.ln_odds(mistake) + self.over_sheet.ln_odds(mistake)))
         })
     }
-}
-
-/// Scatter of flows, of the position and of pressures over the declared noise.
-fn over_sheet(statistic: &Statistic, rig: &Rig) -> [f64; 3] {
-    let sensors = rig.sensors();
-    let found: [Option<f64>; CHANNELS] = statistic.scatter();
-    let over = |found: Option<f64>, declared: f64| match found {
-        Some(found) if declared > 0.0 => (found / declared).max(1.0),
-        _ => 1.0,
-    };
-    [
-        over(found[3], sensors.flow_a.noise_std).max(over(found[4], sensors.flow_b.noise_std)),
-        over(found[0], sensors.position.noise_std),
-        over(found[1], sensors.pressure.noise_std).max(over(found[2], sensors.pressure.noise_std)),
-    ]
 }

@@ -8,6 +8,7 @@ use super::leak_sample::{Weighed, Weighing, cut};
 use super::mended::Mended;
 use super::pass::{Pass, Tables};
 use super::raw_products::{RawProducts, Statistic};
+use super::scatter::Louder;
 use crate::rig::Rig;
 use crate::told::Told;
 use pitchleak_core::PerLeak;
@@ -90,8 +91,8 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     let mut candidates = Candidates::with_constant_leaks(pass, declared);
     candidates.add_courses(LEAST_LN);
     let mended = candidates.add_mistakes(LEAST_LN);
-    let as_declared =
-        Weighing { equations: declared, loudness: [pass.scatter[0].powi(2), pass.scatter[1].powi(2)] };
+    let Louder { flows, position, .. } = pass.over_sheet.louder();
+    let as_declared = Weighing { equations: declared, loudness: [flows * flows, position * position] };
     let weighings: Vec<Weighing<'_>> =
         std::iter::once(as_declared).chain(mended.iter().map(Mended::weighing)).collect();
     let all = candidates.best_first();

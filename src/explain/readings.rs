@@ -2,10 +2,9 @@
 
 use pitchleak_core::continuity::{RAW_SUMS, RawSum};
 use pitchleak_core::{ATMOSPHERE_PA, Cylinder, PerLeak};
-use serde::{Deserialize, Serialize};
 
 /// Which readings a mistake concerns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Of {
     /// Q_A.
     FlowA,
@@ -24,7 +23,7 @@ pub enum Of {
 }
 
 /// A mistake of wiring, sign, unit or geometry, which no small error is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mistake {
     /// Q_A and Q_B are exchanged.
     FlowsExchanged,

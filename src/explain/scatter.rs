@@ -2,7 +2,8 @@
 //!
 //! Either a data sheet tells the noise of all sensors exactly, or of none: with r the scatter over the sheet's,
 //! p(r) = w Π N(ln r; 0, σ_exact²) + (1 − w) Π N(ln r; 0, σ_wide²) over the channels, σ_wide larger above 1 than below.
-//! A mistake by a factor f divides its channels' r by f. So it takes all other sensors to be as their sheets say before one of them is believed to be in another unit.
+//! A mistake by a factor f divides its channels' r by f. So it takes all other sensors to be as their sheets say before one
+//! of them is believed to be in another unit.
 
 use super::readings::Mistake;
 use crate::rig::Rig;
@@ -19,29 +20,55 @@ const WIDER: f64 = 3.0;
 /// Readings that scatter less, in that of their sheet, are computed, and their noise tells no unit.
 const LEAST_RATIO: f64 = 0.01;
 
-/// ln by which the scatter changes the odds of `mistake`.
-pub(crate) fn ln_odds(scatter: &[Option<f64>; CHANNELS], mistake: Mistake, rig: &Rig) -> f64 {
-    let (Mistake::Factor(of, factor), Some(mut ln_ratios)) = (mistake, ln_ratios(scatter, rig)) else {
-        return 0.0;
-    };
-    let as_read = ln_density(&ln_ratios);
-    of.channels().iter().for_each(|channel| ln_ratios[*channel] -= factor.ln());
-    ln_density(&ln_ratios) - as_read
+/// Scatter of each channel's readings over its sheet's noise; none where either is not known.
+#[derive(Clone, Copy)]
+pub(crate) struct OverSheet([Option<f64>; CHANNELS]);
+
+impl OverSheet {
+    /// Of this scatter, SI, in the order of the sensors' [noise](pitchleak_core::Sensors::noise_stds).
+    pub fn of(scatter: [Option<f64>; CHANNELS], rig: &Rig) -> Self {
+        let sheets = rig.sensors().noise_stds();
+        Self(std::array::from_fn(|channel| {
+            let sheet = Some(sheets[channel]).filter(|sheet| *sheet > 0.0);
+            scatter[channel].zip(sheet).map(|(scatter, sheet)| scatter / sheet)
+        }))
+    }
+
+    /// How many times louder than their sheets flows, position and pressures are, the loudest of a kind, at least 1.
+    pub(super) fn louder(&self) -> Louder {
+        let [x, pa, pb, qa, qb] = self.0.map(|ratio| ratio.map_or(1.0, |ratio| ratio.max(1.0)));
+        Louder { flows: qa.max(qb), position: x, pressures: pa.max(pb) }
+    }
+
+    /// Whether all channels scatter: none is computed.
+    pub fn all_scatter(&self) -> bool {
+        self.ln_ratios().is_some()
+    }
+
+    /// ln by which the odds of `mistake` change.
+    pub fn ln_odds(&self, mistake: Mistake) -> f64 {
+        let (Mistake::Factor(of, factor), Some(mut ln_ratios)) = (mistake, self.ln_ratios()) else {
+            return 0.0;
+        };
+        let as_read = ln_density(&ln_ratios);
+        of.channels().for_each(|channel| ln_ratios[channel] -= factor.ln());
+        ln_density(&ln_ratios) - as_read
+    }
+
+    /// None where a channel is computed.
+    fn ln_ratios(&self) -> Option<[f64; CHANNELS]> {
+        let scatters =
+            |ratio: &Option<f64>| ratio.is_some_and(|ratio| ratio.is_finite() && ratio > LEAST_RATIO);
+        self.0.iter().all(scatters).then(|| self.0.map(|ratio| ratio.unwrap_or(1.0).ln()))
+    }
 }
 
-/// ln of each channel's scatter over its sheet's; none where one is computed.
-pub(super) fn ln_ratios(scatter: &[Option<f64>; CHANNELS], rig: &Rig) -> Option<[f64; CHANNELS]> {
-    let sensors = rig.sensors();
-    let sheets = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
-    let mut ln_ratios = [0.0; CHANNELS];
-    for ((ln_ratio, scatter), sheet) in ln_ratios.iter_mut().zip(scatter).zip(sheets) {
-        let ratio = scatter.map_or(0.0, |std| std / sheet.noise_std);
-        if !(ratio.is_finite() && ratio > LEAST_RATIO) {
-            return None;
-        }
-        *ln_ratio = ratio.ln();
-    }
-    Some(ln_ratios)
+/// How many times louder than their sheets readings are.
+#[derive(Clone, Copy)]
+pub(super) struct Louder {
+    pub flows: f64,
+    pub position: f64,
+    pub pressures: f64,
 }
 
 fn ln_density(ln_ratios: &[f64; CHANNELS]) -> f64 {

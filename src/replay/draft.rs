@@ -1,12 +1,13 @@
 //! A report in the making: its figures once, its verdict as soon as it is known what speaks against them.
 
 use super::Replay;
-use crate::channels::ChannelFault;
+use crate::channels::{ChannelFault, ChannelFaultKind};
 use crate::explain::Decision;
 use crate::report::{
     Episode, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell, TraceSummary,
     Verdict,
 };
+use crate::rig::{ColumnMap, Rig};
 use crate::units::LPM_PER_M3S;
 use crate::wiring::Wiring;
 use pitchleak_core::PerLeak;
@@ -16,6 +17,15 @@ pub(super) struct Weighed {
     /// Faults of channels that count, and earlier ones that are only told.
     pub channels: Vec<ChannelFault>,
     earlier_channels: Vec<ChannelFault>,
+}
+
+impl Weighed {
+    /// The mistake that `decision` is sure of, of a trace whose columns were read by `columns`. No wiring explains what a
+    /// broken channel reads.
+    pub fn wiring(&self, decision: Option<&Decision>, columns: &ColumnMap, rig: &Rig) -> Option<Wiring> {
+        let is_broken = self.channels.iter().any(|fault| fault.kind != ChannelFaultKind::Coarse);
+        Wiring::of(decision?, columns, rig).filter(|_| !is_broken)
+    }
 }
 
 impl Replay {

@@ -14,7 +14,6 @@ mod spikes;
 mod state;
 mod stream;
 mod summary;
-mod suspicion;
 mod temperature;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
@@ -451,10 +450,8 @@ pub fn replay<E: From<ReplayError>>(
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());
     let decision = replay.decision().map(|decision| decision.read_by(&columns, rig));
-    let wiring = match refused.as_ref().and_then(Refused::wiring) {
-        None => replay.wiring(decision.as_ref(), &weighed, &columns),
-        wiring => wiring,
-    };
+    let refused = refused.as_ref().and_then(Refused::wiring);
+    let wiring = refused.or_else(|| weighed.wiring(decision.as_ref(), &columns, rig));
     let mut report = replay.report_with(summary, &weighed, decision.as_ref(), wiring);
     hold::advise(&mut report, reader.quality(), has_spool, rig);
     Ok(report)

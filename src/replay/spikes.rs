@@ -42,13 +42,12 @@ pub(super) struct Spikes {
 
 impl Spikes {
     pub fn new(sensors: &Sensors<f64>) -> Self {
-        let spreads = [sensors.position, sensors.pressure, sensors.pressure, sensors.flow_a, sensors.flow_b];
         Self {
             last: [0.0; CHANNELS],
             usual_step: [0.0; CHANNELS],
             quantum: [f64::INFINITY; CHANNELS],
             wild_step: [f64::INFINITY; CHANNELS],
-            least_wild: spreads.map(|spread| NOISE_STDS * spread.noise_std),
+            least_wild: sensors.noise_stds().map(|std| NOISE_STDS * std),
             taken: 0,
             learnt: [0; CHANNELS],
             in_a_row: 0,

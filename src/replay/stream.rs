@@ -241,10 +241,8 @@ impl Stream {
             return Some(ReplayReport { alarms: self.replay.alarms.clone(), ..report });
         }
         let weighed = self.replay.last_stretch();
-        let wiring = match self.refused_for().filter(|_| quality.is_mostly_bad()) {
-            None => self.replay.wiring(decision, &weighed, &self.rig().columns),
-            wiring => wiring,
-        };
+        let refused = self.refused_for().filter(|_| quality.is_mostly_bad());
+        let wiring = refused.or_else(|| weighed.wiring(decision, &self.rig().columns, self.rig()));
         let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
         hold::advise(&mut report, quality, self.has_spool, self.rig());
         Some(report)

@@ -6,7 +6,7 @@ use crate::channels::ChannelFaultKind;
 use crate::explain::{Decision, Explained, MISFIT_DOUBT, WIRING_DOUBT};
 use crate::signal::Signal;
 use crate::units::readable;
-use crate::wiring::HOW_WIRED;
+use crate::wiring::remedy;
 use pitchleak_core::Leak;
 use serde::{Serialize, Serializer};
 
@@ -110,22 +110,14 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
 /// The mistake of wiring that explains the trace, with the lines that mend it.
 fn wiring(findings: &Findings<'_>) -> Option<Reason> {
     if let Some(found) = findings.wiring {
-        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), found.remedy(HOW_WIRED));
+        let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), remedy(&found.columns));
         return Some(reason.against(&found.sensors));
     }
     let decision = findings.decision.filter(|decision| decision.wiring > WIRING_DOUBT)?;
     let best = decision.explanations.iter().find(|one| one.wiring)?;
     let percent = 100.0 * decision.wiring;
-    let mend = if best.columns.is_empty() {
-        format!("check {HOW_WIRED}, and record anew")
-    } else {
-        format!(
-            "check {HOW_WIRED}; where that is so, mend it in the rig file: [columns] {}",
-            best.columns.join("; ")
-        )
-    };
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);
-    Some(Reason::new(ReasonId::Wiring, text, mend).against(&best.sensors))
+    Some(Reason::new(ReasonId::Wiring, text, remedy(&best.columns)).against(&best.sensors))
 }
 
 /// What the trace says too little of.

@@ -59,7 +59,7 @@ impl Gatherer {
             self.unsigned = [true; 2];
         }
         self.readings += 1;
-        let readings = [Some(s.x_m), Some(s.pa_pa), Some(s.pb_pa), s.qa_m3s, s.qb_m3s, s.force_n];
+        let readings = s.readings().into_iter().chain([s.force_n]);
         for ((sum, count), reading) in self.sums.iter_mut().zip(&mut self.counts).zip(readings) {
             if let Some(reading) = reading {
                 *sum += reading;

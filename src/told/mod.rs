@@ -10,6 +10,7 @@ pub use force::ForceBalance;
 pub(crate) use force::{ForceSums, Scaled};
 
 use crate::rig::Rig;
+use crate::signal::Signal;
 use crate::trace::Record;
 use block::Block;
 use serde::{Deserialize, Serialize};
@@ -31,11 +32,12 @@ struct Stretch {
     blocks: u32,
     force: ForceSums,
     signs: SignSums,
-    extremes: [Option<[f64; 2]>; CHANNELS],
+    extremes: [Option<[f64; 2]>; CHANNELS.len()],
 }
 
-/// x, P_A, P_B, Q_A, Q_B.
-const CHANNELS: usize = 5;
+/// In the order of [`Sample::readings`](pitchleak_core::Sample::readings).
+pub(crate) const CHANNELS: [Signal; 5] =
+    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB];
 /// A minute, or longer where samples come so slowly that a block does.
 const STRETCH_BLOCKS: u32 = 240;
 
@@ -107,7 +109,7 @@ pub struct Told {
     /// The balance of the load force, where it was measured.
     pub force: Option<ForceBalance>,
     /// Least and largest mean over a block of x, P_A, P_B, Q_A and Q_B, SI; none of what was not read.
-    pub extremes: [Option<[f64; 2]>; CHANNELS],
+    pub extremes: [Option<[f64; 2]>; CHANNELS.len()],
     /// Of Q_A and Q_B.
     pub signs: [Unsigned; 2],
 }

@@ -36,9 +36,6 @@ pub struct Wiring {
     pub alternatives: Vec<String>,
 }
 
-/// What to check of a mistake of wiring.
-pub const HOW_WIRED: &str = "how the columns are wired and recorded";
-
 impl Wiring {
     /// What the decision is sure of: some mistake with probability 1 − α. The likeliest is named, beside those that are not
     /// much less likely; `columns` are those that the trace was read by.
@@ -70,21 +67,19 @@ impl Wiring {
         })
     }
 
-    /// What to do about it.
-    pub fn remedy(&self, check: &str) -> String {
-        if self.columns.is_empty() {
-            return format!("check {check}, and record anew");
-        }
-        format!(
-            "check {check}; where that is so, mend it in the rig file: [columns] {}",
-            self.columns.join("; ")
-        )
-    }
-
     /// It in one sentence, without a full stop.
     pub fn sentence(&self) -> String {
-        format!("{}; {}", self.suggestion, self.remedy(HOW_WIRED))
+        format!("{}; {}", self.suggestion, remedy(&self.columns))
     }
+}
+
+/// What to do about a mistake that these lines of `[columns]` mend; none where the recording has to be.
+pub(crate) fn remedy(columns: &[String]) -> String {
+    const CHECK: &str = "check how the columns are wired and recorded";
+    if columns.is_empty() {
+        return format!("{CHECK}, and record anew");
+    }
+    format!("{CHECK}; where that is so, mend it in the rig file: [columns] {}", columns.join("; "))
 }
 
 fn suggestion(first: &Explained, names: &[String], residuals: Option<(f64, f64)>) -> String {

@@ -2,13 +2,12 @@
 //! them within its range. Evidence for people; nothing is read otherwise because of it.
 
 use super::Wiring;
-use crate::explain::{Mistake, Of, scatter::ln_odds};
+use crate::explain::{Mistake, Of, scatter::OverSheet};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
-use crate::told::{ForceSums, Gatherer, Scaled};
+use crate::told::{CHANNELS, ForceSums, Gatherer, Scaled};
 use crate::trace::{OVERRANGE, Record};
 use crate::units::{Dimension, readable};
-use pitchleak_core::Sample;
 use pitchleak_core::continuity::Scatter;
 use serde::{Deserialize, Serialize};
 
@@ -31,9 +30,6 @@ const LONGEST_STEP_S: f64 = 1.0;
 const FORGOTTEN_S: f64 = 60.0;
 /// A slipped decimal point.
 const TENFOLD: f64 = 10.0;
-
-const CHANNELS: [Signal; 5] =
-    [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB];
 
 /// Rows as they were read, refused or not, since the first refused one; in constant memory.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -98,7 +94,7 @@ impl Refused {
             return;
         }
         self.rows += 1;
-        let readings = readings(&record.sample);
+        let readings = record.sample.readings();
         if self.channels.iter().zip(readings).any(|(channel, reading)| channel.is_absurd(reading)) {
             return;
         }
@@ -226,8 +222,8 @@ impl Refused {
 
     /// Where one unit makes the scatter far likelier than others, those go.
     fn keep_as_loud(&self, found: &mut Vec<Suspect>) {
-        let scatter = self.scatter.map(|scatter| scatter.std());
-        let ln = |one: &Suspect| ln_odds(&scatter, one.mistake, &self.rig);
+        let over_sheet = OverSheet::of(self.scatter.map(|scatter| scatter.std()), &self.rig);
+        let ln = |one: &Suspect| over_sheet.ln_odds(one.mistake);
         let best = found.iter().map(ln).fold(f64::MIN, f64::max);
         found.retain(|one| ln(one) > best - LN_APART);
     }
@@ -302,8 +298,4 @@ fn factors(signal: Signal, rig: &Rig) -> Vec<f64> {
     factors.sort_by(f64::total_cmp);
     factors.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-6);
     factors
-}
-
-fn readings(sample: &Sample<f64>) -> [Option<f64>; CHANNELS.len()] {
-    [Some(sample.x_m), Some(sample.pa_pa), Some(sample.pb_pa), sample.qa_m3s, sample.qb_m3s]
 }

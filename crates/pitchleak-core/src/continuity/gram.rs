@@ -300,10 +300,8 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
 
     /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
     pub fn push(&mut self, dt_s: T, sample: &Sample<T>) {
-        let readings =
-            [Some(sample.x_m), Some(sample.pa_pa), Some(sample.pb_pa), sample.qa_m3s, sample.qb_m3s];
         let after_gap = dt_s <= T::zero();
-        for (scatter, reading) in self.scatter.iter_mut().zip(readings) {
+        for (scatter, reading) in self.scatter.iter_mut().zip(sample.readings()) {
             scatter.add(reading, after_gap);
         }
         if !after_gap {

@@ -26,6 +26,12 @@ impl<T: Real> Sample<T> {
         self.pa_pa - self.pb_pa
     }
 
+    /// x, P_A, P_B, Q_A and Q_B: what the continuity equations need.
+    #[inline]
+    pub fn readings(&self) -> [Option<T>; 5] {
+        [Some(self.x_m), Some(self.pa_pa), Some(self.pb_pa), self.qa_m3s, self.qb_m3s]
+    }
+
     /// Whether every reading that is there is a finite number.
     #[inline]
     pub fn is_finite(&self) -> bool {

@@ -54,6 +54,13 @@ impl<T: Real> SensorSpread<T> {
 }
 
 impl<T: Real> Sensors<T> {
+    /// Standard deviations of the noise of x (m), P_A, P_B (Pa), Q_A and Q_B (m³/s), in the order of
+    /// [`Sample::readings`](super::Sample::readings).
+    pub fn noise_stds(&self) -> [T; 5] {
+        let Self { flow_a, flow_b, pressure, position, .. } = self;
+        [position, pressure, pressure, flow_a, flow_b].map(|spread| spread.noise_std)
+    }
+
     /// Sensors of the paper's rig (Section III): flow meters 20 L/min full scale, 1 % of full scale.
     pub fn paper() -> Self {
         let one_percent = T::lit(0.01);
