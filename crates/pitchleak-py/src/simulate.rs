@@ -74,7 +74,7 @@ pub struct Order {
 type Arrays<'py> = Vec<(&'static str, Bound<'py, PyArray1<f64>>)>;
 
 /// Simulates a rig; gives the truth as JSON, warnings, and the columns of the trace, or none where it is
-/// written to `out`. `progress` is called with the share that is done and 1.
+/// written to `out`. `progress` is called with the share that is done and 1, now and then and at the end.
 #[pyfunction]
 #[pyo3(signature = (order, rig, out, progress = None))]
 pub fn simulate<'py>(
@@ -107,6 +107,7 @@ pub fn simulate<'py>(
         (Err(RecordingError::Output(error)), _) => return Err(output_error(py, &error)),
         (made, _) => made.map_err(value_error)?,
     };
+    tell(py, 1.0)?;
     let columns = columns.into_iter().map(|(header, values)| (header, values.into_pyarray(py))).collect();
     Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }
