@@ -1,10 +1,10 @@
 //! The diagnosis on traces of the project's own plant.
 
 use pitchleak::Rig;
-use pitchleak::core::effects::EffectConstants;
-use pitchleak::core::{Effect, EffectSet, PerLeak, Sample, Signals};
+use pitchleak::core::effects::{EffectConstants, EffectKind};
+use pitchleak::core::{Cylinder, Effect, EffectSet, PerLeak, Sample, Signals};
 use pitchleak::curve::Curve;
-use pitchleak::diagnose::{Declared, Diagnosis, DoubtId, Series, Verdict, diagnose};
+use pitchleak::diagnose::{Declared, Diagnosis, DoubtId, FoundEffect, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -125,6 +125,66 @@ fn all_that_an_effect_is_stands_in_its_entry() {
             let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
             let is_named = text.contains(&name) || words.clone().any(|word| word == id);
             assert!(!is_named, "{} names {id}", path.display());
+        }
+    }
+}
+
+/// The cylinder's number, so many times what the plant has.
+fn declared_wrong(number: fn(&mut Cylinder<f64>) -> &mut f64, times: f64) -> Rig {
+    let mut rig = rig();
+    *number(&mut rig.cylinder) *= times;
+    rig
+}
+
+fn without_force(mut series: Series) -> Series {
+    series.force_n.fill(f64::NAN);
+    series
+}
+
+/// Beside a load cell for sure; without one a meter's gain does nearly the same, and is not believed either.
+#[test]
+fn a_wrong_area_is_named_and_no_sensor_is_blamed() {
+    let areas: [(_, fn(&mut Cylinder<f64>) -> &mut f64); 2] =
+        [("area_a", |cylinder| &mut cylinder.area_a_m2), ("area_b", |cylinder| &mut cylinder.area_b_m2)];
+    let series = trace(None);
+    let mut true_cylinder = rig().cylinder;
+    for (id, area) in areas {
+        for times in [0.9, 0.95, 1.05, 1.1] {
+            let wrong = declared_wrong(area, times);
+            let answer = ask(series.clone(), &wrong);
+            assert_eq!((first(&answer), answer.effects.len()), (id, 1), "{times}: {:?}", answer.notes);
+            assert_eq!(answer.verdict, Verdict::Explained, "{id} {times}: {:?}", answer.notes);
+            let mended = *area(&mut answer.rig(&wrong).cylinder) / *area(&mut true_cylinder);
+            assert!((mended - 1.0).abs() < 2e-3, "{id}: {mended}");
+
+            let answer = ask(without_force(series.clone()), &wrong);
+            let found = answer.effects.first().expect("is found");
+            assert!(found.id == id || found.confusable_with.contains(&id), "{id} {times}: {found:?}");
+            assert!(found.id == id || !found.confident, "{id} {times}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn no_sensor_is_blamed_for_other_wrong_numbers_of_the_cylinder() {
+    let numbers: [(_, fn(&mut Cylinder<f64>) -> &mut f64); 4] = [
+        ("stroke", |cylinder| &mut cylinder.stroke_m),
+        ("dead volume A", |cylinder| &mut cylinder.dead_volume_a_m3),
+        ("dead volume B", |cylinder| &mut cylinder.dead_volume_b_m3),
+        ("mass", |cylinder| &mut cylinder.moving_mass_kg),
+    ];
+    let series = trace(None);
+    for (name, number) in numbers {
+        for times in [0.9, 0.95, 1.05, 1.1] {
+            for series in [series.clone(), without_force(series.clone())] {
+                let answer = ask(series, &declared_wrong(number, times));
+                let is_blamed = |effect: &&FoundEffect| {
+                    let kind = effect.id.parse::<Effect>().expect("is an effect").spec().kind;
+                    kind == EffectKind::Sensor && effect.confident
+                };
+                let blamed = answer.effects.iter().find(is_blamed);
+                assert_eq!(blamed, None, "{name} {times}");
+            }
         }
     }
 }

@@ -30,13 +30,15 @@ pub use equation::{Equation, PerEquation};
 pub use fit::Progress;
 pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, Doubt, DoubtId, EquationResidual, FoundEffect,
-    HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples, Size, Verdict,
+    FoundLeakChange, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples,
+    Size, Verdict,
 };
 pub use search::{Candidate, Collinearity};
 
 use assess::{HeldOut, model_fit};
 use fit::{Fit, Problem};
 use search::Selection;
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Fits all of `train` as traces of one rig and judges on `test`, or, where that is empty, on blocks
@@ -48,15 +50,23 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let checks = data::check_sensors(&train, &declared);
     let problem = Problem::new(&train, &declared, &checks);
     let plain = Fit::declared(&problem, progress);
-    let before = model_fit(&plain, &test);
+    let mut before = model_fit(&plain, &test);
     let excited = assess::is_excited(&plain);
     let miswired = data::miswired(&train, &declared);
     let beyond_effects = miswired.as_ref().is_some_and(|found| found.is_beyond_effects);
+    let changing = OnceCell::new();
     let selection = if excited && !beyond_effects {
-        search::search(plain, |fit| HeldOut::of(fit, &test).rmse(), progress)
+        let with_changes = || {
+            let plain = || Problem::new(&train, &declared, &checks);
+            changing.get_or_init(|| search::leak_changes::problem(plain, progress)).as_ref()
+        };
+        search::best(plain, with_changes, |fit| HeldOut::of(fit, &test).rmse(), progress)
     } else {
         Selection::none(plain)
     };
+    if selection.fit.problem.has_leak_changes() {
+        before = model_fit(&Fit::declared(selection.fit.problem, progress), &test);
+    }
     let after = model_fit(&selection.fit, &test);
     let judgement = assess::judge(&selection, assess::failures(&checks, &faults), [&before, &after]);
     let found = assess::found(&selection, &judgement);
@@ -86,6 +96,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         before,
         after,
         interactions: judgement.interactions,
+        leak_changes: assess::leak_changes(fit),
         holds,
     }
 }

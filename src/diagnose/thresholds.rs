@@ -168,6 +168,9 @@ pub(crate) const AGREED_SIGMA: f64 = 3.0;
 pub(crate) const LEAST_LAG_SHARE: f64 = 0.01;
 /// Candidates whose fit is this close cannot be told apart. Derived: three standard deviations.
 pub(crate) const CONFUSABLE_CHI2: f64 = 9.0;
+/// A candidate's score is linear about the effect in whose place it would stand, and may err by this share: within it, it is fitted there.
+/// Derived: the square of an effect of a fifth, which is beyond any gain or area in use.
+pub(crate) const CURVED_SHARE: f64 = 0.04;
 /// A score below this is not worth a search for constants. Derived: three standard deviations.
 pub(crate) const WORTH_SEARCHING: f64 = 9.0;
 /// Steps of the search for constants. Chosen against cycles.
@@ -185,6 +188,18 @@ pub(crate) const OTHERS_SHARE: f64 = 0.3;
 pub(crate) const CONSTANT_STEP: f64 = 0.01;
 /// Places along the range of each constant from which the search starts. Chosen: ends and middle.
 pub(crate) const SEARCH_STARTS: [f64; 3] = [0.15, 0.5, 0.85];
+
+// Leaks that change.
+
+/// So many effects that leave more than noise are not trusted before leaks that change are asked. Chosen: two faults at once are rare.
+pub(crate) const FEW_EFFECTS: usize = 2;
+/// χ² that leaks of its own must explain of a part of the traces. Derived: three leaks at one of two thousand places do so by chance once
+/// in a million traces.
+pub(crate) const CHANGE_CHI2: f64 = 46.0;
+/// Places that a change is looked for at, before it is moved to the row that it is best at. Chosen for time.
+pub(crate) const MOST_CHANGE_PLACES: usize = 2000;
+/// How often changes are looked for, at ever less noise. Chosen against cycles.
+pub(crate) const MOST_CHANGE_ROUNDS: usize = 4;
 
 // The verdict.
 

@@ -315,20 +315,13 @@ fn dry_friction_holds_a_piston_with_what_it_resists_at_creeping_speed() {
 
 #[test]
 fn what_adds_to_a_declared_number_is_that_number() {
-    let with = |effect: Effect, cylinder: &mut pitchleak_core::Cylinder<f64>, by: f64| match effect {
-        Effect::DeadVolumeA => cylinder.dead_volume_a_m3 += by,
-        Effect::DeadVolumeB => cylinder.dead_volume_b_m3 += by,
-        Effect::AddedMass => cylinder.moving_mass_kg += by,
-        _ => panic!("{effect} adds to nothing"),
-    };
-    let at = Signals { a_mps2: 0.3, dpa_pas: 1e6, dpb_pas: -2e6, ..Signals::default() };
+    let moving = Signals { x_m: 0.07, v_mps: 0.02, pa_pa: 4e6, pb_pa: 1e6, ..Signals::default() };
+    let at = Signals { a_mps2: 0.3, dpa_pas: 1e6, dpb_pas: -2e6, ..moving };
     let model = Model::paper();
-    for effect in Effect::ALL.iter().filter(|effect| effect.adds_to(&model.cylinder).is_some()) {
-        let mut more = model;
-        let size = effect.spec().default_size;
-        with(*effect, &mut more.cylinder, size);
-        let grown = effect.adds_to(&more.cylinder).zip(effect.adds_to(&model.cylinder));
-        assert!(grown.is_some_and(|(more, less)| (more - less - size).abs() < 1e-12));
+    for effect in Effect::ALL {
+        let (mut more, size) = (model, effect.spec().default_size);
+        let Some(number) = effect.adds_to(&mut more.cylinder) else { continue };
+        *number += size;
         let moved = model.residual(&at).plus(-1.0, more.residual(&at));
         let term = effect.unit_term(&at, &model, &EffectConstants::default());
         let left = moved.plus(-size, term);

@@ -7,8 +7,8 @@ use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Doubt, DoubtId};
 use crate::diagnose::search::{self, Selected, Selection};
 use crate::diagnose::thresholds::{
-    ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS, LEAST_SHARE_BESIDE,
-    UNMENDED_SHARE,
+    ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, CURVED_SHARE, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS,
+    LEAST_SHARE_BESIDE, UNMENDED_SHARE,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
 
@@ -195,7 +195,8 @@ fn at_bound(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
 /// It would take away all that the rig file declares, such as the mass that moves.
 fn takes_all_declared(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let effect = fit.problem.terms[one.term].effect()?;
-    let declared = effect.adds_to(fit.problem.declared_cylinder())?;
+    let mut cylinder = *fit.problem.declared_cylinder();
+    let declared = *effect.adds_to(&mut cylinder)?;
     let own = fit.estimate(one.term)?;
     let is_small = own.value - own.std < -declared;
     let text = || {
@@ -236,12 +237,16 @@ fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
 }
 
 /// By how much a candidate that these traces neither name nor rule out would move an effect's value: a second effect that is too
-/// weak for a name need not be absent.
+/// weak for a name need not be absent. One that comes near in its place was fitted there: it is a rival, or it is not.
 pub(crate) fn unnamed_shift(fit: &Fit<'_>, term: usize) -> f64 {
     let dispersion = fit.dispersion(fit.free.chi2);
+    let without = fit.solve_without(&[term]);
+    let near = (1.0 - CURVED_SHARE) * (without.chi2 - fit.free.chi2);
     let is_possible = |candidate: &usize| {
-        let score = fit.score(&fit.free, *candidate);
-        score.is_some_and(|score| score.chi2_drop > CONFUSABLE_CHI2 * dispersion)
+        let beside = fit.score(&fit.free, *candidate);
+        let in_its_place = || fit.score(&without, *candidate);
+        beside.is_some_and(|score| score.chi2_drop > CONFUSABLE_CHI2 * dispersion)
+            && in_its_place().is_none_or(|score| score.chi2_drop < near)
     };
     let possible = search::open(fit).into_iter().filter(is_possible);
     possible.filter_map(|candidate| fit.shift_by(candidate, term)).map(f64::abs).fold(0.0, f64::max)

@@ -2,16 +2,19 @@
 
 use super::adequacy::Judgement;
 use super::confidence;
-use crate::diagnose::fit::Fit;
-use crate::diagnose::outcome::{Calibration, Doubt, FoundEffect, LeakEstimate, LeakEstimates, Size};
+use crate::diagnose::fit::{Fit, LeakLevel};
+use crate::diagnose::outcome::{
+    Calibration, Doubt, FoundEffect, FoundLeakChange, LeakEstimate, LeakEstimates, Size,
+};
 use crate::diagnose::search::{self, Selected, Selection};
 use crate::diagnose::thresholds::{
     CI95_SIGMA, DETECTABLE_SIGMA, FEWEST_ROWS, IDENTIFIED_M3S, LEARNT_SHARE, NEGATIVE_SIGMA,
     RATIO_KNOWN_SHARE,
 };
 use crate::diagnose::weak_form::{Row, Term};
+use crate::units::LPM_PER_BAR;
 use pitchleak_core::effects::EffectKind;
-use pitchleak_core::{Effect, Estimate};
+use pitchleak_core::{Effect, Estimate, Leak};
 use std::collections::BTreeMap;
 
 fn estimate(fit: &Fit<'_>, term: Term) -> Estimate<f64> {
@@ -26,10 +29,15 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     let mean = |value: &dyn Fn(&Row) -> f64| {
         (rows.iter().map(|row| value(row).abs()).sum::<f64>() / rows.len().max(1) as f64).max(1.0)
     };
-    let leak = |term, pressure_pa: f64| {
-        let Estimate { value, std } = estimate(fit, term);
+    let leak = |leak, pressure_pa: f64| {
+        let Estimate { value, std } = fit.mean_leak(leak);
         let std = std * widening;
-        estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S)
+        let mean = estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S);
+        let levels = fit.leak_levels(leak);
+        let is_possible = levels
+            .iter()
+            .all(|level| level.coefficient.value >= -NEGATIVE_SIGMA * level.coefficient.std * widening);
+        LeakEstimate { physical: mean.physical && is_possible, ..mean }
     };
     let Estimate { value: compressibility, std } = estimate(fit, Term::InverseBulk);
     let bulk = 1.0 / compressibility;
@@ -37,9 +45,9 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     let prior = prior.map_or(f64::INFINITY, |prior| prior.std);
     let std = if fit.held_compressibility.is_some() { prior } else { std };
     LeakEstimates {
-        internal_leak_coefficient: leak(Term::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
-        external_leak_a_coefficient: leak(Term::ExternalA, mean(&|row| row.mean.pa_pa)),
-        external_leak_b_coefficient: leak(Term::ExternalB, mean(&|row| row.mean.pb_pa)),
+        internal_leak_coefficient: leak(Leak::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
+        external_leak_a_coefficient: leak(Leak::ExternalA, mean(&|row| row.mean.pa_pa)),
+        external_leak_b_coefficient: leak(Leak::ExternalB, mean(&|row| row.mean.pb_pa)),
         bulk_modulus: estimated(
             bulk,
             std * widening * bulk * bulk,
@@ -47,6 +55,43 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
             std * widening < LEARNT_SHARE * prior,
         ),
     }
+}
+
+/// Every change of a leak, in order of time.
+pub(crate) fn leak_changes(fit: &Fit<'_>) -> Vec<FoundLeakChange> {
+    let rows = &fit.rows().rows;
+    let of = |leak: Leak| {
+        let levels = fit.leak_levels(leak);
+        let pair = |pair: &[LeakLevel]| {
+            let [before, after] = pair else { return None };
+            let row = rows.get(after.from_row)?;
+            let (before, after) = (before.coefficient, after.coefficient);
+            Some(FoundLeakChange { fault: leak.id(), trace: row.trace(), time_s: row.t_s, before, after })
+        };
+        levels.windows(2).filter_map(pair).collect::<Vec<_>>()
+    };
+    let mut all: Vec<FoundLeakChange> = Leak::ALL.into_iter().flat_map(of).collect();
+    all.sort_by(|a, b| {
+        (a.trace, a.time_s).partial_cmp(&(b.trace, b.time_s)).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    all
+}
+
+/// A sentence for each leak that changes.
+pub(super) fn change_notes(fit: &Fit<'_>) -> Vec<String> {
+    let of = |leak: Leak| {
+        let levels = fit.leak_levels(leak);
+        let values = levels.iter().map(|level| LPM_PER_BAR * level.coefficient.value);
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        (levels.len() > 1).then(|| {
+            format!(
+                "the leak {} changes along the traces, {} times, between {low:.5} and {high:.5} L/min/bar: what is said of it is its mean",
+                leak.label(),
+                levels.len() - 1
+            )
+        })
+    };
+    Leak::ALL.into_iter().filter_map(of).collect()
 }
 
 fn estimated(value: f64, std: f64, unit: &'static str, identifiable: bool) -> LeakEstimate {

@@ -26,6 +26,10 @@ pub(crate) fn check(
     progress: Progress<'_>,
 ) -> Option<Holds> {
     let Selection { fit, effects } = selection;
+    if fit.problem.has_leak_changes() {
+        // Which leak a hold has depends on when it is.
+        return None;
+    }
     let held: Vec<Series> = judged.iter().map(|series| cut(series, &rests(series, declared))).collect();
     let held = [Equation::ChamberA, Equation::ChamberB].map(|one| Held::of(one, fit, &held, declared));
     if held.iter().all(Option::is_none) {

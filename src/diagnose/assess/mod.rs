@@ -7,7 +7,7 @@ mod holds;
 mod residual;
 
 pub(crate) use adequacy::{failures, judge};
-pub(crate) use estimates::{calibration, detection_limits, found, is_excited};
+pub(crate) use estimates::{calibration, detection_limits, found, is_excited, leak_changes};
 pub(crate) use holds::check as check_holds;
 pub(crate) use residual::{HeldOut, model_fit};
 
@@ -47,6 +47,7 @@ pub(crate) fn notes(
     let after = after.map(|after| negative_leaks(&after.leaks, "the model with the effects"));
     notes.extend(after.into_iter().flatten());
     notes.extend(effects.iter().filter_map(|one| ratio_note(fit, one)));
+    notes.extend(estimates::change_notes(fit));
     if !fit.has_converged() {
         notes.push(format!("the fit still moved after {MOST_ROUNDS} linearisations: estimates may be off by more than they say"));
     }

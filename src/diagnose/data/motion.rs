@@ -132,8 +132,8 @@ fn within_bands(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> 
             within_band(&series.t_s, own, own_std, &[meter, position])
         };
     // What flows into B is what the piston sweeps, the other way round.
-    let (area_a, area_b) = (cylinder.area_a_m2, -cylinder.area_b_m2);
-    [of((&qa, qa_std), (&qb, qb_std), area_a, -area_b), of((&qb, qb_std), (&qa, qa_std), area_b, -area_a)]
+    let (a_m2, b_m2) = (cylinder.area_a_m2, -cylinder.area_b_m2);
+    [of((&qa, qa_std), (&qb, qb_std), a_m2, -b_m2), of((&qb, qb_std), (&qa, qa_std), b_m2, -a_m2)]
 }
 
 fn longest_half(step_s: f64) -> usize {

@@ -87,6 +87,60 @@ impl<'a> Fit<'a> {
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
+    /// Best fit with a candidate in an effect's place, while the equations' error stays: see [`left_beyond`](Self::left_beyond).
+    pub(crate) fn in_place_of(
+        &self,
+        old: usize,
+        (new, constants): (usize, EffectConstants<f64>),
+        progress: Progress<'_>,
+    ) -> Self {
+        let (structure, at) = self.left_by(&[old]);
+        let structure = structure.with(new, constants);
+        let round = |at: Linearisation| {
+            let noise_at = (at.clone(), at);
+            Self::around(&structure.active, self.problem, structure.clone(), noise_at, self.assumed_error)
+        };
+        let mut fit = round(at);
+        for _ in 1..MOST_ROUNDS {
+            if fit.stands_still() {
+                break;
+            }
+            progress();
+            fit = round(fit.solved());
+        }
+        fit
+    }
+
+    /// By how much more it leaves than another fit of the same traces: squares of what is left over, each at the noise that its model
+    /// gives it, where it counts for both, and what the priors pay.
+    pub(crate) fn left_beyond(&self, other: &Self) -> f64 {
+        let (own, others) = (self.squares_left(), other.squares_left());
+        let both = own.iter().zip(&others).filter_map(|(own, other)| Some((*own)? - (*other)?));
+        both.sum::<f64>() + self.paid() - other.paid()
+    }
+
+    /// Of each entry that counts.
+    fn squares_left(&self) -> Vec<Option<f64>> {
+        let rows = &self.weak_form.rows;
+        let mut squares = vec![None; rows.entries.len()];
+        for equation in Equation::ALL {
+            for (place, value) in self.regression.innovations_by_entry(rows, &self.free, equation) {
+                squares[place] = Some(value * value);
+            }
+        }
+        squares
+    }
+
+    /// What the priors add to the sum of squares.
+    fn paid(&self) -> f64 {
+        let priors = self.problem.increments(&self.weak_form.at);
+        let terms = self.free.terms.iter().zip(&self.free.value);
+        let of = |(term, value): (&usize, &f64)| {
+            priors[*term].map_or(0.0, |prior| ((value - prior.mean) / prior.std).powi(2))
+        };
+        terms.map(of).sum()
+    }
+
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
     pub(crate) fn vacated(&self, term: usize) -> Self {
         let (structure, at) = self.left_by(&[term]);
@@ -194,16 +248,20 @@ impl<'a> Fit<'a> {
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and
     /// the noise is as it was assumed.
     pub(crate) fn has_converged(&self) -> bool {
+        let (assumed, found) = (self.noise_ratios(self.assumed_error), self.noise_ratio());
+        let is_as_assumed =
+            |equation: Equation| (found[equation] / assumed[equation] - 1.0).abs() <= SETTLED_NOISE;
+        self.stands_still() && Equation::ALL.into_iter().all(is_as_assumed)
+    }
+
+    /// Whether linearising once more would move every estimate by a small share of its standard deviation only.
+    fn stands_still(&self) -> bool {
         let (at, solved) = (&self.weak_form.at, self.solved());
         let is_still = |(term, std): (&usize, &f64)| {
             let term = self.problem.terms[*term];
             (solved.value(term) - at.value(term)).abs() <= SETTLED_SIGMA * std
         };
-        let (assumed, found) = (self.noise_ratios(self.assumed_error), self.noise_ratio());
-        let is_as_assumed =
-            |equation: Equation| (found[equation] / assumed[equation] - 1.0).abs() <= SETTLED_NOISE;
         self.bounded.terms.iter().zip(&self.bounded.std).all(is_still)
-            && Equation::ALL.into_iter().all(is_as_assumed)
     }
 
     /// The linearisation at the solution.

@@ -1,6 +1,7 @@
 //! The declared model and its effects, fitted to all traces together.
 
 mod gauss_newton;
+mod leak_levels;
 mod predict;
 mod problem;
 mod regression;
@@ -9,6 +10,7 @@ mod widening;
 
 pub(crate) use gauss_newton::Fit;
 pub use gauss_newton::Progress;
+pub(crate) use leak_levels::{LeakLevel, LeakProducts};
 pub(crate) use predict::MeanFlow;
 pub(crate) use problem::Problem;
 pub(crate) use regression::Solution;

@@ -3,7 +3,7 @@
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
 use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA};
-use crate::diagnose::weak_form::{DECLARED, Linearisation, Term, all_terms};
+use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors};
 
@@ -46,9 +46,25 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The same with leaks that change.
+    #[must_use]
+    pub(crate) fn with_leak_changes(mut self, changes: &[LeakChange]) -> Self {
+        self.terms.extend(changes.iter().map(|change| Term::LeakChange(*change)));
+        self.priors.resize(self.terms.len(), None);
+        self
+    }
+
+    /// Whether a leak changes along the traces.
+    pub(crate) fn has_leak_changes(&self) -> bool {
+        self.terms.iter().any(|term| matches!(term, Term::LeakChange(_)))
+    }
+
     /// The terms of the declared model: its constants, and what the rig file says may be there.
     pub(super) fn declared_terms(&self) -> Vec<usize> {
-        let is_declared = |i: &usize| DECLARED.contains(&self.terms[*i]) || self.priors[*i].is_some();
+        let is_declared = |i: &usize| {
+            let term = &self.terms[*i];
+            DECLARED.contains(term) || matches!(term, Term::LeakChange(_)) || self.priors[*i].is_some()
+        };
         (0..self.terms.len()).filter(is_declared).collect()
     }
 

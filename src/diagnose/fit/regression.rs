@@ -258,6 +258,17 @@ impl Regression {
         quiet.max(0.0) / (1.0 - noise).powi(2)
     }
 
+    /// Variance of a sum of terms, each times a factor.
+    pub(crate) fn variance_of(&self, solution: &Solution, parts: &[(usize, f64)]) -> f64 {
+        let placed = |(term, factor): &(usize, f64)| {
+            let place = solution.terms.iter().position(|one| one == term)?;
+            Some((place, factor / self.scale[*term]))
+        };
+        let parts: Vec<(usize, f64)> = parts.iter().filter_map(placed).collect();
+        let pairs = parts.iter().flat_map(|one| parts.iter().map(move |other| (one, other)));
+        pairs.map(|((i, a), (j, b))| a * b * solution.inverse[(*i, *j)]).sum()
+    }
+
     /// Whitened sum of squares of each fold under the fit to the other folds.
     pub(crate) fn held_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> [f64; FOLDS] {
         std::array::from_fn(|fold| {

@@ -1,5 +1,6 @@
 //! What is said of effects and of leaks.
 
+use pitchleak_core::Estimate;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -113,6 +114,21 @@ pub struct Calibration {
     pub std: f64,
     /// SI; 1 for a share.
     pub unit: &'static str,
+}
+
+/// A leak that is another from a moment on: a part of the declared model, no effect.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FoundLeakChange {
+    /// `internal`, `external_a` or `external_b`.
+    pub fault: &'static str,
+    /// In which of the traces, from 0.
+    pub trace: usize,
+    /// s since that began.
+    pub time_s: f64,
+    /// The coefficient before, m³/(s·Pa), …
+    pub before: Estimate<f64>,
+    /// … and after it.
+    pub after: Estimate<f64>,
 }
 
 /// A size with its unit.

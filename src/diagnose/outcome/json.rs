@@ -1,8 +1,8 @@
 //! A diagnosis as `diagnose --json` prints it, field by field: schema `pitchleak.diagnose/1`.
 
 use super::{
-    BinnedResidual, Calibration, Diagnosis, EquationResidual, FoundEffect, Holds, Interaction, LeakEstimates,
-    Quality, Samples, Size, Verdict,
+    BinnedResidual, Calibration, Diagnosis, EquationResidual, FoundEffect, FoundLeakChange, Holds,
+    Interaction, LeakEstimates, Quality, Samples, Size, Verdict,
 };
 use crate::diagnose::equation::PerEquation;
 use crate::wiring::Wiring;
@@ -22,6 +22,8 @@ struct Document<'a> {
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     calibration: &'a [Calibration],
     leaks: BeforeAfter<&'a LeakEstimates>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    leak_changes: &'a [FoundLeakChange],
     not_detectable_below: &'a BTreeMap<&'static str, Size>,
     verdict: Verdict,
     notes: &'a [String],
@@ -67,6 +69,7 @@ impl Serialize for Diagnosis {
             after: (&after.quality).into(),
             calibration,
             leaks: BeforeAfter { before: &before.leaks, after: &after.leaks },
+            leak_changes: &self.leak_changes,
             not_detectable_below: &self.not_detectable_below,
             verdict: self.verdict,
             notes: &self.notes,

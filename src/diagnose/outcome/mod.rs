@@ -5,7 +5,7 @@ use super::equation::PerEquation;
 use crate::Rig;
 use crate::rig::EffectValue;
 use crate::wiring::Wiring;
-use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::effects::{EffectConstants, EffectKind};
 use pitchleak_core::{Effect, Fluid};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -15,7 +15,8 @@ mod json;
 mod residual;
 
 pub use effects::{
-    Calibration, Doubt, DoubtId, FoundEffect, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, Size,
+    Calibration, Doubt, DoubtId, FoundEffect, FoundLeakChange, HoldLeak, Holds, Interaction, LeakEstimate,
+    LeakEstimates, Size,
 };
 pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
@@ -102,12 +103,14 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Sentences for people: what speaks for the verdict.
     pub notes: Vec<String>,
+    /// Where a leak changes, if that explains the traces better than leaks that stay.
+    pub leak_changes: Vec<FoundLeakChange>,
     /// Leaks while the piston stands, against those found in motion; none without such holds.
     pub holds: Option<Holds>,
 }
 
 impl Diagnosis {
-    /// The rig file with the effects in it, so that replay and simulation use them. The bulk modulus is that of
+    /// The rig file with the effects in it, so that replay and simulation use them; numbers of the cylinder are mended. The bulk modulus is that of
     /// the fit too: volumes and hoses are measured only as V/β.
     pub fn rig(&self, rig: &Rig) -> Rig {
         let mut with = rig.clone();
@@ -121,6 +124,12 @@ impl Diagnosis {
         let sizes = sizes.chain(self.effects.iter().map(|e| (e.id, e.value, e.std, Some(&e.constants))));
         for (id, value, std, found) in sizes {
             let Ok(effect) = id.parse::<Effect>() else { continue };
+            if effect.spec().kind == EffectKind::Cylinder
+                && let Some(declared) = effect.adds_to(&mut with.cylinder)
+            {
+                *declared += value;
+                continue;
+            }
             let mut constants = EffectConstants::default();
             for own in effect.constants() {
                 let value = found.and_then(|found| found.get(own.spec().id));

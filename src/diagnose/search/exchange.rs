@@ -5,10 +5,9 @@
 //! is large and they count for little: what mends part of both balances is then named before what mends one of them whole.
 
 use super::candidates::{Candidates, critical_sigma};
-use super::selection::{self, Selected, Selection};
+use super::selection::{self, Selection};
 use super::trials::Trial;
 use crate::diagnose::fit::{Fit, Progress};
-use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONFUSABLE_CHI2, FEWEST_TO_SIMPLIFY, FORCE_ONLY_SHARE, MOST_SWAPS};
 use crate::diagnose::weak_form::Term;
 
@@ -31,7 +30,7 @@ fn swap_one(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
         if let Some(best) = Candidates::of(&vacated).trials(&vacated.free).into_iter().next() {
             all.fit = selection::with(&vacated, &[], &best, progress);
             if best.score.term != one.term {
-                replace(&all.fit, one, &best);
+                one.stands_for(&all.fit, &best);
                 return true;
             }
         }
@@ -62,7 +61,7 @@ fn merge_two(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let Some(((a, b), best)) = mergeable(all, pairs) else { return false };
     let terms = [all.effects[a].term, all.effects[b].term];
     all.fit = selection::with(&all.fit, &terms, &best, progress);
-    replace(&all.fit, &mut all.effects[a], &best);
+    all.effects[a].stands_for(&all.fit, &best);
     all.effects.remove(b);
     true
 }
@@ -109,7 +108,7 @@ pub(super) fn simplify(all: &mut Selection<'_>, progress: Progress<'_>) {
         });
         if let Some(simpler) = simpler {
             *all = simpler;
-            return all.find_confusable();
+            return all.find_confusable(progress);
         }
     }
 }
@@ -119,11 +118,6 @@ fn does_as_well(simpler: &Fit<'_>, than: &Fit<'_>) -> bool {
     let spare = critical_sigma(than, than.problem.usual_constants).powi(2);
     let is_as_complete = than.is_incomplete() || !simpler.is_incomplete();
     is_as_complete && simpler.free.chi2 <= than.free.chi2 + spare * than.dispersion(than.free.chi2)
-}
-
-fn replace(fit: &Fit<'_>, one: &mut Selected, best: &Trial) {
-    let chi2_drop = best.score.chi2_drop / fit.dispersion(fit.free.chi2);
-    *one = Selected { term: best.score.term, p_value: statistics::chi2_p(chi2_drop, 1.0), ..one.clone() };
 }
 
 /// Gives the place of such an effect to two beside which the residual is noise; false where all keep theirs.

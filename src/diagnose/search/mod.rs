@@ -2,6 +2,7 @@
 
 mod candidates;
 mod exchange;
+pub(crate) mod leak_changes;
 mod selection;
 mod trials;
 
@@ -11,8 +12,37 @@ pub(crate) use trials::std_of_constants;
 pub use trials::{Candidate, Collinearity};
 
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::fit::{Fit, Progress};
-use crate::diagnose::thresholds::MOST_STEPS;
+use crate::diagnose::fit::{Fit, Problem, Progress};
+use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_STEPS};
+
+/// The effects that are missing from a declared model whose leaks stay, or from one whose leaks change: whichever says more with less.
+/// Leaks are asked whether they change once a few effects leave more than noise.
+pub(crate) fn best<'a>(
+    declared: Fit<'a>,
+    with_changes: impl FnOnce() -> Option<&'a Problem<'a>>,
+    error: impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
+    progress: Progress<'_>,
+) -> Selection<'a> {
+    let mut staying = Selection::none(declared);
+    add_while(
+        &mut staying,
+        |all| all.effects.len() < FEW_EFFECTS || !all.fit.is_incomplete(),
+        &error,
+        progress,
+    );
+    if !staying.fit.is_incomplete() {
+        return tidied(staying, progress);
+    }
+    let changing = with_changes().map(|problem| search(Fit::declared(problem, progress), &error, progress));
+    let says_all = |all: &Selection<'_>| all.effects.is_empty() && !all.fit.is_incomplete();
+    let changing = match changing {
+        Some(changing) if says_all(&changing) => return changing,
+        changing => changing,
+    };
+    add_while(&mut staying, |_| true, &error, progress);
+    let staying = tidied(staying, progress);
+    changing.into_iter().fold(staying, |best, other| if other.cost() < best.cost() { other } else { best })
+}
 
 /// Names effect after effect while each is significant; `error` gives the held-out error of a fit.
 pub(crate) fn search<'a>(
@@ -20,24 +50,38 @@ pub(crate) fn search<'a>(
     error: impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
     progress: Progress<'_>,
 ) -> Selection<'a> {
-    let mut last = error(&declared);
     let mut all = Selection::none(declared);
+    add_while(&mut all, |_| true, error, progress);
+    tidied(all, progress)
+}
+
+/// Adds effects while there are further ones, and `goes_on`.
+fn add_while(
+    all: &mut Selection<'_>,
+    goes_on: impl Fn(&Selection<'_>) -> bool,
+    error: impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
+    progress: Progress<'_>,
+) {
+    let mut last = error(&all.fit);
     for _ in 0..MOST_STEPS {
-        if !all.add_next(progress) && !exchange::split_one(&mut all, progress) {
+        if !goes_on(all) || !all.add_next(progress) && !exchange::split_one(all, progress) {
             break;
         }
         all.refine_friction(progress);
         all.drop_needless(progress);
-        exchange::exchange_all(&mut all, progress);
+        exchange::exchange_all(all, progress);
         let now = error(&all.fit);
         let mended = reduction_percent(&last, &now);
         all.effects.iter_mut().for_each(|one| _ = one.mended_percent.get_or_insert(mended));
         last = now;
     }
-    // The last exchange may have left some.
+}
+
+/// Without those that the last exchange may have left needless, each held against its rivals, and no more than it takes.
+fn tidied<'a>(mut all: Selection<'a>, progress: Progress<'_>) -> Selection<'a> {
     all.drop_needless(progress);
     all.drop_doubtful(progress);
-    all.find_confusable();
+    all.find_confusable(progress);
     exchange::simplify(&mut all, progress);
     all
 }
@@ -52,7 +96,6 @@ fn reduction_percent(before: &PerEquation<Option<f64>>, after: &PerEquation<Opti
 mod tests {
     use super::*;
     use crate::diagnose::data::Series;
-    use crate::diagnose::fit::Problem;
     use crate::diagnose::testing::{TURBULENT, declared, sound, torn_seal};
     use crate::diagnose::weak_form::Term;
     use pitchleak_core::Effect;
@@ -64,7 +107,8 @@ mod tests {
     fn found_in(series: Series) -> Vec<Effect> {
         let traces = [series];
         let problem = Problem::new(&traces, &declared(), &[]);
-        names(&search(Fit::declared(&problem, &|| ()), |_| PerEquation::default(), &|| ()))
+        let plain = Fit::declared(&problem, &|| ());
+        names(&search(plain, |_| PerEquation::default(), &|| ()))
     }
 
     #[test]

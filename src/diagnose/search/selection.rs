@@ -3,11 +3,13 @@
 
 use super::candidates::{Candidates, critical_sigma, strongest_unlisted, unlisted_chi2_drop};
 use super::trials::{self, Trial};
+use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::{Fit, Progress, Solution};
 use crate::diagnose::outcome::Interaction;
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    AGREED_SIGMA, CONFUSABLE_CHI2, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE, MOST_EFFECTS,
+    AGREED_SIGMA, CONFUSABLE_CHI2, CURVED_SHARE, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE,
+    MOST_EFFECTS, MOST_SWAPS,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Effect;
@@ -27,6 +29,14 @@ pub(crate) struct Selected {
     pub(crate) unlisted_rival: Option<Unlisted>,
     /// A product of signals that the table does not list would have fitted better.
     pub(crate) is_below_unlisted: bool,
+}
+
+impl Selected {
+    /// Another effect took its place.
+    pub(super) fn stands_for(&mut self, fit: &Fit<'_>, best: &Trial) {
+        self.term = best.score.term;
+        self.p_value = statistics::chi2_p(best.score.chi2_drop / fit.dispersion(fit.free.chi2), 1.0);
+    }
 }
 
 #[cfg(test)]
@@ -104,6 +114,17 @@ fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>)
 }
 
 impl Selection<'_> {
+    /// Twice the log likelihood that it lacks of sensor noise, with the equations' noise as found, and what each of its effects and of the
+    /// leaks' changes has to bring.
+    pub(crate) fn cost(&self) -> f64 {
+        let fit = &self.fit;
+        let ratios = fit.noise_ratio();
+        let misfit = Equation::ALL.map(|one| 2.0 * ratios[one].ln() * fit.innovations(one).len() as f64);
+        let changes = fit.problem.terms.iter().filter(|term| matches!(term, Term::LeakChange(_))).count();
+        let needed = critical_sigma(fit, fit.problem.usual_constants).powi(2);
+        misfit.iter().sum::<f64>() + needed * (self.effects.len() + changes) as f64
+    }
+
     /// Adds the next effect; false when nothing further is significant.
     pub(super) fn add_next(&mut self, progress: Progress<'_>) -> bool {
         self.add_best(|_, _| true, progress)
@@ -169,17 +190,41 @@ impl Selection<'_> {
         }
     }
 
-    /// Names for each effect those candidates that would explain the data nearly as well in its place, and
-    /// orders the effects by what the fit loses without them.
-    pub(super) fn find_confusable(&mut self) {
+    /// Names for each effect those candidates that would explain the data nearly as well in its place, gives it to one that
+    /// does better, and orders the effects by what the fit loses without them.
+    pub(super) fn find_confusable(&mut self, progress: Progress<'_>) {
+        for _ in 0..MOST_SWAPS {
+            let Some((at, better)) = self.weigh_rivals(progress) else { break };
+            self.fit = with(&self.fit, &[self.effects[at].term], &better, progress);
+            self.effects[at].stands_for(&self.fit, &better);
+        }
+        let fit = &self.fit;
+        self.effects.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
+    }
+
+    /// Holds each effect against all that could stand in its place; the first that a rival beats.
+    fn weigh_rivals(&mut self, progress: Progress<'_>) -> Option<(usize, Trial)> {
         let fit = &self.fit;
         let dispersion = fit.dispersion(fit.free.chi2);
         let mut candidates = Candidates::of(fit);
-        for one in &mut self.effects {
+        for (at, one) in self.effects.iter_mut().enumerate() {
             let without = fit.solve_without(&[one.term]);
             let lost = without.chi2 - fit.free.chi2;
             let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            let trials = candidates.trials(&without);
+            let mut trials = candidates.trials(&without);
+            // A score is linear about the effect that stands there.
+            for trial in trials.iter_mut().filter(|trial| trial.score.chi2_drop > (1.0 - CURVED_SHARE) * lost)
+            {
+                let in_its_place = fit.in_place_of(one.term, (trial.score.term, trial.constants), progress);
+                trial.score.chi2_drop = lost - in_its_place.left_beyond(fit);
+            }
+            let own = lost / dispersion - critical_sigma(fit, fit.constants(one.term)).powi(2);
+            let better = trials.iter().filter(|trial| trial.beyond(dispersion) > own);
+            if let Some(best) =
+                better.max_by(|a, b| a.score.chi2_drop.total_cmp(&b.score.chi2_drop)).filter(|_| lost > 0.0)
+            {
+                return Some((at, *best));
+            }
             one.probability = place_probability(fit, one.term, lost / dispersion, &trials, &without);
             let rivals = trials.into_iter().filter(is_close);
             let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
@@ -188,7 +233,7 @@ impl Selection<'_> {
             one.confusable_with =
                 rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
         }
-        self.effects.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
+        None
     }
 }
 

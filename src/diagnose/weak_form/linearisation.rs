@@ -111,7 +111,7 @@ impl Linearisation {
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
             }
-            Term::Unlisted(_) | Term::Product(..) => 0.0,
+            Term::Unlisted(_) | Term::Product(..) | Term::LeakChange(_) => 0.0,
         }
     }
 
@@ -133,7 +133,8 @@ impl Linearisation {
             Term::ExternalA => leaks.external_a = value,
             Term::ExternalB => leaks.external_b = value,
             Term::Effect(effect) => self.set_effect(effect, value, constants),
-            Term::Unlisted(_) | Term::Product(..) => {}
+            // A change stays in what is left over: its column is exact at any size.
+            Term::Unlisted(_) | Term::Product(..) | Term::LeakChange(_) => {}
         }
     }
 

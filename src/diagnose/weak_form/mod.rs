@@ -1,6 +1,7 @@
 //! The equations integrated against test functions at a linearisation, and the known noise of their residual.
 
 mod integrals;
+mod leak_change;
 mod linearisation;
 mod noise;
 mod rows;
@@ -8,6 +9,7 @@ mod sensitivity;
 mod shared_noise;
 mod terms;
 
+pub(crate) use leak_change::LeakChange;
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
@@ -52,6 +54,7 @@ impl<'a> WeakForm<'a> {
         let motions = motions(traces, sensors, &at);
         let rows = Rows::build(traces, &motions, &Integrand::of(&at, columns), BLOCK_S);
         let mut rows = rows.at_places(columns.places, columns.terms.len());
+        rows.add_leak_changes(columns.terms);
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
         add_unresolved(&mut sensitivities, &mut rows, (traces, &motions), (sensors, &noise_at));
         let (of_rows, of_noise) = (&rows, &sensitivities);
@@ -76,6 +79,7 @@ impl<'a> WeakForm<'a> {
     pub(crate) fn with_columns(mut self, columns: Columns<'_>) -> Self {
         let rows = Rows::build(self.traces, &self.motions, &Integrand::of(&self.at, columns), BLOCK_S);
         self.rows.columns = rows.at_places(columns.places, columns.terms.len()).columns;
+        self.rows.add_leak_changes(columns.terms);
         self
     }
 

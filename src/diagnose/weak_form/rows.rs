@@ -31,11 +31,13 @@ pub(crate) struct Row {
     /// Whether its balance of forces is not seen: the speed jumps between samples, and neither pressures nor load show the impulse that it
     /// takes; or a pressure sensor lies somewhere in a play that is larger than its noise.
     pub(crate) has_unseen_force: bool,
+    /// Whether a leak changes while it lasts.
+    pub(crate) has_leak_change: bool,
 }
 
 impl Row {
     /// Which of the traces it is of.
-    pub(super) fn trace(&self) -> usize {
+    pub(crate) fn trace(&self) -> usize {
         self.stretch / MOST_STRETCHES
     }
 
@@ -192,6 +194,7 @@ impl Rows {
             mean,
             unsure_share: weighted.unsure_s / block_s,
             has_unseen_force: false,
+            has_leak_change: false,
         });
         for equation in Equation::ALL {
             if weighted.missing_s[equation] > SLIVER * block_s {
@@ -212,10 +215,14 @@ impl Rows {
         (own.stretch == later.stretch).then_some(later)
     }
 
-    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where its forces are unseen.
+    /// Whether the entry takes part in the fit: not a force while the direction of motion is unknown, nor where its forces are unseen, nor
+    /// a chamber while its leak changes.
     pub(crate) fn counts(&self, entry: &Entry) -> bool {
         let row = &self.rows[entry.row];
-        entry.equation != Equation::Force || row.unsure_share <= SLIVER && !row.has_unseen_force
+        match entry.equation {
+            Equation::Force => row.unsure_share <= SLIVER && !row.has_unseen_force,
+            _ => !row.has_leak_change,
+        }
     }
 }
 

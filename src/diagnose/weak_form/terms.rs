@@ -1,9 +1,10 @@
 //! The unknowns of the fit: the declared model's own four constants, every effect of the core's table, and a few products of signals
 //! that the table does not list, which only serve to say "something else is there", or "that would do as well".
 
+use super::leak_change::LeakChange;
 use crate::diagnose::data::Channel;
 use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide};
-use pitchleak_core::{Effect, Model, Signals, Terms};
+use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
 /// One column of the regression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +23,8 @@ pub(crate) enum Term {
     Unlisted(Unlisted),
     /// The product of two effects' terms, equation by equation: one acts on the other.
     Product(Effect, Effect),
+    /// By how much a leak is larger from some row on; its column is made of the leak's.
+    LeakChange(LeakChange),
 }
 
 /// Which columns are built.
@@ -86,6 +89,15 @@ pub(crate) fn all_terms() -> Vec<Term> {
 }
 
 impl Term {
+    /// The declared model's term of a leak.
+    pub(crate) fn of_leak(leak: Leak) -> Self {
+        match leak {
+            Leak::Internal => Self::Internal,
+            Leak::ExternalA => Self::ExternalA,
+            Leak::ExternalB => Self::ExternalB,
+        }
+    }
+
     /// What one unit adds to the residual at an instant.
     pub(crate) fn unit_term(
         self,
@@ -108,6 +120,7 @@ impl Term {
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
+            Self::LeakChange(_) => Terms::default(),
         }
     }
 
@@ -130,7 +143,7 @@ impl Term {
     /// Whether it is a leak.
     pub(crate) fn is_leak(self) -> bool {
         match self {
-            Self::Internal | Self::ExternalA | Self::ExternalB => true,
+            Self::Internal | Self::ExternalA | Self::ExternalB | Self::LeakChange(_) => true,
             Self::Effect(effect) => effect.spec().kind.is_leak(),
             Self::InverseBulk | Self::Unlisted(_) | Self::Product(..) => false,
         }

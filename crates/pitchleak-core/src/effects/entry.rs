@@ -15,6 +15,8 @@ pub enum EffectKind {
     Storage,
     /// A force on the piston.
     Force,
+    /// A number of the cylinder that is not as declared: the plant is built with it.
+    Cylinder,
     /// A sensor that does not read the truth; the plant itself is unchanged.
     Sensor,
 }
@@ -183,9 +185,9 @@ macro_rules! effects {
 
             /// The declared number of the cylinder to which the effect's value adds, in the effect's unit. None for what the rig
             /// file has no number for.
-            pub fn adds_to<T: Real>(self, cylinder: &Cylinder<T>) -> Option<T> {
+            pub fn adds_to<T>(self, cylinder: &mut Cylinder<T>) -> Option<&mut T> {
                 match self {
-                    $($(Self::$variant => Some(cylinder.$declared),)?)*
+                    $($(Self::$variant => Some(&mut cylinder.$declared),)?)*
                     _ => None,
                 }
             }

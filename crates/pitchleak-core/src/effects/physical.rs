@@ -2,7 +2,7 @@
 
 use super::EffectConstants;
 use super::sensor::known;
-use crate::{ATMOSPHERE_PA, Cylinder, LEAST_ABSOLUTE_PA, Real, Signals, Terms};
+use crate::{ATMOSPHERE_PA, Cylinder, LEAST_ABSOLUTE_PA, Model, Real, Signals, Terms};
 
 pub(super) fn chamber_a<T: Real>(flow_m3s: T) -> Terms<T> {
     Terms { chamber_a_m3s: flow_m3s, ..Terms::default() }
@@ -19,6 +19,18 @@ pub(super) fn past_piston<T: Real>(flow_m3s: T) -> Terms<T> {
 
 pub(super) fn force<T: Real>(force_n: T) -> Terms<T> {
     Terms { force_n, ..Terms::default() }
+}
+
+/// One square metre more at chamber A, in eq. (1)–(2): it sweeps, it holds oil, and the pressure pushes on it.
+pub(super) fn area_a<T: Real>(at: &Signals<T>, model: &Model<T>) -> Terms<T> {
+    let stored = at.x_m / model.fluid.bulk_modulus_pa * at.dpa_pas;
+    Terms { chamber_a_m3s: at.v_mps + stored, chamber_b_m3s: T::zero(), force_n: -at.pa_pa }
+}
+
+/// One square metre more at chamber B.
+pub(super) fn area_b<T: Real>(at: &Signals<T>, model: &Model<T>) -> Terms<T> {
+    let stored = (model.cylinder.stroke_m - at.x_m) / model.fluid.bulk_modulus_pa * at.dpb_pas;
+    Terms { chamber_a_m3s: T::zero(), chamber_b_m3s: stored - at.v_mps, force_n: at.pb_pa }
 }
 
 /// Free gas, polytropic: per volume of oil, 1/β grows by (α/n) P_0^{1/n} / P^{1/n + 1}, absolute

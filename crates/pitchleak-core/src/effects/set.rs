@@ -1,5 +1,5 @@
 use super::{Effect, EffectConstants, EffectKind};
-use crate::{Model, Real, Signals, Terms};
+use crate::{Cylinder, Model, Real, Signals, Terms};
 
 /// Effects that may act at the same time.
 const CAPACITY: usize = 8;
@@ -106,6 +106,18 @@ impl<T: Real> EffectSet<T> {
     /// The effects that are on.
     pub fn iter(&self) -> impl Iterator<Item = &ActiveEffect<T>> {
         self.active.iter().map_while(Option::as_ref)
+    }
+
+    /// The cylinder as it is where the effects that are on say that it is not as declared.
+    #[inline]
+    pub fn built(&self, declared: &Cylinder<T>) -> Cylinder<T> {
+        let mut cylinder = *declared;
+        for active in self.iter().filter(|active| active.effect.spec().kind == EffectKind::Cylinder) {
+            if let Some(number) = active.effect.adds_to(&mut cylinder) {
+                *number += active.value;
+            }
+        }
+        cylinder
     }
 
     /// The terms of all physical effects whose kind passes `counts`.

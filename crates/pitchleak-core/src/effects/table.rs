@@ -19,24 +19,24 @@
 
 use super::entry::effects;
 use super::physical::{
-    accumulator, bell, beyond_cracking, chamber_a, chamber_b, direction, entrained_air, flow_direction,
-    force, past_piston, stribeck,
+    accumulator, area_a, area_b, bell, beyond_cracking, chamber_a, chamber_b, direction, entrained_air,
+    flow_direction, force, past_piston, stribeck,
 };
 use super::sensor::{known, scale, shift};
 use crate::signed_root;
 
 effects! {
-    DeadVolumeA "dead_volume_a" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
+    DeadVolumeA "dead_volume_a" ["m3"] Storage -2e-2 .. 2e-2, 1e-4;
         term |at, model, _| chamber_a(at.dpa_pas / model.fluid.bulk_modulus_pa);
         adds dead_volume_a_m3;
-        "Hose, port or manifold volume at chamber A, or a hose that swells, takes oil in step with the pressure slope."
+        "More (or less) oil than declared is compressed at chamber A: hose, port or manifold, a hose that swells."
         "Measure hose length and bore and declare dead_volume_a in the rig file."
         "Pressure steps on side A with the piston at the A end, at low and at high pressure: a volume takes the same oil at both."
-    DeadVolumeB "dead_volume_b" ["m3"] Storage 0.0 .. 2e-2, 1e-4;
+    DeadVolumeB "dead_volume_b" ["m3"] Storage -2e-2 .. 2e-2, 1e-4;
         term |at, model, _| chamber_b(at.dpb_pas / model.fluid.bulk_modulus_pa);
         adds dead_volume_b_m3;
-        "Hose, port or manifold volume at chamber B, or a hose that swells, takes oil in step with the pressure slope."
-        "Measure hose length and bore and declare dead_volume_b in the rig file."
+        "More (or less) oil than declared is compressed at chamber B: hose, port or manifold, a hose that swells, or another stroke than declared, which is area_b times as much."
+        "Measure hose length and bore and declare dead_volume_b in the rig file, and compare its stroke with the data sheet."
         "Pressure steps on side B with the piston at the B end, at low and at high pressure: a volume takes the same oil at both."
     InternalLeakTurbulent "internal_leak_turbulent" ["m3/(s*sqrt(Pa))"] InternalLeak 0.0 .. 1e-6, 6e-9;
         term |at, _, _| past_piston(signed_root(at.pa_pa - at.pb_pa));
@@ -284,6 +284,20 @@ effects! {
         "Flow meter B shows nothing while less than the value named flows, either way: a turbine or gear wheel that does not start, or a cut-off for small flows in its electronics."
         "Take the cut-off out of flow meter B's settings, use a meter of a smaller range, or declare the dead band."
         "The piston moved slower and slower: the flow below which meter B shows nothing while the position still changes."
+    AreaA "area_a" ["m2"] Cylinder -1e-2 .. 1.0, 6e-5;
+        term |at, model, _| area_a(at, model);
+        carries Speed;
+        adds area_a_m2;
+        "The piston's area at chamber A is not as declared: swept flow, volume and force of the pressure are all wrong in the same proportion."
+        "Look the bore up in the cylinder's data sheet and declare area_a in the rig file; the sensors stay as they are."
+        "A full stroke at constant speed: the oil that flow meter A counts, over the stroke, is the area; beside a load cell the force over the pressure is the same."
+    AreaB "area_b" ["m2"] Cylinder -1e-2 .. 1.0, 6e-5;
+        term |at, model, _| area_b(at, model);
+        carries Speed;
+        adds area_b_m2;
+        "The ring area at chamber B is not as declared (another rod diameter): swept flow, volume and force of the pressure are all wrong in the same proportion."
+        "Look bore and rod up in the cylinder's data sheet and declare area_b in the rig file; the sensors stay as they are."
+        "A full stroke at constant speed: the oil that flow meter B counts, over the stroke, is the area; beside a load cell the force over the pressure is the same."
 }
 
 impl core::fmt::Display for Effect {

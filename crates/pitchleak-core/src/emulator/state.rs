@@ -37,7 +37,7 @@ impl<T: Real> State<T> {
     pub fn at_rest(params: &EmulatorParams<T>, x_m: T, load_n: T) -> Self {
         let supply_pa = params.supply.idle_pressure_pa();
         let still = |axis: &Axis<T>, x_m: T| {
-            let cylinder = &axis.plant.model.cylinder;
+            let cylinder = &axis.plant.cylinder();
             let pb_pa = supply_pa / T::lit(4.0);
             let pa_pa = (load_n + pb_pa * cylinder.area_b_m2) / cylinder.area_a_m2;
             axis.plant.state_at(x_m, T::zero(), pa_pa.max(T::zero()).min(supply_pa), pb_pa)

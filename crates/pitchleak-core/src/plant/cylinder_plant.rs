@@ -1,7 +1,7 @@
 use super::chamber::Chamber;
 use super::{EndStop, PlantError};
 use crate::effects::{EffectKind, EffectSet};
-use crate::{Model, PerLeak, Real, Signals, Terms, rk4_step};
+use crate::{Cylinder, Model, PerLeak, Real, Signals, Terms, rk4_step};
 
 /// Numbers in the state vector of one cylinder: x, ẋ, oil in A, oil in B.
 pub(crate) const STATES: usize = 4;
@@ -85,7 +85,7 @@ impl<T: Real> CylinderPlant<T> {
 
     /// Says whether a plant like this can exist.
     pub fn check(&self) -> Result<(), PlantError> {
-        self.model.cylinder.check()?;
+        self.cylinder().check()?;
         self.model.fluid.check()?;
         let vapour = self.vapour_pressure_pa;
         if !self.model.leaks_m3spa.is_physical() {
@@ -149,7 +149,8 @@ impl<T: Real> CylinderPlant<T> {
         (pa_pa, pb_pa): (T, T),
         drive: &Drive<T>,
     ) -> CylinderRates<T> {
-        let cylinder = &self.model.cylinder;
+        let model = Model { cylinder: self.cylinder(), ..self.model };
+        let cylinder = &model.cylinder;
         let chamber = self.chamber();
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let mut signals = Signals {
@@ -164,8 +165,9 @@ impl<T: Real> CylinderPlant<T> {
             t_s: self.time_s,
             ..Signals::default()
         };
-        let effects = self.effects.terms(&signals, &self.model, |kind| kind != EffectKind::Storage);
-        let net = self.model.residual(&signals).plus(-T::one(), effects);
+        let acts = |kind| !matches!(kind, EffectKind::Storage | EffectKind::Cylinder);
+        let effects = self.effects.terms(&signals, &model, acts);
+        let net = model.residual(&signals).plus(-T::one(), effects);
         let storage = self.storage(&signals);
 
         let bulk = self.model.fluid.bulk_modulus_pa;
@@ -226,7 +228,7 @@ impl<T: Real> CylinderPlant<T> {
     /// Springs and drags on the mass near a state with these pressures P_A, P_B: the square of the rate at which oil and end
     /// stop swing it, 1/s², and the rate at which friction and end stop brake it, 1/s.
     pub(crate) fn stiffness(&self, state: &CylinderState<T>, (pa_pa, pb_pa): (T, T)) -> (T, T) {
-        let cylinder = &self.model.cylinder;
+        let cylinder = &self.cylinder();
         let (volume_a, volume_b) = self.volumes_m3(state.x_m);
         let bulk = self.model.fluid.bulk_modulus_pa;
         let (area_a, area_b) = (cylinder.area_a_m2, cylinder.area_b_m2);
@@ -291,8 +293,14 @@ impl<T: Real> CylinderPlant<T> {
         self.effects.terms(&unit, &self.model, |kind| kind == EffectKind::Storage)
     }
 
+    /// The cylinder as it is built: its numbers are not those of the model where an effect says so.
+    #[inline]
+    pub(crate) fn cylinder(&self) -> Cylinder<T> {
+        if self.effects.is_empty() { self.model.cylinder } else { self.effects.built(&self.model.cylinder) }
+    }
+
     fn volumes_m3(&self, x_m: T) -> (T, T) {
-        let cylinder = &self.model.cylinder;
+        let cylinder = self.cylinder();
         let x = self.end_stop.guarded_m(x_m, cylinder.stroke_m);
         (cylinder.volume_a_m3(x), cylinder.volume_b_m3(x))
     }

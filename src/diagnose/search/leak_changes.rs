@@ -1,0 +1,125 @@
+//! Where leaks change along the traces: the partition of the rows that lets each part have leaks of its own, by dynamic programming
+//! (Jackson et al. 2005, "An algorithm for optimal partitioning of data on an interval", IEEE Signal Processing Letters 12).
+
+use super::candidates::critical_sigma;
+use crate::diagnose::fit::{Fit, LeakProducts, Problem, Progress};
+use crate::diagnose::thresholds::{CHANGE_CHI2, MOST_CHANGE_PLACES, MOST_CHANGE_ROUNDS};
+use crate::diagnose::weak_form::{LeakChange, Term};
+use nalgebra::{Cholesky, Matrix3};
+use pitchleak_core::Leak;
+
+/// The problem with the changes that its declared model needs; none where leaks that stay do as well.
+pub(crate) fn problem<'a>(plain: impl Fn() -> Problem<'a>, progress: Progress<'_>) -> Option<Problem<'a>> {
+    let with = |changes: &[LeakChange]| plain().with_leak_changes(changes);
+    let changes = find(with, progress);
+    (!changes.is_empty()).then(|| with(&changes))
+}
+
+/// The changes that the declared model needs. While it is incomplete the noise that it is
+/// held against is large, so that the largest are found first.
+fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'_>) -> Vec<LeakChange> {
+    let mut changes = Vec::new();
+    for _ in 0..MOST_CHANGE_ROUNDS {
+        let with = problem(&changes);
+        let fit = Fit::declared(&with, progress);
+        let more: Vec<LeakChange> = if fit.is_incomplete() { new_ones(&fit, &changes) } else { Vec::new() };
+        if more.is_empty() {
+            break;
+        }
+        changes.extend(more);
+        let with = problem(&changes);
+        changes = needed(&Fit::declared(&with, progress));
+    }
+    changes
+}
+
+fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
+    let rows = borders(&fit.leak_products());
+    let all = rows.into_iter().flat_map(|row| Leak::ALL.map(|leak| LeakChange { leak, row }));
+    all.filter(|change| !known.iter().any(|other| other.overlaps(change))).collect()
+}
+
+/// Those without which more is left than chance would leave.
+fn needed(fit: &Fit<'_>) -> Vec<LeakChange> {
+    let changes = fit.problem.terms.iter().enumerate().filter_map(|(place, term)| match term {
+        Term::LeakChange(change) => Some((place, *change)),
+        _ => None,
+    });
+    let mut kept: Vec<(usize, LeakChange)> = changes.collect();
+    let mut gone = Vec::new();
+    let needs = critical_sigma(fit, fit.problem.usual_constants).powi(2) * fit.dispersion(fit.free.chi2);
+    loop {
+        let present = fit.solve_without(&gone).chi2;
+        let loss = |(at, (place, _)): (usize, &(usize, LeakChange))| {
+            let without: Vec<usize> = gone.iter().copied().chain([*place]).collect();
+            (at, fit.solve_without(&without).chi2 - present)
+        };
+        let least = kept.iter().enumerate().map(loss).min_by(|a, b| a.1.total_cmp(&b.1));
+        match least {
+            Some((at, loss)) if loss < needs => gone.push(kept.remove(at).0),
+            _ => {
+                let mut changes: Vec<LeakChange> = kept.into_iter().map(|(_, change)| change).collect();
+                changes.sort_by_key(|change| change.row);
+                return changes;
+            }
+        }
+    }
+}
+
+/// Sums over the first rows.
+#[derive(Clone, Copy, Default)]
+struct Sums(LeakProducts);
+
+impl Sums {
+    /// What leaks of their own explain of the rows between two sums.
+    fn explained_since(&self, earlier: &Self) -> f64 {
+        let gram = self.0.gram - earlier.0.gram;
+        let pull = self.0.pull - earlier.0.pull;
+        let ridge = 1e-9 * gram.trace() + f64::MIN_POSITIVE;
+        Cholesky::new(gram + Matrix3::from_diagonal_element(ridge))
+            .map_or(0.0, |root| pull.dot(&root.solve(&pull)))
+    }
+}
+
+/// Rows at which the parts of the best partition begin, the first left out.
+fn borders(products: &[LeakProducts]) -> Vec<usize> {
+    let mut sums = vec![Sums::default()];
+    for row in products {
+        let last = sums.last().copied().unwrap_or_default().0;
+        sums.push(Sums(LeakProducts { gram: last.gram + row.gram, pull: last.pull + row.pull }));
+    }
+    let spacing = products.len().div_ceil(MOST_CHANGE_PLACES).max(1);
+    let places: Vec<usize> = (0..products.len()).step_by(spacing).chain([products.len()]).collect();
+    let coarse = partition(&sums, &places);
+    // Between its neighbours each border moves to the row that it is best at.
+    let mut fine = coarse.clone();
+    for at in 0..coarse.len() {
+        let from = if at == 0 { 0 } else { fine[at - 1] };
+        let until = coarse.get(at + 1).copied().unwrap_or(products.len());
+        let near = coarse[at].saturating_sub(spacing).max(from + 1)..(coarse[at] + spacing).min(until);
+        let gain =
+            |row: usize| sums[row].explained_since(&sums[from]) + sums[until].explained_since(&sums[row]);
+        fine[at] = near.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(coarse[at]);
+    }
+    fine
+}
+
+/// The inner borders of the best partition among these places.
+fn partition(sums: &[Sums], places: &[usize]) -> Vec<usize> {
+    let mut best = vec![(0.0_f64, 0_usize)];
+    for (end, until) in places.iter().enumerate().skip(1) {
+        let with =
+            |begin: usize| best[begin].0 + sums[*until].explained_since(&sums[places[begin]]) - CHANGE_CHI2;
+        let found = (0..end).map(|begin| (with(begin), begin)).max_by(|a, b| a.0.total_cmp(&b.0));
+        best.push(found.unwrap_or_default());
+    }
+    let mut borders = Vec::new();
+    let mut at = places.len() - 1;
+    while at > 0 {
+        at = best[at].1;
+        borders.push(places[at]);
+    }
+    borders.pop();
+    borders.reverse();
+    borders
+}
