@@ -7,6 +7,7 @@ use pitchleak::curve::Curve;
 use pitchleak::diagnose::{Declared, Diagnosis, DoubtId, FoundEffect, Series, Verdict, diagnose};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
+use pitchleak::units::LPM_PER_BAR;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_view::{Palette, Text};
 use std::f64::consts::TAU;
@@ -187,6 +188,86 @@ fn no_sensor_is_blamed_for_other_wrong_numbers_of_the_cylinder() {
             }
         }
     }
+}
+
+/// 40 s in which the leak past the piston has this course.
+fn leaking(internal: &str, effects: EffectSet<f64>, seed: u64) -> Series {
+    let reference = Reference::of(
+        wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
+        wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
+    );
+    let mut scenario =
+        Scenario { effects, start_s: 4.0, duration_s: 40.0, ..Scenario::new(rig(), reference) };
+    scenario.leaks.internal = internal.parse().expect("is a course");
+    let mut sensing = Sensing::new(rig().sensors(), Biases::default(), seed);
+    let mut series = Series::default();
+    let push = |truth: &Truth| series.push(truth.t_s, &sensing.read(&truth.sample), None);
+    scenario.run(scenario.leak_coefficients().expect("given"), push).expect("the plant runs");
+    series
+}
+
+#[test]
+fn a_leak_that_comes_goes_and_grows_is_no_effect() {
+    let none = EffectSet::default();
+    for (course, moments, moved) in [
+        ("0.012 L/min/bar @ 15 s..", &[15.0][..], &[0.012][..]),
+        ("0.012 L/min/bar @ 10 s..25 s", &[10.0, 25.0], &[0.012, -0.012]),
+        ("0.006 L/min/bar every 16 s for 8 s", &[8.0, 16.0, 24.0, 32.0], &[-0.006, 0.006, -0.006, 0.006]),
+    ] {
+        let answer = ask(leaking(course, none, 3), &rig());
+        assert_eq!(
+            (first(&answer), answer.verdict),
+            ("", Verdict::NoMissingEffect),
+            "{course}: {:?}",
+            answer.notes
+        );
+        let found: Vec<_> = answer.leak_changes.iter().filter(|change| change.fault == "internal").collect();
+        assert_eq!(
+            (found.len(), answer.leak_changes.len()),
+            (moments.len(), moments.len()),
+            "{course}: {found:?}"
+        );
+        for (change, (moment_s, lpm_bar)) in found.iter().zip(moments.iter().zip(moved)) {
+            let change_m3spa = change.after.value - change.before.value;
+            let std = change.after.std.hypot(change.before.std);
+            // Where the load pressure passes zero no flow tells.
+            assert!((change.time_s - moment_s).abs() < 1.0, "{course}: {change:?}");
+            assert!((change_m3spa - lpm_bar / LPM_PER_BAR).abs() < 4.0 * std, "{course}: {change:?}");
+        }
+    }
+    let answer = ask(leaking("0 L/min/bar -> 0.03 L/min/bar @ 5 s..20 s", none, 3), &rig());
+    assert_eq!((first(&answer), answer.verdict), ("", Verdict::NoMissingEffect), "{:?}", answer.notes);
+}
+
+#[test]
+fn an_effect_beside_a_leak_that_changes_is_named_by_itself() {
+    for (effect, size) in [(Effect::FlowMeterGainA, 0.03), (Effect::ViscousFriction, 1500.0)] {
+        let mut effects = EffectSet::default();
+        effects.set(effect, size, EffectConstants::default()).expect("is within bounds");
+        let answer = ask(leaking("0.012 L/min/bar @ 15 s..", effects, 4), &rig());
+        let names: Vec<_> = answer.effects.iter().map(|one| one.id).collect();
+        assert_eq!(
+            (names, answer.verdict),
+            (vec![effect.spec().id], Verdict::Explained),
+            "{:?}",
+            answer.notes
+        );
+        let found = &answer.effects[0];
+        assert!((found.value - size).abs() < 4.0 * found.std, "{effect}: {} ± {}", found.value, found.std);
+        let of: Vec<_> =
+            answer.leak_changes.iter().map(|change| (change.fault, change.time_s.round())).collect();
+        assert_eq!(of, [("internal", 15.0)]);
+    }
+}
+
+#[test]
+fn traces_of_one_rig_may_leak_differently() {
+    let none = EffectSet::default();
+    let traces = [leaking("0.012 L/min/bar", none, 5), leaking("0 L/min", none, 6)];
+    let answer = diagnose(&traces, &[], &Declared::of(&rig()), &|| ());
+    assert_eq!((first(&answer), answer.verdict), ("", Verdict::NoMissingEffect), "{:?}", answer.notes);
+    let of: Vec<_> = answer.leak_changes.iter().map(|change| (change.fault, change.trace)).collect();
+    assert_eq!(of, [("internal", 1)]);
 }
 
 /// A meter that was mended between the traces that are fitted and the one that judges.

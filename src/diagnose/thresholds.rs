@@ -193,9 +193,9 @@ pub(crate) const SEARCH_STARTS: [f64; 3] = [0.15, 0.5, 0.85];
 
 /// So many effects that leave more than noise are not trusted before leaks that change are asked. Chosen: two faults at once are rare.
 pub(crate) const FEW_EFFECTS: usize = 2;
-/// χ² that leaks of its own must explain of a part of the traces. Derived: three leaks at one of two thousand places do so by chance once
-/// in a million traces.
-pub(crate) const CHANGE_CHI2: f64 = 46.0;
+/// χ² that leaks of its own must explain of a part of the traces. Derived: three leaks that grow, at one of two thousand places, do so by
+/// chance once in a million traces.
+pub(crate) const CHANGE_CHI2: f64 = 54.0;
 /// Places that a change is looked for at, before it is moved to the row that it is best at. Chosen for time.
 pub(crate) const MOST_CHANGE_PLACES: usize = 2000;
 /// How often changes are looked for, at ever less noise. Chosen against cycles.

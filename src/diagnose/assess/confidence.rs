@@ -2,6 +2,7 @@
 //! beside it, and against what physics allows.
 
 use super::adequacy::{self, Judgement};
+use super::estimates;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Doubt, DoubtId};
@@ -11,6 +12,7 @@ use crate::diagnose::thresholds::{
     LEAST_SHARE_BESIDE, UNMENDED_SHARE,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
+use pitchleak_core::Leak;
 
 /// Reasons not to believe the name of an effect or its value; none when both can be believed.
 pub(crate) fn doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Vec<Doubt> {
@@ -219,21 +221,17 @@ fn may_be_none(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
 /// With it a leak comes out below zero.
 fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let acts = acts_in(fit, one.term);
-    let impossible = |(term, name, equations): (Term, &str, &[Equation])| {
-        let own = fit.estimate(fit.problem.place(term)?)?;
-        let is_negative = own.value < -DOUBTED_LEAK_SIGMA * own.std;
+    let impossible = |(leak, equations): (Leak, &[Equation])| {
+        let course = estimates::course(fit, leak).into_iter().filter(|at| at.std > 0.0);
+        let sigma = course.map(|at| -at.value / at.std).fold(f64::NEG_INFINITY, f64::max);
         let is_near = equations.iter().any(|equation| acts[*equation]);
-        let text = || format!("with it the {name} is {:.1} sigma below zero", -own.value / own.std);
-        (is_negative && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
+        let text = || format!("with it the leak {} is {sigma:.1} sigma below zero", leak.label());
+        (sigma > DOUBTED_LEAK_SIGMA && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
     };
     let (a, b) = (Equation::ChamberA, Equation::ChamberB);
-    [
-        (Term::Internal, "internal leak", &[a, b][..]),
-        (Term::ExternalA, "external leak A", &[a][..]),
-        (Term::ExternalB, "external leak B", &[b][..]),
-    ]
-    .into_iter()
-    .find_map(impossible)
+    [(Leak::Internal, &[a, b][..]), (Leak::ExternalA, &[a][..]), (Leak::ExternalB, &[b][..])]
+        .into_iter()
+        .find_map(impossible)
 }
 
 /// By how much a candidate that these traces neither name nor rule out would move an effect's value: a second effect that is too

@@ -2,7 +2,7 @@
 
 use super::adequacy::Judgement;
 use super::confidence;
-use crate::diagnose::fit::{Fit, LeakLevel};
+use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{
     Calibration, Doubt, FoundEffect, FoundLeakChange, LeakEstimate, LeakEstimates, Size,
 };
@@ -33,10 +33,7 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
         let Estimate { value, std } = fit.mean_leak(leak);
         let std = std * widening;
         let mean = estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S);
-        let levels = fit.leak_levels(leak);
-        let is_possible = levels
-            .iter()
-            .all(|level| level.coefficient.value >= -NEGATIVE_SIGMA * level.coefficient.std * widening);
+        let is_possible = course(fit, leak).iter().all(|at| at.value >= -NEGATIVE_SIGMA * at.std * widening);
         LeakEstimate { physical: mean.physical && is_possible, ..mean }
     };
     let Estimate { value: compressibility, std } = estimate(fit, Term::InverseBulk);
@@ -57,37 +54,42 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     }
 }
 
+/// A leak before and after each of its changes, and at both ends: between them it is steady or grows evenly.
+pub(super) fn course(fit: &Fit<'_>, leak: Leak) -> Vec<Estimate<f64>> {
+    let changes = fit.rows_of_change(leak).into_iter().flat_map(|row| [row.saturating_sub(1), row]);
+    let rows = std::iter::once(0).chain(changes).chain([fit.rows().rows.len().saturating_sub(1)]);
+    rows.map(|row| fit.leak_at(leak, row)).collect()
+}
+
 /// Every change of a leak, in order of time.
 pub(crate) fn leak_changes(fit: &Fit<'_>) -> Vec<FoundLeakChange> {
     let rows = &fit.rows().rows;
     let of = |leak: Leak| {
-        let levels = fit.leak_levels(leak);
-        let pair = |pair: &[LeakLevel]| {
-            let [before, after] = pair else { return None };
-            let row = rows.get(after.from_row)?;
-            let (before, after) = (before.coefficient, after.coefficient);
-            Some(FoundLeakChange { fault: leak.id(), trace: row.trace(), time_s: row.t_s, before, after })
+        let change = move |row: usize| {
+            let at = rows.get(row)?;
+            let [before, after] = [row.saturating_sub(1), row].map(|row| fit.leak_at(leak, row));
+            Some((
+                row,
+                FoundLeakChange { fault: leak.id(), trace: at.trace(), time_s: at.t_s, before, after },
+            ))
         };
-        levels.windows(2).filter_map(pair).collect::<Vec<_>>()
+        fit.rows_of_change(leak).into_iter().filter_map(change)
     };
-    let mut all: Vec<FoundLeakChange> = Leak::ALL.into_iter().flat_map(of).collect();
-    all.sort_by(|a, b| {
-        (a.trace, a.time_s).partial_cmp(&(b.trace, b.time_s)).unwrap_or(std::cmp::Ordering::Equal)
-    });
-    all
+    let mut all: Vec<_> = Leak::ALL.into_iter().flat_map(of).collect();
+    all.sort_by_key(|(row, _)| *row);
+    all.into_iter().map(|(_, change)| change).collect()
 }
 
 /// A sentence for each leak that changes.
 pub(super) fn change_notes(fit: &Fit<'_>) -> Vec<String> {
     let of = |leak: Leak| {
-        let levels = fit.leak_levels(leak);
-        let values = levels.iter().map(|level| LPM_PER_BAR * level.coefficient.value);
+        let changes = fit.rows_of_change(leak).len();
+        let values = course(fit, leak).into_iter().map(|at| LPM_PER_BAR * at.value);
         let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-        (levels.len() > 1).then(|| {
+        (changes > 0).then(|| {
             format!(
-                "the leak {} changes along the traces, {} times, between {low:.5} and {high:.5} L/min/bar: what is said of it is its mean",
+                "the leak {} changes along the traces, at {changes} moments, between {low:.5} and {high:.5} L/min/bar: what is said of it is its mean",
                 leak.label(),
-                levels.len() - 1
             )
         })
     };

@@ -6,7 +6,7 @@ use super::dead_band::{Beside, median_of_three, within_band};
 use super::play::{Followed, Sides};
 use super::series::Series;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
-use pitchleak_core::{Effect, EffectSet, Model, Sensors, Signals};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
 #[derive(Default)]
@@ -30,17 +30,20 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Of a trace whose sensors have these `effects`, which are undone.
+    /// Of a trace whose sensors have these `effects`, which are undone, and whose leaks at each time are `leaks_at`.
     pub(crate) fn of(
         series: &Series,
-        model: &Model<f64>,
+        (model, leaks_at): (&Model<f64>, impl Fn(f64) -> PerLeak<f64>),
         effects: &EffectSet<f64>,
         sensors: &Sensors<f64>,
     ) -> Self {
+        let model = Model { cylinder: effects.built(&model.cylinder), ..*model };
+
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
-            let [qa, qb] = within_bands(series, model, sensors);
-            let (v_mps, std_mps, rms_mps) = from_flow(series, model, effects, sensors, [&qa.side, &qb.side]);
+            let [qa, qb] = within_bands(series, &model, sensors);
+            let raw = raw_speed(series, (&model, leaks_at), effects, [&qa.side, &qb.side]);
+            let (v_mps, std_mps, rms_mps) = from_flow(series, &raw, &model, sensors);
             Self { v_mps, std_mps, rms_mps, qa, qb, ..Self::default() }
         } else {
             Self::from_position(series, effects, sensors)
@@ -100,18 +103,16 @@ impl Motion {
 /// Speed, standard deviation of its noise, and its root mean square, m/s.
 fn from_flow(
     series: &Series,
+    raw: &[f64],
     model: &Model<f64>,
-    effects: &EffectSet<f64>,
     sensors: &Sensors<f64>,
-    unread: [&[f64]; 2],
 ) -> (Vec<f64>, f64, f64) {
-    let raw = raw_speed(series, model, effects, unread);
-    let rms = root_mean_square(&raw);
+    let rms = root_mean_square(raw);
     let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
         .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
     let (half, step) = (half_window(std, rms, 2.0), series.step_s());
     let half = half.min(longest_half(step));
-    (smooth(&raw, half), std / ((2 * half + 1) as f64).sqrt(), rms)
+    (smooth(raw, half), std / ((2 * half + 1) as f64).sqrt(), rms)
 }
 
 /// Where in dead bands of their meters the flows A and B would lie: what the other meter shows says how they go on meanwhile, or
@@ -151,11 +152,11 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
 /// Speed from eq. (1), both chambers averaged where both have a meter. `unread`: where in their dead bands the flows lie.
 fn raw_speed(
     series: &Series,
-    model: &Model<f64>,
+    (model, leaks_at): (&Model<f64>, impl Fn(f64) -> PerLeak<f64>),
     effects: &EffectSet<f64>,
     [qa_unread, qb_unread]: [&[f64]; 2],
 ) -> Vec<f64> {
-    let (cylinder, leaks, bulk) = (&model.cylinder, &model.leaks_m3spa, model.fluid.bulk_modulus_pa);
+    let (cylinder, bulk) = (&model.cylinder, model.fluid.bulk_modulus_pa);
     let rate = |values: &[f64], at: usize| {
         let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
         let span = series.t_s[to] - series.t_s[from];
@@ -178,6 +179,7 @@ fn raw_speed(
                 ..Signals::default()
             };
             let seen = effects.correct(&reading);
+            let leaks = leaks_at(series.t_s[at]);
             let past = leaks.internal * (seen.pa_pa - seen.pb_pa);
             let stored_a = cylinder.volume_a_m3(seen.x_m) / bulk * seen.dpa_pas;
             let stored_b = cylinder.volume_b_m3(seen.x_m) / bulk * seen.dpb_pas;

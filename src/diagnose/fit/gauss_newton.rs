@@ -259,7 +259,7 @@ impl<'a> Fit<'a> {
         let (at, solved) = (&self.weak_form.at, self.solved());
         let is_still = |(term, std): (&usize, &f64)| {
             let term = self.problem.terms[*term];
-            (solved.value(term) - at.value(term)).abs() <= SETTLED_SIGMA * std
+            (solved.known(term) - at.known(term)).abs() <= SETTLED_SIGMA * std
         };
         self.bounded.terms.iter().zip(&self.bounded.std).all(is_still)
     }

@@ -10,7 +10,7 @@ mod widening;
 
 pub(crate) use gauss_newton::Fit;
 pub use gauss_newton::Progress;
-pub(crate) use leak_levels::{LeakLevel, LeakProducts};
+pub(crate) use leak_levels::LeakProducts;
 pub(crate) use predict::MeanFlow;
 pub(crate) use problem::Problem;
 pub(crate) use regression::Solution;

@@ -54,9 +54,17 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// The leaks' changes with their places.
+    pub(crate) fn leak_changes(&self) -> impl Iterator<Item = (usize, LeakChange)> {
+        self.terms.iter().enumerate().filter_map(|(place, term)| match term {
+            Term::LeakChange(change) => Some((place, *change)),
+            _ => None,
+        })
+    }
+
     /// Whether a leak changes along the traces.
     pub(crate) fn has_leak_changes(&self) -> bool {
-        self.terms.iter().any(|term| matches!(term, Term::LeakChange(_)))
+        self.leak_changes().next().is_some()
     }
 
     /// The terms of the declared model: its constants, and what the rig file says may be there.
@@ -118,7 +126,9 @@ fn usual_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f6
     let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
     let speeds: Vec<(f64, f64)> = traces
         .iter()
-        .map(|series| least(&Motion::of(series, &model, &declared.effects, &declared.sensors)))
+        .map(|series| {
+            least(&Motion::of(series, (&model, |_| PerLeak::default()), &declared.effects, &declared.sensors))
+        })
         .collect();
     let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
     let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);

@@ -3,9 +3,9 @@
 
 use super::candidates::critical_sigma;
 use crate::diagnose::fit::{Fit, LeakProducts, Problem, Progress};
-use crate::diagnose::thresholds::{CHANGE_CHI2, MOST_CHANGE_PLACES, MOST_CHANGE_ROUNDS};
-use crate::diagnose::weak_form::{LeakChange, Term};
-use nalgebra::{Cholesky, Matrix3};
+use crate::diagnose::thresholds::{CHANGE_CHI2, COLLINEAR_RIDGE, MOST_CHANGE_PLACES, MOST_CHANGE_ROUNDS};
+use crate::diagnose::weak_form::{ChangeKind, LeakChange};
+use nalgebra::{Cholesky, Matrix6};
 use pitchleak_core::Leak;
 
 /// The problem with the changes that its declared model needs; none where leaks that stay do as well.
@@ -34,18 +34,22 @@ fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'
 }
 
 fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
-    let rows = borders(&fit.leak_products());
-    let all = rows.into_iter().flat_map(|row| Leak::ALL.map(|leak| LeakChange { leak, row }));
+    let borders = borders(&fit.leak_products());
+    let steps = borders.iter().map(|row| (*row, ChangeKind::Step));
+    let growths = std::iter::once(0).chain(borders.iter().copied()).map(|row| (row, ChangeKind::Growth));
+    let all = steps.chain(growths);
+    let rows = &fit.rows().rows;
+    let all = all.filter_map(|(row, kind)| {
+        let (trace, from_s) = rows.get(row).map(|own| (own.trace(), own.t_s))?;
+        Some(Leak::ALL.map(|leak| LeakChange { leak, kind, row, trace, from_s }))
+    });
+    let all = all.flatten();
     all.filter(|change| !known.iter().any(|other| other.overlaps(change))).collect()
 }
 
 /// Those without which more is left than chance would leave.
 fn needed(fit: &Fit<'_>) -> Vec<LeakChange> {
-    let changes = fit.problem.terms.iter().enumerate().filter_map(|(place, term)| match term {
-        Term::LeakChange(change) => Some((place, *change)),
-        _ => None,
-    });
-    let mut kept: Vec<(usize, LeakChange)> = changes.collect();
+    let mut kept: Vec<(usize, LeakChange)> = fit.problem.leak_changes().collect();
     let mut gone = Vec::new();
     let needs = critical_sigma(fit, fit.problem.usual_constants).powi(2) * fit.dispersion(fit.free.chi2);
     loop {
@@ -57,11 +61,7 @@ fn needed(fit: &Fit<'_>) -> Vec<LeakChange> {
         let least = kept.iter().enumerate().map(loss).min_by(|a, b| a.1.total_cmp(&b.1));
         match least {
             Some((at, loss)) if loss < needs => gone.push(kept.remove(at).0),
-            _ => {
-                let mut changes: Vec<LeakChange> = kept.into_iter().map(|(_, change)| change).collect();
-                changes.sort_by_key(|change| change.row);
-                return changes;
-            }
+            _ => return kept.into_iter().map(|(_, change)| change).collect(),
         }
     }
 }
@@ -75,8 +75,8 @@ impl Sums {
     fn explained_since(&self, earlier: &Self) -> f64 {
         let gram = self.0.gram - earlier.0.gram;
         let pull = self.0.pull - earlier.0.pull;
-        let ridge = 1e-9 * gram.trace() + f64::MIN_POSITIVE;
-        Cholesky::new(gram + Matrix3::from_diagonal_element(ridge))
+        let ridge = COLLINEAR_RIDGE * gram.trace() + f64::MIN_POSITIVE;
+        Cholesky::new(gram + Matrix6::from_diagonal_element(ridge))
             .map_or(0.0, |root| pull.dot(&root.solve(&pull)))
     }
 }

@@ -80,6 +80,7 @@ fn add_while(
 /// Without those that the last exchange may have left needless, each held against its rivals, and no more than it takes.
 fn tidied<'a>(mut all: Selection<'a>, progress: Progress<'_>) -> Selection<'a> {
     all.drop_needless(progress);
+    all.drop_needless_changes(progress);
     all.drop_doubtful(progress);
     all.find_confusable(progress);
     exchange::simplify(&mut all, progress);

@@ -120,7 +120,7 @@ impl Selection<'_> {
         let fit = &self.fit;
         let ratios = fit.noise_ratio();
         let misfit = Equation::ALL.map(|one| 2.0 * ratios[one].ln() * fit.innovations(one).len() as f64);
-        let changes = fit.problem.terms.iter().filter(|term| matches!(term, Term::LeakChange(_))).count();
+        let changes = fit.leak_changes().count();
         let needed = critical_sigma(fit, fit.problem.usual_constants).powi(2);
         misfit.iter().sum::<f64>() + needed * (self.effects.len() + changes) as f64
     }
@@ -168,13 +168,23 @@ impl Selection<'_> {
     }
 
     fn first_needless(&self) -> Option<usize> {
+        self.effects.iter().position(|one| self.is_needless(one.term))
+    }
+
+    /// Whether no more than chance would be left without it.
+    fn is_needless(&self, term: usize) -> bool {
         let fit = &self.fit;
-        let dispersion = fit.dispersion(fit.free.chi2);
-        let is_needless = |one: &Selected| {
-            let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
-            loss(fit, &[one.term]) / dispersion < needed
-        };
-        self.effects.iter().position(is_needless)
+        let needed = critical_sigma(fit, fit.constants(term)).powi(2);
+        loss(fit, &[term]) / fit.dispersion(fit.free.chi2) < needed
+    }
+
+    /// Drops changes of leaks that the effects have made needless.
+    pub(super) fn drop_needless_changes(&mut self, progress: Progress<'_>) {
+        let next =
+            |all: &Self| all.fit.leak_changes().map(|(place, _)| place).find(|place| all.is_needless(*place));
+        while let Some(change) = next(self) {
+            self.fit = self.fit.without(change, progress);
+        }
     }
 
     /// Drops effects that the pieces of the data do not agree upon: where the model stays incomplete, a good score

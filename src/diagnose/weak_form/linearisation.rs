@@ -1,5 +1,6 @@
 //! Where the model stands: its constants and the effects found so far.
 
+use super::leak_change::LeakChange;
 use super::terms::Term;
 use crate::diagnose::data::Declared;
 use crate::diagnose::equation::PerEquation;
@@ -15,6 +16,9 @@ pub(crate) struct Linearisation {
     pub(crate) effects: EffectSet<f64>,
     /// Values of 1/β that the rig file leaves possible, per Pa.
     pub(crate) compressibility: (f64, f64),
+    /// What the leaks' changes came to last. They stay in what is left over, as their columns are exact at any size: only the speed that
+    /// forces feel hangs on them.
+    changes: Vec<(LeakChange, f64)>,
 }
 
 /// The same instant with the motion that forces feel (`data/motion.rs`).
@@ -43,7 +47,23 @@ impl Linearisation {
                 compressibility * (1.0 - share).max(LEAST_COMPRESSIBILITY),
                 compressibility * (1.0 + share),
             ),
+            changes: Vec::new(),
         }
+    }
+
+    /// The leaks at a time of a trace, changes included.
+    pub(crate) fn leaks_at(&self, trace: usize, t_s: f64) -> PerLeak<f64> {
+        let mut leaks = self.model.leaks_m3spa;
+        for (change, value) in &self.changes {
+            leaks[change.leak] += value * change.at(trace, t_s);
+        }
+        leaks
+    }
+
+    /// What is known of a term's value, which a change has in what is left over.
+    pub(crate) fn known(&self, term: Term) -> f64 {
+        let Term::LeakChange(change) = term else { return self.value(term) };
+        self.changes.iter().find(|(own, _)| *own == change).map_or(0.0, |(_, value)| *value)
     }
 
     /// The residual of the three equations at corrected readings.
@@ -133,8 +153,11 @@ impl Linearisation {
             Term::ExternalA => leaks.external_a = value,
             Term::ExternalB => leaks.external_b = value,
             Term::Effect(effect) => self.set_effect(effect, value, constants),
-            // A change stays in what is left over: its column is exact at any size.
-            Term::Unlisted(_) | Term::Product(..) | Term::LeakChange(_) => {}
+            Term::LeakChange(change) => {
+                self.changes.retain(|(own, _)| *own != change);
+                self.changes.push((change, value));
+            }
+            Term::Unlisted(_) | Term::Product(..) => {}
         }
     }
 

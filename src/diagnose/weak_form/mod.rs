@@ -9,7 +9,7 @@ mod sensitivity;
 mod shared_noise;
 mod terms;
 
-pub(crate) use leak_change::LeakChange;
+pub(crate) use leak_change::{ChangeKind, LeakChange};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
@@ -171,5 +171,8 @@ fn add_unresolved(
 }
 
 fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
-    traces.iter().map(|series| Motion::of(series, &at.model, &at.effects, sensors)).collect()
+    let of = |(trace, series): (usize, &Series)| {
+        Motion::of(series, (&at.model, |t_s| at.leaks_at(trace, t_s)), &at.effects, sensors)
+    };
+    traces.iter().enumerate().map(of).collect()
 }

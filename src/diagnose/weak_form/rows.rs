@@ -306,7 +306,8 @@ mod tests {
             series.push(t, &sample, None);
         }
         let at = Linearisation::declared(&declared);
-        let motion = Motion::of(&series, &at.model, &at.effects, &declared.sensors);
+        let motion =
+            Motion::of(&series, (&at.model, |_| at.model.leaks_m3spa), &at.effects, &declared.sensors);
         let integrand = Integrand::new(&at, &[Term::Internal], &[EffectConstants::default()]);
         Rows::build(&[series], &[motion], &integrand, 0.1)
     }

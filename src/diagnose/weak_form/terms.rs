@@ -7,7 +7,7 @@ use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide}
 use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
 /// One column of the regression.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Term {
     /// 1/β, per Pa.
     InverseBulk,
