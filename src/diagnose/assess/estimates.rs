@@ -12,7 +12,6 @@ use crate::diagnose::thresholds::{
     RATIO_KNOWN_SHARE,
 };
 use crate::diagnose::weak_form::{Row, Term};
-use crate::units::LPM_PER_BAR;
 use pitchleak_core::effects::EffectKind;
 use pitchleak_core::{Effect, Estimate, Leak};
 use std::collections::BTreeMap;
@@ -84,13 +83,10 @@ pub(crate) fn leak_changes(fit: &Fit<'_>) -> Vec<FoundLeakChange> {
 pub(super) fn change_notes(fit: &Fit<'_>) -> Vec<String> {
     let of = |leak: Leak| {
         let changes = fit.rows_of_change(leak).len();
-        let values = course(fit, leak).into_iter().map(|at| LPM_PER_BAR * at.value);
-        let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        let times = if changes == 1 { "once".to_owned() } else { format!("{changes} times") };
+        let label = leak.label();
         (changes > 0).then(|| {
-            format!(
-                "the leak {} changes along the traces, at {changes} moments, between {low:.5} and {high:.5} L/min/bar: what is said of it is its mean",
-                leak.label(),
-            )
+            format!("the {label} leak changes {times} along the traces: its coefficient here is the mean")
         })
     };
     Leak::ALL.into_iter().filter_map(of).collect()

@@ -26,7 +26,7 @@ pub(crate) fn check(
     progress: Progress<'_>,
 ) -> Option<Holds> {
     let Selection { fit, effects } = selection;
-    if fit.problem.has_leak_changes() {
+    if fit.leak_changes().next().is_some() {
         // Which leak a hold has depends on when it is.
         return None;
     }

@@ -2,9 +2,9 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
-use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA};
+use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, ROUNDING_SHARE};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
-use pitchleak_core::effects::{EffectConstant, EffectConstants};
+use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind};
 use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors};
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
@@ -115,8 +115,18 @@ impl<'a> Problem<'a> {
     /// Values of a term that physics allows and samples can show.
     pub(crate) fn allows(&self, term: usize, value: f64) -> bool {
         let (lower, upper) = self.terms[term].bounds();
-        let is_lag = self.terms[term].effect().is_some_and(Effect::is_lag);
-        (lower..=upper).contains(&value) && !(is_lag && value < self.least_lag_s)
+        let effect = self.terms[term].effect();
+        let is_short = effect.is_some_and(Effect::is_lag) && value < self.least_lag_s;
+        let is_rounding = effect.is_some_and(|effect| value.abs() < self.rounding(effect));
+        (lower..=upper).contains(&value) && !is_short && !is_rounding
+    }
+
+    /// By so much a declared number may be off because its data sheet rounds it.
+    fn rounding(&self, effect: Effect) -> f64 {
+        let mut cylinder = *self.declared_cylinder();
+        let is_number = effect.spec().kind == EffectKind::Cylinder;
+        let declared = is_number.then(|| effect.adds_to(&mut cylinder)).flatten();
+        declared.map_or(0.0, |number| ROUNDING_SHARE * *number)
     }
 }
 

@@ -34,9 +34,9 @@ pub(crate) fn best<'a>(
         return tidied(staying, progress);
     }
     let changing = with_changes().map(|problem| search(Fit::declared(problem, progress), &error, progress));
-    let says_all = |all: &Selection<'_>| all.effects.is_empty() && !all.fit.is_incomplete();
-    let changing = match changing {
-        Some(changing) if says_all(&changing) => return changing,
+    // While something else is missing, what leaks seem to do is that one's doing.
+    let changing = match changing.filter(|all| !all.fit.is_incomplete()) {
+        Some(whole) if whole.effects.is_empty() => return whole,
         changing => changing,
     };
     add_while(&mut staying, |_| true, &error, progress);

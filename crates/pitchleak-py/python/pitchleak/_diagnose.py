@@ -107,6 +107,28 @@ class Interaction:
 
 
 @dataclass(frozen=True, slots=True)
+class Level:
+    """A leak coefficient, m³/(s·Pa), with its standard deviation."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True, slots=True)
+class LeakChange:
+    """A leak that is another from a moment on: a part of the declared model, no effect."""
+
+    fault: str
+    """``internal``, ``external_a`` or ``external_b``."""
+    trace: int
+    """In which of the traces, from 0."""
+    time_s: float
+    """Since that began, s."""
+    before: Level
+    after: Level
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """A sensor's error that the rig file declares possible, as these traces show it."""
 
@@ -246,6 +268,8 @@ class Diagnosis(Raw, Paged, Tabular):
     """The mistake of wiring, sign or unit that explains the traces; then no effect is worth looking for."""
     interactions: tuple[Interaction, ...] = ()
     """Effects that act on each other."""
+    leak_changes: tuple[LeakChange, ...] = ()
+    """Where leaks change, if that explains the traces better than leaks that stay."""
     calibration: tuple[Calibration, ...] = ()
     """Offsets and gains that the rig file declares possible, as found with the effects."""
     holds: Holds | None = None

@@ -17,6 +17,9 @@ use std::fmt::Write;
 /// Where less of the traces than this was fitted, they were fitted in pieces: ends that fill no mean aside.
 const PIECES_SHARE: f64 = 0.9;
 
+/// Changes of leaks that are listed.
+const MOST_CHANGES: usize = 20;
+
 /// Variables named per equation.
 const MOST_NAMED: usize = 3;
 
@@ -59,6 +62,7 @@ impl DiagnosisText<'_> {
             self.write_residuals(&mut out);
             self.write_bins(&mut out);
             self.write_leaks(&mut out);
+            self.write_leak_changes(&mut out);
             self.write_holds(&mut out);
         }
         let Samples { read, fitted } = self.diagnosis.samples;
@@ -121,6 +125,28 @@ impl DiagnosisText<'_> {
                 with_interval(leak.value * LPM_PER_BAR, Some(leak.std * LPM_PER_BAR)) + mark
             };
             let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
+        }
+    }
+
+    /// Where leaks change, in order of time.
+    fn write_leak_changes(&self, out: &mut String) {
+        let changes = &self.diagnosis.leak_changes;
+        if changes.is_empty() {
+            return;
+        }
+        out.push_str("\nleaks that change, L/min/bar            before                  after\n");
+        for change in changes.iter().take(MOST_CHANGES) {
+            let text = |level: &Estimate<f64>| {
+                with_interval(level.value * LPM_PER_BAR, Some(level.std * LPM_PER_BAR))
+            };
+            let at = format!("{} at {:.1} s", change.fault.replace('_', " "), change.time_s);
+            let trace =
+                if change.trace == 0 { String::new() } else { format!(", trace {}", change.trace + 1) };
+            let (before, after) = (text(&change.before), text(&change.after));
+            let _ = writeln!(out, "  {:<22} {before:>24} {after:>22}", at + &trace);
+        }
+        if let Some(more) = changes.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
+            let _ = writeln!(out, "  and {more} more");
         }
     }
 
