@@ -117,8 +117,12 @@ impl<'a> Problem<'a> {
         let (lower, upper) = self.terms[term].bounds();
         let effect = self.terms[term].effect();
         let is_short = effect.is_some_and(Effect::is_lag) && value < self.least_lag_s;
-        let is_rounding = effect.is_some_and(|effect| value.abs() < self.rounding(effect));
-        (lower..=upper).contains(&value) && !is_short && !is_rounding
+        (lower..=upper).contains(&value) && !is_short
+    }
+
+    /// Whether so much of an effect is worth its name, not only a doubt about another's.
+    pub(crate) fn is_worth_a_name(&self, term: usize, value: f64) -> bool {
+        self.terms[term].effect().is_none_or(|effect| value.abs() >= self.rounding(effect))
     }
 
     /// By so much a declared number may be off because its data sheet rounds it.

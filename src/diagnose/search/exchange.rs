@@ -27,7 +27,8 @@ fn swap_one(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
         let one = &mut all.effects[at];
         let vacated = all.fit.vacated(one.term);
         progress();
-        if let Some(best) = Candidates::of(&vacated).trials(&vacated.free).into_iter().next() {
+        let trials = Candidates::of(&vacated).trials(&vacated.free);
+        if let Some(best) = trials.into_iter().find(|trial| trial.is_worth_a_name(&vacated)) {
             all.fit = selection::with(&vacated, &[], &best, progress);
             if best.score.term != one.term {
                 one.stands_for(&all.fit, &best);
@@ -80,7 +81,7 @@ fn mergeable(
         let lost = without.chi2 - fit.free.chi2;
         let needed = terms.map(|term| critical_sigma(fit, fit.constants(term)).powi(2));
         let spare = dispersion * needed[0].max(needed[1]);
-        let best = candidates.rough_trials(&without).into_iter().next()?;
+        let best = candidates.rough_trials(&without).into_iter().find(|trial| trial.is_worth_a_name(fit))?;
         (lost - best.score.chi2_drop <= spare).then_some(((a, b), best))
     })
 }

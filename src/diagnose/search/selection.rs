@@ -229,7 +229,8 @@ impl Selection<'_> {
                 trial.score.chi2_drop = lost - in_its_place.left_beyond(fit);
             }
             let own = lost / dispersion - critical_sigma(fit, fit.constants(one.term)).powi(2);
-            let better = trials.iter().filter(|trial| trial.beyond(dispersion) > own);
+            let is_better = |trial: &&Trial| trial.beyond(dispersion) > own && trial.is_worth_a_name(fit);
+            let better = trials.iter().filter(is_better);
             if let Some(best) =
                 better.max_by(|a, b| a.score.chi2_drop.total_cmp(&b.score.chi2_drop)).filter(|_| lost > 0.0)
             {
@@ -270,7 +271,10 @@ fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
     let chi2_drop = trial.score.chi2_drop;
     let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
     let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= LEAST_MENDED_SHARE;
-    is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
+    is_significant
+        && mends_enough
+        && trial.is_worth_a_name(fit)
+        && fit.helps_held_out(trial.score.term, trial.constants)
 }
 
 /// The pairs whose product explains more than chance would.
