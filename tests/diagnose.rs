@@ -130,8 +130,11 @@ fn all_that_an_effect_is_stands_in_its_entry() {
     }
 }
 
+/// One number of a cylinder.
+type Number = fn(&mut Cylinder<f64>) -> &mut f64;
+
 /// The cylinder's number, so many times what the plant has.
-fn declared_wrong(number: fn(&mut Cylinder<f64>) -> &mut f64, times: f64) -> Rig {
+fn declared_wrong(number: Number, times: f64) -> Rig {
     let mut rig = rig();
     *number(&mut rig.cylinder) *= times;
     rig
@@ -145,7 +148,7 @@ fn without_force(mut series: Series) -> Series {
 /// Beside a load cell for sure; without one a meter's gain does nearly the same, and is not believed either.
 #[test]
 fn a_wrong_area_is_named_and_no_sensor_is_blamed() {
-    let areas: [(_, fn(&mut Cylinder<f64>) -> &mut f64); 2] =
+    let areas: [(_, Number); 2] =
         [("area_a", |cylinder| &mut cylinder.area_a_m2), ("area_b", |cylinder| &mut cylinder.area_b_m2)];
     let series = trace(None);
     let mut true_cylinder = rig().cylinder;
@@ -168,7 +171,7 @@ fn a_wrong_area_is_named_and_no_sensor_is_blamed() {
 
 #[test]
 fn no_sensor_is_blamed_for_other_wrong_numbers_of_the_cylinder() {
-    let numbers: [(_, fn(&mut Cylinder<f64>) -> &mut f64); 4] = [
+    let numbers: [(_, Number); 4] = [
         ("stroke", |cylinder| &mut cylinder.stroke_m),
         ("dead volume A", |cylinder| &mut cylinder.dead_volume_a_m3),
         ("dead volume B", |cylinder| &mut cylinder.dead_volume_b_m3),
