@@ -112,8 +112,8 @@ fn every_id_names_its_effect() {
 fn a_set_refuses_what_cannot_be() {
     let (mut set, constants) = (EffectSet::<f64>::default(), EffectConstants::default());
     for bad in [-1e-5, f64::NAN, f64::INFINITY] {
-        let error = set.set(Effect::DeadVolumeA, bad, constants);
-        assert_eq!(error, Err(EffectError::Value(Effect::DeadVolumeA)));
+        let error = set.set(Effect::AccumulatorA, bad, constants);
+        assert_eq!(error, Err(EffectError::Value(Effect::AccumulatorA)));
     }
     let flat = EffectConstants { spot_width_m: 0.0, ..constants };
     let error = set.set(Effect::PositionDependentLeak, 1e-12, flat);
@@ -122,7 +122,7 @@ fn a_set_refuses_what_cannot_be() {
         set.set(*effect, effect.spec().default_size, constants).unwrap();
     }
     assert_eq!(set.set(Effect::LoadOffset, 1.0, constants), Err(EffectError::Full));
-    set.set(Effect::DeadVolumeA, 0.0, constants).unwrap();
+    set.set(Effect::AccumulatorA, 0.0, constants).unwrap();
     set.set(Effect::LoadOffset, 1.0, constants).unwrap();
     assert_eq!(set.iter().count(), 8);
 }
