@@ -28,6 +28,11 @@ fn wave(lines: &[f64], amplitude: f64, offset: f64) -> Curve {
     Curve::through(&t, &values).expect("is a curve")
 }
 
+/// Position and load of all traces here that do not follow the wind.
+fn multi_sine() -> Reference {
+    Reference::of(wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1), wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0))
+}
+
 /// 40 s of a rig with this effect, through sensors of 0.1 % of full scale.
 fn trace(effect: Option<(Effect, f64)>) -> Series {
     trace_with(effect, |_| 0.0)
@@ -41,17 +46,13 @@ fn trace_with(effect: Option<(Effect, f64)>, resists_n: impl Fn(&Signals<f64>) -
     }
     let rig = rig();
     let mut sensing = Sensing::new(rig.sensors(), Biases::default(), 7);
-    let reference = Reference::of(
-        wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
-        wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
-    );
     let scenario = Scenario {
         leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
         effects,
         start_s: 4.0,
         warm_up_s: 2.0,
         duration_s: 40.0,
-        ..Scenario::new(rig, reference)
+        ..Scenario::new(rig, multi_sine())
     };
     let mut series = Series::default();
     let leaks = scenario.leak_coefficients().expect("given");
@@ -195,12 +196,8 @@ fn no_sensor_is_blamed_for_other_wrong_numbers_of_the_cylinder() {
 
 /// 40 s in which the leak past the piston has this course.
 fn leaking(internal: &str, effects: EffectSet<f64>, seed: u64) -> Series {
-    let reference = Reference::of(
-        wave(&[0.06, 0.13, 0.31, 0.62], 0.015, 0.1),
-        wave(&[0.05, 0.17, 0.4, 0.9], 400.0, 1800.0),
-    );
     let mut scenario =
-        Scenario { effects, start_s: 4.0, duration_s: 40.0, ..Scenario::new(rig(), reference) };
+        Scenario { effects, start_s: 4.0, duration_s: 40.0, ..Scenario::new(rig(), multi_sine()) };
     scenario.leaks.internal = internal.parse().expect("is a course");
     let mut sensing = Sensing::new(rig().sensors(), Biases::default(), seed);
     let mut series = Series::default();

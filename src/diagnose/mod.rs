@@ -64,7 +64,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     } else {
         Selection::none(plain)
     };
-    if selection.fit.problem.has_leak_changes() {
+    if selection.fit.has_leak_changes() {
         before = model_fit(&Fit::declared(selection.fit.problem, progress), &test);
     }
     let after = model_fit(&selection.fit, &test);

@@ -225,7 +225,7 @@ fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
         let course = estimates::course(fit, leak).into_iter().filter(|at| at.std > 0.0);
         let sigma = course.map(|at| -at.value / at.std).fold(f64::NEG_INFINITY, f64::max);
         let is_near = equations.iter().any(|equation| acts[*equation]);
-        let text = || format!("with it the leak {} is {sigma:.1} sigma below zero", leak.label());
+        let text = || format!("with it the {} leak is {sigma:.1} sigma below zero", leak.label());
         (sigma > DOUBTED_LEAK_SIGMA && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
     };
     let (a, b) = (Equation::ChamberA, Equation::ChamberB);

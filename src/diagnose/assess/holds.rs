@@ -26,7 +26,7 @@ pub(crate) fn check(
     progress: Progress<'_>,
 ) -> Option<Holds> {
     let Selection { fit, effects } = selection;
-    if fit.leak_changes().next().is_some() {
+    if fit.has_leak_changes() {
         // Which leak a hold has depends on when it is.
         return None;
     }

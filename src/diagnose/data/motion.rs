@@ -38,7 +38,6 @@ impl Motion {
         sensors: &Sensors<f64>,
     ) -> Self {
         let model = Model { cylinder: effects.built(&model.cylinder), ..*model };
-
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
             let [qa, qb] = within_bands(series, &model, sensors);

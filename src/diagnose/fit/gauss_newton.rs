@@ -96,19 +96,9 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let (structure, at) = self.left_by(&[old]);
         let structure = structure.with(new, constants);
-        let round = |at: Linearisation| {
-            let noise_at = (at.clone(), at);
-            Self::around(&structure.active, self.problem, structure.clone(), noise_at, self.assumed_error)
-        };
-        let mut fit = round(at);
-        for _ in 1..MOST_ROUNDS {
-            if fit.stands_still() {
-                break;
-            }
-            progress();
-            fit = round(fit.solved());
-        }
-        fit
+        let error = self.assumed_error;
+        let next = |fit: &Self| (!fit.stands_still()).then_some(error);
+        Self::linearised(self.problem, &structure, (at, error), next, progress)
     }
 
     /// By how much more it leaves than another fit of the same traces: squares of what is left over, each at the noise that its model
@@ -225,17 +215,8 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
         progress: Progress<'_>,
     ) -> Self {
-        let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
-            Self::around(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
-        };
-        let mut fit = round(at, assumed_error);
-        for _ in 1..MOST_ROUNDS {
-            if fit.has_converged() {
-                break;
-            }
-            progress();
-            fit = round(fit.solved(), fit.equation_error);
-        }
+        let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
+        let fit = Self::linearised(problem, &structure, (at, assumed_error), next, progress);
         let columns = Columns {
             terms: &problem.terms,
             constants: &structure.constants,
@@ -243,6 +224,26 @@ impl<'a> Fit<'a> {
         };
         let weak_form = fit.weak_form.with_columns(columns);
         Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
+    }
+
+    /// Linearises anew, with the equations' error that `next` gives, until that gives none.
+    fn linearised(
+        problem: &'a Problem<'a>,
+        structure: &Structure,
+        (at, assumed_error): (Linearisation, PerEquation<f64>),
+        next: impl Fn(&Self) -> Option<PerEquation<f64>>,
+        progress: Progress<'_>,
+    ) -> Self {
+        let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
+            Self::around(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
+        };
+        let mut fit = round(at, assumed_error);
+        for _ in 1..MOST_ROUNDS {
+            let Some(error) = next(&fit) else { break };
+            progress();
+            fit = round(fit.solved(), error);
+        }
+        fit
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and

@@ -47,14 +47,14 @@ impl Fit<'_> {
     /// A leak's coefficient at a row.
     pub(crate) fn leak_at(&self, leak: Leak, row: usize) -> Estimate<f64> {
         let at = self.rows().rows.get(row);
-        self.leak_with(leak, |change| at.map_or(0.0, |row| change.at(row.trace(), row.t_s)))
+        self.leak_with(leak, |change| at.map_or(0.0, |row| change.at_row(row)))
     }
 
     /// A leak's mean coefficient over the traces.
     pub(crate) fn mean_leak(&self, leak: Leak) -> Estimate<f64> {
         let rows = &self.rows().rows;
         self.leak_with(leak, |change| {
-            rows.iter().map(|row| change.at(row.trace(), row.t_s)).sum::<f64>() / rows.len().max(1) as f64
+            rows.iter().map(|row| change.at_row(row)).sum::<f64>() / rows.len().max(1) as f64
         })
     }
 
@@ -72,6 +72,11 @@ impl Fit<'_> {
     /// The changes that are fitted, with their places.
     pub(crate) fn leak_changes(&self) -> impl Iterator<Item = (usize, LeakChange)> {
         self.problem.leak_changes().filter(|(place, _)| self.active().contains(place))
+    }
+
+    /// Whether a leak changes along the traces.
+    pub(crate) fn has_leak_changes(&self) -> bool {
+        self.leak_changes().next().is_some()
     }
 
     fn changes_of(&self, leak: Leak) -> impl Iterator<Item = (usize, LeakChange)> {

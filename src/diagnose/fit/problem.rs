@@ -62,11 +62,6 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Whether a leak changes along the traces.
-    pub(crate) fn has_leak_changes(&self) -> bool {
-        self.leak_changes().next().is_some()
-    }
-
     /// The terms of the declared model: its constants, and what the rig file says may be there.
     pub(super) fn declared_terms(&self) -> Vec<usize> {
         let is_declared = |i: &usize| {

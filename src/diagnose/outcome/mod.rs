@@ -110,8 +110,8 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// The rig file with the effects in it, so that replay and simulation use them; numbers of the cylinder are mended. The bulk modulus is that of
-    /// the fit too: volumes and hoses are measured only as V/β.
+    /// The rig file with the effects in it, so that replay and simulation use them; numbers of the cylinder are mended. The bulk
+    /// modulus is that of the fit too: volumes and hoses are measured only as V/β.
     pub fn rig(&self, rig: &Rig) -> Rig {
         let mut with = rig.clone();
         if !self.effects.is_empty() {

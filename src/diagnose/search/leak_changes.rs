@@ -15,8 +15,8 @@ pub(crate) fn problem<'a>(plain: impl Fn() -> Problem<'a>, progress: Progress<'_
     (!changes.is_empty()).then(|| with(&changes))
 }
 
-/// The changes that the declared model needs. While it is incomplete the noise that it is
-/// held against is large, so that the largest are found first.
+/// The changes that the declared model needs. While it is incomplete the noise that it is held against is large, so that the largest are
+/// found first.
 fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'_>) -> Vec<LeakChange> {
     let mut changes = Vec::new();
     for _ in 0..MOST_CHANGE_ROUNDS {
@@ -28,7 +28,10 @@ fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'
         }
         changes.extend(more);
         let with = problem(&changes);
-        changes = needed(&Fit::declared(&with, progress));
+        let fit = Fit::declared(&with, progress);
+        let gone = needless(&fit);
+        let kept = fit.leak_changes().filter(|(place, _)| !gone.contains(place));
+        changes = kept.map(|(_, change)| change).collect();
     }
     changes
 }
@@ -47,47 +50,42 @@ fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
     all.filter(|change| !known.iter().any(|other| other.overlaps(change))).collect()
 }
 
-/// Those without which more is left than chance would leave.
-fn needed(fit: &Fit<'_>) -> Vec<LeakChange> {
-    let mut kept: Vec<(usize, LeakChange)> = fit.problem.leak_changes().collect();
+/// Places of those without all of which no more than chance is left, the least first.
+pub(super) fn needless(fit: &Fit<'_>) -> Vec<usize> {
+    let mut kept: Vec<usize> = fit.leak_changes().map(|(place, _)| place).collect();
     let mut gone = Vec::new();
     let needs = critical_sigma(fit, fit.problem.usual_constants).powi(2) * fit.dispersion(fit.free.chi2);
     loop {
         let present = fit.solve_without(&gone).chi2;
-        let loss = |(at, (place, _)): (usize, &(usize, LeakChange))| {
-            let without: Vec<usize> = gone.iter().copied().chain([*place]).collect();
-            (at, fit.solve_without(&without).chi2 - present)
+        let loss = |place: usize| {
+            let without: Vec<usize> = gone.iter().copied().chain([place]).collect();
+            (place, fit.solve_without(&without).chi2 - present)
         };
-        let least = kept.iter().enumerate().map(loss).min_by(|a, b| a.1.total_cmp(&b.1));
-        match least {
-            Some((at, loss)) if loss < needs => gone.push(kept.remove(at).0),
-            _ => return kept.into_iter().map(|(_, change)| change).collect(),
+        match kept.iter().copied().map(loss).min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((place, loss)) if loss < needs => {
+                kept.retain(|other| *other != place);
+                gone.push(place);
+            }
+            _ => return gone,
         }
     }
 }
 
-/// Sums over the first rows.
-#[derive(Clone, Copy, Default)]
-struct Sums(LeakProducts);
-
-impl Sums {
-    /// What leaks of their own explain of the rows between two sums.
-    fn explained_since(&self, earlier: &Self) -> f64 {
-        let gram = self.0.gram - earlier.0.gram;
-        let pull = self.0.pull - earlier.0.pull;
-        let ridge = COLLINEAR_RIDGE * gram.trace() + f64::MIN_POSITIVE;
-        Cholesky::new(gram + Matrix6::from_diagonal_element(ridge))
-            .map_or(0.0, |root| pull.dot(&root.solve(&pull)))
-    }
+/// What leaks of their own explain of the rows between two sums over the first rows.
+fn explained(until: &LeakProducts, from: &LeakProducts) -> f64 {
+    let (gram, pull) = (until.gram - from.gram, until.pull - from.pull);
+    let ridge = COLLINEAR_RIDGE * gram.trace() + f64::MIN_POSITIVE;
+    Cholesky::new(gram + Matrix6::from_diagonal_element(ridge))
+        .map_or(0.0, |root| pull.dot(&root.solve(&pull)))
 }
 
 /// Rows at which the parts of the best partition begin, the first left out.
 fn borders(products: &[LeakProducts]) -> Vec<usize> {
-    let mut sums = vec![Sums::default()];
-    for row in products {
-        let last = sums.last().copied().unwrap_or_default().0;
-        sums.push(Sums(LeakProducts { gram: last.gram + row.gram, pull: last.pull + row.pull }));
-    }
+    let mut sums = vec![LeakProducts::default()];
+    sums.extend(products.iter().scan(LeakProducts::default(), |sum, row| {
+        *sum = LeakProducts { gram: sum.gram + row.gram, pull: sum.pull + row.pull };
+        Some(*sum)
+    }));
     let spacing = products.len().div_ceil(MOST_CHANGE_PLACES).max(1);
     let places: Vec<usize> = (0..products.len()).step_by(spacing).chain([products.len()]).collect();
     let coarse = partition(&sums, &places);
@@ -97,19 +95,18 @@ fn borders(products: &[LeakProducts]) -> Vec<usize> {
         let from = if at == 0 { 0 } else { fine[at - 1] };
         let until = coarse.get(at + 1).copied().unwrap_or(products.len());
         let near = coarse[at].saturating_sub(spacing).max(from + 1)..(coarse[at] + spacing).min(until);
-        let gain =
-            |row: usize| sums[row].explained_since(&sums[from]) + sums[until].explained_since(&sums[row]);
+        let gain = |row: usize| explained(&sums[row], &sums[from]) + explained(&sums[until], &sums[row]);
         fine[at] = near.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(coarse[at]);
     }
     fine
 }
 
 /// The inner borders of the best partition among these places.
-fn partition(sums: &[Sums], places: &[usize]) -> Vec<usize> {
+fn partition(sums: &[LeakProducts], places: &[usize]) -> Vec<usize> {
     let mut best = vec![(0.0_f64, 0_usize)];
     for (end, until) in places.iter().enumerate().skip(1) {
         let with =
-            |begin: usize| best[begin].0 + sums[*until].explained_since(&sums[places[begin]]) - CHANGE_CHI2;
+            |begin: usize| best[begin].0 + explained(&sums[*until], &sums[places[begin]]) - CHANGE_CHI2;
         let found = (0..end).map(|begin| (with(begin), begin)).max_by(|a, b| a.0.total_cmp(&b.0));
         best.push(found.unwrap_or_default());
     }

@@ -2,6 +2,7 @@
 //! not fit; and whether two effects that were found act on each other.
 
 use super::candidates::{Candidates, critical_sigma, strongest_unlisted, unlisted_chi2_drop};
+use super::leak_changes;
 use super::trials::{self, Trial};
 use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::{Fit, Progress, Solution};
@@ -168,22 +169,20 @@ impl Selection<'_> {
     }
 
     fn first_needless(&self) -> Option<usize> {
-        self.effects.iter().position(|one| self.is_needless(one.term))
-    }
-
-    /// Whether no more than chance would be left without it.
-    fn is_needless(&self, term: usize) -> bool {
         let fit = &self.fit;
-        let needed = critical_sigma(fit, fit.constants(term)).powi(2);
-        loss(fit, &[term]) / fit.dispersion(fit.free.chi2) < needed
+        let dispersion = fit.dispersion(fit.free.chi2);
+        let is_needless = |one: &Selected| {
+            let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
+            loss(fit, &[one.term]) / dispersion < needed
+        };
+        self.effects.iter().position(is_needless)
     }
 
     /// Drops changes of leaks that the effects have made needless.
     pub(super) fn drop_needless_changes(&mut self, progress: Progress<'_>) {
-        let next =
-            |all: &Self| all.fit.leak_changes().map(|(place, _)| place).find(|place| all.is_needless(*place));
-        while let Some(change) = next(self) {
-            self.fit = self.fit.without(change, progress);
+        let gone = leak_changes::needless(&self.fit);
+        if !gone.is_empty() {
+            self.fit = self.fit.changed(&gone, &[], progress);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Leaks that change along the traces: from a row on a leak is larger by the value of a term, or grows by it. The declared model has as many
 //! of these as it takes.
 
-use super::rows::Rows;
+use super::rows::{Row, Rows};
 use super::terms::Term;
 use pitchleak_core::Leak;
 
@@ -45,6 +45,11 @@ impl LeakChange {
         }
     }
 
+    /// The same at a row.
+    pub(crate) fn at_row(&self, row: &Row) -> f64 {
+        self.at(row.trace(), row.t_s)
+    }
+
     /// Whether a row may be of both levels.
     fn touches(&self, row: usize) -> bool {
         self.kind == ChangeKind::Step && (self.row.saturating_sub(BESIDE)..self.row + BESIDE).contains(&row)
@@ -58,8 +63,8 @@ impl Rows {
             let Term::LeakChange(change) = term else { continue };
             let leak = terms.iter().position(|other| *other == Term::of_leak(change.leak));
             let Some(own) = leak.and_then(|leak| self.columns.get(leak)) else { continue };
-            let share = |row: usize| self.rows.get(row).map_or(0.0, |row| change.at(row.trace(), row.t_s));
-            let column = self.entries.iter().zip(own).map(|(entry, leak)| share(entry.row) * leak);
+            let column = self.entries.iter().zip(own);
+            let column = column.map(|(entry, leak)| change.at_row(&self.rows[entry.row]) * leak);
             self.columns[place] = column.collect();
             let touched = self.rows.iter_mut().enumerate().filter(|(row, _)| change.touches(*row));
             touched.for_each(|(_, row)| row.has_leak_change = true);

@@ -4,7 +4,7 @@ use super::Text;
 use crate::Palette;
 use crate::labels::{name, people, people_unit, quantity, symbol};
 use crate::spark::level;
-use pitchleak::core::Estimate;
+use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,
     Verdict,
@@ -139,7 +139,8 @@ impl DiagnosisText<'_> {
             let text = |level: &Estimate<f64>| {
                 with_interval(level.value * LPM_PER_BAR, Some(level.std * LPM_PER_BAR))
             };
-            let at = format!("{} at {:.1} s", change.fault.replace('_', " "), change.time_s);
+            let leak = Leak::ALL.into_iter().find(|leak| leak.id() == change.fault).map_or("", Leak::label);
+            let at = format!("{leak} at {:.1} s", change.time_s);
             let trace =
                 if change.trace == 0 { String::new() } else { format!(", trace {}", change.trace + 1) };
             let (before, after) = (text(&change.before), text(&change.after));
