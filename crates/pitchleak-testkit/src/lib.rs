@@ -20,6 +20,8 @@ mod motion;
 mod noise;
 pub mod rig;
 mod statistics;
+#[cfg(feature = "judges")]
+pub mod subsets;
 pub mod trace_text;
 pub mod valve;
 #[cfg(feature = "judges")]

@@ -127,23 +127,16 @@ fn binned_chi2(white: &[f64], values: &[f64]) -> Option<(f64, f64)> {
 /// What is wrong with the sensors themselves, in sentences: no model of the machine can mend it.
 pub(crate) fn failures(checks: &[SensorCheck], faults: &[ChannelFault]) -> Vec<String> {
     let told = |fault: &ChannelFault| format!("{}: {}", fault.text, fault.suggestion);
-    ripples(checks).into_iter().chain(faults.iter().map(told)).collect()
+    ripples(checks).chain(faults.iter().map(told)).collect()
 }
 
-/// A signal whose noise is no noise. Where several have the same, the machine does it: it is motion, and the balances hold.
-fn ripples(checks: &[SensorCheck]) -> Vec<String> {
+/// Signals whose noise is no noise.
+fn ripples(checks: &[SensorCheck]) -> impl Iterator<Item = String> {
     let sentence = |check: &SensorCheck| {
         let ratio = check.found.std / check.declared_std;
         format!("{}: fast, regular noise {ratio:.1} times the declared one (a ripple)", check.name)
     };
-    let found: Vec<&SensorCheck> = checks.iter().filter(|check| check.is_ripple()).collect();
-    if let [only] = found[..]
-        && only.is_its_own()
-    {
-        vec![sentence(only)]
-    } else {
-        vec![]
-    }
+    checks.iter().filter(|check| check.is_ripple_of_its_own()).map(sentence)
 }
 
 /// What speaks for and against the model with the effects.

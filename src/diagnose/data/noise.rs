@@ -16,8 +16,8 @@ pub(crate) struct SensorCheck {
     pub(crate) name: &'static str,
     pub(crate) declared_std: f64,
     pub(crate) found: FastNoise,
-    /// Fast motion so large no other sensor shows as more than its noise.
-    unseen: f64,
+    /// What of that is motion of the machine, since another sensor shows it too.
+    shared_std: f64,
 }
 
 impl SensorCheck {
@@ -35,32 +35,37 @@ impl SensorCheck {
         self.found.std > RIPPLE * self.declared_std && self.found.colour > RIPPLE_COLOUR
     }
 
-    /// Whether no motion of the machine can be behind a ripple: the other sensors would show that.
-    pub(crate) fn is_its_own(&self) -> bool {
-        self.found.std.powi(2) > self.declared_std.powi(2) + self.unseen.powi(2)
+    /// Whether it is one without the motion that other sensors show too.
+    pub(crate) fn is_ripple_of_its_own(&self) -> bool {
+        let own = self.found.std.powi(2) - self.shared_std.powi(2);
+        self.is_ripple() && own > (RIPPLE * self.declared_std).powi(2)
     }
 }
 
 /// Compares each signal's fast part with the data sheet.
 pub(crate) fn check_sensors(traces: &[Series], declared: &Declared) -> Vec<SensorCheck> {
-    let Declared { sensors: declared, cylinder, .. } = declared;
+    let declared = &declared.sensors;
     type Column = fn(&Series) -> &[f64];
-    // Gusts move the load as fast as one can sample; pressures follow it.
-    let unseen_n = (RIPPLE * RIPPLE - 1.0).sqrt() * declared.pressure.noise_std * cylinder.area_a_m2;
-    let signals: [(&'static str, f64, f64, Column); 6] = [
-        ("position", declared.position.noise_std, 0.0, |s| &s.x_m),
-        ("pressure a", declared.pressure.noise_std, 0.0, |s| &s.pa_pa),
-        ("pressure b", declared.pressure.noise_std, 0.0, |s| &s.pb_pa),
-        ("flow a", declared.flow_a.noise_std, 0.0, |s| &s.qa_m3s),
-        ("flow b", declared.flow_b.noise_std, 0.0, |s| &s.qb_m3s),
-        ("force", declared.force.noise_std, unseen_n, |s| &s.force_n),
+    let signals: [(&'static str, f64, Column); 6] = [
+        ("position", declared.position.noise_std, |s| &s.x_m),
+        ("pressure a", declared.pressure.noise_std, |s| &s.pa_pa),
+        ("pressure b", declared.pressure.noise_std, |s| &s.pb_pa),
+        ("flow a", declared.flow_a.noise_std, |s| &s.qa_m3s),
+        ("flow b", declared.flow_b.noise_std, |s| &s.qb_m3s),
+        ("force", declared.force.noise_std, |s| &s.force_n),
     ];
     let order = difference_order(traces.iter().map(Series::step_s).fold(0.0, f64::max));
-    let check = |(name, declared_std, unseen, column): (_, _, _, Column)| {
-        let found = fast_noise(traces.iter().map(column), order);
-        SensorCheck { name, declared_std, found, unseen }
+    let parts = signals.map(|(.., column)| FastPart::of(traces.iter().map(column), order));
+    let shared = |at: usize| {
+        let others = (0..parts.len()).filter(|other| *other != at);
+        let of_other = |other: usize| parts[at].shared_with(&parts[other], signals[other].1);
+        others.map(of_other).fold(0.0, f64::max)
     };
-    signals.map(check).into()
+    let check = |at: usize| {
+        let (name, declared_std, _) = signals[at];
+        SensorCheck { name, declared_std, found: parts[at].noise, shared_std: shared(at) }
+    };
+    (0..signals.len()).map(check).collect()
 }
 
 /// The declared noise, or what the traces really carry where that is more.
@@ -136,35 +141,71 @@ pub(super) fn differences(signal: &[f64], order: usize) -> (Vec<f64>, f64) {
     (fast, binomials(2 * order)[order].sqrt())
 }
 
-/// Noise by differences of high order: what the machine does within so few samples is smooth, so that only
-/// noise (and ripple faster than that) is left. The middle size of all `signals` counts: a few jolts, as where
-/// a valve switches, are motion and no noise.
-pub(crate) fn fast_noise<'a>(signals: impl Iterator<Item = &'a [f64]>, order: usize) -> FastNoise {
-    let lags = order + 1..=order + 9;
-    let (mut power, mut gain) = (0.0, 1.0);
-    let mut sizes = Vec::new();
-    let mut products = vec![0.0; order + 10];
-    for signal in signals {
-        let (mut fast, of_white) = differences(signal, order);
-        fast.retain(|d| d.is_finite());
-        gain = of_white;
-        power += fast.iter().map(|d| d * d).sum::<f64>();
-        for lag in lags.clone() {
-            if let Some(later) = fast.get(lag..) {
-                products[lag] += fast.iter().zip(later).map(|(a, b)| a * b).sum::<f64>();
-            }
+/// What of a signal changes from sample to sample, by differences of high order: what the machine does within so few samples is smooth,
+/// so that only noise (and ripple faster than that) is left.
+pub(crate) struct FastPart {
+    /// Differences, a list for each trace.
+    differences: Vec<Vec<f64>>,
+    /// Their standard deviation for unit white noise.
+    gain: f64,
+    order: usize,
+    pub(crate) noise: FastNoise,
+}
+
+impl FastPart {
+    pub(crate) fn of<'a>(signals: impl Iterator<Item = &'a [f64]>, order: usize) -> Self {
+        let (differences, gains): (Vec<_>, Vec<_>) = signals.map(|signal| differences(signal, order)).unzip();
+        let mut part = Self {
+            differences,
+            gain: gains.into_iter().fold(1.0, f64::max),
+            order,
+            noise: FastNoise::default(),
+        };
+        part.noise = part.size();
+        part
+    }
+
+    /// The middle size counts: a few jolts, as where a valve switches, are motion and no noise.
+    fn size(&self) -> FastNoise {
+        let sizes = self.differences.iter().flatten().filter(|d| d.is_finite());
+        let mut sizes: Vec<f64> = sizes.map(|d| d.abs()).collect();
+        let power: f64 = sizes.iter().map(|d| d * d).sum();
+        if sizes.is_empty() || power <= 0.0 {
+            return FastNoise::default();
         }
-        sizes.extend(fast.into_iter().map(f64::abs));
+        let middle = sizes.len() / 2;
+        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let lags = (self.order + 1..).take(9);
+        let colour = lags.map(|lag| (self.product(self, lag, [f64::INFINITY; 2]) / power).abs()).fold(0.0, f64::max);
+        let independent = sizes.len() as f64 / correlated(self.order);
+        let scatter = (0.5 / MEDIAN_EFFICIENCY / independent).sqrt();
+        FastNoise { std: median / NORMAL_MEDIAN / self.gain, scatter, colour }
     }
-    let middle = sizes.len() / 2;
-    if sizes.is_empty() || power <= 0.0 {
-        return FastNoise::default();
+
+    /// Sum of products with another signal so many samples later, no difference of either counting more than so much.
+    fn product(&self, other: &Self, lag: usize, [a, b]: [f64; 2]) -> f64 {
+        let of_trace = |(own, other): (&Vec<f64>, &Vec<f64>)| {
+            let pairs = own.iter().zip(other.get(lag..).unwrap_or_default());
+            let products = pairs.map(|(own, other)| own.clamp(-a, a) * other.clamp(-b, b));
+            products.filter(|product| product.is_finite()).sum::<f64>()
+        };
+        self.differences.iter().zip(&other.differences).map(of_trace).sum()
     }
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let colour = lags.map(|lag| (products[lag] / power).abs()).fold(0.0, f64::max);
-    let independent = sizes.len() as f64 / correlated(order);
-    let scatter = (0.5 / MEDIAN_EFFICIENCY / independent).sqrt();
-    FastNoise { std: median / NORMAL_MEDIAN / gain, scatter, colour }
+
+    /// Standard deviation of the motion that another signal has in common with this one: all beyond its declared noise is motion there, and
+    /// goes with what it is here. None where chance could do it.
+    fn shared_with(&self, other: &Self, declared_std: f64) -> f64 {
+        let count = self.differences.iter().map(Vec::len).sum::<usize>() as f64;
+        let excess = other.noise.std.powi(2) - declared_std.powi(2);
+        let lags = 0..=self.order;
+        let both_ways = lags.flat_map(|lag| [(self, other, lag), (other, self, lag)]);
+        let most = |part: &Self| UNRESOLVED_SIGMA * part.noise.std * part.gain;
+        let sums = both_ways.map(|(first, second, lag)| first.product(second, lag, [most(first), most(second)]).abs());
+        let covariance = sums.fold(0.0, f64::max) / (count * self.gain * other.gain);
+        let by_chance = self.noise.std * other.noise.std * (correlated(self.order) / count).sqrt();
+        let is_shared = excess > 0.0 && covariance > NOISIER_SIGMA * by_chance;
+        if is_shared { covariance / excess.sqrt() } else { 0.0 }
+    }
 }
 
 /// Median of the size of a standard normal number.
@@ -220,9 +261,9 @@ mod sensor_noise_tests {
     #[test]
     fn a_ripple_is_coloured_and_a_smooth_signal_is_quiet() {
         let ripple: Vec<f64> = (0..2000).map(|i| (2.1 * f64::from(i)).sin()).collect();
-        assert!(fast_noise(std::iter::once(ripple.as_slice()), 3).colour > 0.9);
+        assert!(FastPart::of(std::iter::once(ripple.as_slice()), 3).noise.colour > 0.9);
         let smooth: Vec<f64> = (0..2000).map(|i| (0.06 * f64::from(i)).sin()).collect();
-        assert!(fast_noise(std::iter::once(smooth.as_slice()), 3).std < 1e-4);
+        assert!(FastPart::of(std::iter::once(smooth.as_slice()), 3).noise.std < 1e-4);
     }
 
     #[test]

@@ -2,10 +2,10 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
-use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, ROUNDING_SHARE};
+use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, ROUNDING_SHARE, SHOWN_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind};
-use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors};
+use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors, Signals};
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -110,9 +110,18 @@ impl<'a> Problem<'a> {
     /// Values of a term that physics allows and samples can show.
     pub(crate) fn allows(&self, term: usize, value: f64) -> bool {
         let (lower, upper) = self.terms[term].bounds();
-        let effect = self.terms[term].effect();
-        let is_short = effect.is_some_and(Effect::is_lag) && value < self.least_lag_s;
-        (lower..=upper).contains(&value) && !is_short
+        let least = self.terms[term].effect().map_or(lower, |effect| self.least_shown(effect).max(lower));
+        (least..=upper).contains(&value)
+    }
+
+    /// A lag shows from some share of a sample's length on, a meter's dead band where it silences more than what its noise does: within
+    /// that the meter showed what flowed.
+    fn least_shown(&self, effect: Effect) -> f64 {
+        let Sensors { flow_a, flow_b, .. } = self.sensors;
+        let flows = Signals { qa_m3s: flow_a.noise_std, qb_m3s: flow_b.noise_std, ..Signals::default() };
+        let noise_m3s = effect.deaf(&mut { flows }).copied();
+        let lag_s = effect.is_lag().then_some(self.least_lag_s);
+        noise_m3s.map(|std| SHOWN_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
     }
 
     /// Whether so much of an effect is worth its name, not only a doubt about another's.
