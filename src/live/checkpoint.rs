@@ -1,22 +1,19 @@
-//! The cylinders' states in a folder, a file for each: written whole or not at all, the one before kept, so that what is
-//! wrong with one is nobody else's.
+//! The cylinders' states in a folder, a file for each, so that what is wrong with one is nobody else's. A record is put behind
+//! those before while that is the least to write; then a new file begins, and the one before is kept.
 
 use super::cylinder::Cylinder;
 use super::event::NoticeEvent;
+use super::record::{self, Records};
 use super::watch::Watch;
+use crate::Rig;
 use crate::output::{self, OutputError};
-use crate::replay::every_number;
-use ciborium::Value;
-use flate2::bufread::GzDecoder;
-use flate2::{Compression, GzBuilder};
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Name and version of the saved form: gzip, which has a checksum, of CBOR: this, the cylinder's name, and its state.
-const SCHEMA: &str = "pitchleak.watch/5";
 /// Folder of the states, in the folder that is given.
 const CYLINDERS: &str = "cylinders";
 /// Whose process has the folder for itself.
@@ -33,10 +30,8 @@ const ASIDE: &str = "state.aside";
 const PLAIN: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_');
 /// Bytes of a cylinder's name in that of a file: with an ending, file systems take 255.
 const LONGEST_NAME: usize = 240;
-/// No state is larger once unpacked, bytes: a forged one would fill the memory.
-const LARGEST: u64 = 16 * 1024 * 1024;
-/// Beyond any time in s and any sum of flows in L/min.
-const LARGEST_NUMBER: f64 = 1e15;
+/// A file grows to so many times its first record. More writes less, and a restart reads more; chosen.
+const GROWTH: usize = 5;
 
 /// Whether a cylinder may have this name.
 pub(super) fn can_name(name: &str) -> bool {
@@ -49,6 +44,18 @@ pub(super) fn can_name(name: &str) -> bool {
 pub struct Checkpoint {
     folder: PathBuf,
     _lock: File,
+    /// Files that a record may be put behind.
+    files: Mutex<BTreeMap<String, Written>>,
+}
+
+/// A file of this process.
+#[derive(Clone, Copy, Debug)]
+struct Written {
+    /// Blocks that its last state has taken in.
+    blocks: u64,
+    /// Bytes of its first record, none where there is no file before, and of all.
+    first: usize,
+    all: usize,
 }
 
 /// What a [`Watch`] knew of some cylinders at one moment, to be written while it goes on.
@@ -64,8 +71,10 @@ impl Snapshot {
     pub fn of(watch: &mut Watch) -> Self {
         let changed = watch.cylinders.iter_mut().filter(|(_, cylinder)| cylinder.changed);
         let as_of_now = |(name, cylinder): (&String, &mut Cylinder)| {
+            let now = (name.clone(), cylinder.clone());
             cylinder.changed = false;
-            (name.clone(), cylinder.clone())
+            cylinder.stream.forget_fresh();
+            now
         };
         let mut cylinders: BTreeMap<_, _> = changed.map(as_of_now).collect();
         cylinders.append(&mut watch.gone);
@@ -141,7 +150,7 @@ impl Checkpoint {
         }
         let folder = folder.join(CYLINDERS);
         output::make_folder(&folder)?;
-        Ok(Self { folder, _lock: lock })
+        Ok(Self { folder, _lock: lock, files: Mutex::default() })
     }
 
     /// Writes what was known; says how many bytes it took.
@@ -149,22 +158,14 @@ impl Checkpoint {
     /// # Errors
     /// Where the disk does not take it; then each cylinder's state is the old one or the new one.
     pub fn save(&self, snapshot: &Snapshot) -> Result<usize, CheckpointError> {
-        let states = snapshot.cylinders.iter().map(|state| (state, STATE));
-        let aside = snapshot.aside.iter().map(|state| (state, ASIDE));
-        let all: Vec<_> = states.chain(aside).collect();
+        let mut files = self.files();
         let mut bytes = 0;
-        for ((name, cylinder), _) in &all {
-            match self.write(name, cylinder) {
-                Ok(more) => bytes += more,
-                Err(error) => {
-                    // Room for what else the disk has to take.
-                    all.iter().for_each(|((name, _), _)| _ = fs::remove_file(self.file(name, NEW)));
-                    return Err(error);
-                }
-            }
+        for (name, cylinder) in &snapshot.aside {
+            files.remove(name);
+            bytes += self.begin(name, cylinder, ASIDE)?;
         }
-        for ((name, _), ending) in all {
-            self.place(name, ending).map_err(|source| self.not_written(name, source))?;
+        for (name, cylinder) in &snapshot.cylinders {
+            bytes += self.put(&mut files, name, cylinder)?;
         }
         let synced = File::open(&self.folder).and_then(|folder| folder.sync_all());
         synced
@@ -172,15 +173,59 @@ impl Checkpoint {
         Ok(bytes)
     }
 
+    fn files(&self) -> MutexGuard<'_, BTreeMap<String, Written>> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts a state behind those before, and begins a new file where there is none or it is long.
+    fn put(
+        &self,
+        files: &mut BTreeMap<String, Written>,
+        name: &str,
+        cylinder: &Cylinder,
+    ) -> Result<usize, CheckpointError> {
+        let [before, blocks] = cylinder.stream.blocks();
+        let mut more = 0;
+        // It is known again once it is written.
+        if let Some(mut file) = files.remove(name).filter(|file| file.blocks == before) {
+            more = self.append(name, cylinder, file.all)?;
+            file = Written { blocks, all: file.all + more, ..file };
+            if file.all < GROWTH * file.first {
+                files.insert(name.to_owned(), file);
+                return Ok(more);
+            }
+        }
+        // The file before ends with the same state: where this one is damaged nothing is lost.
+        let has_before = self.file(name, STATE).exists();
+        let all = self.begin(name, cylinder, STATE)?;
+        files.insert(name.to_owned(), Written { blocks, first: if has_before { all } else { 0 }, all });
+        Ok(more + all)
+    }
+
+    /// One more record, all on the disk.
+    fn append(&self, name: &str, cylinder: &Cylinder, end: usize) -> Result<usize, CheckpointError> {
+        let written = record::since(name, cylinder).and_then(|bytes| {
+            let mut file = File::options().append(true).open(self.file(name, STATE))?;
+            let written = file.write_all(&bytes).and_then(|()| file.sync_data());
+            written.inspect_err(|_| _ = file.set_len(end as u64)).map(|()| bytes.len())
+        });
+        written.map_err(|source| self.not_written(name, source))
+    }
+
     /// A new file, all on the disk.
-    fn write(&self, name: &str, cylinder: &Cylinder) -> Result<usize, CheckpointError> {
-        let written = packed(name, cylinder).and_then(|bytes| {
+    fn begin(&self, name: &str, cylinder: &Cylinder, ending: &str) -> Result<usize, CheckpointError> {
+        let written = record::whole(name, cylinder).and_then(|bytes| {
             let mut new = File::create(self.file(name, NEW))?;
             new.write_all(&bytes)?;
             new.sync_all()?;
+            self.place(name, ending)?;
             Ok(bytes.len())
         });
-        written.map_err(|source| self.not_written(name, source))
+        written.map_err(|source| {
+            // Room for what else the disk has to take.
+            let _ = fs::remove_file(self.file(name, NEW));
+            self.not_written(name, source)
+        })
     }
 
     /// Gives it its name. A moment without a state under that name there is not.
@@ -237,40 +282,59 @@ impl Checkpoint {
             return Err(format!("{}: there are too many cylinders", file.display()));
         }
         let Some(rig) = watch.config().rig_of(name) else { return Ok(()) };
-        let states = [STATE, BEFORE].map(|ending| {
-            read(&self.file(name, ending), name).map(|state| match state {
-                Ok(cylinder) if cylinder.is_of(rig) => Ok(cylinder),
-                Ok(_) => Err("of another rig than it has now".to_owned()),
-                Err(why) => Err(why),
-            })
-        });
-        let (why, before) = match states {
-            [Some(Ok(cylinder)), _] => {
+        self.files().remove(name);
+        let (why, cylinder) = match [STATE, BEFORE].map(|ending| self.read(name, ending, rig)) {
+            [None, None] => return Ok(()),
+            [Some(Records { cylinder: Some(cylinder), damage: None, .. }), _] => {
                 watch.cylinders.insert(name.to_owned(), cylinder);
                 return Ok(());
             }
-            [None, None] => return Ok(()),
-            [Some(Err(why)), before] => (why, before),
-            [None, before] => ("missing".to_owned(), before),
-        };
-        // Else the next checkpoint would put it in the place of the one before.
-        let is_aside = fs::rename(&file, self.file(name, ASIDE)).is_ok();
-        let then = match before {
-            Some(Ok(cylinder)) => {
-                watch.cylinders.insert(name.to_owned(), cylinder);
-                "the one before is used"
+            [Some(Records { cylinder: Some(cylinder), damage: Some(why), sound }), _] => {
+                self.cut(name, sound);
+                (why, Some(cylinder))
             }
-            _ => {
-                let before = self.file(name, BEFORE);
-                let _ = if is_aside {
-                    fs::remove_file(before)
-                } else {
-                    fs::rename(before, self.file(name, ASIDE))
-                };
-                "the cylinder begins anew"
+            [newest, before] => {
+                let why = newest.map_or("missing".to_owned(), |newest| newest.damage.unwrap_or_default());
+                let cylinder = before.and_then(|before| before.cylinder);
+                self.put_aside(name, cylinder.is_some());
+                (why, cylinder)
             }
         };
+        let then = if cylinder.is_some() { "the one before is used" } else { "the cylinder begins anew" };
+        watch.cylinders.extend(cylinder.map(|cylinder| (name.to_owned(), cylinder)));
         Err(format!("{}: {why}: {then}", file.display()))
+    }
+
+    /// What a file holds for a cylinder of this rig; none where there is no file.
+    fn read(&self, name: &str, ending: &str, rig: &Rig) -> Option<Records> {
+        let broken = |damage| Records { cylinder: None, sound: 0, damage: Some(damage) };
+        match fs::read(self.file(name, ending)) {
+            Ok(bytes) => Some(match record::read(&bytes, name) {
+                Records { cylinder: Some(cylinder), .. } if !cylinder.is_of(rig) => {
+                    broken("of another rig than it has now".to_owned())
+                }
+                records => records,
+            }),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            Err(error) => Some(broken(error.to_string())),
+        }
+    }
+
+    /// Keeps what is sound of a file; all of it stays aside.
+    fn cut(&self, name: &str, sound: usize) {
+        let file = self.file(name, STATE);
+        let _ = fs::copy(&file, self.file(name, ASIDE));
+        let _ = File::options().write(true).open(&file).and_then(|file| file.set_len(sound as u64));
+    }
+
+    /// Nobody goes on from the newest file, and from the one before only where that is used.
+    fn put_aside(&self, name: &str, uses_before: bool) {
+        let [aside, before] = [ASIDE, BEFORE].map(|ending| self.file(name, ending));
+        // Else the next checkpoint would put it in the place of the one before.
+        let is_aside = fs::rename(self.file(name, STATE), &aside).is_ok();
+        if !uses_before {
+            let _ = if is_aside { fs::remove_file(before) } else { fs::rename(before, aside) };
+        }
     }
 }
 
@@ -280,53 +344,4 @@ fn name_of(file: &str) -> Option<String> {
     let name = percent_decode_str(stem).decode_utf8().ok()?;
     ([STATE, BEFORE].contains(&ending) && utf8_percent_encode(&name, PLAIN).to_string() == stem)
         .then(|| name.into_owned())
-}
-
-/// As in the file.
-fn packed(name: &str, cylinder: &Cylinder) -> io::Result<Vec<u8>> {
-    let mut out = GzBuilder::new().write(Vec::new(), Compression::fast());
-    ciborium::into_writer(&(SCHEMA, name, cylinder), &mut out).map_err(io::Error::other)?;
-    out.finish()
-}
-
-/// A cylinder's state; none where there is no file.
-fn read(path: &Path, name: &str) -> Option<Result<Cylinder, String>> {
-    match fs::read(path) {
-        Ok(bytes) => Some(unpacked(&bytes, name)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => Some(Err(error.to_string())),
-    }
-}
-
-/// What a file holds; else what is wrong with it.
-fn unpacked(bytes: &[u8], name: &str) -> Result<Cylinder, String> {
-    let mut decoder = GzDecoder::new(bytes);
-    let mut body = Vec::new();
-    let length = decoder.by_ref().take(LARGEST).read_to_end(&mut body).map_err(|_| "damaged".to_owned())?;
-    if length as u64 == LARGEST || !decoder.into_inner().is_empty() {
-        return Err("something follows its end".to_owned());
-    }
-    let version = || format!("of another version, this one reads `{SCHEMA}`");
-    // A list whose first is the version.
-    if body.get(2..2 + SCHEMA.len()) != Some(SCHEMA.as_bytes()) {
-        return Err(version());
-    }
-    let mut rest = body.as_slice();
-    let tree: Value = ciborium::from_reader(&mut rest).map_err(|_| version())?;
-    if !rest.is_empty() {
-        return Err("something follows its end".to_owned());
-    }
-    // Of the watch itself; estimators look at their own.
-    if !every_number(&tree, &|number| number.abs() <= LARGEST_NUMBER) {
-        return Err("a number in it is impossible".to_owned());
-    }
-    let (_, saved_name, cylinder): (String, String, Cylinder) =
-        tree.deserialized().map_err(|ciborium::value::Error::Custom(why)| why)?;
-    if saved_name != name {
-        return Err(format!("of the cylinder `{}`", crate::header::shorten(&saved_name, 40)));
-    }
-    if !cylinder.is_possible() {
-        return Err("its counts contradict each other".to_owned());
-    }
-    Ok(cylinder)
 }

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Cylinder {
     /// Its alarms are those not yet said.
     #[serde(with = "stream_bytes")]
-    stream: Stream,
+    pub stream: Stream,
     /// Time of the last estimate said, s.
     told_s: Option<f64>,
     order: Order,

@@ -18,6 +18,7 @@ mod neuron;
 mod notices;
 mod order;
 mod plain_json;
+mod record;
 mod watch;
 mod weighing;
 

@@ -7,11 +7,13 @@ use super::format::{Fields, LineFormat, Parser};
 use super::history::History;
 use super::layouts::Layouts;
 use super::notices::Notices;
+use super::record;
 use crate::Rig;
 use crate::header::shorten;
 use crate::units::S_PER_DAY;
 use pitchleak_core::PerLeak;
 use std::collections::BTreeMap;
+use std::io;
 
 /// Watches many cylinders, line by line or message by message.
 pub struct Watch {
@@ -158,6 +160,17 @@ impl Watch {
             self.notice(kind, text, events);
         }
         unreadable
+    }
+
+    /// Each cylinder's state, as the first record of a checkpoint's file: of two that are alike it is the same.
+    ///
+    /// # Errors
+    /// None in practice: every part has its form.
+    pub fn states(&self) -> io::Result<BTreeMap<&str, Vec<u8>>> {
+        self.cylinders
+            .iter()
+            .map(|(name, cylinder)| Ok((name.as_str(), record::whole(name, cylinder)?)))
+            .collect()
     }
 
     /// Counts input that was not even a line.

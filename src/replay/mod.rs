@@ -7,6 +7,7 @@ mod effect_uncertainty;
 mod episodes;
 mod estimate_file;
 mod estimator;
+mod fresh;
 mod known;
 mod pressures;
 mod scoring;
@@ -18,6 +19,7 @@ mod temperature;
 
 pub use estimate_file::{EstimateFile, EstimateFileError};
 pub use estimator::{BulkModulus, Estimator};
+pub(crate) use fresh::Fresh;
 pub use state::RestoreError;
 pub(crate) use state::every_number;
 pub use stream::{Stream, Taken};
@@ -36,6 +38,7 @@ use consistency::Consistency;
 use correction::Correction;
 use effect_uncertainty::{EffectUncertainty, added_std};
 use episodes::Episodes;
+use pitchleak_core::continuity::Block;
 use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
@@ -119,6 +122,9 @@ pub struct Replay {
     spikes: Spikes,
     oil: OilTemperature,
     statistic: Box<Statistic>,
+    /// Blocks that it took in since they were last forgotten.
+    #[serde(skip)]
+    fresh: Vec<Block<f64>>,
     /// What tells mistakes of wiring beside it.
     evidence: Beside,
     /// Whether the ports are shut: a hold is for [`hold`](crate::hold), not for this estimator.
@@ -151,6 +157,7 @@ impl Replay {
             spikes: Spikes::new(&rig.sensors()),
             oil: OilTemperature::default(),
             statistic: Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors())),
+            fresh: Vec::new(),
             evidence: Beside::default(),
             rests: false,
             end_s: 0.0,
@@ -228,7 +235,13 @@ impl Replay {
         self.pressures.add(record);
         self.oil.add(record);
         if self.knows_noise() {
-            self.statistic.push(record.step_s(), &record.sample);
+            let fresh = &mut self.fresh;
+            self.statistic.push_each(record.step_s(), &record.sample, &mut |block| {
+                if fresh.len() == fresh::MOST {
+                    fresh.clear();
+                }
+                fresh.push(*block);
+            });
             self.evidence.add(record, &self.rig);
         }
         let update = self.estimator.update(record);

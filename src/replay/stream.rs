@@ -1,3 +1,4 @@
+use super::fresh::Fresh;
 use super::state::{self, RestoreError};
 use super::{Replay, ReplayError};
 use crate::explain::Decision;
@@ -79,6 +80,31 @@ impl Stream {
             return Ok(stream);
         }
         Err(RestoreError::Rig { saved: stream.rig().name.clone(), wanted: rig.name.clone() })
+    }
+
+    /// How many blocks came before those that are fresh, and with them.
+    pub(crate) fn blocks(&self) -> [u64; 2] {
+        self.replay.blocks()
+    }
+
+    /// Gathers blocks anew: a checkpoint has those so far.
+    pub(crate) fn forget_fresh(&mut self) {
+        self.replay.forget_fresh();
+    }
+
+    /// Leaves it without what follows from an earlier state and these blocks.
+    pub(crate) fn take_fresh(&mut self) -> Fresh {
+        self.replay.take_fresh()
+    }
+
+    /// Takes these blocks in, for what follows from blocks alone; says whether they are the next.
+    pub(crate) fn take_blocks(&mut self, fresh: &Fresh) -> bool {
+        self.replay.take_blocks(fresh)
+    }
+
+    /// Gives it what another one's blocks have made.
+    pub(crate) fn adopt_segments(&mut self, from: Self) {
+        self.replay.adopt_segments(from.replay);
     }
 
     /// Whether rows are held against what this rig may read.

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block_sums::{Block, RawSum};
+use crate::number::Filled;
 use crate::{Cylinder, Real, Sensors};
 
 /// Blocks that wait at most: 6 s.
@@ -25,14 +26,12 @@ const RIDGE: f64 = 1e-6;
 #[cfg_attr(
     feature = "serde",
     serde(bound(
-        serialize = "T: serde::Serialize + Copy",
+        serialize = "T: serde::Serialize + Real",
         deserialize = "T: Real + serde::Deserialize<'de>"
     ))
 )]
 pub(super) struct Waiting<T> {
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
-    blocks: [Block<T>; WAITING],
-    count: usize,
+    blocks: Filled<Block<T>, WAITING>,
     area_m2: [T; 2],
     /// Variance of a balance's flow noise per s² of Σ dt², m².
     variance: T,
@@ -42,8 +41,7 @@ impl<T: Real> Waiting<T> {
     pub fn new(cylinder: &Cylinder<T>, sensors: &Sensors<T>) -> Self {
         let square = |std: T, area: T| std * std / (area * area);
         Self {
-            blocks: [Block::default(); WAITING],
-            count: 0,
+            blocks: Filled::new(),
             area_m2: [cylinder.area_a_m2, cylinder.area_b_m2],
             variance: square(sensors.flow_a.noise_std, cylinder.area_a_m2)
                 + square(sensors.flow_b.noise_std, cylinder.area_b_m2),
@@ -52,32 +50,27 @@ impl<T: Real> Waiting<T> {
 
     /// The waiting blocks, oldest first.
     pub fn blocks(&self) -> &[Block<T>] {
-        self.blocks.get(..self.count).unwrap_or(&self.blocks)
+        self.blocks.all()
     }
 
     /// One more.
     pub fn add(&mut self, block: &Block<T>) {
-        if let Some(place) = self.blocks.get_mut(self.count) {
-            *place = *block;
-            self.count += 1;
-        }
+        self.blocks.push(*block);
     }
 
     /// Whether it has to let some go.
     pub fn is_full(&self) -> bool {
-        self.count == WAITING
+        self.blocks.is_full()
     }
 
     /// Lets the oldest go.
     pub fn release(&mut self, released: usize) {
-        let released = released.min(self.count);
-        self.blocks.copy_within(released..self.count, 0);
-        self.count -= released;
+        self.blocks.remove(0, released);
     }
 
     /// The block in which a flow changed at once, if one did.
     pub fn change(&self) -> Option<usize> {
-        let latest = self.count.checked_sub(LEAST_SIDE)?;
+        let latest = self.blocks().len().checked_sub(LEAST_SIDE)?;
         let mut best = (None, T::lit(CHANGE_SIGMAS * CHANGE_SIGMAS));
         for at in LEAST_SIDE..latest {
             for internal in [false, true] {

@@ -1,17 +1,11 @@
-//! The sufficient statistic of the continuity equations: Gram matrices of their whitened rows, by segments of the trace.
-//!
-//! Whatever is linear in the raw sums can be asked of them afterwards: a zero, gain, lag or area set free, an exchange of
-//! columns. Memory is constant: where all segments are full, those two neighbours become one that differ least.
+//! Gram matrices of a stretch of the trace.
 
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::block_sums::{Block, BlockSums, MPA_PER_PA, RAW_SUMS, RawSum};
-use super::change::{SEGMENT_BLOCKS, Waiting};
-use super::clocks::{self, Clocks, Next, Readings};
-use super::scatter::Scatter;
-use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS, Whitener};
-use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
+use super::block_sums::{Block, MPA_PER_PA, RAW_SUMS, RawSum};
+use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS};
+use crate::{PerLeak, Real};
 
 /// Entries of a packed symmetric matrix, row by row of its lower triangle.
 const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
@@ -19,40 +13,6 @@ const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
 const DIFFERENCE_SIGMAS: f64 = 3.0;
 /// Keeps pressures that do not change solvable; numerical.
 const DESCRIPTION_RIDGE: f64 = 1e-4;
-
-/// The statistic, in at most `S` segments.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
-pub struct ContinuityStatistic<T, const S: usize> {
-    clocks: Clocks<T>,
-    /// The last row, and its step, s.
-    last: Option<Sample<T>>,
-    step_s: T,
-    blocks: BlockSums<T>,
-    waiting: Waiting<T>,
-    whitener: Whitener<T>,
-    #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
-    segments: [Segment<T>; S],
-    used: usize,
-    /// What is longer ago than this may be forgotten, s.
-    horizon_s: T,
-    scatter: [Scatter<T>; CHANNELS],
-    time_s: T,
-    roots: PerLeak<T>,
-}
-
-/// A flow without a reading for so long rests, until its own step is known; as long as two blocks. Chosen.
-const LONGEST_SILENCE_S: f64 = 0.5;
-
-/// Channels whose scatter is watched: position, P_A, P_B, Q_A, Q_B.
-pub const CHANNELS: usize = 5;
 
 /// Gram matrices of a stretch of the trace.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +66,7 @@ fn add_each<T: Real, const N: usize>(sums: &mut [[T; 3]; N], values: &[[T; 3]; N
 }
 
 /// Sums over time, by what they are sums of.
-const AGED: [(RawSum, RawSum); 3] = [
+pub(super) const AGED: [(RawSum, RawSum); 3] = [
     (RawSum::AgedPressureA, RawSum::PressureA),
     (RawSum::AgedPressureB, RawSum::PressureB),
     (RawSum::AgedTime, RawSum::Time),
@@ -145,7 +105,21 @@ impl<T: Real> Segment<T> {
         self.end_noise[equation]
     }
 
-    fn add(&mut self, equation: usize, row: &Row<T>) {
+    /// Takes in the rows that a block has become.
+    pub(super) fn add(&mut self, rows: &[Option<Row<T>>; EQUATIONS], block: &Block<T>) {
+        for (equation, row) in rows.iter().enumerate() {
+            if let Some(row) = row {
+                self.add_row(equation, row);
+            }
+        }
+        self.blocks += 1;
+        self.time_s += block.sums[RawSum::Time as usize];
+        let [pa, pb] = [RawSum::PressureA, RawSum::PressureB].map(|raw| block.sums[raw as usize]);
+        let sizes = PerLeak { internal: (pa - pb).abs(), external_a: pa.abs(), external_b: pb.abs() };
+        self.pressure_time = self.pressure_time.zip(sizes).map(|(sum, size)| sum + size);
+    }
+
+    fn add_row(&mut self, equation: usize, row: &Row<T>) {
         let gram = &mut self.gram[equation];
         let mut place = gram.iter_mut();
         for (i, one) in row.columns.iter().enumerate() {
@@ -179,7 +153,7 @@ impl<T: Real> Segment<T> {
     }
 
     /// Puts the segment that follows to it.
-    fn append(&mut self, next: &Self) {
+    pub(super) fn append(&mut self, next: &Self) {
         let mut next = *next;
         next.shift_time(self.time_s);
         for equation in 0..EQUATIONS {
@@ -196,7 +170,7 @@ impl<T: Real> Segment<T> {
     }
 
     /// What it costs to make one of two neighbours: their length, and what is lost where leaks and zeros of both are the same.
-    fn cost(&self, next: &Self) -> T {
+    pub(super) fn cost(&self, next: &Self) -> T {
         let both =
             |equation: usize, i: usize, j: usize| self.product(equation, i, j) + next.product(equation, i, j);
         let apart = explained(|equation, i, j| self.product(equation, i, j))
@@ -266,197 +240,4 @@ fn explained<T: Real>(product: impl Fn(usize, usize, usize) -> T) -> T {
         sum += half[i] * half[i];
     }
     sum
-}
-
-impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
-    /// No reading yet.
-    pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
-        Self {
-            clocks: Clocks::new(T::lit(LONGEST_SILENCE_S)),
-            last: None,
-            step_s: T::zero(),
-            blocks: BlockSums::new(cylinder, fluid),
-            waiting: Waiting::new(cylinder, sensors),
-            whitener: Whitener::new(cylinder, fluid, sensors),
-            segments: [Segment::default(); S],
-            used: 0,
-            horizon_s: T::max_value(),
-            scatter: [Scatter::default(); CHANNELS],
-            time_s: T::zero(),
-            roots: PerLeak::default(),
-        }
-    }
-
-    /// Of a stream: forgets what is longer ago than `horizon_s`, as soon as its place is needed.
-    #[must_use]
-    pub fn forgetting(self, horizon_s: T) -> Self {
-        Self { horizon_s, ..self }
-    }
-
-    /// Length of all segments but the first.
-    fn later_s(&self) -> T {
-        self.segments().iter().skip(1).fold(T::zero(), |sum, segment| sum + segment.time_s)
-    }
-
-    /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
-    pub fn push(&mut self, dt_s: T, sample: &Sample<T>) {
-        let after_gap = dt_s <= T::zero();
-        for (scatter, reading) in self.scatter.iter_mut().zip(sample.readings()) {
-            scatter.add(reading, after_gap);
-        }
-        if !after_gap {
-            let pressures = PerLeak {
-                internal: sample.load_pressure_pa(),
-                external_a: sample.pa_pa,
-                external_b: sample.pb_pa,
-            };
-            self.time_s += dt_s;
-            self.roots = self.roots.zip(pressures).map(|(sum, p)| sum + dt_s * signed_root(p).abs());
-        }
-        self.place(dt_s, sample);
-    }
-
-    /// Brings flows that are not read with every sample to the samples' times.
-    fn place(&mut self, dt_s: T, sample: &Sample<T>) {
-        if dt_s <= T::zero() {
-            self.clocks.begin_anew();
-            self.step_s = T::zero();
-        } else if !self.clocks.is_empty() || self.waits_for(sample) {
-            if let Some(last) = self.last.filter(|_| self.clocks.is_empty()) {
-                self.clocks.go_on_after(&last, Some(self.step_s).filter(|step_s| *step_s > T::zero()));
-            }
-            self.step_s = T::zero();
-            self.clocks.push(dt_s, &Readings::from(sample));
-            return self.take_waiting();
-        } else {
-            // A flow that was not read before has another step than the rows.
-            self.step_s = if self.follows(sample) { dt_s } else { T::zero() };
-        }
-        self.take_row(&clocks::Row::read(dt_s, sample));
-    }
-
-    /// Whether a flow has no reading after one that had.
-    fn waits_for(&self, now: &Sample<T>) -> bool {
-        let is_missing = |last: Option<T>, now: Option<T>| last.is_some() && now.is_none();
-        self.last
-            .is_some_and(|last| is_missing(last.qa_m3s, now.qa_m3s) || is_missing(last.qb_m3s, now.qb_m3s))
-    }
-
-    /// Whether each flow that is read was read with the row before, too.
-    fn follows(&self, now: &Sample<T>) -> bool {
-        let follows = |last: Option<T>, now: Option<T>| last.is_some() || now.is_none();
-        self.last.is_some_and(|last| follows(last.qa_m3s, now.qa_m3s) && follows(last.qb_m3s, now.qb_m3s))
-    }
-
-    #[cold]
-    fn take_waiting(&mut self) {
-        loop {
-            match self.clocks.pop() {
-                Next::Waits => return,
-                Next::Gap => self.last = None,
-                Next::Row(row) => self.take_row(&row),
-            }
-        }
-    }
-
-    fn take_row(&mut self, row: &clocks::Row<T>) {
-        self.last = Some(row.sample);
-        if let Some(block) = self.blocks.push(row) {
-            self.take(&block);
-        }
-    }
-
-    /// Takes the blocks that still wait for their segment into one, for a verdict: of a statistic that goes on, close a copy.
-    pub fn close(&mut self) {
-        if let Some(at) = self.waiting.change() {
-            self.end_segment(at, 1);
-        }
-        self.end_segment(self.waiting.blocks().len(), 0);
-    }
-
-    /// The segments so far, oldest first.
-    pub fn segments(&self) -> &[Segment<T>] {
-        self.segments.get(..self.used).unwrap_or(&self.segments)
-    }
-
-    /// Mean root of that size, √Pa.
-    pub fn mean_roots(&self) -> PerLeak<T> {
-        self.roots.map(|sum| sum / self.time_s)
-    }
-
-    /// Standard deviation of each channel's readings as their third differences tell it; the motion's share in those is
-    /// small but for slow sampling.
-    pub fn scatter(&self) -> [Option<T>; CHANNELS] {
-        self.scatter.map(|scatter| scatter.std())
-    }
-
-    fn take(&mut self, block: &Block<T>) {
-        if block.begins_at.is_some() {
-            self.close();
-        }
-        self.waiting.add(block);
-        if self.waiting.is_full() {
-            match self.waiting.change() {
-                // The block in which a flow changed is of neither level.
-                Some(at) => self.end_segment(at, 1),
-                None => self.end_segment(SEGMENT_BLOCKS, 0),
-            }
-        }
-    }
-
-    /// Makes a segment of the oldest waiting blocks, and leaves out some that follow.
-    fn end_segment(&mut self, blocks: usize, left_out: usize) {
-        if blocks == 0 {
-            return;
-        }
-        self.begin_segment();
-        for place in 0..blocks {
-            if let Some(block) = self.waiting.blocks().get(place).copied() {
-                self.add(&block);
-            }
-        }
-        self.waiting.release(blocks + left_out);
-    }
-
-    fn add(&mut self, block: &Block<T>) {
-        let mut block = *block;
-        let begins_s = self.segments[..self.used].last().map_or(T::zero(), |last| last.time_s);
-        for (aged, plain) in AGED {
-            block.sums[aged as usize] += begins_s * block.sums[plain as usize];
-        }
-        let rows = self.whitener.push(&block);
-        let Some(segment) = self.used.checked_sub(1).and_then(|last| self.segments.get_mut(last)) else {
-            return;
-        };
-        for (equation, row) in rows.into_iter().enumerate() {
-            let Some(row) = row else { continue };
-            segment.add(equation, &row);
-        }
-        segment.blocks += 1;
-        segment.time_s += block.sums[RawSum::Time as usize];
-        let [pa, pb] = [RawSum::PressureA, RawSum::PressureB].map(|raw| block.sums[raw as usize]);
-        let sizes = PerLeak { internal: (pa - pb).abs(), external_a: pa.abs(), external_b: pb.abs() };
-        segment.pressure_time = segment.pressure_time.zip(sizes).map(|(sum, size)| sum + size);
-    }
-
-    /// Makes room where there is none; a segment's noise is independent of that of those before.
-    fn begin_segment(&mut self) {
-        if self.used == S && self.later_s() >= self.horizon_s {
-            self.segments.copy_within(1.., 0);
-            self.used -= 1;
-        }
-        if self.used == S {
-            let cheapest = (1..S)
-                .map(|next| (next, self.segments[next - 1].cost(&self.segments[next])))
-                .fold((1, T::infinity()), |best, one| if one.1 < best.1 { one } else { best })
-                .0;
-            let next = self.segments[cheapest];
-            self.segments[cheapest - 1].append(&next);
-            self.segments.copy_within(cheapest + 1.., cheapest);
-            self.used -= 1;
-        }
-        self.segments[self.used] = Segment::default();
-        self.used += 1;
-        self.whitener.begin_anew();
-    }
 }

@@ -2,8 +2,10 @@
 
 #[cfg(feature = "serde")]
 pub(crate) mod arrays;
+mod filled;
 mod real;
 
+pub(crate) use filled::Filled;
 pub use real::Real;
 
 /// 1 m³/s in L/min, in which people think of flows.

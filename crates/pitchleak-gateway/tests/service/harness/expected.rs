@@ -1,16 +1,15 @@
 use super::{Listener, data};
 use pitchleak::Rig;
-use pitchleak::live::{Batch, BatchFormat, Checkpoint, Event, LiveConfig, Snapshot, Watch};
+use pitchleak::live::{Batch, BatchFormat, Checkpoint, Event, LiveConfig, Watch};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Each cylinder's state by the name of its file.
+/// Each cylinder's state.
 pub type States = BTreeMap<String, Vec<u8>>;
 
 /// The states and the alarms' ids of a run that nothing disturbs.
 pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (States, BTreeSet<String>) {
-    let rig = Rig::load(data().join("traces/rig.toml")).unwrap();
-    let mut watch = Watch::new(LiveConfig::of(rig), None);
+    let mut watch = Watch::new(LiveConfig::of(rig()), None);
     let mut events = Vec::new();
     for payload in batches {
         for cylinder in cylinders {
@@ -19,25 +18,35 @@ pub fn undisturbed(cylinders: &[String], batches: &[String]) -> (States, BTreeSe
             watch.take_batch(&batch, &mut events);
         }
     }
-    let folder = tempfile::tempdir().unwrap();
-    Checkpoint::new(folder.path()).unwrap().save(&Snapshot::of(&mut watch)).unwrap();
     let ids = events.into_iter().filter_map(|event| match event {
         Event::Alarm(alarm) => Some(alarm.id),
         _ => None,
     });
-    let undisturbed = state(folder.path());
+    let undisturbed = states(&watch);
     assert!(!undisturbed.is_empty());
     (undisturbed, ids.collect())
 }
 
-/// As they are now.
+/// As a gateway would go on now that had only what is on the disk.
 pub fn state(folder: &Path) -> States {
     let Ok(entries) = std::fs::read_dir(folder.join("cylinders")) else { return States::new() };
-    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    let states = names.filter(|name| name.ends_with(".state"));
-    states
-        .filter_map(|name| Some((name.clone(), std::fs::read(folder.join("cylinders").join(name)).ok()?)))
-        .collect()
+    let copy = tempfile::tempdir().unwrap();
+    let checkpoint = Checkpoint::new(copy.path()).unwrap();
+    for file in entries.filter_map(Result::ok) {
+        // One that is gone by now has another name.
+        let _ = std::fs::copy(file.path(), copy.path().join("cylinders").join(file.file_name()));
+    }
+    let mut watch = Watch::new(LiveConfig::of(rig()), None);
+    checkpoint.restore(&mut watch).unwrap();
+    states(&watch)
+}
+
+fn states(watch: &Watch) -> States {
+    watch.states().unwrap().into_iter().map(|(name, state)| (name.to_owned(), state)).collect()
+}
+
+fn rig() -> Rig {
+    Rig::load(data().join("traces/rig.toml")).unwrap()
 }
 
 /// Of the alarms that were heard.

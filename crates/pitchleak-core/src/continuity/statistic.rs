@@ -1,0 +1,158 @@
+//! The sufficient statistic of the continuity equations: Gram matrices of their whitened rows, by segments of the trace.
+//!
+//! Whatever is linear in the raw sums can be asked of them afterwards: a zero, gain, lag or area set free, an exchange of
+//! columns. Memory is constant: where all segments are full, those two neighbours become one that differ least.
+
+use super::block_sums::{Block, BlockSums};
+use super::change::Waiting;
+use super::clocks::{self, Clocks, Next, Readings};
+use super::gram::Segment;
+use super::scatter::Scatter;
+use super::whitening::Whitener;
+use crate::number::Filled;
+use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
+
+/// The statistic, in at most `S` segments.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(
+        serialize = "T: serde::Serialize + Real",
+        deserialize = "T: Real + serde::Deserialize<'de>"
+    ))
+)]
+pub struct ContinuityStatistic<T, const S: usize> {
+    clocks: Clocks<T>,
+    /// The last row, and its step, s.
+    last: Option<Sample<T>>,
+    step_s: T,
+    blocks: BlockSums<T>,
+    pub(super) waiting: Waiting<T>,
+    pub(super) whitener: Whitener<T>,
+    pub(super) segments: Filled<Segment<T>, S>,
+    /// Blocks that were taken in.
+    pub(super) taken: u64,
+    /// What is longer ago than this may be forgotten, s.
+    pub(super) horizon_s: T,
+    scatter: [Scatter<T>; CHANNELS],
+    time_s: T,
+    roots: PerLeak<T>,
+}
+
+/// A flow without a reading for so long rests, until its own step is known; as long as two blocks. Chosen.
+const LONGEST_SILENCE_S: f64 = 0.5;
+
+/// Channels whose scatter is watched: position, P_A, P_B, Q_A, Q_B.
+pub const CHANNELS: usize = 5;
+
+impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
+    /// No reading yet.
+    pub fn new(cylinder: &Cylinder<T>, fluid: &Fluid<T>, sensors: &Sensors<T>) -> Self {
+        Self {
+            clocks: Clocks::new(T::lit(LONGEST_SILENCE_S)),
+            last: None,
+            step_s: T::zero(),
+            blocks: BlockSums::new(cylinder, fluid),
+            waiting: Waiting::new(cylinder, sensors),
+            whitener: Whitener::new(cylinder, fluid, sensors),
+            segments: Filled::new(),
+            taken: 0,
+            horizon_s: T::max_value(),
+            scatter: [Scatter::default(); CHANNELS],
+            time_s: T::zero(),
+            roots: PerLeak::default(),
+        }
+    }
+
+    /// Of a stream: forgets what is longer ago than `horizon_s`, as soon as its place is needed.
+    #[must_use]
+    pub fn forgetting(self, horizon_s: T) -> Self {
+        Self { horizon_s, ..self }
+    }
+
+    /// Takes in a reading that comes `dt_s` after the one before, or after a pause where that is not positive.
+    pub fn push(&mut self, dt_s: T, sample: &Sample<T>) {
+        self.push_each(dt_s, sample, &mut |_| ());
+    }
+
+    /// The same; `each` gets the blocks that it ends, as the segments take them in.
+    pub fn push_each(&mut self, dt_s: T, sample: &Sample<T>, each: &mut impl FnMut(&Block<T>)) {
+        let after_gap = dt_s <= T::zero();
+        for (scatter, reading) in self.scatter.iter_mut().zip(sample.readings()) {
+            scatter.add(reading, after_gap);
+        }
+        if !after_gap {
+            let pressures = PerLeak {
+                internal: sample.load_pressure_pa(),
+                external_a: sample.pa_pa,
+                external_b: sample.pb_pa,
+            };
+            self.time_s += dt_s;
+            self.roots = self.roots.zip(pressures).map(|(sum, p)| sum + dt_s * signed_root(p).abs());
+        }
+        self.place(dt_s, sample, each);
+    }
+
+    /// Brings flows that are not read with every sample to the samples' times.
+    fn place(&mut self, dt_s: T, sample: &Sample<T>, each: &mut impl FnMut(&Block<T>)) {
+        if dt_s <= T::zero() {
+            self.clocks.begin_anew();
+            self.step_s = T::zero();
+        } else if !self.clocks.is_empty() || self.waits_for(sample) {
+            if let Some(last) = self.last.filter(|_| self.clocks.is_empty()) {
+                self.clocks.go_on_after(&last, Some(self.step_s).filter(|step_s| *step_s > T::zero()));
+            }
+            self.step_s = T::zero();
+            self.clocks.push(dt_s, &Readings::from(sample));
+            return self.take_waiting(each);
+        } else {
+            // A flow that was not read before has another step than the rows.
+            self.step_s = if self.follows(sample) { dt_s } else { T::zero() };
+        }
+        self.take_row(&clocks::Row::read(dt_s, sample), each);
+    }
+
+    /// Whether a flow has no reading after one that had.
+    fn waits_for(&self, now: &Sample<T>) -> bool {
+        let is_missing = |last: Option<T>, now: Option<T>| last.is_some() && now.is_none();
+        self.last
+            .is_some_and(|last| is_missing(last.qa_m3s, now.qa_m3s) || is_missing(last.qb_m3s, now.qb_m3s))
+    }
+
+    /// Whether each flow that is read was read with the row before, too.
+    fn follows(&self, now: &Sample<T>) -> bool {
+        let follows = |last: Option<T>, now: Option<T>| last.is_some() || now.is_none();
+        self.last.is_some_and(|last| follows(last.qa_m3s, now.qa_m3s) && follows(last.qb_m3s, now.qb_m3s))
+    }
+
+    #[cold]
+    fn take_waiting(&mut self, each: &mut impl FnMut(&Block<T>)) {
+        loop {
+            match self.clocks.pop() {
+                Next::Waits => return,
+                Next::Gap => self.last = None,
+                Next::Row(row) => self.take_row(&row, each),
+            }
+        }
+    }
+
+    fn take_row(&mut self, row: &clocks::Row<T>, each: &mut impl FnMut(&Block<T>)) {
+        self.last = Some(row.sample);
+        if let Some(block) = self.blocks.push(row) {
+            self.take(&block);
+            each(&block);
+        }
+    }
+
+    /// Mean root of that size, √Pa.
+    pub fn mean_roots(&self) -> PerLeak<T> {
+        self.roots.map(|sum| sum / self.time_s)
+    }
+
+    /// Standard deviation of each channel's readings as their third differences tell it; the motion's share in those is
+    /// small but for slow sampling.
+    pub fn scatter(&self) -> [Option<T>; CHANNELS] {
+        self.scatter.map(|scatter| scatter.std())
+    }
+}
