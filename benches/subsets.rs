@@ -18,7 +18,8 @@ impl Options {
 
     fn seed(&self) -> u64 {
         let commit = || {
-            let git = std::process::Command::new("git").args(["rev-parse", "--short=7", "HEAD"]).output().ok()?;
+            let git =
+                std::process::Command::new("git").args(["rev-parse", "--short=7", "HEAD"]).output().ok()?;
             String::from_utf8(git.stdout).ok()
         };
         let words = self.value("seed").map(str::to_owned).or_else(commit).unwrap_or_default();
@@ -29,11 +30,17 @@ impl Options {
 fn main() {
     let options = Options(std::env::args().skip(1).collect());
     let seed = options.seed();
-    for (kind, effects, usual) in [("sound", 0, 0), ("singles", 1, 0), ("pairs", 2, 200), ("triples", 3, 100)] {
+    for (kind, effects, usual) in [("sound", 0, 0), ("singles", 1, 0), ("pairs", 2, 200), ("triples", 3, 100)]
+    {
         let count = options.value(kind).and_then(|count| count.parse().ok()).unwrap_or(usual);
         let cases: Vec<Case> = (0..count).map(|number| Case::draw(seed, number, effects)).collect();
         let only = options.value("only").and_then(|n| n.parse::<usize>().ok());
-        let cases: Vec<Case> = cases.into_iter().enumerate().filter(|(i, _)| only.is_none_or(|n| n == *i)).map(|one| one.1).collect();
+        let cases: Vec<Case> = cases
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| only.is_none_or(|n| n == *i))
+            .map(|one| one.1)
+            .collect();
         let answers = ask_all(&cases);
         let is_wanted = |(_, answer): &&(Case, Answer)| {
             options.has("each") || options.has("wrong") && answer.line().contains("WRONG")

@@ -5,6 +5,7 @@
 pub mod plant;
 pub mod questions;
 
+use crate::doubts::alone;
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, Fluid};
 use pitchleak::diagnose::{Declared, Diagnosis, FoundEffect, Traces, Verdict, diagnose};
@@ -261,7 +262,7 @@ pub fn summary(answers: &[(Case, Diagnosis)]) -> String {
     format!(
         "{} runs, {} no missing effect, {} explained, {} partly, {} unexplained; {} name something, {} something wrong surely, \
          {} explained with a sure name; first right {}, all named {}, all named and explained {}, all sure {}; {within} of {} sure values within 4 σ; \
-         of {} names of at least 95 % {} are right, of {} others {}",
+         of {} names of at least 95 % {} are right, of {} others {}\n{}",
         answers.len(),
         count(&|_, a| a.verdict == Verdict::NoMissingEffect),
         count(&|_, a| a.verdict == Verdict::Explained),
@@ -279,5 +280,10 @@ pub fn summary(answers: &[(Case, Diagnosis)]) -> String {
         named(&|one| one.probability >= 0.95, true),
         named(&|one| one.probability < 0.95, false),
         named(&|one| one.probability < 0.95, true),
+        alone(
+            answers
+                .iter()
+                .flat_map(|(case, answer)| answer.effects.iter().map(|one| (one, is_true(case, one))))
+        ),
     )
 }

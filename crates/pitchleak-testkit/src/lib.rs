@@ -10,6 +10,8 @@
 pub mod blind;
 #[cfg(feature = "judges")]
 pub mod confidence;
+#[cfg(feature = "judges")]
+mod doubts;
 pub mod hold;
 pub mod hopsan;
 #[cfg(feature = "judges")]

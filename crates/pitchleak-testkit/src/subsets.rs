@@ -1,5 +1,6 @@
 //! Any effects of the table at once, at random: each rig is drawn from a seed with its motion, its sensors, its leaks, and what is missing.
 
+use crate::doubts::alone;
 use pitchleak::Rig;
 use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
@@ -10,7 +11,6 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Sizes of effects, in what the same trace of a sound rig says it could have shown (five standard deviations): even in their logarithm.
@@ -102,15 +102,19 @@ impl Case {
         Some(diagnose(&[series], &[], &Declared::of(&self.rig()), &|| ()))
     }
 
-    /// None where such a rig can't be: effects that exclude each other, or of which nothing shows.
+    /// None where such a rig can't be: effects that exclude each other, or that show only where they are larger than anything built.
     pub fn ask(&self) -> Option<Answer> {
         let sound = self.diagnosed(EffectSet::default())?;
         let (mut effects, mut truth) = (EffectSet::default(), vec![]);
         for (effect, multiple) in &self.missing {
             let spec = effect.spec();
             let size = multiple * sound.not_detectable_below.get(spec.id)?.value;
-            let most = SHARE_OF_UPPER * if size < 0.0 { spec.lower.abs() } else { spec.upper };
-            let size = size.clamp(-most, most);
+            let declared = effect.adds_to(&mut self.rig().cylinder).copied();
+            let least = declared.map_or(spec.lower, |number| spec.lower.max(-number));
+            let most = SHARE_OF_UPPER * if size < 0.0 { least.abs() } else { spec.upper };
+            if size.abs() > most {
+                return None;
+            }
             effects.set(*effect, size, self.constants).ok()?;
             truth.push((spec.id, size));
         }
@@ -163,7 +167,10 @@ impl Answer {
             let right = if self.is_there(one) { "" } else { "WRONG " };
             let doubts: Vec<DoubtId> = one.doubts.iter().map(|doubt| doubt.id).collect();
             let FoundEffect { id, value, std, probability, confusable_with, .. } = one;
-            let _ = write!(out, " {right}{id} {value:.3e}±{std:.1e} {probability:.2} {doubts:?} {confusable_with:?}");
+            let _ = write!(
+                out,
+                " {right}{id} {value:.3e}±{std:.1e} {probability:.2} {doubts:?} {confusable_with:?}"
+            );
         }
         out
     }
@@ -186,7 +193,8 @@ pub fn summary(answers: &[(Case, Answer)]) -> String {
         format!("{} of {}", all.iter().filter(|right| **right).count(), all.len())
     };
     let within = |answer: &Answer| -> Vec<bool> {
-        let size = |one: &FoundEffect| answer.truth.iter().find(|(id, _)| *id == one.id).map(|(_, size)| *size);
+        let size =
+            |one: &FoundEffect| answer.truth.iter().find(|(id, _)| *id == one.id).map(|(_, size)| *size);
         let sure = answer.diagnosis.effects.iter().filter(|one| one.confident);
         sure.filter_map(|one| Some((one.value - size(one)?).abs() <= 4.0 * one.std)).collect()
     };
@@ -210,19 +218,8 @@ pub fn summary(answers: &[(Case, Answer)]) -> String {
         let right = names(&|one| (low..high).contains(&one.probability));
         let _ = writeln!(out, "  names of {low} to {high}: {right} right");
     }
-    out + &doubts(answers)
-}
-
-/// Of each doubt: the names that it alone takes confidence from.
-fn doubts(answers: &[(Case, Answer)]) -> String {
-    let mut alone: BTreeMap<String, [usize; 2]> = BTreeMap::new();
-    for (_, answer) in answers {
-        for one in &answer.diagnosis.effects {
-            if let [only] = &one.doubts[..] {
-                alone.entry(format!("{:?}", only.id)).or_default()[usize::from(answer.is_there(one))] += 1;
-            }
-        }
-    }
-    let line = |(id, [wrong, right]): (&String, &[usize; 2])| format!("  {id} alone: {wrong} wrong, {right} right\n");
-    alone.iter().map(line).collect()
+    let names = answers
+        .iter()
+        .flat_map(|(_, answer)| answer.diagnosis.effects.iter().map(|one| (one, answer.is_there(one))));
+    out + &alone(names)
 }

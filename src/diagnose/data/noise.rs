@@ -176,7 +176,8 @@ impl FastPart {
         let middle = sizes.len() / 2;
         let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
         let lags = (self.order + 1..).take(9);
-        let colour = lags.map(|lag| (self.product(self, lag, [f64::INFINITY; 2]) / power).abs()).fold(0.0, f64::max);
+        let colour =
+            lags.map(|lag| (self.product(self, lag, [f64::INFINITY; 2]) / power).abs()).fold(0.0, f64::max);
         let independent = sizes.len() as f64 / correlated(self.order);
         let scatter = (0.5 / MEDIAN_EFFICIENCY / independent).sqrt();
         FastNoise { std: median / NORMAL_MEDIAN / self.gain, scatter, colour }
@@ -200,7 +201,8 @@ impl FastPart {
         let lags = 0..=self.order;
         let both_ways = lags.flat_map(|lag| [(self, other, lag), (other, self, lag)]);
         let most = |part: &Self| UNRESOLVED_SIGMA * part.noise.std * part.gain;
-        let sums = both_ways.map(|(first, second, lag)| first.product(second, lag, [most(first), most(second)]).abs());
+        let sums = both_ways
+            .map(|(first, second, lag)| first.product(second, lag, [most(first), most(second)]).abs());
         let covariance = sums.fold(0.0, f64::max) / (count * self.gain * other.gain);
         let by_chance = self.noise.std * other.noise.std * (correlated(self.order) / count).sqrt();
         let is_shared = excess > 0.0 && covariance > NOISIER_SIGMA * by_chance;
