@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use std::io::{self, Read as _};
 
 /// Name and version of the saved form, with which a record begins.
-const SCHEMA: &str = "pitchleak.watch/6";
+const SCHEMA: &str = "pitchleak.watch/7";
 /// No record is larger once unpacked, bytes: a forged one would fill the memory.
 const LARGEST: u64 = 16 * 1024 * 1024;
 /// Beyond any time in s and any sum of flows in L/min.

@@ -87,7 +87,7 @@ fn expected() -> Vec<([f32; 6], bool)> {
     let mut detector = LeakDetector::new(AlarmSettings { threshold_m3s, ..AlarmSettings::default() });
     let mut told = Vec::new();
     for (dt_s, sample) in samples() {
-        if let Update::Renewed { elapsed_s, .. } = rls.update(dt_s, &sample) {
+        if let Update::Renewed { elapsed_s, .. } = rls.update_waiting(dt_s, &sample) {
             detector.update(elapsed_s, &rls.mean_leaks_m3s());
             let PerLeak { internal: i, external_a: a, external_b: b } = rls.estimates().mean_leaks_m3s;
             told.push(([i.value, i.std, a.value, a.std, b.value, b.std], detector.active().internal));

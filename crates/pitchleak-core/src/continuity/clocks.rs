@@ -272,9 +272,10 @@ impl<T: Real> Clocks<T> {
         }
     }
 
-    /// Takes in what was read `dt_s` after the row before.
-    pub fn push(&mut self, dt_s: T, readings: &Readings<T>) {
-        if usize::from(self.count) >= ROWS {
+    /// Takes in what was read `dt_s` after the row before; says whether a row that waited had to be dropped.
+    pub fn push(&mut self, dt_s: T, readings: &Readings<T>) -> bool {
+        let dropped = usize::from(self.count) >= ROWS;
+        if dropped {
             self.thin();
         }
         let place = self.place(usize::from(self.count));
@@ -282,6 +283,7 @@ impl<T: Real> Clocks<T> {
             *row = Waiting::new(dt_s, readings);
             self.count += 1;
         }
+        dropped
     }
 
     /// The first row that waits, once every channel is known at its time.

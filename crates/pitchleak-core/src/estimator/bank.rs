@@ -15,8 +15,10 @@ const TRENDS: usize = 5;
 const MEMORIES_S: [f64; TRENDS] = [3600.0, 480.0, 90.0, 18.0, 4.0];
 /// All hypotheses: leaks that stay, and the trends.
 const HYPOTHESES: usize = TRENDS + 1;
-/// Calls of [`Bank::go_on`] that finish a renewal: one for each trend, and one to conclude.
-pub(super) const STEPS: usize = TRENDS + 1;
+/// What comes in a renewal once all of them were heard.
+const CONCLUDE: u8 = HYPOTHESES as u8;
+const REPLACE: u8 = CONCLUDE + 1;
+const DONE: u8 = REPLACE + 1;
 /// Least ln of a weight beside the best one's. It bounds how long the past of a hypothesis counts for it: from
 /// here it needs seven nats of new evidence to be believed.
 const LEAST: f64 = -8.5;
@@ -44,8 +46,8 @@ const RECENT_S: f64 = 20.0;
 /// What is told is the mixture: its mean, and the covariance about it, which holds what the hypotheses disagree on.
 ///
 /// A renewal is spread over several samples, so that none of them takes much longer than the others: [`begin`](Self::begin)
-/// takes in what has been seen and hears the hypothesis that nothing changes, each [`go_on`](Self::go_on) one
-/// trend, and the last one concludes.
+/// takes in what has been seen, and each sample hears one hypothesis, first of all a jump that is suspected. As soon as it has foretold
+/// best it is told; else the next sample concludes. The one after replaces what was refuted.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -64,6 +66,8 @@ pub(super) struct Bank<T, const N: usize> {
     recent: [T; HYPOTHESES],
     /// Of the latest block.
     pub evidence: Evidence<T, N>,
+    /// What is next in a renewal: the hypothesis of this number, [`CONCLUDE`], [`REPLACE`], or nothing.
+    next: u8,
     pending: Pending<T, N>,
 }
 
@@ -99,8 +103,6 @@ struct Renewal<T, const N: usize> {
     drifted: [T; 2],
     /// How much larger than declared the noise is.
     inflation: T,
-    /// Hypotheses that were heard.
-    heard: u8,
     /// The trend that foretold the recent data best before.
     best_trend: u8,
     /// ln of the block's probability by each.
@@ -114,14 +116,20 @@ struct Renewal<T, const N: usize> {
     mixture: Mixture<T, N>,
 }
 
+/// What the bank says of a block.
+pub(super) enum Heard<T> {
+    /// Nothing new.
+    Part,
+    /// The leaks have changed at once: no hypothesis foretells them.
+    Jumped,
+    /// What is known is new.
+    All(Outlook<T>),
+}
+
 /// What the bank knows after a block.
 pub(super) struct Outlook<T> {
     /// Slopes of the leaks, mean and variance, prior units per s; by the trend that foretold best what came before the block.
     pub slopes_ps: [(T, T); LEAKS],
-    /// Whether the leaks have changed at once: no hypothesis foretells them.
-    pub jumped: bool,
-    /// Length of the block, s.
-    pub time_s: T,
     /// Σ (y − fᵀθ)² of the block by what is known now, and its number of rows.
     pub chi_square: (T, T),
 }
@@ -138,6 +146,7 @@ impl<T: Real, const N: usize> Bank<T, N> {
             log_weights: unheard(),
             recent: [T::zero(); HYPOTHESES],
             evidence: Evidence::none(),
+            next: DONE,
             pending: Pending::Nothing,
         }
     }
@@ -149,6 +158,7 @@ impl<T: Real, const N: usize> Bank<T, N> {
         }
         self.log_weights = unheard();
         self.recent = [T::zero(); HYPOTHESES];
+        self.next = DONE;
         self.pending = Pending::Nothing;
     }
 
@@ -163,7 +173,6 @@ impl<T: Real, const N: usize> Bank<T, N> {
         self.pending = Pending::Renewal(Renewal {
             drifted,
             inflation,
-            heard: 0,
             best_trend: best_trend(&self.recent),
             gained: [T::zero(); HYPOTHESES],
             by_jump,
@@ -171,66 +180,74 @@ impl<T: Real, const N: usize> Bank<T, N> {
             slopes_ps: [(T::zero(), T::zero()); LEAKS],
             mixture: Mixture::new(),
         });
-        self.hear(prior, known);
+        self.next = 0;
+        if by_jump.is_none() {
+            self.hear(prior, known);
+        }
     }
 
     /// Whether a renewal is half done.
     #[inline]
     pub fn is_renewing(&self) -> bool {
-        matches!(self.pending, Pending::Renewal(_))
+        self.next < DONE
     }
 
-    /// Goes on with a renewal, which began with this `prior` and what was `known`: at its end, what is known.
+    /// Goes on with a renewal, which began with this `prior` and what was `known`.
     #[cfg_attr(target_os = "none", inline(never))]
-    pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
-        let Pending::Renewal(renewal) = &self.pending else { return None };
-        if usize::from(renewal.heard) >= HYPOTHESES {
-            return self.conclude(prior, known);
+    pub fn go_on(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Heard<T> {
+        match self.next {
+            CONCLUDE => return self.conclude(prior, known),
+            REPLACE => self.replace_refuted(),
+            _ => self.hear(prior, known),
         }
-        self.hear(prior, known);
-        None
+        match &self.pending {
+            Pending::Renewal(renewal) if self.next == CONCLUDE && renewal.has_jumped() => Heard::Jumped,
+            _ => Heard::Part,
+        }
     }
 
     /// The next hypothesis is heard.
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     fn hear(&mut self, prior: &Prior<'_, T>, known: &Solution<T, N>) {
         let Pending::Renewal(renewal) = &mut self.pending else { return };
-        let Some(hypothesis) = self.hypotheses.get_mut(usize::from(renewal.heard)) else { return };
-        renewal.hear(&self.evidence, hypothesis, &self.log_weights, prior, known);
+        let next = usize::from(self.next);
+        if let (Some(hypothesis), Some(weight)) = (self.hypotheses.get_mut(next), self.log_weights.get(next))
+        {
+            renewal.hear(self.next, hypothesis, *weight, &self.evidence, prior, known);
+        }
+        self.next += 1;
     }
 
     /// Weighs the hypotheses, all of which were heard.
     #[cfg_attr(target_os = "none", inline(never))]
-    fn conclude(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Option<Outlook<T>> {
-        let Pending::Renewal(renewal) = &self.pending else { return None };
-        let Renewal { gained, by_jump, news, slopes_ps, .. } = *renewal;
-        let time_s = self.evidence.block.time_s;
+    fn conclude(&mut self, prior: &Prior<'_, T>, known: &mut Solution<T, N>) -> Heard<T> {
+        let Pending::Renewal(renewal) = &self.pending else { return Heard::Part };
+        let Renewal { gained, news, slopes_ps, .. } = *renewal;
         let mut jumped = Hypothesis::steady(T::infinity());
-        if !news && self.suspects_jump(renewal, prior, known, &mut jumped) {
-            *known = jumped.known.solution(prior);
+        let mut after = Posterior::room();
+        if !news && self.suspects_jump(renewal, prior, known, &mut jumped, &mut after) {
+            *known = after.solution();
             self.pending = Pending::Jump(jumped);
         } else {
             *known = renewal.mixture.solution();
             self.pending = Pending::Nothing;
         }
-        let chi_square = self.evidence.block.chi_square(&known.mean);
         if !news {
-            self.weigh(&gained, time_s);
+            self.weigh(&gained, self.evidence.block.time_s);
         }
-        self.replace_refuted();
-        // After a wild reading the jump that was suspected does not foretell best.
-        let jumped = !news && by_jump.is_some_and(|gain| gained.iter().all(|other| gain > *other));
-        Some(Outlook { slopes_ps, jumped, time_s, chi_square })
+        self.next = REPLACE;
+        Heard::All(Outlook { slopes_ps, chi_square: self.evidence.block.chi_square(&known.mean) })
     }
 
     /// Holds against the hypotheses that the leaks jumped to anything usual just before this block, all else as
-    /// known, as `jumped` says then. Whether that is much more likely.
+    /// known, as `jumped` says then, of which `after` is known. Whether that is much more likely.
     fn suspects_jump(
         &self,
         renewal: &Renewal<T, N>,
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
         jumped: &mut Hypothesis<T, N>,
+        after: &mut Posterior<T, N>,
     ) -> bool {
         let mut variance = [T::zero(); N];
         for i in 0..N {
@@ -241,7 +258,7 @@ impl<T: Real, const N: usize> Bank<T, N> {
         }
         let pivots = variance.map(|variance| T::one() / variance);
         jumped.known.set(&known.mean, &pivots, prior);
-        let gain = self.evidence.gain(jumped, prior, &known.mean);
+        let (gain, _) = self.evidence.teach(jumped, prior, &known.mean, after);
         let mut foretold = T::neg_infinity();
         for k in 0..HYPOTHESES {
             foretold = (self.log_weights[k] + renewal.gained[k]).at_least(foretold);
@@ -262,6 +279,7 @@ impl<T: Real, const N: usize> Bank<T, N> {
 
     /// A hypothesis that recent data refute goes on from what the best one knows. Only one whose own past would
     /// hold it back longer than the best's: the others forget it by themselves.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn replace_refuted(&mut self) {
         let mut best = 0;
         for k in 0..HYPOTHESES {
@@ -275,17 +293,17 @@ impl<T: Real, const N: usize> Bank<T, N> {
                 self.replace(k, best);
             }
         }
+        self.next = DONE;
     }
 
     #[cfg_attr(target_os = "none", inline(never))]
     fn replace(&mut self, refuted: usize, best: usize) {
-        let Some(source) = self.hypotheses.get(best).copied() else { return };
-        let Some(hypothesis) = self.hypotheses.get_mut(refuted) else { return };
+        let Ok([hypothesis, source]) = self.hypotheses.get_disjoint_mut([refuted, best]) else { return };
         // Only one whose own past holds it back longer: leaks that stay, or a longer memory; and none that is as quick as the
         // evidence itself.
         let longer = if best == 0 { hypothesis.memory_s > T::lit(RECENT_S) } else { refuted < best };
         if longer {
-            hypothesis.take_over(&source);
+            hypothesis.take_over(source);
             self.restart(refuted);
         }
     }
@@ -304,13 +322,20 @@ impl<T: Real, const N: usize> Bank<T, N> {
 }
 
 impl<T: Real, const N: usize> Renewal<T, N> {
-    /// The next hypothesis takes the block in, and is heard: it weighs by what it was believed before, and not at all where that was the
-    /// least.
+    /// The jump that was suspected foretold best. After a wild reading it does not.
+    fn has_jumped(&self) -> bool {
+        let best = |gain: T| self.gained.iter().all(|other| gain > *other);
+        !self.news && self.by_jump.is_some_and(best)
+    }
+
+    /// The hypothesis of number `own` takes the block in, and is heard: it weighs by what it was believed before, and not at all where
+    /// that was the least.
     fn hear(
         &mut self,
-        evidence: &Evidence<T, N>,
+        own: u8,
         hypothesis: &mut Hypothesis<T, N>,
-        log_weights: &[T; HYPOTHESES],
+        log_weight: T,
+        evidence: &Evidence<T, N>,
         prior: &Prior<'_, T>,
         known: &Solution<T, N>,
     ) {
@@ -320,23 +345,21 @@ impl<T: Real, const N: usize> Renewal<T, N> {
         hypothesis.advance(evidence.block.time_s);
         let mut posterior = Posterior::room();
         let (gain, growth) = evidence.teach(hypothesis, prior, &known.mean, &mut posterior);
-        if self.heard == self.best_trend {
+        if own == self.best_trend {
             self.slopes_ps = posterior.slopes();
         }
-        if self.heard == 0 {
+        if own == 0 {
             // Before there is something to foretell with, all hypotheses say the same, up to rounding.
             self.news = growth >= T::lit(NEWS);
         }
         let gained = if self.news { T::zero() } else { gain / self.inflation };
-        let own = usize::from(self.heard);
-        if let (Some(own), Some(before)) = (self.gained.get_mut(own), log_weights.get(own)) {
+        if let Some(own) = self.gained.get_mut(usize::from(own)) {
             *own = gained;
-            if *before > T::lit(LEAST) {
-                let share = T::one() - (T::lit(LEAST) - *before).libm_exp();
-                self.mixture.add(share, *before + gained, &posterior);
-            }
         }
-        self.heard += 1;
+        if log_weight > T::lit(LEAST) {
+            let share = T::one() - (T::lit(LEAST) - log_weight).libm_exp();
+            self.mixture.add(share, log_weight + gained, &posterior);
+        }
     }
 }
 

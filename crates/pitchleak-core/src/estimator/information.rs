@@ -66,7 +66,7 @@ impl<T: Real, const N: usize> Solution<T, N> {
     }
 
     /// Of a covariance's lower triangle.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
     pub fn of(mean: [T; N], mut covariance: [[T; N]; N]) -> Self {
         for i in 0..N {
             covariance[i][i] = covariance[i][i].at_least(T::min_positive_value());
@@ -77,10 +77,21 @@ impl<T: Real, const N: usize> Solution<T, N> {
         Self { mean, covariance }
     }
 
-    /// What is known before any sample.
-    #[cfg_attr(target_os = "none", inline(never))]
-    pub fn of_prior(offsets: &[[T; 2]; 2]) -> Self {
-        Information::new().solution(&Prior { mean_0: T::zero(), offsets })
+    /// What is known before any sample: of parameters that have nothing to do with each other, but for the two offsets.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each caller
+    pub fn of_prior(&[[aa, ab], [ba, bb]]: &[[T; 2]; 2]) -> Self {
+        const A: usize = Parameter::OffsetA as usize;
+        const B: usize = Parameter::OffsetB as usize;
+        let mut known = Self::zero();
+        for i in 0..N {
+            known.covariance[i][i] = T::one();
+        }
+        if N > B {
+            let over = T::one() / (aa * bb - ab * ba);
+            (known.covariance[A][A], known.covariance[B][B]) = (bb * over, aa * over);
+            (known.covariance[A][B], known.covariance[B][A]) = (-ab * over, -ba * over);
+        }
+        known
     }
 
     /// Variance of aᵀθ.
@@ -303,14 +314,6 @@ impl<T: Real, const N: usize> Information<T, N> {
         factors.solve(mean, half, prior.mean_0);
     }
 
-    /// What is known of the levels where there are no slopes.
-    #[cfg_attr(target_os = "none", inline(never))] // its stack is none of what follows
-    pub fn solution(&self, prior: &Prior<'_, T>) -> Solution<T, N> {
-        let mut posterior = Posterior::room();
-        self.solve(prior, T::zero(), &mut posterior);
-        Solution::of(posterior.mean, posterior.covariance())
-    }
-
     #[cfg(test)]
     pub fn solved(&self, prior: &Prior<'_, T>, rate_ps: T) -> Posterior<T, N> {
         let mut posterior = Posterior::room();
@@ -396,7 +399,8 @@ impl<T: Real, const N: usize> Posterior<T, N> {
         self.factors.covariance()
     }
 
-    #[cfg(test)]
+    /// What is known of the levels.
+    #[cfg_attr(target_os = "none", inline(never))] // its stack is none of what follows
     pub fn solution(&self) -> Solution<T, N> {
         Solution::of(self.mean, self.covariance())
     }
@@ -447,6 +451,19 @@ mod tests {
         }
         let before = Information::<f64, 4>::new().solved(&PRIOR, 0.0);
         assert!((posterior.growth_since(&before.pivots()) - expected.determinant().ln()).abs() < 1e-9);
+    }
+
+    /// Offsets that have to do with each other, as through a leak.
+    #[test]
+    fn without_a_sample_the_prior_is_known() {
+        let prior = Prior { mean_0: 0.0, offsets: &[[2.0, -0.7], [-0.7, 1.5]] };
+        let (known, solved) =
+            (Solution::<f64, 6>::of_prior(prior.offsets), Information::new().solved(&prior, 0.0).solution());
+        let [known, solved] =
+            [known, solved].map(|told| told.mean.into_iter().chain(told.covariance.into_iter().flatten()));
+        for (known, solved) in known.zip(solved) {
+            assert!((known - solved).abs() < 1e-12, "{known} {solved}");
+        }
     }
 
     #[test]

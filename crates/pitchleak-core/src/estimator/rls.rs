@@ -1,4 +1,4 @@
-use super::bank::{Bank, STEPS};
+use super::bank::{Bank, Heard, Outlook};
 use super::block::{BALANCES, Balance, BlockSums};
 use super::change::ChangeDetector;
 use super::information::{Prior, Solution};
@@ -17,17 +17,15 @@ use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors};
 /// Memory of the mean pressures at which leak flows are quoted, and of the innovations' size, s.
 const AVERAGING_S: f64 = 60.0;
 
-/// Least number of steps of a block, however slowly samples come: a renewal ends before the next block does.
+/// Least number of steps of a block, however slowly samples come.
 const LEAST_STEPS: f64 = 8.0;
-const _: () = assert!((STEPS as f64) < LEAST_STEPS);
 
 /// Share of its usual length that a block has after a sudden change: what it tells is then known as soon as the usual block
 /// would end, at the usual 25 samples a block.
 const FIRST_SHARE: f64 = 0.75;
 
-/// Rows that are taken in with one sample: more than come, so that those that waited are caught up with.
-///
-/// At most one of them ends a block or a renewal, as these are further apart.
+/// Rows that are taken in with one sample where little else is due: more than come, so that those that waited are caught up with.
+/// Beside a renewal's share it is one, and none where a block or a renewal ends.
 const ROWS_AT_ONCE: usize = 2;
 
 /// Recursive generalised least squares on both chambers, with N parameters:
@@ -162,7 +160,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         let follows = dt_s > T::zero() && dt_s <= self.longest_s;
         let Some(last) = self.last.filter(|_| follows) else {
-            return self.begin_at(&Sample { force_n: None, ..*sample });
+            self.begin_at(&Sample { force_n: None, ..*sample });
+            return Update::Started;
         };
         self.last = Some(Sample { force_n: None, ..*sample });
         self.pressure_noise.add([last.pa_pa, last.pb_pa], [sample.pa_pa, sample.pb_pa]);
@@ -176,7 +175,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if measured != Measured::Neither {
             self.advance(&step, &weights, Some(sample.x_m));
         }
-        self.finish(&step)
+        self.block.add(&step);
+        self.work()
     }
 
     /// Not both flows were measured over `step`: the position goes on by the one that was, or anew.
@@ -198,24 +198,28 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Nothing goes over from what came before.
     #[cold]
-    fn begin_at(&mut self, sample: &Sample<T>) -> Update<T> {
+    fn begin_at(&mut self, sample: &Sample<T>) {
         self.clocks.forget_rows();
         self.longest_s = self.settings.max_step_s;
-        self.restart(sample)
+        self.restart(sample);
     }
 
-    /// The step is taken in: what is due at its end.
+    /// What is due with each sample, if anything: a renewal's next share, or the block's end, which comes no sooner than the renewal
+    /// by those before it.
     #[inline(always)]
-    fn finish(&mut self, step: &Integrals<T>) -> Update<T> {
-        self.block.add(step);
-        let full = self.block.time >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS);
-        if full {
-            self.close_block()
-        } else if self.bank.is_renewing() {
+    fn work(&mut self) -> Update<T> {
+        if self.bank.is_renewing() {
             self.go_on()
+        } else if self.is_full() {
+            self.close_block()
         } else {
             Update::Accepted
         }
+    }
+
+    #[inline(always)]
+    fn is_full(&self) -> bool {
+        self.block.time >= self.block_time_s && self.block.steps >= T::lit(LEAST_STEPS)
     }
 
     /// The position equation's step; none is compared with where the position was not read.
@@ -274,12 +278,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
     }
 
     #[cold]
-    fn restart(&mut self, sample: &Sample<T>) -> Update<T> {
+    fn restart(&mut self, sample: &Sample<T>) {
         self.last = Some(*sample);
         self.anchor(sample.x_m);
         self.memory = None;
         self.pressure_noise.interrupt();
-        Update::Started
     }
 
     #[inline]
@@ -352,6 +355,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if !plausible {
             return Update::Rejected;
         }
+        let renewing = self.bank.is_renewing();
+        let mut update = self.work();
         if !self.is_integrable(dt_s) {
             self.last = None;
             self.clocks.begin_anew();
@@ -360,27 +365,33 @@ impl<T: Real, const N: usize> Rls<T, N> {
             self.clocks.go_on_after(&last, step_s);
         }
         self.step_s = T::zero();
-        self.clocks.push(dt_s, readings);
-        let mut update = Update::Accepted;
-        for _ in 0..ROWS_AT_ONCE {
-            update = match self.clocks.pop() {
+        let dropped = self.clocks.push(dt_s, readings);
+        let rows = match update {
+            Update::Accepted if renewing || dropped => 1,
+            Update::Accepted => ROWS_AT_ONCE,
+            _ => 0,
+        };
+        for _ in 0..rows {
+            match self.clocks.pop() {
                 Next::Waits => break,
-                Next::Gap => {
-                    self.last = None;
-                    continue;
+                Next::Gap => self.last = None,
+                Next::Row(row) => {
+                    if self.take_row(&row) {
+                        update = Update::Started;
+                    }
                 }
-                Next::Row(row) => match self.take_row(&row) {
-                    Update::Accepted => update,
-                    news => news,
-                },
-            };
+            }
         }
         self.longest_s = if self.clocks.is_empty() { self.settings.max_step_s } else { T::zero() };
         update
     }
 
-    fn take_row(&mut self, row: &Row<T>) -> Update<T> {
-        let Some(last) = self.last.replace(row.sample) else { return self.restart(&row.sample) };
+    /// Says whether nothing goes over from what came before.
+    fn take_row(&mut self, row: &Row<T>) -> bool {
+        let Some(last) = self.last.replace(row.sample) else {
+            self.restart(&row.sample);
+            return true;
+        };
         let Step { integrals: mut step, measured } =
             Step::between(&self.cylinder, row.dt_s, &last, &row.sample);
         if row.read.pa && row.read.pb && !row.thinned {
@@ -404,7 +415,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
         if measured != Measured::Both {
             self.unfed.add(&step);
         }
-        self.finish(&step)
+        self.block.add(&step);
+        false
     }
 
     /// Closes a block of the balance; after every second one the renewal of the estimates begins.
@@ -475,7 +487,23 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn go_on(&mut self) -> Update<T> {
         let prior = prior(self.compressibility, &self.scale, &self.offsets);
-        let Some(outlook) = self.bank.go_on(&prior, &mut self.solution) else { return Update::Accepted };
+        let elapsed_s = self.bank.evidence.block.time_s;
+        let changed = match self.bank.go_on(&prior, &mut self.solution) {
+            Heard::Part => return Update::Accepted,
+            Heard::Jumped => {
+                self.begin_anew();
+                true
+            }
+            Heard::All(outlook) => {
+                self.take(outlook);
+                false
+            }
+        };
+        Update::Renewed { elapsed_s, changed, innovation: None }
+    }
+
+    /// The estimates are new.
+    fn take(&mut self, outlook: Outlook<T>) {
         self.slopes_ps = outlook.slopes_ps;
         let (mut chi_square, mut count) = outlook.chi_square;
         for Balance { equation, .. } in self.balances.iter().flatten() {
@@ -486,10 +514,6 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.innovations.position(chi_square.at_least(T::zero()), count);
         self.balances = [None; BALANCES];
         self.reweigh();
-        if outlook.jumped {
-            self.begin_anew();
-        }
-        Update::Renewed { elapsed_s: outlook.time_s, changed: outlook.jumped, innovation: None }
     }
 
     /// By how much zeros may have drifted since the estimates were renewed, variances in prior units.
