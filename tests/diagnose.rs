@@ -146,6 +146,21 @@ fn without_force(mut series: Series) -> Series {
     series
 }
 
+/// The one whose answer is the least certain: here whether the likeliest of several near equals is there.
+#[test]
+fn the_next_measurement_parts_an_effect_from_its_strongest_rival() {
+    let answer = ask(trace(Some((Effect::LoadOffset, 3.0))), &rig());
+    let found = answer.effects.first().expect("is found");
+    let next = answer.next_measurement.expect("has rivals");
+    let [one, rival] = next.between;
+    assert!((0.2..0.8).contains(&found.probability) && !found.confident, "{found:?}");
+    assert_eq!((one, next.probability), (found.id, found.probability), "{next:?}");
+    assert!(found.confusable_with.contains(&rival), "{next:?}");
+    assert_eq!(next.measurement, one.parse::<Effect>().expect("is an effect").spec().measurement);
+    let alone = ask(trace(None), &declared_wrong(|cylinder| &mut cylinder.area_a_m2, 0.9));
+    assert_eq!((alone.effects.len(), alone.next_measurement), (1, None));
+}
+
 /// Beside a load cell for sure; without one a meter's gain does nearly the same, and is not believed either.
 #[test]
 fn a_wrong_area_is_named_and_no_sensor_is_blamed() {

@@ -30,8 +30,8 @@ pub use equation::{Equation, PerEquation};
 pub use fit::Progress;
 pub use outcome::{
     BinnedResidual, Calibration, Correlation, Diagnosis, Doubt, DoubtId, EquationResidual, FoundEffect,
-    FoundLeakChange, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, Quality, Samples,
-    Size, Verdict,
+    FoundLeakChange, HoldLeak, Holds, Interaction, LeakEstimate, LeakEstimates, ModelFit, NextMeasurement,
+    Quality, Samples, Size, Verdict,
 };
 pub use search::{Candidate, Collinearity};
 
@@ -82,6 +82,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     Diagnosis {
         samples: Samples::of(&train),
         effects: found,
+        next_measurement: assess::next_measurement(&selection),
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict,

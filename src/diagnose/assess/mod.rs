@@ -4,11 +4,13 @@ mod adequacy;
 mod confidence;
 mod estimates;
 mod holds;
+mod next_measurement;
 mod residual;
 
 pub(crate) use adequacy::{failures, judge};
 pub(crate) use estimates::{calibration, detection_limits, found, is_excited, leak_changes};
 pub(crate) use holds::check as check_holds;
+pub(crate) use next_measurement::next_measurement;
 pub(crate) use residual::{HeldOut, model_fit};
 
 use self::adequacy::Judgement;

@@ -92,6 +92,17 @@ pub enum DoubtId {
     DoubtfulNeighbour,
 }
 
+/// The one measurement that would settle most: whose answer is the least certain beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NextMeasurement {
+    /// What to do.
+    pub measurement: &'static str,
+    /// The two explanations that it parts.
+    pub between: [&'static str; 2],
+    /// The probability that it finds the first of them.
+    pub probability: f64,
+}
+
 /// Two effects that act on each other: the product of their terms explains more than chance would.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interaction {

@@ -2,7 +2,7 @@
 
 use super::{
     BinnedResidual, Calibration, Diagnosis, EquationResidual, FoundEffect, FoundLeakChange, Holds,
-    Interaction, LeakEstimates, Quality, Samples, Size, Verdict,
+    Interaction, LeakEstimates, NextMeasurement, Quality, Samples, Size, Verdict,
 };
 use crate::diagnose::equation::PerEquation;
 use crate::wiring::Wiring;
@@ -15,6 +15,8 @@ struct Document<'a> {
     samples: Samples,
     before: QualityFields<'a>,
     effects: &'a [FoundEffect],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_measurement: Option<NextMeasurement>,
     wiring: Option<&'a Wiring>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     interactions: &'a [Interaction],
@@ -64,6 +66,7 @@ impl Serialize for Diagnosis {
             samples: self.samples,
             before: (&before.quality).into(),
             effects,
+            next_measurement: self.next_measurement,
             wiring: self.wiring.as_ref(),
             interactions,
             after: (&after.quality).into(),

@@ -16,7 +16,7 @@ mod residual;
 
 pub use effects::{
     Calibration, Doubt, DoubtId, FoundEffect, FoundLeakChange, HoldLeak, Holds, Interaction, LeakEstimate,
-    LeakEstimates, Size,
+    LeakEstimates, NextMeasurement, Size,
 };
 pub use residual::{BinnedResidual, Correlation, EquationResidual};
 
@@ -93,6 +93,8 @@ pub struct Diagnosis {
     /// The mistake of wiring, sign or unit that explains the traces. Then no effect was looked for, unless the mistake
     /// is one that a sensor's lag or offset might have done.
     pub wiring: Option<Wiring>,
+    /// What to measure next; none where no effect has a rival.
+    pub next_measurement: Option<NextMeasurement>,
     /// Pairs of these effects that act on each other.
     pub interactions: Vec<Interaction>,
     /// Offsets and gains that the rig file declares possible, as found with the effects.

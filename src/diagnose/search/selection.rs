@@ -24,6 +24,8 @@ pub(crate) struct Selected {
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
     pub(crate) confusable_with: Vec<Effect>,
+    /// The most probable of these, with its probability in this one's place.
+    pub(crate) strongest_rival: Option<(Effect, f64)>,
     /// Probability of it among all that could stand in its place.
     pub(crate) probability: f64,
     /// A product of signals that the table does not list and that fits nearly as well in its place.
@@ -49,6 +51,7 @@ impl Selected {
             p_value: 1.0,
             mended_percent: None,
             confusable_with: vec![],
+            strongest_rival: None,
             probability: 0.0,
             unlisted_rival: None,
             is_below_unlisted: false,
@@ -153,6 +156,7 @@ impl Selection<'_> {
             p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
             mended_percent: None,
             confusable_with: vec![],
+            strongest_rival: None,
             probability: 0.0,
             unlisted_rival: None,
             is_below_unlisted: unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
@@ -240,8 +244,13 @@ impl Selection<'_> {
             let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
             one.unlisted_rival =
                 strongest_unlisted(fit, &without).filter(is_near).map(|(product, _)| product);
-            one.confusable_with =
-                rivals.filter_map(|trial| fit.problem.terms[trial.score.term].effect()).collect();
+            let weighed = rivals.filter_map(|trial| {
+                let effect = fit.problem.terms[trial.score.term].effect()?;
+                Some((effect, one.probability * ((trial.beyond(dispersion) - own) / 2.0).exp()))
+            });
+            let weighed: Vec<(Effect, f64)> = weighed.collect();
+            one.strongest_rival = weighed.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
+            one.confusable_with = weighed.into_iter().map(|(effect, _)| effect).collect();
         }
         None
     }

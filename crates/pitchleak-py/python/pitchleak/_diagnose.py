@@ -95,6 +95,18 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
+class NextMeasurement:
+    """The one measurement that would settle most."""
+
+    measurement: str
+    """What to do."""
+    between: tuple[str, ...]
+    """The two explanations that it parts."""
+    probability: float
+    """That it finds the first of them."""
+
+
+@dataclass(frozen=True, slots=True)
 class Interaction:
     """Two effects that act on each other."""
 
@@ -266,6 +278,8 @@ class Diagnosis(Raw, Paged, Tabular):
     """What speaks for it."""
     wiring: Wiring | None = None
     """The mistake of wiring, sign or unit that explains the traces; then no effect is worth looking for."""
+    next_measurement: NextMeasurement | None = None
+    """What to measure next; None where no effect has a rival."""
     interactions: tuple[Interaction, ...] = ()
     """Effects that act on each other."""
     leak_changes: tuple[LeakChange, ...] = ()

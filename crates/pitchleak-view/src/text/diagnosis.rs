@@ -57,6 +57,10 @@ impl DiagnosisText<'_> {
             None => out = format!("{}\n", sentence(self.diagnosis.verdict)),
         }
         self.diagnosis.effects.iter().for_each(|effect| write_effect(&mut out, effect));
+        if let Some(next) = &self.diagnosis.next_measurement {
+            let [one, other] = next.between;
+            let _ = writeln!(out, "\nMeasure next, to tell {one} from {other}: {}", next.measurement);
+        }
         if self.diagnosis.verdict != Verdict::InsufficientExcitation {
             self.write_errors(&mut out);
             self.write_residuals(&mut out);
@@ -251,9 +255,5 @@ fn write_effect(out: &mut String, effect: &FoundEffect) {
     let _ = writeln!(out, "  To do: {}", effect.remedy);
     if let Some(doubt) = effect.doubts_in_words() {
         let _ = writeln!(out, "  Doubtful: {doubt}.");
-    }
-    if let Some(separation) = &effect.separated_by {
-        let rivals = effect.confusable_with.join(", ");
-        let _ = writeln!(out, "  These traces cannot tell it from: {rivals}. Would tell: {separation}");
     }
 }

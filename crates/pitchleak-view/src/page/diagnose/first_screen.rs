@@ -41,11 +41,13 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     let (_, says) = crate::text::sentence(diagnosis.verdict).split_once(": ").unwrap_or_default();
     let named: Vec<_> =
         diagnosis.effects.iter().map(|effect| format!("{} of {}", spoken(effect.id), size(effect))).collect();
-    if named.is_empty() {
-        format!("{}.", capital(says))
-    } else {
-        format!("{}: {}.", capital(says), named.join(", "))
-    }
+    let named = if named.is_empty() { String::new() } else { format!(": {}", named.join(", ")) };
+    let changes = match diagnosis.leak_changes.len() {
+        0 => String::new(),
+        1 => " A leak changes once.".to_owned(),
+        count => format!(" Leaks change {count} times."),
+    };
+    format!("{}{named}.{changes}", capital(says))
 }
 
 fn to_do(diagnosis: &Diagnosis) -> Markup {
@@ -71,6 +73,10 @@ fn to_do(diagnosis: &Diagnosis) -> Markup {
                         strong { (capital(&spoken(effect.id))) ": " }
                         @if effect.confident { (prose(effect.remedy)) } @else { "not sure yet; see what would settle it. If so: " (prose(effect.remedy)) }
                     }
+                }
+                @if let Some(next) = &diagnosis.next_measurement {
+                    @let [one, other] = next.between.map(spoken);
+                    li { strong { "To tell " (one) " from " (other) ": " } (next.measurement) }
                 }
                 li { code { "pitchleak diagnose --save-rig corrected.toml" } " writes what was found into a rig file, which "
                     code { "pitchleak replay" } " then corrects for." }
