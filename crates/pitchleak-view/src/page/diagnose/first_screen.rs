@@ -121,12 +121,25 @@ fn errors(diagnosis: &Diagnosis) -> Markup {
                             td .number { (short(before * factor)) }
                             @if found {
                                 td .number { (short(after * factor)) }
-                                td .number { (format!("{:.0} %", 100.0 * (1.0 - after / before))) }
+                                td .number { (percent(1.0 - after / before)) }
                             }
                         }
                     }
                 }
             }
         }
+    }
+}
+
+/// No zero is negative.
+fn percent(share: f64) -> String {
+    format!("{:.0} %", (100.0 * share).round() + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn no_zero_is_negative() {
+        assert_eq!([-1e-4, 1e-4, -0.6].map(super::percent), ["0 %", "0 %", "-60 %"]);
     }
 }
