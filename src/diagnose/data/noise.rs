@@ -259,6 +259,8 @@ impl Unresolved {
 #[cfg(test)]
 mod sensor_noise_tests {
     use super::*;
+    use crate::diagnose::testing::{declared, sound};
+    use pitchleak_testkit::white_noise;
 
     #[test]
     fn a_ripple_is_coloured_and_a_smooth_signal_is_quiet() {
@@ -266,6 +268,28 @@ mod sensor_noise_tests {
         assert!(FastPart::of(std::iter::once(ripple.as_slice()), 3).noise.colour > 0.9);
         let smooth: Vec<f64> = (0..2000).map(|i| (0.06 * f64::from(i)).sin()).collect();
         assert!(FastPart::of(std::iter::once(smooth.as_slice()), 3).noise.std < 1e-4);
+    }
+
+    /// Flow A of a sound rig with a fast part, nearly regular, of so many standard deviations of its noise, flow B with another.
+    fn flow_a(own: f64, others: f64) -> SensorCheck {
+        let (mut series, declared) = (sound(60), declared());
+        let Sensors { flow_a, flow_b, .. } = declared.sensors;
+        let mut fast = 0.0;
+        for (at, noise) in white_noise(5).take(series.len()).enumerate() {
+            fast = -0.9 * fast + 0.436 * noise;
+            series.qa_m3s[at] += own * flow_a.noise_std * fast;
+            series.qb_m3s[at] -= others * flow_b.noise_std * fast;
+        }
+        check_sensors(&[series], &declared).swap_remove(3)
+    }
+
+    #[test]
+    fn a_ripple_is_a_sensors_own_beyond_the_motion_that_another_shows_less_of() {
+        let (own, shared, none) = (flow_a(0.8, 0.0), flow_a(0.8, 0.4), flow_a(0.0, 0.0));
+        assert_eq!(own.name, "flow a");
+        assert!(own.is_ripple_of_its_own() && !none.is_ripple());
+        let ratios = [shared.found.std, shared.shared_std].map(|std| std / shared.declared_std);
+        assert!(shared.is_ripple() && !shared.is_ripple_of_its_own(), "{ratios:?} {}", shared.found.colour);
     }
 
     #[test]

@@ -192,3 +192,21 @@ fn prior(term: Term, declared: &Declared) -> Option<Prior> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{declared, sound};
+
+    #[test]
+    fn a_dead_band_silences_more_than_its_meters_noise_does() {
+        let (traces, declared) = ([sound(20)], declared());
+        let problem = Problem::new(&traces, &declared, &[]);
+        let Sensors { flow_a, flow_b, .. } = declared.sensors;
+        for (effect, noise) in [(Effect::FlowMeterDeadBandA, flow_a), (Effect::FlowMeterDeadBandB, flow_b)] {
+            let term = problem.place(Term::Effect(effect)).expect("is a term");
+            let allows = |sigma: f64| problem.allows(term, sigma * noise.noise_std);
+            assert_eq!([0.5, 2.9, 3.1, 30.0].map(allows), [false, false, true, true], "{effect:?}");
+        }
+    }
+}
