@@ -8,6 +8,7 @@ use pitchleak_testkit::judge::Case;
 use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver};
 use pitchleak_testkit::judge::score::{Judgement, Scored, Sum};
 use pitchleak_testkit::judge::worlds::{WORLDS, Wires, World};
+use pitchleak_testkit::options::Options;
 use rayon::prelude::*;
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,55 +19,26 @@ const SECONDS: f64 = 60.0;
 const HEADER: &str = "giver,world,number,motion,size,accuracy,internal_lpm,external_a_lpm,external_b_lpm,judgement,why,log_loss,cause_named,\
                       sound_part_blamed,causes,text";
 
-struct Options(Vec<String>);
-
-impl Options {
-    fn value(&self, name: &str) -> Option<&str> {
-        self.0.iter().find_map(|word| word.strip_prefix(name)?.strip_prefix('='))
-    }
-
-    fn number<T: std::str::FromStr>(&self, name: &str) -> Option<T> {
-        self.value(name)?.parse().ok()
-    }
-
-    fn has(&self, word: &str) -> bool {
-        self.0.iter().any(|own| own == word)
-    }
-
-    fn seed(&self) -> String {
-        let commit = || {
-            let git =
-                std::process::Command::new("git").args(["rev-parse", "--short=7", "HEAD"]).output().ok()?;
-            Some(String::from_utf8(git.stdout).ok()?.trim().to_owned())
-        };
-        self.value("seed")
-            .map(str::to_owned)
-            .or_else(commit)
-            .filter(|seed| !seed.is_empty())
-            .unwrap_or("0".into())
-    }
-
-    fn worlds(&self) -> Vec<&'static World> {
-        let asked = self.value("worlds").unwrap_or_default();
-        let wanted = |world: &&World| match asked {
-            "" => true,
-            "held-out" => world.held_out,
-            "known" => !world.held_out,
-            _ => asked.split(',').any(|part| world.name.contains(part)),
-        };
-        WORLDS.iter().filter(wanted).collect()
-    }
+fn worlds(options: &Options) -> Vec<&'static World> {
+    let asked = options.value("worlds").unwrap_or_default();
+    let wanted = |world: &&World| match asked {
+        "" => true,
+        "held-out" => world.held_out,
+        "known" => !world.held_out,
+        _ => asked.split(',').any(|part| world.name.contains(part)),
+    };
+    WORLDS.iter().filter(wanted).collect()
 }
 
 fn main() {
-    let options = Options(std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect());
+    let options = Options::of_arguments();
     let seed = options.seed();
     let (accuracy, seconds) = (options.number("accuracy"), options.number("seconds").unwrap_or(SECONDS));
     let draws = match options.number::<u64>("number") {
         Some(number) => number..number + 1,
         None => 0..options.number("draws").unwrap_or(DRAWS),
     };
-    let worlds = options.worlds();
+    let worlds = worlds(&options);
     let each = |world: &&'static World| {
         let world = *world;
         let draw = |number| Case::draw(world, number, &seed, accuracy, seconds);
@@ -82,7 +54,7 @@ fn main() {
     side_by_side(&givers, &worlds, &rows);
     givers.iter().zip(&rows).for_each(|(giver, own)| details(giver.name(), own));
     givers.iter().zip(&rows).for_each(|(giver, own)| lines(giver.name(), own, &options));
-    for file in options.0.iter().filter(|word| word.ends_with(".csv")) {
+    for file in options.ending_in(".csv") {
         let rows = givers.iter().enumerate().flat_map(|(place, giver)| {
             cases.iter().zip(&scored).map(move |(case, all)| csv(giver.name(), case, &all[place]))
         });

@@ -20,6 +20,8 @@ pub mod judge;
 pub mod lies;
 mod motion;
 mod noise;
+#[cfg(feature = "judges")]
+pub mod options;
 pub mod rig;
 mod statistics;
 #[cfg(feature = "judges")]

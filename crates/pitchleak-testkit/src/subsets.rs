@@ -134,8 +134,9 @@ impl Answer {
         self.truth.iter().any(|(id, _)| *id == effect.id)
     }
 
-    fn names(&self, id: &str) -> bool {
-        self.diagnosis.effects.iter().any(|effect| effect.id == id)
+    /// Something is named that is not there.
+    pub fn has_a_wrong_name(&self) -> bool {
+        self.diagnosis.effects.iter().any(|effect| !self.is_there(effect))
     }
 
     fn first_is_right(&self) -> bool {
@@ -151,7 +152,8 @@ impl Answer {
     }
 
     fn all_are_named(&self) -> bool {
-        self.truth.iter().all(|(id, _)| self.names(id))
+        let is_named = |id| self.diagnosis.effects.iter().any(|effect| effect.id == id);
+        self.truth.iter().all(|(id, _)| is_named(*id))
     }
 
     /// What is there and what was said.

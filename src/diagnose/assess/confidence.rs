@@ -96,7 +96,7 @@ fn acts_in(fit: &Fit<'_>, term: usize) -> PerEquation<bool> {
 
 /// Others fit as well in its place.
 fn rivals(one: &Selected) -> Option<Doubt> {
-    let ids: Vec<&str> = one.confusable_with.iter().map(|rival| rival.spec().id).collect();
+    let ids: Vec<&str> = one.rivals.iter().map(|(rival, _)| rival.spec().id).collect();
     let text = || format!("these traces do not tell it from {}", ids.join(", "));
     (!ids.is_empty()).then(|| doubt(DoubtId::Rivals, text()))
 }

@@ -151,7 +151,7 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
     let std = std_with_oil(fit, one.term).unwrap_or(std);
     let std = std.hypot(search::std_of_constants(fit, one.term));
     let spec = effect.spec();
-    let confusable_with: Vec<_> = one.confusable_with.iter().map(|other| other.spec().id).collect();
+    let confusable_with: Vec<_> = one.rivals.iter().map(|(rival, _)| rival.spec().id).collect();
     let constants = fit.constants(one.term);
     let constants = effect.constants().iter().map(|own| (own.spec().id, constants.get(*own))).collect();
     Some(FoundEffect {
@@ -165,7 +165,7 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
         doubts,
         rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
         p_value: one.p_value,
-        separated_by: separation(effect, &one.confusable_with),
+        separated_by: separation(effect, &one.rivals),
         confusable_with,
         constants,
         cause: spec.cause,
@@ -174,8 +174,8 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
 }
 
 /// The measurements that tell an effect from its rivals: what shows each of them alone.
-fn separation(effect: Effect, rivals: &[Effect]) -> Option<String> {
-    let group = std::iter::once(&effect).chain(rivals);
+fn separation(effect: Effect, rivals: &[(Effect, f64)]) -> Option<String> {
+    let group = std::iter::once(&effect).chain(rivals.iter().map(|(rival, _)| rival));
     let measurements: Vec<_> = group.map(|one| one.spec().measurement).collect();
     (!rivals.is_empty()).then(|| measurements.join(" "))
 }

@@ -16,7 +16,7 @@ pub(crate) struct SensorCheck {
     pub(crate) name: &'static str,
     pub(crate) declared_std: f64,
     pub(crate) found: FastNoise,
-    /// What of that is motion of the machine, since another sensor shows it too.
+    /// What of a ripple is motion of the machine, since another sensor shows it too.
     shared_std: f64,
 }
 
@@ -63,7 +63,9 @@ pub(crate) fn check_sensors(traces: &[Series], declared: &Declared) -> Vec<Senso
     };
     let check = |at: usize| {
         let (name, declared_std, _) = signals[at];
-        SensorCheck { name, declared_std, found: parts[at].noise, shared_std: shared(at) }
+        let check = SensorCheck { name, declared_std, found: parts[at].noise, shared_std: 0.0 };
+        // Asked of a ripple alone: it is a pass over all signals for each lag.
+        if check.is_ripple() { SensorCheck { shared_std: shared(at), ..check } } else { check }
     };
     (0..signals.len()).map(check).collect()
 }
@@ -143,17 +145,17 @@ pub(super) fn differences(signal: &[f64], order: usize) -> (Vec<f64>, f64) {
 
 /// What of a signal changes from sample to sample, by differences of high order: what the machine does within so few samples is smooth,
 /// so that only noise (and ripple faster than that) is left.
-pub(crate) struct FastPart {
+struct FastPart {
     /// Differences, a list for each trace.
     differences: Vec<Vec<f64>>,
     /// Their standard deviation for unit white noise.
     gain: f64,
     order: usize,
-    pub(crate) noise: FastNoise,
+    noise: FastNoise,
 }
 
 impl FastPart {
-    pub(crate) fn of<'a>(signals: impl Iterator<Item = &'a [f64]>, order: usize) -> Self {
+    fn of<'a>(signals: impl Iterator<Item = &'a [f64]>, order: usize) -> Self {
         let (differences, gains): (Vec<_>, Vec<_>) = signals.map(|signal| differences(signal, order)).unzip();
         let mut part = Self {
             differences,

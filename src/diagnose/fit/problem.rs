@@ -118,8 +118,8 @@ impl<'a> Problem<'a> {
     /// that the meter showed what flowed.
     fn least_shown(&self, effect: Effect) -> f64 {
         let Sensors { flow_a, flow_b, .. } = self.sensors;
-        let flows = Signals { qa_m3s: flow_a.noise_std, qb_m3s: flow_b.noise_std, ..Signals::default() };
-        let noise_m3s = effect.deaf(&mut { flows }).copied();
+        let mut noise = Signals { qa_m3s: flow_a.noise_std, qb_m3s: flow_b.noise_std, ..Signals::default() };
+        let noise_m3s = effect.deaf(&mut noise).copied();
         let lag_s = effect.is_lag().then_some(self.least_lag_s);
         noise_m3s.map(|std| SHOWN_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
     }

@@ -94,8 +94,7 @@ pub(super) fn simplify(all: &mut Selection<'_>, progress: Progress<'_>) {
             return;
         }
         let one = all.effects[at].clone();
-        let places =
-            one.confusable_with.iter().filter_map(|rival| all.fit.problem.place(Term::Effect(*rival)));
+        let places = one.rivals.iter().filter_map(|(rival, _)| all.fit.problem.place(Term::Effect(*rival)));
         let simpler = places.filter(|place| !all.fit.active().contains(place)).find_map(|rival| {
             let new = [(rival, all.fit.constants(rival))];
             let mut trial =

@@ -125,7 +125,7 @@ mod tests {
         let plain = Fit::declared(&problem, &|| ());
         for wrong in [&[Effect::FlowMeterGainA][..], &[Effect::FlowMeterGainA, Effect::FlowMeterOffsetB]] {
             let places = wrong.iter().map(|effect| problem.place(Term::Effect(*effect)).expect("is a term"));
-            let effects: Vec<_> = places.map(Selected::unjudged).collect();
+            let effects: Vec<_> = places.map(|term| Selected::new(term, 1.0)).collect();
             let new: Vec<_> = effects.iter().map(|one| (one.term, problem.usual_constants)).collect();
             let mut all = Selection { fit: plain.changed(&[], &new, &|| ()), effects };
             exchange::exchange_all(&mut all, &|| ());

@@ -23,9 +23,8 @@ pub(crate) struct Selected {
     pub(crate) p_value: f64,
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
-    pub(crate) confusable_with: Vec<Effect>,
-    /// The most probable of these, with its probability in this one's place.
-    pub(crate) strongest_rival: Option<(Effect, f64)>,
+    /// Others that fit as well in its place, each with its probability there.
+    pub(crate) rivals: Vec<(Effect, f64)>,
     /// Probability of it among all that could stand in its place.
     pub(crate) probability: f64,
     /// A product of signals that the table does not list and that fits nearly as well in its place.
@@ -35,27 +34,23 @@ pub(crate) struct Selected {
 }
 
 impl Selected {
-    /// Another effect took its place.
-    pub(super) fn stands_for(&mut self, fit: &Fit<'_>, best: &Trial) {
-        self.term = best.score.term;
-        self.p_value = statistics::chi2_p(best.score.chi2_drop / fit.dispersion(fit.free.chi2), 1.0);
-    }
-}
-
-#[cfg(test)]
-impl Selected {
-    /// An effect of which nothing is known but its place.
-    pub(crate) fn unjudged(term: usize) -> Self {
+    /// One that has not been held against its rivals yet.
+    pub(super) fn new(term: usize, p_value: f64) -> Self {
         Self {
             term,
-            p_value: 1.0,
+            p_value,
             mended_percent: None,
-            confusable_with: vec![],
-            strongest_rival: None,
+            rivals: vec![],
             probability: 0.0,
             unlisted_rival: None,
             is_below_unlisted: false,
         }
+    }
+
+    /// Another effect took its place.
+    pub(super) fn stands_for(&mut self, fit: &Fit<'_>, best: &Trial) {
+        self.term = best.score.term;
+        self.p_value = statistics::chi2_p(best.score.chi2_drop / fit.dispersion(fit.free.chi2), 1.0);
     }
 }
 
@@ -151,16 +146,9 @@ impl Selection<'_> {
         let Some(trial) = trials.into_iter().find(is_next) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
-        self.effects.push(Selected {
-            term: trial.score.term,
-            p_value: statistics::chi2_p(chi2_drop / dispersion, 1.0),
-            mended_percent: None,
-            confusable_with: vec![],
-            strongest_rival: None,
-            probability: 0.0,
-            unlisted_rival: None,
-            is_below_unlisted: unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion,
-        });
+        let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
+        let is_below_unlisted = unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion;
+        self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
         self.fit = with(fit, &[], &trial, progress);
         true
     }
@@ -239,34 +227,25 @@ impl Selection<'_> {
             {
                 return Some((at, *best));
             }
-            one.probability = place_probability(fit, one.term, lost / dispersion, &trials, &without);
-            let rivals = trials.into_iter().filter(is_close);
+            one.probability = place_probability(fit, own, &trials, &without);
             let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
             one.unlisted_rival =
                 strongest_unlisted(fit, &without).filter(is_near).map(|(product, _)| product);
-            let weighed = rivals.filter_map(|trial| {
+            let weighed = |trial: Trial| {
                 let effect = fit.problem.terms[trial.score.term].effect()?;
                 Some((effect, one.probability * ((trial.beyond(dispersion) - own) / 2.0).exp()))
-            });
-            let weighed: Vec<(Effect, f64)> = weighed.collect();
-            one.strongest_rival = weighed.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
-            one.confusable_with = weighed.into_iter().map(|(effect, _)| effect).collect();
+            };
+            one.rivals = trials.into_iter().filter(is_close).filter_map(weighed).collect();
         }
         None
     }
 }
 
 /// The probability of an effect among all that could stand in its place, beside the others: equal prior odds for each candidate and each
-/// unlisted law, and by how much each passes what chance and its fitted constants could bring, twice a log likelihood.
-fn place_probability(
-    fit: &Fit<'_>,
-    term: usize,
-    chi2_drop: f64,
-    trials: &[Trial],
-    without: &Solution,
-) -> f64 {
+/// unlisted law, and by how much each, and the effect its `own`, passes what chance and its fitted constants could bring, twice a log
+/// likelihood.
+fn place_probability(fit: &Fit<'_>, own: f64, trials: &[Trial], without: &Solution) -> f64 {
     let dispersion = fit.dispersion(fit.free.chi2);
-    let own = chi2_drop - critical_sigma(fit, fit.constants(term)).powi(2);
     let usual = critical_sigma(fit, fit.problem.usual_constants).powi(2);
     let others = trials.iter().map(|trial| trial.beyond(dispersion));
     let unlisted = strongest_unlisted(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
