@@ -300,3 +300,23 @@ fn a_stream_that_is_saved_amid_a_hold_goes_on_with_it() {
     assert_eq!(expected.verdict.faults, [Leak::Internal]);
     assert!(feed(&mut second, &rows[rows.len() - 1..]).is_none(), "told once");
 }
+
+/// `[valve] shut`: the spool at its middle holds the cylinder, after a second in which what moved it dies down.
+#[test]
+fn a_spool_that_rests_at_its_middle_makes_a_hold() {
+    let held = trace(HeldCylinder { leaks_lpm: [0.01, 0.0, 0.0], ..HeldCylinder::default() }, 10.0, 6);
+    let (_, rows) = held.text.split_once('\n').expect("a header");
+    let from_1_s: Vec<&str> = rows.lines().skip(100).collect();
+    let marked = judged(&format!("t_s,x_mm,pa_bar,pb_bar,shut\n{}\n", from_1_s.join("\n")));
+    assert_eq!(marked.verdict.faults, [Leak::Internal]);
+
+    let valve = "[valve]\nrated_flow = \"4 L/min\"\nrated_drop = \"35 bar\"\nshut = \"below 0.5 %\"\nstroke = \"2 mm\"";
+    let rig = Rig::parse(&format!("{}{valve}", declared().to_toml()), "by its spool").expect("a rig");
+    let by_spool = |spool_mm: &str| {
+        let rows = rows.lines().map(|row| row[..row.len() - 1].to_owned() + spool_mm + "\n");
+        judged_by(&rig, &("t_s,x_mm,pa_bar,pb_bar,spool_mm\n".to_owned() + &rows.collect::<String>()))
+    };
+    let held = by_spool("-0.008");
+    assert_eq!((held.leakage, held.verdict.text), (marked.leakage, marked.verdict.text));
+    assert!(by_spool("0.02").hold.is_none(), "1 % is not below 0.5 %");
+}

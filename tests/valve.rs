@@ -366,3 +366,16 @@ fn without_a_chamber_pressure_and_a_calibration_nothing_is_told() {
     let message = calibrated(&rig, text, LeaksThen::Unknown).expect_err("no pressure").to_string();
     assert!(message.contains("no column for pressure B"), "{message}");
 }
+
+/// `[valve] shut` on a cylinder at work: its spool rests too seldom for a hold, and the valve's flows tell.
+#[test]
+fn a_spool_that_passes_its_middle_makes_no_hold() {
+    let (plain, by_spool) = (rig(""), rig("shut = \"below 0.5 %\""));
+    for wind in [1.0, 2.5] {
+        let text =
+            ValveCylinder { wind, ..ValveCylinder::drawn(77) }.leaking(0, 0.05).trace(60.0, 100.0, 3e-3);
+        let report = judged(text.clone(), &by_spool);
+        assert!(is_found(&report, Leak::Internal) && report.hold.is_none(), "{}", report.verdict.text);
+        assert_eq!(report.verdict.status, judged(text, &plain).verdict.status);
+    }
+}

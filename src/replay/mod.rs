@@ -27,7 +27,7 @@ pub use stream::{Stream, Taken};
 use crate::channels::ChannelMonitor;
 use crate::explain::{Decision, Statistic, explain};
 use crate::hold::{self, Recorder};
-use crate::report::{Alarm, ReplayReport, TraceSummary};
+use crate::report::{Alarm, ReplayReport, Status, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::told::Beside;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
@@ -454,11 +454,17 @@ pub fn replay<E: From<ReplayError>>(
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
-    if let Some(hold) = holds.and_then(|holds| holds.finish(rig)) {
-        return Ok(hold.report(summary, rig));
-    }
+    let hold = holds.and_then(|holds| holds.finish(rig)).map(|hold| hold.report(summary.clone(), rig));
+    // A spool that came to rest now and then may have told too little: the valve's flows tell more.
+    let hold = match hold {
+        Some(hold) if !(rig.may_shut_itself() && hold.verdict.status == Status::NotSure) => return Ok(hold),
+        other => other,
+    };
     if let Some(valve) = valve.and_then(|mut valve| valve.finish(rig)) {
         return Ok(valve.report(summary, rig));
+    }
+    if let Some(hold) = hold {
+        return Ok(hold);
     }
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());

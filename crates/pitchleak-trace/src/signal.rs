@@ -121,7 +121,7 @@ impl Signal {
             Self::Position => Some(Dimension::Length),
             Self::Speed => Some(Dimension::Speed),
             Self::PressureA | Self::PressureB | Self::Supply | Self::Tank => Some(Dimension::Pressure),
-            Self::Spool | Self::Command => Some(Dimension::Share),
+            Self::Spool | Self::Command => Some(Dimension::Spool),
             Self::Force => Some(Dimension::Force),
             Self::Temperature => Some(Dimension::Temperature),
             Self::FlowA | Self::FlowB | Self::LeakInternal | Self::LeakExternalA | Self::LeakExternalB => {

@@ -58,6 +58,8 @@ pub enum Dimension {
     Temperature,
     /// A plain number or a share of something, 1.
     Share,
+    /// Position of a spool: a share of its stroke, 1; or a length, m, which the stroke makes a share.
+    Spool,
 }
 
 /// One accepted unit: SI value = value · `factor` / `divisor` + `offset`.
@@ -94,6 +96,11 @@ impl Unit {
     /// A value in SI, in this unit.
     pub fn from_si(&self, value: f64) -> f64 {
         (value - self.offset) * self.divisor / self.factor
+    }
+
+    /// Whether it is a length.
+    pub fn is_length(&self) -> bool {
+        LENGTH.iter().any(|length| length.text == self.text)
     }
 
     /// Whether the unit is the SI unit itself.
@@ -189,6 +196,7 @@ const TIME: &[Unit] = &[
 const FREQUENCY: &[Unit] = &[times("Hz", None, 1.0), times("kHz", None, 1e3)];
 const TEMPERATURE: &[Unit] = &[times("K", Some("k"), 1.0), unit_of("°C", Some("c"), 1.0, 1.0, 273.15)];
 const SHARE: &[Unit] = &[times("1", None, 1.0), over("%", Some("percent"), 1e2)];
+const SPOOL: &[Unit] = &[SHARE[0], SHARE[1], LENGTH[2]];
 
 impl Dimension {
     /// The accepted units, SI first.
@@ -206,13 +214,14 @@ impl Dimension {
             Self::Frequency => FREQUENCY,
             Self::Temperature => TEMPERATURE,
             Self::Share => SHARE,
+            Self::Spool => SPOOL,
         }
     }
 
     /// The SI unit as text; empty for a plain number.
     pub fn si(self) -> &'static str {
         match self {
-            Self::Share => "",
+            Self::Share | Self::Spool => "",
             other => other.units().first().map_or("", |unit| unit.text),
         }
     }
@@ -241,7 +250,7 @@ impl Dimension {
             Self::Flow => "L/min",
             Self::Speed => "mm/s",
             Self::Temperature => "°C",
-            Self::Share => "%",
+            Self::Share | Self::Spool => "%",
             other => other.si(),
         };
         self.units().iter().find(|unit| unit.text == text).copied()

@@ -93,6 +93,30 @@ impl Layout {
         Ok(layout)
     }
 
+    /// As shares of its stroke what is read of the spool in millimetres. Without a valve nothing asks for them.
+    ///
+    /// # Errors
+    /// Where `[valve]` does not say the stroke.
+    pub(super) fn of_stroke(mut self, rig: &Rig) -> Result<Self, TraceFault> {
+        let Some(valve) = &rig.valve else { return Ok(self) };
+        for column in &mut self.columns {
+            let Content::Number(Signal::Spool | Signal::Command, Some(unit)) = &mut column.content else {
+                continue;
+            };
+            if !unit.is_length() {
+                continue;
+            }
+            let stroke_m = valve.stroke_m.ok_or_else(|| TraceFault::Ambiguous {
+                what: format!("column `{}` is in {}", shorten(&column.header, 40), unit.text),
+                settle:
+                    "say the spool's stroke in the rig file, [valve] stroke = \"2 mm\", or give percent of it"
+                        .to_owned(),
+            })?;
+            *unit = unit.scaled(1.0 / stroke_m, 0.0);
+        }
+        Ok(self)
+    }
+
     /// Whether the trace has a column for `signal`.
     pub(super) fn has(&self, signal: Signal) -> bool {
         self.header_of(signal).is_some()
@@ -361,7 +385,7 @@ pub(super) fn bind(
             layout
         }
     };
-    Ok(Bound { layout, foreign })
+    Ok(Bound { layout: layout.of_stroke(rig)?, foreign })
 }
 
 /// What a channel is called whose name is its file's.

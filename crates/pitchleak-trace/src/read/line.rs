@@ -21,7 +21,7 @@ impl LineLayout {
     /// # Errors
     /// As for the header row of a trace.
     pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
-        Layout::new(names, &rig.columns).map(|layout| {
+        Layout::new(names, &rig.columns)?.of_stroke(rig).map(|layout| {
             let time = rig.csv.time.clone().unwrap_or(layout.time);
             Self(Layout { counted: Counted::Lines, time, ..layout })
         })

@@ -219,8 +219,7 @@ pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<
 fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal> {
     let words = words(column.header);
     if let Some(signal) = of_the_valve(&words) {
-        // A spool in millimetres needs its stroke: only a person knows that.
-        let found = column.unit(Dimension::Share)?;
+        let found = column.unit(Dimension::Spool)?;
         return Some(Proposal { signal, column: column.named(found), why: Why::Name });
     }
     if !may_be_a_reading(&words) {
@@ -448,16 +447,7 @@ mod tests {
         let (steady, both_ways) = (cells(|i| 50.0 + i.sin()), cells(|i| 2.0 * i.sin()));
         for cells in [&steady, &both_ways] {
             let cells: Vec<&str> = cells.iter().map(String::as_str).collect();
-            for header in [
-                "Validity",
-                "Value",
-                "time",
-                "ScaleFactor",
-                "X_Value",
-                "Spool position [mm]",
-                "x_setpoint",
-                "Valve cmd",
-            ] {
+            for header in ["Validity", "Value", "time", "ScaleFactor", "X_Value", "x_setpoint", "Valve cmd"] {
                 assert_eq!(proposed(&[header], &[&cells]), [""; 0], "{header}");
             }
         }

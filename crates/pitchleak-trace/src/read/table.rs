@@ -37,7 +37,7 @@ impl TableLayout {
     /// # Errors
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
-        match Layout::new(headers, &rig.columns) {
+        match Layout::new(headers, &rig.columns).and_then(|layout| layout.of_stroke(rig)) {
             Ok(layout) => Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout }))),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }

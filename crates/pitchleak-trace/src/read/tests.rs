@@ -658,3 +658,70 @@ fn beside_a_valve_one_chamber_pressure_may_be_missing() {
         assert!(open(header).is_err(), "{header}");
     }
 }
+
+/// A rig with a valve, whose `[valve]` says `more`.
+fn valve(more: &str) -> Rig {
+    let valve = format!("[valve]\nrated_flow = \"4 L/min\"\nrated_drop = \"35 bar\"\n{more}");
+    Rig::parse(&format!("{}{valve}", Rig::paper().to_toml()), "rig").expect("a rig")
+}
+
+fn records(text: String, rig: &Rig) -> Result<Vec<Record>, TraceError> {
+    let mut reader = TraceReader::from_stream("t", Box::new(std::io::Cursor::new(text)), rig)?;
+    let (mut record, mut records) = (Record::default(), Vec::new());
+    while reader.next_record(&mut record)? {
+        records.push(record);
+    }
+    Ok(records)
+}
+
+/// By its own name, by `[columns]` and by a row of units; without a stroke the message says what to write.
+#[test]
+fn a_spool_in_millimetres_is_a_share_of_its_stroke() {
+    let text = |header: &str, units: &str| {
+        format!(
+            "t_s,x_m,pa_pa,pb_pa,{header},valve_command_mm\n{units}0,0.1,5e6,4e6,-0.5,0.5\n1,0.1,5e6,4e6,,0.5\n"
+        )
+    };
+    let mapped = "stroke = \"2 mm\"\n[columns]\nspool = { name = \"LVDT\", unit = \"mm\", scale = -1, offset = \"0.1 mm\" }";
+    let cases = [
+        (text("spool_mm", ""), "stroke = \"2 mm\"", [-0.25, 0.25]),
+        (text("LVDT", ""), mapped, [0.3, 0.25]),
+        (text("Spool position [mm]", ""), "stroke = \"2 mm\"", [-0.25, 0.25]),
+        (text("Spool", "s,m,Pa,Pa,mm,mm\n"), "stroke = \"2 mm\"", [-0.25, 0.25]),
+    ];
+    for (text, more, expected) in cases {
+        let shares: Vec<_> = records(text, &valve(more))
+            .expect(more)
+            .iter()
+            .map(|record| record.valve.map(|valve| valve.spool))
+            .collect();
+        for (share, expected) in shares.iter().zip(expected) {
+            assert!((share.expect("a spool") - expected).abs() < 1e-12, "{more}: {shares:?}");
+        }
+    }
+    let message = records(text("spool_mm", ""), &valve("")).expect_err("no stroke").to_string();
+    assert!(message.contains("`spool_mm`") && message.contains("stroke = \"2 mm\""), "{message}");
+    assert!(records(text("spool_mm", ""), &Rig::paper()).is_ok(), "nothing asks for it without a valve");
+}
+
+/// Once it has rested for a second, until it moves; what the trace itself says goes before.
+#[test]
+fn a_spool_that_rests_near_its_middle_shuts_the_ports() {
+    let rig = valve("shut = \"below 0.5 %\"");
+    let spool = |k: i32| match k {
+        0..100 | 350.. => 3.0,
+        100..130 => 0.2,
+        130..140 => -0.6,
+        _ => -0.4,
+    };
+    let rows = |shut: &str| {
+        let mut text =
+            format!("t_s,x_m,pa_pa,pb_pa,spool_percent{}\n", if shut.is_empty() { "" } else { ",shut" });
+        (0..400).for_each(|k| text += &format!("{},0.1,5e6,4e6,{}{shut}\n", f64::from(k) / 100.0, spool(k)));
+        records(text, &rig).expect("rows")
+    };
+    for (k, record) in rows("").iter().enumerate() {
+        assert_eq!(record.shut, Some((240..350).contains(&k)), "{k}");
+    }
+    assert!(rows(",0").iter().all(|record| record.shut == Some(false)));
+}

@@ -24,6 +24,9 @@ pub struct RowValidator {
     /// The chamber pressure that is not measured.
     #[serde(default)]
     unread: Option<Signal>,
+    /// Where the rig file says at which positions of the spool the ports are shut.
+    #[serde(default)]
+    shut: Option<ShutBySpool>,
     /// The last row, if it was refused as out of range.
     #[serde(skip)]
     refused: Option<Record>,
@@ -43,13 +46,15 @@ impl RowValidator {
             bad_rows: BadRows::Skip,
             quality,
             unread: layout.unread(),
+            shut: ShutBySpool::of(rig),
             refused: None,
         }
     }
 
     /// Whether it holds rows against what `rig` may read.
     pub fn is_for(&self, rig: &Rig) -> bool {
-        self.ranges == Ranges::of(rig)
+        let below = |shut: Option<&ShutBySpool>| shut.map(|shut| shut.below);
+        self.ranges == Ranges::of(rig) && below(self.shut.as_ref()) == below(ShutBySpool::of(rig).as_ref())
     }
 
     pub(super) fn unread(&self) -> Option<Signal> {
@@ -127,6 +132,9 @@ impl RowValidator {
             }
         };
         *record = Record { dt_s, after_gap, ..self.readings(row) };
+        if let Some(shut) = &mut self.shut {
+            shut.tell(record);
+        }
         self.quality.count_row(record);
         None
     }
@@ -170,6 +178,38 @@ impl RowValidator {
         }
         let first = self.quality.first_bad.first().cloned();
         Err(TraceFault::NoRows { skipped: self.quality.skipped, first, mistake: None })
+    }
+}
+
+/// So long the spool has to rest before its ports count as shut, s. Chosen: one that only passes its middle is no hold, and what moved
+/// the cylinder has died down.
+const RESTS_S: f64 = 1.0;
+
+/// Ports that are shut by the valve's own spool at rest, `[valve] shut`.
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+struct ShutBySpool {
+    /// Distance from the middle, a share of the stroke.
+    below: f64,
+    /// The first of the readings so far that are all below it, s.
+    since_s: Option<f64>,
+}
+
+impl ShutBySpool {
+    fn of(rig: &Rig) -> Option<Self> {
+        let below = rig.valve.as_ref()?.shut_below?;
+        Some(Self { below, since_s: None })
+    }
+
+    /// Says of a record that does not say so itself whether its ports are shut. Where there are meters, they go on.
+    fn tell(&mut self, record: &mut Record) {
+        let Some(valve) = record.valve.as_ref().filter(|_| !record.has_flow()) else { return };
+        if valve.spool.abs() >= self.below {
+            self.since_s = None;
+        } else if record.after_gap || self.since_s.is_none() {
+            self.since_s = Some(record.t_s);
+        }
+        let rests = self.since_s.is_some_and(|since_s| record.t_s - since_s >= RESTS_S);
+        record.shut = record.shut.or(Some(rests));
     }
 }
 

@@ -262,11 +262,19 @@ fn a_valve_is_read_and_written() {
     assert_eq!(Rig::parse(&rig.to_toml(), "valve").expect("its own text"), rig);
     assert_eq!(Rig::parse(&rig.to_toml_over(VALVE), "valve").expect("its own text"), rig);
 
+    let shut = VALVE.replace("supply = ", "stroke = \"2 mm\"\nshut = \"below 0.5 %\"\nsupply = ");
+    let rig = Rig::parse(&shut, "valve").expect("a rig");
+    let valve = rig.valve.clone().expect("a valve");
+    assert_eq!((valve.stroke_m, valve.shut_below), (Some(2e-3), Some(5e-3)));
+    assert_eq!(Rig::parse(&rig.to_toml(), "valve").expect("its own text"), rig);
+
     let wrong = [
         ("rated_drop = \"35 bar\"", "rated_drop = \"35 mm\"", "valve.rated_drop"),
         ("rated_flow = \"4 L/min\"", "", "valve.rated_flow"),
         ("spool = { accuracy", "spool = { full_scale = 1, accuracy", "sensors.spool.full_scale"),
-        ("supply = \"100 bar\"", "shut = \"below 1 %\"", "valve.shut"),
+        ("supply = \"100 bar\"", "shut = \"above 1 %\"", "valve.shut"),
+        ("supply = \"100 bar\"", "shut = \"below 120 %\"", "valve.shut"),
+        ("supply = \"100 bar\"", "stroke = \"2 bar\"", "valve.stroke"),
     ];
     for (is, becomes, key) in wrong {
         let message = Rig::parse(&VALVE.replace(is, becomes), "valve").expect_err(becomes).to_string();

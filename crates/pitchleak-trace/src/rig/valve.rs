@@ -2,7 +2,7 @@
 
 use super::bound::{self, Bound};
 use super::document::{RigError, Section};
-use crate::units::Dimension;
+use crate::units::{self, Dimension};
 
 /// The valve between supply and cylinder, of four edges: supply to A, A to tank, supply to B, B to tank.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -19,6 +19,10 @@ pub struct ValveSheet {
     pub lap_std: f64,
     /// What the whole valve leaks at its middle, as a share of the rated flow.
     pub null_leak: f64,
+    /// Travel of the spool from its middle to full flow, m, where a trace has its position in millimetres.
+    pub stroke_m: Option<f64>,
+    /// Both ports are shut while the spool rests nearer to its middle than this share of its stroke.
+    pub shut_below: Option<f64>,
     /// Half width of the spool's hysteresis, a share of its stroke.
     pub hysteresis: f64,
     /// By how much the spool's reading is late, s.
@@ -57,6 +61,7 @@ const SUPPLY_STD: f64 = 0.1;
 /// Over an edge, Pa: from hoses to hammers.
 const DROP: Bound = Bound::between(1e3, 1e8);
 const LAP: Bound = Bound::between(-1.0, 1.0);
+const STROKE_M: Bound = Bound::between(1e-6, 1.0);
 const LAG_S: Bound = Bound::between(-1.0, 1.0);
 const TANK_PA: Bound = Bound::between(-1.01325e5, 1e8);
 const SUPPLY_PA: Bound = Bound::between(1e4, 1e9);
@@ -73,6 +78,8 @@ impl ValveSheet {
             "lap",
             "lap_std",
             "null_leak",
+            "stroke",
+            "shut",
             "hysteresis",
             "spool_lag",
             "drift",
@@ -91,6 +98,8 @@ impl ValveSheet {
             lap: section.quantity("lap", Dimension::Share, LAP)?.unwrap_or(0.0),
             lap_std: share("lap_std")?.unwrap_or(LAP_STD),
             null_leak: share("null_leak")?.unwrap_or(NULL_LEAK),
+            stroke_m: section.quantity("stroke", Dimension::Length, STROKE_M)?,
+            shut_below: read_shut(section)?,
             hysteresis: share("hysteresis")?.unwrap_or(HYSTERESIS),
             spool_lag_s: section.quantity("spool_lag", Dimension::Time, LAG_S)?.unwrap_or(0.0),
             drift: ValveDrift::read(&section.section("drift")?)?,
@@ -101,6 +110,17 @@ impl ValveSheet {
             calibration: section.text("calibration")?.map(str::to_owned),
         }))
     }
+}
+
+/// Reads `shut = "below 0.5 %"`.
+fn read_shut(section: &Section<'_>) -> Result<Option<f64>, RigError> {
+    let Some(text) = section.text("shut")? else { return Ok(None) };
+    let below =
+        text.trim().strip_prefix("below ").and_then(|share| units::parse(share, Dimension::Share).ok());
+    let below = below.filter(|share| *share > 0.0 && *share < 1.0);
+    below
+        .map(Some)
+        .ok_or_else(|| section.impossible("shut", text, "\"below 0.5 %\", a share of the spool's stroke"))
 }
 
 impl ValveDrift {

@@ -199,6 +199,8 @@ impl Rig {
                 ("lap", share(valve.lap)),
                 ("lap_std", share(valve.lap_std)),
                 ("null_leak", share(valve.null_leak)),
+                ("stroke", valve.stroke_m.and_then(|stroke_m| with(stroke_m, Dimension::Length))),
+                ("shut", valve.shut_below.map(|share| toml_text(&format!("below {share:?}")))),
                 ("hysteresis", share(valve.hysteresis)),
                 ("spool_lag", with(valve.spool_lag_s, Dimension::Time)),
                 ("drift.gain", share(valve.drift.gain)),
