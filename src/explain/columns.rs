@@ -131,6 +131,7 @@ impl Scales<'_> {
         let kappa = self.compressibility();
         let instruments = &self.rig.instruments;
         let stroke = self.rig.cylinder.stroke_m;
+        let [dead_a, dead_b] = [self.rig.cylinder.dead_volume_a_m3, self.rig.cylinder.dead_volume_b_m3];
         let flow = self.full_scale_m3s();
         let per_mpa = self.pressures_mpa.map(|p| flow / p.max(LEAST_MPA));
         let per_root = self.roots.map(|root| flow / root.max(1.0));
@@ -153,9 +154,24 @@ impl Scales<'_> {
             Column::Lags => plain(&[(R::FlowChangeA, -1.0)], &[(R::FlowChangeB, -1.0)]),
             Column::DeadVolumeA => plain(&[(R::PressureChangeA, kappa * area_a * stroke)], &[]),
             Column::DeadVolumeB => plain(&[], &[(R::PressureChangeB, kappa * area_b * stroke)]),
-            Column::AreaA => plain(&[(R::Travel, area_a)], &[]),
-            Column::AreaB => plain(&[], &[(R::Travel, -area_b)]),
-            Column::PositionGain => plain(&[(R::Travel, area_a)], &[(R::Travel, -area_b)]),
+            // The swept volume, V less the dead one, is as wrong as the area.
+            Column::AreaA => plain(
+                &[(R::Travel, area_a), (R::StorageA, kappa), (R::PressureChangeA, -kappa * dead_a)],
+                &[],
+            ),
+            Column::AreaB => plain(
+                &[],
+                &[(R::Travel, -area_b), (R::StorageB, kappa), (R::PressureChangeB, -kappa * dead_b)],
+            ),
+            // As of both areas; but V_B counts from the other end, which stays where it is.
+            Column::PositionGain => plain(
+                &[(R::Travel, area_a), (R::StorageA, kappa), (R::PressureChangeA, -kappa * dead_a)],
+                &[
+                    (R::Travel, -area_b),
+                    (R::StorageB, kappa),
+                    (R::PressureChangeB, -kappa * (dead_b + area_b * stroke)),
+                ],
+            ),
             Column::PositionZero => plain(
                 &[(R::PressureChangeA, kappa * area_a * stroke)],
                 &[(R::PressureChangeB, -kappa * area_b * stroke)],

@@ -213,7 +213,8 @@ pub(super) fn departures() -> Vec<Entry> {
     const CLOCK: &str = "Compare the clocks and filters of flow meters and position.";
     const AREA: &str = "Measure piston and rod, or compare the data sheet.";
     const PRESSURE: &str = "Compare both pressure sensors with a gauge.";
-    let (late_s, very_late_s, gain, gross) = (0.1, 1.0, 0.05, 0.01);
+    // Meters come with a certificate; an area is a rod of another size, or a slip.
+    let (late_s, very_late_s, meter_gain, gain, gross) = (0.1, 1.0, 0.02, 0.05, 0.01);
     let entry = |id, share, text| Entry::new(id, Kind::Departure, share, text);
     let as_declared = entry("as_declared", 0.80, "sensors and rig are as declared");
     let mut all = vec![
@@ -227,8 +228,14 @@ pub(super) fn departures() -> Vec<Entry> {
         entry("flow_lag_gross", 0.5 * RARE, "both flow meters lag by seconds")
             .free(C::Lags, very_late_s)
             .remedy(CLOCK, None),
-        entry("flow_gain_a", UNCOMMON, "flow meter A's gain is off").free(C::GainA, gain).remedy(METER, None),
-        entry("flow_gain_b", UNCOMMON, "flow meter B's gain is off").free(C::GainB, gain).remedy(METER, None),
+        entry("flow_gain_a", UNCOMMON, "flow meter A's gain is off")
+            .free(C::GainA, meter_gain)
+            .remedy(METER, None)
+            .alike(&["area_a"]),
+        entry("flow_gain_b", UNCOMMON, "flow meter B's gain is off")
+            .free(C::GainB, meter_gain)
+            .remedy(METER, None)
+            .alike(&["area_b"]),
         entry("flow_gain", UNCOMMON, "both flow meters' gain, or the position's, is off")
             .free(C::Gains, gain)
             .remedy(METER, None)

@@ -42,7 +42,7 @@ use pitchleak_core::continuity::Block;
 use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
 use pressures::TracePressures;
 use scoring::Scoring;
-use spikes::Spikes;
+use spikes::{Sifted, Spikes};
 use temperature::OilTemperature;
 
 /// The estimates after one record, for a file of estimates over time.
@@ -206,14 +206,16 @@ impl Replay {
     #[inline]
     fn push_open(&mut self, record: &Record) -> bool {
         self.channels.add(record);
-        if self.spikes.leave_out(record) {
-            return false;
-        }
-        let left_out_s = self.spikes.take_left_out_s();
-        if left_out_s > 0.0 {
-            self.correct(&Record { dt_s: record.dt_s + left_out_s, ..*record })
-        } else {
-            self.correct(record)
+        match self.spikes.sift(record) {
+            Sifted::Waits => false,
+            Sifted::Taken => self.correct(record),
+            Sifted::AfterSpikes(left_out_s) => {
+                self.correct(&Record { dt_s: record.dt_s + left_out_s, ..*record })
+            }
+            Sifted::AfterAll(waited) => {
+                let renewed = waited.iter().fold(false, |renewed, waited| self.correct(waited) | renewed);
+                self.correct(record) | renewed
+            }
         }
     }
 
@@ -374,11 +376,6 @@ impl Replay {
     /// Whether both ports are shut: such records are for [`crate::hold`].
     pub fn rests(&self) -> bool {
         self.rests
-    }
-
-    /// Whether the last record was left out as a spike.
-    pub fn left_out(&self) -> bool {
-        self.spikes.left_out()
     }
 
     /// Alarms so far, in the order of time.

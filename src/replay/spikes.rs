@@ -1,7 +1,7 @@
 //! Single wild readings, as a disturbed cable makes them, are left out before anything is estimated.
 //!
-//! A reading is wild where it steps away from the one before by far more than the channel usually does; where it stays
-//! there, it was none, and the row or two left out are no loss.
+//! A reading is wild where it steps away from the one before by far more than the channel usually does. It waits until the next ones
+//! tell: where they stay there, it was none, and is taken in as if nothing had been.
 
 use crate::trace::Record;
 use pitchleak_core::Sensors;
@@ -13,15 +13,28 @@ const NOISE_STDS: f64 = 8.0;
 /// … and beyond so many steps of the reading's resolution.
 const QUANTA: f64 = 2.5;
 /// Wild rows in a row that are left out at the most.
-const MOST_IN_A_ROW: u32 = 2;
+const MOST_IN_A_ROW: usize = 2;
 /// Steps over which the usual one is averaged; as long, at first, every reading is taken. Later one of so many is enough.
 const MEMORY: u32 = 64;
 const THINNED: u64 = 4;
 
 const CHANNELS: usize = 5;
 
+/// What to do with a record.
+#[derive(Debug, PartialEq)]
+pub(super) enum Sifted {
+    /// It may be a spike: nothing is taken in yet.
+    Waits,
+    /// Take it.
+    Taken,
+    /// Take it; those that waited were spikes, and it stands for their time as well, s.
+    AfterSpikes(f64),
+    /// Take those that waited, which were none, then it.
+    AfterAll(Vec<Record>),
+}
+
 /// Watches steps; a few instructions per reading.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Spikes {
     /// Position, pressures, flows as last taken.
     last: [f64; CHANNELS],
@@ -34,9 +47,9 @@ pub(super) struct Spikes {
     /// Rows taken, and of each channel the steps that were learnt from.
     taken: u64,
     learnt: [u32; CHANNELS],
-    in_a_row: u32,
-    /// Time of the rows left out since the last one taken, s.
-    left_out_s: f64,
+    /// Wild ones since the last one taken.
+    #[serde(default)]
+    waiting: Vec<Record>,
     rows: u64,
 }
 
@@ -50,23 +63,24 @@ impl Spikes {
             least_wild: sensors.noise_stds().map(|std| NOISE_STDS * std),
             taken: 0,
             learnt: [0; CHANNELS],
-            in_a_row: 0,
-            left_out_s: 0.0,
+            waiting: Vec::new(),
             rows: 0,
         }
     }
 
-    /// Whether to leave this record out.
+    /// What to do with this record.
     #[inline]
-    pub fn leave_out(&mut self, record: &Record) -> bool {
+    pub fn sift(&mut self, record: &Record) -> Sifted {
         let s = &record.sample;
         let now = [s.x_m, s.pa_pa, s.pb_pa, s.qa_m3s.unwrap_or(f64::NAN), s.qb_m3s.unwrap_or(f64::NAN)];
         // By place: zipped iterators are made by calls here, for every record. Of what was not read there is no step.
         let steps = from_fn(|channel| (now[channel] - self.last[channel]).abs());
         let is_wild = |channel: usize| steps[channel] > self.wild_step[channel];
         let wild = (0..CHANNELS).fold(false, |wild, channel| wild | is_wild(channel));
-        if (wild || self.in_a_row > 0) && self.is_spike(wild, record) {
-            return true;
+        let sifted =
+            if wild || !self.waiting.is_empty() { self.sift_wild(wild, record) } else { Sifted::Taken };
+        if sifted == Sifted::Waits {
+            return sifted;
         }
         let last = self.last;
         self.last = from_fn(|channel| if now[channel].is_nan() { last[channel] } else { now[channel] });
@@ -74,23 +88,23 @@ impl Spikes {
         if self.taken <= u64::from(MEMORY) || self.taken.is_multiple_of(THINNED) {
             self.learn(&steps, record);
         }
-        false
+        sifted
     }
 
-    /// Whether a record that steps away, or follows one that did, is to be left out.
+    /// Of a record that steps away, or follows one that did.
     #[cold]
-    fn is_spike(&mut self, wild: bool, record: &Record) -> bool {
+    fn sift_wild(&mut self, wild: bool, record: &Record) -> Sifted {
         let follows = !record.after_gap && record.dt_s > 0.0;
-        if wild && follows && self.in_a_row < MOST_IN_A_ROW {
-            self.in_a_row += 1;
-            self.rows += 1;
-            self.left_out_s += record.dt_s;
-            return true;
+        if wild && follows && self.waiting.len() < MOST_IN_A_ROW {
+            self.waiting.push(*record);
+            return Sifted::Waits;
         }
-        // What stays is no spike.
-        self.rows -= if wild { u64::from(self.in_a_row) } else { 0 };
-        self.in_a_row = 0;
-        false
+        let waited = std::mem::take(&mut self.waiting);
+        if wild && follows {
+            return Sifted::AfterAll(waited);
+        }
+        self.rows += waited.len() as u64;
+        Sifted::AfterSpikes(waited.iter().map(|spike| spike.dt_s).sum())
     }
 
     /// What is usual.
@@ -112,17 +126,6 @@ impl Spikes {
         }
     }
 
-    /// The time that the rows left out before this one stood for, s; it is then forgotten.
-    #[inline]
-    pub fn take_left_out_s(&mut self) -> f64 {
-        std::mem::take(&mut self.left_out_s)
-    }
-
-    /// Whether the last record was left out.
-    pub fn left_out(&self) -> bool {
-        self.in_a_row > 0
-    }
-
     /// What a reader of the results should know of it.
     pub fn warning(&self) -> Option<String> {
         (self.rows > 0)
@@ -136,21 +139,29 @@ mod tests {
     use crate::rig::Rig;
     use crate::simulate::Normal;
 
-    /// A slow motion with noise of which row `wild` reads `pa_pa`.
+    /// Rows that are left out of a slow motion with noise and `change`.
     fn left_out(change: impl Fn(usize, &mut Record)) -> Vec<usize> {
         let sensors = Rig::paper().sensors();
         let mut spikes = Spikes::new(&sensors);
         let mut normal = Normal::stream(1, 0);
-        let rows = (0..2000).filter(|k| {
-            let t_s = 0.01 * *k as f64;
-            let mut record = Record { t_s, dt_s: 0.01, ..Record::default() };
+        let mut taken = Vec::new();
+        for k in 0..2000_usize {
+            let t_s = 0.01 * k as f64;
+            let mut record = Record { line: k as u64, t_s, dt_s: 0.01, ..Record::default() };
             record.sample.x_m = 0.1 + 0.05 * t_s.sin() + sensors.position.noise_std * normal.draw();
             record.sample.pa_pa = 5e6 + 1e6 * (3.0 * t_s).sin() + sensors.pressure.noise_std * normal.draw();
             record.sample.qa_m3s = Some(sensors.flow_a.noise_std * normal.draw());
-            change(*k, &mut record);
-            spikes.leave_out(&record)
-        });
-        rows.collect()
+            change(k, &mut record);
+            match spikes.sift(&record) {
+                Sifted::Waits => continue,
+                Sifted::AfterAll(waited) => taken.extend(waited.iter().map(|waited| waited.line)),
+                Sifted::Taken | Sifted::AfterSpikes(_) => {}
+            }
+            taken.push(record.line);
+        }
+        assert!(taken.is_sorted());
+        assert_eq!(spikes.rows, 2000 - taken.len() as u64);
+        (0..2000).filter(|k| !taken.contains(&(*k as u64))).collect()
     }
 
     #[test]
@@ -187,6 +198,6 @@ mod tests {
     #[test]
     fn what_stays_is_taken() {
         let stepped = left_out(|k, record| record.sample.pa_pa += if k < 1000 { 0.0 } else { 4e6 });
-        assert_eq!(stepped, [1000, 1001]);
+        assert_eq!(stepped, [] as [usize; 0]);
     }
 }
