@@ -3,11 +3,13 @@
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
-use super::hypothesis::{CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, State, Subset, subsets};
+use super::hypothesis::{
+    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
+};
 use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::pass::Pass;
-use super::table::{Entry, USUAL};
+use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
 const BEYOND_WANDERING: f64 = 2.0;
@@ -96,7 +98,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
     fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
         let hypothesis =
             Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course);
-        let scored = Scored::new(self.declared, hypothesis);
+        let scored = Scored::new(self.declared, &self.pass.sizes, hypothesis);
         let ln_likelihood = scored.ln_likelihood;
         self.best_ln = self.best_ln.max(scored.ln_posterior);
         self.all.push(scored);
@@ -206,7 +208,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let (sizes, segments) = (&self.pass.sizes, self.pass.segments);
             let mut hypothesis = Hypothesis::new(&mended.equations, sizes, segments, state, leaks, ln_prior);
             hypothesis.wiring = Some(entry);
-            let mut scored = Scored::new(&mended.equations, hypothesis);
+            let mut scored = Scored::new(&mended.equations, sizes, hypothesis);
             scored.wiring = wiring;
             scored.ln_posterior += mended.ln_chance(scored.scales);
             // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
@@ -231,9 +233,9 @@ struct Mistaken<'a> {
 }
 
 impl<'a> Scored<'a> {
-    fn new(equations: &NormalEquations, hypothesis: Hypothesis<'a>) -> Self {
+    fn new(equations: &NormalEquations, sizes: &Sizes, hypothesis: Hypothesis<'a>) -> Self {
         let Fit { ln_evidence, ln_likelihood, scales, means, .. } = fit(equations, &hypothesis.free);
-        let ln_posterior = if is_impossible(equations, &hypothesis, &means) {
+        let ln_posterior = if is_impossible(equations, sizes, &hypothesis, &means) {
             f64::NEG_INFINITY
         } else {
             ln_evidence + hypothesis.ln_prior
@@ -253,13 +255,26 @@ const GAINS: [Column; 8] = [
     Column::PressureGainB,
 ];
 
-fn is_impossible(equations: &NormalEquations, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
+fn is_impossible(
+    equations: &NormalEquations,
+    sizes: &Sizes,
+    hypothesis: &Hypothesis<'_>,
+    means: &[f64],
+) -> bool {
     let places = GAINS.map(|gain| equations.place(gain, Course::Constant));
     let compressibility = equations.place(Column::Compressibility, Course::Constant);
+    let volumes =
+        [Column::DeadVolumeA, Column::DeadVolumeB].map(|volume| equations.place(volume, Course::Constant));
+    // A chamber holds what is swept; the stroke may be wrong as a gain may.
+    let least = |place: Option<usize>| {
+        let side = volumes.iter().position(|volume| *volume == place)?;
+        Some(-sizes.dead_volumes[side] - MOST_GAIN)
+    };
     hypothesis.free.iter().zip(means).any(|(free, mean)| {
         let place = Some(free.column);
         mean.abs() > MOST_GAIN && places.contains(&place)
             || place == compressibility && !COMPRESSIBILITY.contains(mean)
+            || free.std > USUAL_DEAD_VOLUME && least(place).is_some_and(|least| *mean < least)
     })
 }
 

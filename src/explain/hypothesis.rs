@@ -156,6 +156,8 @@ pub(super) struct Sizes {
     pub compressibility: f64,
     pub zeros: [f64; 2],
     pub gains: [f64; 2],
+    /// Shares of what is swept.
+    pub dead_volumes: [f64; 2],
 }
 
 impl Sizes {

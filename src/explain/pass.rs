@@ -83,6 +83,10 @@ impl<'a, 's> Pass<'a, 's> {
                 compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
                 zeros: flows.map(|flow| flow.bias),
                 gains: flows.map(|flow| flow.gain),
+                dead_volumes: [
+                    rig.cylinder.dead_volume_a_m3 / (rig.cylinder.area_a_m2 * rig.cylinder.stroke_m),
+                    rig.cylinder.dead_volume_b_m3 / (rig.cylinder.area_b_m2 * rig.cylinder.stroke_m),
+                ],
             },
             segments: statistic.segments().len(),
             full_scale_m3s,

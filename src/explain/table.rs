@@ -38,7 +38,7 @@ pub(crate) const USUAL_GAIN: f64 = 0.005;
 /// Lag of a meter, s: one or two periods of its own averaging. A guess.
 const USUAL_LAG_S: f64 = 0.010;
 /// Hose and port, share of the swept volume: 20 cm³ of the paper's 250 cm³. A guess.
-const USUAL_DEAD_VOLUME: f64 = 0.08;
+pub(super) const USUAL_DEAD_VOLUME: f64 = 0.08;
 /// Zero and gain of a pressure sensor that declares none, share of full scale each. A guess.
 pub(super) const USUAL_PRESSURE: f64 = 0.002;
 
@@ -258,10 +258,10 @@ pub(super) fn departures() -> Vec<Entry> {
             .free(C::PositionZero, 0.1)
             .remedy("Compare the position with the stroke's both ends.", None)
             .alike(&["dead_volume_a", "dead_volume_b"]),
-        entry("dead_volume_a", RARE, "chamber A holds more oil than declared")
+        entry("dead_volume_a", RARE, "the dead volume of chamber A is not as declared")
             .free(C::DeadVolumeA, 0.5)
             .remedy("Declare hoses and ports.", Some("dead_volume_a = \"{} cm^3\"")),
-        entry("dead_volume_b", RARE, "chamber B holds more oil than declared, or the stroke is longer")
+        entry("dead_volume_b", RARE, "the dead volume of chamber B, or the stroke, is not as declared")
             .free(C::DeadVolumeB, 0.5)
             .remedy("Declare hoses and ports, and the stroke.", Some("dead_volume_b = \"{} cm^3\""))
             .alike(&["stroke"]),
