@@ -29,7 +29,10 @@ type Leaks = [Option<LeakCourse>; 3];
 /// An explanation and its evidence before leaks are cut at zero.
 pub(super) struct Scored<'a> {
     pub hypothesis: Hypothesis<'a>,
+    /// At the most: with `ln_sign`.
     pub ln_posterior: f64,
+    /// At the most ln of the probability that no leak is negative: −½z² of the one that is so by the most standard deviations.
+    pub ln_sign: f64,
     ln_likelihood: f64,
     /// Noise scales s² of both equations.
     pub scales: [f64; 2],
@@ -135,7 +138,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
     /// Where even that raises the likelihood by too little, it need not be asked.
     fn add_free_courses(&mut self, state: State<'a>, subset: Subset) -> Option<f64> {
         let steady = find(&self.all, state, subset)?;
-        let (steady_ln, steady_likelihood) = (steady.ln_posterior, steady.ln_likelihood);
+        let (steady_ln, steady_likelihood) = (steady.ln_posterior - steady.ln_sign, steady.ln_likelihood);
         let mut most_likely = steady_likelihood;
         for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
             let ln_course = self.pass.tables.ln_course(course);
@@ -213,7 +216,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             scored.ln_posterior += mended.ln_chance(scored.scales);
             // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
             if subset == [false; 3] {
-                none_ln = scored.ln_posterior - scored.ln_likelihood;
+                none_ln = scored.ln_posterior - scored.ln_sign - scored.ln_likelihood;
             }
             let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < least;
             self.all.push(scored);
@@ -234,14 +237,23 @@ struct Mistaken<'a> {
 
 impl<'a> Scored<'a> {
     fn new(equations: &NormalEquations, sizes: &Sizes, hypothesis: Hypothesis<'a>) -> Self {
-        let Fit { ln_evidence, ln_likelihood, scales, means, .. } = fit(equations, &hypothesis.free);
-        let ln_posterior = if is_impossible(equations, sizes, &hypothesis, &means) {
+        let fit = fit(equations, &hypothesis.free);
+        let ln_sign = ln_sign(&fit, &hypothesis.positive);
+        let ln_posterior = if is_impossible(equations, sizes, &hypothesis, &fit.means) {
             f64::NEG_INFINITY
         } else {
-            ln_evidence + hypothesis.ln_prior
+            fit.ln_evidence + hypothesis.ln_prior + ln_sign
         };
-        Self { hypothesis, ln_posterior, ln_likelihood, scales, wiring: 0 }
+        let Fit { ln_likelihood, scales, .. } = fit;
+        Self { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, wiring: 0 }
     }
+}
+
+/// What the parameters that cannot be negative, and are, cost at the least.
+fn ln_sign(fit: &Fit, positive: &[usize]) -> f64 {
+    let negative = positive.iter().filter(|&&i| fit.means[i] < 0.0);
+    let squares = negative.map(|&i| fit.means[i].powi(2) / fit.covariance(&[i])[0][0]);
+    -0.5 * squares.fold(0.0, f64::max)
 }
 
 const GAINS: [Column; 8] = [

@@ -50,27 +50,20 @@ struct Fitted<'e, 'a> {
     fit: Fit,
 }
 
-/// An explanation with its leaks at least zero, its evidence and a sample of the leaks, beside the best so far; none
-/// where it is less probable than that by more than `least_ln`.
+/// An explanation with its leaks at least zero, its evidence and a sample of the leaks, beside the best so far.
 pub(super) fn cut<'a>(
     pass: &Pass<'a, '_>,
     weighing: Weighing<'_>,
-    Scored { hypothesis, ln_posterior, .. }: Scored<'a>,
+    Scored { hypothesis, ln_posterior, ln_sign, .. }: Scored<'a>,
     best: f64,
-    least_ln: f64,
-) -> Option<(f64, Weighed<'a>)> {
+) -> (f64, Weighed<'a>) {
     let fit = fit(weighing.equations, &hypothesis.free);
     let means: Vec<f64> = hypothesis.positive.iter().map(|&i| fit.means[i]).collect();
     let covariance = fit.covariance(&hypothesis.positive);
-    let heights = means.iter().enumerate().map(|(i, mean)| mean / covariance[i][i].sqrt());
-    let lowest = heights.fold(0.0, f64::min);
-    if ln_posterior - 0.5 * lowest * lowest < best - least_ln {
-        return None;
-    }
     let count = if ln_posterior < best - LITTLE_LN { FEW_POINTS } else { POINTS };
     let orthant = positive_orthant(&means, &covariance, count);
-    let ln = ln_posterior + orthant.ln_probability;
-    Some((ln, Fitted { pass, weighing, hypothesis, fit }.weighed(orthant)))
+    let ln = ln_posterior - ln_sign + orthant.ln_probability;
+    (ln, Fitted { pass, weighing, hypothesis, fit }.weighed(orthant))
 }
 
 impl<'a> Fitted<'_, 'a> {

@@ -119,7 +119,7 @@ fn mix<'a>(
             break;
         }
         let Some(weighing) = weighings.get(scored.wiring) else { continue };
-        let Some((ln, weighed)) = cut(pass, *weighing, scored, best, least_ln) else { continue };
+        let (ln, weighed) = cut(pass, *weighing, scored, best);
         best = best.max(ln);
         kept.push((ln, weighed));
     }
