@@ -8,6 +8,7 @@ use super::hypothesis::{
 };
 use super::mended::Mended;
 use super::mistakes::ln_wired;
+use super::orthant::ln_most;
 use super::pass::Pass;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 
@@ -31,7 +32,7 @@ pub(super) struct Scored<'a> {
     pub hypothesis: Hypothesis<'a>,
     /// At the most: with `ln_sign`.
     pub ln_posterior: f64,
-    /// At the most ln of the probability that no leak is negative: −½z² of the one that is so by the most standard deviations.
+    /// At the most ln of the probability that no leak is negative.
     pub ln_sign: f64,
     ln_likelihood: f64,
     /// Noise scales s² of both equations.
@@ -251,9 +252,8 @@ impl<'a> Scored<'a> {
 
 /// What the parameters that cannot be negative, and are, cost at the least.
 fn ln_sign(fit: &Fit, positive: &[usize]) -> f64 {
-    let negative = positive.iter().filter(|&&i| fit.means[i] < 0.0);
-    let squares = negative.map(|&i| fit.means[i].powi(2) / fit.covariance(&[i])[0][0]);
-    -0.5 * squares.fold(0.0, f64::max)
+    let means: Vec<f64> = positive.iter().map(|&i| fit.means[i]).collect();
+    if means.iter().all(|mean| *mean >= 0.0) { 0.0 } else { ln_most(&means, &fit.covariance(positive)) }
 }
 
 const GAINS: [Column; 8] = [

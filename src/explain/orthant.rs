@@ -19,6 +19,8 @@ const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.
 const LEAST_POINTS: f64 = 20.0;
 /// Sweeps until a sample has forgotten where it began; numerical.
 const GIBBS_BURN_IN: usize = 64;
+/// Sweeps of the dual problem: each only raises a bound; numerical.
+const DUAL_SWEEPS: usize = 20;
 /// Below such a tail its first asymptotic term serves.
 const LEAST_TAIL: f64 = 1e-12;
 
@@ -49,6 +51,22 @@ pub(super) static NORMALS: LazyLock<Vec<[f64; MOST]>> = LazyLock::new(|| {
     let normal = |point: usize, i: usize| normal_quantile(uniform((point * strides[i]) % POINTS, 8 + i));
     (0..POINTS).map(|point| std::array::from_fn(|i| normal(point, i))).collect()
 });
+
+/// ln of at the most what N(`means`, `covariance`) has in the positive orthant: −½d², where d is how many standard deviations off it
+/// is (Chernoff's bound, for a convex set). By the dual problem, max −½λ'Σλ − λ'μ over λ ≥ 0, of which every λ is a bound.
+pub(super) fn ln_most(means: &[f64], covariance: &[Vec<f64>]) -> f64 {
+    let mut dual = vec![0.0_f64; means.len()];
+    let slope = |dual: &[f64], i: usize| {
+        means[i] + covariance[i].iter().zip(dual).map(|(cell, dual)| cell * dual).sum::<f64>()
+    };
+    for _ in 0..DUAL_SWEEPS {
+        for i in 0..means.len() {
+            dual[i] = (dual[i] - slope(&dual, i) / covariance[i][i]).max(0.0);
+        }
+    }
+    // ½ λ'(μ + (μ + Σλ)) is the dual's negative.
+    0.5 * dual.iter().enumerate().map(|(i, own)| own * (means[i] + slope(&dual, i))).sum::<f64>()
+}
 
 /// N(`means`, `covariance`), of `MOST` variables or fewer, where every one is positive; a sample of `count` points.
 pub(crate) fn positive_orthant(means: &[f64], covariance: &[Vec<f64>], count: usize) -> Orthant {
@@ -212,7 +230,19 @@ mod tests {
                 probability
             );
             assert!((first - mean).abs() < 0.02 * mean.max(0.5), "{first} {mean}");
+            assert!(ln_most(&means, &covariance) >= probability.ln());
         }
+    }
+
+    /// Two that are each near zero and cannot be positive together: one by one hardly off, together six standard deviations.
+    #[test]
+    fn the_bound_knows_what_cannot_be_positive_together() {
+        let (means, covariance) = (vec![0.1, -0.7], vec![vec![1.0, -0.995], vec![-0.995, 1.0]]);
+        let bound = ln_most(&means, &covariance);
+        let (probability, _) = by_quadrature(&means, &covariance);
+        assert!(bound >= probability.ln() && bound < -15.0, "{bound} {}", probability.ln());
+        assert!(ln_most(&[1.0, 0.5], &covariance).abs() < 1e-12);
+        assert!((ln_most(&[-3.0], &[vec![4.0]]) + 9.0 / 8.0).abs() < 1e-12);
     }
 
     /// Far out in the tail the sample stays on the right side, and its probability finite.
