@@ -138,14 +138,19 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
     };
     let open: Vec<Leak> =
         Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && !findings.is_below(*leak)).collect();
+    let (away, open): (Vec<_>, Vec<_>) = open.into_iter().partition(|leak| findings.is_away(*leak));
+    let away = (!away.is_empty()).then(|| {
+        let text = format!("{} leaks come and go, and the last seconds show none", join(&away, "and"));
+        Reason::new(ReasonId::Undecided, text, "record some minutes, or watch it (`pitchleak watch`)")
+    });
     let (untold, undecided): (Vec<_>, Vec<_>) =
         open.into_iter().partition(|leak| decision.probability[*leak] <= TELLS_NOTHING);
     let untold = (!untold.is_empty()).then(|| {
         let text = format!("this trace cannot tell about {} leaks", join(&untold, "and"));
         Reason::new(ReasonId::NotIdentifiable, text, RECORD)
     });
-    untold
-        .into_iter()
+    away.into_iter()
+        .chain(untold)
         .chain(undecided.into_iter().map(|leak| self::undecided(findings, decision, leak)))
         .collect()
 }

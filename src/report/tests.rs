@@ -221,6 +221,25 @@ fn an_alarm_that_the_whole_trace_speaks_against_is_explained() {
     assert!(standing.verdict().text.contains("That explains the alarm of the internal leak."));
 }
 
+/// That the last seconds show none is no news of a leak that comes and goes; of one that stopped it is.
+#[test]
+fn a_leak_that_comes_and_goes_is_not_gone_while_its_alarm_stands() {
+    let with = |id: &str, active: PerLeak<bool>| {
+        let mut away = Found { active, ..sound() };
+        let decision = away.decision.as_mut().unwrap();
+        decision.ruled_out = Leak::ALL.to_vec();
+        decision.explanations = vec![explained(id, "", 0.9)];
+        away
+    };
+    let away = with("internal:wandering", INTERNAL);
+    assert_eq!(away.judged(), (Status::NotSure, vec!["undecided"]));
+    let text = away.verdict().text;
+    assert!(text.contains("Internal leaks come and go, and the last seconds show none."), "{text}");
+    assert!(text.contains("No external A or external B leak"), "{text}");
+    assert_eq!(with("internal:sudden", INTERNAL).judged(), (Status::Sound, vec![]));
+    assert_eq!(with("internal:wandering", PerLeak::default()).judged(), (Status::Sound, vec![]));
+}
+
 /// A sensor that is off is told, and spoils no verdict that does not hang on it.
 #[test]
 fn what_is_not_as_declared_is_told_beside_a_sure_verdict() {

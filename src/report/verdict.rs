@@ -130,9 +130,21 @@ impl Findings<'_> {
 
     /// Whether the data exclude that a leak is above its threshold.
     pub(super) fn is_below(&self, leak: Leak) -> bool {
-        self.decision.is_some_and(|decision| decision.ruled_out.contains(&leak))
+        self.decision.is_some_and(|decision| decision.ruled_out.contains(&leak)) && !self.is_away(leak)
+    }
+
+    /// Whether a leak comes and goes, as likely as not, and is away while its alarm stands.
+    pub(super) fn is_away(&self, leak: Leak) -> bool {
+        let Some(decision) = self.decision.filter(|_| self.active[leak]) else { return false };
+        let wandering = format!("{}:wandering", leak.id());
+        let coming =
+            decision.explanations.iter().filter(|one| one.id.split('+').any(|part| part == wandering));
+        decision.ruled_out.contains(&leak) && coming.map(|one| one.probability).sum::<f64>() > AWAY_DOUBT
     }
 }
+
+/// As likely as not.
+const AWAY_DOUBT: f64 = 0.5;
 
 /// A figure whose standard deviation is a larger share of it is none.
 const QUOTED_SHARE: f64 = 0.5;
