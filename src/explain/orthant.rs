@@ -19,8 +19,6 @@ const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.
 const LEAST_POINTS: f64 = 20.0;
 /// Sweeps until a sample has forgotten where it began; numerical.
 const GIBBS_BURN_IN: usize = 64;
-/// Sweeps of the dual problem: each only raises a bound; numerical.
-const DUAL_SWEEPS: usize = 20;
 /// Below such a tail its first asymptotic term serves.
 const LEAST_TAIL: f64 = 1e-12;
 
@@ -53,19 +51,19 @@ pub(super) static NORMALS: LazyLock<Vec<[f64; MOST]>> = LazyLock::new(|| {
 });
 
 /// ln of at the most what N(`means`, `covariance`) has in the positive orthant: −½d², where d is how many standard deviations off it
-/// is (Chernoff's bound, for a convex set). By the dual problem, max −½λ'Σλ − λ'μ over λ ≥ 0, of which every λ is a bound.
+/// is (Chernoff's bound, for a convex set), as far as one or two variables tell. By the dual problem, max −½λ'Σλ − λ'μ over λ ≥ 0,
+/// of which every λ is a bound.
 pub(super) fn ln_most(means: &[f64], covariance: &[Vec<f64>]) -> f64 {
-    let mut dual = vec![0.0_f64; means.len()];
-    let slope = |dual: &[f64], i: usize| {
-        means[i] + covariance[i].iter().zip(dual).map(|(cell, dual)| cell * dual).sum::<f64>()
+    let one = |i: usize| if means[i] < 0.0 { -0.5 * means[i] * means[i] / covariance[i][i] } else { 0.0 };
+    let two = |i: usize, j: usize| {
+        let (own, other, both) = (covariance[i][i], covariance[j][j], covariance[i][j]);
+        let determinant = own * other - both * both;
+        let lambda = [both * means[j] - other * means[i], both * means[i] - own * means[j]];
+        let is_bound = determinant > 0.0 && lambda.iter().all(|lambda| *lambda > 0.0);
+        if is_bound { 0.5 * (lambda[0] * means[i] + lambda[1] * means[j]) / determinant } else { 0.0 }
     };
-    for _ in 0..DUAL_SWEEPS {
-        for i in 0..means.len() {
-            dual[i] = (dual[i] - slope(&dual, i) / covariance[i][i]).max(0.0);
-        }
-    }
-    // ½ λ'(μ + (μ + Σλ)) is the dual's negative.
-    0.5 * dual.iter().enumerate().map(|(i, own)| own * (means[i] + slope(&dual, i))).sum::<f64>()
+    let pairs = (0..means.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    pairs.map(|(i, j)| if i == j { one(i) } else { two(i, j) }).fold(0.0, f64::min)
 }
 
 /// N(`means`, `covariance`), of `MOST` variables or fewer, where every one is positive; a sample of `count` points.
