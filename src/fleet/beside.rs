@@ -1,8 +1,8 @@
 //! A cylinder beside its siblings: the blades of one turbine move alike, in the same oil and weather, so that one whose leak
 //! differs is told long before it reaches a threshold.
 
-use super::scatter::Scatter;
 use super::standing::Answer;
+use super::trend::Scatter;
 use super::{FleetCylinder, FleetRow, count};
 use crate::report::with_interval;
 use pitchleak_core::{Estimate, Leak};

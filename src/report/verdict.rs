@@ -1,7 +1,7 @@
 //! What an operator acts on.
 
-use super::episode::comes_and_goes;
 use super::reason::{Reason, contradictions, gaps};
+use super::spell::comes_and_goes;
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};

@@ -1,23 +1,20 @@
 //! The program `pitchleak`: arguments in, text out, no numerics of its own.
 
+mod about;
 mod calibrate;
 mod check;
 mod columns;
-mod completions;
 mod diagnose;
-mod explanations;
 mod failure;
 mod fleet;
 mod init;
 mod input;
 mod interrupt;
-mod man;
 mod output;
 mod prove;
 mod replay;
 mod reproduce;
 mod simulate;
-mod text_format;
 mod watch;
 
 use clap::error::ErrorKind;
@@ -55,12 +52,12 @@ enum Command {
     Columns(columns::Arguments),
     Init(init::Arguments),
     Fleet(fleet::Arguments),
-    Explanations(explanations::Arguments),
+    Explanations(about::Explanations),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
-    Completions(completions::Arguments),
-    Man(man::Arguments),
+    Completions(about::Completions),
+    Man(about::ManualPage),
 }
 
 /// What a command that ran to its end has to say by its exit status.
@@ -152,11 +149,11 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Columns(arguments) => columns::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),
-        Command::Explanations(arguments) => explanations::run(arguments),
+        Command::Explanations(arguments) => arguments.run(),
         Command::Watch(arguments) => watch::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Reproduce(arguments) => reproduce::run(arguments),
-        Command::Completions(arguments) => completions::run(arguments),
-        Command::Man(arguments) => man::run(arguments),
+        Command::Completions(arguments) => arguments.run(),
+        Command::Man(arguments) => arguments.run(),
     }
 }

@@ -27,7 +27,6 @@ mod labels;
 pub mod page;
 mod palette;
 mod residual_figures;
-mod spark;
 pub mod text;
 
 pub use envelope::{Envelopes, Range, Spot};

@@ -1,8 +1,7 @@
 //! Which column of a file holds which signal, and in which unit: by the names of the contract, those of `[columns]`, and
 //! foreign ones that name signal and unit.
 
-use super::error::Counted;
-use super::error::TraceFault;
+use super::error::{Counted, TraceFault};
 use crate::header::{self, HeaderUnit, near, shorten};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;

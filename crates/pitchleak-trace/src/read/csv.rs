@@ -2,8 +2,7 @@
 
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
-use super::error::TraceFault;
-use super::error::{BadReason, BadRow, Counted};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
 use super::format::{Format, Reading, Stream};
 use super::number::plain_number;
 use super::records::{Record, Records, Stop, Text, stopped_early};

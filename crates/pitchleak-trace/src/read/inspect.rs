@@ -1,10 +1,9 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::columns::Bound;
-use super::columns::{Content, partly};
+use super::columns::{Bound, Content, partly};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
-use super::file;
+use super::format;
 use super::number::decimal;
 use super::proposal::{Proposal, Why, proposals};
 use super::table_text::TextTable;
@@ -93,10 +92,10 @@ impl FileReading {
 
     fn look(path: &Path, rig: &Rig) -> Result<Self, TraceFault> {
         let (format, stream) = if path == Path::new("-") {
-            file::start(Box::new(std::io::stdin()), None)?
+            format::start(Box::new(std::io::stdin()), None)?
         } else {
             let file = File::open(path).map_err(TraceFault::Open)?;
-            file::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
+            format::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
         };
         Ok(Self::of_table(format.look(stream, rig)?, rig))
     }

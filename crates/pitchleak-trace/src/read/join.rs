@@ -3,7 +3,7 @@
 use super::clock::is_same;
 use super::columns::{Layout, REQUIRED};
 use super::error::TraceFault;
-use super::file;
+use super::format;
 use super::format::Rows;
 use super::row::{Next, Row, RowSource};
 use crate::rig::Rig;
@@ -78,7 +78,7 @@ impl Part {
         rig.csv.part = Some(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
         let file = File::open(path).map_err(TraceFault::Open)?;
         let again = file.try_clone().ok();
-        Ok(Self { rows: file::open(Box::new(file), again, &rig)?, next: None, ended: false })
+        Ok(Self { rows: format::open(Box::new(file), again, &rig)?, next: None, ended: false })
     }
 
     /// How much later than the recording its own seconds begin, s.

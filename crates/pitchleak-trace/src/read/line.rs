@@ -2,10 +2,8 @@
 
 use super::columns::{Column, Content, Layout};
 use super::csv::{Cells, describe, read_cells};
-use super::error::TraceFault;
-use super::error::{BadReason, BadRow, Counted};
-use super::row::{BadRows, Record};
-use super::row::{NEEDED, Row};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
+use super::row::{BadRows, NEEDED, Record, Row};
 use super::stamps::Epoch;
 use super::validator::{MOST_TIME_S, RowValidator, missing};
 use crate::rig::{ColumnMap, Rig};

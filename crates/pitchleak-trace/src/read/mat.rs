@@ -6,8 +6,7 @@ mod hdf5;
 mod vector;
 
 use super::columns::bind;
-use super::error::Counted;
-use super::error::TraceFault;
+use super::error::{Counted, TraceFault};
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
 use super::stamps::{Stamped, sample};
 use super::table::TableRows;

@@ -1,13 +1,11 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
 mod ahead;
-mod changed;
 mod clock;
 mod columns;
 mod csv;
 mod dialect;
 mod error;
-mod file;
 mod format;
 mod inspect;
 mod join;
@@ -26,12 +24,11 @@ mod table;
 mod table_text;
 mod validator;
 
-pub use changed::FlowChange;
 pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, LineRead, read as read_line};
 pub use quality::TraceQuality;
-pub use row::{BadRows, Record, ValveReading};
+pub use row::{BadRows, FlowChange, Record, ValveReading};
 pub use stamps::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 pub use validator::{OVERRANGE, RowValidator};
@@ -39,10 +36,9 @@ pub use validator::{OVERRANGE, RowValidator};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::Clock;
-use changed::ChangedFlows;
 use join::Joined;
 use own_clocks::OwnClocks;
-use row::{Next, Row, RowSource};
+use row::{ChangedFlows, Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -122,7 +118,7 @@ impl TraceReader<'static> {
         file: Option<File>,
         rig: &Rig,
     ) -> Result<Self, TraceError> {
-        match file::open(stream, file, rig) {
+        match format::open(stream, file, rig) {
             Ok(rows) => Ok(Self::over(name, rows, rig)),
             Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
         }

@@ -1,9 +1,7 @@
 //! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
 
-use super::columns::TextRow;
-use super::columns::{Content, Layout};
-use super::error::BadReason;
-use super::error::TraceFault;
+use super::columns::{Content, Layout, TextRow};
+use super::error::{BadReason, TraceFault};
 use super::table::Cells;
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};

@@ -1,8 +1,7 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
 use super::columns::{Content, Layout};
-use super::error::{BadReason, BadRow, Counted};
-use super::error::{TraceError, TraceFault};
+use super::error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
 use crate::rig::Rig;

@@ -1,8 +1,7 @@
 //! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`.
 
 use super::bound;
-use super::document::Section;
-use super::document::{Fault, RigError};
+use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
 use super::odds::Odds;
 use crate::header;

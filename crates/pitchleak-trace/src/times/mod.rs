@@ -2,13 +2,11 @@
 //! numbers of a spreadsheet, or any format with a pattern.
 
 mod civil;
-mod clock;
 mod guess;
 mod zone;
 
-pub use clock::Clock;
 pub use guess::{TimeFault, guess};
-pub use zone::Zone;
+pub use zone::{Clock, Zone};
 
 use jiff::Timestamp;
 use jiff::civil::{DateTime, date};

@@ -2,9 +2,7 @@
 
 use super::super::machine::{prose, short};
 use super::super::{Card, Head, Tone};
-use super::effects::size;
-use super::leaks::entries;
-use super::spoken;
+use super::{entries, size, spoken};
 use crate::labels::{name, people_unit};
 use maud::{Markup, html};
 use pitchleak::diagnose::{Diagnosis, Verdict};
