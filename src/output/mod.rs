@@ -184,7 +184,7 @@ impl Write for Sink {
 ///
 /// # Errors
 /// As [`OutputFile::finish`].
-pub fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), OutputError> {
+pub(crate) fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), OutputError> {
     let sealed = |OutputFile { path, coding }| match coding.sealed() {
         Ok(sink) => Ok((path, sink)),
         Err(source) => Err(OutputError::Write { path, source }),

@@ -139,7 +139,7 @@ const QUOTED_SHARE: f64 = 0.5;
 
 impl Verdict {
     /// Of this leak alone: who is sure of another is not sure of it.
-    pub fn status_of(&self, leak: Leak) -> Status {
+    pub(crate) fn status_of(&self, leak: Leak) -> Status {
         if self.status.is_sure() && !self.faults.contains(&leak) { Status::NotSure } else { self.status }
     }
 

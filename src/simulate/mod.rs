@@ -200,7 +200,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`SimulateError`].
-    pub fn run_while(
+    pub(crate) fn run_while(
         &self,
         leaks_m3spa: PerLeak<f64>,
         mut each: impl FnMut(&Truth) -> bool,

@@ -9,7 +9,6 @@ mod failure;
 mod fleet;
 mod init;
 mod input;
-mod interrupt;
 mod output;
 mod prove;
 mod replay;
@@ -138,7 +137,7 @@ fn in_one_line(answer: &str) -> String {
 fn run(command: &Command) -> Result<Outcome, Failure> {
     // A watch that is to end saves its state first.
     if !matches!(command, Command::Watch(_)) {
-        interrupt::leave_nothing_half_written()?;
+        failure::leave_nothing_half_written()?;
     }
     match command {
         Command::Replay(arguments) => replay::run(arguments),

@@ -5,7 +5,6 @@ mod alarms;
 mod board;
 mod broker;
 mod config;
-mod dead_letters;
 mod http;
 mod log;
 mod metrics;

@@ -98,7 +98,7 @@ impl Unit {
 
     /// Whether the unit is the SI unit itself.
     #[allow(clippy::float_cmp)]
-    pub fn is_si(&self) -> bool {
+    pub(crate) fn is_si(&self) -> bool {
         self.factor == 1.0 && self.divisor == 1.0 && self.offset == 0.0
     }
 }
@@ -248,7 +248,7 @@ impl Dimension {
     }
 
     /// The unit that people read a difference of two values in: 5 K more are not 5 °C.
-    pub fn difference_for_people(self) -> Option<Unit> {
+    pub(crate) fn difference_for_people(self) -> Option<Unit> {
         self.for_people().filter(|unit| unit.offset.abs() <= 0.0)
     }
 

@@ -4,12 +4,13 @@ mod text;
 
 pub use text::SensorFaultError;
 
+use super::sensing::unit;
 use super::span::Span;
 use crate::rig::Instruments;
 use crate::signal::Signal;
 use crate::simulate::Reading;
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng;
 use std::collections::VecDeque;
 
 /// One mistake of the sensors, their wires or their recorder; see [`SensorFault::from_str`](std::str::FromStr).
@@ -202,11 +203,6 @@ impl Running {
         }
         self.waiting.front().map_or(reading, |(_, oldest)| *oldest)
     }
-}
-
-/// A number in 0 <= u < 1.
-fn unit(random: &mut ChaCha8Rng) -> f64 {
-    (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0
 }
 
 /// Full scale of a channel's sensor; of one without a data sheet, 1 in SI.

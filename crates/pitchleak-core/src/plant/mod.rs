@@ -7,9 +7,9 @@ mod valve;
 
 pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive};
 pub use end_stop::EndStop;
-pub use valve::{Supply, Valve, ValveFlows, ValvePlant, ValvePlantState};
+pub use valve::{Supply, Valve, ValveFlows};
 
-pub(crate) use cylinder_plant::{STATES as CYLINDER_STATES, number_or_zero, substeps};
+pub(crate) use cylinder_plant::{number_or_zero, substeps};
 
 use crate::{CylinderError, Real};
 

@@ -1,9 +1,8 @@
 //! The service: samples in, estimates and alarms out, acknowledged once they are on the disk.
 
 use crate::alarms::Alarms;
-use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{Broker, DeadLetters, Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{Config, Samples};
-use crate::dead_letters::DeadLetters;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::pace::{Due, Pace};

@@ -147,7 +147,7 @@ pub fn parse(bytes: &[u8]) -> Result<Run, Problem> {
 
 /// Whether these bytes begin like a binary output file: a two-byte id whose high byte is zero, as
 /// no text begins.
-pub fn is_binary(bytes: &[u8]) -> bool {
+pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     matches!(bytes, [_, 0, ..])
 }
 

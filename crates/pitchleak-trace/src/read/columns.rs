@@ -32,6 +32,15 @@ impl Content {
             Self::Ignored => None,
         }
     }
+
+    /// What a column of numbers in memory is read as: a signal and its unit, a time stamp as the time; none of what is not read.
+    pub(super) fn cells(self) -> Option<(Signal, Option<Unit>)> {
+        match self {
+            Self::Number(signal, unit) => Some((signal, unit)),
+            Self::Timestamp => Some((Signal::Time, None)),
+            Self::Ignored => None,
+        }
+    }
 }
 
 /// The columns of a trace in the order of the file.
@@ -174,7 +183,7 @@ impl Layout {
                 return Err(TraceFault::UnknownUnit {
                     column: shorten(&column.header, 40),
                     signal: signal.name(),
-                    unit: unit.to_owned(),
+                    unit: shorten(unit, 40),
                     allowed: dimension.suffixes(),
                 });
             }

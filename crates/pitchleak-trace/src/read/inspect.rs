@@ -100,20 +100,6 @@ impl FileReading {
         Ok(Self::of_table(format.look(stream, rig)?, rig))
     }
 
-    fn empty() -> Self {
-        Self {
-            schema: Self::SCHEMA,
-            path: String::new(),
-            text: None,
-            time_format: None,
-            columns: Vec::new(),
-            named: Vec::new(),
-            problem: None,
-            proposals: Vec::new(),
-            misspelt: Vec::new(),
-        }
-    }
-
     fn of_table(table: TextTable, rig: &Rig) -> Self {
         let everything: Vec<Vec<&str>> = (0..table.headers.len()).map(|index| table.column(index)).collect();
         let marks = rig.csv.decimal.or_else(|| decimal(&everything).ok());
@@ -136,19 +122,22 @@ impl FileReading {
         let columns = columns.collect();
         let proposals = proposals(&table, &found, rig).iter().map(line).collect();
         let misspelt = misspelt(&table.headers, &rig.columns);
+        let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
-            let problem = table.bound.err().map(|fault| fault.to_string());
-            return Self { columns, named, problem, proposals, misspelt, ..Self::empty() };
+            problem = table.bound.err().map(|fault| fault.to_string());
+        } else {
+            match Dialect::of(table, super::records::Encoding::Utf8, rig) {
+                Ok(Dialect { layout, .. }) if layout.has(Signal::Timestamp) => {
+                    let zone =
+                        layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
+                    time_format = Some(format!("{}{zone}", layout.time.kind));
+                }
+                Ok(_) => {}
+                Err(fault) => problem = Some(fault.to_string()),
+            }
         }
-        let dialect = Dialect::of(table, super::records::Encoding::Utf8, rig);
-        let time_format =
-            dialect.as_ref().ok().filter(|dialect| dialect.layout.has(Signal::Timestamp)).map(|dialect| {
-                let time = &dialect.layout.time;
-                let zone = time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-                format!("{}{zone}", time.kind)
-            });
-        let problem = dialect.err().map(|fault| fault.to_string());
-        Self { text, time_format, columns, named, problem, proposals, misspelt, ..Self::empty() }
+        let (schema, path) = (Self::SCHEMA, String::new());
+        Self { schema, path, text, time_format, columns, named, problem, proposals, misspelt }
     }
 
     /// One line of JSON.

@@ -8,7 +8,7 @@ mod vector;
 use super::columns::bind;
 use super::error::{Counted, TraceFault};
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
-use super::stamps::{Stamped, sample};
+use super::stamps::{self, sample};
 use super::table::TableRows;
 use super::table_text::TextTable;
 use crate::header::shorten;
@@ -57,12 +57,8 @@ fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
     layout.counted = Counted::Rows;
-    let stamps = Stamped::new(&layout, &bound.foreign, rig, &values)?;
-    layout.time = stamps.format.clone();
-    let layout = Arc::new(layout);
-    let cells = stamps.cells(&layout, values);
-    let mut once = Some(cells);
-    Ok(Box::new(TableRows::over(layout, Box::new(move || Ok(once.take())))))
+    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, values)?);
+    Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 
 fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {

@@ -1,6 +1,6 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
-use super::columns::{Content, Layout};
+use super::columns::{Column, Content, Layout};
 use super::error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
@@ -53,11 +53,9 @@ impl TableLayout {
 
     /// Which of the headers is that of the time.
     pub fn time(&self) -> Option<usize> {
-        self.0.columns.iter().position(|column| match column.content {
-            Content::Number(signal, _) => signal == Signal::Time,
-            Content::Timestamp => true,
-            Content::Ignored => false,
-        })
+        let is_time =
+            |column: &Column| column.content.cells().is_some_and(|(signal, _)| signal == Signal::Time);
+        self.0.columns.iter().position(is_time)
     }
 }
 
@@ -179,11 +177,7 @@ impl RowSource for TableRows<'_> {
 fn bind<'a>(layout: &Layout, batch: &Batch<'a>) -> Result<Vec<Cells<'a>>, TraceFault> {
     let mut read: Vec<Cells<'a>> = Vec::new();
     for (index, column) in layout.columns.iter().enumerate() {
-        let (signal, unit) = match column.content {
-            Content::Number(signal, unit) => (signal, unit),
-            Content::Timestamp => (Signal::Time, None),
-            Content::Ignored => continue,
-        };
+        let Some((signal, unit)) = column.content.cells() else { continue };
         let values = batch.get(index).copied().unwrap_or_default();
         if let Some(first) = read.first().filter(|first| first.values.len() != values.len()) {
             let other = layout.columns.get(first.index).map_or("", |column| &column.header);

@@ -3,7 +3,7 @@
 use super::Text;
 use crate::Palette;
 use crate::bar::level;
-use crate::labels::{name, people, people_unit, quantity, symbol};
+use crate::residuals::{name, people, people_unit, quantity, symbol};
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,

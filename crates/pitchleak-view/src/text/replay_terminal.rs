@@ -127,7 +127,7 @@ impl ReplaySketch {
     }
 
     /// Times of the first and the last record, s.
-    pub fn ends_s(&self) -> [f64; 2] {
+    fn ends_s(&self) -> [f64; 2] {
         self.ends_s.unwrap_or_default()
     }
 

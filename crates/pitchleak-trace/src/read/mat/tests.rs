@@ -226,6 +226,11 @@ fn damage_is_one_line_and_costs_no_memory() {
     broken_name[at + 1] = b'\n';
     let message = read(broken_name).unwrap_err().to_string();
     assert!(message.contains("variable `t\\ns` is a struct") && !message.contains('\n'), "{message}");
+    let mut broken_unit = file(false, false, CLASS_DOUBLE, 50);
+    let at = broken_unit.windows(6).position(|bytes| bytes == b"pa_bar").unwrap();
+    broken_unit[at + 3] = b'\n';
+    let message = read(broken_unit).unwrap_err().to_string();
+    assert!(message.contains("unknown unit `\\nar`") && !message.contains('\n'), "{message}");
     let mut huge = file(false, false, CLASS_DOUBLE, 50);
     // The count of the first variable, and the size of its data.
     let at = huge.windows(4).position(|bytes| bytes == 50_u32.to_le_bytes()).unwrap();

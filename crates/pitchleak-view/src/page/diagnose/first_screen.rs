@@ -3,7 +3,7 @@
 use super::super::machine::{prose, short};
 use super::super::{Card, Head, Tone};
 use super::{entries, size, spoken};
-use crate::labels::{name, people_unit};
+use crate::residuals::{name, people_unit};
 use maud::{Markup, html};
 use pitchleak::diagnose::{Diagnosis, Verdict};
 use pitchleak::report::capital;

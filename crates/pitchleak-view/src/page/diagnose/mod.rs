@@ -4,9 +4,9 @@ mod first_screen;
 mod residuals;
 
 use super::chart::Charts;
-use super::machine::{channels, facts, prose, rig};
+use super::machine::{channels, facts, prose, rig, table};
 use super::{Page, Section};
-use crate::labels::quantity;
+use crate::residuals::quantity;
 use maud::{Markup, html};
 use pitchleak::core::Leak;
 use pitchleak::diagnose::{Diagnosis, FoundEffect, HoldLeak, LeakEstimate, LeakEstimates};
@@ -144,16 +144,15 @@ fn leaks(diagnosis: &Diagnosis) -> Markup {
         _ => "",
     };
     html! {
-        div .wide { table {
-            thead { tr { td {} th .number scope="col" { "before, 95 %" } th .number scope="col" { "after, 95 %" } } }
-            tbody { @for ((name, before), (_, after)) in both {
+        (table(&["", "#before, 95 %", "#after, 95 %"], html! {
+            @for ((name, before), (_, after)) in both {
                 tr {
                     th scope="row" { (capital(name)) }
                     td .number { (text(before)) (mark(before)) }
                     td .number { (text(after)) (mark(after)) }
                 }
-            } }
-        } }
+            }
+        }))
         @if let Some(holds) = diagnosis.holds {
             h3 { "At rest against in motion" }
             p .note { "Flow that leaves a chamber while the piston stands, measured, beside what the model fitted to motion foretells." }
