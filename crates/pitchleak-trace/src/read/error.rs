@@ -84,6 +84,13 @@ pub struct TraceError {
     pub fault: TraceFault,
 }
 
+impl TraceFault {
+    /// It, of a trace of this name.
+    pub(super) fn of(self, trace: &str) -> TraceError {
+        TraceError { trace: trace.to_owned(), fault: self }
+    }
+}
+
 /// What makes a trace unusable.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceFault {

@@ -87,7 +87,7 @@ impl FileReading {
         let name = path.as_ref().display().to_string();
         Self::look(path.as_ref(), rig)
             .map(|reading| Self { path: name.clone(), ..reading })
-            .map_err(|fault| TraceError { trace: name, fault })
+            .map_err(|fault| fault.of(&name))
     }
 
     fn look(path: &Path, rig: &Rig) -> Result<Self, TraceFault> {

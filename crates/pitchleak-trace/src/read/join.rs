@@ -2,7 +2,7 @@
 
 use super::clock::is_same;
 use super::columns::{Layout, REQUIRED};
-use super::error::TraceFault;
+use super::error::{TraceError, TraceFault};
 use super::format;
 use super::format::Rows;
 use super::row::{Next, Row, RowSource};
@@ -31,17 +31,14 @@ pub(super) struct Joined {
 
 impl Joined {
     /// Opens the files; together they must have what a trace has.
-    pub(super) fn open(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, (String, TraceFault)> {
-        let mut parts = Vec::new();
-        for path in paths {
-            let name = path.as_ref().display().to_string();
-            parts.push(Part::open(path.as_ref(), rig).map_err(|fault| (name, fault))?);
-        }
-        let whole = || "the files together".to_owned();
+    pub(super) fn open(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, TraceError> {
+        let open = |path: &Path| Part::open(path, rig).map_err(|fault| fault.of(&path.display().to_string()));
+        let parts = paths.iter().map(|path| open(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        let whole = |fault: TraceFault| fault.of("the files together");
         let layout = Layout::joined(parts.iter().map(|part| part.rows.layout()));
-        layout.check(&rig.columns, &REQUIRED).map_err(|fault| (whole(), fault))?;
+        layout.check(&rig.columns, &REQUIRED).map_err(whole)?;
         let mut joined = Self { parts, layout, epoch_ns: None };
-        joined.begin().map_err(|fault| (whole(), fault))?;
+        joined.begin().map_err(whole)?;
         Ok(joined)
     }
 

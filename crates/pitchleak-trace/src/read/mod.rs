@@ -80,15 +80,13 @@ impl TraceReader<'static> {
             return Self::from_stream("standard input", Box::new(std::io::stdin()), rig);
         }
         let name = path.display().to_string();
-        match File::open(path) {
-            Ok(_) if path.is_dir() => Err(TraceError { trace: name, fault: TraceFault::Format(FOLDER) }),
-            Ok(file) => {
-                // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
-                let again = file.try_clone().ok();
-                Self::from_source(&name, wrap(file), again, rig)
-            }
-            Err(error) => Err(TraceError { trace: name, fault: TraceFault::Open(error) }),
+        let file = File::open(path).map_err(|error| TraceFault::Open(error).of(&name))?;
+        if path.is_dir() {
+            return Err(TraceFault::Format(FOLDER).of(&name));
         }
+        // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
+        let again = file.try_clone().ok();
+        Self::from_source(&name, wrap(file), again, rig)
     }
 
     /// As [`open`](Self::open), from any stream; `name` is for messages.
@@ -106,10 +104,7 @@ impl TraceReader<'static> {
     /// As [`open`](Self::open), of each file, and of all together.
     pub fn join(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, TraceError> {
         let names: Vec<String> = paths.iter().map(|path| path.as_ref().display().to_string()).collect();
-        match Joined::open(paths, rig) {
-            Ok(rows) => Ok(Self::over(&names.join(" + "), Box::new(rows), rig)),
-            Err((trace, fault)) => Err(TraceError { trace, fault }),
-        }
+        Ok(Self::over(&names.join(" + "), Box::new(Joined::open(paths, rig)?), rig))
     }
 
     fn from_source(
@@ -118,10 +113,8 @@ impl TraceReader<'static> {
         file: Option<File>,
         rig: &Rig,
     ) -> Result<Self, TraceError> {
-        match format::open(stream, file, rig) {
-            Ok(rows) => Ok(Self::over(name, rows, rig)),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let rows = format::open(stream, file, rig).map_err(|fault| fault.of(name))?;
+        Ok(Self::over(name, rows, rig))
     }
 }
 
@@ -152,10 +145,8 @@ impl<'a> TraceReader<'a> {
         batches: Vec<Batch<'a>>,
         rig: &Rig,
     ) -> Result<Self, TraceError> {
-        match TableRows::new(layout, batches) {
-            Ok(rows) => Ok(Self::over(name, Box::new(rows), rig)),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let rows = TableRows::new(layout, batches).map_err(|fault| fault.of(name))?;
+        Ok(Self::over(name, Box::new(rows), rig))
     }
 
     fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
@@ -278,7 +269,7 @@ impl<'a> TraceReader<'a> {
     }
 
     fn error(&self, fault: TraceFault) -> TraceError {
-        TraceError { trace: self.name.clone(), fault }
+        fault.of(&self.name)
     }
 }
 

@@ -36,10 +36,8 @@ impl TableLayout {
     /// # Errors
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
-        match Layout::new(headers, &rig.columns) {
-            Ok(layout) => Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout }))),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let layout = Layout::new(headers, &rig.columns).map_err(|fault| fault.of(name))?;
+        Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout })))
     }
 
     /// What each column is read as, in the order of the headers.

@@ -20,7 +20,7 @@ const COURSE: usize = 60;
 pub(super) fn write_bars(out: &mut String, report: &ReplayReport, sketch: &ReplaySketch, palette: &Palette) {
     let known = Leak::ALL.into_iter().filter(|leak| report.estimates.leaks()[*leak].identifiable);
     let bars: Vec<(Leak, Bar)> =
-        known.map(|leak| (leak, bar(&report.leakage[leak], sketch.threshold_lpm()[leak]))).collect();
+        known.map(|leak| (leak, bar(&report.leakage[leak], sketch.threshold_lpm[leak]))).collect();
     let Some(ends) = scale(bars.iter().map(|(_, bar)| bar)) else { return };
     let (faint, reset) = palette.faint();
     let range = scale_text(ends);
@@ -55,14 +55,14 @@ pub(super) fn write_courses(
     flows.sort_by(f64::total_cmp);
     // What is usual: estimates begin anywhere.
     let usual = flows.get(flows.len() * 98 / 100).or(flows.last()).copied().unwrap_or(0.0);
-    let threshold_lpm = sketch.threshold_lpm();
+    let threshold_lpm = sketch.threshold_lpm;
     let top = threshold_lpm.iter().map(|(_, threshold)| *threshold).fold(usual, f64::max);
     let (faint, reset) = palette.faint();
     let _ = writeln!(out, "\n{faint}{:<12}over the trace, from 0 to {top:.2} L/min{reset}", "leak");
     for (leak, course) in courses.iter() {
         let _ = writeln!(out, "{:<12}{}", leak.label(), line(course, threshold_lpm[leak], top, palette));
     }
-    let [from, to] = sketch.ends_s().map(|t_s| report.trace.time(t_s, 0));
+    let [from, to] = sketch.ends_s.unwrap_or_default().map(|t_s| report.trace.time(t_s, 0));
     let width = courses.internal.len();
     let _ = writeln!(
         out,
@@ -124,16 +124,6 @@ impl ReplaySketch {
         let flows = replay.watched_flows_m3s();
         let spots = Leak::ALL.map(|leak| Some(Spot::at(flows[leak].value * LPM_PER_M3S)));
         self.flows_lpm.add(record.t_s, &spots);
-    }
-
-    /// Times of the first and the last record, s.
-    fn ends_s(&self) -> [f64; 2] {
-        self.ends_s.unwrap_or_default()
-    }
-
-    /// The alarm levels, L/min.
-    pub fn threshold_lpm(&self) -> PerLeak<f64> {
-        self.threshold_lpm
     }
 
     /// Each leak's flow over the trace in at most `columns` stretches of the same length, L/min; none where it pauses.
