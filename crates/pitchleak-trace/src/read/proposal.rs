@@ -272,12 +272,11 @@ fn possible_unit(signal: Signal, values: &[f64], rig: &Rig) -> Option<Unit> {
         }
         _ => return None,
     };
-    let unit = |name: &&str| dimension.units().iter().find(|unit| unit.text == *name).copied();
     let possible = |unit: &Unit| {
         let share = unit.to_si(size) / full_scale;
         (0.005..1.3).contains(&share)
     };
-    usual.iter().filter_map(unit).find(possible)
+    usual.iter().filter_map(|name| dimension.by_text(name)).find(possible)
 }
 
 fn values(column: &Unread<'_>, decimal: Decimal) -> Vec<f64> {
