@@ -40,7 +40,7 @@ pub struct EmulatorParams<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EmulatorReading<T> {
     /// Signals of the pitching cylinder; dQ/dt is left at zero. What the sensors make of them:
-    /// [`EffectSet::read`].
+    /// [`EffectSet::read`](crate::EffectSet::read).
     pub signals: Signals<T>,
     /// Flows through the leak circuits (and leak effects), m³/s.
     pub leaks_m3s: PerLeak<T>,
