@@ -1,10 +1,11 @@
 //! A cylinder beside its siblings: the blades of one turbine move alike, in the same oil and weather, so that one whose leak
 //! differs is told long before it reaches a threshold.
 
-use super::scatter::Scatter;
 use super::standing::Answer;
+use super::trend::{Fit, Scatter};
 use super::{FleetCylinder, FleetRow, count};
 use crate::report::with_interval;
+use nalgebra::SVector;
 use pitchleak_core::{Estimate, Leak};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -110,54 +111,30 @@ struct Difference {
     chance: f64,
 }
 
-/// Weighted means of each cylinder's flows.
-struct Levels {
-    means: Vec<f64>,
-    /// Inverse variances.
-    weights: Vec<f64>,
-    /// Weighted sum of the squares of what the flows differ from their cylinder's mean.
-    residual: f64,
-    /// Weights times what is not leverage.
-    free_weight: f64,
-}
-
-impl Levels {
-    fn of(flows: &[Vec<Estimate<f64>>], scatter: f64) -> Self {
-        let mut levels = Self { means: Vec::new(), weights: Vec::new(), residual: 0.0, free_weight: 0.0 };
-        for own in flows {
-            let weights: Vec<_> = own.iter().map(|flow| (flow.std.powi(2) + scatter).recip()).collect();
-            let weight: f64 = weights.iter().sum();
-            let mean = own.iter().zip(&weights).map(|(flow, w)| w * flow.value).sum::<f64>() / weight;
-            let square = |(flow, w): (&Estimate<f64>, &f64)| w * (flow.value - mean).powi(2);
-            levels.residual += own.iter().zip(&weights).map(square).sum::<f64>();
-            levels.free_weight += weight - weights.iter().map(|w| w * w).sum::<f64>() / weight;
-            levels.means.push(mean);
-            levels.weights.push(weight);
-        }
-        levels
-    }
-}
-
 /// Of each cylinder from the mean of the others. None where no cylinder has a second trace.
 fn differences(flows: &[Vec<Estimate<f64>>]) -> Vec<Difference> {
     let freedom = flows.iter().map(|own| own.len() - 1).sum();
-    let Some(scatter) = Scatter::with_freedom(freedom) else { return Vec::new() };
-    if flows.len() < 2 {
-        return Vec::new();
-    }
-    let apart = Levels::of(flows, 0.0);
-    let variance = scatter.variance(apart.residual, apart.free_weight);
-    let Levels { means, weights, residual, .. } = Levels::of(flows, variance);
-    let inflation = scatter.inflation(residual);
+    let Some(scatter) = Scatter::with_freedom(freedom).filter(|_| flows.len() > 1) else { return Vec::new() };
+    let means = |scatter: f64| -> Option<Vec<Fit<1>>> {
+        let mean = |own: &Vec<Estimate<f64>>| {
+            Fit::of(&own.iter().map(|flow| (SVector::from([1.0]), *flow)).collect::<Vec<_>>(), scatter)
+        };
+        flows.iter().map(mean).collect()
+    };
+    let sum = |fits: &[Fit<1>], of: fn(&Fit<1>) -> f64| fits.iter().map(of).sum::<f64>();
+    let Some(apart) = means(0.0) else { return Vec::new() };
+    let variance = scatter.variance(sum(&apart, |fit| fit.residual), sum(&apart, |fit| fit.free_weight));
+    let Some(means) = means(variance) else { return Vec::new() };
+    let inflation = scatter.inflation(sum(&means, |fit| fit.residual));
     let siblings = means.len() - 1;
-    let (sum, variance) = (means.iter().sum::<f64>(), weights.iter().map(|w| w.recip()).sum::<f64>());
-    let difference = |(mean, weight): (&f64, &f64)| {
-        let more = mean - (sum - mean) / siblings as f64;
-        let own = weight.recip();
-        let std = ((own + (variance - own) / (siblings as f64).powi(2)) * inflation).sqrt();
+    let (all, variances) = (sum(&means, |fit| fit.unknowns[0]), sum(&means, |fit| fit.covariance[0]));
+    let difference = |fit: &Fit<1>| {
+        let (mean, own) = (fit.unknowns[0], fit.covariance[0]);
+        let more = mean - (all - mean) / siblings as f64;
+        let std = ((own + (variances - own) / (siblings as f64).powi(2)) * inflation).sqrt();
         Difference { siblings, more, std: std * scatter.width(), chance: scatter.chance(more / std) }
     };
-    means.iter().zip(&weights).map(difference).collect()
+    means.iter().map(difference).collect()
 }
 
 #[cfg(test)]

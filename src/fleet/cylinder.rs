@@ -149,7 +149,7 @@ impl FleetCylinder {
     }
 
     /// The largest flow among the leaks to act on, L/min.
-    pub fn worst_lpm(&self) -> f64 {
+    pub(crate) fn worst_lpm(&self) -> f64 {
         let flow = |leak: &Leak| self.leaks[*leak].flow.map_or(0.0, |flow| flow.mean_lpm);
         self.faults.iter().map(flow).fold(0.0, f64::max)
     }

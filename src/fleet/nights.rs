@@ -127,7 +127,7 @@ fn unread(file: &Path, why: &impl ToString) -> FleetError {
 /// What each row of a night's file was seen as, and the row.
 fn read(path: &Path) -> Result<Vec<(String, FleetRow)>, FleetError> {
     let file = File::open(path).map_err(|error| unread(path, &error))?;
-    let rows = super::write::texts(file, ["seen", "row"]).map_err(|error| unread(path, &error))?;
+    let rows = super::table::texts(file, ["seen", "row"]).map_err(|error| unread(path, &error))?;
     let row = |[seen, row]: [String; 2]| Ok((seen, serde_json::from_str(&row)?));
     rows.into_iter().map(row).collect::<Result<_, serde_json::Error>>().map_err(|error| unread(path, &error))
 }

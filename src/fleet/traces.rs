@@ -1,9 +1,13 @@
 //! Which traces there are, and what is known of each before it is read.
 
-use super::{FleetError, RigTable, TraceIdentity, doubles};
+use super::{FleetError, TraceIdentity};
 use crate::Rig;
 use crate::output::{Inputs, identity};
-use std::collections::{HashMap, HashSet};
+use glob::{MatchOptions, Pattern};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fs::File;
+use std::hash::{DefaultHasher, Hasher};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -86,7 +90,7 @@ impl FleetTrace {
                 trace: trace.display().to_string(),
                 others: without.count(),
             }),
-            _ => Ok(doubles::merge(found.into_iter().flatten().collect())),
+            _ => Ok(merged(found.into_iter().flatten().collect())),
         }
     }
 
@@ -173,4 +177,150 @@ impl Shelf {
         let file = trace.with_file_name("rig.toml");
         self.beside.entry(file).or_insert_with_key(|file| file.is_file().then(|| file.clone())).clone()
     }
+}
+
+/// Within so many bytes the noise of two recordings of one size makes them differ.
+const HEAD_BYTES: usize = 64 << 10;
+
+/// A recording counts once, whatever its files are called. Moves copies to the trace that comes first: the same bytes, judged with
+/// the same rig. Only files of one size are opened,
+/// and only those that begin alike are read to their end.
+fn merged(traces: Vec<FleetTrace>) -> Vec<FleetTrace> {
+    let looks: [fn(&Path) -> Option<u64>; 3] =
+        [size, |path| hash(path, HEAD_BYTES as u64), |path| hash(path, u64::MAX)];
+    let mut groups: Vec<Vec<usize>> = vec![(0..traces.len()).collect()];
+    for look in looks {
+        let same = |group: &Vec<usize>| alike(group, |at| look(&traces.get(*at)?.path));
+        groups = groups.iter().flat_map(same).collect();
+    }
+    let mut first_of = HashMap::new();
+    for group in groups {
+        let mut firsts: Vec<usize> = Vec::new();
+        for at in group {
+            let rig = |at: usize| traces.get(at).map(|trace| &trace.rig);
+            match firsts.iter().find(|first| rig(**first).zip(rig(at)).is_some_and(|(a, b)| same_rig(a, b))) {
+                Some(first) => drop(first_of.insert(at, *first)),
+                None => firsts.push(at),
+            }
+        }
+    }
+    let mut kept: BTreeMap<usize, FleetTrace> = BTreeMap::new();
+    for (at, trace) in traces.into_iter().enumerate() {
+        match first_of.get(&at).and_then(|first| kept.get_mut(first)) {
+            Some(first) => first.copies.extend([trace.path].into_iter().chain(trace.other_names)),
+            None => drop(kept.insert(at, trace)),
+        }
+    }
+    kept.into_values().collect()
+}
+
+/// The members that share their key with another, by their keys.
+fn alike(group: &[usize], key: impl Fn(&usize) -> Option<u64>) -> Vec<Vec<usize>> {
+    let mut by_key: HashMap<u64, Vec<usize>> = HashMap::new();
+    for at in group {
+        if let Some(key) = key(at) {
+            by_key.entry(key).or_default().push(*at);
+        }
+    }
+    by_key.into_values().filter(|group| group.len() > 1).collect()
+}
+
+/// Whether a trace is judged alike by both, wherever their files stand.
+fn same_rig(a: &Result<Arc<Rig>, Arc<str>>, b: &Result<Arc<Rig>, Arc<str>>) -> bool {
+    let nameless = |rig: &Rig| Rig { name: String::new(), ..rig.clone() };
+    match (a, b) {
+        (Ok(a), Ok(b)) => Arc::ptr_eq(a, b) || nameless(a) == nameless(b),
+        (a, b) => a == b,
+    }
+}
+
+/// Of what can be opened twice: not of a pipe.
+fn size(path: &Path) -> Option<u64> {
+    Some(std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?.len())
+}
+
+/// Of a file's first bytes.
+fn hash(path: &Path, most: u64) -> Option<u64> {
+    let mut file = File::open(path).ok()?.take(most);
+    let mut hasher = DefaultHasher::new();
+    let mut block = vec![0; HEAD_BYTES];
+    loop {
+        let length = file.read(&mut block).ok()?;
+        match block.get(..length)? {
+            [] => return Some(hasher.finish()),
+            bytes => hasher.write(bytes),
+        }
+    }
+}
+
+/// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
+/// Paths count from the table's folder; the first row that fits a trace is taken.
+#[derive(Clone, Debug)]
+pub struct RigTable {
+    rows: Vec<RigRow>,
+}
+
+/// What the table says of a trace.
+#[derive(Clone, Debug)]
+struct RigRow {
+    pattern: Pattern,
+    rig: PathBuf,
+    cylinder: Option<String>,
+}
+
+impl RigTable {
+    /// Reads a table.
+    ///
+    /// # Errors
+    /// [`FleetError::RigTable`], with the row.
+    pub fn load(path: &Path) -> Result<Self, FleetError> {
+        let file = path.display().to_string();
+        read(path).map(|rows| Self { rows }).map_err(|why| FleetError::RigTable { file, why })
+    }
+
+    fn row_of(&self, trace: &Path) -> Option<&RigRow> {
+        let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
+        let trace = std::path::absolute(trace).unwrap_or_else(|_| trace.to_owned());
+        let trace = trace.to_string_lossy();
+        self.rows.iter().find(|row| row.pattern.matches_with(&trace, options))
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<RigRow>, String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let absolute = std::path::absolute(folder).or_else(|_| std::env::current_dir());
+    let absolute = absolute.map_err(|error| error.to_string())?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(|e| say(&e))?;
+    let headers = reader.headers().map_err(|error| say(&error))?.clone();
+    let column = |name| headers.iter().position(|header| header.trim_start_matches('\u{feff}') == name);
+    let (Some(trace), Some(rig)) = (column("trace"), column("rig")) else {
+        let found = headers.iter().collect::<Vec<_>>().join(",");
+        return Err(format!("a header `trace,rig` or `trace,rig,cylinder` is expected; it is `{found}`"));
+    };
+    let cylinder = column("cylinder");
+    let row = |record: Result<csv::StringRecord, csv::Error>| {
+        let record = record.map_err(|error| say(&error))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let cell = |column: usize| record.get(column).filter(|cell| !cell.is_empty());
+        let needed = |column, name| cell(column).ok_or_else(|| format!("line {line}: no {name}"));
+        let pattern = in_folder(&absolute, needed(trace, "trace")?);
+        let pattern = Pattern::new(&pattern).map_err(|error| format!("line {line}: {error}"))?;
+        let rig = folder.join(needed(rig, "rig")?);
+        Ok(RigRow { pattern, rig, cylinder: cylinder.and_then(cell).map(str::to_owned) })
+    };
+    reader.records().map(row).collect()
+}
+
+/// A pattern that counts from a folder whose own name is no pattern.
+fn in_folder(folder: &Path, pattern: &str) -> String {
+    let pattern = pattern.strip_prefix("./").unwrap_or(pattern);
+    if Path::new(pattern).is_absolute() {
+        return pattern.to_owned();
+    }
+    let folder = Pattern::escape(&folder.to_string_lossy());
+    format!("{}/{pattern}", folder.trim_end_matches('/'))
+}
+
+fn say(error: &csv::Error) -> String {
+    error.to_string().replace('\n', " ")
 }

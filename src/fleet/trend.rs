@@ -1,12 +1,13 @@
 //! A leak's course over the traces of days and months.
 
-use super::scatter::Scatter;
 use super::{FleetCylinder, FleetRow};
 use crate::report::{LeakTrend, with_interval};
 use crate::units::S_PER_DAY;
 use jiff::Timestamp;
+use nalgebra::{SMatrix, SVector};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 const H_PER_MONTH: f64 = 24.0 * 30.0;
 
@@ -76,7 +77,7 @@ impl LongTrend {
     }
 
     /// The slope, L/min a month of 30 days.
-    pub fn monthly_lpm(&self) -> Estimate<f64> {
+    pub(crate) fn monthly_lpm(&self) -> Estimate<f64> {
         self.trend.slope().scaled(H_PER_MONTH)
     }
 
@@ -127,51 +128,36 @@ struct Line {
     scatter: f64,
 }
 
-/// Sums of weights, of weighted times and values, and what follows from them.
-struct Sums {
-    weight: f64,
-    t: f64,
-    tt: f64,
-    level: f64,
-    slope: f64,
+/// A least-squares fit of flows, each a sum of `N` unknowns times known numbers.
+pub(super) struct Fit<const N: usize> {
+    /// The unknowns.
+    pub unknowns: SVector<f64, N>,
+    /// Their covariance, were each flow's variance the one that it was weighted by.
+    pub covariance: SMatrix<f64, N, N>,
+    /// Weighted sum of the squares of what the flows differ from the fit.
+    pub residual: f64,
+    /// Weights times what is not leverage.
+    pub free_weight: f64,
 }
 
-impl Sums {
-    fn of(points: &[(f64, Estimate<f64>)], weights: &[f64]) -> Option<Self> {
-        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-            points.iter().zip(weights).map(|((t, y), w)| w * of(*t, y.value)).sum()
-        };
-        let (weight, t, tt) = (sum(&|_, _| 1.0), sum(&|t, _| t), sum(&|t, _| t * t));
-        let (y, ty) = (sum(&|_, y| y), sum(&|t, y| t * y));
-        let determinant = weight * tt - t * t;
-        // Traces of one moment have no slope.
-        (determinant > 1e-9 * weight * tt).then(|| Self {
-            weight,
-            t,
-            tt,
-            level: (tt * y - t * ty) / determinant,
-            slope: (weight * ty - t * y) / determinant,
-        })
-    }
+impl<const N: usize> Fit<N> {
+    /// Variances of unknowns so many times those that each had alone tell nothing of them: traces of one moment have no slope.
+    const MOST_INFLATION: f64 = 1e9;
 
-    fn determinant(&self) -> f64 {
-        self.weight * self.tt - self.t * self.t
-    }
-
-    /// Weighted sum of the squares of the line's residuals.
-    fn residual(&self, points: &[(f64, Estimate<f64>)], weights: &[f64]) -> f64 {
-        let square =
-            |((t, y), w): (&(f64, Estimate<f64>), &f64)| w * (y.value - self.level - self.slope * t).powi(2);
-        points.iter().zip(weights).map(square).sum()
-    }
-
-    /// Weight times what is not leverage, over all points.
-    fn free_weight(&self, points: &[(f64, Estimate<f64>)], weights: &[f64]) -> f64 {
-        let one = |((t, _), w): (&(f64, Estimate<f64>), &f64)| {
-            let leverage = w * (self.tt - 2.0 * t * self.t + t * t * self.weight) / self.determinant();
-            w * (1.0 - leverage)
-        };
-        points.iter().zip(weights).map(one).sum()
+    /// Weighted by the inverse of each flow's own variance plus `scatter`.
+    pub fn of(flows: &[(SVector<f64, N>, Estimate<f64>)], scatter: f64) -> Option<Self> {
+        let weighed = || flows.iter().map(|(x, y)| (x, y.value, (y.std.powi(2) + scatter).recip()));
+        let normal: SMatrix<f64, N, N> = weighed().map(|(x, _, w)| w * x * x.transpose()).sum();
+        let right: SVector<f64, N> = weighed().map(|(x, y, w)| w * y * x).sum();
+        let covariance = normal.try_inverse()?;
+        let inflation = covariance.diagonal().component_mul(&normal.diagonal());
+        if !inflation.iter().all(|inflation| *inflation < Self::MOST_INFLATION) {
+            return None;
+        }
+        let unknowns = covariance * right;
+        let residual = weighed().map(|(x, y, w)| w * (y - x.dot(&unknowns)).powi(2)).sum();
+        let free_weight = weighed().map(|(x, _, w)| w * (1.0 - w * x.dot(&(covariance * x)))).sum();
+        Some(Self { unknowns, covariance, residual, free_weight })
     }
 }
 
@@ -180,18 +166,53 @@ impl Line {
     /// the 95 % interval.
     fn through(points: &[(f64, Estimate<f64>)]) -> Option<Self> {
         let scatter = Scatter::with_freedom(points.len().checked_sub(2)?)?;
-        let own: Vec<_> = points.iter().map(|(_, y)| y.std.powi(-2)).collect();
-        let sums = Sums::of(points, &own)?;
-        let variance = scatter.variance(sums.residual(points, &own), sums.free_weight(points, &own));
-        let weights: Vec<_> = points.iter().map(|(_, y)| (y.std.powi(2) + variance).recip()).collect();
-        let sums = Sums::of(points, &weights)?;
-        let inflation = scatter.inflation(sums.residual(points, &weights)).sqrt() * scatter.width();
-        let std = |of: f64| (of / sums.determinant()).sqrt() * inflation;
-        Some(Self {
-            level: Estimate { value: sums.level, std: std(sums.tt) },
-            slope: Estimate { value: sums.slope, std: std(sums.weight) },
-            scatter: variance.sqrt(),
-        })
+        let points: Vec<_> = points.iter().map(|(t, y)| (SVector::from([1.0, *t]), *y)).collect();
+        let own = Fit::of(&points, 0.0)?;
+        let variance = scatter.variance(own.residual, own.free_weight);
+        let Fit { unknowns, covariance, residual, .. } = Fit::of(&points, variance)?;
+        let inflation = scatter.inflation(residual).sqrt() * scatter.width();
+        let std = covariance.diagonal().map(|variance| variance.sqrt() * inflation);
+        let [level, slope] = [0, 1].map(|at| Estimate { value: unknowns[at], std: std[at] });
+        Some(Self { level, slope, scatter: variance.sqrt() })
+    }
+}
+
+/// A weighted fit with a scatter between traces beside their own errors.
+///
+/// The scatter's variance is by moments (DerSimonian & Laird 1986, "Meta-analysis in clinical trials"), the intervals by
+/// Student's t and the weighted residual, never below 1 (Knapp & Hartung 2003, "Improved tests for a random effects
+/// meta-regression with a single covariate").
+pub(super) struct Scatter {
+    freedom: f64,
+    student: StudentsT,
+}
+
+impl Scatter {
+    /// Of a fit with so many values more than unknowns. None without one: then nobody knows what traces scatter.
+    pub fn with_freedom(freedom: usize) -> Option<Self> {
+        let freedom = freedom as f64;
+        Some(Self { freedom, student: StudentsT::new(0.0, 1.0, freedom).ok()? })
+    }
+
+    /// Variance between traces, from a fit weighted by the values' own variances: its weighted sum of squares, and its
+    /// weight times what is not leverage.
+    pub fn variance(&self, residual: f64, free_weight: f64) -> f64 {
+        ((residual - self.freedom) / free_weight).max(0.0)
+    }
+
+    /// Factor of the variances of a fit with this weighted sum of squares.
+    pub fn inflation(&self, residual: f64) -> f64 {
+        (residual / self.freedom).max(1.0)
+    }
+
+    /// Factor of standard deviations such that 1.96 of them are the half of the 95 % interval.
+    pub fn width(&self) -> f64 {
+        self.student.inverse_cdf(0.975) / Estimate { value: 0.0, std: 1.0 }.half_width95()
+    }
+
+    /// How probable it is that chance alone is above so many standard deviations.
+    pub fn chance(&self, deviations: f64) -> f64 {
+        self.student.sf(deviations)
     }
 }
 

@@ -1,8 +1,7 @@
 //! Many samples in one message.
 
-use super::csv::Csv;
-use super::format::Fields;
-use super::{ndjson, neuron, plain_json};
+use super::format::{Csv, Fields};
+use super::json;
 use serde_json::value::RawValue;
 
 /// How a message holds its samples.
@@ -35,25 +34,25 @@ pub(super) fn parse<'a>(batch: &Batch<'a>) -> Result<Vec<Result<Fields<'a>, Stri
     let payload = std::str::from_utf8(batch.payload).map_err(|_| "not UTF-8".to_owned())?;
     Ok(match batch.format {
         BatchFormat::Json if payload.trim_start().starts_with('[') => array(payload)?,
-        BatchFormat::Json => lines(payload).map(ndjson::parse).collect(),
+        BatchFormat::Json => lines(payload).map(json::parse).collect(),
         BatchFormat::Csv => {
             let mut csv = Csv::default();
             let row = |line| csv.parse(line).map(|row| row.map(Fields::into_owned)).transpose();
             lines(payload).filter_map(row).collect()
         }
-        BatchFormat::Neuron => vec![neuron::parse(payload)],
+        BatchFormat::Neuron => vec![json::parse_neuron(payload)],
     })
 }
 
 /// All at once where each is a sample, else one by one.
 fn array(payload: &str) -> Result<Vec<Result<Fields<'_>, String>>, String> {
-    let all = plain_json::array(payload).or_else(|| serde_json::from_str::<Vec<Fields<'_>>>(payload).ok());
+    let all = json::plain_array(payload).or_else(|| serde_json::from_str::<Vec<Fields<'_>>>(payload).ok());
     if let Some(samples) = all {
         return Ok(samples.into_iter().map(Ok).collect());
     }
     let samples: Vec<&RawValue> =
         serde_json::from_str(payload).map_err(|error| format!("not a JSON array: {error}"))?;
-    Ok(samples.into_iter().map(|sample| ndjson::parse(sample.get())).collect())
+    Ok(samples.into_iter().map(|sample| json::parse(sample.get())).collect())
 }
 
 fn lines(payload: &str) -> impl Iterator<Item = &str> {

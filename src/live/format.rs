@@ -1,5 +1,8 @@
-use super::csv::Csv;
-use super::{influx, ndjson};
+//! How lines are written: JSON (`json.rs`), a header and rows, influx line protocol.
+
+use super::json;
+use crate::header::shorten;
+use jiff::Timestamp;
 use std::borrow::Cow;
 
 /// How a line says what was measured.
@@ -98,9 +101,162 @@ impl Parser {
     /// The line's fields; none where it is a header or a comment.
     pub(super) fn parse<'a>(&'a mut self, line: &'a str) -> Result<Option<Fields<'a>>, String> {
         match self {
-            Self::Ndjson => ndjson::parse(line).map(Some),
+            Self::Ndjson => json::parse(line).map(Some),
             Self::Csv(csv) => csv.parse(line),
-            Self::Influx => influx::parse(line),
+            Self::Influx => parse_influx(line),
+        }
+    }
+}
+
+/// A header row, then rows.
+#[derive(Default)]
+pub(super) struct Csv {
+    delimiter: char,
+    /// Of the header; empty before it.
+    names: Vec<String>,
+}
+
+impl Csv {
+    /// The first line is the header; so is one that repeats it, as after a feed began anew.
+    pub(super) fn parse<'a>(&'a mut self, line: &'a str) -> Result<Option<Fields<'a>>, String> {
+        if self.names.is_empty() {
+            let line = line.trim_start_matches('\u{feff}');
+            let most = |delimiter: &char| line.matches(*delimiter).count();
+            self.delimiter = [',', ';', '\t'].into_iter().rev().max_by_key(most).unwrap_or(',');
+            self.names = split(line, self.delimiter).map(Cow::into_owned).collect();
+            return Ok(None);
+        }
+        let mut fields = Fields::default();
+        let mut cells = split(line, self.delimiter);
+        let mut repeated = true;
+        for name in &self.names {
+            let cell = cells.next().ok_or_else(|| format!("{} cells expected", self.names.len()))?;
+            repeated &= cell == name.as_str();
+            fields.push(Cow::Borrowed(name), cell);
+        }
+        if cells.next().is_some() {
+            return Err(format!("{} cells expected", self.names.len()));
+        }
+        Ok((!repeated).then_some(fields))
+    }
+}
+
+/// Cells without blanks and quotes around them.
+fn split(line: &str, delimiter: char) -> impl Iterator<Item = Cow<'_, str>> {
+    let mut quoted = false;
+    line.split(move |c| {
+        quoted ^= c == '"';
+        c == delimiter && !quoted
+    })
+    .map(|cell| {
+        let cell = cell.trim();
+        match cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')) {
+            Some(inner) => Cow::Owned(inner.replace("\"\"", "\"")),
+            None => Cow::Borrowed(cell),
+        }
+    })
+}
+
+/// The fields of a line of influx line protocol (measurement, tags, fields, time in ns); none of a comment.
+fn parse_influx(line: &str) -> Result<Option<Fields<'_>>, String> {
+    if line.starts_with('#') {
+        return Ok(None);
+    }
+    let mut found = parts(line, ' ').filter(|part| !part.is_empty());
+    let (Some(series), Some(values)) = (found.next(), found.next()) else {
+        return Err("measurement, fields and time expected".to_owned());
+    };
+    let mut fields = Fields::default();
+    for tag in parts(series, ',').skip(1) {
+        let (name, value) = pair(tag)?;
+        if name == CYLINDER {
+            fields.cylinder = value;
+        }
+    }
+    for field in parts(values, ',') {
+        let (name, value) = pair(field)?;
+        fields.push(name, value);
+    }
+    if let Some(time) = found.next() {
+        let time: i128 = time.trim().parse().map_err(|_| format!("`{time}` is no time in ns"))?;
+        let stamp = Timestamp::from_nanosecond(time).map_err(|_| format!("{time} ns is no time"))?;
+        if !fields.names.iter().any(|name| name == "t_s" || name == "t_ms") {
+            fields.push("timestamp".into(), stamp.to_string().into());
+        }
+    }
+    Ok(Some(fields))
+}
+
+/// Parts between delimiters that are neither escaped nor within quotes.
+fn parts(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
+    let (mut quoted, mut escaped) = (false, false);
+    text.split(move |c| {
+        let here = c == delimiter && !quoted && !escaped;
+        quoted ^= c == '"' && !escaped;
+        escaped = c == '\\' && !escaped;
+        here
+    })
+}
+
+fn pair(text: &str) -> Result<(Cow<'_, str>, Cow<'_, str>), String> {
+    let mut sides = parts(text, '=');
+    match (sides.next(), sides.next(), sides.next()) {
+        (Some(name), Some(value), None) if !name.is_empty() => Ok((plain(name), plain(number(value)))),
+        _ => Err(format!("`{}` is no name=value", shorten(text, 40))),
+    }
+}
+
+/// A whole number carries a letter.
+fn number(value: &str) -> &str {
+    match value.strip_suffix(['i', 'u']) {
+        Some(digits) if digits.trim_start_matches('-').bytes().all(|b| b.is_ascii_digit()) => digits,
+        _ => value,
+    }
+}
+
+/// Without escapes and quotes.
+fn plain(text: &str) -> Cow<'_, str> {
+    let text = text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text);
+    if !text.contains('\\') {
+        return Cow::Borrowed(text);
+    }
+    let mut escaped = false;
+    let kept = |c: &char| {
+        escaped = *c == '\\' && !escaped;
+        !escaped
+    };
+    Cow::Owned(text.chars().filter(kept).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_names_the_cells_of_the_rows() {
+        let mut csv = Csv::default();
+        assert_eq!(csv.parse("cylinder;t_s;x_mm"), Ok(None));
+        let fields = csv.parse("\"T7; B2\"; 0.1;4e1").unwrap().unwrap();
+        assert_eq!((fields.cylinder.as_ref(), fields.names.join(" ")), ("T7; B2", "t_s x_mm".to_owned()));
+        assert_eq!(fields.cells, ["0.1", "4e1"]);
+        assert_eq!(csv.parse("cylinder;t_s;x_mm"), Ok(None));
+        assert!(csv.parse("a;1").is_err() && csv.parse("a;1;2;3").is_err());
+    }
+
+    #[test]
+    fn tags_fields_and_time() {
+        let line = r"pitch,cylinder=T7\ a\,b,host=gw x_mm=40.5,pa_bar=3i,qa_lpm=-1e-3 1700000000500000000";
+        let fields = parse_influx(line).unwrap().unwrap();
+        assert_eq!(fields.cylinder, "T7 a,b");
+        assert_eq!(fields.names, ["x_mm", "pa_bar", "qa_lpm", "timestamp"]);
+        assert_eq!(fields.cells, ["40.5", "3", "-1e-3", "2023-11-14T22:13:20.5Z"]);
+        assert_eq!(parse_influx("# comment"), Ok(None));
+    }
+
+    #[test]
+    fn what_is_no_line_is_refused() {
+        for line in ["pitch", "pitch x", "pitch =3", "pitch x=1=2", "pitch x=1 soon"] {
+            assert!(parse_influx(line).is_err(), "{line}");
         }
     }
 }

@@ -6,21 +6,14 @@
 mod batch;
 mod checkpoint;
 mod config;
-mod csv;
 mod cylinder;
 mod event;
 mod format;
 mod history;
-mod influx;
-mod layouts;
-mod ndjson;
-mod neuron;
-mod notices;
+mod json;
 mod order;
-mod plain_json;
 mod record;
 mod watch;
-mod weighing;
 
 pub use batch::{Batch, BatchFormat};
 pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};

@@ -1,17 +1,16 @@
 use super::batch::{self, Batch};
-use super::checkpoint;
 use super::config::LiveConfig;
 use super::cylinder::{Cylinder, Line};
-use super::event::{Event, NoticeEvent};
+use super::event::{Event, NoticeEvent, Notices};
 use super::format::{Fields, LineFormat, Parser};
 use super::history::History;
-use super::layouts::Layouts;
-use super::notices::Notices;
-use super::record;
+use super::{checkpoint, record};
 use crate::Rig;
 use crate::header::shorten;
+use crate::trace::LineLayout;
 use crate::units::S_PER_DAY;
 use pitchleak_core::PerLeak;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io;
 
@@ -274,4 +273,29 @@ fn rig_of<'a>(
         return Err(("too_many_cylinders", format!("`{}` is left out", shown())));
     }
     config.rig_of(name).ok_or_else(|| ("unknown_cylinder", format!("`{}` has no rig", shown())))
+}
+
+/// Sets of names that are remembered with what they mean.
+const LAYOUTS: usize = 16;
+
+/// What sets of names mean, the last used first.
+#[derive(Default)]
+struct Layouts(Vec<(String, Vec<String>, LineLayout)>);
+
+impl Layouts {
+    /// What cells of these names mean to a rig.
+    fn find(&mut self, names: &[Cow<'_, str>], rig: &Rig) -> Result<&LineLayout, String> {
+        let known = self.0.iter().position(|(rig_name, known, _)| *rig_name == rig.name && known == names);
+        match known {
+            Some(0) => {}
+            Some(at) => self.0.swap(0, at),
+            None => {
+                let names: Vec<String> = names.iter().map(|name| name.clone().into_owned()).collect();
+                let layout = LineLayout::new(&names, rig).map_err(|fault| fault.to_string())?;
+                self.0.insert(0, (rig.name.clone(), names, layout));
+                self.0.truncate(LAYOUTS);
+            }
+        }
+        self.0.first().map(|(_, _, layout)| layout).ok_or_else(String::new)
+    }
 }

@@ -5,15 +5,9 @@
 //! to as it is.
 
 mod fault;
-mod inputs;
 mod replacement;
-#[cfg(test)]
-mod tests;
-mod unfinished;
 
-pub use inputs::Inputs;
-pub(crate) use inputs::{Identity, identity};
-pub use unfinished::abandon;
+pub use replacement::abandon;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -104,6 +98,15 @@ impl OutputFile {
         finish_all([self])
     }
 
+    /// Writes all of it and ends it.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_with(mut self, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
+        self.write_all(bytes.as_ref()).map_err(|source| self.error(source))?;
+        self.finish()
+    }
+
     /// What a failed write to it means.
     pub fn error(&self, source: io::Error) -> OutputError {
         OutputError::Write { path: self.path.clone(), source }
@@ -181,7 +184,7 @@ impl Write for Sink {
 ///
 /// # Errors
 /// As [`OutputFile::finish`].
-pub fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), OutputError> {
+pub(crate) fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), OutputError> {
     let sealed = |OutputFile { path, coding }| match coding.sealed() {
         Ok(sink) => Ok((path, sink)),
         Err(source) => Err(OutputError::Write { path, source }),
@@ -197,9 +200,7 @@ pub fn finish_all(files: impl IntoIterator<Item = OutputFile>) -> Result<(), Out
 /// # Errors
 /// [`OutputError`].
 pub fn write(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>, inputs: &Inputs) -> Result<(), OutputError> {
-    let mut file = OutputFile::create(path, inputs)?;
-    file.write_all(bytes.as_ref()).map_err(|source| file.error(source))?;
-    file.finish()
+    OutputFile::create(path, inputs)?.finish_with(bytes)
 }
 
 /// Makes the folder where it is not there, and finds out whether files can be made in it.
@@ -211,3 +212,53 @@ pub fn make_folder(folder: &Path) -> Result<(), OutputError> {
     // Not placed, it goes.
     made.map(drop).map_err(|source| OutputError::Write { path: folder.to_owned(), source })
 }
+
+/// The files that a run reads. They are known by their identity, so that another name or a link doesn't hide one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Inputs(Vec<(PathBuf, Identity)>);
+
+/// Device and number of the file there.
+#[cfg(unix)]
+pub(crate) type Identity = (u64, u64);
+
+/// The path without links; a hard link is another file.
+#[cfg(not(unix))]
+pub(crate) type Identity = PathBuf;
+
+impl Inputs {
+    /// Those among `paths` that are files; `-` is standard input.
+    pub fn of(paths: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
+        let known = |path: &Path| Some((path.to_owned(), identity(path)?));
+        Self(paths.into_iter().filter_map(|path| known(path.as_ref())).collect())
+    }
+
+    /// With those of another list.
+    #[must_use]
+    pub fn and(mut self, others: Self) -> Self {
+        self.0.extend(others.0);
+        self
+    }
+
+    /// The input that lies at `path`.
+    pub(super) fn at(&self, path: &Path) -> Option<&Path> {
+        let identity = identity(path)?;
+        self.0.iter().find(|(_, input)| *input == identity).map(|(path, _)| path.as_path())
+    }
+}
+
+#[cfg(unix)]
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
+    use std::os::unix::fs::MetadataExt;
+    let path = if path == Path::new("-") { Path::new("/dev/stdin") } else { path };
+    // Not opened: that would take from a pipe, or wait for one.
+    let metadata = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+#[cfg(not(unix))]
+pub(crate) fn identity(path: &Path) -> Option<Identity> {
+    std::fs::canonicalize(path).ok().filter(|path| path.is_file())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,11 +1,12 @@
 //! A file that takes another's place when it is whole.
 
 use super::fault;
-use super::unfinished::unfinished;
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Written beside `target` under a name of its own; [`place`](Self::place) gives it the target's name. Dropped
@@ -106,4 +107,23 @@ fn sync(folder: &Path) -> io::Result<()> {
         Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
         done => done,
     }
+}
+
+/// Temporaries of this process that have no place yet.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// While it is held no file begins and none is finished.
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every file that this process has begun and not finished, for a process that ends at once: whichever of its
+/// threads would begin or finish one from here on waits for ever.
+pub fn abandon() {
+    let mut unfinished = unfinished();
+    for path in std::mem::take(&mut *unfinished) {
+        // Gone already or not to be removed: there is nobody left to tell.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(unfinished);
 }

@@ -1,15 +1,13 @@
 //! What a replay found, as data (`pitchleak.replay/1`) and as text for people.
 
-mod episode;
 mod reason;
 mod spell;
 mod statement;
 mod trend;
 mod verdict;
 
-pub use episode::Episode;
 pub use reason::{Reason, ReasonId};
-pub use spell::Spell;
+pub use spell::{Episode, Spell};
 pub(crate) use statement::join;
 pub use statement::{advice, capital, interval, with_interval};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
@@ -261,15 +259,7 @@ impl Leakage {
         let value = self.mean_lpm;
         self.std_lpm.map_or([value; 2], |std| Estimate { value, std }.ci95())
     }
-
-    /// Whether it is below zero by more than chance, which no leak is.
-    pub fn is_negative(&self) -> bool {
-        self.std_lpm.is_some_and(|std| self.mean_lpm + NEGATIVE_SIGMAS * std < 0.0)
-    }
 }
-
-/// Below zero by so many standard deviations is more than chance.
-const NEGATIVE_SIGMAS: f64 = 3.0;
 
 /// Offsets of the flow meters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

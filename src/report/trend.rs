@@ -82,7 +82,7 @@ impl LeakTrend {
     }
 
     /// Whether the leak changes at all, with 95 % probability.
-    pub fn is_significant(&self) -> bool {
+    pub(crate) fn is_significant(&self) -> bool {
         is_significant(&self.slope())
     }
 }

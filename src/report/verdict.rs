@@ -1,7 +1,7 @@
 //! What an operator acts on.
 
-use super::episode::comes_and_goes;
 use super::reason::{Reason, contradictions, gaps};
+use super::spell::comes_and_goes;
 use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};
@@ -151,7 +151,7 @@ const QUOTED_SHARE: f64 = 0.5;
 
 impl Verdict {
     /// Of this leak alone: who is sure of another is not sure of it.
-    pub fn status_of(&self, leak: Leak) -> Status {
+    pub(crate) fn status_of(&self, leak: Leak) -> Status {
         if self.status.is_sure() && !self.faults.contains(&leak) { Status::NotSure } else { self.status }
     }
 

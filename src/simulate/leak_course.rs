@@ -126,7 +126,7 @@ impl LeakCourse {
     ///
     /// # Errors
     /// [`LeakCourseError::Onset`] where it has times of its own.
-    pub fn opening_at(self, onset_s: f64) -> Result<Self, LeakCourseError> {
+    pub(crate) fn opening_at(self, onset_s: f64) -> Result<Self, LeakCourseError> {
         match self.opening {
             _ if onset_s <= 0.0 => Ok(self),
             Opening::Steady => Ok(Self::from_onset(self.size, onset_s)),

@@ -4,41 +4,35 @@
 //! trace file and the truth beside it. The controllers act on the truth, not on the readings.
 
 mod effects;
-mod followed;
 mod leak;
 mod leak_course;
 mod oil_temperature;
 mod plan;
-mod reading;
 mod recording;
 mod sensing;
 pub mod sensor_fault;
-mod sensor_memory;
 mod span;
 mod valve;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
-pub use followed::Followed;
 pub use leak::{LeakSize, LeakSizeError};
 pub use leak_course::{LeakCourse, LeakCourseError, Opening};
 pub use oil_temperature::{OilTemperature, OilTemperatureError};
-pub use plan::{Noise, Plan, PlanError, ShareError, share_of_full_scale};
-pub use reading::Reading;
+pub use plan::{Followed, Noise, Plan, PlanError, ShareError, share_of_full_scale};
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile};
-pub use sensing::Normal;
-pub use sensing::{Biases, Sensing};
+pub use sensing::{Biases, Normal, Sensing};
 pub use sensor_fault::{SensorFault, SensorFaults};
 pub use span::{Span, SpanError};
 pub use valve::{ValveFlaw, ValveFlawError, ValveTruth};
-pub use writer::{Columns, Row, TraceLayout, TraceWriter};
+pub use writer::{Columns, Reading, Row, TraceLayout, TraceWriter};
 
 use crate::Rig;
 use crate::reference::Reference;
+use effects::RememberingSensor;
 use pitchleak_core::emulator::{Emulator, EmulatorParams};
 use pitchleak_core::plant::PlantError;
 use pitchleak_core::{EffectSet, Model, PerLeak, Sample, Signals};
-use sensor_memory::RememberingSensor;
 
 /// What is simulated: a rig, what it follows, its leaks, and for how long.
 #[derive(Clone, Debug)]
@@ -206,7 +200,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`SimulateError`].
-    pub fn run_while(
+    pub(crate) fn run_while(
         &self,
         leaks_m3spa: PerLeak<f64>,
         mut each: impl FnMut(&Truth) -> bool,

@@ -72,7 +72,7 @@ impl OilTemperature {
 
     /// How much more a laminar leak lets through at this time than at 40 °C, where its size holds: the inverse ratio of the
     /// viscosities. The oil's thermal expansion (0.07 % per kelvin) is left out.
-    pub fn leak_factor(&self, t_s: f64) -> f64 {
+    pub(crate) fn leak_factor(&self, t_s: f64) -> f64 {
         viscosity_mm2ps(GRADE_K) / viscosity_mm2ps(self.at(t_s))
     }
 }

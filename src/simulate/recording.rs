@@ -64,7 +64,7 @@ pub struct TruthFile {
     /// Standard deviations of the sensors' white noise, SI.
     pub noise_std: BTreeMap<&'static str, f64>,
     /// Constant offsets of the sensors, reading minus truth, SI.
-    pub biases: BTreeMap<&'static str, f64>,
+    pub biases: Biases,
     /// Mistakes of the sensors, as given, in the order in which they happen.
     pub sensor_faults: Vec<String>,
     /// How the reference went on after its end, and when, where the trace is longer.
@@ -285,14 +285,7 @@ impl Recording {
                 ("qb_m3s", noise.flow_b.noise_std),
                 ("force_n", noise.force.noise_std),
             ]),
-            biases: BTreeMap::from([
-                ("x_m", biases.x_m),
-                ("pa_pa", biases.pa_pa),
-                ("pb_pa", biases.pb_pa),
-                ("qa_m3s", biases.qa_m3s),
-                ("qb_m3s", biases.qb_m3s),
-                ("force_n", biases.force_n),
-            ]),
+            biases: *biases,
             sensor_faults: sensor_faults.iter().map(ToString::to_string).collect(),
             reference_end: self.reference_end(),
             position_error_rms_m: (totals.position_square / count).sqrt(),

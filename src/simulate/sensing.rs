@@ -2,12 +2,13 @@ use crate::rig::{Instrument, Instruments};
 use pitchleak_core::{Sample, Sensors};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
 
 /// Constant offsets of the sensors, reading minus truth, SI.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
 pub struct Biases {
-    /// Position sensor, m.
-    pub x_m: f64,
+    /// Force sensor, N.
+    pub force_n: f64,
     /// Pressure sensor A, Pa.
     pub pa_pa: f64,
     /// Pressure sensor B, Pa.
@@ -16,8 +17,8 @@ pub struct Biases {
     pub qa_m3s: f64,
     /// Flow meter B, m³/s.
     pub qb_m3s: f64,
-    /// Force sensor, N.
-    pub force_n: f64,
+    /// Position sensor, m.
+    pub x_m: f64,
 }
 
 impl Biases {
@@ -26,10 +27,8 @@ impl Biases {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // A stream of its own: the noise may be drawn from the same seed.
         random.set_stream(1);
-        let mut within = |sheet: &Instrument| {
-            let unit = (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0;
-            (2.0 * unit - 1.0) * share * sheet.full_scale + 0.0
-        };
+        let mut within =
+            |sheet: &Instrument| (2.0 * unit(&mut random) - 1.0) * share * sheet.full_scale + 0.0;
         Self {
             x_m: within(&instruments.position),
             pa_pa: within(&instruments.pressure),
@@ -39,6 +38,11 @@ impl Biases {
             force_n: within(&instruments.force),
         }
     }
+}
+
+/// A number in 0 <= u < 1.
+pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
+    (random.next_u64() >> 11) as f64 * f64::EPSILON / 2.0
 }
 
 /// Sensors that show the truth plus a constant bias plus white noise.
@@ -55,7 +59,7 @@ impl Sensing {
     /// Sensors with the white noise of `noise` (its biases and gains are not used) and the offsets
     /// `biases`, from `seed`.
     pub fn new(noise: Sensors<f64>, biases: Biases, seed: u64) -> Self {
-        Self { noise, biases, normal: Normal::seeded(seed) }
+        Self { noise, biases, normal: Normal::stream(seed, 0) }
     }
 
     /// One reading of `truth`. Every sensor draws its number each time, so that a channel that is
@@ -88,10 +92,6 @@ pub struct Normal {
 }
 
 impl Normal {
-    fn seeded(seed: u64) -> Self {
-        Self::stream(seed, 0)
-    }
-
     /// The numbers of one of the streams that a seed has; the sensors' noise is stream 0.
     pub fn stream(seed: u64, stream: u64) -> Self {
         let mut uniform = ChaCha8Rng::seed_from_u64(seed);
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn numbers_are_normal() {
-        let mut normal = Normal::seeded(7);
+        let mut normal = Normal::stream(7, 0);
         let draws: Vec<f64> = (0..200_000).map(|_| normal.draw()).collect();
         let signals = |p: i32| draws.iter().map(|x| x.powi(p)).sum::<f64>() / draws.len() as f64;
         assert!(signals(1).abs() < 0.01 && (signals(2) - 1.0).abs() < 0.02);

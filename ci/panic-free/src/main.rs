@@ -133,9 +133,9 @@ fn plant_and_emulator<T: Real>() {
         let drive = any(Drive { qa_m3s: T::one(), qb_m3s: T::one(), force_n: T::one() });
         keep(plant.step(&state, any(T::one()), |_| drive));
     }
-    let Ok(params) = EmulatorParams::for_model(model) else { return };
+    let Ok(mut params) = EmulatorParams::for_model(model) else { return };
+    params.pitch.plant.effects = effects;
     if let Ok(mut emulator) = Emulator::new(params, any(T::one()), any(T::one())) {
-        emulator.set_effects(effects);
         while any(true) {
             keep(emulator.step(any(T::one()), any(T::one()), any(T::one())).is_ok());
             keep(emulator.reading());

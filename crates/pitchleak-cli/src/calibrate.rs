@@ -1,15 +1,14 @@
 use crate::failure::Failure;
+use crate::input::rig;
 use crate::{Outcome, output};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use pitchleak::Rig;
 use pitchleak::output::{Inputs, OutputFile};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::trace::TraceReader;
 use pitchleak::valve::{Calibrator, LeaksThen};
 use pitchleak_view::Text;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Learn the valve of a cylinder without flow meters from traces of it: gains, laps and clearances of its edges
 ///
@@ -47,14 +46,9 @@ fn leaks_then() -> impl TypedValueParser<Value = LeaksThen> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let first = arguments.traces.first().map_or(Path::new("-"), PathBuf::as_path);
-    let rig = match &arguments.rig {
-        Some(rig) => Rig::load(rig)?,
-        None => Rig::beside(first)?,
-    }
-    .uncalibrated();
+    let rig = rig(arguments.rig.as_ref(), &arguments.traces)?.uncalibrated();
     let read = arguments.traces.iter().chain(&arguments.evidence).map(PathBuf::as_path).chain(rig.file());
-    let mut file = OutputFile::create(&arguments.out, &Inputs::of(read))?;
+    let file = OutputFile::create(&arguments.out, &Inputs::of(read))?;
     let mut calibrator = Calibrator::new(&rig, arguments.leaks)?;
     if let Some(hold) = &arguments.evidence {
         let mut reader = TraceReader::open(hold, &rig)?;
@@ -64,9 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         calibrator.read(&mut TraceReader::open(path, &rig)?)?;
     }
     let found = calibrator.finish()?;
-    let text = found.to_toml()?;
-    file.write_all(text.as_bytes()).map_err(|source| file.error(source))?;
-    file.finish()?;
+    file.finish_with(found.to_toml()?)?;
     output::print(&found.to_text(&output::palette()))?;
     output::print(&format!("\nIn {}: [valve] calibration = \"{}\"\n", rig.name, arguments.out.display()))?;
     Ok(Outcome::Done)

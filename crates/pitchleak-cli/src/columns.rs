@@ -1,8 +1,7 @@
 use crate::failure::Failure;
-use crate::text_format::TextFormat;
+use crate::input::{TextFormat, rig};
 use crate::{Outcome, output};
 use clap::Args;
-use pitchleak::Rig;
 use pitchleak::trace::FileReading;
 use std::path::PathBuf;
 
@@ -30,10 +29,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut rig = match &arguments.rig {
-        Some(path) => Rig::load(path)?,
-        None => Rig::beside(&arguments.file)?,
-    };
+    let mut rig = rig(arguments.rig.as_ref(), std::slice::from_ref(&arguments.file))?;
     arguments.text_format.settle(&mut rig);
     let reading = FileReading::of(&arguments.file, &rig)?;
     let text = if arguments.json { reading.to_json()? + "\n" } else { reading.to_text() };

@@ -1,5 +1,5 @@
 use crate::failure::Failure;
-use crate::text_format::TextFormat;
+use crate::input::{TextFormat, rig};
 use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
@@ -10,7 +10,6 @@ use pitchleak::trace::{BadRows, TraceReader};
 use pitchleak_view::page::{Page, PageFile};
 use pitchleak_view::{Palette, Text, residual_figures};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -64,11 +63,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut rig = match (&arguments.rig, arguments.traces.first()) {
-        (Some(path), _) => Rig::load(path)?,
-        (None, Some(trace)) => Rig::beside(trace)?,
-        (None, None) => Rig::paper(),
-    };
+    let mut rig = rig(arguments.rig.as_ref(), &arguments.traces)?;
     arguments.text_format.settle(&mut rig);
     let roles = Roles::of(&arguments.traces, &arguments.test)?;
     roles.repeated.iter().for_each(|same| output::warn(&[same.to_string()]));
@@ -94,11 +89,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     bar.set_message("fitting");
     let diagnosis = diagnose(&train, &test, &Declared::of(&rig), &|| bar.tick());
     bar.finish_and_clear();
-    if let Some(mut file) = saved {
+    if let Some(file) = saved {
         let before = rig.file().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
-        let written = file.write_all(diagnosis.rig(&rig).to_toml_over(&before).as_bytes());
-        written.map_err(|source| file.error(source))?;
-        file.finish()?;
+        file.finish_with(diagnosis.rig(&rig).to_toml_over(&before))?;
     }
     if let Some(page) = page {
         let names: Vec<_> =

@@ -1,13 +1,12 @@
 use crate::failure::Failure;
-use crate::text_format::TextFormat;
+use crate::input::TextFormat;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::Rig;
-use pitchleak::output::{Inputs, OutputFile};
+use pitchleak::output::{Inputs, write};
 use pitchleak::signal::Signal;
 use pitchleak::template::{NEEDED_KEYS, template};
 use pitchleak::trace::{FileReading, ProposedLine};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Begin a rig file for traces: their columns named, the cylinder's numbers as blanks to fill in
@@ -53,10 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             }
         }
     }
-    let mut file = OutputFile::create(&out, &Inputs::of(arguments.files.iter().map(PathBuf::as_path)))?;
-    let written = file.write_all(template(&rig, &lines, &given).as_bytes());
-    written.map_err(|source| file.error(source))?;
-    file.finish()?;
+    let inputs = Inputs::of(arguments.files.iter().map(PathBuf::as_path));
+    write(&out, template(&rig, &lines, &given), &inputs)?;
     output::print(&format!(
         "{} written: {} columns named. Fill in {} where it says `#`, look over [columns] and [sensors], then: pitchleak replay {}\n",
         out.display(),

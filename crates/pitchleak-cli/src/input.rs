@@ -1,12 +1,13 @@
 //! The arguments that say what to read.
 
 use crate::failure::Failure;
-use crate::text_format::TextFormat;
 use crate::{Outcome, output};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;
 use pitchleak::output::Inputs;
+use pitchleak::rig::{Decimal, Delimiter, RigError};
+use pitchleak::times::{TimeFormat, TimeKind};
 use pitchleak::trace::{BadRows, TraceReader};
 use std::path::{Path, PathBuf};
 
@@ -68,13 +69,18 @@ impl Input {
     }
 
     fn trace(&self, paths: Vec<PathBuf>) -> Result<Trace, Failure> {
-        let mut rig = match &self.rig {
-            Some(rig) => Rig::load(rig)?,
-            None => Rig::beside(paths.first().map_or(Path::new("-"), PathBuf::as_path))?,
-        };
+        let mut rig = rig(self.rig.as_ref(), &paths)?;
         self.text_format.settle(&mut rig);
         let bad_rows = if self.strict { BadRows::Fatal } else { BadRows::Skip };
         Ok(Trace { follows: self.traces.len() > paths.len(), paths, rig, bad_rows })
+    }
+}
+
+/// The rig that is given, else the one beside the first trace, else the built-in one.
+pub fn rig(given: Option<&PathBuf>, traces: &[PathBuf]) -> Result<Rig, RigError> {
+    match given {
+        Some(rig) => Rig::load(rig),
+        None => Rig::beside(traces.first().map_or(Path::new("-"), PathBuf::as_path)),
     }
 }
 
@@ -133,4 +139,47 @@ fn progress(bytes: u64) -> ProgressBar {
         return ProgressBar::hidden();
     }
     output::bar(bytes, "{bar:40} {percent:>3} %  {bytes_per_sec}, {eta} left")
+}
+
+// How a text file of numbers is written, where the file leaves it open.
+#[derive(Args)]
+#[command(next_help_heading = "Where a file leaves it open")]
+pub struct TextFormat {
+    /// What stands between cells: comma, semicolon, tab or bar
+    #[arg(long, value_name = "NAME", value_parser = delimiter)]
+    delimiter: Option<Delimiter>,
+
+    /// What stands before decimals: point or comma
+    #[arg(long, value_name = "NAME", value_parser = decimal)]
+    decimal: Option<Decimal>,
+
+    /// How times are written: iso, dmy, mdy, ymd, hms, epoch s|ms|us|ns, excel, or a pattern (%d.%m.%Y %H:%M:%S%.f)
+    #[arg(long, value_name = "FORMAT", value_parser = time)]
+    time_format: Option<TimeKind>,
+}
+
+fn delimiter(name: &str) -> Result<Delimiter, String> {
+    let names = Delimiter::NAMES.map(|(name, _)| name).join(", ");
+    Delimiter::by_name(name).ok_or_else(|| format!("one of: {names}"))
+}
+
+fn decimal(name: &str) -> Result<Decimal, String> {
+    Decimal::by_name(name).ok_or_else(|| "one of: point, comma".to_owned())
+}
+
+fn time(name: &str) -> Result<TimeKind, String> {
+    TimeKind::by_name(name).ok_or_else(|| format!("one of: {}", TimeKind::ALLOWED))
+}
+
+impl TextFormat {
+    /// What is given comes before what the rig file says.
+    pub fn settle(&self, rig: &mut Rig) {
+        let csv = &mut rig.csv;
+        csv.delimiter = self.delimiter.or(csv.delimiter);
+        csv.decimal = self.decimal.or(csv.decimal);
+        if let Some(kind) = &self.time_format {
+            let zone = csv.time.take().and_then(|time| time.zone);
+            csv.time = Some(TimeFormat { kind: kind.clone(), zone });
+        }
+    }
 }

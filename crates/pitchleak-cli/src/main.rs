@@ -1,23 +1,19 @@
 //! The program `pitchleak`: arguments in, text out, no numerics of its own.
 
+mod about;
 mod calibrate;
 mod check;
 mod columns;
-mod completions;
 mod diagnose;
-mod explanations;
 mod failure;
 mod fleet;
 mod init;
 mod input;
-mod interrupt;
-mod man;
 mod output;
 mod prove;
 mod replay;
 mod reproduce;
 mod simulate;
-mod text_format;
 mod watch;
 
 use clap::error::ErrorKind;
@@ -55,12 +51,12 @@ enum Command {
     Columns(columns::Arguments),
     Init(init::Arguments),
     Fleet(fleet::Arguments),
-    Explanations(explanations::Arguments),
+    Explanations(about::Explanations),
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
-    Completions(completions::Arguments),
-    Man(man::Arguments),
+    Completions(about::Completions),
+    Man(about::ManualPage),
 }
 
 /// What a command that ran to its end has to say by its exit status.
@@ -141,7 +137,7 @@ fn in_one_line(answer: &str) -> String {
 fn run(command: &Command) -> Result<Outcome, Failure> {
     // A watch that is to end saves its state first.
     if !matches!(command, Command::Watch(_)) {
-        interrupt::leave_nothing_half_written()?;
+        failure::leave_nothing_half_written()?;
     }
     match command {
         Command::Replay(arguments) => replay::run(arguments),
@@ -152,11 +148,11 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Columns(arguments) => columns::run(arguments),
         Command::Init(arguments) => init::run(arguments),
         Command::Fleet(arguments) => fleet::run(arguments),
-        Command::Explanations(arguments) => explanations::run(arguments),
+        Command::Explanations(arguments) => arguments.run(),
         Command::Watch(arguments) => watch::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Reproduce(arguments) => reproduce::run(arguments),
-        Command::Completions(arguments) => completions::run(arguments),
-        Command::Man(arguments) => man::run(arguments),
+        Command::Completions(arguments) => arguments.run(),
+        Command::Man(arguments) => arguments.run(),
     }
 }

@@ -1,5 +1,5 @@
-use crate::failure::Failure;
-use crate::{Outcome, interrupt, output};
+use crate::failure::{Failure, at_the_end};
+use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Snapshot, Watch};
@@ -148,7 +148,7 @@ fn inputs() -> Result<Receiver<Input>, Failure> {
     let (sender, receiver) = sync_channel(WAITING);
     let at_signal = sender.clone();
     // Whatever waits is taken in first.
-    interrupt::at_the_end(move |_| drop(at_signal.send(Input::End)))?;
+    at_the_end(move |_| drop(at_signal.send(Input::End)))?;
     std::thread::spawn(move || read(&mut io::stdin().lock(), &sender));
     Ok(receiver)
 }

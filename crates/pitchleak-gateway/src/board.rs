@@ -4,7 +4,7 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::live::EstimateEvent;
 use pitchleak::report::Status;
 use prometheus_client::collector::Collector;
-use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric as _};
+use prometheus_client::encoding::{DescriptorEncoder, EncodeLabelSet, EncodeMetric};
 use prometheus_client::metrics::MetricType;
 use prometheus_client::metrics::gauge::ConstGauge;
 use serde::Serialize;
@@ -185,40 +185,45 @@ impl Collector for Board {
         let told = || cards.iter().filter_map(|(name, card)| Some((name.as_str(), card.estimate.as_ref()?)));
         let leaks = || told().flat_map(|(name, told)| Leak::ALL.map(|leak| (name, leak, told)));
 
-        let mut family =
-            encoder.encode_descriptor("leak_lpm", "Mean flow of a leak, L/min", None, MetricType::Gauge)?;
-        for (name, leak, told) in leaks() {
-            let labels = [("cylinder", name), ("leak", leak.id())];
-            ConstGauge::new(told.leakage[leak].mean_lpm).encode(family.encode_family(&labels)?)?;
-        }
-        let help = "Standard deviation of its error, L/min";
-        let mut family = encoder.encode_descriptor("leak_std_lpm", help, None, MetricType::Gauge)?;
-        for (name, leak, told) in leaks() {
-            let labels = [("cylinder", name), ("leak", leak.id())];
-            let std_lpm = told.leakage[leak].std_lpm.unwrap_or(f64::NAN);
-            ConstGauge::new(std_lpm).encode(family.encode_family(&labels)?)?;
-        }
-        let help = "1 while the alarm of a leak stands";
-        let mut family = encoder.encode_descriptor("alarm", help, None, MetricType::Gauge)?;
-        for (name, leak, told) in leaks() {
-            let labels = [("cylinder", name), ("leak", leak.id())];
-            let stands = i64::from(told.faults.contains(&leak));
-            ConstGauge::new(stands).encode(family.encode_family(&labels)?)?;
-        }
-        let help = "1 for the status that a cylinder has";
-        let mut family = encoder.encode_descriptor("status", help, None, MetricType::Gauge)?;
-        for (name, told) in told() {
-            for status in [Status::Leak, Status::Sound, Status::Doubtful, Status::NotSure] {
-                let labels = [("cylinder", name), ("status", status.id())];
-                ConstGauge::new(i64::from(told.status == status)).encode(family.encode_family(&labels)?)?;
-            }
-        }
+        let of_leaks = |value: fn(&EstimateEvent, Leak) -> f64| {
+            leaks()
+                .map(move |(name, leak, told)| ([("cylinder", name), ("leak", leak.id())], value(told, leak)))
+        };
+        let mean = of_leaks(|told, leak| told.leakage[leak].mean_lpm);
+        gauges(&mut encoder, "leak_lpm", "Mean flow of a leak, L/min", mean)?;
+        let std = of_leaks(|told, leak| told.leakage[leak].std_lpm.unwrap_or(f64::NAN));
+        gauges(&mut encoder, "leak_std_lpm", "Standard deviation of its error, L/min", std)?;
+        let stands = leaks().map(|(name, leak, told)| {
+            ([("cylinder", name), ("leak", leak.id())], i64::from(told.faults.contains(&leak)))
+        });
+        gauges(&mut encoder, "alarm", "1 while the alarm of a leak stands", stands)?;
+        let each = told().flat_map(|(name, told)| {
+            [Status::Leak, Status::Sound, Status::Doubtful, Status::NotSure].map(|status| {
+                ([("cylinder", name), ("status", status.id())], i64::from(told.status == status))
+            })
+        });
+        gauges(&mut encoder, "status", "1 for the status that a cylinder has", each)?;
         let help = "Time since the last estimate of a cylinder, or since the service waits for one, s";
-        let mut family = encoder.encode_descriptor("silent_seconds", help, None, MetricType::Gauge)?;
-        for (name, card) in &*cards {
-            let labels = [("cylinder", name.as_str())];
-            ConstGauge::new(card.heard.elapsed().as_secs_f64()).encode(family.encode_family(&labels)?)?;
-        }
-        Ok(())
+        let silent = cards
+            .iter()
+            .map(|(name, card)| ([("cylinder", name.as_str())], card.heard.elapsed().as_secs_f64()));
+        gauges(&mut encoder, "silent_seconds", help, silent)
     }
+}
+
+/// A family of gauges: each with its labels.
+fn gauges<L: EncodeLabelSet, V>(
+    encoder: &mut DescriptorEncoder<'_>,
+    name: &str,
+    help: &str,
+    values: impl Iterator<Item = (L, V)>,
+) -> fmt::Result
+where
+    ConstGauge<V>: EncodeMetric,
+{
+    let mut family = encoder.encode_descriptor(name, help, None, MetricType::Gauge)?;
+    for (labels, value) in values {
+        ConstGauge::new(value).encode(family.encode_family(&labels)?)?;
+    }
+    Ok(())
 }

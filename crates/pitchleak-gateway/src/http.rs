@@ -1,6 +1,6 @@
 //! What a browser, Prometheus and whoever asks for its health are told, over HTTP/1.1. Nobody keeps others waiting.
 
-use crate::failure::Failure;
+use crate::Failure;
 use crate::metrics::Metrics;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

@@ -5,29 +5,23 @@ mod alarms;
 mod board;
 mod broker;
 mod config;
-mod dead_letters;
-mod failure;
 mod http;
-mod input;
 mod log;
 mod metrics;
 mod mqtt;
 mod outbox;
 mod pace;
-mod reload;
 mod run;
 mod saver;
-mod secrets;
 mod service;
-mod session;
-mod summaries;
 mod topics;
 
 use clap::Parser;
 use config::Config;
-use failure::Failure;
+use pitchleak::live::{CheckpointError, ConfigError};
+use std::io;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Watches hydraulic pitch cylinders whose samples come over MQTT, and publishes what leaks.
@@ -69,4 +63,31 @@ fn start(arguments: &Arguments) -> Result<(), Failure> {
     }
     config.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     writeln!(std::io::stdout(), "{}", run::in_words(&config)).map_err(Failure::Output)
+}
+
+/// Why the service does not start, or ended; one line for people each.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("{path}: {why}", path = path.display())]
+    Content { path: PathBuf, why: String },
+    #[error(transparent)]
+    Watch(#[from] ConfigError),
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    #[error("cannot listen on {address}: {source}")]
+    Listen { address: String, source: io::Error },
+    #[error("TLS: {0}")]
+    Tls(String),
+    #[error("cannot write to standard output: {0}")]
+    Output(io::Error),
+    #[error("cannot {what}: {source}")]
+    System { what: &'static str, source: io::Error },
+}
+
+impl Failure {
+    pub(crate) fn content(path: &Path, why: impl Into<String>) -> Self {
+        Self::Content { path: path.to_owned(), why: why.into() }
+    }
 }

@@ -53,47 +53,35 @@ impl Metrics {
     pub fn new(board: Arc<Board>) -> Self {
         let mut registry = Registry::with_prefix("pitchleak");
         let all = &mut registry;
-        let connected = registered(all, "connected", "1 while there is a connection to the broker");
-        let cylinders = registered(all, "cylinders", "Cylinders of which samples came");
-        let messages = registered(all, "messages", "Messages of samples");
-        let bytes = registered(all, "bytes", "Bytes in them");
-        let estimates = registered(all, "estimates", "Estimates made");
-        let alarms = registered(all, "alarms", "Alarms raised and cleared");
-        let unacknowledged = registered(all, "unacknowledged", "Messages that wait for a checkpoint");
-        let unsent_alarms = registered(all, "unsent_alarms", "Alarms that the broker does not have yet");
-        let reload_failures = registered(all, "reload_failures", "Configurations that could not be used");
-        let checkpoints = registered(all, "checkpoints", "Checkpoints written");
-        let checkpoint_failures =
-            registered(all, "checkpoint_failures", "Checkpoints that could not be written");
-        let checkpoint_bytes = registered(all, "checkpoint_bytes", "Size of the last checkpoint");
-        let checkpoint_seconds = registered(all, "checkpoint_seconds", "Time that it took, s");
-        let checkpoint_age_seconds =
-            registered(all, "checkpoint_age_seconds", "Time since it was written, s");
-        let written_bytes = registered(all, "written_bytes", "Bytes of all checkpoints");
-        let left_out = registered(all, "left_out", "Samples and messages that were left out");
-        let latency = Histogram::new(LATENCIES_S);
-        all.register("latency_seconds", "Time from a message to its estimates, s", latency.clone());
         all.register_collector(Box::new(Arc::clone(&board)));
         Self {
             begun: Instant::now(),
             board,
-            connected,
-            messages,
-            bytes,
-            estimates,
-            alarms,
-            cylinders,
-            unacknowledged,
-            unsent_alarms,
-            reload_failures,
-            checkpoints,
-            checkpoint_failures,
-            checkpoint_bytes,
-            checkpoint_seconds,
-            checkpoint_age_seconds,
-            written_bytes,
-            latency,
-            left_out,
+            connected: registered(all, "connected", "1 while there is a connection to the broker"),
+            cylinders: registered(all, "cylinders", "Cylinders of which samples came"),
+            messages: registered(all, "messages", "Messages of samples"),
+            bytes: registered(all, "bytes", "Bytes in them"),
+            estimates: registered(all, "estimates", "Estimates made"),
+            alarms: registered(all, "alarms", "Alarms raised and cleared"),
+            unacknowledged: registered(all, "unacknowledged", "Messages that wait for a checkpoint"),
+            unsent_alarms: registered(all, "unsent_alarms", "Alarms that the broker does not have yet"),
+            reload_failures: registered(all, "reload_failures", "Configurations that could not be used"),
+            checkpoints: registered(all, "checkpoints", "Checkpoints written"),
+            checkpoint_failures: registered(
+                all,
+                "checkpoint_failures",
+                "Checkpoints that could not be written",
+            ),
+            checkpoint_bytes: registered(all, "checkpoint_bytes", "Size of the last checkpoint"),
+            checkpoint_seconds: registered(all, "checkpoint_seconds", "Time that it took, s"),
+            checkpoint_age_seconds: registered(all, "checkpoint_age_seconds", "Time since it was written, s"),
+            written_bytes: registered(all, "written_bytes", "Bytes of all checkpoints"),
+            left_out: registered(all, "left_out", "Samples and messages that were left out"),
+            latency: {
+                let latency = Histogram::new(LATENCIES_S);
+                all.register("latency_seconds", "Time from a message to its estimates, s", latency.clone());
+                latency
+            },
             failures_in_a_row: AtomicU64::default(),
             turned: AtomicU64::default(),
             saved: AtomicU64::default(),

@@ -1,19 +1,20 @@
 //! MQTT 5 by the crate rumqttc, in a thread of its own that waits for the network alone.
 
+use crate::Failure;
 use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{BrokerConfig, Tls};
-use crate::failure::Failure;
-use crate::input::Input;
 use crate::outbox::{Next, Outbox};
-use crate::session;
+use crate::run::Input;
 use rumqttc::tokio_rustls::rustls::pki_types::pem::PemObject;
 use rumqttc::tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rumqttc::tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use rumqttc::{
     AckMode, AsyncClient, ConnectionError, Event, EventLoop, LastWill, ManualAck, MqttOptions, Packet,
-    PubAck, Publish, PublishOptions, QoS, SessionMode, SubscribeFilter, SubscribeReasonCode,
-    TlsConfiguration, Transport,
+    PersistedAckMode, PersistedSession, PubAck, Publish, PublishOptions, QoS, SessionMode, SessionStore,
+    SessionStoreError, SessionStoreKey, SubscribeFilter, SubscribeReasonCode, TlsConfiguration, Transport,
 };
+use std::future::ready;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -101,8 +102,8 @@ fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> Mqtt
         .set_network_options(network)
         .set_keep_alive(config.keep_alive_s)
         .set_session_mode(SessionMode::Persistent)
-        .set_session_store(session::Empty)
-        .set_outgoing_inflight_upper_limit(session::OUTGOING)
+        .set_session_store(EmptySession)
+        .set_outgoing_inflight_upper_limit(OUTGOING)
         // The broker sends so many before it waits for us.
         .set_receive_maximum(Some(config.in_flight.unwrap_or(u16::MAX)))
         .set_ack_mode(AckMode::Manual)
@@ -265,4 +266,40 @@ async fn publish(client: &AsyncClient, outbox: &Arc<Outbox>, message: Message, i
             }
         }
     });
+}
+
+type Answer<'a, T> = Pin<Box<dyn Future<Output = Result<T, SessionStoreError>> + Send + 'a>>;
+
+/// Messages of ours that the broker may leave unacknowledged.
+const OUTGOING: u16 = 1000;
+
+/// What the crate asks for before it goes on with a session that the broker has kept: ours holds nothing. What we have sent and
+/// the broker has not acknowledged is in `alarms.json`, and what it has sent and we have not acknowledged comes again.
+#[derive(Debug)]
+struct EmptySession;
+
+impl SessionStore for EmptySession {
+    fn load<'a>(&'a self, key: &'a SessionStoreKey) -> Answer<'a, Option<PersistedSession>> {
+        let session = PersistedSession {
+            format_version: 1,
+            client_id: key.client_id().to_owned(),
+            clean_start: false,
+            session_expiry_interval: Some(u32::MAX),
+            outgoing_inflight_upper_limit: Some(OUTGOING),
+            ack_mode: PersistedAckMode::Manual,
+            last_pkid: 0,
+            last_puback: 0,
+            replay: Vec::new(),
+            incoming_qos2: Vec::new(),
+        };
+        Box::pin(ready(Ok(Some(session))))
+    }
+
+    fn save<'a>(&'a self, _: &'a SessionStoreKey, _: &'a PersistedSession) -> Answer<'a, ()> {
+        Box::pin(ready(Ok(())))
+    }
+
+    fn clear<'a>(&'a self, _: &'a SessionStoreKey) -> Answer<'a, ()> {
+        Box::pin(ready(Ok(())))
+    }
 }

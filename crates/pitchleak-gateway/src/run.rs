@@ -2,24 +2,20 @@
 
 use crate::alarms::Alarms;
 use crate::board::Board;
-use crate::broker::Broker;
+use crate::broker::{Broker, Inbound};
 use crate::config::{Config, Tls};
-use crate::failure::Failure;
-use crate::input::Input;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::mqtt::Mqtt;
 use crate::pace::Pace;
-use crate::reload::Reloader;
-use crate::saver::Disk;
+use crate::saver::{Disk, Saved, Summaries};
 use crate::service::{Service, Waiting, status};
-use crate::summaries::Summaries;
-use crate::{http, saver};
+use crate::{Failure, http, saver};
 use pitchleak::live::{Checkpoint, Watch};
 use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
@@ -34,6 +30,16 @@ const TOGETHER: Duration = Duration::from_millis(2);
 const GOODBYE: Duration = Duration::from_secs(3);
 /// For the last checkpoint.
 const LAST_CHECKPOINT: Duration = Duration::from_secs(20);
+
+/// What wakes the service.
+pub enum Input {
+    Broker(Inbound),
+    Saved(Box<Saved>),
+    /// A signal to end.
+    Stop,
+    /// A signal to read the configuration again.
+    Reload,
+}
 
 /// Runs by the file at `path` until a signal asks it to end.
 pub fn run(path: &Path, config: Config) -> Result<(), Failure> {
@@ -84,7 +90,7 @@ fn say(state: &[NotifyState<'_>]) {
     let _ = sd_notify::notify(state);
 }
 
-pub fn warn(log: &Log, warnings: &[String]) {
+fn warn(log: &Log, warnings: &[String]) {
     // Each is a kind of its own: they are few.
     warnings.iter().for_each(|warning| log.say(Level::Warning, &format!("config {warning}"), warning));
 }
@@ -201,4 +207,59 @@ pub fn in_words(config: &Config) -> String {
         config.state.display(),
         config.checkpoint.as_secs_f64(),
     )
+}
+
+/// Another configuration while the service runs, read whole and checked before anything of it counts: the file, and what the
+/// service runs by.
+struct Reloader {
+    path: PathBuf,
+    running: Config,
+    every: Option<Duration>,
+    looked: Instant,
+    /// What was found at the last look and is not what the service runs by: whoever writes it may not have finished.
+    found: Option<Config>,
+}
+
+impl Reloader {
+    fn new(path: &Path, running: Config) -> Self {
+        let (path, every) = (path.to_owned(), running.reload_every);
+        Self { path, running, every, looked: Instant::now(), found: None }
+    }
+
+    /// Reads the file. One that cannot be used changes nothing.
+    fn reload<B: Broker>(&mut self, service: &mut Service<B>) {
+        match Config::load(&self.path) {
+            Ok(config) => self.go_on_by(config, service),
+            Err(failure) => {
+                service.metrics.reload_failures.inc();
+                let text = format!("{failure}: goes on as before");
+                service.log.say(Level::Warning, "reload", &text);
+            }
+        }
+    }
+
+    /// Once in a while, where the configuration asks for it: goes on by what has changed and stays so.
+    fn look<B: Broker>(&mut self, service: &mut Service<B>, now: Instant) {
+        if self.every.is_none_or(|every| now.duration_since(self.looked) < every) {
+            return;
+        }
+        self.looked = now;
+        let found = Config::load(&self.path).ok().filter(|config| *config != self.running);
+        match (found, self.found.take()) {
+            (Some(config), Some(before)) if config == before => self.go_on_by(config, service),
+            (found, _) => self.found = found,
+        }
+    }
+
+    fn go_on_by<B: Broker>(&mut self, config: Config, service: &mut Service<B>) {
+        let later = self.running.needs_a_start(&config);
+        if !later.is_empty() {
+            let text = format!("{}: as before until the next start", later.join(", "));
+            service.log.say(Level::Warning, "reload_later", &text);
+        }
+        warn(&service.log, &config.warnings);
+        self.every = config.reload_every;
+        self.running = config.clone();
+        service.reload(Box::new(config));
+    }
 }

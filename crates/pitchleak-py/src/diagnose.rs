@@ -1,9 +1,7 @@
 use crate::errors::value_error;
 use crate::rig::Rig;
-use crate::signals::Signals;
-use crate::source::Source;
-use crate::table::NAME;
-use crate::threads::detached;
+use crate::signals::{Signals, detached};
+use crate::table::{NAME, Source};
 use pitchleak::diagnose::{
     Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
 };

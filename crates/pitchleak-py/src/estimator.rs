@@ -1,7 +1,6 @@
 use crate::errors::{output_error, trace_error, value_error};
 use crate::rig::Rig;
-use crate::source::Source;
-use crate::table::{Lent, NAME, is_plain};
+use crate::table::{Lent, NAME, Source, is_plain};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pitchleak::Rig as EngineRig;
 use pitchleak::output::{self, Inputs};

@@ -3,8 +3,7 @@
 use crate::errors::{output_error, rig_error, value_error};
 use crate::rig::Rig;
 use crate::signals::{Signals, Stop, Stopped};
-use crate::source::Source;
-use crate::table::{NAME, NOT_A_TIME};
+use crate::table::{NAME, NOT_A_TIME, Source};
 use numpy::PyArray1;
 use pitchleak::fleet::{
     Counts, FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetOdds, FleetReport, FleetRig,

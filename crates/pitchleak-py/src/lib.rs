@@ -1,24 +1,18 @@
 //! The engine for Python: `pitchleak._pitchleak`, under the package `pitchleak`. Data in, JSON and arrays
 //! out; what Python makes of them is in `python/pitchleak`.
 
-mod calibrate;
 mod diagnose;
 mod errors;
 mod estimator;
-mod explanations;
 mod fleet;
 mod linkage;
-mod page;
-mod prove;
 mod replay;
 mod reproduce;
 mod rig;
 mod rig_arguments;
 mod signals;
 mod simulate;
-mod source;
 mod table;
-mod threads;
 
 use pyo3::prelude::*;
 
@@ -26,15 +20,11 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = false)]
 mod _pitchleak {
     #[pymodule_export]
-    use crate::calibrate::calibrate;
-    #[pymodule_export]
     use crate::diagnose::diagnose;
     #[pymodule_export]
     use crate::errors::{RigError, TraceError};
     #[pymodule_export]
     use crate::estimator::Estimator;
-    #[pymodule_export]
-    use crate::explanations::explanations;
     #[pymodule_export]
     use crate::fleet::{
         FleetNights, FleetRow, fleet_counts, fleet_cylinders, fleet_json, fleet_odds, fleet_page, fleet_row,
@@ -43,11 +33,9 @@ mod _pitchleak {
     #[pymodule_export]
     use crate::linkage::Linkage;
     #[pymodule_export]
-    use crate::page::{check_page, replay_page, write_page};
-    #[pymodule_export]
-    use crate::prove::prove;
-    #[pymodule_export]
-    use crate::replay::{check, over_time, replay};
+    use crate::replay::{
+        calibrate, check, check_page, explanations, over_time, prove, replay, replay_page, write_page,
+    };
     #[pymodule_export]
     use crate::reproduce::reproduce;
     #[pymodule_export]

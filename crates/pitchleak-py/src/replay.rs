@@ -1,13 +1,22 @@
-//! Whole traces: replay, its estimates over time, check.
+//! Whole traces: replay, its estimates over time, check, proof, calibration, and their pages; what a verdict weighs.
 
-use crate::errors::value_error;
+use crate::errors::{output_error, trace_error, value_error};
 use crate::rig::Rig;
-use crate::signals::{Signals, Stop};
-use crate::source::Source;
+use crate::signals::{Signals, Stop, Stopped};
+use crate::simulate::Quantity;
+use crate::table::Source;
 use numpy::{IntoPyArray, PyArray1};
+use pitchleak::core::{Leak, PerLeak};
+use pitchleak::output::Inputs;
+use pitchleak::prove::ProveError;
 use pitchleak::replay::EstimateRow;
+use pitchleak::units::{Dimension, LPM_PER_M3S};
+use pitchleak::valve::{CalibrationError, Calibrator, LeaksThen};
+use pitchleak_view::page::{History, Page, PageError, PageFile};
 use pitchleak_view::{Palette, Text};
 use pyo3::prelude::*;
+use std::cell::RefCell;
+use std::path::PathBuf;
 
 /// A report for programs (JSON) and for people.
 pub type Report = (String, String);
@@ -67,4 +76,142 @@ pub fn check(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyR
         pitchleak::check::check(&mut reader, &rig.0, |_, _, _| signals.heed())
     })?;
     Ok((report.to_json().map_err(value_error)?, report.to_text(&Palette::PLAIN)))
+}
+
+/// Replays a trace again and makes the page of it; the report's JSON comes first.
+#[pyfunction]
+pub fn replay_page(
+    py: Python<'_>,
+    source: Source<'_>,
+    rig: &Rig,
+    estimator: Option<&str>,
+    strict: bool,
+) -> PyResult<(String, String)> {
+    let rig = rig.with_estimator(estimator)?;
+    let mut signals = Signals::new(None);
+    let (report, html) = source.read(py, &rig, strict, |mut reader| {
+        let mut history = History::default();
+        let report = pitchleak::replay::replay(&mut reader, &rig, |replay, record, renewed| {
+            history.add(replay, record, renewed);
+            signals.heed()
+        })?;
+        let html = Page::of_replay(&report, &rig, &history).to_html();
+        Ok((report, html))
+    })?;
+    Ok((report.to_json().map_err(value_error)?, html))
+}
+
+/// Checks a trace again and makes the page of it; the report's JSON comes first.
+#[pyfunction]
+pub fn check_page(py: Python<'_>, source: Source<'_>, rig: &Rig, strict: bool) -> PyResult<(String, String)> {
+    let mut signals = Signals::new(None);
+    let (report, html) = source.read(py, &rig.0, strict, |mut reader| {
+        let mut history = History::default();
+        let report = pitchleak::check::check(&mut reader, &rig.0, |replay, record, renewed| {
+            history.add(replay, record, renewed);
+            signals.heed()
+        })?;
+        let html = Page::of_check(&report, &rig.0, &history).to_html();
+        Ok((report, html))
+    })?;
+    Ok((report.to_json().map_err(value_error)?, html))
+}
+
+/// Writes a page to `path`, whole or not at all, and never over one of `inputs`.
+#[pyfunction]
+pub fn write_page(py: Python<'_>, path: PathBuf, html: &str, inputs: Vec<PathBuf>) -> PyResult<()> {
+    let written = py.detach(|| PageFile::create(path, &Inputs::of(inputs))?.finish_html(html));
+    written.map_err(|error| match error {
+        PageError::Output(error) => output_error(py, &error),
+        error @ PageError::Kind(_) => value_error(error),
+    })
+}
+
+/// Mean flows to put in, of each leak; of usual sizes where there is none at all.
+type Sizes = [Vec<Quantity>; 3];
+
+/// Puts leaks into a trace, one at a time; gives JSON, the text for people and the page.
+#[pyfunction]
+pub fn prove(
+    py: Python<'_>,
+    source: Source<'_>,
+    rig: &Rig,
+    strict: bool,
+    sizes: Sizes,
+) -> PyResult<(String, String, String)> {
+    let sizes_lpm = in_lpm(&sizes)?;
+    let proof = source.read_again(py, &rig.0, strict, |open| {
+        let signals = RefCell::new(Signals::new(None));
+        let heeded = || signals.borrow_mut().heed_now().and_then(|()| open());
+        pitchleak::prove::prove(heeded, &rig.0, &sizes_lpm, || ())
+    })?;
+    let html = Page::of_proof(&proof, &rig.0).to_html();
+    Ok((proof.to_json().map_err(value_error)?, proof.to_text(&Palette::PLAIN), html))
+}
+
+fn in_lpm([internal, external_a, external_b]: &Sizes) -> PyResult<PerLeak<Vec<f64>>> {
+    let of = |leak: Leak, sizes: &[Quantity]| {
+        let name = format!("leak_{}", leak.id());
+        let lpm = |size: &Quantity| match size.si(&name, Dimension::Flow)? {
+            0.0 => Err(value_error(format!("{name}: a leak that is put in is more than none"))),
+            m3s => Ok(m3s * LPM_PER_M3S),
+        };
+        sizes.iter().map(lpm).collect::<PyResult<Vec<f64>>>()
+    };
+    Ok(PerLeak {
+        internal: of(Leak::Internal, internal)?,
+        external_a: of(Leak::ExternalA, external_a)?,
+        external_b: of(Leak::ExternalB, external_b)?,
+    })
+}
+
+impl From<ProveError> for Stopped {
+    fn from(error: ProveError) -> Self {
+        match error {
+            ProveError::Replay(error) => Self::Failed(error),
+            error => Self::Asked(value_error(error)),
+        }
+    }
+}
+
+/// Learns the valve of a rig from traces of it; gives the file's text, and the text for people.
+#[pyfunction]
+pub fn calibrate(
+    py: Python<'_>,
+    traces: Vec<Source<'_>>,
+    rig: &Rig,
+    leaks: &str,
+    evidence: Option<Source<'_>>,
+) -> PyResult<(String, String)> {
+    let leaks = LeaksThen::by_name(leaks)
+        .ok_or_else(|| value_error(format!("leaks: `{leaks}` is neither zero nor unknown")))?;
+    let told = |error: CalibrationError| match &error {
+        CalibrationError::Trace(error) => trace_error(py, error),
+        error => value_error(error),
+    };
+    let rig = rig.0.uncalibrated();
+    let mut calibrator = Calibrator::new(&rig, leaks).map_err(told)?;
+    if let Some(hold) = evidence {
+        let report = hold.read(py, &rig, false, |mut reader| {
+            pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, Stopped>(()))
+        })?;
+        calibrator.rest_on(&report).map_err(told)?;
+    }
+    for trace in traces {
+        trace.read(py, &rig, false, |mut reader| Ok(calibrator.read(&mut reader)))?.map_err(told)?;
+    }
+    let found = calibrator.finish().map_err(told)?;
+    Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN)))
+}
+
+/// Id, kind, prior share within its kind, what it says, what to do, and ids that no trace tells it from.
+type Entry = (&'static str, &'static str, f64, &'static str, &'static str, Vec<&'static str>);
+
+/// Every explanation.
+#[pyfunction]
+pub fn explanations() -> Vec<Entry> {
+    let entry = |entry: &pitchleak::explain::Entry| {
+        (entry.id, entry.kind.name(), entry.share, entry.text, entry.remedy, entry.alike.to_vec())
+    };
+    pitchleak::explain::explanations().iter().map(entry).collect()
 }

@@ -1,5 +1,5 @@
 use crate::errors::{output_error, value_error};
-use crate::threads::detached;
+use crate::signals::detached;
 use pitchleak::output::make_folder;
 use pitchleak_reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;

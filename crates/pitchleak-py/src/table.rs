@@ -1,12 +1,15 @@
 //! Columns that Python holds, lent to the engine without a copy where they are f64 already.
 
-use crate::errors::{out_of_order, trace_error};
+use crate::errors::{out_of_order, replay_error, trace_error};
 use crate::rig::Rig;
+use crate::signals::Stopped;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
-use pitchleak::trace::{ColumnContent, TableLayout, seconds_between};
+use pitchleak::Rig as EngineRig;
+use pitchleak::trace::{BadRows, ColumnContent, TableLayout, TraceReader, seconds_between};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyType, PyWeakrefReference};
+use std::path::PathBuf;
 
 /// What the columns of a table are read as, by their headers.
 #[pyclass(frozen, module = "pitchleak._pitchleak")]
@@ -223,4 +226,55 @@ fn seconds(times_ns: impl Iterator<Item = i64>, first_ns: &mut Option<i64>) -> V
         seconds_between(i128::from(*first_ns.get_or_insert(time)), i128::from(time))
     };
     times_ns.map(&mut since_first).collect()
+}
+
+/// Where a trace comes from.
+#[derive(FromPyObject)]
+pub enum Source<'py> {
+    Table(Bound<'py, Table>),
+    Path(PathBuf),
+}
+
+impl Source<'_> {
+    /// Gives `work` a reader of the trace, with the interpreter released.
+    pub fn read<T: Send>(
+        &self,
+        py: Python<'_>,
+        rig: &EngineRig,
+        strict: bool,
+        work: impl FnOnce(TraceReader<'_>) -> Result<T, Stopped> + Send,
+    ) -> PyResult<T> {
+        self.read_again(py, rig, strict, |open| work(open()?))
+    }
+
+    /// Gives `work` what opens the trace, as often as it likes, with the interpreter released.
+    pub fn read_again<T: Send>(
+        &self,
+        py: Python<'_>,
+        rig: &EngineRig,
+        strict: bool,
+        work: impl for<'a> FnOnce(&'a dyn Fn() -> Result<TraceReader<'a>, Stopped>) -> Result<T, Stopped> + Send,
+    ) -> PyResult<T> {
+        let bad_rows = if strict { BadRows::Fatal } else { BadRows::Skip };
+        let done = match self {
+            Self::Path(path) => {
+                py.detach(|| work(&|| Ok(TraceReader::open(path, rig)?.with_bad_rows(bad_rows))))
+            }
+            Self::Table(table) => {
+                let table = table.get();
+                let lent = table.lend(py)?;
+                let batches = table.slices(&lent)?;
+                py.detach(|| {
+                    work(&|| {
+                        let reader = TraceReader::from_table(NAME, table.layout(), batches.clone(), rig)?;
+                        Ok(reader.since(table.first_ns()).with_bad_rows(bad_rows))
+                    })
+                })
+            }
+        };
+        done.map_err(|stopped| match stopped {
+            Stopped::Failed(error) => replay_error(py, &error),
+            Stopped::Asked(error) => error,
+        })
+    }
 }

@@ -123,60 +123,43 @@ pub fn parts(header: &str) -> impl Iterator<Item = (&str, &str)> {
     ways.into_iter().flatten()
 }
 
-/// What the names of columns are called beside the names of the contract, letters and digits only.
-const NAMES: [(Signal, &[&str]); 14] = [
-    (Signal::Time, &["t", "time", "zeit", "elapsedtime", "relativetime", "timesincestart"]),
-    (
-        Signal::Timestamp,
-        &["timestamp", "datetime", "dateandtime", "dateutime", "datumzeit", "datumuhrzeit", "zeitstempel"],
-    ),
-    (
-        Signal::Position,
-        &["x", "position", "pistonposition", "cylinderposition", "kolbenposition", "kolbenweg"],
-    ),
-    (Signal::Speed, &["v", "pistonspeed", "pistonvelocity", "kolbengeschwindigkeit"]),
+/// What columns are called beside the names of the contract, letters and digits only, with blanks between the names.
+const NAMES: [(Signal, &str); 14] = [
+    (Signal::Time, "t time zeit elapsedtime relativetime timesincestart"),
+    (Signal::Timestamp, "timestamp datetime dateandtime dateutime datumzeit datumuhrzeit zeitstempel"),
+    (Signal::Position, "x position pistonposition cylinderposition kolbenposition kolbenweg"),
+    (Signal::Speed, "v pistonspeed pistonvelocity kolbengeschwindigkeit"),
     (
         Signal::PressureA,
-        &[
-            "pa",
-            "pressurea",
-            "pressurechambera",
-            "chamberapressure",
-            "pressureinchambera",
-            "drucka",
-            "druckkammera",
-        ],
+        "pa pressurea pressurechambera chamberapressure pressureinchambera drucka druckkammera",
     ),
     (
         Signal::PressureB,
-        &[
-            "pb",
-            "pressureb",
-            "pressurechamberb",
-            "chamberbpressure",
-            "pressureinchamberb",
-            "druckb",
-            "druckkammerb",
-        ],
+        "pb pressureb pressurechamberb chamberbpressure pressureinchamberb druckb druckkammerb",
     ),
-    (Signal::FlowA, &["qa", "flowa", "flowratea", "flowintoa", "volumenstroma", "durchflussa"]),
-    (Signal::FlowB, &["qb", "flowb", "flowrateb", "flowintob", "volumenstromb", "durchflussb"]),
-    (Signal::Force, &["force", "loadforce"]),
-    (Signal::Spool, &["spool", "spoolposition", "valvespool", "valvespoolposition", "schieberweg"]),
-    (Signal::Command, &["valvecommand", "spoolcommand", "ventilsollwert"]),
-    (Signal::Supply, &["ps", "supplypressure", "systempressure", "systemdruck", "versorgungsdruck"]),
-    (Signal::Tank, &["pt", "tankpressure", "tankdruck"]),
-    (Signal::Temperature, &["temp", "oiltemperature", "oiltemp", "öltemperatur"]),
+    (Signal::FlowA, "qa flowa flowratea flowintoa volumenstroma durchflussa"),
+    (Signal::FlowB, "qb flowb flowrateb flowintob volumenstromb durchflussb"),
+    (Signal::Force, "force loadforce"),
+    (Signal::Spool, "spool spoolposition valvespool valvespoolposition schieberweg"),
+    (Signal::Command, "valvecommand spoolcommand ventilsollwert"),
+    (Signal::Supply, "ps supplypressure systempressure systemdruck versorgungsdruck"),
+    (Signal::Tank, "pt tankpressure tankdruck"),
+    (Signal::Temperature, "temp oiltemperature oiltemp öltemperatur"),
 ];
 
 /// The signal that a name says without a doubt; its unit is not part of it.
 pub fn signal(name: &str) -> Option<Signal> {
     let name = letters(name);
-    NAMES.iter().find(|(_, names)| names.contains(&name.as_str())).map(|(signal, _)| *signal)
+    NAMES.iter().find(|(_, names)| lists(names, &name)).map(|(signal, _)| *signal)
+}
+
+/// Whether a list of words, with blanks between them, has this one.
+pub(crate) fn lists(words: &str, word: &str) -> bool {
+    words.split(' ').any(|one| one == word)
 }
 
 /// Small letters and digits only.
-fn letters(name: &str) -> String {
+pub(crate) fn letters(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 

@@ -105,7 +105,7 @@ impl Unit {
 
     /// Whether the unit is the SI unit itself.
     #[allow(clippy::float_cmp)]
-    pub fn is_si(&self) -> bool {
+    pub(crate) fn is_si(&self) -> bool {
         self.factor == 1.0 && self.divisor == 1.0 && self.offset == 0.0
     }
 }
@@ -230,6 +230,11 @@ impl Dimension {
         join(self.units().iter().map(|unit| unit.text))
     }
 
+    /// The unit of this name, as the tables have it.
+    pub(crate) fn by_text(self, text: &str) -> Option<Unit> {
+        self.units().iter().find(|unit| unit.text == text).copied()
+    }
+
     /// The unit with this column suffix.
     pub fn by_suffix(self, suffix: &str) -> Option<Unit> {
         self.units().iter().find(|unit| unit.suffix == Some(suffix)).copied()
@@ -239,9 +244,7 @@ impl Dimension {
     pub fn suffixes(self) -> String {
         join(self.units().iter().filter_map(|unit| unit.suffix))
     }
-}
 
-impl Dimension {
     /// The unit that people read it in.
     pub fn for_people(self) -> Option<Unit> {
         let text = match self {
@@ -253,11 +256,11 @@ impl Dimension {
             Self::Share | Self::Spool => "%",
             other => other.si(),
         };
-        self.units().iter().find(|unit| unit.text == text).copied()
+        self.by_text(text)
     }
 
     /// The unit that people read a difference of two values in: 5 K more are not 5 °C.
-    pub fn difference_for_people(self) -> Option<Unit> {
+    pub(crate) fn difference_for_people(self) -> Option<Unit> {
         self.for_people().filter(|unit| unit.offset.abs() <= 0.0)
     }
 
@@ -317,9 +320,8 @@ fn canonical(unit: &str) -> String {
 
 /// The unit of this name in a rig file; a column suffix (`lpm`, `mpa`) does as well.
 pub fn unit(name: &str, dimension: Dimension) -> Result<Unit, UnitError> {
-    let text = canonical(name);
-    let found = dimension.units().iter().find(|unit| unit.text == text).copied();
-    found
+    dimension
+        .by_text(&canonical(name))
         .or_else(|| dimension.by_suffix(name))
         .ok_or_else(|| UnitError::Unit { unit: name.to_owned(), allowed: dimension.allowed() })
 }

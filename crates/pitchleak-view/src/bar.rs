@@ -1,4 +1,4 @@
-//! An interval in a line of text, beside an alarm level.
+//! Marks in a line of text: an interval beside an alarm level, and heights.
 
 pub(crate) const ZERO: char = '│';
 pub(crate) const INTERVAL: char = '━';
@@ -47,6 +47,19 @@ impl Bar {
     }
 }
 
+const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// A mark for each value between `low` and `high`, a blank for a missing one.
+pub(crate) fn course(values: &[Option<f64>], [low, high]: [f64; 2]) -> String {
+    values.iter().map(|value| value.map_or(' ', |value| level((value - low) / (high - low)))).collect()
+}
+
+/// The mark for a share of the greatest height.
+pub(crate) fn level(share: f64) -> char {
+    let index = (share * LEVELS.len() as f64) as usize;
+    LEVELS.get(index).or(LEVELS.last()).copied().unwrap_or(' ')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,5 +78,13 @@ mod tests {
         assert_eq!(scale([&bar]), Some([0.0, 0.2]));
         assert_eq!(scale([&Bar { interval: [f64::NAN; 2], limit: 0.0, ..bar }]), None);
         assert_eq!(scale_text([-0.001, 0.2]), "0.00 to 0.20 L/min");
+    }
+
+    #[test]
+    fn every_share_has_its_height() {
+        assert_eq!(
+            [-1.0, 0.0, 0.5, 0.99, 1.0, 7.0, f64::NAN].map(level),
+            ['▁', '▁', '▅', '█', '█', '█', '▁']
+        );
     }
 }

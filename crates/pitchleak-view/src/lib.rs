@@ -22,15 +22,10 @@
 mod bar;
 mod envelope;
 pub mod figure;
-mod in_a_row;
-mod labels;
 pub mod page;
-mod palette;
-mod residual_figures;
-mod spark;
+mod residuals;
 pub mod text;
 
 pub use envelope::{Envelopes, Range, Spot};
-pub use palette::Palette;
-pub use residual_figures::residual_figures;
-pub use text::Text;
+pub use residuals::residual_figures;
+pub use text::{Palette, Text};

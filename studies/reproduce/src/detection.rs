@@ -1,7 +1,6 @@
 //! How soon a leak that opens raises its alarm, and how often a sound cylinder raises one.
 
-use super::counted::map_counted;
-use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, rig};
+use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, map_counted, rig};
 use super::{Law, Progress};
 use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak, RlsError};

@@ -1,7 +1,6 @@
 //! The paper's experiment again (Wu et al. 2011, Section IV): four winds, two leak settings, its law
 //! and ours on the same readings, with many seeds. docs/reproduction.md explains every choice.
 
-mod counted;
 pub mod cramer_rao;
 mod detection;
 mod efficient;
@@ -21,7 +20,6 @@ pub use table::{Bound, ErrorMetrics, Row, Scored};
 pub use trial::{EstimateHistory, TrialScore};
 
 use crate::cramer_rao::CramerRaoModel;
-use counted::map_counted;
 use efficient::Efficient;
 use pitchleak::Rig;
 use pitchleak::core::{ExcitationSettings, Leak, PerLeak, Sample};
@@ -29,6 +27,7 @@ use pitchleak::rig::{Instrument, Instruments};
 use pitchleak::simulate::{Biases, Normal, Sensing};
 use pitchleak::units::LPM_PER_M3S;
 use pitchleak::wind::WindCase;
+use protocol::map_counted;
 use rayon::prelude::*;
 use serde::Serialize;
 use table::{Entry, WindowBound};

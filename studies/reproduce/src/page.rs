@@ -4,7 +4,7 @@ use crate::{BulkModulusBound, Detection, Drawing, Report, ReproduceError, Reprod
 use maud::{Markup, html};
 use pitchleak_view::figure::{self, Panel};
 use pitchleak_view::page::chart::{Chart, Charts, Ink, Limit, Line};
-use pitchleak_view::page::machine::{facts, rig, rough, short};
+use pitchleak_view::page::machine::{facts, rig, rough, short, table};
 use pitchleak_view::page::{Card, Head, Page, Section, Tone};
 use pitchleak_view::{Envelopes, Range, Spot};
 
@@ -138,22 +138,31 @@ fn tables(report: &Report) -> Markup {
     html! {
         p .note { "Medians over all seeds, worst in brackets; sensors with white noise of 3 σ = 1 % of full scale. The bound is that of the \
             coefficient at the end of a window, 1 σ." }
-        (table(&report.rows))
+        (rows(&report.rows))
         h3 { "The same, each sensor with a constant bias of up to 1 % of full scale" }
-        (table(&report.rows_with_bias))
+        (rows(&report.rows_with_bias))
     }
 }
 
-fn table(rows: &[Row]) -> Markup {
-    html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "wind, case" } th scope="col" { "leak" } th scope="col" { "law" }
-                @for head in ["leakage, mean %", "peak %", "coefficient, mean %", "peak %", "within 5 % after s", "bound %", "covered %"] {
-                    th .number scope="col" { (head) }
-                }
-            } }
-            tbody { @for row in rows {
+/// Heads of the paper's table.
+const HEADS: [&str; 10] = [
+    "wind, case",
+    "leak",
+    "law",
+    "#leakage, mean %",
+    "#peak %",
+    "#coefficient, mean %",
+    "#peak %",
+    "#within 5 % after s",
+    "#bound %",
+    "#covered %",
+];
+
+fn rows(rows: &[Row]) -> Markup {
+    table(
+        &HEADS,
+        html! {
+            @for row in rows {
                 tr {
                     th scope="row" { (row.wind_mps) " m/s, " (u8::from(row.case)) }
                     td { (leak(row.leak)) }
@@ -162,29 +171,15 @@ fn table(rows: &[Row]) -> Markup {
                     td .number { (rough(row.bound.coefficient_std_percent)) }
                     td .number { @match row.coverage_percent { Some(share) => (format!("{share:.0}")), None => "–" } }
                 }
-            } }
-        } }
-    }
+            }
+        },
+    )
 }
 
-fn cells(row: &Row) -> Vec<String> {
-    let numbers = |scored: &Scored| {
-        [
-            scored.leakage_mean_error_percent,
-            scored.leakage_peak_error_percent,
-            scored.coefficient_mean_error_percent,
-            scored.coefficient_peak_error_percent,
-            scored.convergence_time_s,
-        ]
-    };
+/// The five figures, median and worst.
+fn cells(row: &Row) -> [String; 5] {
     let Some(worst) = row.worst else {
-        return vec![
-            "not identifiable".to_owned(),
-            String::new(),
-            String::new(),
-            String::new(),
-            String::new(),
-        ];
+        return ["not identifiable", "", "", "", ""].map(str::to_owned);
     };
     let text = |value: Option<f64>| match value {
         None => "–".to_owned(),
@@ -192,8 +187,8 @@ fn cells(row: &Row) -> Vec<String> {
         Some(value) if value >= 100.0 => format!("{value:.0}"),
         Some(value) => format!("{value:.2}"),
     };
-    let pairs = numbers(&row.median).into_iter().zip(numbers(&Scored::from(worst)));
-    pairs.map(|(median, worst)| format!("{} ({})", text(median), text(worst))).collect()
+    let (medians, worst) = (row.median.values(), Scored::from(worst).values());
+    std::array::from_fn(|at| format!("{} ({})", text(medians[at]), text(worst[at])))
 }
 
 /// A curve as a screen shows it.
@@ -241,13 +236,8 @@ fn rest(report: &Report) -> Markup {
         if bound.identifiable { text } else { format!("{text}, not identifiable") }
     };
     html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "wind, case" } th .number scope="col" { "position error, % of stroke (rms, peak)" }
-                th .number scope="col" { "load error, % of peak (rms, peak)" } th .number scope="col" { "leaks, L/min" }
-                th .number scope="col" { "bulk modulus, spread before and after 20 s" }
-            } }
-            tbody { @for (t, bound) in report.tracking.iter().zip(&report.bulk_modulus) {
+        (table(&["wind, case", "#position error, % of stroke (rms, peak)", "#load error, % of peak (rms, peak)", "#leaks, L/min", "#bulk modulus, spread before and after 20 s"], html! {
+            @for (t, bound) in report.tracking.iter().zip(&report.bulk_modulus) {
                 tr {
                     th scope="row" { (t.wind_mps) " m/s, " (u8::from(t.case)) }
                     td .number { (format!("{:.2}, {:.2}", t.position_rms_percent_of_stroke, t.position_peak_percent_of_stroke)) }
@@ -255,8 +245,8 @@ fn rest(report: &Report) -> Markup {
                     td .number { (format!("{:.2}, {:.2}", t.internal_mean_lpm, t.external_a_mean_lpm)) }
                     td .number { (oil(bound)) }
                 }
-            } }
-        } }
+            }
+        }))
     }
 }
 
@@ -265,12 +255,8 @@ fn alarms(detection: &Detection) -> Markup {
     html! {
         p { (detection.false_alarms) " false alarms in " (short(detection.sound_hours)) " hours of sound operation; with biases of up to 1 % of full scale "
             (detection.biased_false_alarms) " of " (detection.biased_runs) " sound runs raised one." }
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "wind" } th scope="col" { "leak" } th .number scope="col" { "L/min" } th .number scope="col" { "found within a minute" }
-                th .number scope="col" { "delay, s (longest)" } th .number scope="col" { "another named as well" }
-            } }
-            tbody { @for delay in &detection.delays {
+        (table(&["wind", "leak", "#L/min", "#found within a minute", "#delay, s (longest)", "#another named as well"], html! {
+            @for delay in &detection.delays {
                 tr {
                     th scope="row" { (delay.wind_mps) " m/s" }
                     td { (leak(delay.leak)) }
@@ -279,8 +265,8 @@ fn alarms(detection: &Detection) -> Markup {
                     td .number { (seconds(delay.median_delay_s)) " (" (seconds(delay.longest_delay_s)) ")" }
                     td .number { (format!("{:.0} %", delay.misnamed_percent)) }
                 }
-            } }
-        } }
+            }
+        }))
     }
 }
 

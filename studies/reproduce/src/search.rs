@@ -1,7 +1,6 @@
 //! The paper does not print λ and γ: the best ones are searched for, in the same runs.
 
-use super::counted::map_counted;
-use super::protocol::{ReproduceError, Run, WINDOWS, rig};
+use super::protocol::{ReproduceError, Run, WINDOWS, map_counted, rig};
 use super::trial::{EstimateHistory, mean};
 use pitchleak::Rig;
 use pitchleak::core::Leak;

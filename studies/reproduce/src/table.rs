@@ -6,16 +6,16 @@ use pitchleak::core::{Estimate, ExcitationSettings};
 use serde::Serialize;
 
 /// The five figures of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ErrorMetrics {
+#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
+pub struct ErrorMetrics<T = f64> {
     /// Mean leakage error in steady state, % of the window's mean |Q|.
-    pub leakage_mean_error_percent: f64,
+    pub leakage_mean_error_percent: T,
     /// Peak leakage error in steady state, % of the window's mean |Q|.
-    pub leakage_peak_error_percent: f64,
+    pub leakage_peak_error_percent: T,
     /// Mean coefficient error in steady state, %.
-    pub coefficient_mean_error_percent: f64,
+    pub coefficient_mean_error_percent: T,
     /// Peak coefficient error in steady state, %.
-    pub coefficient_peak_error_percent: f64,
+    pub coefficient_peak_error_percent: T,
     /// Time until the coefficient stays within 5 %, s; `null` where it does not.
     pub convergence_time_s: Option<f64>,
 }
@@ -65,19 +65,7 @@ pub struct Row {
 }
 
 /// The five figures, or nulls where the row is not identifiable.
-#[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
-pub struct Scored {
-    /// See [`ErrorMetrics::leakage_mean_error_percent`].
-    pub leakage_mean_error_percent: Option<f64>,
-    /// See [`ErrorMetrics::leakage_peak_error_percent`].
-    pub leakage_peak_error_percent: Option<f64>,
-    /// See [`ErrorMetrics::coefficient_mean_error_percent`].
-    pub coefficient_mean_error_percent: Option<f64>,
-    /// See [`ErrorMetrics::coefficient_peak_error_percent`].
-    pub coefficient_peak_error_percent: Option<f64>,
-    /// See [`ErrorMetrics::convergence_time_s`].
-    pub convergence_time_s: Option<f64>,
-}
+pub type Scored = ErrorMetrics<Option<f64>>;
 
 /// What one seed adds to a row.
 #[derive(Clone, Copy, Debug)]
@@ -251,7 +239,8 @@ fn limit_line(row: &Row) -> String {
 }
 
 impl Scored {
-    fn cells(&self) -> [String; 5] {
+    /// All five, in the order of the table's columns.
+    pub(super) fn values(&self) -> [Option<f64>; 5] {
         [
             self.leakage_mean_error_percent,
             self.leakage_peak_error_percent,
@@ -259,7 +248,10 @@ impl Scored {
             self.coefficient_peak_error_percent,
             self.convergence_time_s,
         ]
-        .map(|value| value.map_or_else(|| "-".into(), short))
+    }
+
+    fn cells(&self) -> [String; 5] {
+        self.values().map(|value| value.map_or_else(|| "-".into(), short))
     }
 }
 

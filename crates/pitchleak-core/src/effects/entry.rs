@@ -101,7 +101,7 @@ macro_rules! effects {
         $cause:literal $remedy:literal $measurement:literal
     )*) => {
         use $crate::effects::entry::given_or;
-        use $crate::effects::sensor::Distortion;
+        use $crate::effects::terms::Distortion;
         use $crate::effects::{EffectConstant, EffectConstants, EffectKind, EffectSpec, LeftSide};
         use $crate::{Cylinder, Model, Real, Sensors, Signals, Terms};
 

@@ -3,16 +3,15 @@
 
 mod constants;
 mod entry;
-mod physical;
-mod sensor;
 mod set;
 mod table;
+mod terms;
 
 pub use constants::{EffectConstant, EffectConstantSpec, EffectConstants};
 pub use entry::{EffectKind, EffectSpec, LeftSide};
-pub use sensor::{LaggedReading, Play};
 pub use set::{ActiveEffect, EffectError, EffectSet};
 pub use table::{Effect, UnknownEffect};
+pub use terms::{LaggedReading, Play};
 
 use crate::{Model, Real, Signals, Terms};
 
@@ -27,7 +26,10 @@ impl Effect {
         constants: &EffectConstants<T>,
     ) -> Terms<T> {
         match self.spec().kind {
-            EffectKind::Sensor => sensor::unit_term(self, at, model),
+            EffectKind::Sensor => {
+                let distortion = self.distortion(at);
+                model.misread(T::lit(self.spec().default_size), |value| distortion.read(value, at))
+            }
             _ => self.physical_term(at, model, constants),
         }
     }
@@ -49,14 +51,15 @@ impl Effect {
     }
 
     /// What the sensors show when this effect has size `value`; physical effects change nothing.
+    #[inline]
     pub fn read<T: Real>(self, value: T, truth: &Signals<T>) -> Signals<T> {
-        sensor::read(self, value, truth)
+        self.distortion(truth).read(value, truth)
     }
 
     /// The truth behind a reading when this effect has size `value`.
     ///
     /// For a lag, the derivative is that of the reading, which makes the inverse exact.
     pub fn correct<T: Real>(self, value: T, reading: &Signals<T>) -> Signals<T> {
-        sensor::correct(self, value, reading)
+        self.distortion(reading).correct(value, reading)
     }
 }

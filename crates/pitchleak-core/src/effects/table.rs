@@ -18,11 +18,10 @@
 //! ```
 
 use super::entry::effects;
-use super::physical::{
+use super::terms::{
     accumulator, area_a, area_b, bell, beyond_cracking, chamber_a, chamber_b, direction, entrained_air,
-    flow_direction, force, past_piston, stribeck,
+    flow_direction, force, known, past_piston, scale, shift, stribeck,
 };
-use super::sensor::{known, scale, shift};
 use crate::signed_root;
 
 effects! {

@@ -1,15 +1,10 @@
 //! The rig of the paper's Section III (Fig. 2): a pitching cylinder under position control and,
 //! back to back with it, a load cylinder under force control, both on one supply.
 
-#[cfg(test)]
-mod accuracy;
-mod controller;
 mod state;
 
-pub use controller::Gains;
-
 use crate::plant::{CylinderPlant, PlantError, Supply, Valve, number_or_zero, substeps};
-use crate::{Cylinder, EffectSet, Model, PerLeak, Real, Signals, rk4_step};
+use crate::{Cylinder, Model, PerLeak, Real, Signals, rk4_step};
 use state::{Pressures, State};
 
 /// One hydraulic axis: a cylinder, its valve and its controller.
@@ -45,7 +40,7 @@ pub struct EmulatorParams<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct EmulatorReading<T> {
     /// Signals of the pitching cylinder; dQ/dt is left at zero. What the sensors make of them:
-    /// [`EffectSet::read`].
+    /// [`EffectSet::read`](crate::EffectSet::read).
     pub signals: Signals<T>,
     /// Flows through the leak circuits (and leak effects), m³/s.
     pub leaks_m3s: PerLeak<T>,
@@ -211,11 +206,6 @@ impl<T: Real> Emulator<T> {
         self.params.pitch.is_shut = is_shut;
     }
 
-    /// Changes the effects that act on the pitching cylinder.
-    pub fn set_effects(&mut self, effects: EffectSet<T>) {
-        self.params.pitch.plant.effects = effects;
-    }
-
     /// Runs the rig for `step_s`, the references moving in a straight line to the given ones.
     /// A reference that is not a number stays where it was, a position outside the stroke is
     /// brought inside; a step that is not positive and finite, or takes more than a hundred million
@@ -331,30 +321,40 @@ impl<T: Real> Axis<T> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// PID controller with its output limited to ±1 and the integral held while it is (Åström and
+/// Hägglund, "Advanced PID Control", §3.5). The caller passes the error's rate, as speeds are
+/// states here and need no differencing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Gains<T> {
+    /// Valve command per unit of error.
+    pub proportional: T,
+    /// Valve command per unit of error and second.
+    pub integral_ps: T,
+    /// Valve command per unit of the error's rate.
+    pub derivative_s: T,
+}
 
-    /// With P_A + P_B = P_S both edges drop the same, and the valve fed forward gives just the flows of the speed;
-    /// metering rounds the root off where it is laminar, by less than a per mille here.
-    #[test]
-    fn the_opening_fed_forward_gives_the_speed() {
-        let mut axis = EmulatorParams::<f64>::for_model(Model::paper()).unwrap().pitch;
-        axis.valve.underlap = 0.0;
-        let (supply_pa, cylinder) = (10e6, axis.plant.model.cylinder);
-        for pa_pa in [2e6, 5e6, 7e6] {
-            let state = axis.plant.state_at(0.1, 0.0, pa_pa, supply_pa - pa_pa);
-            for speed_mps in [0.02, -0.02] {
-                let spool = axis.opening(axis.plant.pressures_pa(&state), supply_pa, speed_mps);
-                let flows = axis.valve.flows(spool, supply_pa, pa_pa, supply_pa - pa_pa);
-                let expected = [cylinder.area_a_m2 * speed_mps, -cylinder.area_b_m2 * speed_mps];
-                for (flow, expected) in [flows.a_m3s, flows.b_m3s].into_iter().zip(expected) {
-                    assert!(
-                        (flow / expected - 1.0).abs() < 1e-3,
-                        "{flow} for {expected} m³/s, P_A {pa_pa} Pa"
-                    );
-                }
-            }
+impl<T: Real> Gains<T> {
+    pub(super) fn is_physical(&self) -> bool {
+        [self.proportional, self.integral_ps, self.derivative_s]
+            .iter()
+            .all(|gain| gain.is_finite() && *gain >= T::zero())
+    }
+
+    /// The valve command ±1 for an error and its rate; `integral` is the controller's memory.
+    pub(super) fn command(&self, integral: &mut T, step_s: T, error: T, rate: T, feedforward: T) -> T {
+        let grown = *integral + self.integral_ps * error * step_s;
+        let wanted =
+            |integral: T| feedforward + self.proportional * error + self.derivative_s * rate + integral;
+        let free = wanted(grown);
+        let saturated = free.abs() > T::one() && free * error > T::zero();
+        if grown.is_finite() && !saturated {
+            *integral = grown.max(-T::one()).min(T::one());
         }
+        wanted(*integral).max(-T::one()).min(T::one())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use crate::effects::{EffectKind, EffectSet};
 use crate::{Cylinder, Model, PerLeak, Real, Signals, Terms, rk4_step};
 
 /// Numbers in the state vector of one cylinder: x, ẋ, oil in A, oil in B.
-pub(crate) const STATES: usize = 4;
+const STATES: usize = 4;
 
 /// Largest step times rate that RK4 is given (its stability limit is 2.78).
 const STEP_RATE: f64 = 1.4;

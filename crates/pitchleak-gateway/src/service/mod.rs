@@ -1,25 +1,23 @@
 //! The service: samples in, estimates and alarms out, acknowledged once they are on the disk.
 
 use crate::alarms::Alarms;
-use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{Broker, DeadLetters, Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{Config, Samples};
-use crate::dead_letters::DeadLetters;
-use crate::input::Input;
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
 use crate::pace::{Due, Pace};
+use crate::run::Input;
 use crate::saver::{Job, Saved};
 use crate::topics;
 use pitchleak::Rig;
 use pitchleak::live::{
     Batch, Checkpoint, CheckpointError, Event, OutputFormat, Snapshot, Span, SummaryEvent, Watch,
 };
+use pitchleak::units::LPM_PER_M3S;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
-/// L/min for each m³/s.
-const LPM_PER_M3S: f64 = 60_000.0;
 /// Hours and days that could not be written, at most.
 const MOST_UNWRITTEN: usize = 10_000;
 /// Between two counts for the metrics.

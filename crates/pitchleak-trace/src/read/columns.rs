@@ -1,8 +1,7 @@
 //! Which column of a file holds which signal, and in which unit: by the names of the contract, those of `[columns]`, and
 //! foreign ones that name signal and unit.
 
-use super::error::Counted;
-use super::error::TraceFault;
+use super::error::{Counted, TraceFault};
 use crate::header::{self, HeaderUnit, near, shorten};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
@@ -30,6 +29,15 @@ impl Content {
         match self {
             Self::Number(signal, _) => Some(signal),
             Self::Timestamp => Some(Signal::Timestamp),
+            Self::Ignored => None,
+        }
+    }
+
+    /// What a column of numbers in memory is read as: a signal and its unit, a time stamp as the time; none of what is not read.
+    pub(super) fn cells(self) -> Option<(Signal, Option<Unit>)> {
+        match self {
+            Self::Number(signal, unit) => Some((signal, unit)),
+            Self::Timestamp => Some((Signal::Time, None)),
             Self::Ignored => None,
         }
     }
@@ -199,7 +207,7 @@ impl Layout {
                 return Err(TraceFault::UnknownUnit {
                     column: shorten(&column.header, 40),
                     signal: signal.name(),
-                    unit: unit.to_owned(),
+                    unit: shorten(unit, 40),
                     allowed: dimension.suffixes(),
                 });
             }

@@ -2,8 +2,7 @@
 
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
-use super::error::TraceFault;
-use super::error::{BadReason, BadRow, Counted};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
 use super::format::{Format, Reading, Stream};
 use super::number::plain_number;
 use super::records::{Record, Records, Stop, Text, stopped_early};
@@ -108,8 +107,9 @@ impl Splitting {
                     Plain { text, end, delimiter, decimal, at: 0, length: 0, places: 0, ended: false };
                 read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
-            Text::Unquoted(text, ends) => {
-                let cells = Unquoted { text, ends, decimal: self.decimal, at: 0, length: 0 };
+            Text::Unquoted(..) => {
+                let cells = record.cells(self.delimiter);
+                let cells = Split { cells: &cells, decimal: self.decimal, at: 0 };
                 read_cells(&self.layout, &mut self.epoch, &mut self.last_cells, cells, row)
             }
         }
@@ -201,9 +201,7 @@ pub(super) trait Cells<'a> {
     fn length(&self) -> usize;
 
     /// What stands before the decimals.
-    fn decimal(&self) -> Decimal {
-        Decimal::Point
-    }
+    fn decimal(&self) -> Decimal;
 
     /// Reads a cell as a number; NaN where it is empty.
     #[inline]
@@ -248,6 +246,10 @@ impl<'a> Plain<'a> {
 }
 
 impl<'a> Cells<'a> for Plain<'a> {
+    fn decimal(&self) -> Decimal {
+        self.decimal
+    }
+
     #[inline(always)]
     fn ended(&self) -> bool {
         self.ended
@@ -292,34 +294,30 @@ impl<'a> Cells<'a> for Plain<'a> {
     }
 }
 
-/// A record whose quotes were taken off.
-struct Unquoted<'a> {
-    text: &'a [u8],
-    /// Of the cells that are left.
-    ends: &'a [usize],
-    decimal: Decimal,
-    at: usize,
-    length: usize,
+/// Cells that were split before: of a record whose quotes were taken off, or of a line of a feed.
+pub(super) struct Split<'a> {
+    pub(super) cells: &'a [&'a [u8]],
+    pub(super) decimal: Decimal,
+    pub(super) at: usize,
 }
 
-impl<'a> Cells<'a> for Unquoted<'a> {
+impl<'a> Cells<'a> for Split<'a> {
     fn decimal(&self) -> Decimal {
         self.decimal
     }
 
     fn ended(&self) -> bool {
-        self.ends.is_empty()
+        self.at >= self.cells.len()
     }
 
     fn cell(&mut self) -> &'a [u8] {
-        let Some((&end, ends)) = self.ends.split_first() else { return &[] };
-        let cell = self.text.get(self.at..end).unwrap_or_default();
-        (self.at, self.ends, self.length) = (end, ends, cell.trim_ascii().len());
+        let cell = self.cells.get(self.at).copied().unwrap_or_default();
+        self.at += 1;
         cell
     }
 
     fn length(&self) -> usize {
-        self.length
+        self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
     }
 }
 

@@ -3,12 +3,10 @@
 
 use super::columns::{Content, Layout, REQUIRED, partly};
 use super::error::TraceFault;
-use super::format::Stream;
-use super::format::mistaken;
+use super::format::{Stream, mistaken};
 use super::number::decimal;
 use super::proposal::{Proposal, proposals};
-use super::records::Encoding;
-use super::records::{Records, Stop, stopped_early};
+use super::records::{Encoding, Records, Stop, stopped_early};
 use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;

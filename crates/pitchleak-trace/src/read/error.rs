@@ -1,5 +1,4 @@
-use std::fmt;
-use std::io;
+use std::{fmt, io};
 
 /// Why a row is of no use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -83,6 +82,13 @@ pub struct TraceError {
     pub trace: String,
     /// What is wrong.
     pub fault: TraceFault,
+}
+
+impl TraceFault {
+    /// It, of a trace of this name.
+    pub(super) fn of(self, trace: &str) -> TraceError {
+        TraceError { trace: trace.to_owned(), fault: self }
+    }
 }
 
 /// What makes a trace unusable.

@@ -1,10 +1,9 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::columns::Bound;
-use super::columns::{Content, partly};
+use super::columns::{Bound, Content, partly};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
-use super::file;
+use super::format;
 use super::number::decimal;
 use super::proposal::{Proposal, Why, proposals};
 use super::table_text::TextTable;
@@ -88,31 +87,17 @@ impl FileReading {
         let name = path.as_ref().display().to_string();
         Self::look(path.as_ref(), rig)
             .map(|reading| Self { path: name.clone(), ..reading })
-            .map_err(|fault| TraceError { trace: name, fault })
+            .map_err(|fault| fault.of(&name))
     }
 
     fn look(path: &Path, rig: &Rig) -> Result<Self, TraceFault> {
         let (format, stream) = if path == Path::new("-") {
-            file::start(Box::new(std::io::stdin()), None)?
+            format::start(Box::new(std::io::stdin()), None)?
         } else {
             let file = File::open(path).map_err(TraceFault::Open)?;
-            file::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
+            format::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
         };
         Ok(Self::of_table(format.look(stream, rig)?, rig))
-    }
-
-    fn empty() -> Self {
-        Self {
-            schema: Self::SCHEMA,
-            path: String::new(),
-            text: None,
-            time_format: None,
-            columns: Vec::new(),
-            named: Vec::new(),
-            problem: None,
-            proposals: Vec::new(),
-            misspelt: Vec::new(),
-        }
     }
 
     fn of_table(table: TextTable, rig: &Rig) -> Self {
@@ -137,19 +122,22 @@ impl FileReading {
         let columns = columns.collect();
         let proposals = proposals(&table, &found, rig).iter().map(line).collect();
         let misspelt = misspelt(&table.headers, &rig.columns);
+        let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
-            let problem = table.bound.err().map(|fault| fault.to_string());
-            return Self { columns, named, problem, proposals, misspelt, ..Self::empty() };
+            problem = table.bound.err().map(|fault| fault.to_string());
+        } else {
+            match Dialect::of(table, super::records::Encoding::Utf8, rig) {
+                Ok(Dialect { layout, .. }) if layout.has(Signal::Timestamp) => {
+                    let zone =
+                        layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
+                    time_format = Some(format!("{}{zone}", layout.time.kind));
+                }
+                Ok(_) => {}
+                Err(fault) => problem = Some(fault.to_string()),
+            }
         }
-        let dialect = Dialect::of(table, super::records::Encoding::Utf8, rig);
-        let time_format =
-            dialect.as_ref().ok().filter(|dialect| dialect.layout.has(Signal::Timestamp)).map(|dialect| {
-                let time = &dialect.layout.time;
-                let zone = time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-                format!("{}{zone}", time.kind)
-            });
-        let problem = dialect.err().map(|fault| fault.to_string());
-        Self { text, time_format, columns, named, problem, proposals, misspelt, ..Self::empty() }
+        let (schema, path) = (Self::SCHEMA, String::new());
+        Self { schema, path, text, time_format, columns, named, problem, proposals, misspelt }
     }
 
     /// One line of JSON.

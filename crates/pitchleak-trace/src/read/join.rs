@@ -2,8 +2,8 @@
 
 use super::clock::is_same;
 use super::columns::{Layout, REQUIRED};
-use super::error::TraceFault;
-use super::file;
+use super::error::{TraceError, TraceFault};
+use super::format;
 use super::format::Rows;
 use super::row::{Next, Row, RowSource};
 use crate::rig::Rig;
@@ -31,17 +31,14 @@ pub(super) struct Joined {
 
 impl Joined {
     /// Opens the files; together they must have what a trace has.
-    pub(super) fn open(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, (String, TraceFault)> {
-        let mut parts = Vec::new();
-        for path in paths {
-            let name = path.as_ref().display().to_string();
-            parts.push(Part::open(path.as_ref(), rig).map_err(|fault| (name, fault))?);
-        }
-        let whole = || "the files together".to_owned();
+    pub(super) fn open(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, TraceError> {
+        let open = |path: &Path| Part::open(path, rig).map_err(|fault| fault.of(&path.display().to_string()));
+        let parts = paths.iter().map(|path| open(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        let whole = |fault: TraceFault| fault.of("the files together");
         let layout = Layout::joined(parts.iter().map(|part| part.rows.layout()));
-        layout.check(&rig.columns, &REQUIRED).map_err(|fault| (whole(), fault))?;
+        layout.check(&rig.columns, &REQUIRED).map_err(whole)?;
         let mut joined = Self { parts, layout, epoch_ns: None };
-        joined.begin().map_err(|fault| (whole(), fault))?;
+        joined.begin().map_err(whole)?;
         Ok(joined)
     }
 
@@ -78,7 +75,7 @@ impl Part {
         rig.csv.part = Some(path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
         let file = File::open(path).map_err(TraceFault::Open)?;
         let again = file.try_clone().ok();
-        Ok(Self { rows: file::open(Box::new(file), again, &rig)?, next: None, ended: false })
+        Ok(Self { rows: format::open(Box::new(file), again, &rig)?, next: None, ended: false })
     }
 
     /// How much later than the recording its own seconds begin, s.

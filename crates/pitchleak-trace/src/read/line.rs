@@ -1,14 +1,12 @@
 //! Rows that come one by one as text, such as the lines of a live feed.
 
 use super::columns::{Column, Content, Layout};
-use super::csv::{Cells, describe, read_cells};
-use super::error::TraceFault;
-use super::error::{BadReason, BadRow, Counted};
-use super::row::{BadRows, Record};
-use super::row::{NEEDED, Row};
+use super::csv::{Cells, Split, describe, read_cells};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
+use super::row::{BadRows, NEEDED, Record, Row};
 use super::stamps::Epoch;
 use super::validator::{MOST_TIME_S, RowValidator, missing};
-use crate::rig::{ColumnMap, Rig};
+use crate::rig::{ColumnMap, Decimal, Rig};
 use crate::signal::Signal;
 
 /// What the cells of a line hold, by their names, which are those of a trace's columns.
@@ -33,7 +31,7 @@ impl LineLayout {
             |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));
         let times = self.0.columns.iter().enumerate().find(|(_, column)| is_time(column));
         let (at, column) = times.ok_or(BadReason::Missing)?;
-        let mut cells = LineCells { cells, at };
+        let mut cells = Split { cells, decimal: Decimal::Point, at };
         let time_s = match column.content {
             Content::Timestamp => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell()),
             Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
@@ -82,7 +80,13 @@ pub fn read(
     let LineLayout(layout) = layout;
     let mut row = Row { line, ..Row::empty() };
     let mut epoch = Epoch::since(*epoch_ns, layout.time.clone());
-    let read = read_cells(layout, &mut epoch, &mut [0, 0], LineCells { cells, at: 0 }, &mut row);
+    let read = read_cells(
+        layout,
+        &mut epoch,
+        &mut [0, 0],
+        Split { cells, decimal: Decimal::Point, at: 0 },
+        &mut row,
+    );
     *epoch_ns = epoch.first_ns();
     row.stand_in(validator.unread());
     let bad = match read {
@@ -95,26 +99,4 @@ pub fn read(
     let Some(bad) = bad else { return Ok(LineRead::Good) };
     validator.skip(bad.clone())?;
     Ok(LineRead::Bad(bad, validator.take_refused().map(Box::new)))
-}
-
-/// Cells that were split before.
-struct LineCells<'a> {
-    cells: &'a [&'a [u8]],
-    at: usize,
-}
-
-impl<'a> Cells<'a> for LineCells<'a> {
-    fn ended(&self) -> bool {
-        self.at >= self.cells.len()
-    }
-
-    fn cell(&mut self) -> &'a [u8] {
-        let cell = self.cells.get(self.at).copied().unwrap_or_default();
-        self.at += 1;
-        cell
-    }
-
-    fn length(&self) -> usize {
-        self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
-    }
 }

@@ -6,10 +6,9 @@ mod hdf5;
 mod vector;
 
 use super::columns::bind;
-use super::error::Counted;
-use super::error::TraceFault;
+use super::error::{Counted, TraceFault};
 use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
-use super::stamps::{Stamped, sample};
+use super::stamps::{self, sample};
 use super::table::TableRows;
 use super::table_text::TextTable;
 use crate::header::shorten;
@@ -20,17 +19,7 @@ use std::sync::Arc;
 
 pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows { open, look } };
 
-/// Types of data elements.
-const INT8: u32 = 1;
-const UINT8: u32 = 2;
-const INT16: u32 = 3;
-const UINT16: u32 = 4;
-const INT32: u32 = 5;
-const UINT32: u32 = 6;
-const SINGLE: u32 = 7;
-const DOUBLE: u32 = 9;
-const INT64: u32 = 12;
-const UINT64: u32 = 13;
+/// Types of data elements that hold others.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
@@ -58,12 +47,8 @@ fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
     layout.counted = Counted::Rows;
-    let stamps = Stamped::new(&layout, &bound.foreign, rig, &values)?;
-    layout.time = stamps.format.clone();
-    let layout = Arc::new(layout);
-    let cells = stamps.cells(&layout, values);
-    let mut once = Some(cells);
-    Ok(Box::new(TableRows::over(layout, Box::new(move || Ok(once.take())))))
+    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, values)?);
+    Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 
 fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
@@ -263,9 +248,9 @@ impl<R: Read> Elements<R> {
             return other("matrix");
         }
         let (kind, size, small) = self.tag()?;
-        let width =
-            width(kind).ok_or_else(|| damaged_variable(&name, &format!("holds data of type {kind}")))?;
-        if length.checked_mul(width as u64) != Some(u64::from(size)) {
+        let written = Written::of(kind, self.big_endian)
+            .ok_or_else(|| damaged_variable(&name, &format!("holds data of type {kind}")))?;
+        if length.checked_mul(written.width as u64) != Some(u64::from(size)) {
             return Err(damaged_variable(&name, &format!("has {size} bytes for {length} numbers")));
         }
         if small && size > 4 {
@@ -273,12 +258,12 @@ impl<R: Read> Elements<R> {
             return Err(damaged_variable(&name, &what));
         }
         *budget = budget.checked_sub(length).ok_or(TraceFault::Format(TOO_LARGE))?;
-        let values = self.numbers(kind, width, size, padding(size, small))?;
+        let values = self.numbers(written, size, padding(size, small))?;
         Ok(Some(Variable { name, values: Values::Vector(values) }))
     }
 
     /// Numbers in pieces: memory is taken as they come, whatever the tag promises.
-    fn numbers(&mut self, kind: u32, width: usize, size: u32, padding: u32) -> Result<Vec<f64>, TraceFault> {
+    fn numbers(&mut self, written: Written, size: u32, padding: u32) -> Result<Vec<f64>, TraceFault> {
         let mut values = Vec::new();
         let mut piece = vec![0; 64 * 1024];
         let mut left = size as usize;
@@ -286,7 +271,7 @@ impl<R: Read> Elements<R> {
             let count = left.min(piece.len());
             let bytes = piece.get_mut(..count).unwrap_or_default();
             self.bytes.read_exact(bytes).map_err(damaged)?;
-            values.extend(bytes.chunks_exact(width).map(|bytes| number(kind, self.big_endian, bytes)));
+            values.extend(written.numbers(bytes, 1));
             left -= count;
         }
         io::copy(&mut self.bytes.by_ref().take(u64::from(padding)), &mut io::sink()).map_err(damaged)?;
@@ -294,37 +279,58 @@ impl<R: Read> Elements<R> {
     }
 }
 
-fn number(kind: u32, big_endian: bool, bytes: &[u8]) -> f64 {
-    let mut word = [0; 8];
-    for (index, byte) in bytes.iter().enumerate() {
-        let place = if big_endian { bytes.len() - 1 - index } else { index };
-        if let Some(to) = word.get_mut(place) {
-            *to = *byte;
-        }
-    }
-    let [a, b, c, d, ..] = word;
-    match kind {
-        INT8 => f64::from(i8::from_le_bytes([a])),
-        UINT8 => f64::from(a),
-        INT16 => f64::from(i16::from_le_bytes([a, b])),
-        UINT16 => f64::from(u16::from_le_bytes([a, b])),
-        INT32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-        UINT32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-        SINGLE => f64::from(f32::from_le_bytes([a, b, c, d])),
-        INT64 => i64::from_le_bytes(word) as f64,
-        UINT64 => u64::from_le_bytes(word) as f64,
-        _ => f64::from_le_bytes(word),
-    }
+/// How numbers are written.
+#[derive(Clone, Copy)]
+struct Written {
+    form: Form,
+    /// Bytes of each, eight at most.
+    width: usize,
+    big_endian: bool,
 }
 
-/// Bytes of a number; none of what is no number.
-fn width(kind: u32) -> Option<usize> {
-    match kind {
-        INT8 | UINT8 => Some(1),
-        INT16 | UINT16 => Some(2),
-        INT32 | UINT32 | SINGLE => Some(4),
-        DOUBLE | INT64 | UINT64 => Some(8),
-        _ => None,
+#[derive(Clone, Copy)]
+enum Form {
+    Signed,
+    Unsigned,
+    Floating,
+}
+
+impl Written {
+    /// In data elements of this type (miINT8 = 1 to miUINT64 = 13); none where they hold no numbers.
+    fn of(kind: u32, big_endian: bool) -> Option<Self> {
+        let (form, width) = match kind {
+            1 => (Form::Signed, 1),
+            2 => (Form::Unsigned, 1),
+            3 => (Form::Signed, 2),
+            4 => (Form::Unsigned, 2),
+            5 => (Form::Signed, 4),
+            6 => (Form::Unsigned, 4),
+            7 => (Form::Floating, 4),
+            9 => (Form::Floating, 8),
+            12 => (Form::Signed, 8),
+            13 => (Form::Unsigned, 8),
+            _ => return None,
+        };
+        Some(Self { form, width, big_endian })
+    }
+
+    /// Every so many of the numbers.
+    fn numbers(self, bytes: &[u8], stride: usize) -> impl Iterator<Item = f64> {
+        bytes.chunks_exact(self.width).step_by(stride.max(1)).map(move |bytes| self.number(bytes))
+    }
+
+    fn number(self, bytes: &[u8]) -> f64 {
+        let join = |word: u64, byte: &u8| word << 8 | u64::from(*byte);
+        let word =
+            if self.big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) };
+        // The sign is the highest bit of the bytes that there are.
+        let above = 64 - 8 * self.width as u32;
+        match self.form {
+            Form::Signed => ((word << above).cast_signed() >> above) as f64,
+            Form::Unsigned => word as f64,
+            Form::Floating if self.width == 4 => f32::from_bits(word as u32).into(),
+            Form::Floating => f64::from_bits(word),
+        }
     }
 }
 

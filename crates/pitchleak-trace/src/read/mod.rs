@@ -1,13 +1,11 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
 mod ahead;
-mod changed;
 mod clock;
 mod columns;
 mod csv;
 mod dialect;
 mod error;
-mod file;
 mod format;
 mod inspect;
 mod join;
@@ -26,12 +24,11 @@ mod table;
 mod table_text;
 mod validator;
 
-pub use changed::FlowChange;
 pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
 pub use line::{LineLayout, LineRead, read as read_line};
 pub use quality::TraceQuality;
-pub use row::{BadRows, Record, ValveReading};
+pub use row::{BadRows, FlowChange, Record, ValveReading};
 pub use stamps::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 pub use validator::{OVERRANGE, RowValidator};
@@ -39,10 +36,9 @@ pub use validator::{OVERRANGE, RowValidator};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::Clock;
-use changed::ChangedFlows;
 use join::Joined;
 use own_clocks::OwnClocks;
-use row::{Next, Row, RowSource};
+use row::{ChangedFlows, Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -84,15 +80,13 @@ impl TraceReader<'static> {
             return Self::from_stream("standard input", Box::new(std::io::stdin()), rig);
         }
         let name = path.display().to_string();
-        match File::open(path) {
-            Ok(_) if path.is_dir() => Err(TraceError { trace: name, fault: TraceFault::Format(FOLDER) }),
-            Ok(file) => {
-                // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
-                let again = file.try_clone().ok();
-                Self::from_source(&name, wrap(file), again, rig)
-            }
-            Err(error) => Err(TraceError { trace: name, fault: TraceFault::Open(error) }),
+        let file = File::open(path).map_err(|error| TraceFault::Open(error).of(&name))?;
+        if path.is_dir() {
+            return Err(TraceFault::Format(FOLDER).of(&name));
         }
+        // Parquet is read from anywhere in the file: no progress is seen, but it is soon done.
+        let again = file.try_clone().ok();
+        Self::from_source(&name, wrap(file), again, rig)
     }
 
     /// As [`open`](Self::open), from any stream; `name` is for messages.
@@ -110,10 +104,7 @@ impl TraceReader<'static> {
     /// As [`open`](Self::open), of each file, and of all together.
     pub fn join(paths: &[impl AsRef<Path>], rig: &Rig) -> Result<Self, TraceError> {
         let names: Vec<String> = paths.iter().map(|path| path.as_ref().display().to_string()).collect();
-        match Joined::open(paths, rig) {
-            Ok(rows) => Ok(Self::over(&names.join(" + "), Box::new(rows), rig)),
-            Err((trace, fault)) => Err(TraceError { trace, fault }),
-        }
+        Ok(Self::over(&names.join(" + "), Box::new(Joined::open(paths, rig)?), rig))
     }
 
     fn from_source(
@@ -122,10 +113,8 @@ impl TraceReader<'static> {
         file: Option<File>,
         rig: &Rig,
     ) -> Result<Self, TraceError> {
-        match file::open(stream, file, rig) {
-            Ok(rows) => Ok(Self::over(name, rows, rig)),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let rows = format::open(stream, file, rig).map_err(|fault| fault.of(name))?;
+        Ok(Self::over(name, rows, rig))
     }
 }
 
@@ -156,10 +145,8 @@ impl<'a> TraceReader<'a> {
         batches: Vec<Batch<'a>>,
         rig: &Rig,
     ) -> Result<Self, TraceError> {
-        match TableRows::new(layout, batches) {
-            Ok(rows) => Ok(Self::over(name, Box::new(rows), rig)),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let rows = TableRows::new(layout, batches).map_err(|fault| fault.of(name))?;
+        Ok(Self::over(name, Box::new(rows), rig))
     }
 
     fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
@@ -282,7 +269,7 @@ impl<'a> TraceReader<'a> {
     }
 
     fn error(&self, fault: TraceFault) -> TraceError {
-        TraceError { trace: self.name.clone(), fault }
+        fault.of(&self.name)
     }
 }
 

@@ -184,8 +184,7 @@ fn is_group(number: &str, mark: char) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::plain_number;
-    use super::*;
+    use super::{plain_number, *};
     use proptest::prelude::*;
 
     fn library(text: &str) -> Option<(u64, usize)> {

@@ -3,7 +3,7 @@
 use super::columns::{Content, bare_unit};
 use super::number::decimal;
 use super::table_text::TextTable;
-use crate::header::{self, HeaderUnit};
+use crate::header::{self, HeaderUnit, lists};
 use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
 use crate::times;
@@ -73,42 +73,26 @@ impl Unread<'_> {
     }
 }
 
-/// What a word says of a quantity, and of a side.
-const WORDS: [(Signal, &[&str]); 5] = [
-    (Signal::PressureA, &["p", "pressure", "press", "pres", "druck"]),
-    (Signal::FlowA, &["q", "flow", "flowrate", "volumenstrom", "durchfluss"]),
-    (
-        Signal::Position,
-        &[
-            "x",
-            "position",
-            "pos",
-            "stroke",
-            "weg",
-            "hub",
-            "kolbenweg",
-            "stellweg",
-            "kolbenhub",
-            "displacement",
-            "lvdt",
-            "travel",
-        ],
-    ),
-    (Signal::Force, &["force", "load", "kraft"]),
-    (Signal::Time, &["t", "time", "zeit", "date", "datum", "timestamp", "elapsed", "clock"]),
+/// What a word says of a quantity, and of a side; blanks between the words.
+const WORDS: [(Signal, &str); 5] = [
+    (Signal::PressureA, "p pressure press pres druck"),
+    (Signal::FlowA, "q flow flowrate volumenstrom durchfluss"),
+    (Signal::Position, "x position pos stroke weg hub kolbenweg stellweg kolbenhub displacement lvdt travel"),
+    (Signal::Force, "force load kraft"),
+    (Signal::Time, "t time zeit date datum timestamp elapsed clock"),
 ];
-const SIDE_A: &[&str] = &["a", "1", "head", "cap", "bore", "piston", "kolben", "blind"];
-const SIDE_B: &[&str] = &["b", "2", "rod", "annulus", "ring", "stange"];
+const SIDE_A: &str = "a 1 head cap bore piston kolben blind";
+const SIDE_B: &str = "b 2 rod annulus ring stange";
 
-const SUPPLY: &[&str] = &["supply", "system", "pump", "versorgung", "versorgungs"];
-const TANK: &[&str] = &["tank", "return", "reservoir", "rücklauf"];
-const SPOOL: &[&str] = &["spool", "schieber"];
-const VALVE: &[&str] = &["valve", "servovalve", "ventil"];
-const COMMAND: &[&str] = &["command", "cmd", "setpoint", "soll", "sollwert", "demand", "reference"];
+const SUPPLY: &str = "supply system pump versorgung versorgungs";
+const TANK: &str = "tank return reservoir rücklauf";
+const SPOOL: &str = "spool schieber";
+const VALVE: &str = "valve servovalve ventil";
+const COMMAND: &str = "command cmd setpoint soll sollwert demand reference";
 
 /// A spool's position, or what it is told.
 fn of_the_valve(words: &[String]) -> Option<Signal> {
-    let says = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+    let says = |known: &str| words.iter().any(|word| lists(known, word));
     match (says(SPOOL), says(VALVE), says(COMMAND)) {
         (true, _, true) | (_, true, true) => Some(Signal::Command),
         (true, _, false) => Some(Signal::Spool),
@@ -117,38 +101,13 @@ fn of_the_valve(words: &[String]) -> Option<Signal> {
 }
 
 /// Words of a column that holds no reading of a sensor: what a reading is worth, what was wanted, what counts or scales.
-const NO_READINGS: &[&str] = &[
-    "validity",
-    "valid",
-    "quality",
-    "status",
-    "state",
-    "value",
-    "scalefactor",
-    "scale",
-    "factor",
-    "spool",
-    "valve",
-    "ventil",
-    "command",
-    "cmd",
-    "setpoint",
-    "soll",
-    "sollwert",
-    "target",
-    "demand",
-    "ref",
-    "reference",
-    "index",
-    "id",
-    "no",
-    "nr",
-];
+const NO_READINGS: &str = "validity valid quality status state value scalefactor scale factor spool valve ventil command \
+                           cmd setpoint soll sollwert target demand ref reference index id no nr";
 
 /// Whether a column may be proposed for what a sensor reads.
 fn may_be_a_reading(words: &[String]) -> bool {
     let joined = words.concat();
-    !words.iter().any(|word| NO_READINGS.contains(&word.as_str())) && joined != "scalefactor"
+    !words.iter().any(|word| lists(NO_READINGS, word)) && joined != "scalefactor"
 }
 
 /// Proposals for the signals that `wanted` names, of columns that are not read.
@@ -171,9 +130,9 @@ pub(super) fn propose(
     }
     for column in left {
         let words = words(column.header);
-        let is_time = WORDS.iter().any(|(signal, known)| {
-            *signal == Signal::Time && words.iter().any(|word| known.contains(&word.as_str()))
-        });
+        let is_time = WORDS
+            .iter()
+            .any(|(signal, known)| *signal == Signal::Time && words.iter().any(|word| lists(known, word)));
         if !may_be_a_reading(&words) || is_time {
             continue;
         }
@@ -225,11 +184,8 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     if !may_be_a_reading(&words) {
         return None;
     }
-    let says = |known: &[&str]| {
-        words
-            .iter()
-            .any(|word| known.iter().any(|known| word == known || known.len() > 3 && word.contains(known)))
-    };
+    let is = |word: &String, known: &str| word == known || known.len() > 3 && word.contains(known);
+    let says = |known: &str| words.iter().any(|word| known.split(' ').any(|known| is(word, known)));
     let quantity = WORDS.iter().find(|(_, known)| says(known)).map(|(signal, _)| *signal)?;
     let signal = match (quantity, says(SIDE_A), says(SIDE_B)) {
         (Signal::PressureA | Signal::FlowA, true, false) => quantity,
@@ -315,12 +271,11 @@ fn possible_unit(signal: Signal, values: &[f64], rig: &Rig) -> Option<Unit> {
         }
         _ => return None,
     };
-    let unit = |name: &&str| dimension.units().iter().find(|unit| unit.text == *name).copied();
     let possible = |unit: &Unit| {
         let share = unit.to_si(size) / full_scale;
         (0.005..1.3).contains(&share)
     };
-    usual.iter().filter_map(unit).find(possible)
+    usual.iter().filter_map(|name| dimension.by_text(name)).find(possible)
 }
 
 fn values(column: &Unread<'_>, decimal: Decimal) -> Vec<f64> {

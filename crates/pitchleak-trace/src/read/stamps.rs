@@ -1,9 +1,7 @@
 //! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
 
-use super::columns::TextRow;
-use super::columns::{Content, Layout};
-use super::error::BadReason;
-use super::error::TraceFault;
+use super::columns::{Content, Layout, TextRow};
+use super::error::{BadReason, TraceFault};
 use super::table::Cells;
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};
@@ -33,6 +31,11 @@ impl Epoch {
     /// The first stamp, ns since 1970.
     pub(super) fn first_ns(&self) -> Option<i64> {
         self.first_ns.and_then(|first_ns| i64::try_from(first_ns).ok())
+    }
+
+    /// As [`seconds`](Self::seconds), of a cell that holds a number; NaN where it is no stamp.
+    pub(super) fn seconds_of(&mut self, number: f64) -> f64 {
+        self.seconds(number.to_string().as_bytes()).unwrap_or(f64::NAN)
     }
 
     /// Seconds since the first stamp read; NaN for an empty cell. A stamp without an offset is read
@@ -75,48 +78,33 @@ pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
     (0..rows).map(row).collect()
 }
 
-/// How the column of time stamps, if there is one, becomes seconds.
-pub(super) struct Stamped {
-    pub(super) format: TimeFormat,
-    epoch: Epoch,
-}
-
-impl Stamped {
-    pub(super) fn new(
-        layout: &Layout,
-        foreign: &ColumnMap,
-        rig: &Rig,
-        columns: &[Vec<f64>],
-    ) -> Result<Self, TraceFault> {
-        let stamps = layout.columns.iter().position(|column| column.content == Content::Timestamp);
-        let format = match stamps.and_then(|index| columns.get(index)) {
-            None => TimeFormat::default(),
-            Some(values) => {
-                let cells: Vec<String> =
-                    values.iter().take(ROWS).filter(|value| !value.is_nan()).map(f64::to_string).collect();
-                time_format(&cells.iter().map(String::as_str).collect::<Vec<_>>(), layout, foreign, rig)?
-            }
-        };
-        Ok(Self { epoch: Epoch::new(format.clone()), format })
-    }
-
-    /// The columns that are read.
-    pub(super) fn cells(mut self, layout: &Layout, columns: Vec<Vec<f64>>) -> Vec<Cells<'static>> {
-        let mut cells = Vec::new();
-        for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
-            let (signal, unit, values) = match column.content {
-                Content::Number(signal, unit) => (signal, unit, values),
-                Content::Timestamp => {
-                    let seconds =
-                        |value: &f64| self.epoch.seconds(value.to_string().as_bytes()).unwrap_or(f64::NAN);
-                    (Signal::Time, None, values.iter().map(seconds).collect())
-                }
-                Content::Ignored => continue,
-            };
-            cells.push(Cells { signal, unit, values: Cow::Owned(values), index });
+/// The columns that are read; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
+pub(super) fn cells(
+    layout: &mut Layout,
+    foreign: &ColumnMap,
+    rig: &Rig,
+    columns: Vec<Vec<f64>>,
+) -> Result<Vec<Cells<'static>>, TraceFault> {
+    let stamps = layout.columns.iter().position(|column| column.content == Content::Timestamp);
+    layout.time = match stamps.and_then(|index| columns.get(index)) {
+        None => TimeFormat::default(),
+        Some(values) => {
+            let known = values.iter().take(ROWS).filter(|value| !value.is_nan());
+            let cells: Vec<String> = known.map(f64::to_string).collect();
+            time_format(&cells.iter().map(String::as_str).collect::<Vec<_>>(), layout, foreign, rig)?
         }
-        cells
+    };
+    let mut epoch = Epoch::new(layout.time.clone());
+    let mut cells = Vec::new();
+    for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
+        let Some((signal, unit)) = column.content.cells() else { continue };
+        let values = match column.content {
+            Content::Timestamp => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
+            _ => values,
+        };
+        cells.push(Cells { signal, unit, values: Cow::Owned(values), index });
     }
+    Ok(cells)
 }
 
 /// As the rig file or the command line says it, else as the cells themselves do.

@@ -1,8 +1,7 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
-use super::columns::{Content, Layout};
-use super::error::{BadReason, BadRow, Counted};
-use super::error::{TraceError, TraceFault};
+use super::columns::{Column, Content, Layout};
+use super::error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
 use crate::rig::Rig;
@@ -37,10 +36,9 @@ impl TableLayout {
     /// # Errors
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
-        match Layout::new(headers, &rig.columns).and_then(|layout| layout.of_stroke(rig)) {
-            Ok(layout) => Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout }))),
-            Err(fault) => Err(TraceError { trace: name.to_owned(), fault }),
-        }
+        let layout = Layout::new(headers, &rig.columns).and_then(|layout| layout.of_stroke(rig));
+        let layout = layout.map_err(|fault| fault.of(name))?;
+        Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout })))
     }
 
     /// What each column is read as, in the order of the headers.
@@ -54,11 +52,9 @@ impl TableLayout {
 
     /// Which of the headers is that of the time.
     pub fn time(&self) -> Option<usize> {
-        self.0.columns.iter().position(|column| match column.content {
-            Content::Number(signal, _) => signal == Signal::Time,
-            Content::Timestamp => true,
-            Content::Ignored => false,
-        })
+        let is_time =
+            |column: &Column| column.content.cells().is_some_and(|(signal, _)| signal == Signal::Time);
+        self.0.columns.iter().position(is_time)
     }
 }
 
@@ -180,11 +176,7 @@ impl RowSource for TableRows<'_> {
 fn bind<'a>(layout: &Layout, batch: &Batch<'a>) -> Result<Vec<Cells<'a>>, TraceFault> {
     let mut read: Vec<Cells<'a>> = Vec::new();
     for (index, column) in layout.columns.iter().enumerate() {
-        let (signal, unit) = match column.content {
-            Content::Number(signal, unit) => (signal, unit),
-            Content::Timestamp => (Signal::Time, None),
-            Content::Ignored => continue,
-        };
+        let Some((signal, unit)) = column.content.cells() else { continue };
         let values = batch.get(index).copied().unwrap_or_default();
         if let Some(first) = read.first().filter(|first| first.values.len() != values.len()) {
             let other = layout.columns.get(first.index).map_or("", |column| &column.header);

@@ -2,8 +2,7 @@
 
 use super::columns::{Bound, TextRow, bare_unit, bind, column, name_part};
 use super::error::TraceFault;
-use super::records::Records;
-use super::records::text;
+use super::records::{Records, text};
 use crate::header::HeaderUnit;
 use crate::rig::{Delimiter, Rig};
 use std::io::Cursor;

@@ -2,11 +2,9 @@
 
 use super::clock::{Clock, Step};
 use super::columns::Layout;
-use super::error::TraceFault;
-use super::error::{BadReason, BadRow, Counted};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
 use super::quality::TraceQuality;
-use super::row::Row;
-use super::row::{BadRows, Record, ValveReading};
+use super::row::{BadRows, Record, Row, ValveReading};
 use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;

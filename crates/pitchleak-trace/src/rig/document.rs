@@ -130,6 +130,17 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// What the word under `key` stands for; `allowed` are the words that stand for something.
+    pub(super) fn named<T>(
+        &self,
+        key: &str,
+        by_name: impl Fn(&str) -> Option<T>,
+        allowed: &str,
+    ) -> Result<Option<T>, RigError> {
+        let Some(name) = self.text(key)? else { return Ok(None) };
+        by_name(name).map(Some).ok_or_else(|| self.impossible(key, name, allowed))
+    }
+
     /// Whether `key` is there.
     pub(super) fn has(&self, key: &str) -> bool {
         self.value(key).is_some()

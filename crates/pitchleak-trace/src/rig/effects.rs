@@ -1,8 +1,7 @@
 //! `[effects]`: what a diagnosis found and the declared model lacks.
 
 use super::bound::{self, Bound};
-use super::document::RigError;
-use super::document::Section;
+use super::document::{RigError, Section};
 use crate::units::Dimension;
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Effect, EffectSet};

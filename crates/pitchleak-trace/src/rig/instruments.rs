@@ -1,6 +1,5 @@
 use super::bound::{self, Bound};
-use super::document::RigError;
-use super::document::Section;
+use super::document::{RigError, Section};
 use crate::units::{Dimension, LPM_PER_M3S};
 use pitchleak_core::{Cylinder, SensorSpread, Sensors};
 

@@ -1,8 +1,7 @@
 //! The optional sections of a rig file: `[estimator]`, `[alarms]`, `[columns]`.
 
 use super::bound;
-use super::document::Section;
-use super::document::{Fault, RigError};
+use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
 use super::odds::Odds;
 use crate::header;
@@ -99,15 +98,11 @@ pub type ColumnMap = BTreeMap<Signal, ForeignColumn>;
 impl EstimatorSettings {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
         section.allow(&["kind", "forgetting_time", "filter_cutoff", "block_time", "gains"])?;
-        let kind = match section.text("kind")? {
-            None => EstimatorKind::default(),
-            Some(name) => EstimatorKind::by_name(name)
-                .ok_or_else(|| section.impossible("kind", name, &EstimatorKind::NAMES.join(" or ")))?,
-        };
+        let kind = section.named("kind", EstimatorKind::by_name, &EstimatorKind::NAMES.join(" or "))?;
         let gains = section.section("gains")?;
         gains.allow(&["lambda", "gamma"])?;
         Ok(Self {
-            kind,
+            kind: kind.unwrap_or_default(),
             forgetting_time_s: section.quantity("forgetting_time", Dimension::Time, bound::MEMORY)?,
             filter_cutoff_hz: section.quantity("filter_cutoff", Dimension::Frequency, bound::CUTOFF)?,
             block_time_s: section.quantity("block_time", Dimension::Time, bound::MEMORY)?,
@@ -235,9 +230,6 @@ pub enum Decimal {
 }
 
 impl Decimal {
-    /// All, by their names.
-    pub const NAMES: [(&'static str, Self); 2] = [("point", Self::Point), ("comma", Self::Comma)];
-
     /// As it is called.
     pub fn name(self) -> &'static str {
         match self {
@@ -259,19 +251,9 @@ impl Decimal {
 impl CsvSettings {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
         section.allow(&["delimiter", "decimal", "time_format", "zone"])?;
-        let allowed = |names: &[&str]| names.join(" or ");
-        let delimiter = match section.text("delimiter")? {
-            None => None,
-            Some(name) => Some(Delimiter::by_name(name).ok_or_else(|| {
-                section.impossible("delimiter", name, &allowed(&Delimiter::NAMES.map(|(name, _)| name)))
-            })?),
-        };
-        let decimal = match section.text("decimal")? {
-            None => None,
-            Some(name) => Some(Decimal::by_name(name).ok_or_else(|| {
-                section.impossible("decimal", name, &allowed(&Decimal::NAMES.map(|(name, _)| name)))
-            })?),
-        };
+        let delimiters = Delimiter::NAMES.map(|(name, _)| name).join(" or ");
+        let delimiter = section.named("delimiter", Delimiter::by_name, &delimiters)?;
+        let decimal = section.named("decimal", Decimal::by_name, "point or comma")?;
         let kind = read_time_kind(section, "time_format")?;
         let zone = read_zone(section)?;
         let time =
@@ -281,14 +263,11 @@ impl CsvSettings {
 }
 
 fn read_time_kind(section: &Section<'_>, key: &str) -> Result<Option<TimeKind>, RigError> {
-    let Some(name) = section.text(key)? else { return Ok(None) };
-    TimeKind::by_name(name).map(Some).ok_or_else(|| section.impossible(key, name, TimeKind::ALLOWED))
+    section.named(key, TimeKind::by_name, TimeKind::ALLOWED)
 }
 
 fn read_zone(section: &Section<'_>) -> Result<Option<Zone>, RigError> {
-    let Some(name) = section.text("zone")? else { return Ok(None) };
-    let allowed = "a zone such as Europe/Berlin, CET or +01:00";
-    Zone::by_name(name).map(Some).ok_or_else(|| section.impossible("zone", name, allowed))
+    section.named("zone", Zone::by_name, "a zone such as Europe/Berlin, CET or +01:00")
 }
 
 /// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar", scale = -1.0, offset = "2 bar" }`: minus

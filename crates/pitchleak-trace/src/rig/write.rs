@@ -1,6 +1,5 @@
 use super::bound::{self, Bound};
-use super::effects;
-use super::{CsvSettings, DecisionSettings, ForeignColumn, Instrument, Rig};
+use super::{CsvSettings, DecisionSettings, ForeignColumn, Instrument, Rig, effects};
 use crate::signal::Signal;
 use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;

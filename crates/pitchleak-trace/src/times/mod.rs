@@ -2,13 +2,11 @@
 //! numbers of a spreadsheet, or any format with a pattern.
 
 mod civil;
-mod clock;
 mod guess;
 mod zone;
 
-pub use clock::Clock;
 pub use guess::{TimeFault, guess};
-pub use zone::Zone;
+pub use zone::{Clock, Zone};
 
 use jiff::Timestamp;
 use jiff::civil::{DateTime, date};
@@ -125,7 +123,7 @@ impl fmt::Display for TimeKind {
 impl TimeFormat {
     /// The instant of a reading, ns since 1970, or since the first midnight where there is no date; `last_ns` is the
     /// instant before. Where clocks were set back, an hour comes twice: then it is the one that is after the last.
-    pub fn instant_ns(&self, reading: Reading, last_ns: Option<i128>) -> Option<i128> {
+    pub(crate) fn instant_ns(&self, reading: Reading, last_ns: Option<i128>) -> Option<i128> {
         match reading {
             Reading::Instant(ns) => Some(ns),
             Reading::OfDay(ns) => Some(civil::after_midnights(ns, last_ns)),

@@ -1,6 +1,6 @@
 //! The page of a check.
 
-use super::machine::{channels, facts, prose, rig, rough, short, trace};
+use super::machine::{channels, facts, prose, rig, rough, short, table, trace};
 use super::{Card, Head, History, Page, Section, Tone};
 use crate::text::{data_line, misfit};
 use maud::{Markup, html};
@@ -157,16 +157,15 @@ fn resolution(reach: &Reach, factor: f64, unit: &str) -> String {
 
 fn reach(report: &CheckReport) -> Markup {
     html! {
-        div .wide { table {
-            thead { tr { td {} th .number scope="col" { "known to (95 %)" } td {} } }
-            tbody { @for (name, reach, factor, unit) in all(report) {
+        (table(&["", "#known to (95 %)", ""], html! {
+            @for (name, reach, factor, unit) in all(report) {
                 tr {
                     th scope="row" { (name) }
                     td .number { (resolution(reach, factor, unit)) }
                     td { @if !reach.identifiable { "not identified: " (reach.reason.as_deref().unwrap_or("too little excitation")) } }
                 }
-            } }
-        } }
+            }
+        }))
         @if report.normalised_innovation.is_some() {
             p { (prose(&misfit(&report.verdict).unwrap_or_else(|| "Model and declared noise explain this trace.".to_owned()))) }
         }
@@ -183,12 +182,8 @@ fn readings(readings: &[Reading]) -> Markup {
         other => (1.0, other),
     };
     html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "signal" } th .number scope="col" { "from" } th .number scope="col" { "to" }
-                th .number scope="col" { "rows that have it" }
-            } }
-            tbody { @for reading in readings {
+        (table(&["signal", "#from", "#to", "#rows that have it"], html! {
+            @for reading in readings {
                 @let (factor, unit) = people(reading);
                 tr {
                     th scope="row" { (reading.signal) ", " (unit) }
@@ -196,8 +191,8 @@ fn readings(readings: &[Reading]) -> Markup {
                     td .number { (short(reading.most * factor)) }
                     td .number { (format!("{:.1} %", reading.present_percent)) }
                 }
-            } }
-        } }
+            }
+        }))
     }
 }
 

@@ -63,15 +63,9 @@ pub fn rig(rig: &Rig) -> Markup {
         h3 { "Sensors as declared" }
         p .note { "These decide how wide every interval is: accuracy is 3 σ of white noise; bias, gain and drift say how far zero \
             and scale may be off (1 σ)." }
-        div .wide {
-            table {
-                thead { tr {
-                    th scope="col" { "sensor" } th .number scope="col" { "full scale" } th .number scope="col" { "accuracy" }
-                    th .number scope="col" { "bias" } th .number scope="col" { "gain" } th .number scope="col" { "drift per hour" }
-                } }
-                tbody { @for (name, instrument, factor, unit) in sensors { (sensor(name, &instrument, factor, unit)) } }
-            }
-        }
+        (table(&["sensor", "#full scale", "#accuracy", "#bias", "#gain", "#drift per hour"], html! {
+            @for (name, instrument, factor, unit) in sensors { (sensor(name, &instrument, factor, unit)) }
+        }))
         @if !rig.effects.is_empty() {
             h3 { "Effects in the rig file" }
             (facts(&rig.effects.iter().map(|(effect, size)| (effect.spec().id, short(size.value))).collect::<Vec<_>>()))
@@ -109,23 +103,16 @@ pub fn channels(faults: &[ChannelFault], wiring: Option<&Wiring>) -> Markup {
         @if faults.is_empty() {
             p { "No channel is dead, stuck, clipped, held or coarse." }
         } @else {
-            div .wide {
-                table {
-                    thead { tr {
-                        th scope="col" { "channel" } th scope="col" { "from, to (s)" } th scope="col" { "seen" } th scope="col" { "check" }
-                    } }
-                    tbody {
-                        @for fault in faults {
-                            tr {
-                                th scope="row" { (fault.channel.name()) }
-                                td { (short(fault.from_s)) " to " (short(fault.to_s)) }
-                                td { (fault.text) }
-                                td { (fault.suggestion) }
-                            }
-                        }
+            (table(&["channel", "from, to (s)", "seen", "check"], html! {
+                @for fault in faults {
+                    tr {
+                        th scope="row" { (fault.channel.name()) }
+                        td { (short(fault.from_s)) " to " (short(fault.to_s)) }
+                        td { (fault.text) }
+                        td { (fault.suggestion) }
                     }
                 }
-            }
+            }))
         }
         @match wiring {
             None => p { "No mistake of wiring, sign or unit shows." },
@@ -141,6 +128,22 @@ fn mistake(wiring: &Wiring) -> Markup {
             p { "Where that is so, this in the rig file mends it:" }
             pre { "[columns]\n" @for line in &wiring.columns { (line) "\n" } }
         }
+    }
+}
+
+/// A table that scrolls where it is wider than the page. A head that begins with `#` stands above numbers, an empty one is none.
+pub fn table(heads: &[&str], rows: Markup) -> Markup {
+    html! {
+        div .wide { table {
+            thead { tr { @for head in heads {
+                @match head.strip_prefix('#') {
+                    Some(numbers) => th .number scope="col" { (numbers) },
+                    None if head.is_empty() => td {},
+                    None => th scope="col" { (head) },
+                }
+            } } }
+            tbody { (rows) }
+        } }
     }
 }
 

@@ -6,7 +6,6 @@
 
 pub mod chart;
 mod check;
-mod course;
 mod cylinders;
 mod diagnose;
 pub mod drawing;
@@ -24,7 +23,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use pitchleak::output::{Inputs, OutputError, OutputFile};
 use pitchleak::report::Status;
 use sha2::{Digest, Sha256};
-use std::io::Write;
 use std::path::Path;
 
 const SCRIPT: &str = concat!(
@@ -222,10 +220,8 @@ impl PageFile {
     ///
     /// # Errors
     /// [`PageError::Output`].
-    pub fn finish_html(mut self, html: &str) -> Result<(), PageError> {
-        let written = self.0.write_all(html.as_bytes());
-        written.map_err(|source| self.0.error(source))?;
-        Ok(self.0.finish()?)
+    pub fn finish_html(self, html: &str) -> Result<(), PageError> {
+        Ok(self.0.finish_with(html)?)
     }
 }
 

@@ -1,12 +1,12 @@
 //! The page of a proof.
 
 use super::chart::{Chart, Charts, Ink, Line};
-use super::machine::{facts, prose, rig, trace};
+use super::history::ink;
+use super::machine::{facts, prose, rig, table, trace};
 use super::{Card, Head, Page, Section, Tone};
 use crate::text::data_line;
 use crate::text::proof::{best_possible, found, from, proof_word, seconds, sentence};
 use maud::{Markup, html};
-use pitchleak::core::Leak;
 use pitchleak::prove::{Case, Proof};
 use pitchleak::report::capital;
 use pitchleak::rig::Rig;
@@ -45,19 +45,15 @@ fn head(proof: &Proof) -> Head {
 fn cases(proof: &Proof, charts: &mut Charts) -> Markup {
     html! {
         p { "A known leak was put into these readings from " (format!("{:.1}", proof.onset_s)) " s on, one at a time." }
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "leak" } th .number scope="col" { "put in, L/min" } th .number scope="col" { "found, L/min" }
-                th .number scope="col" { "alarm after" } th scope="col" { "the best possible" }
-            } }
-            tbody { @for case in &proof.cases { tr {
+        (table(&["leak", "#put in, L/min", "#found, L/min", "#alarm after", "the best possible"], html! {
+            @for case in &proof.cases { tr {
                 th scope="row" { (case.leak.label()) }
                 td .number { (readable(case.put_in_lpm, 3)) }
                 td .number { (found(case)) }
                 td .number { (seconds(case.alarm_after_s)) }
                 td { (best_possible(case)) }
-            } } }
-        } }
+            } }
+        }))
         @for case in &proof.cases { (charts.place(course(proof, case))) }
     }
 }
@@ -75,16 +71,11 @@ fn course(proof: &Proof, case: &Case) -> Chart {
         ..Line::over_time(name, ink, &[])
     };
     let truth = Line { bed: true, ..line("in the readings", Ink::Grey, times.iter().map(put_in).collect()) };
-    let ink = match case.leak {
-        Leak::Internal => Ink::Blue,
-        Leak::ExternalA => Ink::Vermilion,
-        Leak::ExternalB => Ink::Green,
-    };
     Chart {
         title: format!("{} leak, {} L/min put in", capital(case.leak.label()), readable(case.put_in_lpm, 3)),
         unit: "L/min",
         note: "Grey: the leak that the trace had, and what was put in",
-        lines: vec![truth, line("estimated", ink, flows)],
+        lines: vec![truth, line("estimated", ink(case.leak), flows)],
         // Where the estimates begin anew they are wild for a moment.
         range: Some([-0.5 * case.put_in_lpm, 1.6 * (own.max(0.0) + case.put_in_lpm)]),
         ..Chart::default()

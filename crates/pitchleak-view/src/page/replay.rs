@@ -3,7 +3,7 @@
 use super::chart::{Chart, Charts, Limit, Span};
 use super::drawing::Drawing;
 use super::history::{Drawn, ink};
-use super::machine::{alarms, facts, prose, short, trace};
+use super::machine::{alarms, facts, prose, short, table, trace};
 use super::{Card, Head, History, Page, Section};
 use crate::text::{data_line, hold_line, missing_rig, valve_line};
 use maud::{Markup, html};
@@ -233,40 +233,32 @@ fn leaks(report: &ReplayReport, rig: &Rig, drawn: &Drawn, charts: &mut Charts) -
             (charts.place(chart))
             h3 { "At the end of the trace" }
         }
-        (table(report))
+        (at_the_end(report))
         (episodes(report))
         (scores(report))
     }
 }
 
-fn table(report: &ReplayReport) -> Markup {
+fn at_the_end(report: &ReplayReport) -> Markup {
     let bulk = &report.estimates.bulk_modulus;
     html! {
-        div .wide {
-            table {
-                thead { tr {
-                    th scope="col" { "leak" } th .number scope="col" { "L/min, 95 %" } th .number scope="col" { "L/min/bar, 95 %" }
-                    th scope="col" { "trend" } td {}
-                } }
-                tbody {
-                    @for (leak, entry) in report.estimates.leaks().iter() {
-                        tr {
-                            th scope="row" { (leak.label()) }
-                            td .number { (known(entry, || interval(&report.leakage[leak]))) }
-                            td .number { (known(entry, || with_interval(entry.value * LPM_PER_BAR, entry.std.map(|std| std * LPM_PER_BAR)))) }
-                            td { (trend(report, leak)) }
-                            td { (doubt(entry)) }
-                        }
-                    }
-                    tr {
-                        th scope="row" { "bulk modulus" }
-                        td .number colspan="2" { (known(bulk, || format!("{} GPa", with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9))))) }
-                        td {}
-                        td { (doubt(bulk)) }
-                    }
+        (table(&["leak", "#L/min, 95 %", "#L/min/bar, 95 %", "trend", ""], html! {
+            @for (leak, entry) in report.estimates.leaks().iter() {
+                tr {
+                    th scope="row" { (leak.label()) }
+                    td .number { (known(entry, || interval(&report.leakage[leak]))) }
+                    td .number { (known(entry, || with_interval(entry.value * LPM_PER_BAR, entry.std.map(|std| std * LPM_PER_BAR)))) }
+                    td { (trend(report, leak)) }
+                    td { (doubt(entry)) }
                 }
             }
-        }
+            tr {
+                th scope="row" { "bulk modulus" }
+                td .number colspan="2" { (known(bulk, || format!("{} GPa", with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9))))) }
+                td {}
+                td { (doubt(bulk)) }
+            }
+        }))
         @if let Some(offsets) = &report.flow_meter_offsets {
             p { "Zeros of the flow meters, as found: A " (with_interval(offsets.a.offset_lpm, Some(offsets.a.std_lpm))) ", B "
                 (with_interval(offsets.b.offset_lpm, Some(offsets.b.std_lpm))) " L/min." }
@@ -302,27 +294,19 @@ fn episodes(report: &ReplayReport) -> Markup {
         @if report.spells.is_empty() {
             p { "No alarm stood at any time." }
         } @else {
-            div .wide {
-                table {
-                    thead { tr {
-                        th scope="col" { "leak" } th scope="col" { "from" } th scope="col" { "to" } th .number scope="col" { "times" }
-                        th .number scope="col" { "stood for" } th .number scope="col" { "mean, L/min" } th .number scope="col" { "most, L/min" }
-                    } }
-                    tbody {
-                        @for spell in &report.spells {
-                            tr {
-                                th scope="row" { (spell.fault.label()) }
-                                td { (trace.time(spell.from_s, 1)) }
-                                td { (end(trace, spell.to_s)) }
-                                td .number { (spell.times) }
-                                td .number { (duration(spell.stood_s)) }
-                                td .number { (number(spell.mean_lpm)) }
-                                td .number { (number(spell.peak_lpm)) }
-                            }
-                        }
+            (table(&["leak", "from", "to", "#times", "#stood for", "#mean, L/min", "#most, L/min"], html! {
+                @for spell in &report.spells {
+                    tr {
+                        th scope="row" { (spell.fault.label()) }
+                        td { (trace.time(spell.from_s, 1)) }
+                        td { (end(trace, spell.to_s)) }
+                        td .number { (spell.times) }
+                        td .number { (duration(spell.stood_s)) }
+                        td .number { (number(spell.mean_lpm)) }
+                        td .number { (number(spell.peak_lpm)) }
                     }
                 }
-            }
+            }))
         }
         @if report.episodes.len() > report.spells.len() {
             details {
@@ -359,28 +343,20 @@ fn scores(report: &ReplayReport) -> Markup {
     let percent = |value: f64| format!("{value:.2} %");
     html! {
         h3 { "Against the reference meters, in steady state" }
-        div .wide {
-            table {
-                thead { tr {
-                    th scope="col" { "leak" } th .number scope="col" { "leakage error, mean" } th .number scope="col" { "peak" }
-                    th .number scope="col" { "coefficient error, mean" } th .number scope="col" { "peak" } th .number scope="col" { "within 5 % after" }
-                } }
-                tbody {
-                    @for (leak, score) in scores.iter() {
-                        @if let Some(score) = score {
-                            tr {
-                                th scope="row" { (leak.label()) }
-                                td .number { (percent(score.leakage_mean_error_percent)) }
-                                td .number { (percent(score.leakage_peak_error_percent)) }
-                                td .number { (percent(score.coefficient_mean_error_percent)) }
-                                td .number { (percent(score.coefficient_peak_error_percent)) }
-                                td .number { @match score.convergence_time_s { Some(time_s) => (format!("{time_s:.2} s")), None => "never for good" } }
-                            }
-                        }
+        (table(&["leak", "#leakage error, mean", "#peak", "#coefficient error, mean", "#peak", "#within 5 % after"], html! {
+            @for (leak, score) in scores.iter() {
+                @if let Some(score) = score {
+                    tr {
+                        th scope="row" { (leak.label()) }
+                        td .number { (percent(score.leakage_mean_error_percent)) }
+                        td .number { (percent(score.leakage_peak_error_percent)) }
+                        td .number { (percent(score.coefficient_mean_error_percent)) }
+                        td .number { (percent(score.coefficient_peak_error_percent)) }
+                        td .number { @match score.convergence_time_s { Some(time_s) => (format!("{time_s:.2} s")), None => "never for good" } }
                     }
                 }
             }
-        }
+        }))
     }
 }
 

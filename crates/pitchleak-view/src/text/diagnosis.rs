@@ -2,8 +2,8 @@
 
 use super::Text;
 use crate::Palette;
-use crate::labels::{name, people, people_unit, quantity, symbol};
-use crate::spark::level;
+use crate::bar::level;
+use crate::residuals::{name, people, people_unit, quantity, symbol};
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,

@@ -1,10 +1,11 @@
 //! A fleet in short for people: how many cylinders are how, those that ask for somebody, the leaks that differ or grow.
 
 use super::Text;
-use super::fleet_sketch::{Bars, CELLS, course_of};
 use crate::Palette;
+use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
+use crate::envelope::{Envelopes, Spot};
 use pitchleak::core::Leak;
-use pitchleak::fleet::{Counts, CylinderLeak, FleetCylinder, FleetReport, count};
+use pitchleak::fleet::{Counts, CylinderLeak, FleetCylinder, FleetReport, Point, count};
 use pitchleak::report::{Status, with_interval};
 use std::fmt::Write;
 
@@ -153,4 +154,64 @@ pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> Strin
         found.push(format!("its latest trace is {}", latest.id()));
     }
     found.join(", ")
+}
+
+/// Cells of a bar or a course.
+const CELLS: usize = 20;
+
+/// What a terminal shows beside some lines: the worst leak of each against its alarm level, on one scale.
+struct Bars {
+    ends: [f64; 2],
+}
+
+impl Bars {
+    /// None where no line tells of a leak.
+    fn of(cylinders: &[&FleetCylinder]) -> Option<Self> {
+        let bars: Vec<Bar> = cylinders.iter().filter_map(|cylinder| bar(cylinder)).collect();
+        scale(&bars).map(|ends| Self { ends })
+    }
+
+    /// What the bars show.
+    fn legend(&self, palette: &Palette) -> String {
+        let (faint, reset) = palette.faint();
+        let scale = scale_text(self.ends);
+        format!(
+            "{faint}{:<10}{scale:<CELLS$}  {VALUE} largest leak  {INTERVAL} 95 %  {LIMIT} alarm level{reset}\n",
+            ""
+        )
+    }
+
+    /// Blank where the cylinder has no leak to act on.
+    fn text(&self, cylinder: &FleetCylinder) -> String {
+        let text = bar(cylinder).map_or_else(String::new, |bar| bar.text(self.ends, CELLS));
+        format!("{text:<CELLS$}  ")
+    }
+}
+
+/// Of the largest leak to act on.
+fn bar(cylinder: &FleetCylinder) -> Option<Bar> {
+    let leaks = cylinder.faults.iter().filter_map(|leak| cylinder.leaks[*leak].flow);
+    let worst = leaks.max_by(|a, b| a.mean_lpm.total_cmp(&b.mean_lpm))?;
+    let value = worst.mean_lpm;
+    Some(Bar {
+        interval: worst.ci95.unwrap_or([value; 2]),
+        value: (value, VALUE),
+        limit: worst.threshold_lpm,
+    })
+}
+
+/// A leak over a cylinder's traces, from none to the largest flow or the alarm level, whichever is more.
+fn course_of(report: &FleetReport<'_>, cylinder: &str, leak: Leak) -> String {
+    let own = report.rows.iter().filter(|row| row.cylinder == cylinder);
+    let mut points: Vec<Point> = own.filter_map(|row| Point::of(row, leak)).collect();
+    points.sort_by_key(|point| point.at);
+    let Some(first) = points.first().map(|point| point.at) else { return String::new() };
+    let top = points.iter().map(|point| point.flow.value.max(point.threshold_lpm)).fold(0.0, f64::max);
+    let mut flows = Envelopes::<1>::default();
+    for point in &points {
+        let t_s = first.duration_until(point.at).as_secs_f64();
+        flows.add(t_s, &[Some(Spot::at(point.flow.value))]);
+    }
+    let [flows] = flows.courses(CELLS);
+    course(&flows, [0.0, top])
 }

@@ -1,30 +1,79 @@
 //! Results as lines of text: verdict first, then what backs it.
 
 mod check;
-mod check_sketch;
 mod diagnosis;
 mod fleet;
-mod fleet_sketch;
 pub(crate) mod proof;
 mod replay;
-mod replay_sketch;
 mod replay_terminal;
 mod valve;
 
-pub use check_sketch::CheckSketch;
+pub use check::CheckSketch;
 pub(crate) use diagnosis::companions;
 pub use diagnosis::sentence;
 pub use fleet::fleet_terminal;
 pub(crate) use fleet::found;
 pub use replay::data_line;
 pub(crate) use replay::{hold_line, misfit, missing_rig, rig_line};
-pub use replay_sketch::ReplaySketch;
+pub use replay_terminal::ReplaySketch;
 pub(crate) use valve::valve_line;
 
-use crate::Palette;
+use pitchleak::report::Status;
 
 /// A result that people read.
 pub trait Text {
     /// In the colours of `palette`.
     fn to_text(&self, palette: &Palette) -> String;
+}
+
+/// Escape sequences around a text, empty where the reader is no terminal.
+#[derive(Clone, Copy, Debug)]
+pub struct Palette {
+    fault: &'static str,
+    sound: &'static str,
+    caution: &'static str,
+    faint: &'static str,
+    reset: &'static str,
+}
+
+impl Palette {
+    /// No colours.
+    pub const PLAIN: Self = Self { fault: "", sound: "", caution: "", faint: "", reset: "" };
+    /// ANSI colours.
+    pub const ANSI: Self = Self {
+        fault: "\x1b[1;31m",
+        sound: "\x1b[1;32m",
+        caution: "\x1b[33m",
+        faint: "\x1b[2m",
+        reset: "\x1b[0m",
+    };
+}
+
+impl Palette {
+    /// What it writes between words.
+    pub fn codes(&self) -> [&'static str; 5] {
+        [self.fault, self.sound, self.caution, self.faint, self.reset]
+    }
+
+    /// How a verdict's word is set.
+    pub(crate) fn verdict(&self, status: Status) -> (&'static str, &'static str) {
+        let colour = match status {
+            Status::Leak => self.fault,
+            Status::Sound => self.sound,
+            Status::Doubtful | Status::NotSure => self.caution,
+        };
+        (colour, self.reset)
+    }
+
+    pub(crate) fn fault(&self) -> (&'static str, &'static str) {
+        (self.fault, self.reset)
+    }
+
+    pub(crate) fn faint(&self) -> (&'static str, &'static str) {
+        (self.faint, self.reset)
+    }
+
+    pub(crate) fn caution(&self) -> (&'static str, &'static str) {
+        (self.caution, self.reset)
+    }
 }

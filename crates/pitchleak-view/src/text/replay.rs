@@ -1,8 +1,7 @@
 //! The report as lines of text: verdict first, then what backs it.
 
 use super::Text;
-use super::replay_sketch::ReplaySketch;
-use super::replay_terminal::{write_bars, write_courses};
+use super::replay_terminal::{ReplaySketch, write_bars, write_courses};
 use super::valve::valve_line;
 use crate::Palette;
 use pitchleak::core::{AlarmState, Leak};

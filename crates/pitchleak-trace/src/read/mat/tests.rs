@@ -1,3 +1,4 @@
+use super::Written;
 use crate::Rig;
 use crate::read::{Record, TraceError, TraceReader};
 use flate2::Compression;
@@ -226,6 +227,11 @@ fn damage_is_one_line_and_costs_no_memory() {
     broken_name[at + 1] = b'\n';
     let message = read(broken_name).unwrap_err().to_string();
     assert!(message.contains("variable `t\\ns` is a struct") && !message.contains('\n'), "{message}");
+    let mut broken_unit = file(false, false, CLASS_DOUBLE, 50);
+    let at = broken_unit.windows(6).position(|bytes| bytes == b"pa_bar").unwrap();
+    broken_unit[at + 3] = b'\n';
+    let message = read(broken_unit).unwrap_err().to_string();
+    assert!(message.contains("unknown unit `\\nar`") && !message.contains('\n'), "{message}");
     let mut huge = file(false, false, CLASS_DOUBLE, 50);
     // The count of the first variable, and the size of its data.
     let at = huge.windows(4).position(|bytes| bytes == 50_u32.to_le_bytes()).unwrap();
@@ -259,4 +265,32 @@ proptest::proptest! {
             proptest::prop_assert!(!error.to_string().contains('\n'));
         }
     }
+}
+
+#[test]
+fn every_way_to_write_a_number_is_read_in_either_byte_order() {
+    let ways: [(u32, f64, Vec<u8>); 13] = [
+        (1, -2.0, (-2_i8).to_le_bytes().to_vec()),
+        (2, 254.0, 254_u8.to_le_bytes().to_vec()),
+        (3, -300.0, (-300_i16).to_le_bytes().to_vec()),
+        (4, 65_000.0, 65_000_u16.to_le_bytes().to_vec()),
+        (5, -70_000.0, (-70_000_i32).to_le_bytes().to_vec()),
+        (6, 4e9, 4_000_000_000_u32.to_le_bytes().to_vec()),
+        (7, -0.25, (-0.25_f32).to_le_bytes().to_vec()),
+        (9, 0.1, 0.1_f64.to_le_bytes().to_vec()),
+        (12, -4e18, (-4_000_000_000_000_000_000_i64).to_le_bytes().to_vec()),
+        (13, 1.6e19, 16_000_000_000_000_000_000_u64.to_le_bytes().to_vec()),
+        (1, -128.0, i8::MIN.to_le_bytes().to_vec()),
+        (5, 2_147_483_647.0, i32::MAX.to_le_bytes().to_vec()),
+        (9, f64::NEG_INFINITY, f64::NEG_INFINITY.to_le_bytes().to_vec()),
+    ];
+    for (kind, number, mut bytes) in ways {
+        for big_endian in [false, true] {
+            let written = Written::of(kind, big_endian).expect("numbers");
+            let read: Vec<f64> = written.numbers(&bytes.repeat(3), 2).collect();
+            assert_eq!(read, [number; 2], "type {kind}, big-endian: {big_endian}");
+            bytes.reverse();
+        }
+    }
+    assert!([0, 8, 10, 11, 14, 15].iter().all(|kind| Written::of(*kind, false).is_none()));
 }

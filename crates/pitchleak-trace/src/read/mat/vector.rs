@@ -1,9 +1,7 @@
 //! The numbers of a vector in HDF5.
 
 use super::hdf5::{File, Found, Front, Trouble};
-use super::{
-    DOUBLE, INT8, INT16, INT32, INT64, SINGLE, UINT8, UINT16, UINT32, UINT64, Values, number, width,
-};
+use super::{Form, Values, Written};
 use crate::read::format::MOST_HELD;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -32,15 +30,6 @@ struct Shape {
     length: u64,
 }
 
-/// How numbers are written.
-#[derive(Clone, Copy)]
-struct Written {
-    /// As in MAT files of version 5.
-    kind: u32,
-    width: usize,
-    big_endian: bool,
-}
-
 /// The numbers of an array, or what it is instead.
 pub(super) fn vector(
     file: &mut File<'_>,
@@ -51,7 +40,7 @@ pub(super) fn vector(
     budget: &mut u64,
 ) -> Found<Values> {
     let Some(shape) = Shape::of(dataspace)? else { return Ok(Values::Other("matrix")) };
-    let written = match Written::of(datatype)? {
+    let written = match written(datatype)? {
         Ok(written) => written,
         Err(other) => return Ok(Values::Other(other)),
     };
@@ -99,34 +88,19 @@ impl Shape {
     }
 }
 
-impl Written {
-    /// Or what is written instead of numbers.
-    fn of(datatype: &[u8]) -> Found<Result<Self, &'static str>> {
-        let mut datatype = Front(datatype);
-        let (class, bits) = (datatype.number(1)? & 0x0f, datatype.number(3)?);
-        let kind = match (class, datatype.number(4)?, bits & 8 != 0) {
-            (WHOLE, 1, true) => INT8,
-            (WHOLE, 1, false) => UINT8,
-            (WHOLE, 2, true) => INT16,
-            (WHOLE, 2, false) => UINT16,
-            (WHOLE, 4, true) => INT32,
-            (WHOLE, 4, false) => UINT32,
-            (WHOLE, 8, true) => INT64,
-            (WHOLE, 8, false) => UINT64,
-            (FLOATING, 4, _) => SINGLE,
-            (FLOATING, 8, _) => DOUBLE,
-            (TEXT, ..) => return Ok(Err("text")),
-            (COMPOUND, ..) => return Ok(Err("complex array")),
-            _ => return Ok(Err("variable of an unknown class")),
-        };
-        Ok(Ok(Self { kind, width: width(kind).unwrap_or(1), big_endian: bits & 1 != 0 }))
-    }
-
-    /// Every so many of the numbers.
-    fn numbers(self, bytes: &[u8], stride: usize) -> impl Iterator<Item = f64> {
-        let numbers = bytes.chunks_exact(self.width).step_by(stride.max(1));
-        numbers.map(move |bytes| number(self.kind, self.big_endian, bytes))
-    }
+/// How numbers of this type are written, or what is written instead.
+fn written(datatype: &[u8]) -> Found<Result<Written, &'static str>> {
+    let mut datatype = Front(datatype);
+    let (class, bits) = (datatype.number(1)? & 0x0f, datatype.number(3)?);
+    let (form, width) = match (class, datatype.number(4)?) {
+        (WHOLE, width @ (1 | 2 | 4 | 8)) if bits & 8 != 0 => (Form::Signed, width),
+        (WHOLE, width @ (1 | 2 | 4 | 8)) => (Form::Unsigned, width),
+        (FLOATING, width @ (4 | 8)) => (Form::Floating, width),
+        (TEXT, _) => return Ok(Err("text")),
+        (COMPOUND, _) => return Ok(Err("complex array")),
+        _ => return Ok(Err("variable of an unknown class")),
+    };
+    Ok(Ok(Written { form, width: width as usize, big_endian: bits & 1 != 0 }))
 }
 
 /// The numbers of chunks, which follow one another.

@@ -2,8 +2,7 @@
 //! it is, and makes room for as many values as the page says that it has.
 
 use super::codec::{Codec, unread};
-use super::footer::Leaf;
-use super::footer::{Chunk, Footer, damaged};
+use super::footer::{Chunk, Footer, Leaf, damaged};
 use super::thrift::{Fields, structure};
 use crate::read::format::MOST_HELD;
 use bytes::Bytes;

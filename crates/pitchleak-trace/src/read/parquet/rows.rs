@@ -11,7 +11,6 @@ use crate::read::stamps::{Epoch, seconds_between, time_format};
 use crate::read::table::{Cells, TableRows};
 use crate::read::table_text::TextTable;
 use crate::rig::Rig;
-use crate::signal::Signal;
 use crate::times::TimeFormat;
 use bytes::Bytes;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -238,10 +237,7 @@ impl Batches {
     fn batch(&mut self) -> Result<Vec<Cells<'static>>, TraceFault> {
         let mut cells = Vec::with_capacity(self.read.len());
         for (read, reader) in self.read.iter().zip(&mut self.open) {
-            let (signal, unit) = match read.content {
-                Content::Number(signal, unit) => (signal, unit),
-                _ => (Signal::Time, None),
-            };
+            let Some((signal, unit)) = read.content.cells() else { continue };
             let values = match (read.content, read.kind) {
                 (Content::Timestamp, Kind::Stamp(ns)) => {
                     let stamps = stamps(reader, read.optional)?;
@@ -259,9 +255,7 @@ impl Batches {
                 }
                 (Content::Timestamp, _) => {
                     let values = numbers(reader, read.kind, read.optional, BATCH)?;
-                    let seconds =
-                        |value: &f64| self.epoch.seconds(value.to_string().as_bytes()).unwrap_or(f64::NAN);
-                    values.iter().map(seconds).collect()
+                    values.into_iter().map(|value| self.epoch.seconds_of(value)).collect()
                 }
                 _ => numbers(reader, read.kind, read.optional, BATCH)?,
             };

@@ -52,8 +52,8 @@ fn units(table: &TextTable, _: &[u8]) -> Option<Recast> {
 }
 
 fn date_and_time(table: &TextTable, _: &[u8]) -> Option<Recast> {
-    let date = place(&table.headers, &["date", "datum"])?;
-    let time = place(&table.headers, &["time", "zeit", "uhrzeit", "timeofday"])?;
+    let date = place(&table.headers, "date datum")?;
+    let time = place(&table.headers, "time zeit uhrzeit timeofday")?;
     if !guess(&table.column(time)).is_ok_and(|format| format.kind == TimeKind::OfDay) {
         return None;
     }

@@ -3,49 +3,25 @@
 //! (`VarName;TimeString;VarValue;Validity;Time_ms`) and most databases.
 
 use super::merged::{Merged, Times};
-use super::{Recast, Shape, Source, Text, letters, place};
+use super::{Recast, Shape, Source, Text, place};
+use crate::header::{letters, lists};
 use crate::read::error::TraceFault;
 use crate::read::records::{Stop, stopped_early, text};
 use crate::read::table_text::TextTable;
 
 pub(super) const SHAPE: Shape = Shape { name: "a reading per row", told };
 
-const TIMES: &[&str] = &[
-    "timems",
-    "time",
-    "timestamp",
-    "timestring",
-    "datetime",
-    "dateandtime",
-    "ts",
-    "zeitstempel",
-    "zeit",
-    "date",
-];
-const CHANNELS: &[&str] = &[
-    "field",
-    "channel",
-    "varname",
-    "tag",
-    "tagname",
-    "signal",
-    "variable",
-    "metric",
-    "pointname",
-    "point",
-    "kanal",
-    "sensor",
-    "item",
-    "name",
-];
-const VALUES: &[&str] = &["value", "varvalue", "wert"];
-const UNITS: &[&str] = &["unit", "units", "einheit"];
-/// What a reading is worth, with the cells that say that it is good; OPC counts 192 and more as good.
-const QUALITIES: [(&str, &[&str]); 4] = [
-    ("validity", &["1", "good", "valid", "true"]),
-    ("quality", &["192", "good", "ok", "valid", "true", "216"]),
-    ("statuscode", &["0", "0x00000000", "good"]),
-    ("status", &["0", "good", "ok", "valid"]),
+const TIMES: &str = "timems time timestamp timestring datetime dateandtime ts zeitstempel zeit date";
+const CHANNELS: &str =
+    "field channel varname tag tagname signal variable metric pointname point kanal sensor item name";
+const VALUES: &str = "value varvalue wert";
+const UNITS: &str = "unit units einheit";
+/// What a reading is worth, with the cells that say that it is good, blanks between them; OPC counts 192 and more as good.
+const QUALITIES: [(&str, &str); 4] = [
+    ("validity", "1 good valid true"),
+    ("quality", "192 good ok valid true 216"),
+    ("statuscode", "0 0x00000000 good"),
+    ("status", "0 good ok valid"),
 ];
 /// WinCC counts days since 30 December 1899 in millionths.
 const WINCC_TIME: &str = "timems";
@@ -57,7 +33,7 @@ struct Places {
     channel: usize,
     value: usize,
     unit: Option<usize>,
-    quality: Option<(usize, &'static [&'static str])>,
+    quality: Option<(usize, &'static str)>,
     /// Cells of the header, which may come again.
     header: Vec<String>,
     time_is_wincc: bool,
@@ -65,17 +41,17 @@ struct Places {
 
 fn told(table: &TextTable, _: &[u8]) -> Option<Recast> {
     let headers = &table.headers;
-    let time = place(headers, &[WINCC_TIME]).or_else(|| place(headers, TIMES))?;
+    let time = place(headers, WINCC_TIME).or_else(|| place(headers, TIMES))?;
     let mut channel = place(headers, CHANNELS)?;
     let value = place(headers, VALUES)?;
     // Where every reading is of the field `value`, what was measured tells them apart.
     let own = headers.get(channel);
     let only_values =
         table.column(channel).iter().all(|name| *name == "value" || Some(*name) == own.map(String::as_str));
-    if let Some(measurement) = place(headers, &["measurement"]).filter(|_| only_values) {
+    if let Some(measurement) = place(headers, "measurement").filter(|_| only_values) {
         channel = measurement;
     }
-    let quality = QUALITIES.iter().find_map(|(name, good)| Some((place(headers, &[name])?, *good)));
+    let quality = QUALITIES.iter().find_map(|(name, good)| Some((place(headers, name)?, *good)));
     let time_is_wincc = headers.get(time).is_some_and(|header| letters(header) == WINCC_TIME);
     let cells: Vec<String> = table.column(time).iter().map(|cell| in_days(cell, time_is_wincc)).collect();
     let times = Times::of(&cells.iter().map(String::as_str).collect::<Vec<_>>())?;
@@ -117,8 +93,7 @@ fn recast(mut source: Source, places: &Places, mut times: Times) -> Result<Text,
             None => name,
         };
         let channel = merged.channel(&name);
-        let is_good =
-            places.quality.is_none_or(|(place, good)| good.contains(&cell(place).to_lowercase().as_str()));
+        let is_good = places.quality.is_none_or(|(place, good)| lists(good, &cell(place).to_lowercase()));
         if is_good {
             let time = in_days(&cell(places.time), places.time_is_wincc);
             merged.add(&mut times, time.as_bytes(), channel, cell(places.value).as_bytes())?;

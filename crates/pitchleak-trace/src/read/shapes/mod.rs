@@ -12,6 +12,7 @@ mod own_times;
 use super::error::TraceFault;
 use super::records::{Records, Stop, stopped_early};
 use super::table_text::TextTable;
+use crate::header::{letters, lists};
 use std::io::{self, Read};
 
 /// A shape of tables.
@@ -116,14 +117,9 @@ impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Read for Written<F> {
     }
 }
 
-/// Small letters and digits only.
-fn letters(header: &str) -> String {
-    header.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
-}
-
-/// The first column that is called so, letters and digits only.
-fn place(headers: &[String], names: &[&str]) -> Option<usize> {
-    headers.iter().position(|header| names.contains(&letters(header).as_str()))
+/// The first column that is called by one of the names, letters and digits only; blanks between the names.
+fn place(headers: &[String], names: &str) -> Option<usize> {
+    headers.iter().position(|header| lists(names, &letters(header)))
 }
 
 /// A cell without blanks, and without what would part it.

@@ -2,7 +2,8 @@
 //! several rates: `Time;Pressure A;Time;Flow A`.
 
 use super::merged::{Merged, Times};
-use super::{Recast, Shape, Source, Text, letters};
+use super::{Recast, Shape, Source, Text};
+use crate::header::letters;
 use crate::read::columns::bare_unit;
 use crate::read::error::TraceFault;
 use crate::read::records::{Stop, stopped_early};

@@ -2,10 +2,8 @@
 
 use super::super::machine::{prose, short};
 use super::super::{Card, Head, Tone};
-use super::effects::size;
-use super::leaks::entries;
-use super::spoken;
-use crate::labels::{name, people_unit};
+use super::{entries, size, spoken};
+use crate::residuals::{name, people_unit};
 use maud::{Markup, html};
 use pitchleak::diagnose::{Diagnosis, Verdict};
 use pitchleak::report::capital;

@@ -1,17 +1,18 @@
 //! The page of a diagnosis: from the residual to the effect that explains it, and how sure that is.
 
-mod effects;
 mod first_screen;
-mod leaks;
 mod residuals;
-mod sure;
 
 use super::chart::Charts;
-use super::machine::{channels, facts, rig};
+use super::machine::{channels, facts, prose, rig, table};
 use super::{Page, Section};
+use crate::residuals::quantity;
 use maud::{Markup, html};
-use pitchleak::diagnose::Diagnosis;
+use pitchleak::core::Leak;
+use pitchleak::diagnose::{Diagnosis, FoundEffect, HoldLeak, LeakEstimate, LeakEstimates};
+use pitchleak::report::{capital, with_interval};
 use pitchleak::rig::Rig;
+use pitchleak::units::LPM_PER_M3S;
 
 impl Page {
     /// The report of a diagnosis of `traces` of `machine`.
@@ -19,14 +20,14 @@ impl Page {
         let rows = residuals::over_time(diagnosis);
         let mut charts = Charts::over(rows.rows().iter().map(|row| row.t_s));
         let mut sections = vec![
-            Section { id: "effects", title: "What the model lacks", body: effects::body(diagnosis) },
+            Section { id: "effects", title: "What the model lacks", body: effects(diagnosis) },
             Section {
                 id: "residuals",
                 title: "From residual to effect",
                 body: residuals::body(diagnosis, &rows, &mut charts),
             },
-            Section { id: "leaks", title: "Leaks before and after", body: leaks::body(diagnosis) },
-            Section { id: "sure", title: "What it would take to be sure", body: sure::body(diagnosis) },
+            Section { id: "leaks", title: "Leaks before and after", body: leaks(diagnosis) },
+            Section { id: "sure", title: "What it would take to be sure", body: sure(diagnosis) },
             Section { id: "rig", title: "Rig", body: rig(machine) },
             Section { id: "made", title: "How this was made", body: made(diagnosis, traces) },
         ];
@@ -56,5 +57,128 @@ fn made(diagnosis: &Diagnosis, traces: &[String]) -> Markup {
             ("Samples fitted", diagnosis.samples.fitted.to_string()),
             ("Form of the data", "pitchleak.diagnose/1".to_owned()),
         ]))
+    }
+}
+
+/// Rivals and the measurements that part them, what speaks for and against, what would not have shown.
+fn sure(diagnosis: &Diagnosis) -> Markup {
+    let separating: Vec<_> =
+        diagnosis.effects.iter().filter(|effect| effect.separated_by.is_some()).collect();
+    html! {
+        @if separating.is_empty() {
+            p { "No rival explains these traces as well; a second recording on another day, given with " code { "--test" } ", would confirm it." }
+        } @else {
+            p { "Measurements that tell the rivals apart:" }
+            ul { @for effect in separating { li { strong { (capital(&spoken(effect.id))) } ": " (effect.separated_by.as_deref().unwrap_or_default()) } } }
+        }
+        @if !diagnosis.interactions.is_empty() {
+            h3 { "Effects that act on each other" }
+            ul { @for one in &diagnosis.interactions {
+                li { (one.effects.map(spoken).join(" and ")) ": " (format!("{:.0} σ, would mend {:.1} %", one.sigma, one.mended_percent)) }
+            } }
+        }
+        @if !diagnosis.notes.is_empty() {
+            h3 { "What speaks for the verdict, and against it" }
+            ul { @for note in &diagnosis.notes { li { (prose(&capital(note))) } } }
+        }
+        @if !diagnosis.not_detectable_below.is_empty() {
+            details {
+                summary { "What would not have shown: the smallest size of each further effect that these traces would have told (5 σ)" }
+                (facts(&diagnosis.not_detectable_below.iter().map(|(id, size)| (*id, quantity(size.value, None, size.unit))).collect::<Vec<_>>()))
+            }
+        }
+    }
+}
+
+/// What the model lacks, each effect with its remedy, doubt and rivals.
+fn effects(diagnosis: &Diagnosis) -> Markup {
+    html! {
+        @if diagnosis.effects.is_empty() { p { "No effect is named." } }
+        @for effect in &diagnosis.effects {
+            h3 { (capital(&spoken(effect.id))) ": " (size(effect)) " "
+                @if effect.confident { span .tag .is-sound { "sure of the name" } } @else { span .tag .is-caution { "doubtful" } } }
+            p { (prose(effect.cause)) " " strong { (prose(effect.remedy)) } }
+            @if let Some(doubt) = effect.doubts_in_words() { p { "Doubtful: " (doubt) "." } }
+            (rivals(effect))
+            p .note { "With it the error on samples that were not fitted falls by " (format!("{:.1}", effect.rmse_reduction_percent)) " % in the balance it \
+                mends most; chance would show as much with a probability of " (chance(effect.p_value)) "."
+                @for (constant, value) in &effect.constants { " " (spoken(constant)) ": " (format!("{value:.4e}")) "." } }
+        }
+        @if !diagnosis.calibration.is_empty() {
+            h3 { "Sensors, within what the rig file allows" }
+            (facts(&diagnosis.calibration.iter().map(|one| (one.id, quantity(one.value, Some(one.std), one.unit))).collect::<Vec<_>>()))
+        }
+    }
+}
+
+fn size(effect: &FoundEffect) -> String {
+    quantity(effect.value, Some(effect.std), effect.unit)
+}
+
+fn rivals(effect: &FoundEffect) -> Markup {
+    html! {
+        @if !effect.confusable_with.is_empty() {
+            p { "Rivals that these traces cannot tell from it: " (effect.confusable_with.iter().map(|id| spoken(id)).collect::<Vec<_>>().join(", ")) "."
+                @if let Some(separated_by) = &effect.separated_by { " What would tell: " strong { (separated_by) } } }
+        }
+    }
+}
+
+fn chance(p: f64) -> String {
+    if p < 1e-6 { "less than one in a million".to_owned() } else { format!("{p:.1e}") }
+}
+
+/// Leaks before and after, in motion and at rest.
+fn leaks(diagnosis: &Diagnosis) -> Markup {
+    let both = entries(&diagnosis.before.leaks).into_iter().zip(entries(&diagnosis.after.leaks));
+    let text = |entry: LeakEstimate| {
+        if entry.unit == "Pa" {
+            format!("{} GPa", with_interval(entry.value * 1e-9, Some(entry.std * 1e-9)))
+        } else {
+            quantity(entry.value, Some(entry.std), entry.unit)
+        }
+    };
+    let mark = |entry: LeakEstimate| match entry {
+        LeakEstimate { physical: false, .. } => " (impossible)",
+        LeakEstimate { identifiable: false, .. } => " (not identified)",
+        _ => "",
+    };
+    html! {
+        (table(&["", "#before, 95 %", "#after, 95 %"], html! {
+            @for ((name, before), (_, after)) in both {
+                tr {
+                    th scope="row" { (capital(name)) }
+                    td .number { (text(before)) (mark(before)) }
+                    td .number { (text(after)) (mark(after)) }
+                }
+            }
+        }))
+        @if let Some(holds) = diagnosis.holds {
+            h3 { "At rest against in motion" }
+            p .note { "Flow that leaves a chamber while the piston stands, measured, beside what the model fitted to motion foretells." }
+            @for (leak, hold) in [(Leak::ExternalA, holds.chamber_a), (Leak::ExternalB, holds.chamber_b)] {
+                @if let Some(hold) = hold { (held(if leak == Leak::ExternalA { "A" } else { "B" }, &hold)) }
+            }
+        }
+    }
+}
+
+fn entries(leaks: &LeakEstimates) -> [(&'static str, LeakEstimate); 4] {
+    [
+        ("internal leak", leaks.internal_leak_coefficient),
+        ("external A leak", leaks.external_leak_a_coefficient),
+        ("external B leak", leaks.external_leak_b_coefficient),
+        ("bulk modulus of the oil", leaks.bulk_modulus),
+    ]
+}
+
+fn held(chamber: &str, hold: &HoldLeak) -> Markup {
+    let flow = |value: f64, std: f64| with_interval(value * LPM_PER_M3S, Some(std * LPM_PER_M3S));
+    let [before, after] = hold.apart_sigma();
+    html! {
+        p { "Chamber " (chamber) ", " (hold.count) " holds of 1 s at " (format!("{:.0} bar", hold.mean_pressure_pa / 1e5)) ": "
+            strong { (flow(hold.leak_m3s, hold.std_m3s)) " L/min" } " measured; foretold " (flow(hold.predicted_before_m3s, hold.predicted_before_std_m3s))
+            " before (" (format!("{before:.1}")) " σ apart), " (flow(hold.predicted_after_m3s, hold.predicted_after_std_m3s)) " after ("
+            (format!("{after:.1}")) " σ apart)." }
     }
 }

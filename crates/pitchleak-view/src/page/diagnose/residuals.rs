@@ -1,9 +1,10 @@
 //! The residual of each equation, before and after, over time and against the variables with which it goes.
 
 use super::super::chart::{Chart, Charts, Ink, Line};
+use super::super::machine::table;
 use crate::envelope::{Envelopes, Range, Spot};
-use crate::in_a_row::in_a_row;
-use crate::labels::{name, people, people_unit, symbol};
+use crate::residuals::in_a_row;
+use crate::residuals::{name, people, people_unit, symbol};
 use maud::{Markup, html};
 use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation};
 use pitchleak::report::capital;
@@ -128,27 +129,21 @@ fn quality(diagnosis: &Diagnosis) -> Markup {
         p.map_or_else(|| "–".to_owned(), |p| if p < 1e-3 { "< 0.001".to_owned() } else { format!("{p:.3}") })
     };
     html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "equation" } td {} th .number scope="col" { "of the sensors' noise" }
-                th .number scope="col" { "white, p" } th .number scope="col" { "normal, p" } th scope="col" { "goes with" }
-            } }
-            tbody {
-                @for equation in Equation::ALL {
-                    @for (side, residuals) in sides.iter().take(shown) {
-                        @if let Some(residual) = &residuals[equation] {
-                            tr {
-                                th scope="row" { (capital(name(equation))) }
-                                td { (side) }
-                                td .number { (format!("{:.2}", residual.noise_ratio)) " times" }
-                                td .number { (p(residual.whiteness_p)) }
-                                td .number { (p(residual.normality_p)) }
-                                td { (crate::text::companions(residual)) }
-                            }
+        (table(&["equation", "", "#of the sensors' noise", "#white, p", "#normal, p", "goes with"], html! {
+            @for equation in Equation::ALL {
+                @for (side, residuals) in sides.iter().take(shown) {
+                    @if let Some(residual) = &residuals[equation] {
+                        tr {
+                            th scope="row" { (capital(name(equation))) }
+                            td { (side) }
+                            td .number { (format!("{:.2}", residual.noise_ratio)) " times" }
+                            td .number { (p(residual.whiteness_p)) }
+                            td .number { (p(residual.normality_p)) }
+                            td { (crate::text::companions(residual)) }
                         }
                     }
                 }
             }
-        } }
+        }))
     }
 }

@@ -1,9 +1,10 @@
-//! Figures of the residual: over time, its autocorrelation and distribution, and against each variable.
+//! Residuals for people: names and units, several traces on one axis, and figures: over time, autocorrelation and distribution,
+//! against each variable.
 
 use crate::figure::{FigureError, Ink, Line, Panel, svg};
-use crate::in_a_row::in_a_row;
-use crate::labels::{name, people, people_unit, symbol};
 use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation, EquationResidual};
+use pitchleak::report::with_interval;
+use pitchleak::units::{LPM_PER_M3S, effect_unit};
 
 /// Lags of the autocorrelation, in rows.
 const LAGS: usize = 30;
@@ -157,6 +158,86 @@ fn axis(variable: &str) -> &'static str {
     }
 }
 
+/// A step so many times the usual one is a pause.
+const PAUSE: f64 = 5.0;
+
+/// One trace after the other: each begins where the one before ended. Where one ends, or pauses, a point without a value
+/// breaks the line.
+pub(crate) fn in_a_row(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut steps: Vec<f64> =
+        points.windows(2).filter_map(|pair| Some(pair.last()?.0 - pair.first()?.0)).collect();
+    steps.retain(|step| *step > 0.0);
+    steps.sort_by(f64::total_cmp);
+    let usual = steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY);
+    let (mut row, mut start, mut last) = (Vec::with_capacity(points.len()), 0.0, None);
+    for &(t, value) in points {
+        if let Some(last) = last {
+            let step = t - last;
+            if step < 0.0 {
+                start += last;
+            }
+            if step < 0.0 || step > PAUSE * usual {
+                row.push((start + t - usual.min(0.5 * t.max(0.0)), f64::NAN));
+            }
+        }
+        row.push((start + t, value));
+        last = Some(t);
+    }
+    row
+}
+
+/// Name of an equation in text and figures.
+pub(crate) fn name(equation: Equation) -> &'static str {
+    match equation {
+        Equation::ChamberA => "chamber A",
+        Equation::ChamberB => "chamber B",
+        Equation::Force => "force",
+    }
+}
+
+/// Factor from SI to people's unit of an equation's residual, and that unit.
+pub(crate) fn people_unit(equation: Equation) -> (f64, &'static str) {
+    if equation == Equation::Force { (1.0, "N") } else { (LPM_PER_M3S, "L/min") }
+}
+
+/// Name of a variable in text and figures.
+pub(crate) fn symbol(variable: &str) -> &'static str {
+    match variable {
+        "load_pressure_pa" => "P_L",
+        "pa_pa" => "P_A",
+        "pb_pa" => "P_B",
+        "x_m" => "x",
+        "v_mps" => "speed",
+        "direction" => "direction",
+        "qa_m3s" => "Q_A",
+        "qb_m3s" => "Q_B",
+        "force_n" => "force",
+        "temp_k" => "temperature",
+        _ => "time",
+    }
+}
+
+/// Factor to people's unit, and that unit.
+pub(crate) fn people(variable: &str) -> (f64, &'static str) {
+    match variable {
+        "load_pressure_pa" | "pa_pa" | "pb_pa" => (1e-5, "bar"),
+        "x_m" => (1e3, "mm"),
+        "v_mps" => (1e3, "mm/s"),
+        "qa_m3s" | "qb_m3s" => (LPM_PER_M3S, "L/min"),
+        "force_n" => (1e-3, "kN"),
+        "temp_k" => (1.0, "K"),
+        "direction" => (1.0, ""),
+        _ => (1.0, "s"),
+    }
+}
+
+/// With its 95 % interval, in people's units.
+pub(crate) fn quantity(value: f64, std: Option<f64>, unit: &str) -> String {
+    let (factor, unit) = effect_unit(unit);
+    let size = with_interval(value * factor, std.map(|std| std * factor));
+    format!("{size} {}", unit.replace('*', "·"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,5 +247,16 @@ mod tests {
         let outline = histogram(&[-9.0, -0.1, 0.1, 0.2, 7.0]);
         let area: f64 = outline.chunks(2).map(|class| (class[1].0 - class[0].0) * class[0].1).sum();
         assert!((area - 1.0).abs() < 1e-12, "{area}");
+    }
+
+    #[test]
+    fn a_line_breaks_where_a_trace_pauses_and_between_traces() {
+        let seconds = |from: u32, to: u32| (from..to).map(|t| (f64::from(t), 1.0));
+        let points: Vec<_> = seconds(0, 10).chain(seconds(60, 70)).chain(seconds(1, 10)).collect();
+        let row = in_a_row(&points);
+        let breaks: Vec<_> = row.iter().filter(|point| point.1.is_nan()).map(|point| point.0).collect();
+        assert_eq!(breaks, [59.0, 69.5]);
+        assert!(row.windows(2).all(|pair| pair[0].0 < pair[1].0), "{row:?}");
+        assert_eq!(row.last(), Some(&(78.0, 1.0)));
     }
 }
