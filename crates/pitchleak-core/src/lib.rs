@@ -96,6 +96,7 @@ mod model;
 mod number;
 mod paper;
 pub mod plant;
+mod valve;
 
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use effects::{Effect, EffectSet};
@@ -116,3 +117,7 @@ pub use model::{
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;
+pub use valve::{
+    VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveEstimates, ValveFilter, ValveNoise,
+    ValveSample, ValveUpdate,
+};

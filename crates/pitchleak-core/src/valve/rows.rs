@@ -1,0 +1,227 @@
+//! Both continuity equations over a hat, and the noise of that.
+//!
+//! In the rated flow, with κ the compressibility, c a leak's unit, Δ the rise of the means and ∫ the integral against the hat:
+//!
+//! ```text
+//! g_A =  A_A Δx + κ V_A ΔP_A + c ∫ [C_ip (P_A − P_B) + C_epA P_A] − ∫ Q_A = 0
+//! g_B = −A_B Δx + κ V_B ΔP_B + c ∫ [C_ip (P_B − P_A) + C_epB P_B] − ∫ Q_B = 0
+//! ```
+//!
+//! (Wu et al. 2011, eq. 1.) They are combined to the balance (A_B g_A + A_A g_B)/(A_A + A_B), in which the piston's speed cancels, and
+//! g_A. What moves little beside the valve's opening, lag, hysteresis and droop, acts by its own mean over the hat.
+//!
+//! **Noise.** A reading of variance σ² stands in a block's mean, in its rising and in its falling integral. Of N readings over T:
+//!
+//! ```text
+//! variance of a mean σ²/N      with an integral σ²/N T/2      of an integral σ²/N T²/3      of rising and falling σ²/N T²/6
+//! ```
+//!
+//! With G = ∂g/∂mean and D = ∂ḡ/∂reading, block k stands in hat k as −G_k m + D r and in hat k−1 as G_k−1 m + D f.
+
+use super::calibration::{ValveCalibration, ValveNoise};
+use super::edges::{
+    BY_ROUNDING, BY_SATURATION, BY_SUPPLY, BY_TANK, DRAWN, FLOWS, PRESSURES, SLOPES,
+};
+use super::filter::Row;
+use super::hats::{Block, Hat};
+use super::unknowns::{
+    CLEARANCES, DROOP, GAINS, HYSTERESIS, KAPPA, LAG, LAPS, LEAK_UNIT_M3SPA, PA_PER_BAR, ROUNDING, S_PER_MS,
+    SATURATION, SUPPLY, TANK, VALVE_UNKNOWNS as N,
+};
+use crate::{Cylinder, Fluid, Real};
+
+/// x, P_A, P_B, spool, P_S.
+const SIGNALS: usize = 5;
+/// Of the balance and of g_A.
+pub(super) type Pair<T> = [T; 2];
+
+/// A cylinder in the units of its valve.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Equations<T> {
+    cylinder: Cylinder<T>,
+    rated_flow_m3s: T,
+    pub rated_drop_pa: T,
+    /// κ of the rig, in the rated drop, over the rated flow.
+    kappa: T,
+    kappa_mean: T,
+    /// c.
+    pub leak: T,
+    /// 1 bar in the rated drop.
+    bar: T,
+    /// g_A's and g_B's share of the balance.
+    balance: Pair<T>,
+    variances: [T; SIGNALS],
+    /// What the calibration has of lag, hysteresis and droop.
+    late: [T; 3],
+    gains: [T; 4],
+    clearances: [T; 4],
+}
+
+/// How the readings' noise stands in the equations.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends<T> {
+    /// By the means, …
+    pub by_mean: [Pair<T>; SIGNALS],
+    /// … and by the readings within the block.
+    pub by_reading: [Pair<T>; SIGNALS],
+    /// σ²/N, and T.
+    variances: [T; SIGNALS],
+    time_s: T,
+}
+
+impl<T: Real> Equations<T> {
+    pub fn of(
+        cylinder: &Cylinder<T>,
+        fluid: &Fluid<T>,
+        calibration: &ValveCalibration<T>,
+        noise: &ValveNoise<T>,
+    ) -> Self {
+        let (flow, drop) = (calibration.rated_flow_m3s, calibration.rated_drop_pa);
+        let mean = &calibration.mean;
+        let four = |from: usize| [mean[from], mean[from + 1], mean[from + 2], mean[from + 3]];
+        let square = |std: T| std * std;
+        let pressure = square(noise.pressure_pa / drop);
+        let areas = cylinder.area_a_m2 + cylinder.area_b_m2;
+        Self {
+            cylinder: *cylinder,
+            rated_flow_m3s: flow,
+            rated_drop_pa: drop,
+            kappa: drop / (fluid.bulk_modulus_pa * flow),
+            kappa_mean: mean[KAPPA],
+            leak: T::lit(LEAK_UNIT_M3SPA) * drop / flow,
+            bar: T::lit(PA_PER_BAR) / drop,
+            balance: [cylinder.area_b_m2 / areas, cylinder.area_a_m2 / areas],
+            variances: [
+                square(noise.position_m),
+                pressure,
+                pressure,
+                square(noise.spool),
+                square(noise.supply_pa / drop),
+            ],
+            late: [mean[LAG], mean[HYSTERESIS], mean[DROOP]],
+            gains: four(GAINS),
+            clearances: four(CLEARANCES),
+        }
+    }
+
+    /// The two rows of a hat, before they are white; `play` is where the spool stands within its hysteresis.
+    pub fn rows(&self, hat: &Hat<T>, play: T) -> [Row<T>; 2] {
+        let [mut a, b] = self.chambers(hat, play);
+        let [share_a, share_b] = self.balance;
+        let mut balance = a;
+        balance.iter_mut().zip(&b).for_each(|(a, b)| *a = *a * share_a + *b * share_b);
+        let travel = self.cylinder.area_a_m2 / self.rated_flow_m3s * hat.rise[0];
+        a[N] -= travel;
+        [balance, a]
+    }
+
+    /// −∂g/∂unknown and g less what the piston sweeps, of each chamber; g stands last, its sign turned.
+    fn chambers(&self, hat: &Hat<T>, play: T) -> [Row<T>; 2] {
+        let sums = &hat.sums;
+        let (mut a, mut b) = ([T::zero(); N + 1], [T::zero(); N + 1]);
+        let [_, rise_a, rise_b, rise_u] = hat.rise;
+        let [pa, pb, ps] = [PRESSURES, PRESSURES + 1, PRESSURES + 2].map(|at| self.leak * sums[at]);
+        let compression_a = self.kappa * self.cylinder.volume_a_m3(hat.x_m) * rise_a;
+        let compression_b = self.kappa * self.cylinder.volume_b_m3(hat.x_m) * rise_b;
+        (a[0], b[0]) = (pa - pb, pb - pa);
+        (a[1], b[2]) = (pa, pb);
+        (a[KAPPA], b[KAPPA]) = (compression_a, compression_b);
+        let [e1, e2, e3, e4] = [0, 1, 2, 3].map(|edge| sums[FLOWS + edge]);
+        (a[GAINS], a[GAINS + 1], b[GAINS + 2], b[GAINS + 3]) = (-e1, e2, -e3, e4);
+        let [o1, o2, o3, o4] = [0, 1, 2, 3].map(|edge| sums[SLOPES + edge]);
+        (a[LAPS], a[LAPS + 1], b[LAPS + 2], b[LAPS + 3]) = (o1, -o2, o3, -o4);
+        (a[ROUNDING], b[ROUNDING]) = (-sums[BY_ROUNDING], -sums[BY_ROUNDING + 1]);
+        (a[SATURATION], b[SATURATION]) = (-sums[BY_SATURATION], -sums[BY_SATURATION + 1]);
+        (a[TANK], b[TANK]) = (-self.bar * sums[BY_TANK], -self.bar * sums[BY_TANK + 1]);
+        (a[CLEARANCES], a[CLEARANCES + 1]) = (pa - ps, pa);
+        (b[CLEARANCES + 2], b[CLEARANCES + 3]) = (pb - ps, pb);
+        let (supply_a, supply_b) = (self.bar * sums[BY_SUPPLY], self.bar * sums[BY_SUPPLY + 1]);
+        (a[SUPPLY], b[SUPPLY]) = (-supply_a, -supply_b);
+        let per_time = hat.time_s.recip();
+        let drawn = sums[DRAWN] * per_time;
+        (a[DROOP], b[DROOP]) = (supply_a * drawn, supply_b * drawn);
+        let (by_u_a, by_u_b) = (o1 + o2, -(o3 + o4));
+        let late = T::lit(S_PER_MS) * rise_u * per_time;
+        (a[LAG], b[LAG]) = (-by_u_a * late, -by_u_b * late);
+        (a[HYSTERESIS], b[HYSTERESIS]) = (by_u_a * play, by_u_b * play);
+        for row in [&mut a, &mut b] {
+            row[N] = -self.at_calibration(row);
+        }
+        [a, b]
+    }
+
+    /// g of the calibrated valve, without leaks, less what the piston sweeps.
+    fn at_calibration(&self, row: &Row<T>) -> T {
+        let [lag, hysteresis, droop] = self.late;
+        let mut sum = self.kappa_mean * row[KAPPA] + lag * row[LAG] + hysteresis * row[HYSTERESIS] + droop * row[DROOP];
+        for edge in 0..4 {
+            sum += self.gains[edge] * row[GAINS + edge] + self.clearances[edge] * row[CLEARANCES + edge];
+        }
+        sum
+    }
+
+    /// How the noise of a block stands in the equations of a hat at `x_m`; κ and the leaks as they are found.
+    pub fn ends(&self, block: &Block<T>, x_m: T, kappa: T, leaks: [T; 3]) -> Ends<T> {
+        let zero = T::zero();
+        let [share_a, share_b] = self.balance;
+        let pair = |a: T, b: T| [share_a * a + share_b * b, a];
+        let kappa = self.kappa * kappa;
+        let by_mean = [
+            [zero, self.cylinder.area_a_m2 / self.rated_flow_m3s],
+            pair(kappa * self.cylinder.volume_a_m3(x_m), zero),
+            pair(zero, kappa * self.cylinder.volume_b_m3(x_m)),
+            [zero; 2],
+            [zero; 2],
+        ];
+        let sums = &block.sums;
+        let per_time = block.time_s.recip();
+        let slope = |at: usize| sums[at] * per_time;
+        let [internal, a, b] = leaks.map(|leak| leak * self.leak);
+        let own = |chamber: usize, leak: T| {
+            let clearance = self.leak * (self.clearances[2 * chamber] + self.clearances[2 * chamber + 1]);
+            slope(BY_SUPPLY + chamber) + slope(BY_TANK + chamber) + clearance + leak + internal
+        };
+        let supply = |chamber: usize| -(slope(BY_SUPPLY + chamber) + self.leak * self.clearances[2 * chamber]);
+        let by_reading = [
+            [zero; 2],
+            pair(own(0, a), -internal),
+            pair(-internal, own(1, b)),
+            pair(-slope(SLOPES) - slope(SLOPES + 1), slope(SLOPES + 2) + slope(SLOPES + 3)),
+            pair(supply(0), supply(1)),
+        ];
+        let per_count = block.count.recip();
+        Ends { by_mean, by_reading, variances: self.variances.map(|own| own * per_count), time_s: block.time_s }
+    }
+}
+
+impl<T: Real> Ends<T> {
+    /// Adds to a hat's covariance [balance, both, A] what a block puts in: `sign` is −1 where the hat rises over it, 1 where it falls.
+    pub fn add_own(&self, sign: T, covariance: &mut [T; 3]) {
+        let (half, third) = (T::lit(0.5) * self.time_s * sign, self.time_s * self.time_s / T::lit(3.0));
+        for ((g, d), variance) in self.by_mean.iter().zip(&self.by_reading).zip(&self.variances) {
+            let term = |i: usize, j: usize| {
+                *variance * (g[i] * g[j] + half * (g[i] * d[j] + d[i] * g[j]) + third * d[i] * d[j])
+            };
+            covariance[0] += term(0, 0);
+            covariance[1] += term(0, 1);
+            covariance[2] += term(1, 1);
+        }
+    }
+
+    /// Covariance of a hat that rises over the block (rows) with the one that falls over it (columns), in which means stand by `before`.
+    pub fn shared(&self, before: &[Pair<T>; SIGNALS]) -> [Pair<T>; 2] {
+        let (half, sixth) = (T::lit(0.5) * self.time_s, self.time_s * self.time_s / T::lit(6.0));
+        let mut shared = [[T::zero(); 2]; 2];
+        let signals = self.by_mean.iter().zip(before).zip(self.by_reading.iter().zip(&self.variances));
+        for ((g, was), (d, variance)) in signals {
+            for (i, row) in shared.iter_mut().enumerate() {
+                for (j, entry) in row.iter_mut().enumerate() {
+                    *entry += *variance
+                        * (half * (d[i] * was[j] - g[i] * d[j]) + sixth * d[i] * d[j] - g[i] * was[j]);
+                }
+            }
+        }
+        shared
+    }
+}

@@ -1,0 +1,209 @@
+//! Whether noise explains what the equations say, and when the leaks changed at once.
+//!
+//! Innovations of a filter whose model holds are white and have the variance that it says (Kailath 1968, "An innovations approach to
+//! least-squares estimation"). Over parts of five seconds:
+//!
+//! - **Noise**: mean ν²/S, 1 where the declared noise holds.
+//! - **Course**: by how much a leak moved with each part, Σ K ν, squared over the Σ K² S that noise makes of it. What the model lacks makes
+//!   parts differ (the sandwich of Huber 1967); it widens the leak's interval.
+//! - **Change**: the score of the leaks, s = Σ H ν/S, has the covariance J = Σ H Hᵀ/S. sᵀ J⁻¹ s is χ² of three; beyond chance the leaks
+//!   changed (the generalised likelihood ratio of Willsky and Jones 1976, leaks frozen within the window). Windows last one to sixteen
+//!   parts, so that a small change is seen late and a large one soon.
+
+use super::filter::{Row, Surprise};
+use crate::Real;
+
+/// A part, s.
+const PART_S: f64 = 5.0;
+/// Windows of 1, 2, 4, … parts.
+const WINDOWS: usize = 5;
+/// χ² of three leaks that chance goes beyond once in a million.
+const CHANGED: f64 = 30.7;
+/// So many parts count for how well noise explains: ten minutes. So many with the same leaks are needed, as fewer tell nothing of it.
+const MOST_PARTS: f64 = 120.0;
+const LEAST_PARTS: f64 = 6.0;
+/// Parts differ by more than one in ten thousand sound cylinders', in standard deviations.
+const CHANCE_SIGMAS: f64 = 3.7;
+/// A variance beyond this multiple of the declared is no noise of these sensors.
+const MOST_NOISE: f64 = 9.0;
+/// Leaks change no oftener than once in so long, s.
+const CHANGES_COUNT_S: f64 = 600.0;
+
+/// s and the lower triangle of J.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Score<T> {
+    score: [T; 3],
+    information: [T; 6],
+}
+
+/// Sums over a part.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Part<T> {
+    time_s: T,
+    squares: T,
+    count: T,
+    moved: [T; 3],
+    expected: [T; 3],
+}
+
+/// See the module.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Watch<T> {
+    part: Part<T>,
+    windows: [Score<T>; WINDOWS],
+    /// Parts since the filter began, to say which windows end.
+    ended: u32,
+    /// Means over parts with the same leaks, and how many.
+    noise: T,
+    course: [T; 3],
+    parts: T,
+    changes: u8,
+    since_change_s: T,
+}
+
+impl<T: Real> Score<T> {
+    fn none() -> Self {
+        Self { score: [T::zero(); 3], information: [T::zero(); 6] }
+    }
+
+    fn add(&mut self, row: &Row<T>, left: T, per_variance: T) {
+        let [a, b, c, ..] = *row;
+        let [scaled_a, scaled_b, scaled_c] = [a, b, c].map(|own| own * per_variance);
+        let own = [scaled_a * a, scaled_b * a, scaled_b * b, scaled_c * a, scaled_c * b, scaled_c * c];
+        self.information.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        let own = [scaled_a * left, scaled_b * left, scaled_c * left];
+        self.score.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+    }
+
+    /// sᵀ J⁻¹ s by Cholesky's factor; a direction of which nothing is told counts for nothing.
+    fn chi_square(&self) -> T {
+        let [aa, ba, bb, ca, cb, cc] = self.information;
+        let [a, b, c] = self.score;
+        let per = |pivot: T, whole: T| {
+            if pivot > T::lit(1e-5) * whole { pivot.recip() } else { T::zero() }
+        };
+        let per_a = per(aa, aa);
+        let (on_b, on_c) = (ba * per_a, ca * per_a);
+        let per_b = per(bb - on_b * ba, bb);
+        let cross = cb - on_c * ba;
+        let b = b - on_b * a;
+        let on_c_by_b = cross * per_b;
+        let per_c = per(cc - on_c * ca - on_c_by_b * cross, cc);
+        let c = c - on_c * a - on_c_by_b * b;
+        a * a * per_a + b * b * per_b + c * c * per_c
+    }
+}
+
+impl<T: Real> Part<T> {
+    fn none() -> Self {
+        let zero = T::zero();
+        Self { time_s: zero, squares: zero, count: zero, moved: [zero; 3], expected: [zero; 3] }
+    }
+}
+
+impl<T: Real> Watch<T> {
+    pub fn new() -> Self {
+        Self {
+            part: Part::none(),
+            windows: [Score::none(); WINDOWS],
+            ended: 0,
+            noise: T::one(),
+            course: [T::one(); 3],
+            parts: T::zero(),
+            changes: 0,
+            since_change_s: T::zero(),
+        }
+    }
+
+    /// Takes in what an equation said.
+    pub fn add(&mut self, row: &Row<T>, surprise: &Surprise<T>) {
+        let Surprise { innovation, variance, gains } = surprise;
+        let per_variance = variance.recip();
+        let part = &mut self.part;
+        part.squares += *innovation * *innovation * per_variance;
+        part.count += T::one();
+        for ((moved, expected), gain) in part.moved.iter_mut().zip(&mut part.expected).zip(gains) {
+            *moved += *gain * *innovation;
+            *expected += *gain * *gain * *variance;
+        }
+        if let Some(window) = self.windows.first_mut() {
+            window.add(row, *innovation, per_variance);
+        }
+    }
+
+    /// So much time has passed, s. Says whether the leaks have changed, where a part ends with it.
+    pub fn pass(&mut self, time_s: T) -> bool {
+        self.part.time_s += time_s;
+        if self.part.time_s < T::lit(PART_S) {
+            return false;
+        }
+        let part = core::mem::replace(&mut self.part, Part::none());
+        self.since_change_s += part.time_s;
+        self.ended = self.ended.wrapping_add(1);
+        self.average(&part);
+        let limit = T::lit(CHANGED) * self.noise.at_least(T::one());
+        let mut finest = Score::none();
+        let mut has_changed = false;
+        for (place, window) in self.windows.iter_mut().enumerate() {
+            // What a finer window held counts in the coarser.
+            window.score.iter_mut().zip(finest.score).for_each(|(sum, own)| *sum += own);
+            window.information.iter_mut().zip(finest.information).for_each(|(sum, own)| *sum += own);
+            let ends = self.ended.trailing_zeros() as usize >= place;
+            if !ends {
+                break;
+            }
+            has_changed |= window.chi_square() > limit;
+            finest = core::mem::replace(window, Score::none());
+        }
+        if has_changed {
+            self.change();
+        }
+        has_changed
+    }
+
+    fn average(&mut self, part: &Part<T>) {
+        let parts = self.parts + T::one();
+        let weight = parts.at_most(T::lit(MOST_PARTS)).recip();
+        let noise = part.squares / part.count.at_least(T::one());
+        self.noise += weight * (noise - self.noise);
+        for ((course, moved), expected) in self.course.iter_mut().zip(part.moved).zip(part.expected) {
+            let own = if expected > T::zero() { moved * moved / expected } else { T::one() };
+            *course += weight * (own - *course);
+        }
+        self.parts = parts;
+    }
+
+    fn change(&mut self) {
+        let is_recent = self.changes > 0 && self.since_change_s < T::lit(CHANGES_COUNT_S);
+        self.changes = if is_recent { self.changes.saturating_add(1) } else { 1 };
+        self.since_change_s = T::zero();
+        self.windows = [Score::none(); WINDOWS];
+        self.ended = 0;
+        self.parts = T::zero();
+    }
+
+    /// Mean ν²/S.
+    pub fn noise(&self) -> T {
+        self.noise
+    }
+
+    /// By how much each leak's standard deviation is wider for what noise does not explain.
+    pub fn widening(&self) -> [T; 3] {
+        self.course.map(|course| course.at_least(self.noise).at_least(T::one()).sqrt())
+    }
+
+    /// Whether a valve as calibrated, its leaks and noise explain the readings: parts differ by no more than by chance (Wilson and
+    /// Hilferty 1931), and leaks change no oftener than leaks do.
+    pub fn is_explained(&self) -> bool {
+        let many = self.parts.at_least(T::one()).at_most(T::lit(MOST_PARTS));
+        let share = T::lit(2.0 / 9.0) / many;
+        let root = T::one() - share + T::lit(CHANCE_SIGMAS) * share.sqrt();
+        let most = root * root * root * self.noise.at_least(T::one());
+        let is_often = self.changes > 1 && self.since_change_s < T::lit(CHANGES_COUNT_S);
+        let is_alike = self.course.iter().all(|course| *course <= most);
+        self.parts >= T::lit(LEAST_PARTS) && is_alike && self.noise <= T::lit(MOST_NOISE) && !is_often
+    }
+}
