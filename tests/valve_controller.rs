@@ -128,3 +128,45 @@ fn a_calibrated_valve_on_a_controller() {
         }
     }
 }
+
+/// DUMP
+#[test]
+fn dump() {
+    let Ok(folder) = std::env::var("DUMP") else { return };
+    let seconds: f64 = std::env::var("SECONDS_").ok().and_then(|s| s.parse().ok()).unwrap_or(60.0);
+    (0..4 * runs()).into_par_iter().for_each(|index| {
+        let (wind, seed) = (WINDS[(index % 4) as usize], index / 4);
+        let lpm = [0.02, 0.0, 0.05][(seed % 3) as usize];
+        let leak = ((seed / 3) % 3) as usize;
+        let cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + seed) };
+        let sheet = rig("");
+        let found = calibrated(&cylinder, &sheet);
+        let later = later(&cylinder).leaking(leak, lpm);
+        let text = later.trace(seconds, 100.0, 3e-3);
+        let (valve, noise) = found.for_controller(&sheet).expect("a valve");
+        let mut out: Vec<f64> = Vec::new();
+        out.extend(valve.mean);
+        out.extend(valve.covariance);
+        out.extend([valve.rated_flow_m3s, valve.rated_drop_pa, valve.tank_pa, valve.hysteresis, valve.gain_drift, valve.lap_drift, valve.clearance_drift_m3spa]);
+        out.extend([noise.position_m, noise.pressure_pa, noise.spool, noise.supply_pa]);
+        let folder_ = tempfile::tempdir().expect("a folder");
+        let file = folder_.path().join("valve.toml");
+        std::fs::write(&file, found.to_toml().expect("a file")).expect("written");
+        let rig = rig(&format!("calibration = {:?}", file.display().to_string()));
+        let report = replay(&mut reader(&text, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report");
+        let host = report.estimates.leaks();
+        out.push(report.valve.as_ref().map_or(0.0, |valve| valve.scatter));
+        for leak in Leak::ALL {
+            out.extend([host[leak].value, host[leak].std.unwrap_or(f64::NAN), later.leaks_lpm[leak as usize]]);
+        }
+        let mut rows = reader(&text, &sheet);
+        let (mut record, mut last_s) = (Record::default(), f64::NAN);
+        while rows.next_record(&mut record).expect("a row") {
+            let (sample, valve) = (record.sample, record.valve.expect("a spool"));
+            out.extend([record.t_s - last_s, sample.x_m, sample.pa_pa, sample.pb_pa, valve.spool, valve.supply_pa.expect("a supply")]);
+            last_s = record.t_s;
+        }
+        let bytes: Vec<u8> = out.into_iter().flat_map(f64::to_le_bytes).collect();
+        std::fs::write(format!("{folder}/{index:04}.bin"), bytes).expect("written");
+    });
+}

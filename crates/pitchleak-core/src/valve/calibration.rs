@@ -3,7 +3,7 @@
 use super::unknowns::{
     CLEARANCES, GAINS, KAPPA, LAPS, LEAKS, ROUNDING, VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
 };
-use crate::{Cylinder, CylinderError, Fluid, Real};
+use crate::{CylinderError, Fluid, Real};
 
 /// A valve as `pitchleak calibrate` found it, its data sheet, and by how much it changes since.
 ///
@@ -26,7 +26,7 @@ pub struct ValveCalibration<T> {
     pub hysteresis: T,
     /// Change of an edge's gain in a day, 1 σ, a share of it.
     pub gain_drift: T,
-    /// Change of the spool's zero in ten minutes, 1 σ, a share of its stroke.
+    /// Change of each overlap in a day, and of the spool's zero in ten minutes, 1 σ, a share of its stroke.
     pub lap_drift: T,
     /// Change of an edge's clearance in a day, 1 σ, m³/(s·Pa).
     pub clearance_drift_m3spa: T,
@@ -133,7 +133,7 @@ impl<T: Real> ValveCalibration<T> {
                 LEAKS..KAPPA => leak,
                 KAPPA => oil * oil / day_s,
                 GAINS..LAPS => own * own / day_s,
-                LAPS..ROUNDING => self.lap_drift * self.lap_drift / T::lit(NULL_DRIFT_S),
+                LAPS..ROUNDING => self.lap_drift * self.lap_drift / day_s,
                 CLEARANCES..=19 => clearance * clearance / day_s,
                 _ => T::zero(),
             };
@@ -145,13 +145,16 @@ impl<T: Real> ValveCalibration<T> {
     pub(super) fn since(growth_ps: &[T; N]) -> [T; N] {
         let mut since = growth_ps.map(|growth| growth * T::lit(DRIFT_S));
         for (unknown, variance) in since.iter_mut().enumerate() {
-            match unknown {
-                LEAKS..KAPPA => *variance = T::lit(LEAK_SIZE * LEAK_SIZE),
-                LAPS..ROUNDING => *variance *= T::lit(NULL_DRIFT_S / DRIFT_S),
-                _ => {}
+            if unknown < KAPPA {
+                *variance = T::lit(LEAK_SIZE * LEAK_SIZE);
             }
         }
         since
+    }
+
+    /// What the variance of the spool's zero grows by, 1/s.
+    pub(super) fn zero_growth_ps(&self) -> T {
+        self.lap_drift * self.lap_drift / T::lit(NULL_DRIFT_S)
     }
 }
 

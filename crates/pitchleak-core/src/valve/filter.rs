@@ -101,21 +101,20 @@ impl<T: Real> Filter<T> {
         Surprise { innovation, variance, gains }
     }
 
-    /// An unknown may have moved, by this variance (Agee and Turner 1972; Bierman 1977, §III.5).
-    pub fn widen(&mut self, unknown: usize, variance: T) {
-        let mut vector = [T::zero(); N];
+    /// The unknowns may have moved along a direction, by a step of this variance (Agee and Turner 1972; Bierman 1977, §III.5).
+    pub fn widen(&mut self, variance: T, mut direction: [T; N]) {
         let mut left = variance;
-        for j in (0..N.min(unknown + 1)).rev() {
-            let own = if j == unknown { T::one() } else { vector[j] };
+        for j in (0..N).rev() {
+            let own = direction[j];
             let pivot = self.pivots[j] + left * own * own;
-            if pivot <= T::zero() {
+            if own.is_zero() || pivot <= T::zero() {
                 continue;
             }
             let share = left * own / pivot;
             left *= self.pivots[j] / pivot;
             self.pivots[j] = pivot;
             let column = self.above.get_mut(start(j)..start(j) + j).unwrap_or_default();
-            for (entry, other) in column.iter_mut().zip(&mut vector) {
+            for (entry, other) in column.iter_mut().zip(&mut direction) {
                 *other -= own * *entry;
                 *entry += share * *other;
             }

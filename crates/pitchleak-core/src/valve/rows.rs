@@ -58,13 +58,15 @@ pub(super) struct Equations<T> {
     clearances: [T; 4],
 }
 
-/// How the readings' noise stands in the equations.
+/// G of a hat.
+pub(super) type ByMeans<T> = [Pair<T>; SIGNALS];
+
+/// How the noise of a block's readings stands in the equations.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ends<T> {
-    /// By the means, …
-    pub by_mean: [Pair<T>; SIGNALS],
-    /// … and by the readings within the block.
-    pub by_reading: [Pair<T>; SIGNALS],
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct BlockNoise<T> {
+    /// D.
+    by_reading: [Pair<T>; SIGNALS],
     /// σ²/N, and T.
     variances: [T; SIGNALS],
     time_s: T,
@@ -161,19 +163,26 @@ impl<T: Real> Equations<T> {
         sum
     }
 
-    /// How the noise of a block stands in the equations of a hat at `x_m`; κ and the leaks as they are found.
-    pub fn ends(&self, block: &Block<T>, x_m: T, kappa: T, leaks: [T; 3]) -> Ends<T> {
+    /// G of a hat, with κ as it is found.
+    pub fn by_means(&self, hat: &Hat<T>, kappa: T) -> ByMeans<T> {
         let zero = T::zero();
-        let [share_a, share_b] = self.balance;
-        let pair = |a: T, b: T| [share_a * a + share_b * b, a];
         let kappa = self.kappa * kappa;
-        let by_mean = [
+        [
             [zero, self.cylinder.area_a_m2 / self.rated_flow_m3s],
-            pair(kappa * self.cylinder.volume_a_m3(x_m), zero),
-            pair(zero, kappa * self.cylinder.volume_b_m3(x_m)),
+            self.pair(kappa * self.cylinder.volume_a_m3(hat.x_m), zero),
+            self.pair(zero, kappa * self.cylinder.volume_b_m3(hat.x_m)),
             [zero; 2],
             [zero; 2],
-        ];
+        ]
+    }
+
+    fn pair(&self, a: T, b: T) -> Pair<T> {
+        let [share_a, share_b] = self.balance;
+        [share_a * a + share_b * b, a]
+    }
+
+    /// The noise of a block, with the leaks as they are found.
+    pub fn noise(&self, block: &Block<T>, leaks: [T; 3]) -> BlockNoise<T> {
         let sums = &block.sums;
         let per_time = block.time_s.recip();
         let slope = |at: usize| sums[at] * per_time;
@@ -184,22 +193,22 @@ impl<T: Real> Equations<T> {
         };
         let supply = |chamber: usize| -(slope(BY_SUPPLY + chamber) + self.leak * self.clearances[2 * chamber]);
         let by_reading = [
-            [zero; 2],
-            pair(own(0, a), -internal),
-            pair(-internal, own(1, b)),
-            pair(-slope(SLOPES) - slope(SLOPES + 1), slope(SLOPES + 2) + slope(SLOPES + 3)),
-            pair(supply(0), supply(1)),
+            [T::zero(); 2],
+            self.pair(own(0, a), -internal),
+            self.pair(-internal, own(1, b)),
+            self.pair(-slope(SLOPES) - slope(SLOPES + 1), slope(SLOPES + 2) + slope(SLOPES + 3)),
+            self.pair(supply(0), supply(1)),
         ];
         let per_count = block.count.recip();
-        Ends { by_mean, by_reading, variances: self.variances.map(|own| own * per_count), time_s: block.time_s }
+        BlockNoise { by_reading, variances: self.variances.map(|own| own * per_count), time_s: block.time_s }
     }
 }
 
-impl<T: Real> Ends<T> {
-    /// Adds to a hat's covariance [balance, both, A] what a block puts in: `sign` is −1 where the hat rises over it, 1 where it falls.
-    pub fn add_own(&self, sign: T, covariance: &mut [T; 3]) {
+impl<T: Real> BlockNoise<T> {
+    /// Adds to a hat's covariance [balance, both, A] what the block puts in: `sign` is −1 where the hat rises over it, 1 where it falls.
+    pub fn add_own(&self, sign: T, by_means: &ByMeans<T>, covariance: &mut [T; 3]) {
         let (half, third) = (T::lit(0.5) * self.time_s * sign, self.time_s * self.time_s / T::lit(3.0));
-        for ((g, d), variance) in self.by_mean.iter().zip(&self.by_reading).zip(&self.variances) {
+        for ((g, d), variance) in by_means.iter().zip(&self.by_reading).zip(&self.variances) {
             let term = |i: usize, j: usize| {
                 *variance * (g[i] * g[j] + half * (g[i] * d[j] + d[i] * g[j]) + third * d[i] * d[j])
             };
@@ -209,11 +218,11 @@ impl<T: Real> Ends<T> {
         }
     }
 
-    /// Covariance of a hat that rises over the block (rows) with the one that falls over it (columns), in which means stand by `before`.
-    pub fn shared(&self, before: &[Pair<T>; SIGNALS]) -> [Pair<T>; 2] {
+    /// Covariance of the hat that rises over the block (rows) with the one `before`, which falls over it (columns).
+    pub fn shared(&self, by_means: &ByMeans<T>, before: &ByMeans<T>) -> [Pair<T>; 2] {
         let (half, sixth) = (T::lit(0.5) * self.time_s, self.time_s * self.time_s / T::lit(6.0));
         let mut shared = [[T::zero(); 2]; 2];
-        let signals = self.by_mean.iter().zip(before).zip(self.by_reading.iter().zip(&self.variances));
+        let signals = by_means.iter().zip(before).zip(self.by_reading.iter().zip(&self.variances));
         for ((g, was), (d, variance)) in signals {
             for (i, row) in shared.iter_mut().enumerate() {
                 for (j, entry) in row.iter_mut().enumerate() {

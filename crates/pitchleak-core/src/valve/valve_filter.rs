@@ -3,14 +3,16 @@ use super::edges::{Edges, PRESSURES, SUMS, Scaled};
 use super::filter::Filter;
 use super::hats::{Block, Hat};
 use super::rows::Equations;
-use super::unknowns::{KAPPA, LEAK_UNIT_M3SPA, VALVE_UNKNOWNS as N};
+use super::unknowns::{KAPPA, LAPS, LEAK_UNIT_M3SPA, VALVE_UNKNOWNS as N};
 use super::watch::Watch;
 use super::whitening::Whitening;
 use crate::continuity::{Integrals, PressureMeans};
 use crate::{Cylinder, Estimate, Fluid, PerLeak, Real};
 
-/// Length of a block, s: short beside what a pitch cylinder does, long beside a sample.
-const BLOCK_S: f64 = 0.1;
+/// Length of a block, s, and its least number of samples: short beside what a pitch cylinder does; the noise of the pressures in κ's
+/// column (errors in variables) averages out.
+const BLOCK_S: f64 = 0.25;
+const LEAST_SAMPLES: f64 = 8.0;
 /// Memory of the mean pressures at which leak flows are quoted, s.
 const AVERAGING_S: f64 = 60.0;
 /// Largest pressure that is a reading, Pa.
@@ -88,6 +90,7 @@ pub struct ValveFilter<T> {
     edges: Edges<T>,
     equations: Equations<T>,
     growth_ps: [T; N],
+    zero_growth_ps: T,
     kappa_ppa: T,
     kappa_mean: T,
     stroke_m: T,
@@ -134,6 +137,7 @@ impl<T: Real> ValveFilter<T> {
             edges: Edges::of(calibration),
             equations: Equations::of(cylinder, fluid, calibration, noise),
             growth_ps,
+            zero_growth_ps: calibration.zero_growth_ps(),
             kappa_ppa: fluid.bulk_modulus_pa.recip(),
             kappa_mean: calibration.mean[KAPPA],
             stroke_m: cylinder.stroke_m,
@@ -173,8 +177,8 @@ impl<T: Real> ValveFilter<T> {
             self.interrupt(dt_s);
             return ValveUpdate::Started;
         };
-        let half_step_s = T::lit(0.5) * dt_s;
-        if self.block.time_s + half_step_s >= T::lit(BLOCK_S) {
+        let is_long = self.block.time_s + T::lit(0.5) * dt_s >= T::lit(BLOCK_S);
+        if is_long && self.block.count >= T::lit(LEAST_SAMPLES) {
             self.close_block();
         }
         self.block.add(dt_s, &before, &rates, &reading);
@@ -216,8 +220,13 @@ impl<T: Real> ValveFilter<T> {
             let rows = self.equations.rows(&hat, play);
             let kappa = (self.kappa_mean + self.filter.step[KAPPA]).at_least(T::zero());
             let [internal, a, b, ..] = self.filter.step.map(|leak| leak.at_least(T::zero()));
-            let ends = |block: &Block<T>| self.equations.ends(block, hat.x_m, kappa, [internal, a, b]);
-            self.white = Some(Whitening::next(self.white.as_ref(), rows, &ends(&before), &ends(&block)));
+            let last = self.equations.noise(&block, [internal, a, b]);
+            let first = match &self.white {
+                Some(white) => white.last,
+                None => self.equations.noise(&before, [internal, a, b]),
+            };
+            let by_means = self.equations.by_means(&hat, kappa);
+            self.white = Some(Whitening::next(self.white.as_ref(), &rows, by_means, [first, last]));
             self.due = Due::Balance;
         }
         self.waiting_s += block.time_s;
@@ -267,12 +276,11 @@ impl<T: Real> ValveFilter<T> {
         let turn = usize::from(self.turn);
         self.turn = if turn + 1 < N { self.turn + 1 } else { 0 };
         let growth = self.growth_ps.get(turn).copied().unwrap_or_default();
-        if growth > T::zero() {
-            self.filter.widen(turn, growth * elapsed_s * T::lit(N as f64));
-        }
+        self.filter.widen(growth * elapsed_s * T::lit(N as f64), along(turn));
+        self.filter.widen(self.zero_growth_ps * elapsed_s, along_zero());
         let changed = self.watch.pass(elapsed_s);
         if changed {
-            (0..KAPPA).for_each(|leak| self.filter.widen(leak, T::lit(LEAK_SIZE * LEAK_SIZE)));
+            (0..KAPPA).for_each(|leak| self.filter.widen(T::lit(LEAK_SIZE * LEAK_SIZE), along(leak)));
         }
         ValveUpdate::Renewed { elapsed_s, changed }
     }
@@ -300,4 +308,19 @@ impl<T: Real> ValveFilter<T> {
             is_explained: self.watch.is_explained(),
         }
     }
+}
+
+/// One unknown alone.
+fn along<T: Real>(unknown: usize) -> [T; N] {
+    let mut direction = [T::zero(); N];
+    direction.iter_mut().skip(unknown).take(1).for_each(|own| *own = T::one());
+    direction
+}
+
+/// The spool's zero: what opens P–A and B–T closes A–T and P–B.
+fn along_zero<T: Real>() -> [T; N] {
+    let mut direction = [T::zero(); N];
+    let signs = [T::one(), -T::one(), -T::one(), T::one()];
+    direction.iter_mut().skip(LAPS).zip(signs).for_each(|(own, sign)| *own = sign);
+    direction
 }

@@ -190,16 +190,23 @@ impl<T: Real> Watch<T> {
         self.noise
     }
 
-    /// By how much each leak's standard deviation is wider for what noise does not explain.
+    /// By how much each leak's standard deviation is wider for what noise does not explain: beyond two standard deviations of what so
+    /// many parts scatter by themselves (Birge 1932).
     pub fn widening(&self) -> [T; 3] {
-        self.course.map(|course| course.at_least(self.noise).at_least(T::one()).sqrt())
+        let two = T::lit(2.0);
+        let chance = T::one() + two * (two / self.many()).sqrt();
+        self.course.map(|course| (course / chance).at_least(self.noise).at_least(T::one()).sqrt())
+    }
+
+    /// Parts that count.
+    fn many(&self) -> T {
+        self.parts.at_least(T::one()).at_most(T::lit(MOST_PARTS))
     }
 
     /// Whether a valve as calibrated, its leaks and noise explain the readings: parts differ by no more than by chance (Wilson and
     /// Hilferty 1931), and leaks change no oftener than leaks do.
     pub fn is_explained(&self) -> bool {
-        let many = self.parts.at_least(T::one()).at_most(T::lit(MOST_PARTS));
-        let share = T::lit(2.0 / 9.0) / many;
+        let share = T::lit(2.0 / 9.0) / self.many();
         let root = T::one() - share + T::lit(CHANCE_SIGMAS) * share.sqrt();
         let most = root * root * root * self.noise.at_least(T::one());
         let is_often = self.changes > 1 && self.since_change_s < T::lit(CHANGES_COUNT_S);

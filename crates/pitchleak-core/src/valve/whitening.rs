@@ -1,8 +1,7 @@
 //! Rows of hats whose noise stands in their neighbours, too, made white one after the other: S = L Lᵀ with L of two block diagonals.
 
 use super::filter::Row;
-use super::rows::{Ends, Pair};
-use super::unknowns::VALVE_UNKNOWNS as N;
+use super::rows::{BlockNoise, ByMeans, Pair};
 use crate::Real;
 
 /// The last hat's rows, white.
@@ -12,49 +11,68 @@ pub(super) struct Whitening<T> {
     pub rows: [Row<T>; 2],
     /// L's own block: [balance, both, A].
     diagonal: [T; 3],
-    /// How the means stood in it.
-    by_mean: [Pair<T>; 5],
+    by_means: ByMeans<T>,
+    /// Of the block over which it falls.
+    pub last: BlockNoise<T>,
 }
 
-/// A variance is at least this share of what it was before the last row was taken off: what is less is rounding.
+/// A variance that is less than this share of what it was before the last hat's part was taken off is rounding.
 const LEAST_SHARE: f64 = 1e-5;
 
 impl<T: Real> Whitening<T> {
-    /// The next hat, that rises over `first` and falls over `last`, after `before` where there is no gap between them.
-    pub fn next(before: Option<&Self>, mut rows: [Row<T>; 2], first: &Ends<T>, last: &Ends<T>) -> Self {
-        let mut own = [T::zero(); 3];
-        first.add_own(-T::one(), &mut own);
-        last.add_own(T::one(), &mut own);
-        let whole = own;
+    /// The next hat, from the block over which it rises to the one over which it falls, after the hat `before` where there is no gap.
+    pub fn next(
+        before: Option<&Self>,
+        rows: &[Row<T>; 2],
+        by_means: ByMeans<T>,
+        [first, last]: [BlockNoise<T>; 2],
+    ) -> Self {
+        let mut whole = [T::zero(); 3];
+        first.add_own(-T::one(), &by_means, &mut whole);
+        last.add_own(T::one(), &by_means, &mut whole);
+        let (mut own, mut rows) = (whole, *rows);
         if let Some(before) = before {
-            let [balance, both, a] = before.diagonal;
-            let shared = first.shared(&before.by_mean);
-            let [on_balance, on_a] = shared.map(|[left, right]| {
-                let left = left / balance;
-                [left, (right - both * left) / a]
-            });
-            let dot = |x: Pair<T>, y: Pair<T>| x[0] * y[0] + x[1] * y[1];
-            own[0] -= dot(on_balance, on_balance);
-            own[1] -= dot(on_a, on_balance);
-            own[2] -= dot(on_a, on_a);
-            for (row, [by_balance, by_a]) in rows.iter_mut().zip([on_balance, on_a]) {
-                for ((entry, first), second) in row.iter_mut().zip(&before.rows[0]).zip(&before.rows[1]) {
-                    *entry -= by_balance * *first + by_a * *second;
-                }
+            let shares = before.shares(first.shared(&by_means, &before.by_means));
+            let [[a, b], [c, d]] = shares;
+            let left = [own[0] - a * a - b * b, own[1] - c * a - d * b, own[2] - c * c - d * d];
+            if is_positive(&left, &whole) {
+                own = left;
+                before.take_off(shares, &mut rows);
             }
         }
-        let share = T::lit(LEAST_SHARE);
-        let balance = own[0].at_least(share * whole[0]).sqrt();
+        let balance = own[0].sqrt();
         let both = own[1] / balance;
-        let a = (own[2] - both * both).at_least(share * whole[2]).sqrt();
+        let a = (own[2] - both * both).sqrt();
         let (per_balance, per_a) = (balance.recip(), a.recip());
         let [on_balance, on_a] = &mut rows;
         for (first, second) in on_balance.iter_mut().zip(on_a) {
             *first *= per_balance;
             *second = (*second - both * *first) * per_a;
         }
-        Self { rows, diagonal: [balance, both, a], by_mean: first.by_mean }
+        Self { rows, diagonal: [balance, both, a], by_means, last }
+    }
+
+    /// S_k,k−1 L_k−1⁻ᵀ.
+    fn shares(&self, shared: [Pair<T>; 2]) -> [Pair<T>; 2] {
+        let [balance, both, a] = self.diagonal;
+        shared.map(|[left, right]| {
+            let left = left / balance;
+            [left, (right - both * left) / a]
+        })
+    }
+
+    fn take_off(&self, shares: [Pair<T>; 2], rows: &mut [Row<T>; 2]) {
+        let [balance, a] = &self.rows;
+        for (row, [by_balance, by_a]) in rows.iter_mut().zip(shares) {
+            for ((entry, first), second) in row.iter_mut().zip(balance).zip(a) {
+                *entry -= by_balance * *first + by_a * *second;
+            }
+        }
     }
 }
 
-const _: () = assert!(N == 23);
+/// Whether what is left of a covariance is one, beyond rounding.
+fn is_positive<T: Real>(left: &[T; 3], whole: &[T; 3]) -> bool {
+    let share = T::lit(LEAST_SHARE);
+    left[0] > share * whole[0] && left[2] - left[1] * left[1] / left[0] > share * whole[2]
+}
