@@ -52,6 +52,7 @@ fn later(cylinder: &ValveCylinder) -> ValveCylinder {
         *clearance_lpm = (*clearance_lpm + walk(0.1 * 0.057)).max(0.0);
     }
     later.seed += 50_000;
+    if let Some(seconds) = std::env::var("SECONDS_").ok().and_then(|s| s.parse::<f64>().ok()) { later.valve.null_drift = walk(0.001) * (seconds / 600.0).sqrt(); }
     later
 }
 

@@ -278,11 +278,14 @@ impl<T: Real> ValveFilter<T> {
         let growth = self.growth_ps.get(turn).copied().unwrap_or_default();
         self.filter.widen(growth * elapsed_s * T::lit(N as f64), along(turn));
         self.filter.widen(self.zero_growth_ps * elapsed_s, along_zero());
-        let changed = self.watch.pass(elapsed_s);
-        if changed {
+        let lost_s = self.watch.pass(elapsed_s, &mut self.filter.step);
+        if let Some(lost_s) = lost_s {
+            // White rows carry those before them along, which had other leaks.
+            self.white = None;
+            self.filter.widen(self.zero_growth_ps * lost_s, along_zero());
             (0..KAPPA).for_each(|leak| self.filter.widen(T::lit(LEAK_SIZE * LEAK_SIZE), along(leak)));
         }
-        ValveUpdate::Renewed { elapsed_s, changed }
+        ValveUpdate::Renewed { elapsed_s, changed: lost_s.is_some() }
     }
 
     /// What the readings so far say.

@@ -7,16 +7,17 @@
 //! - **Course**: by how much a leak moved with each part, Σ K ν, squared over the Σ K² S that noise makes of it. What the model lacks makes
 //!   parts differ (the sandwich of Huber 1967); it widens the leak's interval.
 //! - **Change**: the score of the leaks, s = Σ H ν/S, has the covariance J = Σ H Hᵀ/S. sᵀ J⁻¹ s is χ² of three; beyond chance the leaks
-//!   changed (the generalised likelihood ratio of Willsky and Jones 1976, leaks frozen within the window). Windows last one to sixteen
-//!   parts, so that a small change is seen late and a large one soon.
+//!   changed (the generalised likelihood ratio of Willsky and Jones 1976). Windows last 5, 20 and 80 s, so that a small change is seen
+//!   late and a large one soon. What the window taught of all but the leaks was a leak then: it is taken back.
 
 use super::filter::{Row, Surprise};
+use super::unknowns::{KAPPA, VALVE_UNKNOWNS as N};
 use crate::Real;
 
 /// A part, s.
 const PART_S: f64 = 5.0;
-/// Windows of 1, 2, 4, … parts.
-const WINDOWS: usize = 5;
+/// Windows of so many parts.
+const WINDOWS: [u8; 3] = [1, 4, 16];
 /// χ² of three leaks that chance goes beyond once in a million.
 const CHANGED: f64 = 30.7;
 /// So many parts count for how well noise explains: ten minutes. So many with the same leaks are needed, as fewer tell nothing of it.
@@ -37,6 +38,16 @@ struct Score<T> {
     information: [T; 6],
 }
 
+/// Some parts together.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Window<T> {
+    score: Score<T>,
+    parts: u8,
+    /// The unknowns where it began.
+    begin: [T; N],
+}
+
 /// Sums over a part.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -53,9 +64,8 @@ struct Part<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Watch<T> {
     part: Part<T>,
-    windows: [Score<T>; WINDOWS],
-    /// Parts since the filter began, to say which windows end.
-    ended: u32,
+    score: Score<T>,
+    windows: [Window<T>; WINDOWS.len()],
     /// Means over parts with the same leaks, and how many.
     noise: T,
     course: [T; 3],
@@ -78,6 +88,11 @@ impl<T: Real> Score<T> {
         self.score.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
     }
 
+    fn join(&mut self, other: &Self) {
+        self.score.iter_mut().zip(other.score).for_each(|(sum, own)| *sum += own);
+        self.information.iter_mut().zip(other.information).for_each(|(sum, own)| *sum += own);
+    }
+
     /// sᵀ J⁻¹ s by Cholesky's factor; a direction of which nothing is told counts for nothing.
     fn chi_square(&self) -> T {
         let [aa, ba, bb, ca, cb, cc] = self.information;
@@ -97,6 +112,12 @@ impl<T: Real> Score<T> {
     }
 }
 
+impl<T: Real> Window<T> {
+    fn at(begin: [T; N]) -> Self {
+        Self { score: Score::none(), parts: 0, begin }
+    }
+}
+
 impl<T: Real> Part<T> {
     fn none() -> Self {
         let zero = T::zero();
@@ -108,8 +129,8 @@ impl<T: Real> Watch<T> {
     pub fn new() -> Self {
         Self {
             part: Part::none(),
-            windows: [Score::none(); WINDOWS],
-            ended: 0,
+            score: Score::none(),
+            windows: [Window::at([T::zero(); N]); WINDOWS.len()],
             noise: T::one(),
             course: [T::one(); 3],
             parts: T::zero(),
@@ -129,39 +150,35 @@ impl<T: Real> Watch<T> {
             *moved += *gain * *innovation;
             *expected += *gain * *gain * *variance;
         }
-        if let Some(window) = self.windows.first_mut() {
-            window.add(row, *innovation, per_variance);
-        }
+        self.score.add(row, *innovation, per_variance);
     }
 
-    /// So much time has passed, s. Says whether the leaks have changed, where a part ends with it.
-    pub fn pass(&mut self, time_s: T) -> bool {
+    /// So much time has passed, s, with which the unknowns came to `step`. Where a part ends with it and the leaks have changed, all but
+    /// they are taken back to where the window began, and it says how long ago that is, s.
+    pub fn pass(&mut self, time_s: T, step: &mut [T; N]) -> Option<T> {
         self.part.time_s += time_s;
         if self.part.time_s < T::lit(PART_S) {
-            return false;
+            return None;
         }
         let part = core::mem::replace(&mut self.part, Part::none());
+        let score = core::mem::replace(&mut self.score, Score::none());
         self.since_change_s += part.time_s;
-        self.ended = self.ended.wrapping_add(1);
         self.average(&part);
         let limit = T::lit(CHANGED) * self.noise.at_least(T::one());
-        let mut finest = Score::none();
-        let mut has_changed = false;
-        for (place, window) in self.windows.iter_mut().enumerate() {
-            // What a finer window held counts in the coarser.
-            window.score.iter_mut().zip(finest.score).for_each(|(sum, own)| *sum += own);
-            window.information.iter_mut().zip(finest.information).for_each(|(sum, own)| *sum += own);
-            let ends = self.ended.trailing_zeros() as usize >= place;
-            if !ends {
-                break;
+        let mut changed = None;
+        for (window, whole) in self.windows.iter_mut().zip(WINDOWS) {
+            window.score.join(&score);
+            window.parts += 1;
+            if window.parts >= whole {
+                let is_other = window.score.chi_square() > limit;
+                changed = changed.or(is_other.then_some((window.begin, whole)));
+                *window = Window::at(*step);
             }
-            has_changed |= window.chi_square() > limit;
-            finest = core::mem::replace(window, Score::none());
         }
-        if has_changed {
-            self.change();
-        }
-        has_changed
+        let (begin, parts) = changed?;
+        step.iter_mut().zip(begin).skip(KAPPA).for_each(|(now, then)| *now = then);
+        self.change(step);
+        Some(T::lit(PART_S * f64::from(parts)))
     }
 
     fn average(&mut self, part: &Part<T>) {
@@ -176,12 +193,11 @@ impl<T: Real> Watch<T> {
         self.parts = parts;
     }
 
-    fn change(&mut self) {
+    fn change(&mut self, step: &[T; N]) {
         let is_recent = self.changes > 0 && self.since_change_s < T::lit(CHANGES_COUNT_S);
         self.changes = if is_recent { self.changes.saturating_add(1) } else { 1 };
         self.since_change_s = T::zero();
-        self.windows = [Score::none(); WINDOWS];
-        self.ended = 0;
+        self.windows = [Window::at(*step); WINDOWS.len()];
         self.parts = T::zero();
     }
 
