@@ -2,9 +2,7 @@
 //! shares no code with either.
 
 use pitchleak::Rig;
-use pitchleak::core::{
-    Estimate, Leak, PerLeak, ValveEstimates, ValveFilter, ValveSample, ValveUpdate,
-};
+use pitchleak::core::{Estimate, Leak, PerLeak, ValveEstimates, ValveFilter, ValveSample, ValveUpdate};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::trace::{Record, TraceReader};
 use pitchleak::valve::{Calibration, Calibrator, LeaksThen};
@@ -52,7 +50,9 @@ fn later(cylinder: &ValveCylinder) -> ValveCylinder {
         *clearance_lpm = (*clearance_lpm + walk(0.1 * 0.057)).max(0.0);
     }
     later.seed += 50_000;
-    if let Some(seconds) = std::env::var("SECONDS_").ok().and_then(|s| s.parse::<f64>().ok()) { later.valve.null_drift = walk(0.001) * (seconds / 600.0).sqrt(); }
+    if let Some(seconds) = std::env::var("SECONDS_").ok().and_then(|s| s.parse::<f64>().ok()) {
+        later.valve.null_drift = walk(0.001) * (seconds / 600.0).sqrt();
+    }
     later
 }
 
@@ -61,7 +61,12 @@ fn filter(calibration: &Calibration, rig: &Rig) -> ValveFilter<f64> {
     ValveFilter::new(&rig.cylinder, &rig.fluid, &valve, &noise, 0.5).expect("a filter")
 }
 
-fn feed(filter: &mut ValveFilter<f64>, text: &str, rig: &Rig, mut each: impl FnMut(f64, &ValveFilter<f64>, bool)) {
+fn feed(
+    filter: &mut ValveFilter<f64>,
+    text: &str,
+    rig: &Rig,
+    mut each: impl FnMut(f64, &ValveFilter<f64>, bool),
+) {
     let mut reader = reader(text, rig);
     let (mut record, mut last_s) = (Record::default(), f64::NAN);
     while reader.next_record(&mut record).expect("a row") {
@@ -112,17 +117,26 @@ fn a_calibrated_valve_on_a_controller() {
             let rig = rig(&format!("calibration = {:?}", file.display().to_string()));
             let report =
                 replay(&mut reader(&text, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report");
-            let host = report.estimates.leaks().map(|one| Estimate { value: one.value, std: one.std.unwrap_or(f64::NAN) });
+            let host = report
+                .estimates
+                .leaks()
+                .map(|one| Estimate { value: one.value, std: one.std.unwrap_or(f64::NAN) });
             (later.leaks_lpm, edge, host, changes)
         };
         let all: Vec<([f64; 3], ValveEstimates<f64>, PerLeak<Estimate<f64>>, u32)> =
             (0..runs()).into_par_iter().map(one).collect();
         println!("wind {wind}: changes {:?}", all.iter().map(|one| one.3).collect::<Vec<_>>());
         let nis = all.iter().map(|one| one.1.normalised_innovation).sum::<f64>() / all.len() as f64;
-        println!("  noise {nis:.3}; explained {} of {}", all.iter().filter(|one| one.1.is_explained).count(), all.len());
+        println!(
+            "  noise {nis:.3}; explained {} of {}",
+            all.iter().filter(|one| one.1.is_explained).count(),
+            all.len()
+        );
         for leak in Leak::ALL {
-            let error = |found: Estimate<f64>, true_lpm: f64| (found.value / UNIT - true_lpm, found.std / UNIT);
-            let edge: Vec<_> = all.iter().map(|one| error(one.1.leaks_m3spa[leak], one.0[leak as usize])).collect();
+            let error =
+                |found: Estimate<f64>, true_lpm: f64| (found.value / UNIT - true_lpm, found.std / UNIT);
+            let edge: Vec<_> =
+                all.iter().map(|one| error(one.1.leaks_m3spa[leak], one.0[leak as usize])).collect();
             let host: Vec<_> = all.iter().map(|one| error(one.2[leak], one.0[leak as usize])).collect();
             spread(&format!("  {leak:?} controller"), &edge);
             spread(&format!("  {leak:?} host      "), &host);
@@ -148,23 +162,43 @@ fn dump() {
         let mut out: Vec<f64> = Vec::new();
         out.extend(valve.mean);
         out.extend(valve.covariance);
-        out.extend([valve.rated_flow_m3s, valve.rated_drop_pa, valve.tank_pa, valve.hysteresis, valve.gain_drift, valve.lap_drift, valve.clearance_drift_m3spa]);
+        out.extend([
+            valve.rated_flow_m3s,
+            valve.rated_drop_pa,
+            valve.tank_pa,
+            valve.hysteresis,
+            valve.gain_drift,
+            valve.lap_drift,
+            valve.clearance_drift_m3spa,
+        ]);
         out.extend([noise.position_m, noise.pressure_pa, noise.spool, noise.supply_pa]);
         let folder_ = tempfile::tempdir().expect("a folder");
         let file = folder_.path().join("valve.toml");
         std::fs::write(&file, found.to_toml().expect("a file")).expect("written");
         let rig = rig(&format!("calibration = {:?}", file.display().to_string()));
-        let report = replay(&mut reader(&text, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report");
+        let report =
+            replay(&mut reader(&text, &rig), &rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report");
         let host = report.estimates.leaks();
         out.push(report.valve.as_ref().map_or(0.0, |valve| valve.scatter));
         for leak in Leak::ALL {
-            out.extend([host[leak].value, host[leak].std.unwrap_or(f64::NAN), later.leaks_lpm[leak as usize]]);
+            out.extend([
+                host[leak].value,
+                host[leak].std.unwrap_or(f64::NAN),
+                later.leaks_lpm[leak as usize],
+            ]);
         }
         let mut rows = reader(&text, &sheet);
         let (mut record, mut last_s) = (Record::default(), f64::NAN);
         while rows.next_record(&mut record).expect("a row") {
             let (sample, valve) = (record.sample, record.valve.expect("a spool"));
-            out.extend([record.t_s - last_s, sample.x_m, sample.pa_pa, sample.pb_pa, valve.spool, valve.supply_pa.expect("a supply")]);
+            out.extend([
+                record.t_s - last_s,
+                sample.x_m,
+                sample.pa_pa,
+                sample.pb_pa,
+                valve.spool,
+                valve.supply_pa.expect("a supply"),
+            ]);
             last_s = record.t_s;
         }
         let bytes: Vec<u8> = out.into_iter().flat_map(f64::to_le_bytes).collect();

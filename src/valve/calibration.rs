@@ -1,10 +1,10 @@
 //! A valve's calibration: what traces of this rig say of its edges, kept in a file for later traces.
 
-use super::meter::ValveMeter;
 use super::equations::Known;
+use super::meter::ValveMeter;
 use super::unknowns::{
-    Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAK_UNIT_M3SPA, LEAKS, UNKNOWNS, Unknowns,
-    clearance_std,
+    Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAK_UNIT_M3SPA, LEAKS, UNKNOWNS,
+    Unknowns, clearance_std,
 };
 use crate::report::{ReplayReport, Status};
 use crate::rig::{Rig, ValveSheet};
@@ -302,7 +302,8 @@ impl Calibration {
     /// has no valve.
     pub fn for_controller(&self, rig: &Rig) -> Option<(ValveCalibration<f64>, ValveNoise<f64>)> {
         let sheet = rig.valve.as_ref()?;
-        let [position_m, pressure_pa, _, spool, supply_pa] = Known::of(rig, sheet).variances.map(f64::sqrt).into();
+        let [position_m, pressure_pa, _, spool, supply_pa] =
+            Known::of(rig, sheet).variances.map(f64::sqrt).into();
         let calibration = ValveCalibration {
             mean: self.mean.as_slice().try_into().ok()?,
             covariance: self.covariance.concat().try_into().ok()?,

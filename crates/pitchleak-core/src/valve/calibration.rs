@@ -61,7 +61,9 @@ impl core::fmt::Display for ValveError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Cylinder(error) => error.fmt(f),
-            Self::Calibration => f.write_str("the valve's calibration is none that `pitchleak calibrate` wrote"),
+            Self::Calibration => {
+                f.write_str("the valve's calibration is none that `pitchleak calibrate` wrote")
+            }
             Self::Noise => f.write_str("noise of the sensors and the longest step must be positive"),
         }
     }

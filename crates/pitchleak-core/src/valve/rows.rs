@@ -19,9 +19,7 @@
 //! With G = ∂g/∂mean and D = ∂ḡ/∂reading, block k stands in hat k as −G_k m + D r and in hat k−1 as G_k−1 m + D f.
 
 use super::calibration::{ValveCalibration, ValveNoise};
-use super::edges::{
-    BY_ROUNDING, BY_SATURATION, BY_SUPPLY, BY_TANK, DRAWN, FLOWS, PRESSURES, SLOPES,
-};
+use super::edges::{BY_ROUNDING, BY_SATURATION, BY_SUPPLY, BY_TANK, DRAWN, FLOWS, PRESSURES, SLOPES};
 use super::filter::Row;
 use super::hats::{Block, Hat};
 use super::unknowns::{
@@ -156,7 +154,8 @@ impl<T: Real> Equations<T> {
     /// g of the calibrated valve, without leaks, less what the piston sweeps.
     fn at_calibration(&self, row: &Row<T>) -> T {
         let [lag, hysteresis, droop] = self.late;
-        let mut sum = self.kappa_mean * row[KAPPA] + lag * row[LAG] + hysteresis * row[HYSTERESIS] + droop * row[DROOP];
+        let mut sum =
+            self.kappa_mean * row[KAPPA] + lag * row[LAG] + hysteresis * row[HYSTERESIS] + droop * row[DROOP];
         for edge in 0..4 {
             sum += self.gains[edge] * row[GAINS + edge] + self.clearances[edge] * row[CLEARANCES + edge];
         }
@@ -191,7 +190,8 @@ impl<T: Real> Equations<T> {
             let clearance = self.leak * (self.clearances[2 * chamber] + self.clearances[2 * chamber + 1]);
             slope(BY_SUPPLY + chamber) + slope(BY_TANK + chamber) + clearance + leak + internal
         };
-        let supply = |chamber: usize| -(slope(BY_SUPPLY + chamber) + self.leak * self.clearances[2 * chamber]);
+        let supply =
+            |chamber: usize| -(slope(BY_SUPPLY + chamber) + self.leak * self.clearances[2 * chamber]);
         let by_reading = [
             [T::zero(); 2],
             self.pair(own(0, a), -internal),

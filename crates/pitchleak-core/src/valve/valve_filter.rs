@@ -296,8 +296,11 @@ impl<T: Real> ValveFilter<T> {
             let own = Estimate { value: self.filter.step[at], std: self.filter.variance(at).sqrt() * wide };
             own.scaled(unit)
         };
-        let leaks_m3spa =
-            PerLeak { internal: leak(0, wide_internal), external_a: leak(1, wide_a), external_b: leak(2, wide_b) };
+        let leaks_m3spa = PerLeak {
+            internal: leak(0, wide_internal),
+            external_a: leak(1, wide_a),
+            external_b: leak(2, wide_b),
+        };
         let sizes_pa = self.pressures.means().sizes_pa;
         let kappa = Estimate {
             value: self.kappa_mean + self.filter.step[KAPPA],
