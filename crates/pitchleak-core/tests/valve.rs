@@ -1,8 +1,9 @@
 //! Leaks by a calibrated valve's flows, sample by sample, against a plant that shares no code with the program.
 
 use pitchleak_core::{
-    AlarmSettings, AlarmState, Cylinder, Fluid, Leak, LeakDetector, PerLeak, Real, VALVE_COVARIANCES,
-    VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveFilter, ValveNoise, ValveSample, ValveUpdate,
+    AlarmSettings, AlarmState, Cylinder, Estimate, Fluid, Leak, LeakDetector, PerLeak, Real,
+    VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveFilter, ValveNoise, ValveSample,
+    ValveUpdate,
 };
 use pitchleak_testkit::valve::{TrueValve, ValveCylinder};
 use pitchleak_testkit::{coverage_bounds, white_noise};
@@ -29,7 +30,7 @@ const GAIN_DRIFT: f64 = 0.03;
 const LAP_DRIFT: f64 = 0.001;
 const CLEARANCE_DRIFT_LPM: f64 = 0.1 * 0.057;
 
-/// Cylinders of each wind: six, or `PITCHLEAK_RUNS`; others with `PITCHLEAK_SEED`.
+/// What the environment asks for, else as usual: `PITCHLEAK_RUNS` cylinders of each kind, from `PITCHLEAK_SEED` on.
 fn asked(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
@@ -165,127 +166,191 @@ fn feed<T: Real>(
 /// What `of` makes of each seed, on all processors.
 fn of_all<V: Send>(seeds: u64, of: impl Fn(u64) -> V + Sync) -> Vec<V> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
-    let mut all: Vec<(u64, V)> = std::thread::scope(|scope| {
-        let part = |first| {
-            let of = &of;
-            scope.spawn(move || {
-                (first..seeds).step_by(threads as usize).map(|seed| (seed, of(seed))).collect::<Vec<_>>()
-            })
+    let of = &of;
+    std::thread::scope(|scope| {
+        let part = |first: u64| {
+            scope.spawn(move || (first..seeds).step_by(threads as usize).map(of).collect::<Vec<_>>())
         };
         let parts: Vec<_> = (0..threads).map(part).collect();
         parts.into_iter().flat_map(|part| part.join().expect("no panic")).collect()
-    });
-    all.sort_by_key(|(seed, _)| *seed);
-    all.into_iter().map(|(_, value)| value).collect()
+    })
 }
 
-/// An error and its standard deviation, L/min at 50 bar.
-type Error = (f64, f64);
+/// Error and standard deviation of each leak at the end of a trace, L/min at 50 bar, …
+type Errors = PerLeak<(f64, f64)>;
+
+fn errors<T: Real>(filter: &ValveFilter<T>, leaks_lpm: [f64; 3]) -> Errors {
+    let found = filter.estimates().leaks_m3spa;
+    PerLeak::from_fn(|leak| {
+        let Estimate { value, std } = found[leak];
+        (value.as_f64() / UNIT - leaks_lpm[leak as usize], std.as_f64() / UNIT)
+    })
+}
 
 fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().map(|value| value * value).sum::<f64>() / values.count() as f64).sqrt()
 }
 
+/// … of cylinders in four winds that leak in any way, or not, a day after their calibration.
 #[test]
-fn intervals_hold_and_are_as_narrow_as_those_of_a_whole_window() {
+fn intervals_of_a_minute_hold_and_are_narrow() {
     let (runs, first) = (asked("PITCHLEAK_RUNS", 6), asked("PITCHLEAK_SEED", 10_000));
     let one = |index: u64| {
         let (wind, seed) = (WINDS[(index % 4) as usize], first + index);
-        let leak = (index / 4 % 3) as usize;
+        let (leak, size) = ((index / 4 % 3) as usize, [0.02, 0.0, 0.1][(index / 12 % 3) as usize]);
         let cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(seed) };
-        let later = drifted(&cylinder, 60.0).leaking(leak, [0.02, 0.0, 0.1][(index / 12 % 3) as usize]);
+        let later = drifted(&cylinder, 60.0).leaking(leak, size);
         let mut filter = filter::<f64>(&calibration(&cylinder, seed));
         let mut changes = 0;
         feed(&mut filter, &rows(&later.trace(60.0, 100.0, 3e-3)), |_, _, changed| {
-            changes += u32::from(changed)
+            changes += u32::from(changed);
         });
         let found = filter.estimates();
-        let errors = PerLeak::from_fn(|leak| {
-            let estimate = found.leaks_m3spa[leak];
-            (estimate.value / UNIT - later.leaks_lpm[leak as usize], estimate.std / UNIT)
-        });
-        (errors, found.is_explained, found.normalised_innovation, changes)
+        assert!(found.is_explained && changes == 0, "{seed}: {found:?}");
+        (errors(&filter, later.leaks_lpm), found.normalised_innovation)
     };
-    let all: Vec<(PerLeak<Error>, bool, f64, u32)> = of_all(4 * runs, one);
-    let explained = all.iter().filter(|one| one.1).count();
-    let noise = all.iter().map(|one| one.2).sum::<f64>() / all.len() as f64;
-    println!(
-        "explained {explained} of {}; noise {noise:.3}; changes {}",
-        all.len(),
-        all.iter().map(|one| one.3).sum::<u32>()
-    );
-    for leak in Leak::ALL {
-        let errors: Vec<Error> = all.iter().map(|one| one.0[leak]).collect();
-        let held = errors.iter().filter(|(error, std)| error.abs() <= 1.96 * std).count() as f64
-            / errors.len() as f64;
-        let error = rms(errors.iter().map(|error| error.0));
-        let bound = rms(errors.iter().map(|error| error.1));
-        let z = errors.iter().map(|(error, std)| error / std).sum::<f64>() / errors.len() as f64;
-        for w in 0..4 {
-            let e: Vec<_> = errors.iter().enumerate().filter(|(i, _)| i % 4 == w).map(|(_, e)| *e).collect();
-            println!(
-                "   wind {w} rms {:.5} std {:.5} bias {:.2}",
-                rms(e.iter().map(|e| e.0)),
-                rms(e.iter().map(|e| e.1)),
-                e.iter().map(|e| e.0 / e.1).sum::<f64>() / e.len() as f64
-            );
-        }
-        println!("{}: rms {error:.5}, std {bound:.5}, held {held:.3}, bias {z:.2} std", leak.label());
-        assert!(held >= coverage_bounds(0.95, 4 * runs)[0], "{held}");
+    let all: Vec<(Errors, f64)> = of_all(4 * runs, one);
+    let noise = all.iter().map(|one| one.1).sum::<f64>() / all.len() as f64;
+    // A little below 1: the zero of this valve walks less evenly than is declared.
+    assert!((0.9..1.05).contains(&noise), "{noise}");
+    for (leak, most) in [(Leak::Internal, 0.0025), (Leak::ExternalA, 0.009), (Leak::ExternalB, 0.009)] {
+        let of_leak = || all.iter().map(move |one| one.0[leak]);
+        let held =
+            of_leak().filter(|(error, std)| error.abs() <= 1.96 * std).count() as f64 / all.len() as f64;
+        let [error, bound] = [rms(of_leak().map(|one| one.0)), rms(of_leak().map(|one| one.1))];
+        println!("{}: rms {error:.5} of {bound:.5} L/min, held {held:.3} of {}", leak.label(), all.len());
+        assert!(held >= coverage_bounds(0.95, 4 * runs)[0] && error < most, "{leak:?}: {held} {error}");
     }
 }
 
-/// Alarms of a trace, raised while the valve explains it.
+/// A leak that sets in is told as it is, the change of an external one far better than what the clearance may have become.
+#[test]
+fn a_leak_that_sets_in_is_told_within_a_minute() {
+    for (leak, size, within) in
+        [(Leak::Internal, 0.05, 0.005), (Leak::ExternalA, 0.02, 0.003), (Leak::ExternalB, 0.5, 0.005)]
+    {
+        let found = of_all(asked("PITCHLEAK_RUNS", 2), |seed| {
+            let cylinder = ValveCylinder::drawn(300 + seed);
+            let mut later = drifted(&cylinder, 180.0).leaking(leak as usize, size);
+            later.leaks_from_s = 93.0;
+            let mut filter = filter::<f64>(&calibration(&cylinder, seed));
+            let (mut before, mut changes) = (0.0, Vec::new());
+            feed(&mut filter, &rows(&later.trace(153.0, 100.0, 3e-3)), |t_s, filter, changed| {
+                if t_s < later.leaks_from_s {
+                    before = filter.estimates().leaks_m3spa[leak].value;
+                }
+                changes.extend(changed.then_some(t_s - later.leaks_from_s));
+            });
+            let found = filter.estimates();
+            assert!(found.is_explained, "{found:?}");
+            ((found.leaks_m3spa[leak].value - before) / UNIT, changes)
+        });
+        println!("{} of {size} L/min: {found:.4?}", leak.label());
+        for (change, after_s) in found {
+            assert!((change - size).abs() < within, "{leak:?}: {change} of {size}");
+            assert!(matches!(after_s[..], [after_s] if (0.0..30.0).contains(&after_s)), "{after_s:?}");
+        }
+    }
+}
+
+/// Alarms of a trace, raised while the valve explains it, and how often it did of all renewals.
 fn alarms(filter: &mut ValveFilter<f64>, rows: &[(f64, ValveSample<f64>)]) -> (Vec<(f64, Leak)>, [u32; 2]) {
     let mut detector = LeakDetector::new(AlarmSettings::default());
-    let (mut raised, mut counts) = (Vec::new(), [0; 2]);
+    let (mut raised, mut explained) = (Vec::new(), [0; 2]);
     feed(filter, rows, |t_s, filter, _| {
         let found = filter.estimates();
-        counts[usize::from(found.is_explained)] += 1;
+        explained[1] += 1;
         if found.is_explained {
+            explained[0] += 1;
             let changes = detector.update(0.25, &found.mean_leaks_m3s);
-            raised.extend(
-                changes
-                    .iter()
-                    .filter(|(_, change)| **change == Some(AlarmState::Raised))
-                    .map(|(leak, _)| (t_s, leak)),
-            );
+            let is_raised = |change: &Option<AlarmState>| *change == Some(AlarmState::Raised);
+            raised
+                .extend(changes.iter().filter(|(_, change)| is_raised(change)).map(|(leak, _)| (t_s, leak)));
         }
     });
-    (raised, counts)
+    (raised, explained)
 }
 
 #[test]
 fn what_befalls_a_valve_later_raises_no_alarm() {
     type Flaw = fn(&mut ValveCylinder);
-    let flaws: [(&str, Flaw); 7] = [
-        ("none", |_| {}),
-        ("null drift of 0.5 %", |one| one.valve.null_drift = 0.005),
-        ("hysteresis of 1 %", |one| one.valve.hysteresis = 0.01),
-        ("supply droops by 3 bar", |one| one.valve.droop_pa = 3e5),
-        ("pressure A 10 ms late", |one| one.pressure_lag_s = 0.01),
-        ("accumulator at A", |one| one.accumulator_m3pa = 2e-13),
-        ("spool 10 ms late", |one| one.valve.spool_lag_s = 0.01),
+    // Whether it is doubted in all windy traces.
+    let flaws: [(&str, bool, Flaw); 7] = [
+        ("drift as declared", false, |_| {}),
+        ("null drift of 0.5 %", false, |one| one.valve.null_drift = 0.005),
+        ("supply droops by 3 bar", false, |one| one.valve.droop_pa = 3e5),
+        ("pressure A 10 ms late", false, |one| one.pressure_lag_s = 0.01),
+        ("spool 10 ms late", false, |one| one.valve.spool_lag_s = 0.01),
+        ("hysteresis of 1 %", true, |one| one.valve.hysteresis = 0.01),
+        ("accumulator at A", true, |one| one.accumulator_m3pa = 2e-13),
     ];
-    for (name, flaw) in flaws {
-        let runs = asked("PITCHLEAK_RUNS", 2);
-        let found = of_all(runs, |seed| {
-            let cylinder =
-                ValveCylinder { wind: WINDS[(seed % 4) as usize], ..ValveCylinder::drawn(25_000 + seed) };
-            let mut later = drifted(&cylinder, 240.0);
+    for (name, is_doubted, flaw) in flaws {
+        let found = of_all(asked("PITCHLEAK_RUNS", 2), |seed| {
+            let wind = WINDS[(seed % 4) as usize];
+            let cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(25_000 + seed) };
+            let mut later = drifted(&cylinder, 180.0);
             flaw(&mut later);
             let mut filter = filter::<f64>(&calibration(&cylinder, seed));
-            let (raised, counts) = alarms(&mut filter, &rows(&later.trace(240.0, 100.0, 3e-3)));
-            let end = filter.estimates();
-            (
-                raised,
-                counts,
-                end.mean_leaks_m3s.map(|one| (one.value * 60e3, one.std * 60e3)),
-                end.normalised_innovation,
-            )
+            alarms(&mut filter, &rows(&later.trace(180.0, 100.0, 3e-3)))
         });
-        for one in &found {
-            println!("{name}: {one:?}");
+        println!("{name}: {found:?}");
+        for (raised, [explained, renewals]) in found {
+            assert!(raised.is_empty(), "{name}: {raised:?}");
+            let is_right = if is_doubted { explained == 0 } else { explained * 2 > renewals };
+            assert!(is_right, "{name}: {explained} of {renewals}");
         }
     }
+}
+
+#[test]
+fn single_precision_tells_what_double_does_in_three_kilobytes() {
+    assert!(size_of::<ValveFilter<f32>>() + size_of::<LeakDetector<f32>>() <= 3072);
+    let cylinder = ValveCylinder::drawn(7).leaking(0, 0.3);
+    let rows = rows(&drifted(&cylinder, 60.0).trace(60.0, 100.0, 3e-3));
+    let mut single = filter::<f32>(&calibration(&cylinder, 7));
+    let mut double = filter::<f64>(&calibration(&cylinder, 7));
+    feed(&mut single, &rows, |_, _, _| {});
+    feed(&mut double, &rows, |_, _, _| {});
+    let [single, double] = [errors(&single, [0.0; 3]), errors(&double, [0.0; 3])];
+    for (leak, (value, std)) in double {
+        assert!((single[leak].0 - value).abs() < 0.01 * std, "{leak:?}: {single:?} {double:?}");
+    }
+}
+
+/// A pause, a reading that is none, and one that no cylinder gives.
+#[test]
+fn gaps_and_nonsense_are_left_out() {
+    let cylinder = ValveCylinder::drawn(8).leaking(1, 0.1);
+    let mut rows = rows(&cylinder.trace(120.0, 100.0, 3e-3));
+    rows[5000].0 = 900.0;
+    let mut filter = filter::<f64>(&calibration(&cylinder, 8));
+    let nonsense = [
+        ValveSample { pa_pa: f64::NAN, ..rows[0].1 },
+        ValveSample { spool: 3.0, ..rows[0].1 },
+        ValveSample { ps_pa: f64::INFINITY, ..rows[0].1 },
+        ValveSample { x_m: 1.0, ..rows[0].1 },
+    ];
+    assert!(nonsense.iter().all(|one| filter.update(0.01, one) == ValveUpdate::Rejected));
+    feed(&mut filter, &rows[..5000], |_, _, _| {});
+    assert_eq!(filter.update(rows[5000].0, &rows[5000].1), ValveUpdate::Started);
+    feed(&mut filter, &rows[5001..], |_, _, changed| assert!(!changed));
+    for (leak, (error, std)) in errors(&filter, cylinder.leaks_lpm) {
+        assert!(error.abs() < 4.0 * std && std < 0.01, "{leak:?}: {error} {std}");
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let sound = calibration::<f64>(&ValveCylinder::drawn(9), 9);
+    let new = |calibration: &ValveCalibration<f64>, noise: &ValveNoise<f64>, max_step_s: f64| {
+        ValveFilter::new(&geometry(), &fluid(), calibration, noise, max_step_s).err()
+    };
+    assert_eq!(new(&sound, &noise(), 0.5), None);
+    let mut broken = sound;
+    broken.covariance[7] = f64::NAN;
+    assert_eq!(new(&broken, &noise(), 0.5), Some(ValveError::Calibration));
+    let no_drop = ValveCalibration { rated_drop_pa: 0.0, ..sound };
+    assert_eq!(new(&no_drop, &noise(), 0.5), Some(ValveError::Calibration));
+    assert_eq!(new(&sound, &ValveNoise { spool: 0.0, ..noise() }, 0.5), Some(ValveError::Noise));
+    assert_eq!(new(&sound, &noise(), f64::NAN), Some(ValveError::Noise));
 }

@@ -122,21 +122,22 @@ impl<T: Real> Edges<T> {
     #[inline(always)]
     fn passing(&self, s: T, spool_square: T, drop: T) -> Passing<T> {
         let half = T::lit(0.5);
-        let root = (s * s + self.rounding * self.rounding).sqrt();
-        let per_root = root.recip();
-        let open = half * (root + s);
+        let square = s * s + self.rounding * self.rounding;
+        let per_root = square.inverse_root();
+        let open = half * (square * per_root + s);
         let full = T::one() - self.saturation * spool_square;
         let (own, laminar) = (drop * drop, self.laminar * self.laminar);
-        let square = own + laminar;
-        let per_drop = (square * square.sqrt().sqrt()).recip();
-        let metered = drop * square * per_drop;
+        let per_size = (own + laminar).inverse_root();
+        // (Δ² + Δ_l²)^(−¼).
+        let metering = per_size * per_size.inverse_root();
+        let metered = drop * metering;
         let by_s = full * metered;
         Passing {
             flow: open * by_s,
             by_opening: open * per_root * by_s,
             by_rounding: half * self.rounding * per_root * by_s,
             by_saturation: -open * spool_square * metered,
-            by_drop: open * full * (half * own + laminar) * per_drop,
+            by_drop: open * full * (half * own + laminar) * per_size * per_size * metering,
         }
     }
 }

@@ -7,13 +7,24 @@
 //! ```
 //!
 //! So both continuity equations hold between two means where leaks and flows are integrated with a weight that rises over one block
-//! and falls over the next: a weak form with linear test functions. It is exact for steps of any length.
+//! and falls over the next: a weak form with linear test functions. It is exact for steps of any length: each sample stands in half of
+//! the step before it, of weight m/N, and in half of the one after it, of weight (m + 1)/N.
 
-use super::edges::{SUMS, Scaled};
+use super::edges::SUMS;
 use crate::Real;
 
 /// x, P_A, P_B, spool.
 pub(super) const MEANS: usize = 4;
+
+/// A sample whose next step is not known yet.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Sampled<T> {
+    pub rates: [T; SUMS],
+    pub read: [T; MEANS],
+    /// Step before it, s; zero after a gap.
+    pub before_s: T,
+}
 
 /// Samples of one block.
 #[derive(Clone, Copy, Debug)]
@@ -22,10 +33,10 @@ pub(super) struct Block<T> {
     pub count: T,
     /// Of its steps, s.
     pub time_s: T,
-    /// Σ I_m.
+    /// Integrals over its samples' halves of steps, …
     pub sums: [T; SUMS],
-    /// Σ (N − m) I_m.
-    falling: [T; SUMS],
+    /// … and those with weights that rise by one with each sample.
+    rising: [T; SUMS],
     means: [T; MEANS],
 }
 
@@ -43,21 +54,22 @@ pub(super) struct Hat<T> {
 impl<T: Real> Block<T> {
     pub fn new() -> Self {
         let none = T::zero();
-        Self { count: none, time_s: none, sums: [none; SUMS], falling: [none; SUMS], means: [none; MEANS] }
+        Self { count: none, time_s: none, sums: [none; SUMS], rising: [none; SUMS], means: [none; MEANS] }
     }
 
-    /// Goes on to a reading, `dt_s` after the one before, where `rates` are their own and `before` those of that one.
-    pub fn add(&mut self, dt_s: T, before: &[T; SUMS], rates: &[T; SUMS], reading: &Scaled<T>) {
-        let half = T::lit(0.5) * dt_s;
+    /// Adds a sample with the steps before and after it, s, and its rates.
+    pub fn add(&mut self, sample: &Sampled<T>, after_s: T) {
+        let half = T::lit(0.5);
+        let [before_s, after_s] = [half * sample.before_s, half * after_s];
+        let whole = before_s + after_s;
+        let rising = self.count * whole + after_s;
         self.count += T::one();
-        self.time_s += dt_s;
-        let (sums, falling) = (self.sums.iter_mut(), self.falling.iter_mut());
-        for ((sum, falling), (was, is)) in sums.zip(falling).zip(before.iter().zip(rates)) {
-            *sum += half * (*was + *is);
-            *falling += *sum;
+        self.time_s += whole;
+        for ((sum, ramp), rate) in self.sums.iter_mut().zip(&mut self.rising).zip(&sample.rates) {
+            *sum += whole * *rate;
+            *ramp += rising * *rate;
         }
-        let read = [reading.x_m, reading.pa, reading.pb, reading.spool];
-        self.means.iter_mut().zip(read).for_each(|(mean, value)| *mean += value);
+        self.means.iter_mut().zip(sample.read).for_each(|(mean, value)| *mean += value);
     }
 
     /// Mean of the spool, a share of its stroke.
@@ -70,9 +82,11 @@ impl<T: Real> Hat<T> {
     pub fn over(first: &Block<T>, last: &Block<T>) -> Self {
         let half = T::lit(0.5);
         let (per_first, per_last) = (first.count.recip(), last.count.recip());
-        let mut sums = first.sums;
-        for ((sum, before), after) in sums.iter_mut().zip(&first.falling).zip(&last.falling) {
-            *sum += *after * per_last - *before * per_first;
+        let mut sums = [T::zero(); SUMS];
+        for ((sum, before), (falls, ramp)) in
+            sums.iter_mut().zip(&first.rising).zip(last.sums.iter().zip(&last.rising))
+        {
+            *sum = *before * per_first + *falls - *ramp * per_last;
         }
         let mut rise = last.means;
         for (rise, before) in rise.iter_mut().zip(&first.means) {

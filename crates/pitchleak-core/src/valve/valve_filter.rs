@@ -1,7 +1,7 @@
 use super::calibration::{LEAK_SIZE, ValveCalibration, ValveError, ValveNoise};
-use super::edges::{Edges, PRESSURES, SUMS, Scaled};
+use super::edges::{Edges, PRESSURES, Scaled};
 use super::filter::Filter;
-use super::hats::{Block, Hat};
+use super::hats::{Block, Hat, Sampled};
 use super::rows::Equations;
 use super::unknowns::{KAPPA, LAPS, LEAK_UNIT_M3SPA, VALVE_UNKNOWNS as N};
 use super::watch::Watch;
@@ -95,7 +95,7 @@ pub struct ValveFilter<T> {
     kappa_mean: T,
     stroke_m: T,
     max_step_s: T,
-    last: Option<[T; SUMS]>,
+    last: Option<Sampled<T>>,
     block: Block<T>,
     before: Option<Block<T>>,
     white: Option<Whitening<T>>,
@@ -128,7 +128,7 @@ impl<T: Real> ValveFilter<T> {
         fluid.check()?;
         calibration.check()?;
         noise.check()?;
-        if max_step_s <= T::zero() {
+        if !max_step_s.is_finite() || max_step_s <= T::zero() {
             return Err(ValveError::Noise);
         }
         let growth_ps = calibration.growth_ps(fluid, T::lit(LEAK_UNIT_M3SPA));
@@ -171,17 +171,25 @@ impl<T: Real> ValveFilter<T> {
             spool: sample.spool,
             ps: sample.ps_pa * per_drop,
         };
-        let rates = self.edges.at(&reading);
+        let mut now = Sampled {
+            rates: self.edges.at(&reading),
+            read: [reading.x_m, reading.pa, reading.pb, reading.spool],
+            before_s: T::zero(),
+        };
         let follows = dt_s > T::zero() && dt_s <= self.max_step_s;
-        let Some(before) = self.last.replace(rates).filter(|_| follows) else {
+        let Some(last) = self.last.filter(|_| follows) else {
             self.interrupt(dt_s);
+            self.last = Some(now);
             return ValveUpdate::Started;
         };
+        self.block.add(&last, dt_s);
+        now.before_s = dt_s;
+        self.last = Some(now);
         let is_long = self.block.time_s + T::lit(0.5) * dt_s >= T::lit(BLOCK_S);
         if is_long && self.block.count >= T::lit(LEAST_SAMPLES) {
             self.close_block();
+            return ValveUpdate::Accepted;
         }
-        self.block.add(dt_s, &before, &rates, &reading);
         self.work()
     }
 
