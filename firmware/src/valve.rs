@@ -17,7 +17,7 @@ impl Estimator for Valve {
         let mean = file.read::<VALVE_UNKNOWNS>()?;
         let covariance = file.read::<VALVE_COVARIANCES>()?;
         let [rated_flow_m3s, rated_drop_pa, tank_pa, hysteresis] = file.read()?;
-        let [gain_drift, lap_drift, clearance_drift_m3spa] = file.read()?;
+        let [null_leak, gain_drift, lap_drift, null_leak_drift] = file.read()?;
         let [position_m, pressure_pa, spool, supply_pa] = file.read()?;
         let calibration = ValveCalibration {
             mean,
@@ -26,9 +26,10 @@ impl Estimator for Valve {
             rated_drop_pa,
             tank_pa,
             hysteresis,
+            null_leak,
             gain_drift,
             lap_drift,
-            clearance_drift_m3spa,
+            null_leak_drift,
         };
         let noise = ValveNoise { position_m, pressure_pa, spool, supply_pa };
         let filter = ValveFilter::new(&rig.cylinder, &rig.fluid, &calibration, &noise, 0.5).ok()?;

@@ -3,8 +3,7 @@
 use super::equations::Known;
 use super::meter::ValveMeter;
 use super::unknowns::{
-    Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAK_UNIT_M3SPA, LEAKS, UNKNOWNS,
-    Unknowns, clearance_std,
+    Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAKS, UNKNOWNS, Unknowns,
 };
 use crate::report::{ReplayReport, Status};
 use crate::rig::{Rig, ValveSheet};
@@ -311,9 +310,10 @@ impl Calibration {
             rated_drop_pa: sheet.rated_drop_pa,
             tank_pa: sheet.tank_pa,
             hysteresis: sheet.hysteresis,
+            null_leak: sheet.null_leak,
             gain_drift: sheet.drift.gain,
             lap_drift: sheet.drift.lap,
-            clearance_drift_m3spa: sheet.drift.null_leak * clearance_std(sheet) * LEAK_UNIT_M3SPA,
+            null_leak_drift: sheet.drift.null_leak,
         };
         Some((calibration, ValveNoise { position_m, pressure_pa, spool, supply_pa }))
     }

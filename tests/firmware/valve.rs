@@ -54,7 +54,7 @@ fn read(rig: &Rig, calibration: &Calibration, samples: &[(f64, ValveSample<f64>)
     let mut numbers = declared(rig, &rig.sensors());
     numbers.extend(valve.mean.iter().chain(&valve.covariance));
     numbers.extend([valve.rated_flow_m3s, valve.rated_drop_pa, valve.tank_pa, valve.hysteresis]);
-    numbers.extend([valve.gain_drift, valve.lap_drift, valve.clearance_drift_m3spa]);
+    numbers.extend([valve.null_leak, valve.gain_drift, valve.lap_drift, valve.null_leak_drift]);
     numbers.extend([noise.position_m, noise.pressure_pa, noise.spool, noise.supply_pa]);
     for (step_s, ValveSample { x_m, pa_pa, pb_pa, spool, ps_pa }) in samples {
         numbers.extend([*step_s, *x_m, *pa_pa, *pb_pa, *spool, *ps_pa, f64::NAN]);

@@ -28,7 +28,10 @@ const CALIBRATED: [(usize, f64); 10] = [
 const DROOP_STD_BAR: f64 = 0.15;
 const GAIN_DRIFT: f64 = 0.03;
 const LAP_DRIFT: f64 = 0.001;
-const CLEARANCE_DRIFT_LPM: f64 = 0.1 * 0.057;
+const NULL_LEAK: f64 = 0.02;
+const NULL_LEAK_DRIFT: f64 = 0.1;
+/// Of half the leakage of 4 L/min at 35 bar, at 50 bar.
+const CLEARANCE_DRIFT_LPM: f64 = NULL_LEAK_DRIFT * 0.5 * NULL_LEAK * 4.0 * 50.0 / 35.0;
 
 /// What the environment asks for, else as usual: `PITCHLEAK_RUNS` cylinders of each kind, from `PITCHLEAK_SEED` on.
 fn asked(name: &str, usual: u64) -> u64 {
@@ -69,9 +72,10 @@ fn calibration<T: Real>(cylinder: &ValveCylinder, seed: u64) -> ValveCalibration
         rated_drop_pa: T::lit(35e5),
         tank_pa: T::lit(2e5),
         hysteresis: T::zero(),
+        null_leak: T::lit(NULL_LEAK),
         gain_drift: T::lit(GAIN_DRIFT),
         lap_drift: T::lit(LAP_DRIFT),
-        clearance_drift_m3spa: T::lit(CLEARANCE_DRIFT_LPM * UNIT),
+        null_leak_drift: T::lit(NULL_LEAK_DRIFT),
     }
 }
 
@@ -274,17 +278,17 @@ fn alarms(filter: &mut ValveFilter<f64>, rows: &[(f64, ValveSample<f64>)]) -> (V
 #[test]
 fn what_befalls_a_valve_later_raises_no_alarm() {
     type Flaw = fn(&mut ValveCylinder);
-    // Whether it is doubted in all windy traces.
-    let flaws: [(&str, bool, Flaw); 7] = [
-        ("drift as declared", false, |_| {}),
-        ("null drift of 0.5 %", false, |one| one.valve.null_drift = 0.005),
-        ("supply droops by 3 bar", false, |one| one.valve.droop_pa = 3e5),
-        ("pressure A 10 ms late", false, |one| one.pressure_lag_s = 0.01),
-        ("spool 10 ms late", false, |one| one.valve.spool_lag_s = 0.01),
-        ("hysteresis of 1 %", true, |one| one.valve.hysteresis = 0.01),
-        ("accumulator at A", true, |one| one.accumulator_m3pa = 2e-13),
+    // Whether it is explained for most of the time, or never; where winds differ, neither.
+    let flaws: [(&str, Option<bool>, Flaw); 7] = [
+        ("drift as declared", Some(true), |_| {}),
+        ("null drift of 0.5 %", Some(true), |one| one.valve.null_drift = 0.005),
+        ("supply droops by 3 bar", Some(true), |one| one.valve.droop_pa = 3e5),
+        ("pressure A 10 ms late", None, |one| one.pressure_lag_s = 0.01),
+        ("spool 10 ms late", None, |one| one.valve.spool_lag_s = 0.01),
+        ("hysteresis of 1 %", Some(false), |one| one.valve.hysteresis = 0.01),
+        ("accumulator at A", Some(false), |one| one.accumulator_m3pa = 2e-13),
     ];
-    for (name, is_doubted, flaw) in flaws {
+    for (name, is_explained, flaw) in flaws {
         let found = of_all(asked("PITCHLEAK_RUNS", 2), |seed| {
             let wind = WINDS[(seed % 4) as usize];
             let cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(25_000 + seed) };
@@ -296,7 +300,11 @@ fn what_befalls_a_valve_later_raises_no_alarm() {
         println!("{name}: {found:?}");
         for (raised, [explained, renewals]) in found {
             assert!(raised.is_empty(), "{name}: {raised:?}");
-            let is_right = if is_doubted { explained == 0 } else { explained * 2 > renewals };
+            let is_right = match is_explained {
+                Some(true) => explained * 2 > renewals,
+                Some(false) => explained == 0,
+                None => true,
+            };
             assert!(is_right, "{name}: {explained} of {renewals}");
         }
     }

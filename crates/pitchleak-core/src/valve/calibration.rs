@@ -1,7 +1,7 @@
 //! What is known of a valve, its cylinder and its sensors.
 
 use super::unknowns::{
-    CLEARANCES, GAINS, KAPPA, LAPS, LEAKS, ROUNDING, VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
+    CLEARANCES, GAINS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, ROUNDING, VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
 };
 use crate::{CylinderError, Fluid, Real};
 
@@ -24,12 +24,14 @@ pub struct ValveCalibration<T> {
     pub tank_pa: T,
     /// Declared half width of the spool's hysteresis, a share of its stroke; zero for none.
     pub hysteresis: T,
-    /// Change of an edge's gain in a day, 1 σ, a share of it.
+    /// What the whole valve leaks at its middle, a share of the rated flow: `null_leak` of the rig file.
+    pub null_leak: T,
+    /// Change of an edge's gain in a day, 1 σ, a share of it: `drift` of the rig file, as are the two that follow.
     pub gain_drift: T,
     /// Change of each overlap in a day, and of the spool's zero in ten minutes, 1 σ, a share of its stroke.
     pub lap_drift: T,
-    /// Change of an edge's clearance in a day, 1 σ, m³/(s·Pa).
-    pub clearance_drift_m3spa: T,
+    /// Change of an edge's clearance in a day, 1 σ, a share of `null_leak`, of which half passes each edge.
+    pub null_leak_drift: T,
 }
 
 /// White noise of one reading, 1 σ.
@@ -99,7 +101,8 @@ impl<T: Real> ValveCalibration<T> {
         let positive = |value: T| value.is_finite() && value > T::zero();
         let not_negative = |value: T| value.is_finite() && value >= T::zero();
         let sizes = [self.rated_flow_m3s, self.rated_drop_pa, self.mean[KAPPA], self.mean[ROUNDING]];
-        let spreads = [self.hysteresis, self.gain_drift, self.lap_drift, self.clearance_drift_m3spa];
+        let spreads =
+            [self.hysteresis, self.null_leak, self.gain_drift, self.lap_drift, self.null_leak_drift];
         let numbers = self.mean.iter().chain(&self.covariance).chain([&self.tank_pa]);
         let is_possible = sizes.into_iter().all(positive)
             && spreads.into_iter().all(not_negative)
@@ -123,11 +126,12 @@ impl<T: Real> ValveCalibration<T> {
     }
 
     /// What each unknown's variance grows by, 1/s, in its own unit.
-    pub(super) fn growth_ps(&self, fluid: &Fluid<T>, leak_unit_m3spa: T) -> [T; N] {
+    pub(super) fn growth_ps(&self, fluid: &Fluid<T>) -> [T; N] {
         let mut growth = [T::zero(); N];
         let day_s = T::lit(DRIFT_S);
         let oil = fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
-        let clearance = self.clearance_drift_m3spa / leak_unit_m3spa;
+        let half_m3spa = T::lit(0.5) * self.null_leak * self.rated_flow_m3s / self.rated_drop_pa;
+        let clearance = self.null_leak_drift * half_m3spa / T::lit(LEAK_UNIT_M3SPA);
         let leak = T::lit(LEAK_GROWTH * LEAK_GROWTH / HOUR_S);
         for (unknown, (place, mean)) in growth.iter_mut().zip(&self.mean).enumerate() {
             let own = *mean * self.gain_drift;

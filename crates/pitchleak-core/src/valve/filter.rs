@@ -110,15 +110,15 @@ impl<T: Real> Filter<T> {
     /// The unknowns may have moved along a direction, by a step of this variance (Agee and Turner 1972; Bierman 1977, §III.5).
     pub fn widen(&mut self, variance: T, mut direction: [T; N]) {
         let mut left = variance;
-        for j in (0..N).rev() {
-            let own = direction[j];
-            let pivot = self.pivots[j] + left * own * own;
-            if own.is_zero() || pivot <= T::zero() {
+        for (j, pivot) in self.pivots.iter_mut().enumerate().rev() {
+            let own = direction.get(j).copied().unwrap_or_default();
+            let wider = *pivot + left * own * own;
+            if own.is_zero() || wider <= T::zero() {
                 continue;
             }
-            let share = left * own / pivot;
-            left *= self.pivots[j] / pivot;
-            self.pivots[j] = pivot;
+            let share = left * own / wider;
+            left *= *pivot / wider;
+            *pivot = wider;
             let column = self.above.get_mut(start(j)..start(j) + j).unwrap_or_default();
             for (entry, other) in column.iter_mut().zip(&mut direction) {
                 *other -= own * *entry;

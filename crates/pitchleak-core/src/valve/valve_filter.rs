@@ -131,7 +131,7 @@ impl<T: Real> ValveFilter<T> {
         if !max_step_s.is_finite() || max_step_s <= T::zero() {
             return Err(ValveError::Noise);
         }
-        let growth_ps = calibration.growth_ps(fluid, T::lit(LEAK_UNIT_M3SPA));
+        let growth_ps = calibration.growth_ps(fluid);
         let since = ValveCalibration::since(&growth_ps);
         Ok(Self {
             edges: Edges::of(calibration),
