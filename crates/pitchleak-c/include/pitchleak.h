@@ -1,5 +1,5 @@
 /* The leak estimator of pitchleak for C and C++. Made by cbindgen; do not edit. One page shows how to use it:
-   examples/leaks.c. Two threads may not use one estimator at the same time. */
+   examples/leaks.c, without flow meters examples/valve.c. Two threads may not use one estimator at the same time. */
 
 #ifndef PITCHLEAK_H
 #define PITCHLEAK_H

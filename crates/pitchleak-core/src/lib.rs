@@ -55,7 +55,8 @@
 //! - **[Continuity](continuity)**: what a block of samples says of both chambers: integrals, their noise, rows; and channels that
 //!   each have a clock of their own. Whoever fits leaks starts here.
 //! - **Estimators**: [`Rls`], the default, and [`PaperLaw`] with its chain [`PaperEstimator`]. One sample in, at times an
-//!   [`Update`] out, [`Estimates`] with standard deviations whenever they are asked for.
+//!   [`Update`] out, [`Estimates`] with standard deviations whenever they are asked for. [`ValveFilter`] needs no flow meters,
+//!   but a calibrated valve.
 //! - **Detector**: [`LeakDetector`], alarms by a sequential test of those estimates.
 //!
 //! Between samples an estimator can be copied, and with the feature `serde` saved. Channels need not come together:

@@ -84,6 +84,7 @@ impl<T: Real> Edges<T> {
         }
     }
 
+    #[inline(always)]
     pub fn at(&self, reading: &Scaled<T>) -> [T; SUMS] {
         let Scaled { pa, pb, spool: u, .. } = *reading;
         let ps = reading.ps + self.supply;
@@ -138,6 +139,63 @@ impl<T: Real> Edges<T> {
             by_rounding: half * self.rounding * per_root * by_s,
             by_saturation: -open * spool_square * metered,
             by_drop: open * full * (half * own + laminar) * per_size * per_size * metering,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT: Scaled<f64> = Scaled { x_m: 0.1, pa: 1.5, pb: 0.9, spool: 0.01, ps: 2.8 };
+
+    fn edges() -> Edges<f64> {
+        Edges {
+            gains: [0.9, 1.1, 1.05, 0.95],
+            laps: [0.002, -0.004, 0.003, 0.001],
+            rounding: 0.02,
+            saturation: 0.03,
+            supply: 0.01,
+            tank: 0.05,
+            laminar: 0.003,
+        }
+    }
+
+    /// Flows of both chambers without what passes the clearances.
+    fn flows(edges: &Edges<f64>, at: &Scaled<f64>) -> [f64; 2] {
+        let [e1, e2, e3, e4, ..] = edges.at(at);
+        let [k1, k2, k3, k4] = edges.gains;
+        [k1 * e1 - k2 * e2, k3 * e3 - k4 * e4]
+    }
+
+    /// Slopes against differences, on either side of the middle.
+    #[test]
+    fn slopes_are_those_of_the_flows() {
+        let change = |by: &dyn Fn(&mut Edges<f64>, &mut Scaled<f64>, f64), spool: f64| {
+            let [high, low] = [1e-6, -1e-6].map(|step| {
+                let (mut edges, mut at) = (edges(), Scaled { spool, ..AT });
+                by(&mut edges, &mut at, step);
+                flows(&edges, &at)
+            });
+            [0, 1].map(|chamber| (high[chamber] - low[chamber]) / 2e-6)
+        };
+        for spool in [-0.3, -0.01, 0.0, 0.2] {
+            let found = edges().at(&Scaled { spool, ..AT });
+            let check = |expected: [f64; 2], slopes: [f64; 2], what: &str| {
+                for (expected, slope) in expected.into_iter().zip(slopes) {
+                    assert!((expected - slope).abs() < 1e-6, "{what} at {spool}: {expected} {slope}");
+                }
+            };
+            let [o1, o2, o3, o4] = [0, 1, 2, 3].map(|edge| found[SLOPES + edge]);
+            check(change(&|edges, _, step| edges.laps[0] += step, spool), [-o1, 0.0], "lap P–A");
+            check(change(&|edges, _, step| edges.laps[1] += step, spool), [o2, 0.0], "lap A–T");
+            check(change(&|edges, _, step| edges.laps[2] += step, spool), [0.0, -o3], "lap P–B");
+            check(change(&|edges, _, step| edges.laps[3] += step, spool), [0.0, o4], "lap B–T");
+            let pair = |from: usize| [found[from], found[from + 1]];
+            check(change(&|edges, _, step| edges.rounding += step, spool), pair(BY_ROUNDING), "rounding");
+            check(change(&|edges, _, step| edges.saturation += step, spool), pair(BY_SATURATION), "full");
+            check(change(&|edges, _, step| edges.supply += step, spool), pair(BY_SUPPLY), "supply");
+            check(change(&|edges, _, step| edges.tank += step, spool), pair(BY_TANK), "tank");
         }
     }
 }

@@ -142,3 +142,80 @@ impl<T: Real> Filter<T> {
 const fn start(j: usize) -> usize {
     if j == 0 { 0 } else { j * (j - 1) / 2 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::valve::unknowns::VALVE_COVARIANCES;
+    use nalgebra::{SMatrix, SVector};
+    use pitchleak_testkit::white_noise;
+
+    type Dense = SMatrix<f64, N, N>;
+
+    /// A covariance, and the filter of it.
+    fn drawn(seed: u64) -> (Dense, Filter<f64>) {
+        let mut normal = white_noise(seed);
+        let root = Dense::from_fn(|_, _| normal.next().unwrap_or_default());
+        let dense = root * root.transpose() + Dense::identity() * 0.1;
+        let mut covariance = [0.0; VALVE_COVARIANCES];
+        let rows = (0..N).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        covariance.iter_mut().zip(rows).for_each(|(entry, place)| *entry = dense[place]);
+        let calibration = ValveCalibration {
+            mean: [0.0; N],
+            covariance,
+            rated_flow_m3s: 1.0,
+            rated_drop_pa: 1.0,
+            tank_pa: 0.0,
+            hysteresis: 0.0,
+            null_leak: 0.0,
+            gain_drift: 0.0,
+            lap_drift: 0.0,
+            null_leak_drift: 0.0,
+        };
+        (dense, Filter::of(&calibration, &[0.0; N]))
+    }
+
+    fn assert_same(dense: &Dense, filter: &Filter<f64>) {
+        for unknown in 0..N {
+            let variance = dense[(unknown, unknown)];
+            assert!((filter.variance(unknown) / variance - 1.0).abs() < 1e-9, "{unknown}");
+        }
+    }
+
+    /// The textbook's Kalman filter with the whole covariance.
+    #[test]
+    fn an_equation_does_what_the_textbook_says() {
+        let (mut dense, mut filter) = drawn(1);
+        assert_same(&dense, &filter);
+        let mut step = SVector::<f64, N>::zeros();
+        let mut normal = white_noise(2);
+        for _ in 0..50 {
+            let row: Row<f64> = [(); N + 1].map(|()| normal.next().unwrap_or_default());
+            let columns = SVector::<f64, N>::from_iterator(row[..N].iter().copied());
+            let moved = dense * columns;
+            let variance = 1.0 + columns.dot(&moved);
+            let innovation = row[N] - columns.dot(&step);
+            step += moved * (innovation / variance);
+            dense -= moved * moved.transpose() / variance;
+            let surprise = filter.update(&row);
+            assert!((surprise.innovation - innovation).abs() < 1e-8);
+            assert!((surprise.variance / variance - 1.0).abs() < 1e-9);
+            assert!((surprise.gains[5] - moved[5] / variance).abs() < 1e-9);
+        }
+        assert_same(&dense, &filter);
+        assert!(step.iter().zip(filter.step).all(|(dense, own)| (dense - own).abs() < 1e-8));
+    }
+
+    #[test]
+    fn a_direction_that_widens_is_added_to_the_covariance() {
+        let (mut dense, mut filter) = drawn(3);
+        for (unknown, variance) in [(0, 0.5), (9, 2.0), (22, 0.1)] {
+            let mut direction = [0.0; N];
+            (direction[unknown], direction[4]) = (1.0, -0.7);
+            let vector = SVector::from(direction);
+            dense += vector * vector.transpose() * variance;
+            filter.widen(variance, direction);
+            assert_same(&dense, &filter);
+        }
+    }
+}

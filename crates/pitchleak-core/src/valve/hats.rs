@@ -96,3 +96,30 @@ impl<T: Real> Hat<T> {
         Self { sums, rise, x_m, time_s: half * (first.time_s + last.time_s) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pitchleak_testkit::white_noise;
+
+    /// Whatever the steps: means differ by what is integrated against the hat.
+    #[test]
+    fn means_differ_by_the_integral_against_the_hat() {
+        let mut normal = white_noise(4);
+        let mut next = || normal.next().unwrap_or_default();
+        let (mut x, mut rate, mut before_s) = (0.0, 1.0, 0.0);
+        let mut blocks = [Block::new(), Block::new()];
+        for (at, block) in [(0, 9), (1, 14)] {
+            for _ in 0..block {
+                let sample = Sampled { rates: [rate; SUMS], read: [x; MEANS], before_s };
+                before_s = 0.01 * (1.0 + 0.2 * next().abs());
+                blocks[at].add(&sample, before_s);
+                let after = rate + 0.3 * next();
+                x += 0.5 * before_s * (rate + after);
+                rate = after;
+            }
+        }
+        let hat = Hat::over(&blocks[0], &blocks[1]);
+        assert!((hat.sums[7] - hat.rise[2]).abs() < 1e-12, "{} {}", hat.sums[7], hat.rise[2]);
+    }
+}

@@ -234,3 +234,74 @@ impl<T: Real> BlockNoise<T> {
         shared
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::edges::{Edges, Scaled};
+    use super::super::hats::Sampled;
+    use super::super::unknowns::VALVE_COVARIANCES;
+    use super::*;
+
+    fn calibration() -> ValveCalibration<f64> {
+        let mut mean = [0.0; N];
+        mean[KAPPA] = 1.1;
+        mean[GAINS..LAPS].copy_from_slice(&[0.9, 1.1, 1.05, 0.95]);
+        mean[LAPS..ROUNDING].copy_from_slice(&[0.002, -0.004, 0.003, 0.001]);
+        (mean[ROUNDING], mean[SATURATION], mean[TANK], mean[LAG]) = (0.02, 0.03, 0.5, 0.2);
+        mean[CLEARANCES..HYSTERESIS].copy_from_slice(&[0.05, 0.04, 0.03, 0.06]);
+        (mean[HYSTERESIS], mean[SUPPLY], mean[DROOP]) = (0.001, 0.2, 0.4);
+        ValveCalibration {
+            mean,
+            covariance: [0.0; VALVE_COVARIANCES],
+            rated_flow_m3s: 4.0 / 60e3,
+            rated_drop_pa: 35e5,
+            tank_pa: 2e5,
+            hysteresis: 0.003,
+            null_leak: 0.02,
+            gain_drift: 0.03,
+            lap_drift: 0.001,
+            null_leak_drift: 0.1,
+        }
+    }
+
+    /// Rows over a hat in which all moves.
+    fn rows(calibration: &ValveCalibration<f64>) -> [Row<f64>; 2] {
+        let edges = Edges::of(calibration);
+        let mut blocks = [Block::new(), Block::new()];
+        for k in 0..50 {
+            let t = 0.01 * f64::from(k);
+            let reading = Scaled {
+                x_m: 0.1 + 0.02 * t,
+                pa: 1.5 + 0.4 * t,
+                pb: 0.9 - 0.2 * t * t,
+                spool: 0.08 - 0.2 * t,
+                ps: 2.8,
+            };
+            let read = [reading.x_m, reading.pa, reading.pb, reading.spool];
+            blocks[k as usize / 25].add(&Sampled { rates: edges.at(&reading), read, before_s: 0.01 }, 0.01);
+        }
+        let noise = ValveNoise { position_m: 2e-4, pressure_pa: 16e3, spool: 1e-3, supply_pa: 16e3 };
+        let equations = Equations::of(&Cylinder::paper(), &Fluid::paper(), calibration, &noise);
+        equations.rows(&Hat::over(&blocks[0], &blocks[1]), 0.4)
+    }
+
+    /// The left side of another valve is off by its columns.
+    #[test]
+    fn columns_are_slopes_of_the_equations() {
+        let at = rows(&calibration());
+        for unknown in KAPPA..N {
+            let step = 1e-4;
+            let [high, low] = [step, -step].map(|step| {
+                let mut other = calibration();
+                other.mean[unknown] += step;
+                rows(&other)
+            });
+            for row in 0..2 {
+                let slope = (low[row][N] - high[row][N]) / (2.0 * step);
+                let column = at[row][unknown];
+                // What acts by its mean over the hat does not follow the laps.
+                assert!((slope - column).abs() < 3e-2 * column.abs() + 1e-7, "{unknown}: {slope} {column}");
+            }
+        }
+    }
+}

@@ -95,6 +95,7 @@ pub struct ValveFilter<T> {
     kappa_mean: T,
     stroke_m: T,
     max_step_s: T,
+    per_drop: T,
     last: Option<Sampled<T>>,
     block: Block<T>,
     before: Option<Block<T>>,
@@ -142,6 +143,7 @@ impl<T: Real> ValveFilter<T> {
             kappa_mean: calibration.mean[KAPPA],
             stroke_m: cylinder.stroke_m,
             max_step_s,
+            per_drop: calibration.rated_drop_pa.recip(),
             last: None,
             block: Block::new(),
             before: None,
@@ -163,7 +165,27 @@ impl<T: Real> ValveFilter<T> {
         if !self.is_plausible(sample) {
             return ValveUpdate::Rejected;
         }
-        let per_drop = self.equations.rated_drop_pa.recip();
+        let follows = dt_s > T::zero() && dt_s <= self.max_step_s;
+        match &self.last {
+            Some(last) if follows => self.block.add(last, dt_s),
+            _ => {
+                self.interrupt(dt_s);
+                self.last = Some(self.sampled(sample, T::zero()));
+                return ValveUpdate::Started;
+            }
+        }
+        self.last = Some(self.sampled(sample, dt_s));
+        let is_long = self.block.time_s + T::lit(0.5) * dt_s >= T::lit(BLOCK_S);
+        if is_long && self.block.count >= T::lit(LEAST_SAMPLES) {
+            self.close_block();
+            return ValveUpdate::Accepted;
+        }
+        self.work()
+    }
+
+    #[inline(always)]
+    fn sampled(&self, sample: &ValveSample<T>, before_s: T) -> Sampled<T> {
+        let per_drop = self.per_drop;
         let reading = Scaled {
             x_m: sample.x_m,
             pa: sample.pa_pa * per_drop,
@@ -171,26 +193,8 @@ impl<T: Real> ValveFilter<T> {
             spool: sample.spool,
             ps: sample.ps_pa * per_drop,
         };
-        let mut now = Sampled {
-            rates: self.edges.at(&reading),
-            read: [reading.x_m, reading.pa, reading.pb, reading.spool],
-            before_s: T::zero(),
-        };
-        let follows = dt_s > T::zero() && dt_s <= self.max_step_s;
-        let Some(last) = self.last.filter(|_| follows) else {
-            self.interrupt(dt_s);
-            self.last = Some(now);
-            return ValveUpdate::Started;
-        };
-        self.block.add(&last, dt_s);
-        now.before_s = dt_s;
-        self.last = Some(now);
-        let is_long = self.block.time_s + T::lit(0.5) * dt_s >= T::lit(BLOCK_S);
-        if is_long && self.block.count >= T::lit(LEAST_SAMPLES) {
-            self.close_block();
-            return ValveUpdate::Accepted;
-        }
-        self.work()
+        let read = [reading.x_m, reading.pa, reading.pb, reading.spool];
+        Sampled { rates: self.edges.at(&reading), read, before_s }
     }
 
     fn is_plausible(&self, sample: &ValveSample<T>) -> bool {
@@ -260,21 +264,27 @@ impl<T: Real> ValveFilter<T> {
 
     /// A share of what is due.
     fn work(&mut self) -> ValveUpdate<T> {
-        match (self.due, self.white) {
-            (Due::Balance, Some(Whitening { rows: [balance, _], .. })) => {
-                let surprise = self.filter.update(&balance);
-                self.watch.add(&balance, &surprise);
+        match self.due {
+            Due::Nothing => {}
+            Due::Balance => {
+                self.take(0);
                 self.due = Due::Chamber;
             }
-            (Due::Chamber, Some(Whitening { rows: [_, chamber], .. })) => {
-                let surprise = self.filter.update(&chamber);
-                self.watch.add(&chamber, &surprise);
+            Due::Chamber => {
+                self.take(1);
                 self.due = Due::Growth;
             }
-            (Due::Growth, _) => return self.grow(),
-            _ => self.due = Due::Nothing,
+            Due::Growth => return self.grow(),
         }
         ValveUpdate::Accepted
+    }
+
+    /// Takes in a row of the last hat.
+    fn take(&mut self, which: usize) {
+        let row = self.white.as_ref().and_then(|white| white.rows.get(which));
+        if let Some(row) = row {
+            self.watch.add(row, &self.filter.update(row));
+        }
     }
 
     /// The unknowns may have moved, one of them with each block.
