@@ -171,11 +171,12 @@ mod tests {
     /// Slopes against differences, on either side of the middle.
     #[test]
     fn slopes_are_those_of_the_flows() {
-        let change = |by: &dyn Fn(&mut Edges<f64>, &mut Scaled<f64>, f64), spool: f64| {
+        type Change = fn(&mut Edges<f64>, f64);
+        let change = |by: Change, spool: f64| {
             let [high, low] = [1e-6, -1e-6].map(|step| {
-                let (mut edges, mut at) = (edges(), Scaled { spool, ..AT });
-                by(&mut edges, &mut at, step);
-                flows(&edges, &at)
+                let mut edges = edges();
+                by(&mut edges, step);
+                flows(&edges, &Scaled { spool, ..AT })
             });
             [0, 1].map(|chamber| (high[chamber] - low[chamber]) / 2e-6)
         };
@@ -187,15 +188,15 @@ mod tests {
                 }
             };
             let [o1, o2, o3, o4] = [0, 1, 2, 3].map(|edge| found[SLOPES + edge]);
-            check(change(&|edges, _, step| edges.laps[0] += step, spool), [-o1, 0.0], "lap P–A");
-            check(change(&|edges, _, step| edges.laps[1] += step, spool), [o2, 0.0], "lap A–T");
-            check(change(&|edges, _, step| edges.laps[2] += step, spool), [0.0, -o3], "lap P–B");
-            check(change(&|edges, _, step| edges.laps[3] += step, spool), [0.0, o4], "lap B–T");
+            check(change(|edges, step| edges.laps[0] += step, spool), [-o1, 0.0], "lap P–A");
+            check(change(|edges, step| edges.laps[1] += step, spool), [o2, 0.0], "lap A–T");
+            check(change(|edges, step| edges.laps[2] += step, spool), [0.0, -o3], "lap P–B");
+            check(change(|edges, step| edges.laps[3] += step, spool), [0.0, o4], "lap B–T");
             let pair = |from: usize| [found[from], found[from + 1]];
-            check(change(&|edges, _, step| edges.rounding += step, spool), pair(BY_ROUNDING), "rounding");
-            check(change(&|edges, _, step| edges.saturation += step, spool), pair(BY_SATURATION), "full");
-            check(change(&|edges, _, step| edges.supply += step, spool), pair(BY_SUPPLY), "supply");
-            check(change(&|edges, _, step| edges.tank += step, spool), pair(BY_TANK), "tank");
+            check(change(|edges, step| edges.rounding += step, spool), pair(BY_ROUNDING), "rounding");
+            check(change(|edges, step| edges.saturation += step, spool), pair(BY_SATURATION), "full");
+            check(change(|edges, step| edges.supply += step, spool), pair(BY_SUPPLY), "supply");
+            check(change(|edges, step| edges.tank += step, spool), pair(BY_TANK), "tank");
         }
     }
 }

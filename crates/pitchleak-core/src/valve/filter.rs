@@ -72,7 +72,7 @@ impl<T: Real> Filter<T> {
                     *own -= share * *entry;
                 }
             }
-            column.iter_mut().for_each(|entry| *entry = *entry / pivot);
+            column.iter_mut().for_each(|entry| *entry /= pivot);
         }
     }
 

@@ -136,7 +136,9 @@ impl<T: Real> Equations<T> {
         (a[TANK], b[TANK]) = (-self.bar * sums[BY_TANK], -self.bar * sums[BY_TANK + 1]);
         (a[CLEARANCES], a[CLEARANCES + 1]) = (pa - ps, pa);
         (b[CLEARANCES + 2], b[CLEARANCES + 3]) = (pb - ps, pb);
-        let (supply_a, supply_b) = (self.bar * sums[BY_SUPPLY], self.bar * sums[BY_SUPPLY + 1]);
+        let by_supply = |sum: T, clearance: T| self.bar * (sum + self.leak * clearance * hat.time_s);
+        let supply_a = by_supply(sums[BY_SUPPLY], self.clearances[0]);
+        let supply_b = by_supply(sums[BY_SUPPLY + 1], self.clearances[2]);
         (a[SUPPLY], b[SUPPLY]) = (-supply_a, -supply_b);
         let per_time = hat.time_s.recip();
         let drawn = sums[DRAWN] * per_time;
@@ -296,11 +298,11 @@ mod tests {
                 other.mean[unknown] += step;
                 rows(&other)
             });
-            for row in 0..2 {
-                let slope = (low[row][N] - high[row][N]) / (2.0 * step);
-                let column = at[row][unknown];
+            for ((at, high), low) in at.iter().zip(&high).zip(&low) {
+                let (slope, column) = ((low[N] - high[N]) / (2.0 * step), at.get(unknown).copied());
+                let column = column.unwrap_or_default();
                 // What acts by its mean over the hat does not follow the laps.
-                assert!((slope - column).abs() < 3e-2 * column.abs() + 1e-7, "{unknown}: {slope} {column}");
+                assert!((slope - column).abs() < 3e-2 * column.abs() + 1e-5, "{unknown}: {slope} {column}");
             }
         }
     }
