@@ -216,7 +216,7 @@ fn intervals_of_a_minute_hold_and_are_narrow() {
     let all: Vec<(Errors, f64)> = of_all(4 * runs, one);
     let noise = all.iter().map(|one| one.1).sum::<f64>() / all.len() as f64;
     // A little below 1: the zero of this valve walks less evenly than is declared.
-    assert!((0.9..1.05).contains(&noise), "{noise}");
+    assert!((0.85..1.05).contains(&noise), "{noise}");
     for (leak, most) in [(Leak::Internal, 0.0025), (Leak::ExternalA, 0.009), (Leak::ExternalB, 0.009)] {
         let of_leak = || all.iter().map(move |one| one.0[leak]);
         let held =

@@ -6,10 +6,13 @@
 //! o(s) = ½ (√(s² + w²) + s) (1 − c u²)                 ρ(Δ) = Δ (Δ² + Δ_l²)^(−¼)
 //! ```
 //!
+//! Readings of the spool scatter by σ, and o is curved: its mean over readings is ½ o″ σ² too large, o″ = ½ w² (s² + w²)^(−3/2), which is
+//! taken off.
+//!
 //! Merritt, Hydraulic Control Systems (1967), §5-1; ρ is [`metering`](crate::metering). Flows are in the rated flow, pressures in the
 //! drop at which it holds, so that the numbers of any valve are near one.
 
-use super::calibration::ValveCalibration;
+use super::calibration::{ValveCalibration, ValveNoise};
 use super::unknowns::{GAINS, LAPS, PA_PER_BAR, ROUNDING, SATURATION, SUPPLY, TANK};
 use crate::Real;
 
@@ -47,6 +50,8 @@ pub(super) struct Edges<T> {
     supply: T,
     tank: T,
     laminar: T,
+    /// ½ · ½ w² σ².
+    curved: T,
 }
 
 /// A reading: position, m; pressures of A, B and the supply, in the rated drop; spool, a share of its stroke.
@@ -69,7 +74,7 @@ struct Passing<T> {
 }
 
 impl<T: Real> Edges<T> {
-    pub fn of(calibration: &ValveCalibration<T>) -> Self {
+    pub fn of(calibration: &ValveCalibration<T>, noise: &ValveNoise<T>) -> Self {
         let mean = &calibration.mean;
         let per_bar = T::lit(PA_PER_BAR) / calibration.rated_drop_pa;
         let four = |from: usize| [mean[from], mean[from + 1], mean[from + 2], mean[from + 3]];
@@ -81,6 +86,7 @@ impl<T: Real> Edges<T> {
             supply: mean[SUPPLY] * per_bar,
             tank: calibration.tank_pa / calibration.rated_drop_pa + mean[TANK] * per_bar,
             laminar: T::lit(LAMINAR_PA) / calibration.rated_drop_pa,
+            curved: T::lit(0.25) * mean[ROUNDING] * mean[ROUNDING] * noise.spool * noise.spool,
         }
     }
 
@@ -126,6 +132,7 @@ impl<T: Real> Edges<T> {
         let square = s * s + self.rounding * self.rounding;
         let per_root = square.inverse_root();
         let open = half * (square * per_root + s);
+        let mean_open = open - self.curved * per_root * per_root * per_root;
         let full = T::one() - self.saturation * spool_square;
         let (own, laminar) = (drop * drop, self.laminar * self.laminar);
         let per_size = (own + laminar).inverse_root();
@@ -134,7 +141,7 @@ impl<T: Real> Edges<T> {
         let metered = drop * metering;
         let by_s = full * metered;
         Passing {
-            flow: open * by_s,
+            flow: mean_open * by_s,
             by_opening: open * per_root * by_s,
             by_rounding: half * self.rounding * per_root * by_s,
             by_saturation: -open * spool_square * metered,
@@ -158,6 +165,7 @@ mod tests {
             supply: 0.01,
             tank: 0.05,
             laminar: 0.003,
+            curved: 0.0,
         }
     }
 

@@ -13,15 +13,17 @@
 use super::edges::SUMS;
 use crate::Real;
 
-/// x, P_A, P_B, spool.
-pub(super) const MEANS: usize = 4;
+/// x, P_A, P_B, spool; P_A, P_B of the readings between.
+pub(super) const MEANS: usize = 6;
+/// Those that a sample has.
+pub(super) const READ: usize = 4;
 
 /// A sample whose next step is not known yet.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Sampled<T> {
     pub rates: [T; SUMS],
-    pub read: [T; MEANS],
+    pub read: [T; READ],
     /// Step before it, s; zero after a gap.
     pub before_s: T,
 }
@@ -31,6 +33,7 @@ pub(super) struct Sampled<T> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Block<T> {
     pub count: T,
+    pub samples: u32,
     /// Of its steps, s.
     pub time_s: T,
     /// Integrals over its samples' halves of steps, …
@@ -38,6 +41,18 @@ pub(super) struct Block<T> {
     /// … and those with weights that rise by one with each sample.
     rising: [T; SUMS],
     means: [T; MEANS],
+    /// P_A, P_B of its first and of its last sample.
+    ends: [[T; 2]; 2],
+}
+
+/// Every second sample of a block: how many, by how much the weight of the first and last is less than 1, one over the sum of the
+/// weights, and the sum of their squares over its square.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seconds<T> {
+    many: T,
+    less: T,
+    per_sum: T,
+    pub square: T,
 }
 
 /// Two blocks: what is integrated against the hat over both, and by how much the means differ.
@@ -54,7 +69,15 @@ pub(super) struct Hat<T> {
 impl<T: Real> Block<T> {
     pub fn new() -> Self {
         let none = T::zero();
-        Self { count: none, time_s: none, sums: [none; SUMS], rising: [none; SUMS], means: [none; MEANS] }
+        Self {
+            count: none,
+            samples: 0,
+            ends: [[none; 2]; 2],
+            time_s: none,
+            sums: [none; SUMS],
+            rising: [none; SUMS],
+            means: [none; MEANS],
+        }
     }
 
     /// Adds a sample with the steps before and after it, s, and its rates.
@@ -64,12 +87,49 @@ impl<T: Real> Block<T> {
         let whole = before_s + after_s;
         let rising = self.count * whole + after_s;
         self.count += T::one();
+        self.samples += 1;
         self.time_s += whole;
         for ((sum, ramp), rate) in self.sums.iter_mut().zip(&mut self.rising).zip(&sample.rates) {
             *sum += whole * *rate;
             *ramp += rising * *rate;
         }
-        self.means.iter_mut().zip(sample.read).for_each(|(mean, value)| *mean += value);
+        let [x, pa, pb, spool] = sample.read;
+        let [of_x, of_a, of_b, of_spool, between_a, between_b] = &mut self.means;
+        *of_x += x;
+        *of_spool += spool;
+        let [a, b] = if self.samples % 2 == 1 { [of_a, of_b] } else { [between_a, between_b] };
+        *a += pa;
+        *b += pb;
+        self.ends[1] = [pa, pb];
+        if self.samples == 1 {
+            self.ends[0] = [pa, pb];
+        }
+    }
+
+    /// Whether its number of samples is odd: then every second sample from the first to the last have the middle of all.
+    pub fn is_odd(&self) -> bool {
+        self.samples % 2 == 1
+    }
+
+    /// How every second sample, of M, are weighed: the ends by 1 − M/(4M − 6), then their spread in time is that of all, (N² − 1)/12.
+    pub fn seconds(&self) -> Seconds<T> {
+        let one = T::one();
+        let many = T::lit(0.5) * (self.count + one);
+        let less = many / (T::lit(4.0) * many - T::lit(6.0));
+        let per_sum = (many - less - less).recip();
+        let end = one - less;
+        let square = (many - T::lit(2.0) + T::lit(2.0) * end * end) * per_sum * per_sum;
+        Seconds { many, less, per_sum, square }
+    }
+
+    fn means(&self) -> [T; MEANS] {
+        let Seconds { many, less, per_sum, .. } = self.seconds();
+        let (per_count, per_between) = (self.count.recip(), (self.count - many).recip());
+        let [x, pa, pb, spool, between_a, between_b] = self.means;
+        let [[first_a, first_b], [last_a, last_b]] = self.ends;
+        let pa = (pa - less * (first_a + last_a)) * per_sum;
+        let pb = (pb - less * (first_b + last_b)) * per_sum;
+        [x * per_count, pa, pb, spool * per_count, between_a * per_between, between_b * per_between]
     }
 
     /// Mean of the spool, a share of its stroke.
@@ -88,11 +148,9 @@ impl<T: Real> Hat<T> {
         {
             *sum = *before * per_first + *falls - *ramp * per_last;
         }
-        let mut rise = last.means;
-        for (rise, before) in rise.iter_mut().zip(&first.means) {
-            *rise = *rise * per_last - *before * per_first;
-        }
-        let x_m = half * (first.means[0] * per_first + last.means[0] * per_last);
+        let (before, mut rise) = (first.means(), last.means());
+        let x_m = half * (before[0] + rise[0]);
+        rise.iter_mut().zip(before).for_each(|(rise, before)| *rise -= before);
         Self { sums, rise, x_m, time_s: half * (first.time_s + last.time_s) }
     }
 }
@@ -111,7 +169,7 @@ mod tests {
         let mut blocks = [Block::new(), Block::new()];
         for (at, block) in [(0, 9), (1, 14)] {
             for _ in 0..block {
-                let sample = Sampled { rates: [rate; SUMS], read: [x; MEANS], before_s };
+                let sample = Sampled { rates: [rate; SUMS], read: [x; READ], before_s };
                 before_s = 0.01 * (1.0 + 0.2 * next().abs());
                 blocks[at].add(&sample, before_s);
                 let after = rate + 0.3 * next();
@@ -120,6 +178,6 @@ mod tests {
             }
         }
         let hat = Hat::over(&blocks[0], &blocks[1]);
-        assert!((hat.sums[7] - hat.rise[2]).abs() < 1e-12, "{} {}", hat.sums[7], hat.rise[2]);
+        assert!((hat.sums[7] - hat.rise[3]).abs() < 1e-12, "{} {}", hat.sums[7], hat.rise[3]);
     }
 }

@@ -16,7 +16,8 @@
 //! variance of a mean σ²/N      with an integral σ²/N T/2      of an integral σ²/N T²/3      of rising and falling σ²/N T²/6
 //! ```
 //!
-//! With G = ∂g/∂mean and D = ∂ḡ/∂reading, block k stands in hat k as −G_k m + D r and in hat k−1 as G_k−1 m + D f.
+//! κ's column is noisy, as is the left side: by these errors in variables κ would come out too small. So the left side has its pressures
+//! from every second reading, and the column from those between, whose noise is another. With G = ∂g/∂mean and D = ∂ḡ/∂reading, block k stands in hat k as −G_k m + D r and in hat k−1 as G_k−1 m + D f.
 
 use super::calibration::{ValveCalibration, ValveNoise};
 use super::edges::{BY_ROUNDING, BY_SATURATION, BY_SUPPLY, BY_TANK, DRAWN, FLOWS, PRESSURES, SLOPES};
@@ -65,8 +66,9 @@ pub(super) type ByMeans<T> = [Pair<T>; SIGNALS];
 pub(super) struct BlockNoise<T> {
     /// D.
     by_reading: [Pair<T>; SIGNALS],
-    /// σ²/N, and T.
+    /// σ²/N, that of the means, and T.
     variances: [T; SIGNALS],
+    of_means: [T; SIGNALS],
     time_s: T,
 }
 
@@ -120,13 +122,13 @@ impl<T: Real> Equations<T> {
     fn chambers(&self, hat: &Hat<T>, play: T) -> [Row<T>; 2] {
         let sums = &hat.sums;
         let (mut a, mut b) = ([T::zero(); N + 1], [T::zero(); N + 1]);
-        let [_, rise_a, rise_b, rise_u] = hat.rise;
+        let [_, rise_a, rise_b, rise_u, between_a, between_b] = hat.rise;
         let [pa, pb, ps] = [PRESSURES, PRESSURES + 1, PRESSURES + 2].map(|at| self.leak * sums[at]);
-        let compression_a = self.kappa * self.cylinder.volume_a_m3(hat.x_m) * rise_a;
-        let compression_b = self.kappa * self.cylinder.volume_b_m3(hat.x_m) * rise_b;
+        let kappa_a = self.kappa * self.cylinder.volume_a_m3(hat.x_m);
+        let kappa_b = self.kappa * self.cylinder.volume_b_m3(hat.x_m);
         (a[0], b[0]) = (pa - pb, pb - pa);
         (a[1], b[2]) = (pa, pb);
-        (a[KAPPA], b[KAPPA]) = (compression_a, compression_b);
+        (a[KAPPA], b[KAPPA]) = (kappa_a * between_a, kappa_b * between_b);
         let [e1, e2, e3, e4] = [0, 1, 2, 3].map(|edge| sums[FLOWS + edge]);
         (a[GAINS], a[GAINS + 1], b[GAINS + 2], b[GAINS + 3]) = (-e1, e2, -e3, e4);
         let [o1, o2, o3, o4] = [0, 1, 2, 3].map(|edge| sums[SLOPES + edge]);
@@ -147,27 +149,25 @@ impl<T: Real> Equations<T> {
         let late = T::lit(S_PER_MS) * rise_u * per_time;
         (a[LAG], b[LAG]) = (-by_u_a * late, -by_u_b * late);
         (a[HYSTERESIS], b[HYSTERESIS]) = (by_u_a * play, by_u_b * play);
-        for row in [&mut a, &mut b] {
-            row[N] = -self.at_calibration(row);
-        }
+        a[N] = -self.at_calibration(&a) - self.kappa_mean * kappa_a * rise_a;
+        b[N] = -self.at_calibration(&b) - self.kappa_mean * kappa_b * rise_b;
         [a, b]
     }
 
-    /// g of the calibrated valve, without leaks, less what the piston sweeps.
+    /// g of the calibrated valve, without leaks, less what the piston sweeps and what the oil takes.
     fn at_calibration(&self, row: &Row<T>) -> T {
         let [lag, hysteresis, droop] = self.late;
-        let mut sum =
-            self.kappa_mean * row[KAPPA] + lag * row[LAG] + hysteresis * row[HYSTERESIS] + droop * row[DROOP];
+        let mut sum = lag * row[LAG] + hysteresis * row[HYSTERESIS] + droop * row[DROOP];
         for edge in 0..4 {
             sum += self.gains[edge] * row[GAINS + edge] + self.clearances[edge] * row[CLEARANCES + edge];
         }
         sum
     }
 
-    /// G of a hat, with κ as it is found.
-    pub fn by_means(&self, hat: &Hat<T>, kappa: T) -> ByMeans<T> {
+    /// G of a hat.
+    pub fn by_means(&self, hat: &Hat<T>) -> ByMeans<T> {
         let zero = T::zero();
-        let kappa = self.kappa * kappa;
+        let kappa = self.kappa * self.kappa_mean;
         [
             [zero, self.cylinder.area_a_m2 / self.rated_flow_m3s],
             self.pair(kappa * self.cylinder.volume_a_m3(hat.x_m), zero),
@@ -202,7 +202,11 @@ impl<T: Real> Equations<T> {
             self.pair(supply(0), supply(1)),
         ];
         let per_count = block.count.recip();
-        BlockNoise { by_reading, variances: self.variances.map(|own| own * per_count), time_s: block.time_s }
+        let variances = self.variances.map(|own| own * per_count);
+        let [x, pa, pb, spool, ps] = variances;
+        let wider = block.count * block.seconds().square;
+        let of_means = [x, pa * wider, pb * wider, spool, ps];
+        BlockNoise { by_reading, variances, of_means, time_s: block.time_s }
     }
 }
 
@@ -210,9 +214,11 @@ impl<T: Real> BlockNoise<T> {
     /// Adds to a hat's covariance [balance, both, A] what the block puts in: `sign` is −1 where the hat rises over it, 1 where it falls.
     pub fn add_own(&self, sign: T, by_means: &ByMeans<T>, covariance: &mut [T; 3]) {
         let (half, third) = (T::lit(0.5) * self.time_s * sign, self.time_s * self.time_s / T::lit(3.0));
-        for ((g, d), variance) in by_means.iter().zip(&self.by_reading).zip(&self.variances) {
+        let signals = by_means.iter().zip(&self.by_reading).zip(self.variances.iter().zip(&self.of_means));
+        for ((g, d), (variance, of_mean)) in signals {
             let term = |i: usize, j: usize| {
-                *variance * (g[i] * g[j] + half * (g[i] * d[j] + d[i] * g[j]) + third * d[i] * d[j])
+                let cross = half * (g[i] * d[j] + d[i] * g[j]);
+                *of_mean * g[i] * g[j] + *variance * (cross + third * d[i] * d[j])
             };
             covariance[0] += term(0, 0);
             covariance[1] += term(0, 1);
@@ -224,12 +230,12 @@ impl<T: Real> BlockNoise<T> {
     pub fn shared(&self, by_means: &ByMeans<T>, before: &ByMeans<T>) -> [Pair<T>; 2] {
         let (half, sixth) = (T::lit(0.5) * self.time_s, self.time_s * self.time_s / T::lit(6.0));
         let mut shared = [[T::zero(); 2]; 2];
-        let signals = by_means.iter().zip(before).zip(self.by_reading.iter().zip(&self.variances));
-        for ((g, was), (d, variance)) in signals {
+        let readings = self.by_reading.iter().zip(self.variances.iter().zip(&self.of_means));
+        for ((g, was), (d, (variance, of_mean))) in by_means.iter().zip(before).zip(readings) {
             for (i, row) in shared.iter_mut().enumerate() {
                 for (j, entry) in row.iter_mut().enumerate() {
-                    *entry += *variance
-                        * (half * (d[i] * was[j] - g[i] * d[j]) + sixth * d[i] * d[j] - g[i] * was[j]);
+                    let cross = half * (d[i] * was[j] - g[i] * d[j]);
+                    *entry += *variance * (cross + sixth * d[i] * d[j]) - *of_mean * g[i] * was[j];
                 }
             }
         }
@@ -268,7 +274,8 @@ mod tests {
 
     /// Rows over a hat in which all moves.
     fn rows(calibration: &ValveCalibration<f64>) -> [Row<f64>; 2] {
-        let edges = Edges::of(calibration);
+        let noise = ValveNoise { position_m: 2e-4, pressure_pa: 16e3, spool: 1e-3, supply_pa: 16e3 };
+        let edges = Edges::of(calibration, &noise);
         let mut blocks = [Block::new(), Block::new()];
         for k in 0..50 {
             let t = 0.01 * f64::from(k);
@@ -282,7 +289,6 @@ mod tests {
             let read = [reading.x_m, reading.pa, reading.pb, reading.spool];
             blocks[k as usize / 25].add(&Sampled { rates: edges.at(&reading), read, before_s: 0.01 }, 0.01);
         }
-        let noise = ValveNoise { position_m: 2e-4, pressure_pa: 16e3, spool: 1e-3, supply_pa: 16e3 };
         let equations = Equations::of(&Cylinder::paper(), &Fluid::paper(), calibration, &noise);
         equations.rows(&Hat::over(&blocks[0], &blocks[1]), 0.4)
     }

@@ -9,10 +9,9 @@ use super::whitening::Whitening;
 use crate::continuity::{Integrals, PressureMeans};
 use crate::{Cylinder, Estimate, Fluid, PerLeak, Real};
 
-/// Length of a block, s, and its least number of samples: short beside what a pitch cylinder does; the noise of the pressures in κ's
-/// column (errors in variables) averages out.
+/// Length of a block, s, and its least number of samples, which is odd: short beside what a pitch cylinder does.
 const BLOCK_S: f64 = 0.25;
-const LEAST_SAMPLES: f64 = 8.0;
+const LEAST_SAMPLES: u32 = 9;
 /// Memory of the mean pressures at which leak flows are quoted, s.
 const AVERAGING_S: f64 = 60.0;
 /// Largest pressure that is a reading, Pa.
@@ -135,7 +134,7 @@ impl<T: Real> ValveFilter<T> {
         let growth_ps = calibration.growth_ps(fluid);
         let since = ValveCalibration::since(&growth_ps);
         Ok(Self {
-            edges: Edges::of(calibration),
+            edges: Edges::of(calibration, noise),
             equations: Equations::of(cylinder, fluid, calibration, noise),
             growth_ps,
             zero_growth_ps: calibration.zero_growth_ps(),
@@ -176,7 +175,7 @@ impl<T: Real> ValveFilter<T> {
         }
         self.last = Some(self.sampled(sample, dt_s));
         let is_long = self.block.time_s + T::lit(0.5) * dt_s >= T::lit(BLOCK_S);
-        if is_long && self.block.count >= T::lit(LEAST_SAMPLES) {
+        if is_long && self.block.samples >= LEAST_SAMPLES && self.block.is_odd() {
             self.close_block();
             return ValveUpdate::Accepted;
         }
@@ -230,14 +229,13 @@ impl<T: Real> ValveFilter<T> {
             let hat = Hat::over(&before, &block);
             let play = T::lit(0.5) * (was + self.play);
             let rows = self.equations.rows(&hat, play);
-            let kappa = (self.kappa_mean + self.filter.step[KAPPA]).at_least(T::zero());
             let [internal, a, b, ..] = self.filter.step.map(|leak| leak.at_least(T::zero()));
             let last = self.equations.noise(&block, [internal, a, b]);
             let first = match &self.white {
                 Some(white) => white.last,
                 None => self.equations.noise(&before, [internal, a, b]),
             };
-            let by_means = self.equations.by_means(&hat, kappa);
+            let by_means = self.equations.by_means(&hat);
             self.white = Some(Whitening::next(self.white.as_ref(), &rows, by_means, [first, last]));
             self.due = Due::Balance;
         }
