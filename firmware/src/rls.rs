@@ -20,11 +20,8 @@ impl<const N: usize, const CLOCKS: bool> Estimator for Leaks<N, CLOCKS> {
     }
 
     fn update(&mut self, dt_s: f32, sample: &Sample<f32>) -> Option<f32> {
-        let update = if CLOCKS {
-            self.rls.update_waiting(dt_s, sample)
-        } else {
-            self.rls.update(dt_s, sample)
-        };
+        let update =
+            if CLOCKS { self.rls.update_waiting(dt_s, sample) } else { self.rls.update(dt_s, sample) };
         match update {
             Update::Renewed { elapsed_s, .. } => Some(elapsed_s),
             _ => None,

@@ -2,8 +2,8 @@ use crate::measure::{Estimator, Told};
 use crate::rig::Rig;
 use crate::semihosting::File;
 use pitchleak_core::{
-    AlarmSettings, LeakDetector, Sample, VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveFilter, ValveNoise,
-    ValveSample, ValveUpdate,
+    AlarmSettings, LeakDetector, Sample, VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveFilter,
+    ValveNoise, ValveSample, ValveUpdate,
 };
 
 /// The flows of a calibrated valve, and alarms. In the file spool and supply pressure stand where meters would.
@@ -37,7 +37,9 @@ impl Estimator for Valve {
     }
 
     fn update(&mut self, dt_s: f32, sample: &Sample<f32>) -> Option<f32> {
-        let Sample { x_m, pa_pa, pb_pa, qa_m3s: Some(spool), qb_m3s: Some(ps_pa), .. } = *sample else { return None };
+        let Sample { x_m, pa_pa, pb_pa, qa_m3s: Some(spool), qb_m3s: Some(ps_pa), .. } = *sample else {
+            return None;
+        };
         match self.filter.update(dt_s, &ValveSample { x_m, pa_pa, pb_pa, spool, ps_pa }) {
             ValveUpdate::Renewed { elapsed_s, .. } => Some(elapsed_s),
             _ => None,

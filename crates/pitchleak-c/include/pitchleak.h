@@ -32,10 +32,10 @@
 #define PITCHLEAK_VALVE_COVARIANCES 276
 
 // Size of `PitchleakValve` in 64-bit words.
-#define PITCHLEAK_VALVE_WORDS 360
+#define PITCHLEAK_VALVE_WORDS 370
 
 // A state is never longer, bytes.
-#define PITCHLEAK_VALVE_STATE_BYTES 2880
+#define PITCHLEAK_VALVE_STATE_BYTES 2968
 
 // What a function did: zero or above where all is well.
 enum PitchleakResult

@@ -100,7 +100,7 @@ pub struct ValveFilter<T> {
     before: Option<Block<T>>,
     white: Option<Whitening<T>>,
     due: Due,
-    /// Time that the growth of the unknowns waits for, s, and whose turn it is.
+    /// Time since the last renewal, s, and the unknown whose turn to grow it is.
     waiting_s: T,
     turn: u8,
     /// Of the hysteresis: declared half width, and where the spool stands within it, −1 to 1.
@@ -204,7 +204,7 @@ impl<T: Real> ValveFilter<T> {
             && spool.abs() <= T::lit(2.0)
     }
 
-    /// Nothing goes over a gap but what is known.
+    /// Nothing goes over a gap but what is known, and that has changed meanwhile.
     #[cold]
     fn interrupt(&mut self, gap_s: T) {
         while self.due != Due::Nothing {
@@ -213,7 +213,10 @@ impl<T: Real> ValveFilter<T> {
         self.block = Block::new();
         (self.before, self.white, self.spool) = (None, None, None);
         if gap_s > T::zero() && gap_s.is_finite() {
-            self.waiting_s += gap_s;
+            self.filter.widen(self.zero_growth_ps * gap_s, along_zero());
+            for (unknown, growth_ps) in self.growth_ps.iter().enumerate() {
+                self.filter.widen(*growth_ps * gap_s, along(unknown));
+            }
         }
     }
 
