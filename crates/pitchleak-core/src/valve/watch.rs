@@ -163,8 +163,9 @@ impl<T: Real> Watch<T> {
         let part = core::mem::replace(&mut self.part, Part::none());
         let score = core::mem::replace(&mut self.score, Score::none());
         self.since_change_s += part.time_s;
-        self.average(&part);
+        // By the noise before: a leak that sets in is no noise.
         let limit = T::lit(CHANGED) * self.noise.at_least(T::one());
+        self.average(&part);
         let mut changed = None;
         for (window, whole) in self.windows.iter_mut().zip(WINDOWS) {
             window.score.join(&score);
