@@ -4,7 +4,10 @@
 
 use std::hint::black_box;
 
-use pitchleak::core::{Cylinder, Fluid, PaperGains, PaperLaw, Rls, RlsSettings, Sample, Sensors, regressors};
+use pitchleak::core::{
+    Cylinder, Fluid, PaperGains, PaperLaw, Rls, RlsSettings, Sample, Sensors, VALVE_COVARIANCES,
+    VALVE_UNKNOWNS, ValveCalibration, ValveFilter, ValveNoise, ValveSample, regressors,
+};
 
 const PERIOD: usize = 1 << 12;
 
@@ -66,6 +69,35 @@ fn law(count: usize) {
     black_box(law);
 }
 
+fn valve(count: usize) {
+    let mut mean = [0.0; VALVE_UNKNOWNS];
+    mean[3..8].fill(1.0);
+    mean[12] = 0.02;
+    let mut covariance = [0.0; VALVE_COVARIANCES];
+    (0..VALVE_UNKNOWNS).for_each(|row| covariance[row * (row + 3) / 2] = 1e-6);
+    let calibration = ValveCalibration {
+        mean,
+        covariance,
+        rated_flow_m3s: 4.0 / 60e3,
+        rated_drop_pa: 35e5,
+        tank_pa: 0.0,
+        hysteresis: 0.003,
+        null_leak: 0.02,
+        gain_drift: 0.03,
+        lap_drift: 0.001,
+        null_leak_drift: 0.1,
+    };
+    let noise = ValveNoise { position_m: 2e-4, pressure_pa: 16e3, spool: 1e-3, supply_pa: 16e3 };
+    let new = ValveFilter::new(&Cylinder::paper(), &Fluid::paper(), &calibration, &noise, 0.5);
+    let Ok(mut filter) = new else { return };
+    feed(count, |sample| {
+        let Sample { x_m, pa_pa, pb_pa, qa_m3s, .. } = *sample;
+        let spool = 5e3 * qa_m3s.unwrap_or_default();
+        filter.update(black_box(0.01), &ValveSample { x_m, pa_pa, pb_pa, spool, ps_pa: 1e7 });
+    });
+    black_box(filter.estimates());
+}
+
 fn nothing(count: usize) {
     let f = [0.1, -1e11, -1e11, 1e11, -1e3];
     feed(count, |_| {
@@ -83,6 +115,7 @@ fn main() {
         "rls-gains" => rls::<9>(count),
         "paper-law" => law(count),
         "paper" => paper(count),
+        "valve" => valve(count),
         _ => nothing(count),
     }
 }

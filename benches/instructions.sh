@@ -28,5 +28,6 @@ paper 113
 rls 630
 rls-offsets 910
 rls-gains 1760
+valve 1250
 END
 exit $failed

@@ -18,6 +18,8 @@ use std::process::Command;
 
 #[path = "firmware/search.rs"]
 mod search;
+#[path = "firmware/valve.rs"]
+mod valve;
 
 /// Instructions of one tick of the system timer: 25 MHz, and a nanosecond for each.
 const TICK: u32 = 40;
@@ -64,13 +66,12 @@ fn a_microcontroller_tells_what_the_host_tells() {
     let mut table = String::from(HEADER);
     for (program, title) in PROGRAMS {
         let sensors = sensors(&rig, program);
-        let run = emulate(program, &rig, &sensors, &records);
+        let run = emulate(program, &[declared(&rig, &sensors), samples(&records)].concat());
         let host = on_host(program, &rig, &sensors, &records);
-        assert!(run.told.keys().eq(host.keys()), "{program}: renewed after the same samples");
-        let apart = farthest(&run.told, &host);
-        write_row(&mut table, title, &run, apart);
-        assert!(apart.is_none_or(|apart| apart <= FARTHEST), "{program}: {apart:?}");
+        add_row(&mut table, [program, title], &run, &host);
     }
+    let (run, host) = valve::run();
+    add_row(&mut table, ["valve", "calibrated valve"], &run, &host);
     println!("{table}");
     check_table(&table);
 }
@@ -80,7 +81,11 @@ const HEADER: &str = "\
 |---|---|---|---|---|---|---|---|
 ";
 
-fn write_row(table: &mut String, title: &str, run: &Run, apart: Option<f64>) {
+/// The row of a program, that tells what the host does.
+fn add_row(table: &mut String, [program, title]: [&str; 2], run: &Run, host: &Renewals) {
+    assert!(run.told.keys().eq(host.keys()), "{program}: renewed after the same samples");
+    let apart = farthest(&run.told, host);
+    assert!(apart.is_none_or(|apart| apart <= FARTHEST), "{program}: {apart:?}");
     let Run { mean, worst, watch, state, stack, flash, .. } = run;
     let apart = apart.map_or("–".to_owned(), |apart| format!("{apart:.4}"));
     writeln!(table, "| {title} | {mean} | {worst} | {watch} | {state} | {stack} | {flash} | {apart} |")
@@ -133,9 +138,11 @@ fn sensors(rig: &Rig, program: &str) -> Sensors<f64> {
     sensors
 }
 
-fn emulate(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Run {
+/// Runs a program over what it reads.
+fn emulate(program: &str, numbers: &[f64]) -> Run {
     let folder = folder(program);
-    std::fs::write(folder.join("trace.f32"), trace(rig, sensors, records)).unwrap();
+    let bytes: Vec<u8> = numbers.iter().flat_map(|number| (*number as f32).to_le_bytes()).collect();
+    std::fs::write(folder.join("trace.f32"), bytes).unwrap();
     let binary = firmware().join("target/thumbv7em-none-eabihf/release").join(program);
     let output = Command::new("qemu-system-arm")
         .args(["-machine", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
@@ -156,7 +163,6 @@ fn emulate(program: &str, rig: &Rig, sensors: &Sensors<f64>, records: &[Record])
     };
     let cost = numbers(of_kind("cost").next().unwrap_or_else(|| panic!("the program ends: {text}")));
     let [updates, ticks, worst, watch, sample, state, stack] = cost.try_into().unwrap();
-    assert_eq!(updates as usize, records.len());
     Run {
         told: of_kind("told").map(told).collect(),
         mean: u32::try_from(u64::from(ticks) * u64::from(TICK) / u64::from(updates)).unwrap(),
@@ -177,8 +183,8 @@ fn folder(program: &str) -> PathBuf {
     folder
 }
 
-/// What the firmware reads: the rig, then the samples.
-fn trace(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Vec<u8> {
+/// What the firmware reads first: the rig.
+fn declared(rig: &Rig, sensors: &Sensors<f64>) -> Vec<f64> {
     let c = &rig.cylinder;
     let mut numbers =
         vec![c.area_a_m2, c.area_b_m2, c.stroke_m, c.moving_mass_kg, c.dead_volume_a_m3, c.dead_volume_b_m3];
@@ -187,12 +193,17 @@ fn trace(rig: &Rig, sensors: &Sensors<f64>, records: &[Record]) -> Vec<u8> {
     for sensor in [flow_a, flow_b, pressure, position, force] {
         numbers.extend([sensor.noise_std, sensor.bias_std, sensor.gain_std]);
     }
-    for record in records {
+    numbers
+}
+
+/// … and then: the samples.
+fn samples(records: &[Record]) -> Vec<f64> {
+    let row = |record: &Record| {
         let Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, force_n } = record.sample;
-        numbers.extend([record.step_s(), x_m, pa_pa, pb_pa]);
-        numbers.extend([qa_m3s, qb_m3s, force_n].map(|reading| reading.unwrap_or(f64::NAN)));
-    }
-    numbers.into_iter().flat_map(|number| (number as f32).to_le_bytes()).collect()
+        let [qa, qb, force] = [qa_m3s, qb_m3s, force_n].map(|reading| reading.unwrap_or(f64::NAN));
+        [record.step_s(), x_m, pa_pa, pb_pa, qa, qb, force]
+    };
+    records.iter().flat_map(row).collect()
 }
 
 /// Bytes that are written into the flash: code, constants, and what variables start with.

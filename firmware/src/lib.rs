@@ -1,6 +1,6 @@
 //! Runs an estimator over a trace that the host feeds, and tells the host what it estimates and what that costs.
 //!
-//! The host (tests/firmware.rs) writes `trace.f32`: the rig, then a row of seven numbers for each sample.
+//! The host (tests/firmware.rs) writes `trace.f32`: the rig, what else an estimator is made of, then a row of seven numbers for each sample.
 #![no_std]
 
 mod measure;
@@ -8,6 +8,7 @@ pub mod paper;
 mod rig;
 pub mod rls;
 mod semihosting;
+pub mod valve;
 
 pub use measure::run;
 

@@ -6,8 +6,8 @@ use pitchleak_core::Sample;
 
 /// An estimator as the firmware runs it.
 pub trait Estimator: Sized {
-    /// The estimator of a rig; none where the rig is impossible.
-    fn new(rig: &Rig) -> Option<Self>;
+    /// The estimator of a rig, and what else stands in the file before the samples; none where the rig is impossible.
+    fn new(rig: &Rig, file: &File) -> Option<Self>;
     /// Takes in a sample; says whether the estimates are new, and for how long was watched, s.
     fn update(&mut self, dt_s: f32, sample: &Sample<f32>) -> Option<f32>;
     /// What a controller does once the estimates are new: hold the leaks against their alarms.
@@ -43,7 +43,7 @@ struct Cost {
 pub fn run<E: Estimator>() -> ! {
     let file = File::open(b"trace.f32\0");
     if let Some(rig) = Rig::read(&file)
-        && let Some(mut estimator) = E::new(&rig)
+        && let Some(mut estimator) = E::new(&rig, &file)
     {
         start_clock();
         let top = paint_stack();

@@ -1,12 +1,13 @@
 use crate::measure::{Estimator, Told};
 use crate::rig::Rig;
+use crate::semihosting::File;
 use pitchleak_core::{PaperEstimator, PaperGains, Sample, Update};
 
 /// The paper's law with its filters, set up as the host does (λ, γ, cut-off); it knows no spread.
 pub struct Paper(PaperEstimator<f32>);
 
 impl Estimator for Paper {
-    fn new(rig: &Rig) -> Option<Self> {
+    fn new(rig: &Rig, _: &File) -> Option<Self> {
         let gains = PaperGains::scaled(&rig.cylinder, &rig.fluid, 10.0, 3e-5);
         PaperEstimator::new(rig.cylinder, rig.fluid, gains, 5.0, 100.0).ok().map(Self)
     }

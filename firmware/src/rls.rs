@@ -1,5 +1,6 @@
 use crate::measure::{Estimator, Told};
 use crate::rig::Rig;
+use crate::semihosting::File;
 use pitchleak_core::{AlarmSettings, LeakDetector, Rls, RlsSettings, Sample, Update};
 
 /// The default estimator and its alarms, for channels that are all read at once.
@@ -13,17 +14,14 @@ pub struct Leaks<const N: usize, const CLOCKS: bool> {
 }
 
 impl<const N: usize, const CLOCKS: bool> Estimator for Leaks<N, CLOCKS> {
-    fn new(rig: &Rig) -> Option<Self> {
+    fn new(rig: &Rig, _: &File) -> Option<Self> {
         let rls = Rls::new(rig.cylinder, rig.fluid, &rig.sensors, RlsSettings::default()).ok()?;
         Some(Self { rls, detector: LeakDetector::new(AlarmSettings::default()) })
     }
 
     fn update(&mut self, dt_s: f32, sample: &Sample<f32>) -> Option<f32> {
-        let update = if CLOCKS {
-            self.rls.update_waiting(dt_s, sample)
-        } else {
-            self.rls.update(dt_s, sample)
-        };
+        let update =
+            if CLOCKS { self.rls.update_waiting(dt_s, sample) } else { self.rls.update(dt_s, sample) };
         match update {
             Update::Renewed { elapsed_s, .. } => Some(elapsed_s),
             _ => None,

@@ -1,5 +1,6 @@
 //! A valve's calibration: what traces of this rig say of its edges, kept in a file for later traces.
 
+use super::equations::Known;
 use super::meter::ValveMeter;
 use super::unknowns::{
     Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAKS, UNKNOWNS, Unknowns,
@@ -9,6 +10,7 @@ use crate::rig::{Rig, ValveSheet};
 use crate::trace::{Record, TraceError, TraceReader};
 use jiff::Zoned;
 use jiff::civil::Date;
+use pitchleak_core::{ValveCalibration, ValveNoise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -293,6 +295,27 @@ impl Calibration {
             lap: of(LAPS + edge),
             clearance_lpm: of(CLEARANCES + edge),
         })
+    }
+
+    /// As a controller takes it ([`ValveFilter`](pitchleak_core::ValveFilter)), with the noise of the rig's sensors; none where the rig
+    /// has no valve.
+    pub fn for_controller(&self, rig: &Rig) -> Option<(ValveCalibration<f64>, ValveNoise<f64>)> {
+        let sheet = rig.valve.as_ref()?;
+        let [position_m, pressure_pa, _, spool, supply_pa] =
+            Known::of(rig, sheet).variances.map(f64::sqrt).into();
+        let calibration = ValveCalibration {
+            mean: self.mean.as_slice().try_into().ok()?,
+            covariance: self.covariance.concat().try_into().ok()?,
+            rated_flow_m3s: sheet.rated_flow_m3s,
+            rated_drop_pa: sheet.rated_drop_pa,
+            tank_pa: sheet.tank_pa,
+            hysteresis: sheet.hysteresis,
+            null_leak: sheet.null_leak,
+            gain_drift: sheet.drift.gain,
+            lap_drift: sheet.drift.lap,
+            null_leak_drift: sheet.drift.null_leak,
+        };
+        Some((calibration, ValveNoise { position_m, pressure_pa, spool, supply_pa }))
     }
 
     /// What is believed of a later trace: the valve may have changed as declared, the oil as well, and the leaks are open.

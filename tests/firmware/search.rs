@@ -4,7 +4,7 @@
 //! The search is seeded. It takes random recordings, then changes the worst of them bit by bit; the recording found stays in
 //! the folder that is printed.
 
-use super::{PROGRAMS, Renewals, Rig, emulate, farthest, folder, on_host, sensors};
+use super::{PROGRAMS, Renewals, Rig, declared, emulate, farthest, folder, on_host, samples, sensors};
 use pitchleak::core::PerLeak;
 use pitchleak::trace::Record;
 use pitchleak_testkit::{Motion, noisy, seeded};
@@ -163,7 +163,7 @@ fn search(program: &str, rig: &Rig) -> Found {
 /// Instructions of the scene's worst sample.
 fn measure(program: &str, rig: &Rig, scene: &Scene, found: &mut Found) -> u32 {
     let (sensors, records) = (sensors(rig, program), scene.records(rig));
-    let run = emulate(program, rig, &sensors, &records);
+    let run = emulate(program, &[declared(rig, &sensors), samples(&records)].concat());
     let host: Renewals = on_host(program, rig, &sensors, &records);
     found.update = found.update.max(run.worst);
     found.sample = found.sample.max(run.sample);

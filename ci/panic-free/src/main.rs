@@ -10,7 +10,8 @@ use core::ptr::{read_volatile, write_volatile};
 use pitchleak_core::{
     AlarmSettings, AlarmState, Butterworth, Cylinder, Effect, EffectSet, Estimates, Excitation, ExcitationSettings,
     Fluid, LeakDetector, LeakPressures, Linkage, LoadEstimator, Model, Signals, Momentum, PaperEstimator, PaperGains,
-    PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update,
+    PaperLaw, PerLeak, Real, Rls, RlsSettings, Sample, Sensors, Update, VALVE_COVARIANCES, VALVE_UNKNOWNS,
+    ValveCalibration, ValveFilter, ValveNoise, ValveSample,
     continuity::Readings,
     effects::EffectConstants,
     emulator::{Emulator, EmulatorParams},
@@ -143,6 +144,30 @@ fn plant_and_emulator<T: Real>() {
     }
 }
 
+#[inline(never)]
+fn valve<T: Real>() {
+    let one = T::one();
+    let calibration = any(ValveCalibration {
+        mean: [one; VALVE_UNKNOWNS],
+        covariance: [one; VALVE_COVARIANCES],
+        rated_flow_m3s: one,
+        rated_drop_pa: one,
+        tank_pa: one,
+        hysteresis: one,
+        null_leak: one,
+        gain_drift: one,
+        lap_drift: one,
+        null_leak_drift: one,
+    });
+    let noise = any(ValveNoise { position_m: one, pressure_pa: one, spool: one, supply_pa: one });
+    let filter = ValveFilter::new(&any(Cylinder::paper()), &any(Fluid::paper()), &calibration, &noise, any(one));
+    let Ok(mut filter) = filter else { return keep(filter.is_ok()) };
+    while any(true) {
+        let sample = any(ValveSample { x_m: one, pa_pa: one, pb_pa: one, spool: one, ps_pa: one });
+        keep((filter.update(any(one), &sample), filter.estimates()));
+    }
+}
+
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
     loop {
@@ -162,5 +187,7 @@ extern "C" fn _start() -> ! {
         filter_and_linkage::<f64>();
         plant_and_emulator::<f32>();
         plant_and_emulator::<f64>();
+        valve::<f32>();
+        valve::<f64>();
     }
 }

@@ -1,5 +1,5 @@
 /* The leak estimator of pitchleak for C and C++. Made by cbindgen; do not edit. One page shows how to use it:
-   examples/leaks.c. Two threads may not use one estimator at the same time. */
+   examples/leaks.c, without flow meters examples/valve.c. Two threads may not use one estimator at the same time. */
 
 #ifndef PITCHLEAK_H
 #define PITCHLEAK_H
@@ -24,6 +24,18 @@
 
 // A state is never longer, bytes.
 #define PITCHLEAK9_STATE_BYTES 6264
+
+// Numbers in `mean` of `valve.toml`.
+#define PITCHLEAK_VALVE_UNKNOWNS 23
+
+// Numbers in `covariance` of `valve.toml`.
+#define PITCHLEAK_VALVE_COVARIANCES 276
+
+// Size of `PitchleakValve` in 64-bit words.
+#define PITCHLEAK_VALVE_WORDS 370
+
+// A state is never longer, bytes.
+#define PITCHLEAK_VALVE_STATE_BYTES 2968
 
 // What a function did: zero or above where all is well.
 enum PitchleakResult
@@ -57,6 +69,8 @@ enum PitchleakResult
   PITCHLEAK_RESULT_DAMAGED = -7,
   // The bytes are the state of another version, or of an estimator of another size.
   PITCHLEAK_RESULT_OTHER_VERSION = -8,
+  // A number of the valve's calibration cannot be.
+  PITCHLEAK_RESULT_BAD_CALIBRATION = -9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -203,6 +217,96 @@ typedef struct Pitchleak9 {
   uint64_t words[PITCHLEAK9_WORDS];
 } Pitchleak9;
 
+// Memory of an estimator of leaks by a calibrated valve. Begin with `pitchleak_valve_begin`; it may be moved and
+// copied.
+typedef struct PitchleakValve {
+  // Not for reading.
+  uint64_t words[PITCHLEAK_VALVE_WORDS];
+} PitchleakValve;
+
+// A cylinder without flow meters, its calibrated valve and its sensors. `pitchleak calibrate` writes `mean` and
+// `covariance` into `valve.toml`; all else of the valve stands in `[valve]` of the rig file.
+typedef struct PitchleakValveRig {
+  // The cylinder.
+  struct PitchleakCylinder cylinder;
+  // Its oil.
+  struct PitchleakFluid fluid;
+  // `mean` of `valve.toml`, in its order.
+  float mean[PITCHLEAK_VALVE_UNKNOWNS];
+  // `covariance` of `valve.toml`, one row after the other: 1 number, 2 numbers, … 23 numbers.
+  float covariance[PITCHLEAK_VALVE_COVARIANCES];
+  // `rated_flow`: over one fully open edge, m³/s, …
+  float rated_flow_m3s;
+  // … at `rated_drop`, Pa.
+  float rated_drop_pa;
+  // `tank`, Pa.
+  float tank_pa;
+  // `hysteresis`, a share of the stroke; 0.003 where the rig file has none.
+  float hysteresis;
+  // `null_leak`, a share of the rated flow; 0.02 where the rig file has none.
+  float null_leak;
+  // `drift.gain`; 0.03 where the rig file has none.
+  float gain_drift;
+  // `drift.lap`; 0.001 where the rig file has none.
+  float lap_drift;
+  // `drift.null_leak`; 0.1 where the rig file has none.
+  float null_leak_drift;
+  // Noise of one position, one standard deviation, m: a third of `accuracy` of full scale, as are the three that follow.
+  float position_std_m;
+  // Noise of a chamber pressure, Pa.
+  float pressure_std_pa;
+  // Noise of the spool's position, a share of its stroke.
+  float spool_std;
+  // Noise of the supply pressure, Pa.
+  float supply_std_pa;
+  // Internal leak that raises an alarm, m³/s.
+  float threshold_internal_m3s;
+  // External leak of chamber A that raises an alarm, m³/s.
+  float threshold_external_a_m3s;
+  // External leak of chamber B that raises an alarm, m³/s.
+  float threshold_external_b_m3s;
+  // A longer step, s, is a gap: nothing is integrated over it. 0.5 is usual.
+  float max_step_s;
+} PitchleakValveRig;
+
+// One reading of the sensors, SI; pressures are gauge.
+typedef struct PitchleakValveSample {
+  // Piston position from the A end, m.
+  float x_m;
+  // Pressure of chamber A, Pa.
+  float pa_pa;
+  // Pressure of chamber B, Pa.
+  float pb_pa;
+  // Position of the spool, a share of its stroke; above zero it feeds A.
+  float spool;
+  // Supply pressure at the valve, Pa.
+  float ps_pa;
+} PitchleakValveSample;
+
+// What has been found so far.
+typedef struct PitchleakValveFound {
+  // Internal leak past the piston at the mean pressures of the last minute, m³/s.
+  struct PitchleakEstimate internal_m3s;
+  // Leak out of chamber A at its mean pressure, m³/s; since the calibration, where that was made with `--leaks unknown`.
+  struct PitchleakEstimate external_a_m3s;
+  // Leak out of chamber B at its mean pressure, m³/s, likewise.
+  struct PitchleakEstimate external_b_m3s;
+  // Coefficient of the internal leak, m³/(s·Pa).
+  struct PitchleakEstimate internal_m3spa;
+  // Coefficient of the leak out of chamber A, m³/(s·Pa).
+  struct PitchleakEstimate external_a_m3spa;
+  // Coefficient of the leak out of chamber B, m³/(s·Pa).
+  struct PitchleakEstimate external_b_m3spa;
+  // Compressibility of the oil, 1/Pa: one over the bulk modulus.
+  struct PitchleakEstimate compressibility_per_pa;
+  // Normalised innovation squared: 1 where the declared noise explains the readings.
+  float innovation;
+  // 1 where a valve as calibrated, its leaks and noise explain the readings, from half a minute on; alarms rest else.
+  uint8_t is_explained;
+  // Active alarms.
+  struct PitchleakAlarms alarms;
+} PitchleakValveFound;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -309,6 +413,43 @@ PitchleakResult pitchleak9_save(const struct Pitchleak9 *estimator, uint8_t *byt
 // Each pointer is null, or what it says.
 PitchleakResult pitchleak9_restore(struct Pitchleak9 *estimator, const uint8_t *bytes, size_t length);
 
+// Begins anew for a rig.
+//
+// # Safety
+// Each pointer is null, or what it says.
+PitchleakResult pitchleak_valve_begin(struct PitchleakValve *estimator, const struct PitchleakValveRig *rig);
+
+// Takes in a sample, `dt_s` after the one before.
+//
+// # Safety
+// Each pointer is null, or what it says.
+PitchleakResult pitchleak_valve_update(struct PitchleakValve *estimator,
+                                       float dt_s,
+                                       const struct PitchleakValveSample *sample);
+
+// Tells what has been found so far.
+//
+// # Safety
+// Each pointer is null, or what it says.
+PitchleakResult pitchleak_valve_find(const struct PitchleakValve *estimator,
+                                     struct PitchleakValveFound *found);
+
+// Writes the state to `bytes`, of which there are `*length`; afterwards `*length` were written.
+// PITCHLEAK_VALVE_STATE_BYTES are enough.
+//
+// # Safety
+// Each pointer is null, or what it says.
+PitchleakResult pitchleak_valve_save(const struct PitchleakValve *estimator, uint8_t *bytes, size_t *length);
+
+// Goes on from a state that `pitchleak_valve_save` wrote, on this machine or another; other bytes leave the
+// estimator as it was.
+//
+// # Safety
+// Each pointer is null, or what it says.
+PitchleakResult pitchleak_valve_restore(struct PitchleakValve *estimator,
+                                        const uint8_t *bytes,
+                                        size_t length);
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus
@@ -327,6 +468,8 @@ PITCHLEAK_ASSERT(sizeof(Pitchleak4) == 8 * PITCHLEAK4_WORDS && PITCHLEAK_ALIGNOF
 PITCHLEAK_ASSERT(sizeof(Pitchleak6) == 8 * PITCHLEAK6_WORDS && PITCHLEAK_ALIGNOF(Pitchleak6) == 8);
 PITCHLEAK_ASSERT(sizeof(Pitchleak9) == 8 * PITCHLEAK9_WORDS && PITCHLEAK_ALIGNOF(Pitchleak9) == 8);
 PITCHLEAK_ASSERT(sizeof(PitchleakRig) == 112 && sizeof(PitchleakSample) == 20 && sizeof(PitchleakFound) == 68);
-PITCHLEAK_ASSERT(sizeof(PitchleakResult) == 4);
+PITCHLEAK_ASSERT(sizeof(PitchleakValve) == 8 * PITCHLEAK_VALVE_WORDS && PITCHLEAK_ALIGNOF(PitchleakValve) == 8);
+PITCHLEAK_ASSERT(sizeof(PitchleakValveRig) == 1292 && sizeof(PitchleakValveSample) == 20);
+PITCHLEAK_ASSERT(sizeof(PitchleakValveFound) == 64 && sizeof(PitchleakResult) == 4);
 #undef PITCHLEAK_ASSERT
 #undef PITCHLEAK_ALIGNOF

@@ -1,5 +1,6 @@
 //! The estimator of 4 parameters.
 
+use crate::leaks::Leaks;
 use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
 use crate::rig::PitchleakRig;
@@ -20,7 +21,9 @@ pub struct Pitchleak4 {
 }
 
 // SAFETY: `Memory::FITS` holds.
-unsafe impl Memory<4> for Pitchleak4 {}
+unsafe impl Memory for Pitchleak4 {
+    type Kept = Leaks<4>;
+}
 
 /// Begins anew for a rig.
 ///

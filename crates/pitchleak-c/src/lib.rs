@@ -2,10 +2,12 @@
 //! memory, nothing is allocated, and no function reads a clock or a file.
 //!
 //! There is one type for each size of the estimator, `Pitchleak4`, `Pitchleak6`, `Pitchleak9`, so that a controller
-//! that declares no offset pays for none. The functions of all three are thin: what they do stands in `running`.
+//! that declares no offset pays for none. `PitchleakValve` does without flow meters. The functions of all are thin: what they do stands
+//! in `running`.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 mod four;
+mod leaks;
 mod nine;
 mod reading;
 mod result;
@@ -13,6 +15,7 @@ mod rig;
 mod running;
 mod six;
 mod state;
+mod valve;
 
 pub use four::*;
 pub use nine::*;
@@ -20,6 +23,7 @@ pub use reading::{PitchleakAlarms, PitchleakEstimate, PitchleakFound, PitchleakS
 pub use result::PitchleakResult;
 pub use rig::{PitchleakCylinder, PitchleakFluid, PitchleakRig, PitchleakSensor};
 pub use six::*;
+pub use valve::*;
 
 /// Never called: `ci/panic-free` proves that of the core, and here is nothing that could.
 #[cfg(not(any(feature = "std", test)))]

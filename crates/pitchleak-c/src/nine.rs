@@ -1,5 +1,6 @@
 //! The estimator of 9 parameters.
 
+use crate::leaks::Leaks;
 use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
 use crate::rig::PitchleakRig;
@@ -20,7 +21,9 @@ pub struct Pitchleak9 {
 }
 
 // SAFETY: `Memory::FITS` holds.
-unsafe impl Memory<9> for Pitchleak9 {}
+unsafe impl Memory for Pitchleak9 {
+    type Kept = Leaks<9>;
+}
 
 /// Begins anew for a rig.
 ///

@@ -28,4 +28,6 @@ pub enum PitchleakResult {
     Damaged = -7,
     /// The bytes are the state of another version, or of an estimator of another size.
     OtherVersion = -8,
+    /// A number of the valve's calibration cannot be.
+    BadCalibration = -9,
 }

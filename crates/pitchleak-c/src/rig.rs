@@ -109,48 +109,61 @@ impl PitchleakSensor {
     }
 }
 
+/// A cylinder, its oil and the longest step that are possible; no number that is none is.
+pub(crate) fn possible(
+    cylinder: &PitchleakCylinder,
+    fluid: &PitchleakFluid,
+    max_step_s: f32,
+) -> Result<(Cylinder<f32>, Fluid<f32>), PitchleakResult> {
+    let PitchleakCylinder {
+        area_a_m2,
+        area_b_m2,
+        stroke_m,
+        moving_mass_kg,
+        dead_volume_a_m3,
+        dead_volume_b_m3,
+    } = *cylinder;
+    let PitchleakFluid { bulk_modulus_pa, bulk_modulus_std_pa } = *fluid;
+    let is_possible = bounds::AREA.contains(&area_a_m2)
+        && bounds::AREA.contains(&area_b_m2)
+        && bounds::STROKE.contains(&stroke_m)
+        && bounds::MOVING_MASS.contains(&moving_mass_kg)
+        && bounds::DEAD_VOLUME.contains(&dead_volume_a_m3)
+        && bounds::DEAD_VOLUME.contains(&dead_volume_b_m3)
+        && bounds::BULK_MODULUS.contains(&bulk_modulus_pa)
+        && bounds::BULK_MODULUS_STD.contains(&bulk_modulus_std_pa)
+        && bounds::MAX_STEP.contains(&max_step_s);
+    if !is_possible {
+        return Err(PitchleakResult::BadCylinder);
+    }
+    let cylinder =
+        Cylinder { area_a_m2, area_b_m2, stroke_m, moving_mass_kg, dead_volume_a_m3, dead_volume_b_m3 };
+    Ok((cylinder, Fluid { bulk_modulus_pa, bulk_modulus_std_pa }))
+}
+
+/// Alarms at these leaks, m³/s: internal, external A, external B.
+pub(crate) fn detector(
+    [internal, external_a, external_b]: [f32; 3],
+) -> Result<LeakDetector<f32>, PitchleakResult> {
+    let threshold_m3s = PerLeak { internal, external_a, external_b };
+    if !threshold_m3s.iter().all(|(_, threshold)| bounds::THRESHOLD.contains(threshold)) {
+        return Err(PitchleakResult::BadThreshold);
+    }
+    Ok(LeakDetector::new(AlarmSettings { threshold_m3s, ..AlarmSettings::default() }))
+}
+
 impl PitchleakRig {
-    /// Whether all that is declared is possible; no number that is none is.
-    fn check(&self) -> Result<(), PitchleakResult> {
-        let PitchleakCylinder { area_a_m2, area_b_m2, stroke_m, moving_mass_kg, .. } = &self.cylinder;
-        let cylinder = [
-            bounds::AREA.contains(area_a_m2),
-            bounds::AREA.contains(area_b_m2),
-            bounds::STROKE.contains(stroke_m),
-            bounds::MOVING_MASS.contains(moving_mass_kg),
-            bounds::DEAD_VOLUME.contains(&self.cylinder.dead_volume_a_m3),
-            bounds::DEAD_VOLUME.contains(&self.cylinder.dead_volume_b_m3),
-            bounds::BULK_MODULUS.contains(&self.fluid.bulk_modulus_pa),
-            bounds::BULK_MODULUS_STD.contains(&self.fluid.bulk_modulus_std_pa),
-            bounds::MAX_STEP.contains(&self.max_step_s),
-        ];
+    pub(crate) fn estimator<const N: usize>(&self) -> Result<Rls<f32, N>, PitchleakResult> {
+        let (cylinder, fluid) = possible(&self.cylinder, &self.fluid, self.max_step_s)?;
         let sensors = [
             self.flow_a.is_within(&bounds::FLOW),
             self.flow_b.is_within(&bounds::FLOW),
             self.pressure.is_within(&bounds::PRESSURE),
             self.position.is_within(&bounds::POSITION),
         ];
-        match (cylinder.contains(&false), sensors.contains(&false)) {
-            (true, _) => Err(PitchleakResult::BadCylinder),
-            (_, true) => Err(PitchleakResult::BadSensors),
-            _ => Ok(()),
+        if sensors.contains(&false) {
+            return Err(PitchleakResult::BadSensors);
         }
-    }
-
-    pub(crate) fn estimator<const N: usize>(&self) -> Result<Rls<f32, N>, PitchleakResult> {
-        self.check()?;
-        let PitchleakCylinder {
-            area_a_m2,
-            area_b_m2,
-            stroke_m,
-            moving_mass_kg,
-            dead_volume_a_m3,
-            dead_volume_b_m3,
-        } = self.cylinder;
-        let cylinder =
-            Cylinder { area_a_m2, area_b_m2, stroke_m, moving_mass_kg, dead_volume_a_m3, dead_volume_b_m3 };
-        let PitchleakFluid { bulk_modulus_pa, bulk_modulus_std_pa } = self.fluid;
-        let fluid = Fluid { bulk_modulus_pa, bulk_modulus_std_pa };
         let spread = |sensor: PitchleakSensor| SensorSpread {
             noise_std: sensor.noise_std,
             bias_std: sensor.bias_std,
@@ -173,14 +186,6 @@ impl PitchleakRig {
     }
 
     pub(crate) fn detector(&self) -> Result<LeakDetector<f32>, PitchleakResult> {
-        let threshold_m3s = PerLeak {
-            internal: self.threshold_internal_m3s,
-            external_a: self.threshold_external_a_m3s,
-            external_b: self.threshold_external_b_m3s,
-        };
-        if !threshold_m3s.iter().all(|(_, threshold)| bounds::THRESHOLD.contains(threshold)) {
-            return Err(PitchleakResult::BadThreshold);
-        }
-        Ok(LeakDetector::new(AlarmSettings { threshold_m3s, ..AlarmSettings::default() }))
+        detector([self.threshold_internal_m3s, self.threshold_external_a_m3s, self.threshold_external_b_m3s])
     }
 }

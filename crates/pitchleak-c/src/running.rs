@@ -1,38 +1,44 @@
 //! What stands in the memory that the caller brings.
 
-use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
-use crate::rig::PitchleakRig;
 use crate::state;
-use pitchleak_core::{LeakDetector, Rls, Update};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-/// Says that the memory holds an estimator of N parameters.
-const fn mark(parameters: usize) -> u64 {
-    0x7069_7463_686c_6b00 | parameters as u64
+/// Says that the memory holds an estimator of this kind.
+const fn mark(kind: u8) -> u64 {
+    0x7069_7463_686c_6b00 | kind as u64
 }
 
 /// An estimator and its alarms.
 #[repr(C)]
-pub(crate) struct Running<const N: usize> {
+pub(crate) struct Running<E> {
     mark: u64,
-    estimator: Estimator<N>,
+    estimator: E,
 }
 
-/// What is kept from sample to sample.
-#[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Estimator<const N: usize> {
-    rls: Rls<f32, N>,
-    detector: LeakDetector<f32>,
+/// What is kept from sample to sample, an estimator and its alarms: how it begins, and what it makes of a sample.
+pub(crate) trait Kept: Copy + Serialize + DeserializeOwned {
+    /// Its number of unknowns tells its kind.
+    const KIND: u8;
+    type Rig;
+    type Sample: Copy;
+    type Found;
+    fn begin(rig: &Self::Rig) -> Result<Self, PitchleakResult>;
+    fn update(&mut self, dt_s: f32, sample: Self::Sample) -> PitchleakResult;
+    fn find(&self) -> Self::Found;
 }
 
-/// Memory in which a `Running<N>` may stand.
+/// Memory in which an estimator may stand.
 ///
 /// # Safety
-/// It is at least as large, and aligned as well.
-pub(crate) unsafe trait Memory<const N: usize>: Sized {
+/// It is at least as large as a `Running<Kept>`, and aligned as well.
+pub(crate) unsafe trait Memory: Sized {
+    type Kept: Kept;
     /// It does fit.
     const FITS: () = assert!(
-        size_of::<Running<N>>() <= size_of::<Self>() && align_of::<Running<N>>() <= align_of::<Self>(),
+        size_of::<Running<Self::Kept>>() <= size_of::<Self>()
+            && align_of::<Running<Self::Kept>>() <= align_of::<Self>(),
         "the memory is too small for its estimator"
     );
 }
@@ -41,14 +47,10 @@ pub(crate) unsafe trait Memory<const N: usize>: Sized {
 ///
 /// # Safety
 /// Each pointer is null, or what it says.
-pub(crate) unsafe fn begin<M: Memory<N>, const N: usize>(
-    memory: *mut M,
-    rig: *const PitchleakRig,
-) -> PitchleakResult {
+pub(crate) unsafe fn begin<M: Memory>(memory: *mut M, rig: *const <M::Kept as Kept>::Rig) -> PitchleakResult {
     // SAFETY: as the caller promises.
     let Some(rig) = (unsafe { rig.as_ref() }) else { return PitchleakResult::NullPointer };
-    let made = rig.estimator().and_then(|rls| Ok(Estimator { rls, detector: rig.detector()? }));
-    match made {
+    match M::Kept::begin(rig) {
         // SAFETY: as the caller promises.
         Ok(estimator) => unsafe { put(memory, estimator) },
         Err(why) => why,
@@ -59,28 +61,18 @@ pub(crate) unsafe fn begin<M: Memory<N>, const N: usize>(
 ///
 /// # Safety
 /// Each pointer is null, or what it says.
-pub(crate) unsafe fn update<M: Memory<N>, const N: usize>(
+pub(crate) unsafe fn update<M: Memory>(
     memory: *mut M,
     dt_s: f32,
-    sample: *const PitchleakSample,
+    sample: *const <M::Kept as Kept>::Sample,
 ) -> PitchleakResult {
     // SAFETY: as the caller promises.
     let Some(sample) = (unsafe { sample.as_ref() }) else { return PitchleakResult::NullPointer };
     // SAFETY: as the caller promises.
-    let Estimator { rls, detector } = match unsafe { running(memory) } {
+    match unsafe { running(memory) } {
         // SAFETY: begun, and nobody else uses it meanwhile.
-        Ok(running) => unsafe { &mut (*running.cast_mut()).estimator },
-        Err(why) => return why,
-    };
-    // A flow may have a clock of its own.
-    match rls.update_waiting(dt_s, &(*sample).into()) {
-        Update::Started => PitchleakResult::Started,
-        Update::Rejected => PitchleakResult::Rejected,
-        Update::Renewed { elapsed_s, changed, .. } => {
-            detector.update(elapsed_s, &rls.mean_leaks_m3s());
-            if changed { PitchleakResult::Changed } else { PitchleakResult::Renewed }
-        }
-        Update::Accepted | Update::Balanced { .. } => PitchleakResult::Ok,
+        Ok(running) => unsafe { &mut (*running.cast_mut()).estimator }.update(dt_s, *sample),
+        Err(why) => why,
     }
 }
 
@@ -88,9 +80,9 @@ pub(crate) unsafe fn update<M: Memory<N>, const N: usize>(
 ///
 /// # Safety
 /// Each pointer is null, or what it says.
-pub(crate) unsafe fn find<M: Memory<N>, const N: usize>(
+pub(crate) unsafe fn find<M: Memory>(
     memory: *const M,
-    found: *mut PitchleakFound,
+    found: *mut <M::Kept as Kept>::Found,
 ) -> PitchleakResult {
     if found.is_null() {
         return PitchleakResult::NullPointer;
@@ -99,8 +91,7 @@ pub(crate) unsafe fn find<M: Memory<N>, const N: usize>(
     match unsafe { running(memory) } {
         Ok(running) => {
             // SAFETY: begun.
-            let Estimator { rls, detector } = unsafe { &(*running).estimator };
-            let value = PitchleakFound::new(&rls.estimates(), detector.active());
+            let value = unsafe { &(*running).estimator }.find();
             // SAFETY: not null, and as the caller promises.
             unsafe { found.write(value) };
             PitchleakResult::Ok
@@ -113,7 +104,7 @@ pub(crate) unsafe fn find<M: Memory<N>, const N: usize>(
 ///
 /// # Safety
 /// Each pointer is null, or what it says.
-pub(crate) unsafe fn save<M: Memory<N>, const N: usize>(
+pub(crate) unsafe fn save<M: Memory>(
     memory: *const M,
     bytes: *mut u8,
     length: *mut usize,
@@ -143,11 +134,7 @@ pub(crate) unsafe fn save<M: Memory<N>, const N: usize>(
 ///
 /// # Safety
 /// Each pointer is null, or what it says.
-pub(crate) unsafe fn restore<M: Memory<N>, const N: usize>(
-    memory: *mut M,
-    bytes: *const u8,
-    length: usize,
-) -> PitchleakResult {
+pub(crate) unsafe fn restore<M: Memory>(memory: *mut M, bytes: *const u8, length: usize) -> PitchleakResult {
     if bytes.is_null() {
         return PitchleakResult::NullPointer;
     }
@@ -161,13 +148,13 @@ pub(crate) unsafe fn restore<M: Memory<N>, const N: usize>(
 
 /// # Safety
 /// `memory` is null, or a `M`.
-unsafe fn put<M: Memory<N>, const N: usize>(memory: *mut M, estimator: Estimator<N>) -> PitchleakResult {
+unsafe fn put<M: Memory>(memory: *mut M, estimator: M::Kept) -> PitchleakResult {
     let () = M::FITS;
     if memory.is_null() {
         return PitchleakResult::NullPointer;
     }
     // SAFETY: not null, large enough and aligned.
-    unsafe { memory.cast::<Running<N>>().write(Running { mark: mark(N), estimator }) };
+    unsafe { memory.cast::<Running<M::Kept>>().write(Running { mark: mark(M::Kept::KIND), estimator }) };
     PitchleakResult::Ok
 }
 
@@ -175,14 +162,12 @@ unsafe fn put<M: Memory<N>, const N: usize>(memory: *mut M, estimator: Estimator
 ///
 /// # Safety
 /// `memory` is null, or a `M`.
-unsafe fn running<M: Memory<N>, const N: usize>(
-    memory: *const M,
-) -> Result<*const Running<N>, PitchleakResult> {
+unsafe fn running<M: Memory>(memory: *const M) -> Result<*const Running<M::Kept>, PitchleakResult> {
     let () = M::FITS;
     if memory.is_null() {
         return Err(PitchleakResult::NullPointer);
     }
     // SAFETY: not null, large enough and aligned; the mark stands first.
-    let begun = unsafe { memory.cast::<u64>().read() } == mark(N);
+    let begun = unsafe { memory.cast::<u64>().read() } == mark(M::Kept::KIND);
     if begun { Ok(memory.cast()) } else { Err(PitchleakResult::NotBegun) }
 }

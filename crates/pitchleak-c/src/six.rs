@@ -1,5 +1,6 @@
 //! The estimator of 6 parameters.
 
+use crate::leaks::Leaks;
 use crate::reading::{PitchleakFound, PitchleakSample};
 use crate::result::PitchleakResult;
 use crate::rig::PitchleakRig;
@@ -20,7 +21,9 @@ pub struct Pitchleak6 {
 }
 
 // SAFETY: `Memory::FITS` holds.
-unsafe impl Memory<6> for Pitchleak6 {}
+unsafe impl Memory for Pitchleak6 {
+    type Kept = Leaks<6>;
+}
 
 /// Begins anew for a rig.
 ///

@@ -1,8 +1,8 @@
-//! The state as bytes: postcard of a name, a version, the number of parameters and the estimator, then a CRC-32; the
+//! The state as bytes: postcard of a name, a version, the number of unknowns and the estimator, then a CRC-32; the
 //! same on every machine.
 
 use crate::result::PitchleakResult;
-use crate::running::Estimator;
+use crate::running::Kept;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
@@ -19,29 +19,26 @@ struct Form {
 }
 
 impl Form {
-    const fn of(parameters: usize) -> Self {
-        Self { name: NAME, version: VERSION, parameters: parameters as u8 }
+    const fn of(parameters: u8) -> Self {
+        Self { name: NAME, version: VERSION, parameters }
     }
 }
 
-pub(crate) fn save<const N: usize>(
-    estimator: &Estimator<N>,
-    bytes: &mut [u8],
-) -> Result<usize, PitchleakResult> {
-    let state = (Form::of(N), estimator);
+pub(crate) fn save<E: Kept>(estimator: &E, bytes: &mut [u8]) -> Result<usize, PitchleakResult> {
+    let state = (Form::of(E::KIND), estimator);
     let written = postcard::to_slice_crc32(&state, bytes, CRC.digest());
     written.map(|written| written.len()).map_err(|_| PitchleakResult::TooSmall)
 }
 
-pub(crate) fn restore<const N: usize>(bytes: &[u8]) -> Result<Estimator<N>, PitchleakResult> {
+pub(crate) fn restore<E: Kept>(bytes: &[u8]) -> Result<E, PitchleakResult> {
     let (form, _) = postcard::take_from_bytes::<Form>(bytes).map_err(|_| PitchleakResult::Damaged)?;
     if form.name != NAME {
         return Err(PitchleakResult::Damaged);
     }
-    if form != Form::of(N) {
+    if form != Form::of(E::KIND) {
         return Err(PitchleakResult::OtherVersion);
     }
-    match postcard::take_from_bytes_crc32::<(Form, Estimator<N>)>(bytes, CRC.digest()) {
+    match postcard::take_from_bytes_crc32::<(Form, E)>(bytes, CRC.digest()) {
         Ok(((_, estimator), [])) => Ok(estimator),
         _ => Err(PitchleakResult::Damaged),
     }

@@ -4,6 +4,7 @@
 
 use pitchleak_c::*;
 use pitchleak_testkit::Motion;
+use pitchleak_testkit::valve::ValveCylinder;
 use rand::{RngExt, SeedableRng};
 use std::ptr::{null, null_mut};
 
@@ -233,6 +234,139 @@ fn mistakes_have_their_codes() {
         Started,
     ];
     assert_eq!(results, expected);
+}
+
+/// A nominal valve, known to a thousandth, and what its cylinder reads.
+fn valve() -> (PitchleakValveRig, Vec<PitchleakValveSample>) {
+    let PitchleakRig { cylinder, fluid, .. } = rig();
+    let mut mean = [0.0; PITCHLEAK_VALVE_UNKNOWNS];
+    mean[3..8].fill(1.0);
+    mean[12] = 0.02;
+    let mut covariance = [0.0; PITCHLEAK_VALVE_COVARIANCES];
+    (0..PITCHLEAK_VALVE_UNKNOWNS).for_each(|row| covariance[row * (row + 3) / 2] = 1e-6);
+    let rig = PitchleakValveRig {
+        cylinder,
+        fluid,
+        mean,
+        covariance,
+        rated_flow_m3s: 4.0 / 60e3,
+        rated_drop_pa: 35e5,
+        tank_pa: 2e5,
+        hysteresis: 0.003,
+        null_leak: 0.02,
+        gain_drift: 0.03,
+        lap_drift: 0.001,
+        null_leak_drift: 0.1,
+        position_std_m: 0.2e-3,
+        pressure_std_pa: 16e3,
+        spool_std: 1e-3,
+        supply_std_pa: 16e3,
+        threshold_internal_m3s: 1e-6,
+        threshold_external_a_m3s: 1e-6,
+        threshold_external_b_m3s: 1e-6,
+        max_step_s: 0.5,
+    };
+    let text = ValveCylinder::drawn(4).leaking(1, 1.0).trace(12.0, 100.0, 3e-3);
+    let row = |line: &str| {
+        let cells: Vec<f32> = line.split(',').filter_map(|cell| cell.parse().ok()).collect();
+        let [_, x_mm, pa, pb, spool, ps] = cells.try_into().unwrap();
+        let (x_m, pa_pa, pb_pa) = (1e-3 * x_mm, 1e5 * pa, 1e5 * pb);
+        PitchleakValveSample { x_m, pa_pa, pb_pa, spool: 1e-2 * spool, ps_pa: 1e5 * ps }
+    };
+    (rig, text.lines().skip(1).map(row).collect())
+}
+
+fn begun_valve(rig: &PitchleakValveRig) -> Result<PitchleakValve, PitchleakResult> {
+    let mut estimator = PitchleakValve { words: [0; PITCHLEAK_VALVE_WORDS] };
+    // SAFETY: both are what they say.
+    let result = unsafe { pitchleak_valve_begin(&mut estimator, rig) };
+    if result == PitchleakResult::Ok { Ok(estimator) } else { Err(result) }
+}
+
+fn saved_valve(estimator: &PitchleakValve) -> Vec<u8> {
+    let mut bytes = vec![0; PITCHLEAK_VALVE_STATE_BYTES];
+    let mut length = bytes.len();
+    // SAFETY: all are what they say.
+    let result = unsafe { pitchleak_valve_save(estimator, bytes.as_mut_ptr(), &mut length) };
+    assert_eq!(result, PitchleakResult::Ok);
+    bytes.truncate(length);
+    bytes
+}
+
+fn feed_valve(estimator: &mut PitchleakValve, samples: &[PitchleakValveSample]) {
+    for sample in samples {
+        // SAFETY: both are what they say.
+        let result = unsafe { pitchleak_valve_update(estimator, 0.01, sample) };
+        assert!(result as i32 >= 0, "{result:?}");
+    }
+}
+
+#[test]
+fn a_restored_valve_goes_on_to_the_last_bit() {
+    let (rig, samples) = valve();
+    let mut whole = begun_valve(&rig).unwrap();
+    feed_valve(&mut whole, &samples);
+    assert!(saved_valve(&whole).len() > 2000);
+    for at in (0..samples.len()).step_by(7) {
+        let (before, after) = samples.split_at(at);
+        let mut first = begun_valve(&rig).unwrap();
+        feed_valve(&mut first, before);
+        let bytes = saved_valve(&first);
+        let mut second = PitchleakValve { words: [0; PITCHLEAK_VALVE_WORDS] };
+        // SAFETY: all are what they say.
+        let result = unsafe { pitchleak_valve_restore(&mut second, bytes.as_ptr(), bytes.len()) };
+        assert_eq!(result, PitchleakResult::Ok);
+        feed_valve(&mut second, after);
+        assert!(saved_valve(&second) == saved_valve(&whole), "interrupted after {at}");
+    }
+    let other = saved(&begun());
+    // SAFETY: all are what they say.
+    let result = unsafe { pitchleak_valve_restore(&mut whole, other.as_ptr(), other.len()) };
+    assert_eq!(result, PitchleakResult::OtherVersion);
+}
+
+#[test]
+fn a_valve_that_cannot_be_has_its_code() {
+    let (rig, samples) = valve();
+    let broken = |change: fn(&mut PitchleakValveRig)| {
+        let mut broken = rig;
+        change(&mut broken);
+        begun_valve(&broken).err()
+    };
+    assert_eq!(broken(|rig| rig.covariance[3] = f32::NAN), Some(PitchleakResult::BadCalibration));
+    assert_eq!(broken(|rig| rig.rated_flow_m3s = 0.0), Some(PitchleakResult::BadCalibration));
+    assert_eq!(broken(|rig| rig.spool_std = -1.0), Some(PitchleakResult::BadSensors));
+    assert_eq!(broken(|rig| rig.cylinder.stroke_m = f32::INFINITY), Some(PitchleakResult::BadCylinder));
+    assert_eq!(broken(|rig| rig.threshold_external_a_m3s = 0.0), Some(PitchleakResult::BadThreshold));
+    let mut blank = PitchleakValve { words: [0; PITCHLEAK_VALVE_WORDS] };
+    // SAFETY: both are what they say.
+    let result = unsafe { pitchleak_valve_update(&mut blank, 0.01, &samples[0]) };
+    assert_eq!(result, PitchleakResult::NotBegun);
+}
+
+/// Whatever a calibration holds, what is found is a number.
+#[test]
+fn a_valve_that_is_taken_gives_numbers() {
+    let mut dice = Dice(rand_chacha::ChaCha8Rng::seed_from_u64(32));
+    let (sound, samples) = valve();
+    let numbers = size_of::<PitchleakValveRig>() / size_of::<f32>();
+    let mut taken = 0;
+    for _ in 0..1000 {
+        let mut rig = sound;
+        let (which, value) = (dice.0.random_range(0..numbers), any(&mut dice));
+        // SAFETY: the rig is so many floats in a row.
+        unsafe { (&raw mut rig).cast::<f32>().add(which).write(value) };
+        let Ok(mut estimator) = begun_valve(&rig) else { continue };
+        taken += 1;
+        feed_valve(&mut estimator, &samples[..200]);
+        let mut found = PitchleakValveFound::default();
+        // SAFETY: both are what they say.
+        unsafe { pitchleak_valve_find(&estimator, &mut found) };
+        for found in [found.internal_m3s, found.external_a_m3s, found.external_b_m3s] {
+            assert!(!found.value.is_nan() && !found.std.is_nan(), "{which} {value}: {found:?}");
+        }
+    }
+    assert!(taken > 300, "{taken}");
 }
 
 /// As many bytes as the header says are enough, and a state of another form would show.

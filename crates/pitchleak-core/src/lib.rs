@@ -55,7 +55,8 @@
 //! - **[Continuity](continuity)**: what a block of samples says of both chambers: integrals, their noise, rows; and channels that
 //!   each have a clock of their own. Whoever fits leaks starts here.
 //! - **Estimators**: [`Rls`], the default, and [`PaperLaw`] with its chain [`PaperEstimator`]. One sample in, at times an
-//!   [`Update`] out, [`Estimates`] with standard deviations whenever they are asked for.
+//!   [`Update`] out, [`Estimates`] with standard deviations whenever they are asked for. [`ValveFilter`] needs no flow meters,
+//!   but a calibrated valve.
 //! - **Detector**: [`LeakDetector`], alarms by a sequential test of those estimates.
 //!
 //! Between samples an estimator can be copied, and with the feature `serde` saved. Channels need not come together:
@@ -96,6 +97,7 @@ mod model;
 mod number;
 mod paper;
 pub mod plant;
+mod valve;
 
 pub use detector::{AlarmSettings, AlarmState, LeakDetector};
 pub use effects::{Effect, EffectSet};
@@ -116,3 +118,7 @@ pub use model::{
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;
+pub use valve::{
+    VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveEstimates, ValveFilter, ValveNoise,
+    ValveSample, ValveUpdate,
+};

@@ -24,6 +24,9 @@ pub trait Real:
     fn at_most(self, most: Self) -> Self {
         if self < most { self } else { most }
     }
+    /// One over the square root of a positive number, within a few units in the last place. In `f32` by Newton's iteration from the
+    /// bits of the number, on every target: a microcontroller's library takes five times as long for a root and a division.
+    fn inverse_root(self) -> Self;
     /// e to the power of `self`.
     fn libm_exp(self) -> Self;
     /// Natural logarithm.
@@ -52,7 +55,7 @@ mod sealed {
 }
 
 macro_rules! real {
-    ($type:ty, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident) => {
+    ($type:ty, $inverse_root:expr, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident) => {
         impl Real for $type {
             #[inline(always)]
             fn lit(value: f64) -> Self {
@@ -61,6 +64,10 @@ macro_rules! real {
             #[inline(always)]
             fn as_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline(always)]
+            fn inverse_root(self) -> Self {
+                $inverse_root(self)
             }
             #[cfg_attr(target_os = "none", inline(never))] // once in the flash
             fn libm_exp(self) -> Self {
@@ -96,5 +103,32 @@ macro_rules! real {
     };
 }
 
-real!(f32, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf);
-real!(f64, exp, log, log1p, pow, sin, cos, tan, acos, tanh);
+/// Half the exponent, turned, is within 4 % (Lomont 2003, "Fast inverse square root"); each iteration squares the error.
+#[inline(always)]
+fn newtons_inverse_root(number: f32) -> f32 {
+    let mut root = f32::from_bits(0x5f37_5a86_u32.wrapping_sub(number.to_bits() >> 1));
+    let half = 0.5 * number;
+    for _ in 0..3 {
+        root *= 1.5 - half * root * root;
+    }
+    root
+}
+
+real!(f32, newtons_inverse_root, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf);
+real!(f64, |number: f64| 1.0 / number.sqrt(), exp, log, log1p, pow, sin, cos, tan, acos, tanh);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverse_roots_are_those_of_the_root() {
+        let mut number = 1e-30_f32;
+        while number < 1e30 {
+            let exact = 1.0 / f64::from(number).sqrt();
+            assert!((number.inverse_root().as_f64() / exact - 1.0).abs() < 3e-7, "{number}");
+            assert!((f64::from(number).inverse_root() / exact - 1.0).abs() < 1e-15);
+            number *= 1.037;
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! What is not known of a cylinder and its valve, in the order in which `pitchleak calibrate` writes it.
+
+/// How many there are.
+pub const VALVE_UNKNOWNS: usize = 23;
+/// Entries of a lower triangle, row by row, of their covariances.
+pub const VALVE_COVARIANCES: usize = VALVE_UNKNOWNS * (VALVE_UNKNOWNS + 1) / 2;
+
+/// C_ip, C_epA, C_epB, L/min at 50 bar.
+pub(super) const LEAKS: usize = 0;
+/// κ = 1/β, in the rig's.
+pub(super) const KAPPA: usize = 3;
+/// K₁ … K₄, in the data sheet's.
+pub(super) const GAINS: usize = 4;
+/// d₁ … d₄, shares of the stroke.
+pub(super) const LAPS: usize = 8;
+/// w, a share of the stroke.
+pub(super) const ROUNDING: usize = 12;
+/// c of full openings.
+pub(super) const SATURATION: usize = 13;
+/// What the tank's pressure is off by, bar.
+pub(super) const TANK: usize = 14;
+/// By how much the spool's reading is late, ms.
+pub(super) const LAG: usize = 15;
+/// l₁ … l₄, L/min at 50 bar.
+pub(super) const CLEARANCES: usize = 16;
+/// Half width of the hysteresis, a share of the stroke.
+pub(super) const HYSTERESIS: usize = 20;
+/// What the supply's pressure is off by, bar.
+pub(super) const SUPPLY: usize = 21;
+/// By how much the supply's pressure drops between its sensor and the valve at the rated flow, bar.
+pub(super) const DROOP: usize = 22;
+
+/// 1 L/min at 50 bar, m³/(s·Pa).
+pub(super) const LEAK_UNIT_M3SPA: f64 = 1.0 / crate::LPM_PER_M3S / 50e5;
+pub(super) const PA_PER_BAR: f64 = 1e5;
+pub(super) const S_PER_MS: f64 = 1e-3;
