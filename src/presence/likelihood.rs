@@ -1,10 +1,9 @@
 //! The likelihood of the leaks where all else is settled: normal.
 
-use crate::units::LPM_PER_M3S;
 use nalgebra::{Matrix3, Vector3};
+/// Unit of the leak coefficients.
+pub(crate) use pitchleak_core::valve_unknowns::LEAK_UNIT_M3SPA;
 
-/// Unit of the leak coefficients: 1 L/min at 50 bar, in m³/(s·Pa).
-pub(crate) const LEAK_UNIT_M3SPA: f64 = 1.0 / LPM_PER_M3S / 50e5;
 /// Of a coefficient of 1 L/min at 50 bar: a thousand of them, 1 σ.
 pub(crate) const LEAST_INFORMATION: f64 = 1e-6;
 /// … and a share of the best known, below which differences are rounding: constant pressures give two rates for three leaks.

@@ -1,39 +1,13 @@
 //! What is not known of a cylinder and its valve, and what the rig file says of it.
 
 use crate::presence::LEAK_SIZE;
-pub(super) use crate::presence::LEAK_UNIT_M3SPA;
 use crate::rig::{Rig, ValveSheet};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-
-/// How many there are.
-pub(super) const UNKNOWNS: usize = 23;
-/// C_ip, C_epA, C_epB, in [`LEAK_UNIT_M3SPA`].
-pub(super) const LEAKS: usize = 0;
-/// κ = 1/β, in the rig file's.
-pub(super) const KAPPA: usize = 3;
-/// K₁ … K₄, in the data sheet's.
-pub(super) const GAINS: usize = 4;
-/// d₁ … d₄, shares of the stroke.
-pub(super) const LAPS: usize = 8;
-/// w, a share of the stroke.
-pub(super) const ROUNDING: usize = 12;
-/// c of full openings.
-pub(super) const SATURATION: usize = 13;
-/// What the tank's pressure is off by, bar.
-pub(super) const TANK: usize = 14;
-/// By how much the spool's reading is late, ms.
-pub(super) const LAG: usize = 15;
-/// l₁ … l₄, in [`LEAK_UNIT_M3SPA`].
-pub(super) const CLEARANCES: usize = 16;
-/// Half width of the hysteresis, a share of the stroke.
-pub(super) const HYSTERESIS: usize = 20;
-/// What the supply's pressure is off by, bar.
-pub(super) const SUPPLY: usize = 21;
-/// By how much the supply's pressure drops between its sensor and the valve at the rated flow, bar.
-pub(super) const DROOP: usize = 22;
-
-pub(super) const PA_PER_BAR: f64 = 1e5;
-pub(super) const S_PER_MS: f64 = 1e-3;
+pub(super) use pitchleak_core::VALVE_UNKNOWNS as UNKNOWNS;
+pub(super) use pitchleak_core::valve_unknowns::{
+    CLEARANCES, DROOP, GAINS, HYSTERESIS, KAPPA, LAG, LAPS, LEAK_UNIT_M3SPA, LEAKS, PA_PER_BAR, ROUNDING,
+    S_PER_MS, SATURATION, SUPPLY, TANK,
+};
 
 pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 pub(super) type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;

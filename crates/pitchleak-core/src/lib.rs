@@ -118,6 +118,7 @@ pub use model::{
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;
+pub use valve::unknowns as valve_unknowns;
 pub use valve::{
     VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveEstimates, ValveFilter, ValveNoise,
     ValveSample, ValveUpdate,

@@ -15,7 +15,7 @@ mod edges;
 mod filter;
 mod hats;
 mod rows;
-mod unknowns;
+pub mod unknowns;
 mod valve_filter;
 mod watch;
 mod whitening;

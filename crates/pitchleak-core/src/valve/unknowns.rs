@@ -1,4 +1,4 @@
-//! What is not known of a cylinder and its valve, in the order in which `pitchleak calibrate` writes it.
+//! What is not known of a cylinder and its valve: where each stands in a calibration's mean and covariance, and its unit.
 
 /// How many there are.
 pub const VALVE_UNKNOWNS: usize = 23;
@@ -6,31 +6,33 @@ pub const VALVE_UNKNOWNS: usize = 23;
 pub const VALVE_COVARIANCES: usize = VALVE_UNKNOWNS * (VALVE_UNKNOWNS + 1) / 2;
 
 /// C_ip, C_epA, C_epB, L/min at 50 bar.
-pub(super) const LEAKS: usize = 0;
+pub const LEAKS: usize = 0;
 /// κ = 1/β, in the rig's.
-pub(super) const KAPPA: usize = 3;
+pub const KAPPA: usize = 3;
 /// K₁ … K₄, in the data sheet's.
-pub(super) const GAINS: usize = 4;
+pub const GAINS: usize = 4;
 /// d₁ … d₄, shares of the stroke.
-pub(super) const LAPS: usize = 8;
+pub const LAPS: usize = 8;
 /// w, a share of the stroke.
-pub(super) const ROUNDING: usize = 12;
+pub const ROUNDING: usize = 12;
 /// c of full openings.
-pub(super) const SATURATION: usize = 13;
+pub const SATURATION: usize = 13;
 /// What the tank's pressure is off by, bar.
-pub(super) const TANK: usize = 14;
+pub const TANK: usize = 14;
 /// By how much the spool's reading is late, ms.
-pub(super) const LAG: usize = 15;
+pub const LAG: usize = 15;
 /// l₁ … l₄, L/min at 50 bar.
-pub(super) const CLEARANCES: usize = 16;
+pub const CLEARANCES: usize = 16;
 /// Half width of the hysteresis, a share of the stroke.
-pub(super) const HYSTERESIS: usize = 20;
+pub const HYSTERESIS: usize = 20;
 /// What the supply's pressure is off by, bar.
-pub(super) const SUPPLY: usize = 21;
+pub const SUPPLY: usize = 21;
 /// By how much the supply's pressure drops between its sensor and the valve at the rated flow, bar.
-pub(super) const DROOP: usize = 22;
+pub const DROOP: usize = 22;
 
 /// 1 L/min at 50 bar, m³/(s·Pa).
-pub(super) const LEAK_UNIT_M3SPA: f64 = 1.0 / crate::LPM_PER_M3S / 50e5;
-pub(super) const PA_PER_BAR: f64 = 1e5;
-pub(super) const S_PER_MS: f64 = 1e-3;
+pub const LEAK_UNIT_M3SPA: f64 = 1.0 / crate::LPM_PER_M3S / 50e5;
+/// Of the pressures among them.
+pub const PA_PER_BAR: f64 = 1e5;
+/// Of the lag.
+pub const S_PER_MS: f64 = 1e-3;
