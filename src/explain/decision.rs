@@ -139,6 +139,12 @@ pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told:
 }
 
 impl Decision {
+    /// Probability of the explanations one of whose parts `is` so, as far as they are listed.
+    pub(crate) fn probability_where(&self, is: impl Fn(&str) -> bool) -> f64 {
+        let so = self.explanations.iter().filter(|one| one.id.split('+').any(&is));
+        so.map(|one| one.probability).sum()
+    }
+
     /// A flow that seems to count the other way and is never negative may as well have lost its sign.
     fn with_sizes(mut self, tables: &Tables, told: &Told) -> Self {
         for at in 0..self.explanations.len() {

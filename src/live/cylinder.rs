@@ -6,8 +6,9 @@ use super::history::History;
 use super::order::{Order, Turn};
 use crate::Rig;
 use crate::explain::Decision;
+use crate::hold::HoldTest;
 use crate::replay::{ReplayError, Stream, Taken};
-use crate::report::{ReplayReport, Status};
+use crate::report::ReplayReport;
 use crate::trace::{BadReason, BadRows, LineLayout};
 use pitchleak_core::AlarmState;
 use serde::{Deserialize, Serialize};
@@ -154,12 +155,10 @@ impl Cylinder {
         self.tell_counted(name, events);
     }
 
-    /// A spool comes to rest often: of such holds only those are told that tell something.
     fn hold(&self, name: &str, report: Option<ReplayReport>) -> Option<Event> {
         let t_s = self.stream.time_s()?;
-        let tells = |report: &ReplayReport| report.verdict.status != Status::NotSure;
-        let report = report.filter(|report| tells(report) || !self.stream.rig().may_shut_itself());
-        HoldEvent::new(name, t_s, self.time_ns(t_s), report?).map(|hold| Event::Hold(Box::new(hold)))
+        let report = report.filter(|report| HoldTest::tells(report, self.stream.rig()))?;
+        HoldEvent::new(name, t_s, self.time_ns(t_s), report).map(|hold| Event::Hold(Box::new(hold)))
     }
 
     /// What was counted and not said.

@@ -26,8 +26,8 @@ pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
 use crate::explain::{Decision, Statistic, explain};
-use crate::hold::{self, Recorder};
-use crate::report::{Alarm, ReplayReport, Status, TraceSummary};
+use crate::hold::{self, HoldTest, Recorder};
+use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::told::Beside;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
@@ -451,17 +451,14 @@ pub fn replay<E: From<ReplayError>>(
     }
     let summary =
         TraceSummary { begins: reader.clock(), ..TraceSummary::new(reader.name(), reader.quality()) };
-    let hold = holds.and_then(|holds| holds.finish(rig)).map(|hold| hold.report(summary.clone(), rig));
-    // A spool that came to rest now and then may have told too little: the valve's flows tell more.
-    let hold = match hold {
-        Some(hold) if !(rig.may_shut_itself() && hold.verdict.status == Status::NotSure) => return Ok(hold),
-        other => other,
-    };
-    if let Some(valve) = valve.and_then(|mut valve| valve.finish(rig)) {
-        return Ok(valve.report(summary, rig));
-    }
-    if let Some(hold) = hold {
+    let mut hold = holds.and_then(|holds| holds.finish(rig)).map(|hold| hold.report(summary.clone(), rig));
+    if let Some(hold) = hold.take_if(|hold| HoldTest::tells(hold, rig)) {
         return Ok(hold);
+    }
+    // Where the holds tell too little, the valve's flows may tell more.
+    let valve = valve.and_then(|mut valve| valve.finish(rig)).map(|valve| valve.report(summary.clone(), rig));
+    if let Some(report) = valve.or(hold) {
+        return Ok(report);
     }
     let weighed = replay.whole_trace();
     let refused = refused.filter(|_| reader.quality().is_mostly_bad());

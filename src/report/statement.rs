@@ -70,9 +70,7 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
 /// By which law they leak, where it is not the model's for certain.
 fn law(findings: &Findings<'_>) -> Option<String> {
     let decision = findings.decision?;
-    let orifices = decision.explanations.iter().filter(|one| one.id.contains(":orifice"));
-    let probability: f64 = orifices.map(|one| one.probability).sum();
-    (probability >= LAW_SURE)
+    (decision.probability_where(|part| part.ends_with(":orifice")) >= LAW_SURE)
         .then(|| "It leaks as through an orifice, by the root of the pressure.".to_owned())
 }
 

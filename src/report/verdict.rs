@@ -137,9 +137,8 @@ impl Findings<'_> {
     pub(super) fn is_away(&self, leak: Leak) -> bool {
         let Some(decision) = self.decision.filter(|_| self.active[leak]) else { return false };
         let wandering = format!("{}:wandering", leak.id());
-        let coming =
-            decision.explanations.iter().filter(|one| one.id.split('+').any(|part| part == wandering));
-        decision.ruled_out.contains(&leak) && coming.map(|one| one.probability).sum::<f64>() > AWAY_DOUBT
+        decision.ruled_out.contains(&leak)
+            && decision.probability_where(|part| part == wandering) > AWAY_DOUBT
     }
 }
 

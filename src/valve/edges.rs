@@ -11,8 +11,8 @@
 //! what is drawn.
 
 use super::unknowns::{
-    CLEARANCES, DROOP, GAINS, HYSTERESIS, LAG, LAPS, LEAK_UNIT_M3SPA, PA_PER_BAR, ROUNDING, S_PER_MS,
-    SATURATION, SUPPLY, TANK, Unknowns,
+    CLEARANCES, DROOP, GAINS, HYSTERESIS, LAG, LAMINAR_PA, LAPS, LEAK_UNIT_M3SPA, PA_PER_BAR, ROUNDING,
+    S_PER_MS, SATURATION, SUPPLY, TANK, Unknowns,
 };
 use nalgebra::SVector;
 use pitchleak_core::{metering, metering_slope};
@@ -24,9 +24,6 @@ pub(super) const PA: usize = 1;
 pub(super) const PB: usize = 2;
 pub(super) const SPOOL: usize = 3;
 pub(super) const PS: usize = 4;
-
-/// Below this drop an edge turns laminar, Pa.
-const LAMINAR_PA: f64 = 1e4;
 
 /// What is known of an instant beside its readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

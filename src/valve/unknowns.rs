@@ -5,9 +5,10 @@ use crate::rig::{Rig, ValveSheet};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 pub(super) use pitchleak_core::VALVE_UNKNOWNS as UNKNOWNS;
 pub(super) use pitchleak_core::valve_unknowns::{
-    CLEARANCES, DROOP, GAINS, HYSTERESIS, KAPPA, LAG, LAPS, LEAK_UNIT_M3SPA, LEAKS, PA_PER_BAR, ROUNDING,
-    S_PER_MS, SATURATION, SUPPLY, TANK,
+    CLEARANCES, DROOP, GAINS, HYSTERESIS, KAPPA, LAG, LAMINAR_PA, LAPS, LEAK_UNIT_M3SPA, LEAKS, PA_PER_BAR,
+    ROUNDING, S_PER_MS, SATURATION, SUPPLY, TANK,
 };
+use pitchleak_core::valve_unknowns::{DRIFT_S, NULL_DRIFT_S};
 
 pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 pub(super) type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
@@ -22,10 +23,6 @@ const LAG_STD_MS: f64 = 2.0;
 const DROOP_STD_BAR: f64 = 2.0;
 /// Zeros of a pressure sensor that nobody declared, a share of its accuracy: 1 σ.
 const ZERO_SHARE: f64 = 1.0 / 3.0;
-/// Gains, clearances and oil change in so long as is declared, s: a day; the spool's zero, which follows the oil's temperature, in ten
-/// minutes. Chosen.
-const DRIFT_S: f64 = 86_400.0;
-const NULL_DRIFT_S: f64 = 600.0;
 /// Of what is known for certain: rounding.
 pub(super) const CERTAIN: f64 = 1e-6;
 

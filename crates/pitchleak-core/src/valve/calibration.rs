@@ -1,7 +1,8 @@
 //! What is known of a valve, its cylinder and its sensors.
 
 use super::unknowns::{
-    CLEARANCES, GAINS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, ROUNDING, VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
+    CLEARANCES, DRIFT_S, GAINS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, NULL_DRIFT_S, ROUNDING,
+    VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
 };
 use crate::{CylinderError, Fluid, Real};
 
@@ -86,10 +87,6 @@ impl From<CylinderError> for ValveError {
     }
 }
 
-/// Time in which gains, clearances and oil change by what is declared, and that in which the spool's zero does, s: it follows the oil's
-/// temperature. Those of the program.
-const DRIFT_S: f64 = 86_400.0;
-const NULL_DRIFT_S: f64 = 600.0;
 /// A leak grows by so much in an hour, 1 σ, L/min at 50 bar: no valve tells less (docs/valve.md).
 const LEAK_GROWTH: f64 = 0.005;
 const HOUR_S: f64 = 3600.0;

@@ -13,7 +13,7 @@
 //! drop at which it holds, so that the numbers of any valve are near one.
 
 use super::calibration::{ValveCalibration, ValveNoise};
-use super::unknowns::{GAINS, LAPS, PA_PER_BAR, ROUNDING, SATURATION, SUPPLY, TANK};
+use super::unknowns::{GAINS, LAMINAR_PA, LAPS, PA_PER_BAR, ROUNDING, SATURATION, SUPPLY, TANK};
 use crate::Real;
 
 /// What is summed over time.
@@ -34,9 +34,6 @@ pub(super) const BY_TANK: usize = 14;
 pub(super) const PRESSURES: usize = 16;
 /// What is drawn from the supply.
 pub(super) const DRAWN: usize = 19;
-
-/// Below this drop an edge turns laminar, Pa.
-const LAMINAR_PA: f64 = 1e4;
 
 /// A valve as its calibration has it.
 #[derive(Clone, Copy, Debug)]

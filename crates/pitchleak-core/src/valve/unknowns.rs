@@ -30,6 +30,14 @@ pub const SUPPLY: usize = 21;
 /// By how much the supply's pressure drops between its sensor and the valve at the rated flow, bar.
 pub const DROOP: usize = 22;
 
+/// Gains, clearances and oil change in so long as is declared, s: a day; the spool's zero, which follows the oil's temperature, in ten
+/// minutes. Chosen.
+pub const DRIFT_S: f64 = 86_400.0;
+/// See [`DRIFT_S`].
+pub const NULL_DRIFT_S: f64 = 600.0;
+/// Below this drop an edge turns laminar, Pa.
+pub const LAMINAR_PA: f64 = 1e4;
+
 /// 1 L/min at 50 bar, m³/(s·Pa).
 pub const LEAK_UNIT_M3SPA: f64 = 1.0 / crate::LPM_PER_M3S / 50e5;
 /// Of the pressures among them.

@@ -104,11 +104,6 @@ impl Rig {
         }
     }
 
-    /// Whether the valve's spool at rest shuts the ports, so that a hold may come of itself.
-    pub fn may_shut_itself(&self) -> bool {
-        self.valve.as_ref().is_some_and(|valve| valve.shut_below.is_some())
-    }
-
     /// The same without its valve's calibration: a new one does not rest on it.
     #[must_use]
     pub fn uncalibrated(&self) -> Self {
