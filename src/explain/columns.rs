@@ -16,7 +16,7 @@ pub enum Column {
     ZeroA,
     /// The same of meter B.
     ZeroB,
-    /// Gain of a flow meter.
+    /// Gain of a flow meter, share of what it shows: g / (1 + g).
     GainA,
     /// The same of meter B.
     GainB,
@@ -32,11 +32,11 @@ pub enum Column {
     DeadVolumeA,
     /// The same of chamber B; also a stroke declared wrong.
     DeadVolumeB,
-    /// Piston area, share of the declared one.
+    /// By how much the piston area is larger than declared, share of its true size.
     AreaA,
     /// The same of chamber B.
     AreaB,
-    /// Gain of the position sensor.
+    /// Gain of the position sensor; what is too small counts as positive.
     PositionGain,
     /// Zero of the position sensor, share of the stroke.
     PositionZero,
@@ -138,6 +138,11 @@ impl Scales<'_> {
         let found = self.leaks_m3s.zip(self.pressures_mpa).map(|(leak, p)| leak / p.max(LEAST_MPA));
         let (through_a, through_b) = (found.internal + found.external_a, found.internal + found.external_b);
         let pressure_scale = 1e-6 * instruments.pressure.full_scale;
+        // By the position the travel of a larger area would be noisier, and areas would be judged by another noise than gains:
+        // the chamber's equation is written in the declared area instead, and all else is as much smaller.
+        let flow_a = [(R::ResidualA, 1.0), (R::PressureChangeA, -kappa * dead_a)];
+        let flow_b = [(R::ResidualB, 1.0), (R::PressureChangeB, -kappa * dead_b)];
+        let past_piston = [(R::PressureA, -found.internal), (R::PressureB, found.internal)];
         match column {
             Column::LeftSide => plain(
                 &[(R::ResidualA, 1.0), (R::Travel, -area_a), (R::StorageA, -kappa)],
@@ -154,24 +159,13 @@ impl Scales<'_> {
             Column::Lags => plain(&[(R::FlowChangeA, -1.0)], &[(R::FlowChangeB, -1.0)]),
             Column::DeadVolumeA => plain(&[(R::PressureChangeA, kappa * area_a * stroke)], &[]),
             Column::DeadVolumeB => plain(&[], &[(R::PressureChangeB, kappa * area_b * stroke)]),
-            // The swept volume, V less the dead one, is as wrong as the area.
-            Column::AreaA => plain(
-                &[(R::Travel, area_a), (R::StorageA, kappa), (R::PressureChangeA, -kappa * dead_a)],
-                &[],
-            ),
-            Column::AreaB => plain(
-                &[],
-                &[(R::Travel, -area_b), (R::StorageB, kappa), (R::PressureChangeB, -kappa * dead_b)],
-            ),
+            Column::AreaA => plain(&[flow_a, past_piston].concat(), &[]),
+            Column::AreaB => plain(&[], &[flow_b, past_piston.map(|(raw, by)| (raw, -by))].concat()),
             // As of both areas; but V_B counts from the other end, which stays where it is.
-            Column::PositionGain => plain(
-                &[(R::Travel, area_a), (R::StorageA, kappa), (R::PressureChangeA, -kappa * dead_a)],
-                &[
-                    (R::Travel, -area_b),
-                    (R::StorageB, kappa),
-                    (R::PressureChangeB, -kappa * (dead_b + area_b * stroke)),
-                ],
-            ),
+            Column::PositionGain => {
+                let from_end = (R::PressureChangeB, -kappa * area_b * stroke);
+                plain(&flow_a, &[flow_b.as_slice(), &[from_end]].concat())
+            }
             Column::PositionZero => plain(
                 &[(R::PressureChangeA, kappa * area_a * stroke)],
                 &[(R::PressureChangeB, -kappa * area_b * stroke)],

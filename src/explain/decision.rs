@@ -7,7 +7,7 @@ use super::posterior::{Posterior, weigh};
 use super::raw_products::Statistic;
 use super::readings::{Mistake, Of};
 use super::sizes::{mended, sentence};
-use super::table::{Entry, LEAK_SHARE};
+use super::table::{Entry, LEAK_SHARE, explanations};
 use crate::report::Status;
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -341,12 +341,15 @@ fn note(weighed: &[Weighed<'_>], kind: usize, rig: &Rig) -> Option<Note> {
     let (best, _) = *masses.first().filter(|_| probability >= 1.0 - alpha)?;
     let likeliest = weighed.iter().find(|one| found(one)[kind].is_some_and(|entry| entry.id == best.id));
     let others = masses.iter().skip(1).filter(|(_, mass)| *mass > alpha).map(|(entry, _)| entry.id);
-    let cannot_be_told_from = others.chain(best.alike.iter().copied()).map(str::to_owned).collect();
+    let rivals: BTreeSet<&str> = others.chain(best.alike.iter().copied()).collect();
+    let text = likeliest.map_or_else(|| best.text.to_owned(), |one| sentence(best, &one.found, rig));
+    let table = explanations();
+    let words = table.iter().filter(|entry| rivals.contains(entry.id)).map(|entry| entry.text);
     Some(Note {
         id: best.id.to_owned(),
         probability,
-        text: likeliest.map_or_else(|| best.text.to_owned(), |one| sentence(best, &one.found, rig)),
-        cannot_be_told_from,
+        text: std::iter::once(text.as_str()).chain(words).collect::<Vec<_>>().join(", or "),
+        cannot_be_told_from: rivals.into_iter().map(str::to_owned).collect(),
     })
 }
 

@@ -134,16 +134,34 @@ impl<'a> Fitted<'_, 'a> {
             let lately = pressure_pa / all_pa[Leak::ALL[leak]].max(1.0);
             let sheet = USUAL_PRESSURE * self.pass.rig.instruments.pressure.full_scale / pressure_pa;
             let zero = self.pressure_zero_pa(leak) / pressure_pa;
+            let scale = self.scale(Leak::ALL[leak]);
             // The mean size of a pressure of changing sign follows a zero by an unknown share.
-            let spread = if leak == 0 { f64::hypot(sheet, zero) } else { sheet };
+            let spread =
+                if leak == 0 { f64::hypot(sheet, zero) } else { sheet }.hypot(scale.std / scale.value);
             let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]];
             for (out, (point, normals)) in out.iter_mut().zip(points.iter().zip(NORMALS.iter())) {
                 let doubt = doubt_m3s * normals[3 + leak];
                 let pressure = lately * (1.0 + zero + spread * normals[leak]);
-                out[leak] = (flow(point) * pressure * self.pass.full_scale_m3s + doubt).max(0.0);
+                out[leak] =
+                    (flow(point) * scale.value * pressure * self.pass.full_scale_m3s + doubt).max(0.0);
             }
         }
         out
+    }
+
+    /// By how much a leak is larger than in equations that an area off makes smaller ([`Column::AreaA`]).
+    fn scale(&self, leak: Leak) -> Estimate<f64> {
+        let area = match leak {
+            Leak::Internal => None,
+            Leak::ExternalA => Some(Column::AreaA),
+            Leak::ExternalB => Some(Column::AreaB),
+        };
+        let found = self.found();
+        let own = found.iter().find(|(column, _)| *column == Column::PositionGain || Some(*column) == area);
+        own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| {
+            let rest = 1.0 - share.value;
+            Estimate { value: 1.0 / rest, std: share.std / rest.powi(2) }
+        })
     }
 
     /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero of a pressure sensor.

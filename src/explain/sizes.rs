@@ -43,9 +43,22 @@ pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
 pub(super) fn mended(entry: &Entry, found: &[Found], rig: &Rig) -> Vec<String> {
     let of = |column: Column| found.iter().find(|(known, _)| *known == column).map(|(_, size)| size.value);
     let declared = [(Column::AreaA, rig.cylinder.area_a_m2), (Column::AreaB, rig.cylinder.area_b_m2)];
-    let area = declared.into_iter().find_map(|(column, area_m2)| Some(1e4 * area_m2 * (1.0 + of(column)?)));
+    let area = declared.into_iter().find_map(|(column, area_m2)| Some(1e4 * area_m2 / (1.0 - of(column)?)));
     let line = entry.mends.filter(|_| matches!(entry.id, "area_a" | "area_b")).zip(area);
     line.map(|(line, area_cm2)| line.replace("{}", &format!("{area_cm2:.2}"))).into_iter().collect()
+}
+
+/// What is found as a share of a reading or of the true size, as a share of what was declared.
+fn of_the_declared(column: Column, size: Estimate<f64>) -> Estimate<f64> {
+    use Column as C;
+    match column {
+        C::GainA | C::GainB | C::Gains | C::AreaA | C::AreaB | C::PressureGainA | C::PressureGainB => {
+            let rest = 1.0 - size.value;
+            Estimate { value: size.value / rest, std: size.std / rest.powi(2) }
+        }
+        C::PositionGain => Estimate { value: -size.value, ..size },
+        _ => size,
+    }
 }
 
 fn text(column: Column, size: Estimate<f64>, rig: &Rig, several: bool) -> String {
@@ -68,7 +81,7 @@ fn text(column: Column, size: Estimate<f64>, rig: &Rig, several: bool) -> String
         Column::GainB | Column::AreaB | Column::PressureGainB => (100.0, "%", "B"),
         _ => (100.0, "%", "both"),
     };
-    let size = size.scaled(factor);
+    let size = of_the_declared(column, size).scaled(factor);
     let interval = with_interval(size.value, Some(size.std.abs()));
     if several { format!("{interval} {unit} ({which})") } else { format!("{interval} {unit}") }
 }
