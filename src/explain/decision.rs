@@ -21,8 +21,11 @@ use std::collections::BTreeSet;
 pub const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
 const WANDER_DOUBT: f64 = 0.3;
-/// A noise scale of so many times the readings' own scatter contradicts the model. A guess.
-pub const MISFIT_DOUBT: f64 = 2.0;
+/// A noise scale of so many times the readings' own scatter contradicts the model: below, what remains widens the intervals
+/// by enough (docs/bench/judge.md).
+pub const MISFIT_DOUBT: f64 = 5.0;
+/// From here on it is told. A guess.
+pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
 const LEAST_LISTED: f64 = 0.01;
 

@@ -1,6 +1,7 @@
 //! The verdict as sentences.
 
 use super::{Findings, Leakage, Reason, Status};
+use crate::explain::{MISFIT_DOUBT, MISFIT_TOLD};
 use crate::units::duration;
 use pitchleak_core::{Estimate, Leak};
 
@@ -23,11 +24,13 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
         sentences.extend(excluded(findings));
         sentences.extend(unknown(findings));
         sentences.extend(notes(findings));
+        sentences.extend(remains(findings));
     } else {
         sentences.extend(reasons.iter().take(1).flat_map(why));
         sentences.extend(apparent(findings, faults));
         if status == Status::NotSure {
             sentences.extend(excluded(findings));
+            sentences.extend(remains(findings));
         }
     }
     sentences.extend(before(findings));
@@ -100,6 +103,14 @@ fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let stands = Leak::ALL.into_iter().filter(|leak| findings.active[*leak] && findings.is_below(*leak));
     let stands = stands.map(|leak| format!("That explains the alarm of the {} leak.", leak.label()));
     notes.map(|note| format!("Besides, {}.", note.text)).chain(stands)
+}
+
+/// What no explanation fits, where it is too little to contradict a verdict whose intervals it widens.
+fn remains(findings: &Findings<'_>) -> Option<String> {
+    let misfit = findings.decision?.misfit;
+    (misfit > MISFIT_TOLD && misfit <= MISFIT_DOUBT).then(|| {
+        format!("What remains unexplained is {misfit:.1} times what the readings scatter: the intervals allow for it.")
+    })
 }
 
 /// What alarms a verdict in doubt stands beside.

@@ -259,7 +259,7 @@ fn apparent_leaks_are_told_one_by_one() {
     let text = |active| {
         let mut found = found(active);
         let decision = found.decision.as_mut().unwrap();
-        (decision.status, decision.misfit) = (Status::Doubtful, 3.0);
+        (decision.status, decision.misfit) = (Status::Doubtful, 6.0);
         found.verdict().text
     };
     let one = text(INTERNAL);
@@ -277,9 +277,21 @@ fn apparent_leaks_are_told_one_by_one() {
 fn what_no_explanation_fits_is_a_doubt() {
     let mut strange = found(INTERNAL);
     let decision = strange.decision.as_mut().unwrap();
-    (decision.status, decision.misfit) = (Status::Doubtful, 3.0);
+    (decision.status, decision.misfit) = (Status::Doubtful, 6.0);
     assert_eq!(strange.judged(), (Status::Doubtful, vec!["model_does_not_fit"]));
-    assert!(strange.verdict().text.contains("what remains is 3.0 times what the readings scatter"));
+    assert!(strange.verdict().text.contains("what remains is 6.0 times what the readings scatter"));
+}
+
+#[test]
+fn what_remains_within_the_intervals_is_told_beside_the_verdict() {
+    let text = |misfit| {
+        let mut found = found(INTERNAL);
+        found.decision.as_mut().unwrap().misfit = misfit;
+        assert_eq!(found.judged(), (Status::Leak, vec![]));
+        found.verdict().text
+    };
+    assert!(text(2.3).contains("What remains unexplained is 2.3 times what the readings scatter"));
+    assert!(!text(1.9).contains("remains"));
 }
 
 #[test]
@@ -323,7 +335,7 @@ fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
     };
     let mut doubtful = Found { channels: vec![stuck], wiring: Some(wiring), ..found(INTERNAL) };
     doubtful.trace.skipped = 7000;
-    doubtful.decision.as_mut().unwrap().misfit = 3.0;
+    doubtful.decision.as_mut().unwrap().misfit = 6.0;
     assert_eq!(doubtful.judged().1, ["channel_stuck", "wiring", "mostly_bad_rows"]);
     let sensors: Vec<_> = doubtful.verdict().reasons.into_iter().map(|reason| reason.sensors).collect();
     assert_eq!(sensors, [vec![Signal::PressureA], vec![Signal::FlowA, Signal::FlowB], vec![]]);
