@@ -14,6 +14,9 @@ use crate::told::Told;
 use pitchleak_core::continuity::EQUATIONS;
 use pitchleak_core::{Leak, PerLeak};
 
+/// Recorders of pitch systems take at the most 2000 readings a second. Chosen.
+const LEAST_STEP_S: f64 = 5e-4;
+
 /// The table as it is weighed.
 pub(super) struct Tables {
     pub zeros: Vec<Entry>,
@@ -178,10 +181,19 @@ impl<'a, 's> Pass<'a, 's> {
         others.into_iter().chain(sudden).collect()
     }
 
+    /// Whether readings come as slowly as a recorder takes them, once a clock is mended: a block has one at the least.
+    fn allows_clock(&self, mistake: Mistake) -> bool {
+        let Mistake::Clock(factor) = mistake else { return true };
+        let rows: f64 = self.statistic.segments().iter().map(|own| own.rows(0).max(own.rows(1))).sum();
+        self.products.total_s / rows.max(1.0) / factor >= LEAST_STEP_S
+    }
+
     /// Mistakes that these readings may carry, with what tells their odds beside the equations, ln.
     pub fn mistakes(&self) -> impl Iterator<Item = (&'a Entry, Mistake, f64)> {
         self.tables.mistakes.iter().filter_map(|entry| {
-            let mistake = entry.mistake.filter(|mistake| self.told.allows(*mistake, self.rig))?;
+            let is_allowed =
+                |mistake: &Mistake| self.told.allows(*mistake, self.rig) && self.allows_clock(*mistake);
+            let mistake = entry.mistake.filter(is_allowed)?;
             Some((entry, mistake, self.told.ln_odds(mistake) + self.over_sheet.ln_odds(mistake)))
         })
     }

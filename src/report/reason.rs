@@ -113,7 +113,9 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
         let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), remedy(&found.columns));
         return Some(reason.against(&found.sensors));
     }
-    let decision = findings.decision.filter(|decision| decision.wiring > WIRING_DOUBT)?;
+    // What leaves as much as that is no explanation.
+    let is_likely = |decision: &&Decision| decision.wiring > WIRING_DOUBT && decision.misfit <= MISFIT_DOUBT;
+    let decision = findings.decision.filter(is_likely)?;
     let best = decision.explanations.iter().find(|one| one.wiring)?;
     let percent = 100.0 * decision.wiring;
     let text = format!("the trace is explained if {} ({percent:.0} %)", best.cause);

@@ -316,6 +316,15 @@ fn a_mistake_of_wiring_that_is_likelier_than_not_is_named_with_its_lines() {
 }
 
 #[test]
+fn a_mistake_of_wiring_that_leaves_more_than_any_scatter_explains_nothing() {
+    let mut pulsing = found(INTERNAL);
+    let decision = pulsing.decision.as_mut().unwrap();
+    (decision.status, decision.wiring, decision.misfit) = (Status::Doubtful, 0.97, 5.4);
+    decision.explanations = vec![explained("exchanged_flows", "qa and qb are exchanged", 0.97)];
+    assert_eq!(pulsing.judged(), (Status::Doubtful, vec!["model_does_not_fit"]));
+}
+
+#[test]
 fn channels_come_before_wiring_and_that_before_what_follows_from_it() {
     let stuck = ChannelFault {
         channel: Signal::PressureA,
