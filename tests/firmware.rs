@@ -7,8 +7,8 @@
 
 use pitchleak::Rig;
 use pitchleak::core::{
-    AlarmSettings, LeakDetector, PaperEstimator, PaperGains, Rls, RlsSettings, Sample, SensorSpread, Sensors,
-    Update,
+    AlarmSettings, Estimate, LeakDetector, PaperEstimator, PaperGains, Real, Rls, RlsSettings, Sample,
+    SensorSpread, Sensors, Update,
 };
 use pitchleak::trace::{Record, TraceReader};
 use std::collections::BTreeMap;
@@ -16,8 +16,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "firmware/scene.rs"]
+mod scene;
 #[path = "firmware/search.rs"]
 mod search;
+#[path = "firmware/single.rs"]
+mod single;
 #[path = "firmware/valve.rs"]
 mod valve;
 
@@ -95,9 +99,11 @@ fn add_row(table: &mut String, [program, title]: [&str; 2], run: &Run, host: &Re
 /// The largest |f32 − f64| in standard deviations of the estimate; none where there is no such thing.
 fn farthest(found: &Renewals, host: &Renewals) -> Option<f64> {
     let both = found.iter().filter_map(|(at, found)| Some((found, host.get(at)?)));
-    let apart = both
-        .flat_map(|(found, host)| (0..4).map(move |k| (found[2 * k] - host[2 * k]).abs() / host[2 * k + 1]));
-    apart.filter(|apart| apart.is_finite()).reduce(f64::max)
+    both.map(|(found, host)| farthest_of(found, host)).filter(|apart| apart.is_finite()).reduce(f64::max)
+}
+
+fn farthest_of(found: &Told, host: &Told) -> f64 {
+    (0..4).map(|k| (found[2 * k] - host[2 * k]).abs() / host[2 * k + 1]).fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn firmware() -> PathBuf {
@@ -239,14 +245,20 @@ fn rls<const N: usize>(
     for (at, record) in (1..).zip(records) {
         if let Update::Renewed { elapsed_s, .. } = update(&mut rls, record.step_s(), &record.sample) {
             detector.update(elapsed_s, &rls.mean_leaks_m3s());
-            let found = rls.estimates();
-            let (kappa, leaks) = (found.compressibility_per_pa, found.leaks_m3spa);
-            let all = [kappa, leaks.internal, leaks.external_a, leaks.external_b];
-            let values = |k: usize| if k.is_multiple_of(2) { all[k / 2].value } else { all[k / 2].std };
-            told.insert(at, std::array::from_fn(values));
+            told.insert(at, self::told(&rls));
         }
     }
     told
+}
+
+fn told<T: Real + Into<f64>, const N: usize>(rls: &Rls<T, N>) -> Told {
+    let found = rls.estimates();
+    let (kappa, leaks) = (found.compressibility_per_pa, found.leaks_m3spa);
+    let all = [kappa, leaks.internal, leaks.external_a, leaks.external_b];
+    std::array::from_fn(|k| {
+        let Estimate { value, std } = all[k / 2];
+        if k.is_multiple_of(2) { value } else { std }.into()
+    })
 }
 
 fn paper(rig: &Rig, records: &[Record]) -> Renewals {

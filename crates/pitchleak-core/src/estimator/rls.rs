@@ -20,6 +20,9 @@ const AVERAGING_S: f64 = 60.0;
 /// Least number of steps of a block, however slowly samples come.
 const LEAST_STEPS: f64 = 8.0;
 
+/// Share of its length by which a block is whole: steps add up to it but for rounding, in `f32` as in `f64`.
+const WHOLE: f64 = 1.0 - 1e-4;
+
 /// Share of its usual length that a block has after a sudden change: what it tells is then known as soon as the usual block
 /// would end, at the usual 25 samples a block.
 const FIRST_SHARE: f64 = 0.75;
@@ -70,7 +73,7 @@ pub struct Rls<T, const N: usize> {
     /// Blocks of the balance since then; after a sudden change the first one counts at once.
     unlearnt: usize,
     block: Integrals<T>,
-    /// How long it will be, s.
+    /// From when on it is whole, s.
     block_time_s: T,
     /// The part of the block in which not both flows were measured.
     unfed: Integrals<T>,
@@ -132,7 +135,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
             unlearnt_s: T::zero(),
             unlearnt: 0,
             block: Integrals::default(),
-            block_time_s: settings.block_time_s,
+            block_time_s: T::lit(WHOLE) * settings.block_time_s,
             unfed: Integrals::default(),
             pressure_noise: PressureNoise::default(),
             memory: None,
@@ -439,7 +442,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let changed =
             watched.is_some_and(|(equation, by_known)| self.has_changed(equation, by_known, inflation));
         self.block = Integrals::default();
-        self.block_time_s = self.settings.block_time_s;
+        self.block_time_s = T::lit(WHOLE) * self.settings.block_time_s;
         if self.unfed.steps > T::zero() {
             self.unfed = Integrals::default();
         }
@@ -553,7 +556,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.empty_sums();
         self.balances = [None; BALANCES];
         self.unlearnt = BALANCES - 1;
-        self.block_time_s = T::lit(FIRST_SHARE) * self.settings.block_time_s;
+        self.block_time_s = T::lit(WHOLE * FIRST_SHARE) * self.settings.block_time_s;
     }
 
     /// The balance over this block, divided by its standard deviation; `None` where a chamber rested.
