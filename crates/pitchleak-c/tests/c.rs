@@ -34,6 +34,8 @@ fn compile(example: &str, compiler: &str, arguments: &[&str]) -> PathBuf {
     let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{example}-{compiler}"));
     let mut command = Command::new(compiler);
     command.args(arguments).args(STRICT).arg("-I").arg(here().join("include"));
+    // Of whoever builds: `ci/sanitizers` has some.
+    command.args(std::env::var("CFLAGS").unwrap_or_default().split_whitespace());
     command.arg(here().join("examples").join(example).with_extension("c")).args(["-x", "none"]).arg(library);
     run(command.args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
     program

@@ -134,7 +134,9 @@ fn a_rig_that_is_taken_gives_numbers() {
     let mut dice = Dice(rand_chacha::ChaCha8Rng::seed_from_u64(31));
     let samples = samples();
     let mut taken = 0;
-    for round in 0..3000 {
+    // A night under sanitizers may ask for more.
+    let rounds = std::env::var("PITCHLEAK_RIGS").map_or(3000, |rounds| rounds.parse().unwrap());
+    for round in 0..rounds {
         let mut rig = rig();
         // One or two of its 28 numbers are others.
         for _ in 0..1 + round % 2 {
@@ -169,7 +171,7 @@ fn a_rig_that_is_taken_gives_numbers() {
             assert!(!found.value.is_nan() && !found.std.is_nan(), "{rig:?}: {found:?}");
         }
     }
-    assert!(taken > 500, "{taken}");
+    assert!(taken > rounds / 6, "{taken}");
 }
 
 #[test]
