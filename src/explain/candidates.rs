@@ -24,6 +24,9 @@ const MOST_GAIN: f64 = 0.15;
 /// compressibility it is foam. Chosen.
 const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -0.75..=5.0;
 
+/// Oil that is stored and is none, as its share: of noise, all. Chosen, with what chance adds.
+const UNPRESSED: std::ops::RangeInclusive<f64> = -1.2..=0.0;
+
 /// How each leak goes, as far as it is there.
 type Leaks = [Option<LeakCourse>; 3];
 
@@ -282,9 +285,11 @@ fn is_impossible(
         let side = volumes.iter().position(|volume| *volume == place)?;
         Some(-sizes.dead_volumes[side] - MOST_GAIN)
     };
+    let unpressed = equations.place(Column::Unpressed, Course::Constant);
     hypothesis.free.iter().zip(means).any(|(free, mean)| {
         let place = Some(free.column);
         mean.abs() > MOST_GAIN && places.contains(&place)
+            || place == unpressed && !UNPRESSED.contains(mean)
             || place == compressibility && !COMPRESSIBILITY.contains(mean)
             || free.std > USUAL_DEAD_VOLUME && least(place).is_some_and(|least| *mean < least)
     })

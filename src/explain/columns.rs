@@ -12,6 +12,8 @@ pub enum Column {
     LeftSide,
     /// Compressibility 1/β, as a share of the declared one.
     Compressibility,
+    /// What the pressures only seem to press and do not, as their noise is no oil that is stored: share of it, negative.
+    Unpressed,
     /// Zero of a flow meter, share of its full scale.
     ZeroA,
     /// The same of meter B.
@@ -148,7 +150,9 @@ impl Scales<'_> {
                 &[(R::ResidualA, 1.0), (R::Travel, -area_a), (R::StorageA, -kappa)],
                 &[(R::ResidualB, 1.0), (R::Travel, area_b), (R::StorageB, -kappa)],
             ),
-            Column::Compressibility => plain(&[(R::StorageA, kappa)], &[(R::StorageB, kappa)]),
+            Column::Compressibility | Column::Unpressed => {
+                plain(&[(R::StorageA, kappa)], &[(R::StorageB, kappa)])
+            }
             Column::ZeroA => timed(&[(R::Time, instruments.flow_a.full_scale)], &[]),
             Column::ZeroB => timed(&[], &[(R::Time, instruments.flow_b.full_scale)]),
             Column::GainA => plain(&[(R::ResidualA, 1.0)], &[]),

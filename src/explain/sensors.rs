@@ -22,6 +22,7 @@ impl Column {
             Self::PositionGain | Self::PositionZero => Of::Position.sensors(),
             Self::ThroughSealA | Self::PressureZeroA | Self::PressureGainA => Of::PressureA.sensors(),
             Self::ThroughSealB | Self::PressureZeroB | Self::PressureGainB => Of::PressureB.sensors(),
+            Self::Unpressed => Of::Pressures.sensors(),
             Self::LeftSide
             | Self::Compressibility
             | Self::DeadVolumeA

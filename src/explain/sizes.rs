@@ -19,7 +19,9 @@ pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
         let (times, way) = if factor > 1.0 { (factor, "large") } else { (1.0 / factor, "small") };
         return format!("{}: {} times too {way}", entry.text, (100.0 * times).round() / 100.0);
     }
-    let own = entry.free.iter().filter_map(|(column, _, _)| {
+    // How much of the pressures' changes is noise is no size of a sensor's error.
+    let sized = entry.free.iter().filter(|(column, ..)| *column != Column::Unpressed);
+    let own = sized.filter_map(|(column, _, _)| {
         let (_, size) = found.iter().find(|(known, _)| known == column)?;
         Some((*column, *size))
     });

@@ -268,6 +268,9 @@ pub(super) fn departures() -> Vec<Entry> {
         entry("bulk_modulus", RARE, "the oil is softer or stiffer than declared")
             .free(C::Compressibility, 1.0)
             .remedy("Declare the bulk modulus found, or look for air.", Some("bulk_modulus = \"{} GPa\"")),
+        entry("pressure_noise", UNCOMMON, "both pressures are noisier than declared, or hum")
+            .free(C::Unpressed, 1.0)
+            .remedy("Look at the pressures at rest: earth, shield and amplifier.", None),
         entry("flow_lag_and_gains", VERY_RARE, "the flow meters lag and their gains are off")
             .free(C::Lags, late_s)
             .free(C::GainA, gain)
