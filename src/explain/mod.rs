@@ -29,6 +29,7 @@ pub use columns::{Column, Course};
 pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, MISFIT_TOLD, Note, WIRING_DOUBT, explain};
 pub(crate) use odds::Prior;
 pub(crate) use orthant::{Orthant, POINTS, positive_orthant};
+pub(crate) use posterior::NEAR;
 pub use raw_products::{SEGMENTS, Statistic};
 pub use readings::{Mistake, Of};
 pub use table::{Entry, Kind, explanations};

@@ -26,6 +26,11 @@ const MISFIT_WORTH: f64 = 10.0;
 /// Rows of an equation below which nothing can be said.
 const LEAST_ROWS: f64 = 8.0;
 
+/// A residual up to this is noise, in standard deviations of the declared noise. Chosen.
+pub(crate) const NEAR: f64 = std::f64::consts::SQRT_2;
+/// So many times smaller a mistake's residual has to be where it is more. Chosen.
+const LEAST_FALL: f64 = 1.5;
+
 /// Explanations, best first.
 pub(super) struct Posterior<'a> {
     pub weighed: Vec<Weighed<'a>>,
@@ -102,7 +107,20 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
         Some(own.map_or(best.scales[0].max(best.scales[1]).sqrt(), |own| own.residual(best.scales)))
     };
     let residuals = [residual(&|one| one.wiring == 0), residual(&|one| one.wiring > 0)];
+    let all = if tells_of_noise_alone(residuals) { without_mistakes(all) } else { all };
     Posterior { weighed: mix(pass, &weighings, all, least_ln), residuals }
+}
+
+/// Whether mistakes leave as much as the readings as declared do, and more than noise: then what prefers one is how the noise
+/// is shared among the sensors, which no data sheet tells.
+fn tells_of_noise_alone([declared, mistaken]: [Option<f64>; 2]) -> bool {
+    let falls = |(before, after): (f64, f64)| after <= NEAR || before >= LEAST_FALL * after;
+    declared.zip(mistaken).is_some_and(|both| !falls(both))
+}
+
+fn without_mistakes(mut all: Vec<Scored<'_>>) -> Vec<Scored<'_>> {
+    all.retain(|one| one.wiring == 0);
+    all
 }
 
 /// Cuts leaks at zero, best first, until what follows cannot matter.

@@ -8,14 +8,13 @@ mod refused;
 
 pub use refused::Refused;
 
-use crate::explain::{Decision, Explained};
+use crate::explain::{Decision, Explained, NEAR};
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use serde::Serialize;
 
-/// A mistake is named where its residual is at the most this, in standard deviations of the declared noise, …
-const NEAR: f64 = std::f64::consts::SQRT_2;
-/// … or so many times smaller than with the wiring as declared: effects that nobody declared leave more than noise.
+/// A mistake is named where its residual is [`NEAR`] noise, or so many times smaller than with the wiring as declared: effects
+/// that nobody declared leave more than noise.
 const FALLS: f64 = 7.0;
 
 /// A mistake of wiring, sign or unit that explains a trace whose columns are known.
