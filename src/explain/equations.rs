@@ -18,6 +18,8 @@ pub(super) struct NormalEquations {
     pub rows: [f64; EQUATIONS],
     /// What noise adds to the left side's square: as declared, and as the readings scatter.
     left_noise: [[f64; 2]; EQUATIONS],
+    /// Noise scales that the readings' own scatter makes, at least 1: what is louder is no noise of the columns.
+    pub loudest: [f64; EQUATIONS],
     places: HashMap<(Column, Course), usize>,
 }
 
@@ -53,6 +55,7 @@ impl NormalEquations {
             noise: [vec![0.0; size * size], vec![0.0; size * size]],
             rows: [0.0; EQUATIONS],
             left_noise: [[0.0; 2]; EQUATIONS],
+            loudest: [1.0; EQUATIONS],
             places: columns.iter().enumerate().map(|(place, key)| (*key, place)).collect(),
         };
         let kinds: HashMap<Column, [PerChamber; 2]> =
@@ -70,6 +73,7 @@ impl NormalEquations {
             }
         }
         own.silence(columns);
+        own.loudest = own.left_noise.map(|[sheet, scattered]| f64::max(scattered / sheet, 1.0));
         own
     }
 
@@ -103,6 +107,11 @@ impl NormalEquations {
                 .for_each(|product| *product /= unit[equation] * scatter[equation]);
         }
         self
+    }
+
+    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those.
+    pub fn as_loud_as(self, loudest: [f64; EQUATIONS]) -> Self {
+        Self { loudest, ..self }
     }
 
     /// Columns that are mostly noise are zero. The left side's noise is what the residual is measured by.

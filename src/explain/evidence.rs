@@ -102,6 +102,7 @@ impl Products {
 
     /// How much of each column's noise is taken off: all, or so much that three standard deviations of the noise's own
     /// power are left of the column's.
+    /// `scale` is that of the columns' noise.
     fn kept(&self, c: usize, rows: f64, scale: f64) -> Vec<f64> {
         let most = (1.0 - 3.0 * (2.0 / rows.max(1.0)).sqrt()).max(0.1);
         let share = |i: usize| {
@@ -112,15 +113,16 @@ impl Products {
         (0..self.size).map(share).collect()
     }
 
-    /// Products less those of the noise, over the scale.
-    fn clean(&self, c: usize, rows: f64, scale: f64, clean: &mut [f64]) {
-        let kept = self.kept(c, rows, scale);
-        let over = 1.0 / scale;
+    /// Products less those of the noise, over the scale; the columns are no louder than `loudest`.
+    fn clean(&self, c: usize, rows: f64, scale: f64, loudest: f64, clean: &mut [f64]) {
+        let of_columns = scale.min(loudest);
+        let kept = self.kept(c, rows, of_columns);
+        let (over, share) = (1.0 / scale, of_columns / scale);
         for i in 0..self.size {
             let span = i * self.size + i..(i + 1) * self.size;
             let products = self.gram[c][span.clone()].iter().zip(&self.noise[c][span.clone()]);
             for ((out, (gram, noise)), kept_j) in clean[span].iter_mut().zip(products).zip(&kept[i..]) {
-                *out = over * gram - kept[i] * kept_j * noise;
+                *out = over * gram - share * kept[i] * kept_j * noise;
             }
         }
     }
@@ -132,13 +134,14 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let products = Products::of(equations, free);
     let size = products.size;
     let mut scales = [1.0; 2];
+    let mut loudest = [f64::INFINITY; 2];
     let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
     let mut factor = vec![0.0; size * size];
     let mut means = vec![0.0; free.len()];
     let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
     for step in 0..=STEPS {
         for c in 0..2 {
-            products.clean(c, n[c], scales[c], &mut each[c]);
+            products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
         }
         for (out, (one, other)) in factor.iter_mut().zip(each[0].iter().zip(&each[1])) {
             *out = one + other;
@@ -146,7 +149,14 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
         (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
         if step < STEPS {
             for c in 0..2 {
-                let residual = scales[c] * residual(&each[c], size, &means).max(0.0);
+                let mut left = residual(&each[c], size, &means);
+                // More than there is was taken off: the misfit is no noise of the columns.
+                if left < 0.0 {
+                    loudest[c] = equations.loudest[c];
+                    products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
+                    left = residual(&each[c], size, &means);
+                }
+                let residual = scales[c] * left.max(0.0);
                 scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
             }
         }

@@ -159,10 +159,10 @@ impl Mended {
         let measures = [0, 1].map(measure);
         let per_row = |noise: &Noise| mistake.ln_jacobian() / EQUATIONS as f64 - 0.5 * noise.louder().ln();
         let ln_density = noises[BALANCE].as_ref().map_or(0.0, |noise| mended.rows[BALANCE] * per_row(noise));
+        let scattered = measures.map(|own| own.scattered.max(1.0));
         Self {
             ln_measure: ln_density.min(0.0) + measures.iter().map(|own| own.ln_noise).sum::<f64>(),
-            equations: mended
-                .measured_by(measures.map(|own| own.unit), measures.map(|own| own.scattered.max(1.0))),
+            equations: mended.measured_by(measures.map(|own| own.unit), scattered).as_loud_as(scattered),
             measures,
         }
     }
