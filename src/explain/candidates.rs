@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, fit};
+use super::evidence::{Fit, Free, chi_square, fit};
 use super::hypothesis::{
     CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
 };
@@ -10,6 +10,7 @@ use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::orthant::ln_most;
 use super::pass::Pass;
+use super::readings::Mistake;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
@@ -20,6 +21,11 @@ const STATES_WITH_PAIRS: usize = 3;
 const STATES_WITH_COURSES: usize = 5;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
+/// ln of what columns gain at the noise of the explanation without them, from which on they speak for a mistake: more they
+/// would gain by less noise. Chosen.
+const MUCH: f64 = 30.0;
+/// Standard deviation of a gain that may be any.
+const ANY_GAIN: f64 = 100.0;
 /// Compressibility beyond the declared one, as its share: no oil is four times as stiff as its sheet says, and with six times its
 /// compressibility it is foam. Chosen.
 const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -0.75..=5.0;
@@ -189,6 +195,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
+        let bound = Bound::of(best, self.declared);
         let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
@@ -197,8 +204,14 @@ impl<'a, 'p> Candidates<'a, 'p> {
         for (entry, mistake, ln_told) in self.pass.mistakes() {
             let equations = self.pass.equations(&whole, Some(entry), &columns);
             let mended = Mended::new(equations, self.declared, mistake, scales, scatters);
-            let ln_prior = entry.share.ln() - ln_wired + ln_told + mended.ln_measure;
+            let ln_share = entry.share.ln() - ln_wired + ln_told;
+            let ln_prior = ln_share + mended.ln_measure;
+            let begin = self.all.len();
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
+            let most = bound.as_ref().map_or(f64::INFINITY, |bound| bound.ln_most(mistake, ln_share));
+            self.all[begin..]
+                .iter_mut()
+                .for_each(|own| own.ln_posterior = own.ln_posterior.min(most + own.ln_sign));
             kept.push(mended);
         }
         kept
@@ -227,6 +240,43 @@ impl<'a, 'p> Candidates<'a, 'p> {
             if hopeless {
                 break;
             }
+        }
+    }
+}
+
+/// What a mistake may reach at the most that its columns do not speak for: a unit is a gain, and what prefers it though its gain
+/// is not off is noise, of which no data sheet is so exact.
+struct Bound<'e> {
+    declared: &'e NormalEquations,
+    /// Of the likeliest explanation of the readings as declared.
+    free: Vec<Free>,
+    scales: [f64; 2],
+    ln_posterior: f64,
+    chi_square: f64,
+}
+
+impl<'e> Bound<'e> {
+    /// None where the readings as declared have no explanation.
+    fn of(best: Option<&Scored<'_>>, declared: &'e NormalEquations) -> Option<Self> {
+        let best = best.filter(|best| best.ln_posterior.is_finite())?;
+        let (free, scales) = (best.hypothesis.free.clone(), best.scales);
+        let chi_square = chi_square(declared, &free, scales);
+        Some(Self { declared, free, scales, ln_posterior: best.ln_posterior, chi_square })
+    }
+
+    /// ln of its posterior, of a mistake with this ln prior.
+    fn ln_most(&self, mistake: Mistake, ln_share: f64) -> f64 {
+        let columns = mistake.as_columns();
+        let mut free = self.free.clone();
+        for place in columns.iter().filter_map(|column| self.declared.place(*column, Course::Constant)) {
+            free.retain(|known| known.column != place);
+            free.push(Free { column: place, std: ANY_GAIN });
+        }
+        let gained = 0.5 * (self.chi_square - chi_square(self.declared, &free, self.scales));
+        if columns.is_empty() || gained > MUCH {
+            f64::INFINITY
+        } else {
+            self.ln_posterior + ln_share + gained.max(0.0)
         }
     }
 }

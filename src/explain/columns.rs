@@ -40,6 +40,12 @@ pub enum Column {
     AreaB,
     /// Gain of the position sensor; what is too small counts as positive.
     PositionGain,
+    /// The piston's travel as read, share of it: its gain by its own readings.
+    Travel,
+    /// The other meter's flow in place of each, share of it: 1 where they are exchanged.
+    Exchanged,
+    /// The same where they count the other way, too.
+    ExchangedAndTurned,
     /// Zero of the position sensor, share of the stroke.
     PositionZero,
     /// P_A past the piston: the gain of its sensor, where the internal leak is.
@@ -158,6 +164,15 @@ impl Scales<'_> {
             Column::GainA => plain(&[(R::ResidualA, 1.0)], &[]),
             Column::GainB => plain(&[], &[(R::ResidualB, 1.0)]),
             Column::Gains => plain(&[(R::ResidualA, 1.0)], &[(R::ResidualB, 1.0)]),
+            Column::Travel => plain(&[(R::Travel, area_a)], &[(R::Travel, -area_b)]),
+            Column::Exchanged => plain(
+                &[(R::ResidualA, 1.0), (R::ResidualB, -1.0)],
+                &[(R::ResidualA, -1.0), (R::ResidualB, 1.0)],
+            ),
+            Column::ExchangedAndTurned => plain(
+                &[(R::ResidualA, 1.0), (R::ResidualB, 1.0)],
+                &[(R::ResidualA, 1.0), (R::ResidualB, 1.0)],
+            ),
             Column::LagA => plain(&[(R::FlowChangeA, -1.0)], &[]),
             Column::LagB => plain(&[], &[(R::FlowChangeB, -1.0)]),
             Column::Lags => plain(&[(R::FlowChangeA, -1.0)], &[(R::FlowChangeB, -1.0)]),

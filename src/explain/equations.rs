@@ -110,7 +110,7 @@ impl NormalEquations {
     }
 
     /// Of other units than the sheet's: with scales that the readings' own scatter makes in those.
-    pub fn as_loud_as(self, loudest: [f64; EQUATIONS]) -> Self {
+    pub fn with_loudest(self, loudest: [f64; EQUATIONS]) -> Self {
         Self { loudest, ..self }
     }
 

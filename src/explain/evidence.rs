@@ -174,6 +174,18 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     }
 }
 
+/// χ² where the noise has these scales, and the columns that of the readings' scatter.
+pub(super) fn chi_square(equations: &NormalEquations, free: &[Free], scales: [f64; 2]) -> f64 {
+    let products = Products::of(equations, free);
+    let size = products.size;
+    let (mut sum, mut one) = (vec![0.0; size * size], vec![0.0; size * size]);
+    for (c, scale) in scales.into_iter().enumerate() {
+        products.clean(c, equations.rows[c], scale, equations.loudest[c], &mut one);
+        sum.iter_mut().zip(&one).for_each(|(sum, one)| *sum += one);
+    }
+    solve(&mut sum, size, &mut vec![0.0; free.len()]).1
+}
+
 /// ln of the prior density of a noise scale s², up to a constant: −½ν (ln s² + 1/s² − 1).
 pub(super) fn ln_scale_prior(scale: f64) -> f64 {
     -0.5 * NU * (scale.ln() + 1.0 / scale - 1.0)

@@ -151,6 +151,8 @@ impl<'a, 's> Pass<'a, 's> {
         columns.extend(
             entries.flat_map(|entry| entry.free.iter().map(|(column, course, _)| (*column, *course))),
         );
+        let mistaken = self.mistakes().flat_map(|(_, mistake, _)| mistake.as_columns());
+        columns.extend(mistaken.map(|column| (*column, Course::Constant)));
         for leak in LEAK_COLUMNS {
             columns.extend([Course::Constant, Course::FromBegin, Course::ToEnd].map(|course| (leak, course)));
             columns.extend(

@@ -102,6 +102,7 @@ pub const EXPLANATIONS: [(&str, &[&str]); 5] = [
             "dead_volume_b",
             "bulk_modulus",
             "flow_lag_and_gains",
+            "pressure_noise",
             "pressure_zero_gross_a",
             "pressure_zero_gross_b",
             "pressure_zero_a",
