@@ -23,7 +23,7 @@ pub const WIRING_DOUBT: f64 = 0.5;
 const WANDER_DOUBT: f64 = 0.3;
 /// A noise scale of so many times the readings' own scatter contradicts the model: below, what remains widens the intervals
 /// by enough (docs/bench/judge.md).
-pub const MISFIT_DOUBT: f64 = 5.0;
+pub const MISFIT_DOUBT: f64 = 3.0;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
