@@ -1,11 +1,10 @@
 //! Hours of sensors that are not as declared and yet work, on a cylinder that does not leak: how often a stream raises an
 //! alarm, and how often it doubts. After `--`: `hours=50`, `seed=…` (else the version's commit).
 
-use pitchleak::core::{AlarmState, PerLeak};
+use pitchleak::core::AlarmState;
 use pitchleak::live::{Event, LineFormat, LiveConfig, Watch};
 use pitchleak::report::Status;
 use pitchleak_testkit::judge::Case;
-use pitchleak_testkit::judge::motion::Kind;
 use pitchleak_testkit::judge::worlds::{WORLDS, World};
 use pitchleak_testkit::options::Options;
 use rayon::prelude::*;
@@ -77,9 +76,8 @@ fn main() {
 }
 
 fn hour(world: &'static World, number: u64, seed: &str) -> Hour {
-    let mut case = Case::draw(world, number, seed, None, HOUR_S);
-    case.leaks_lpm = PerLeak::default();
-    case.motion = Kind::Wind(WINDS_MPS[number as usize % WINDS_MPS.len()]);
+    let mps = WINDS_MPS[number as usize % WINDS_MPS.len()];
+    let case = Case::draw_sound(world, number, seed, HOUR_S, mps);
     let (trace, _) = case.record();
     let (mut found, mut before, mut events) = (Hour::default(), Status::NotSure, Vec::new());
     let mut watch = Watch::new(LiveConfig::of(case.rig()), Some(LineFormat::Csv));

@@ -1,11 +1,9 @@
 //! A small piece of the blind judge (`cargo bench --bench judge`): honest cylinders alone.
 
-use pitchleak::core::PerLeak;
 use pitchleak::live::{Event, LineFormat, LiveConfig, Watch};
 use pitchleak::report::Status;
 use pitchleak_testkit::judge::Case;
 use pitchleak_testkit::judge::givers::{Explain, Replay, VerdictGiver};
-use pitchleak_testkit::judge::motion::Kind;
 use pitchleak_testkit::judge::score::{Judgement, Scored};
 use pitchleak_testkit::judge::worlds::{WORLDS, World};
 use rayon::prelude::*;
@@ -41,20 +39,13 @@ fn honest_traces_are_sure_and_right_and_no_wire_is_blamed() {
     }
 }
 
-/// Sound, in wind of so many m/s.
-fn sound(world: &'static World, number: u64, seed: &str, seconds: f64, mps: u8) -> Case {
-    let mut case = Case::draw(world, number, seed, None, seconds);
-    (case.leaks_lpm, case.motion) = (PerLeak::default(), Kind::Wind(mps));
-    case
-}
-
 /// In calm wind the piston hardly moves, and how loud sensors are beside each other is no unit: over half an hour of a stream what
 /// no sheet tells so exactly made "x in another unit, 10 times too large" of it.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn a_stream_of_working_sensors_in_calm_wind_blames_no_wire() {
     ["zero 0.2 %, A", "lag 50 ms", "12 bit"].into_par_iter().for_each(|name| {
-        let case = sound(world(name), 0, "t0", 2100.0, 5);
+        let case = Case::draw_sound(world(name), 0, "t0", 2100.0, 5);
         let (mut watch, mut events) =
             (Watch::new(LiveConfig::of(case.rig()), Some(LineFormat::Csv)), Vec::new());
         case.record().0.split(|byte| *byte == b'\n').for_each(|line| watch.take(line, &mut events));
@@ -71,7 +62,7 @@ fn a_stream_of_working_sensors_in_calm_wind_blames_no_wire() {
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
 fn pressures_that_hum_are_told_to() {
     for (number, mps) in [(0, 13), (2, 21)] {
-        let said = sound(world("hum 1 %"), number, "s92", 60.0, mps).judge(&[&Replay]);
+        let said = Case::draw_sound(world("hum 1 %"), number, "s92", 60.0, mps).judge(&[&Replay]);
         assert_eq!(said[0].judgement, Judgement::Right, "{}", said[0].text);
         assert!(said[0].causes.contains("pressure_noise"), "{}: {}", said[0].causes, said[0].text);
     }

@@ -12,6 +12,7 @@ use super::orthant::ln_most;
 use super::pass::Pass;
 use super::readings::Mistake;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
+use std::collections::HashMap;
 
 /// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
 const BEYOND_WANDERING: f64 = 2.0;
@@ -195,7 +196,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
-        let bound = Bound::of(best, self.declared);
+        let mut bound = Bound::of(best, self.declared);
         let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
@@ -208,7 +209,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let ln_prior = ln_share + mended.ln_measure;
             let begin = self.all.len();
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
-            let most = bound.as_ref().map_or(f64::INFINITY, |bound| bound.ln_most(mistake, ln_share));
+            let most = bound.as_mut().map_or(f64::INFINITY, |bound| bound.ln_most(mistake, ln_share));
             self.all[begin..]
                 .iter_mut()
                 .for_each(|own| own.ln_posterior = own.ln_posterior.min(most + own.ln_sign));
@@ -253,6 +254,8 @@ struct Bound<'e> {
     scales: [f64; 2],
     ln_posterior: f64,
     chi_square: f64,
+    /// ln of what each set of columns gains: units of a reading share theirs.
+    gained: HashMap<&'static [Column], f64>,
 }
 
 impl<'e> Bound<'e> {
@@ -261,23 +264,33 @@ impl<'e> Bound<'e> {
         let best = best.filter(|best| best.ln_posterior.is_finite())?;
         let (free, scales) = (best.hypothesis.free.clone(), best.scales);
         let chi_square = chi_square(declared, &free, scales);
-        Some(Self { declared, free, scales, ln_posterior: best.ln_posterior, chi_square })
+        let (ln_posterior, gained) = (best.ln_posterior, HashMap::new());
+        Some(Self { declared, free, scales, ln_posterior, chi_square, gained })
     }
 
     /// ln of its posterior, of a mistake with this ln prior.
-    fn ln_most(&self, mistake: Mistake, ln_share: f64) -> f64 {
+    fn ln_most(&mut self, mistake: Mistake, ln_share: f64) -> f64 {
         let columns = mistake.as_columns();
-        let mut free = self.free.clone();
-        for place in columns.iter().filter_map(|column| self.declared.place(*column, Course::Constant)) {
-            free.retain(|known| known.column != place);
-            free.push(Free { column: place, std: ANY_GAIN });
-        }
-        let gained = 0.5 * (self.chi_square - chi_square(self.declared, &free, self.scales));
+        let gained = match self.gained.get(columns) {
+            Some(gained) => *gained,
+            None => self.gain(columns),
+        };
+        self.gained.insert(columns, gained);
         if columns.is_empty() || gained > MUCH {
             f64::INFINITY
         } else {
             self.ln_posterior + ln_share + gained.max(0.0)
         }
+    }
+
+    /// ln of what these columns gain, set free.
+    fn gain(&self, columns: &[Column]) -> f64 {
+        let mut free = self.free.clone();
+        for place in columns.iter().filter_map(|column| self.declared.place(*column, Course::Constant)) {
+            free.retain(|known| known.column != place);
+            free.push(Free { column: place, std: ANY_GAIN });
+        }
+        0.5 * (self.chi_square - chi_square(self.declared, &free, self.scales))
     }
 }
 

@@ -7,7 +7,7 @@ use super::evidence::{Fit, fit};
 use super::hypothesis::{Hypothesis, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::Pass;
-use super::sizes::Found;
+use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
@@ -158,10 +158,7 @@ impl<'a> Fitted<'_, 'a> {
         };
         let found = self.found();
         let own = found.iter().find(|(column, _)| *column == Column::PositionGain || Some(*column) == area);
-        own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| {
-            let rest = 1.0 - share.value;
-            Estimate { value: 1.0 / rest, std: share.std / rest.powi(2) }
-        })
+        own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| over_declared(*share))
     }
 
     /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero of a pressure sensor.

@@ -100,14 +100,16 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     let as_declared = Weighing { equations: declared, loudness: [flows * flows, position * position] };
     let weighings: Vec<Weighing<'_>> =
         std::iter::once(as_declared).chain(mended.iter().map(Mended::weighing)).collect();
-    let all = candidates.best_first();
+    let mut all = candidates.best_first();
     let residual = |is: &dyn Fn(&Scored<'_>) -> bool| {
         let best = all.iter().find(|one| is(one) && one.ln_posterior.is_finite())?;
         let own = best.wiring.checked_sub(1).and_then(|at| mended.get(at));
         Some(own.map_or(best.scales[0].max(best.scales[1]).sqrt(), |own| own.residual(best.scales)))
     };
     let residuals = [residual(&|one| one.wiring == 0), residual(&|one| one.wiring > 0)];
-    let all = if tells_of_noise_alone(residuals) { without_mistakes(all) } else { all };
+    if tells_of_noise_alone(residuals) {
+        all.retain(|one| one.wiring == 0);
+    }
     Posterior { weighed: mix(pass, &weighings, all, least_ln), residuals }
 }
 
@@ -116,11 +118,6 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
 fn tells_of_noise_alone([declared, mistaken]: [Option<f64>; 2]) -> bool {
     let falls = |(before, after): (f64, f64)| after <= NEAR || before >= LEAST_FALL * after;
     declared.zip(mistaken).is_some_and(|both| !falls(both))
-}
-
-fn without_mistakes(mut all: Vec<Scored<'_>>) -> Vec<Scored<'_>> {
-    all.retain(|one| one.wiring == 0);
-    all
 }
 
 /// Cuts leaks at zero, best first, until what follows cannot matter.

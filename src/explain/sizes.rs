@@ -43,11 +43,19 @@ pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
 
 /// Declared area, as it would have to be; other entries' lines name columns that only the trace's reader knows.
 pub(super) fn mended(entry: &Entry, found: &[Found], rig: &Rig) -> Vec<String> {
-    let of = |column: Column| found.iter().find(|(known, _)| *known == column).map(|(_, size)| size.value);
+    let of = |column: Column| {
+        found.iter().find(|(known, _)| *known == column).map(|(_, size)| over_declared(*size).value)
+    };
     let declared = [(Column::AreaA, rig.cylinder.area_a_m2), (Column::AreaB, rig.cylinder.area_b_m2)];
-    let area = declared.into_iter().find_map(|(column, area_m2)| Some(1e4 * area_m2 / (1.0 - of(column)?)));
+    let area = declared.into_iter().find_map(|(column, area_m2)| Some(1e4 * area_m2 * of(column)?));
     let line = entry.mends.filter(|_| matches!(entry.id, "area_a" | "area_b")).zip(area);
     line.map(|(line, area_cm2)| line.replace("{}", &format!("{area_cm2:.2}"))).into_iter().collect()
+}
+
+/// A true size over the declared one, where it is larger by this share of itself.
+pub(super) fn over_declared(share: Estimate<f64>) -> Estimate<f64> {
+    let rest = 1.0 - share.value;
+    Estimate { value: 1.0 / rest, std: share.std / rest.powi(2) }
 }
 
 /// What is found as a share of a reading or of the true size, as a share of what was declared.
@@ -55,8 +63,8 @@ fn of_the_declared(column: Column, size: Estimate<f64>) -> Estimate<f64> {
     use Column as C;
     match column {
         C::GainA | C::GainB | C::Gains | C::AreaA | C::AreaB | C::PressureGainA | C::PressureGainB => {
-            let rest = 1.0 - size.value;
-            Estimate { value: size.value / rest, std: size.std / rest.powi(2) }
+            let whole = over_declared(size);
+            Estimate { value: whole.value - 1.0, ..whole }
         }
         C::PositionGain => Estimate { value: -size.value, ..size },
         _ => size,

@@ -5,12 +5,11 @@
 //! the folder that is printed.
 
 use super::scene::Scene;
-use super::{PROGRAMS, Rig, declared, emulate, folder, samples, sensors};
+use super::{PROGRAMS, Rig, declared, emulate, folder, samples, sensors, stands_in_docs};
 use pitchleak_testkit::seeded;
 use rand::RngExt;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
 
 const BEGIN: &str = "<!-- firmware search: begin -->\n";
 const END: &str = "<!-- firmware search: end -->\n";
@@ -79,13 +78,7 @@ fn no_sample_takes_more_than_the_docs_say() {
         measured.insert(title, [update, sample]);
     }
     println!("{table}");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/edge.md");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let (before, rest) = text.split_once(BEGIN).unwrap();
-    let (stands, after) = rest.split_once(END).unwrap();
-    if std::env::var_os("PITCHLEAK_WRITE_TABLE").is_some() {
-        return std::fs::write(&path, [before, BEGIN, &table, END, after].concat()).unwrap();
-    }
+    let Some(stands) = stands_in_docs([BEGIN, END], &table) else { return };
     for (title, numbers) in measured {
         let row = stands.lines().find(|line| line.starts_with(&format!("| {title} |"))).unwrap();
         let said = row.split('|').skip(2).filter_map(|cell| cell.trim().parse::<u32>().ok());

@@ -1,12 +1,11 @@
 //! `f32` beside `f64`, over recordings as they are searched for the worst sample: on the host, where there is time for many.
 
 use super::scene::Scene;
-use super::{farthest_of, sensors, told};
+use super::{farthest_of, sensors, stands_in_docs, told};
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, Fluid, Rls, RlsSettings, Sample, SensorSpread, Sensors, Update};
 use pitchleak_testkit::seeded;
 use std::fmt::Write as _;
-use std::path::Path;
 
 const BEGIN: &str = "<!-- single precision: begin -->\n";
 const END: &str = "<!-- single precision: end -->\n";
@@ -33,13 +32,7 @@ fn single_precision_tells_what_double_does_but_for_seconds_after_a_jump() {
     add_row(&mut table, "N = 6", apart::<6>(&rig, "clocks6"));
     add_row(&mut table, "N = 9", apart::<9>(&rig, "clocks9"));
     println!("{table}");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/edge.md");
-    let text = std::fs::read_to_string(&path).unwrap();
-    let (before, rest) = text.split_once(BEGIN).unwrap();
-    let (stands, after) = rest.split_once(END).unwrap();
-    if std::env::var_os("PITCHLEAK_WRITE_TABLE").is_some() {
-        std::fs::write(&path, [before, BEGIN, &table, END, after].concat()).unwrap();
-    } else {
+    if let Some(stands) = stands_in_docs([BEGIN, END], &table) {
         assert_eq!(stands, table, "docs/edge.md has another table");
     }
 }

@@ -70,6 +70,12 @@ impl Case {
         Self { world, number, motion, machine: Machine::of_size(size), accuracy, leaks_lpm, seconds, seed }
     }
 
+    /// The same without a leak, in wind of so many m/s.
+    pub fn draw_sound(world: &'static World, number: u64, seed: &str, seconds: f64, mps: u8) -> Self {
+        let drawn = Self::draw(world, number, seed, None, seconds);
+        Self { leaks_lpm: PerLeak::default(), motion: Kind::Wind(mps), ..drawn }
+    }
+
     /// As in a table's row, comma-separated.
     pub fn key(&self) -> String {
         let PerLeak { internal, external_a, external_b } = self.leaks_lpm;
