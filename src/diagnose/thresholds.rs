@@ -151,15 +151,15 @@ pub(crate) const CONSTANTS_TRIALS: usize = 20;
 pub(crate) const MOST_EFFECTS: usize = 6;
 /// Additions, counting those that are taken back. Chosen against cycles.
 pub(crate) const MOST_STEPS: usize = 10;
-/// Swaps that one addition may set off. Chosen against cycles.
+/// Times that another set is named in the place of one. Chosen against cycles.
 pub(crate) const MOST_SWAPS: usize = 4;
-/// So many effects may be two in disguise. Derived: a rival for one of them, and a single one for the two others.
-pub(crate) const FEWEST_TO_SIMPLIFY: usize = 3;
+/// Named effects that others may stand for together. Chosen for cost.
+pub(crate) const MOST_EXCHANGED: usize = 3;
+/// Sets of effects near the named one that are fitted. Chosen for time.
+pub(crate) const MOST_EXCHANGES: usize = 12;
 /// While the residual is larger than the noise, an effect must mend this share of it to be named.
 /// Chosen: below that it is too small to be told from what the wrong equations make of it.
 pub(crate) const LEAST_MENDED_SHARE: f64 = 0.02;
-/// An effect shows in the forces alone where that share of its column stands in them. Chosen: the rest moves nothing.
-pub(crate) const FORCE_ONLY_SHARE: f64 = 0.99;
 /// A candidate below this share of the best is not worth a search for its constants. Chosen for cost.
 pub(crate) const IN_THE_RUNNING: f64 = 0.4;
 /// Standard deviations by the jackknife that an effect must have beside an unexplained residual. Chosen: three.

@@ -6,7 +6,7 @@ use super::estimates;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Doubt, DoubtId};
-use crate::diagnose::search::{self, Selected, Selection};
+use crate::diagnose::search::{self, Rival, Selected, Selection};
 use crate::diagnose::thresholds::{
     ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, CURVED_SHARE, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS,
     LEAST_SHARE_BESIDE, UNMENDED_SHARE,
@@ -96,9 +96,13 @@ fn acts_in(fit: &Fit<'_>, term: usize) -> PerEquation<bool> {
 
 /// Others fit as well in its place.
 fn rivals(one: &Selected) -> Option<Doubt> {
-    let ids: Vec<&str> = one.rivals.iter().map(|(rival, _)| rival.spec().id).collect();
-    let text = || format!("these traces do not tell it from {}", ids.join(", "));
-    (!ids.is_empty()).then(|| doubt(DoubtId::Rivals, text()))
+    let together = |rival: &Rival| -> String {
+        let ids: Vec<&str> = rival.effects.iter().map(|effect| effect.spec().id).collect();
+        ids.join(" with ")
+    };
+    let rivals: Vec<String> = one.rivals.iter().map(together).collect();
+    let text = || format!("these traces do not tell it from {}", rivals.join(", "));
+    (!rivals.is_empty()).then(|| doubt(DoubtId::Rivals, text()))
 }
 
 /// A law that the table does not list fits as well, or better.

@@ -151,7 +151,7 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
     let std = std_with_oil(fit, one.term).unwrap_or(std);
     let std = std.hypot(search::std_of_constants(fit, one.term));
     let spec = effect.spec();
-    let confusable_with: Vec<_> = one.rivals.iter().map(|(rival, _)| rival.spec().id).collect();
+    let rivals = rivals(one);
     let constants = fit.constants(one.term);
     let constants = effect.constants().iter().map(|own| (own.spec().id, constants.get(*own))).collect();
     Some(FoundEffect {
@@ -165,17 +165,28 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
         doubts,
         rmse_reduction_percent: one.mended_percent.unwrap_or(0.0),
         p_value: one.p_value,
-        separated_by: separation(effect, &one.rivals),
-        confusable_with,
+        separated_by: separation(effect, &rivals),
+        confusable_with: rivals.iter().map(|rival| rival.spec().id).collect(),
         constants,
         cause: spec.cause,
         remedy: spec.remedy,
     })
 }
 
+/// Each effect that may stand in its place, once.
+fn rivals(one: &Selected) -> Vec<Effect> {
+    let mut rivals = vec![];
+    for effect in one.rivals.iter().flat_map(|rival| &rival.effects) {
+        if !rivals.contains(effect) {
+            rivals.push(*effect);
+        }
+    }
+    rivals
+}
+
 /// The measurements that tell an effect from its rivals: what shows each of them alone.
-fn separation(effect: Effect, rivals: &[(Effect, f64)]) -> Option<String> {
-    let group = std::iter::once(&effect).chain(rivals.iter().map(|(rival, _)| rival));
+fn separation(effect: Effect, rivals: &[Effect]) -> Option<String> {
+    let group = std::iter::once(&effect).chain(rivals);
     let measurements: Vec<_> = group.map(|one| one.spec().measurement).collect();
     (!rivals.is_empty()).then(|| measurements.join(" "))
 }

@@ -10,7 +10,8 @@ pub(crate) fn next_measurement(selection: &Selection<'_>) -> Option<NextMeasurem
     let terms = &selection.fit.problem.terms;
     let of_one = |one: &Selected| {
         let named = (terms[one.term].effect()?, one.probability);
-        let rival = one.rivals.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let rival = one.rivals.iter().max_by(|a, b| a.probability.total_cmp(&b.probability))?;
+        let rival = (*rival.effects.first()?, rival.probability);
         Some([parting(named, rival), parting(rival, named)])
     };
     let all = selection.effects.iter().filter_map(of_one).flatten();

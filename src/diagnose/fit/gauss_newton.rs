@@ -87,48 +87,30 @@ impl<'a> Fit<'a> {
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
-    /// Best fit with a candidate in an effect's place, while the equations' error stays: see [`left_beyond`](Self::left_beyond).
+    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: with the columns of both.
     pub(crate) fn in_place_of(
         &self,
-        old: usize,
-        (new, constants): (usize, EffectConstants<f64>),
+        old: &[usize],
+        new: &[(usize, EffectConstants<f64>)],
         progress: Progress<'_>,
     ) -> Self {
-        let (structure, at) = self.left_by(&[old]);
-        let structure = structure.with(new, constants);
+        let (structure, at) = self.left_by(old);
+        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
         let error = self.assumed_error;
         let next = |fit: &Self| (!fit.stands_still()).then_some(error);
-        Self::linearised(self.problem, &structure, (at, error), next, progress)
+        let fit = Self::linearised(self.problem, &structure, (at, error), next, progress);
+        let places = [&structure.active, old].concat();
+        fit.with_columns(structure, &places)
     }
 
-    /// By how much more it leaves than another fit of the same traces: squares of what is left over, each at the noise that its model
-    /// gives it, where it counts for both, and what the priors pay.
-    pub(crate) fn left_beyond(&self, other: &Self) -> f64 {
-        let (own, others) = (self.squares_left(), other.squares_left());
-        let both = own.iter().zip(&others).filter_map(|(own, other)| Some((*own)? - (*other)?));
-        both.sum::<f64>() + self.paid() - other.paid()
-    }
-
-    /// Of each entry that counts.
-    fn squares_left(&self) -> Vec<Option<f64>> {
-        let rows = &self.weak_form.rows;
-        let mut squares = vec![None; rows.entries.len()];
-        for equation in Equation::ALL {
-            for (place, value) in self.regression.innovations_by_entry(rows, &self.free, equation) {
-                squares[place] = Some(value * value);
-            }
+    /// The fit with some effects held at zero and others free: no new pass over the data.
+    pub(crate) fn exchanged(&self, gone: &[usize], new: &[usize]) -> Solution {
+        let mut priors = self.problem.increments(&self.weak_form.at);
+        for term in gone {
+            let mean = -self.weak_form.at.value(self.problem.terms[*term]);
+            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
         }
-        squares
-    }
-
-    /// What the priors add to the sum of squares.
-    fn paid(&self) -> f64 {
-        let priors = self.problem.increments(&self.weak_form.at);
-        let terms = self.free.terms.iter().zip(&self.free.value);
-        let of = |(term, value): (&usize, &f64)| {
-            priors[*term].map_or(0.0, |prior| ((value - prior.mean) / prior.std).powi(2))
-        };
-        terms.map(of).sum()
+        self.regression.solve(&[self.active(), new].concat(), &priors)
     }
 
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
@@ -217,13 +199,15 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
         let fit = Self::linearised(problem, &structure, (at, assumed_error), next, progress);
-        let columns = Columns {
-            terms: &problem.terms,
-            constants: &structure.constants,
-            places: &problem.every_place(),
-        };
-        let weak_form = fit.weak_form.with_columns(columns);
-        Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
+        fit.with_columns(structure, &problem.every_place())
+    }
+
+    /// The same linearisation and its solution with other columns.
+    fn with_columns(self, structure: Structure, places: &[usize]) -> Self {
+        let Self { problem, weak_form, assumed_error, .. } = self;
+        let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
+        let weak_form = weak_form.with_columns(columns);
+        Self::solving(weak_form, columns, problem, structure.clone(), assumed_error)
     }
 
     /// Linearises anew, with the equations' error that `next` gives, until that gives none.
@@ -256,7 +240,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only.
-    fn stands_still(&self) -> bool {
+    pub(crate) fn stands_still(&self) -> bool {
         let (at, solved) = (&self.weak_form.at, self.solved());
         let is_still = |(term, std): (&usize, &f64)| {
             let term = self.problem.terms[*term];
@@ -378,12 +362,7 @@ impl<'a> Fit<'a> {
 
     /// The fit with some effects held at zero: no new pass over the data.
     pub(crate) fn solve_without(&self, terms: &[usize]) -> Solution {
-        let mut priors = self.problem.increments(&self.weak_form.at);
-        for term in terms {
-            let mean = -self.weak_form.at.value(self.problem.terms[*term]);
-            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
-        }
-        self.regression.solve(&self.structure.active, &priors)
+        self.exchanged(terms, &[])
     }
 
     /// By how much one further term would move the value of a fitted one: no new pass over the data.

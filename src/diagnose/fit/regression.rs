@@ -17,6 +17,13 @@ pub(crate) struct Prior {
     pub(crate) std: f64,
 }
 
+impl Solution {
+    /// Of a term that is fitted, from the linearisation.
+    pub(crate) fn increment(&self, term: usize) -> Option<f64> {
+        self.terms.iter().position(|one| *one == term).map(|at| self.value[at])
+    }
+}
+
 /// Whitened columns and their products.
 #[derive(Clone)]
 pub(crate) struct Regression {
@@ -33,6 +40,8 @@ pub(crate) struct Regression {
     pub(super) noise_share: Vec<f64>,
     grams: Vec<DMatrix<f64>>,
     pub(super) total: DMatrix<f64>,
+    /// What was taken off `total` for the noise that columns share.
+    pub(super) taken: DMatrix<f64>,
 }
 
 /// [`SharedNoise`], whitened; columns in units of the regression's.
@@ -68,18 +77,20 @@ impl Regression {
         let total_rows = rows.rows.len().max(1);
         let piece_of: Vec<usize> = rows.entries.iter().map(|e| e.row * PIECES / total_rows).collect();
         let (y, columns, scale, noise_share) = (vec![], vec![], vec![], vec![]);
-        let (grams, total) = (vec![], DMatrix::zeros(0, 0));
-        let mut new = Self { piece_of, y, columns, scale, counted, noise_share, grams, total };
+        let (grams, total, taken) = (vec![], DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
+        let mut new = Self { piece_of, y, columns, scale, counted, noise_share, grams, total, taken };
         new.y = new.counting(whitening.whiten(&rows.y));
         let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
         (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
         new.grams = new.products();
         let shared: Vec<WhiteNoise> = shared.iter().map(|noise| new.white_noise(noise, whitening)).collect();
         new.noise_share = new.noise_shares(&shared);
+        let as_measured = sum_of(&new.grams);
         for noise in &shared {
             new.take_off(noise, 1.0 / shared.len() as f64);
         }
         new.total = sum_of(&new.grams);
+        new.taken = as_measured - &new.total;
         new
     }
 

@@ -1,8 +1,8 @@
 //! What one more term would bring, without a fit: the score test.
 
 use super::regression::{Regression, Solution, normalised};
-use crate::diagnose::thresholds::LEAST_NEW_SHARE;
-use nalgebra::DVector;
+use crate::diagnose::thresholds::{LEAST_NEW_SHARE, MOST_NOISE_SHARE};
+use nalgebra::{DMatrix, DVector};
 
 /// What a further term would bring.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,81 @@ impl PartialColumn {
     }
 }
 
+/// What is new in some columns beside a solution: their products, and those with what it leaves.
+pub(crate) struct Beside<'r> {
+    regression: &'r Regression,
+    terms: Vec<usize>,
+    products: DMatrix<f64>,
+    /// Of that, what was taken off for noise.
+    noise: DMatrix<f64>,
+    pulls: DVector<f64>,
+}
+
+/// What two further terms would bring together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairScore {
+    /// By how much the sum of squares falls.
+    pub(crate) chi2_drop: f64,
+    /// Their increments.
+    pub(crate) values: [f64; 2],
+}
+
+impl Beside<'_> {
+    /// By how much the sum of squares falls with one of them.
+    pub(crate) fn alone(&self, at: usize) -> f64 {
+        if self.is_new(at) { self.pulls[at].powi(2) / self.products[(at, at)] } else { 0.0 }
+    }
+
+    fn is_new(&self, at: usize) -> bool {
+        self.products[(at, at)] >= LEAST_NEW_SHARE
+    }
+
+    /// What two of them bring; none where they are one column, or what is new in them is mostly noise.
+    pub(crate) fn pair(&self, a: usize, b: usize) -> Option<PairScore> {
+        let (own, other, cross) = (self.products[(a, a)], self.products[(b, b)], self.products[(a, b)]);
+        let determinant = own * other - cross * cross;
+        if !(self.is_new(a) && self.is_new(b) && determinant >= LEAST_NEW_SHARE * own * other) {
+            return None;
+        }
+        let (pull, pull_other) = (self.pulls[a], self.pulls[b]);
+        let sizes = [
+            (pull * other - pull_other * cross) / determinant,
+            (pull_other * own - pull * cross) / determinant,
+        ];
+        let chi2_drop = sizes[0] * pull + sizes[1] * pull_other;
+        let noise = &self.noise;
+        let noise = sizes[0] * (sizes[0] * noise[(a, a)] + 2.0 * sizes[1] * noise[(a, b)])
+            + sizes[1] * sizes[1] * noise[(b, b)];
+        if noise > MOST_NOISE_SHARE * (chi2_drop + noise) {
+            return None;
+        }
+        let scales = [a, b].map(|at| self.regression.scale[self.terms[at]]);
+        Some(PairScore { chi2_drop, values: [sizes[0] / scales[0], sizes[1] / scales[1]] })
+    }
+}
+
 impl Regression {
+    /// What is new in the columns of some terms, none of them a solution's own.
+    pub(crate) fn beside(&self, solution: &Solution, terms: &[usize]) -> Beside<'_> {
+        let y = self.columns.len();
+        let of = |matrix: &DMatrix<f64>, left: &[usize], right: &[usize]| {
+            DMatrix::from_fn(left.len(), right.len(), |i, j| matrix[(left[i], right[j])])
+        };
+        let cross = of(&self.total, &solution.terms, terms);
+        let explained = &solution.inverse * &cross;
+        let shared = of(&self.taken, &solution.terms, terms);
+        let noise = of(&self.taken, terms, terms) - shared.tr_mul(&explained) - explained.tr_mul(&shared)
+            + explained.tr_mul(&(of(&self.taken, &solution.terms, &solution.terms) * &explained));
+        let with_y = DVector::from_fn(terms.len(), |i, _| self.total[(terms[i], y)]);
+        Beside {
+            regression: self,
+            terms: terms.to_vec(),
+            products: of(&self.total, terms, terms) - cross.tr_mul(&explained),
+            noise,
+            pulls: with_y - cross.tr_mul(&solution.scaled),
+        }
+    }
+
     /// Score (Lagrange multiplier) test of one more term: Rao (1948).
     pub(crate) fn score(&self, solution: &Solution, term: usize) -> Option<Score> {
         if !self.shows(term) || solution.terms.contains(&term) {
@@ -123,7 +197,6 @@ mod tests {
     use crate::diagnose::fit::Problem;
     use crate::diagnose::testing::{declared, torn_seal};
     use crate::diagnose::weak_form::{Columns, DECLARED, Term, WeakForm};
-    use nalgebra::DMatrix;
     use pitchleak_core::Effect;
 
     /// A regression of the declared model's constants and some effects, none of which share the residual's noise.

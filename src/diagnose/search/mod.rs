@@ -1,19 +1,19 @@
 //! Which effects are missing.
 
 mod candidates;
-mod exchange;
 pub(crate) mod leak_changes;
 mod selection;
+mod sets;
 mod trials;
 
 pub(crate) use candidates::{critical_sigma, open, strongest_unlisted};
-pub(crate) use selection::{Selected, Selection, interactions, loss};
+pub(crate) use selection::{Rival, Selected, Selection, interactions, loss};
 pub(crate) use trials::std_of_constants;
 pub use trials::{Candidate, Collinearity};
 
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::{Fit, Problem, Progress};
-use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_STEPS};
+use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_STEPS, MOST_SWAPS};
 
 /// The effects that are missing from a declared model whose leaks stay, or from one whose leaks change: whichever says more with less.
 /// Leaks are asked whether they change once a few effects leave more than noise.
@@ -31,7 +31,7 @@ pub(crate) fn best<'a>(
         progress,
     );
     if !staying.fit.is_incomplete() {
-        return tidied(staying, progress);
+        return finished(staying, &error, progress);
     }
     let changing = with_changes().map(|problem| search(Fit::declared(problem, progress), &error, progress));
     // While something else is missing, what leaks seem to do is that one's doing.
@@ -40,7 +40,7 @@ pub(crate) fn best<'a>(
         changing => changing,
     };
     add_while(&mut staying, |_| true, &error, progress);
-    let staying = tidied(staying, progress);
+    let staying = finished(staying, &error, progress);
     changing.into_iter().fold(staying, |best, other| if other.cost() < best.cost() { other } else { best })
 }
 
@@ -51,8 +51,8 @@ pub(crate) fn search<'a>(
     progress: Progress<'_>,
 ) -> Selection<'a> {
     let mut all = Selection::none(declared);
-    add_while(&mut all, |_| true, error, progress);
-    tidied(all, progress)
+    add_while(&mut all, |_| true, &error, progress);
+    finished(all, &error, progress)
 }
 
 /// Adds effects while there are further ones, and `goes_on`.
@@ -64,12 +64,11 @@ fn add_while(
 ) {
     let mut last = error(&all.fit);
     for _ in 0..MOST_STEPS {
-        if !goes_on(all) || !all.add_next(progress) && !exchange::split_one(all, progress) {
+        if !goes_on(all) || !all.add_next(progress) {
             break;
         }
         all.refine_friction(progress);
         all.drop_needless(progress);
-        exchange::exchange_all(all, progress);
         let now = error(&all.fit);
         let mended = reduction_percent(&last, &now);
         all.effects.iter_mut().for_each(|one| _ = one.mended_percent.get_or_insert(mended));
@@ -77,13 +76,22 @@ fn add_while(
     }
 }
 
-/// Without those that the last exchange may have left needless, each held against its rivals, and no more than it takes.
-fn tidied<'a>(mut all: Selection<'a>, progress: Progress<'_>) -> Selection<'a> {
-    all.drop_needless(progress);
-    all.drop_needless_changes(progress);
-    all.drop_doubtful(progress);
-    all.find_confusable(progress);
-    exchange::simplify(&mut all, progress);
+/// Without those that the last exchange may have left needless, each held against the sets without it. Another set may want others beside.
+fn finished<'a>(
+    mut all: Selection<'a>,
+    error: &impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
+    progress: Progress<'_>,
+) -> Selection<'a> {
+    for _ in 0..MOST_SWAPS {
+        all.drop_needless(progress);
+        all.drop_needless_changes(progress);
+        all.drop_doubtful(progress);
+        if !sets::weigh(&mut all, progress) {
+            return all;
+        }
+        add_while(&mut all, |_| true, error, progress);
+    }
+    sets::weigh(&mut all, progress);
     all
 }
 
@@ -128,7 +136,7 @@ mod tests {
             let effects: Vec<_> = places.map(|term| Selected::new(term, 1.0)).collect();
             let new: Vec<_> = effects.iter().map(|one| (one.term, problem.usual_constants)).collect();
             let mut all = Selection { fit: plain.changed(&[], &new, &|| ()), effects };
-            exchange::exchange_all(&mut all, &|| ());
+            sets::weigh(&mut all, &|| ());
             assert!(names(&all).contains(&TURBULENT.0), "{wrong:?} became {:?}", names(&all));
             assert!(
                 names(&all).len() <= wrong.len()

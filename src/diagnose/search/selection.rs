@@ -1,19 +1,26 @@
 //! The effects named so far: forward selection by the score test, with backward elimination, each step confirmed on data that it did
 //! not fit; and whether two effects that were found act on each other.
 
-use super::candidates::{Candidates, critical_sigma, strongest_unlisted, unlisted_chi2_drop};
+use super::candidates::{Candidates, critical_sigma, unlisted_chi2_drop};
 use super::leak_changes;
 use super::trials::{self, Trial};
 use crate::diagnose::equation::Equation;
-use crate::diagnose::fit::{Fit, Progress, Solution};
+use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::outcome::Interaction;
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    AGREED_SIGMA, CONFUSABLE_CHI2, CURVED_SHARE, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE,
-    MOST_EFFECTS, MOST_SWAPS,
+    AGREED_SIGMA, CONFUSABLE_CHI2, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE, MOST_EFFECTS,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Effect;
+
+/// Effects that fit as well where a named one is gone, alone or with other named ones.
+#[derive(Clone, Debug)]
+pub(crate) struct Rival {
+    pub(crate) effects: Vec<Effect>,
+    /// Of these in its place.
+    pub(crate) probability: f64,
+}
 
 /// One effect of the answer, by its place among the problem's terms.
 #[derive(Clone, Debug)]
@@ -23,8 +30,8 @@ pub(crate) struct Selected {
     pub(crate) p_value: f64,
     /// Fall of the held-out error when it was added, percent; none before that is known.
     pub(crate) mended_percent: Option<f64>,
-    /// Others that fit as well in its place, each with its probability there.
-    pub(crate) rivals: Vec<(Effect, f64)>,
+    /// What fits as well in its place.
+    pub(crate) rivals: Vec<Rival>,
     /// Probability of it among all that could stand in its place.
     pub(crate) probability: f64,
     /// A product of signals that the table does not list and that fits nearly as well in its place.
@@ -45,12 +52,6 @@ impl Selected {
             unlisted_rival: None,
             is_below_unlisted: false,
         }
-    }
-
-    /// Another effect took its place.
-    pub(super) fn stands_for(&mut self, fit: &Fit<'_>, best: &Trial) {
-        self.term = best.score.term;
-        self.p_value = statistics::chi2_p(best.score.chi2_drop / fit.dispersion(fit.free.chi2), 1.0);
     }
 }
 
@@ -86,17 +87,21 @@ pub(crate) fn loss(fit: &Fit<'_>, terms: &[usize]) -> f64 {
     fit.solve_without(terms).chi2 - fit.free.chi2
 }
 
-/// The fit with a candidate in the place of others, its constants fitted too.
-pub(super) fn with<'a>(fit: &Fit<'a>, old: &[usize], trial: &Trial, progress: Progress<'_>) -> Fit<'a> {
+/// The fit with a candidate, its constants fitted too.
+fn with<'a>(fit: &Fit<'a>, trial: &Trial, progress: Progress<'_>) -> Fit<'a> {
     let term = trial.score.term;
-    let with = fit.changed(old, &[(term, trial.constants)], progress);
+    let with = fit.with(term, trial.constants, progress);
     let is_usual = trial.constants == fit.problem.usual(term);
     if is_usual { with } else { with_better_constants(&with, term, progress).unwrap_or(with) }
 }
 
 /// The fit with an effect's constants fitted again, now that what it leaves is no longer in the way; none where they stay. The usual
 /// ones are kept unless the traces speak against them.
-fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>) -> Option<Fit<'a>> {
+pub(super) fn with_better_constants<'a>(
+    fit: &Fit<'a>,
+    term: usize,
+    progress: Progress<'_>,
+) -> Option<Fit<'a>> {
     if !trials::are_fitted(fit, term) {
         return None;
     }
@@ -126,15 +131,6 @@ impl Selection<'_> {
 
     /// Adds the next effect; false when nothing further is significant.
     pub(super) fn add_next(&mut self, progress: Progress<'_>) -> bool {
-        self.add_best(|_, _| true, progress)
-    }
-
-    /// Adds the best of the wanted effects; false when none is significant.
-    pub(super) fn add_best(
-        &mut self,
-        is_wanted: impl Fn(&Fit<'_>, usize) -> bool,
-        progress: Progress<'_>,
-    ) -> bool {
         let fit = &self.fit;
         let is_added =
             |i: &&usize| fit.problem.priors[**i].is_none() && fit.problem.terms[**i].effect().is_some();
@@ -142,14 +138,13 @@ impl Selection<'_> {
             return false;
         }
         let trials = Candidates::of(fit).trials(&fit.free);
-        let is_next = |trial: &Trial| is_wanted(fit, trial.score.term) && deserves_a_name(fit, trial);
-        let Some(trial) = trials.into_iter().find(is_next) else { return false };
+        let Some(trial) = trials.into_iter().find(|trial| deserves_a_name(fit, trial)) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
         let is_below_unlisted = unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion;
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
-        self.fit = with(fit, &[], &trial, progress);
+        self.fit = with(fit, &trial, progress);
         true
     }
 
@@ -190,67 +185,6 @@ impl Selection<'_> {
             self.drop_at(at, progress);
         }
     }
-
-    /// Names for each effect those candidates that would explain the data nearly as well in its place, gives it to one that
-    /// does better, and orders the effects by what the fit loses without them.
-    pub(super) fn find_confusable(&mut self, progress: Progress<'_>) {
-        for _ in 0..MOST_SWAPS {
-            let Some((at, better)) = self.weigh_rivals(progress) else { break };
-            self.fit = with(&self.fit, &[self.effects[at].term], &better, progress);
-            self.effects[at].stands_for(&self.fit, &better);
-        }
-        let fit = &self.fit;
-        self.effects.sort_by(|a, b| loss(fit, &[b.term]).total_cmp(&loss(fit, &[a.term])));
-    }
-
-    /// Holds each effect against all that could stand in its place; the first that a rival beats.
-    fn weigh_rivals(&mut self, progress: Progress<'_>) -> Option<(usize, Trial)> {
-        let fit = &self.fit;
-        let dispersion = fit.dispersion(fit.free.chi2);
-        let mut candidates = Candidates::of(fit);
-        for (at, one) in self.effects.iter_mut().enumerate() {
-            let without = fit.solve_without(&[one.term]);
-            let lost = without.chi2 - fit.free.chi2;
-            let is_close = |trial: &Trial| lost - trial.score.chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            let mut trials = candidates.trials(&without);
-            // A score is linear about the effect that stands there.
-            for trial in trials.iter_mut().filter(|trial| trial.score.chi2_drop > (1.0 - CURVED_SHARE) * lost)
-            {
-                let in_its_place = fit.in_place_of(one.term, (trial.score.term, trial.constants), progress);
-                trial.score.chi2_drop = lost - in_its_place.left_beyond(fit);
-            }
-            let own = lost / dispersion - critical_sigma(fit, fit.constants(one.term)).powi(2);
-            let is_better = |trial: &&Trial| trial.beyond(dispersion) > own && trial.is_worth_a_name(fit);
-            let better = trials.iter().filter(is_better);
-            if let Some(best) =
-                better.max_by(|a, b| a.score.chi2_drop.total_cmp(&b.score.chi2_drop)).filter(|_| lost > 0.0)
-            {
-                return Some((at, *best));
-            }
-            one.probability = place_probability(fit, own, &trials, &without);
-            let is_near = |(_, chi2_drop): &(Unlisted, f64)| lost - chi2_drop < CONFUSABLE_CHI2 * dispersion;
-            one.unlisted_rival =
-                strongest_unlisted(fit, &without).filter(is_near).map(|(product, _)| product);
-            let weighed = |trial: Trial| {
-                let effect = fit.problem.terms[trial.score.term].effect()?;
-                Some((effect, one.probability * ((trial.beyond(dispersion) - own) / 2.0).exp()))
-            };
-            one.rivals = trials.into_iter().filter(is_close).filter_map(weighed).collect();
-        }
-        None
-    }
-}
-
-/// The probability of an effect among all that could stand in its place, beside the others: equal prior odds for each candidate and each
-/// unlisted law, and by how much each, and the effect its `own`, passes what chance and its fitted constants could bring, twice a log
-/// likelihood.
-fn place_probability(fit: &Fit<'_>, own: f64, trials: &[Trial], without: &Solution) -> f64 {
-    let dispersion = fit.dispersion(fit.free.chi2);
-    let usual = critical_sigma(fit, fit.problem.usual_constants).powi(2);
-    let others = trials.iter().map(|trial| trial.beyond(dispersion));
-    let unlisted = strongest_unlisted(fit, without).map(|(_, chi2_drop)| chi2_drop / dispersion - usual);
-    let odds_against: f64 = others.chain(unlisted).map(|other| ((other - own) / 2.0).exp()).sum();
-    1.0 / (1.0 + odds_against)
 }
 
 /// Whether a candidate is significant, mends enough, and helps where it was not fitted.

@@ -151,12 +151,6 @@ impl Trial {
 }
 
 impl Candidates<'_, '_> {
-    /// Every candidate against a model, its constants only tried at a few places; the best first.
-    pub(super) fn rough_trials(&mut self, model: &Solution) -> Vec<Trial> {
-        let scores = self.starts(model);
-        self.ranked(model, scores)
-    }
-
     /// Every candidate at its best against a model; the best first.
     pub(super) fn trials(&mut self, model: &Solution) -> Vec<Trial> {
         let mut scores = self.starts(model);

@@ -70,12 +70,15 @@ const STORAGE: [(Channel, usize); 2] = [(Channel::PressureA, 1), (Channel::Press
 /// Forces feel speed and acceleration.
 const FELT: [(Channel, usize); 2] = [(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
 
-/// The channel that measures a left side of the chambers' equations.
-fn left_side(side: LeftSide) -> (Channel, usize) {
+/// The signals that measure a left side of the equations.
+fn left_side(side: LeftSide) -> &'static [(Channel, usize)] {
     match side {
-        LeftSide::Speed => (Channel::Position, 1),
-        LeftSide::FlowA => (Channel::FlowA, 0),
-        LeftSide::FlowB => (Channel::FlowB, 0),
+        LeftSide::Speed => &[(Channel::Position, 1)],
+        LeftSide::FlowA => &[(Channel::FlowA, 0)],
+        LeftSide::FlowB => &[(Channel::FlowB, 0)],
+        LeftSide::PressureA => &[(Channel::PressureA, 0), (Channel::PressureA, 1)],
+        LeftSide::PressureB => &[(Channel::PressureB, 0), (Channel::PressureB, 1)],
+        LeftSide::Force => &[(Channel::Force, 0)],
     }
 }
 
@@ -178,14 +181,14 @@ impl Term {
     pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {
         match self {
             Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => STORAGE.to_vec(),
-            Self::Unlisted(Unlisted::DirectionLeak) => vec![left_side(LeftSide::Speed)],
+            Self::Unlisted(Unlisted::DirectionLeak) => left_side(LeftSide::Speed).to_vec(),
             Self::Unlisted(Unlisted::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
             Self::Unlisted(Unlisted::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
             Self::Effect(effect) => {
                 let EffectSpec { carries, shares_noise_of, kind, .. } = effect.spec();
                 match *kind {
                     _ if carries.is_some() || !shares_noise_of.is_empty() => {
-                        carries.iter().chain(*shares_noise_of).copied().map(left_side).collect()
+                        carries.iter().chain(*shares_noise_of).copied().flat_map(left_side).copied().collect()
                     }
                     EffectKind::Sensor => vec![],
                     _ if self.in_force() => FELT.to_vec(),
@@ -210,7 +213,7 @@ impl Term {
         self.effect().is_some_and(|effect| effect.stiction(&PROBE).is_some())
     }
 
-    /// Whether the column is in proportion to what the equations have on their left side, Q or A ẋ.
+    /// Whether the column is in proportion to what the equations have on their left side.
     pub(crate) fn is_left_side(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().carries.is_some(),

@@ -28,7 +28,7 @@ impl EffectKind {
     }
 }
 
-/// A measured quantity on the left side of the chambers' equations, Q = A ẋ + ….
+/// A measured quantity on the left side of an equation: Q = A ẋ + … of the chambers, A_A P_A − A_B P_B − F = … of the forces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LeftSide {
     /// ẋ, from the position sensor.
@@ -37,6 +37,12 @@ pub enum LeftSide {
     FlowA,
     /// Q_B.
     FlowB,
+    /// P_A and its rate.
+    PressureA,
+    /// P_B and its rate.
+    PressureB,
+    /// F, from the load cell.
+    Force,
 }
 
 /// What is fixed about an effect.

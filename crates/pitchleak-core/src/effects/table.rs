@@ -10,7 +10,7 @@
 //!     constants [names];                in which the term is not linear, and which a fit may vary
 //!     given [names];                    the same, but taken as they are
 //!     prior sensor.spread;              the declared error of the sensor that the effect is
-//!     carries LeftSide;                 the measured left side of eq. (1) to which the term is in proportion
+//!     carries LeftSide;                 the measured left side of an equation to which the term is in proportion
 //!     shares [LeftSide];                further ones whose noise the term shares with the residual
 //!     dry |at| …;                       dry friction: the force with which one unit can hold a piston that stands, N
 //!     adds field;                       the declared number of the cylinder to which the value adds
@@ -142,13 +142,13 @@ effects! {
         "Line B vented: what pressure sensor B still reads."
     PressureGainA "pressure_gain_a" ["1"] Sensor -0.5 .. 0.5, 2e-2;
         reads |_, one, none| scale(Signals { pa_pa: one, dpa_pas: one, d2pa_pas2: one, ..none });
-        prior pressure.gain_std;
+        prior pressure.gain_std; carries PressureA;
         "Pressure sensor A reads a constant share too much or too little; the force balance shows it."
         "Calibrate pressure sensor A against a reference gauge."
         "A reference gauge at port A at high pressure."
     PressureGainB "pressure_gain_b" ["1"] Sensor -0.5 .. 0.5, 2e-2;
         reads |_, one, none| scale(Signals { pb_pa: one, dpb_pas: one, d2pb_pas2: one, ..none });
-        prior pressure.gain_std;
+        prior pressure.gain_std; carries PressureB;
         "Pressure sensor B reads a constant share too much or too little; the force balance shows it."
         "Calibrate pressure sensor B against a reference gauge."
         "A reference gauge at port B at high pressure."
@@ -249,7 +249,7 @@ effects! {
         "Fast reversals without load: force in step with acceleration."
     ForceGain "force_gain" ["1"] Sensor -0.5 .. 0.5, 5e-2;
         reads |_, one, none| scale(Signals { force_n: one, ..none });
-        prior force.gain_std;
+        prior force.gain_std; carries Force;
         "The load cell reads a constant share too much or too little."
         "Calibrate the load cell."
         "A known weight on the load cell."
@@ -285,14 +285,14 @@ effects! {
         "The piston moved slower and slower: the flow below which meter B shows nothing while the position still changes."
     AreaA "area_a" ["m2"] Cylinder -1e-2 .. 1.0, 6e-5;
         term |at, model, _| area_a(at, model);
-        carries Speed;
+        carries Speed; shares [PressureA];
         adds area_a_m2;
         "The piston's area at chamber A is not as declared: swept flow, volume and force of the pressure are all wrong in the same proportion."
         "Look the bore up in the cylinder's data sheet and declare area_a in the rig file; the sensors stay as they are."
         "A full stroke at constant speed: the oil that flow meter A counts, over the stroke, is the area; beside a load cell the force over the pressure is the same."
     AreaB "area_b" ["m2"] Cylinder -1e-2 .. 1.0, 6e-5;
         term |at, model, _| area_b(at, model);
-        carries Speed;
+        carries Speed; shares [PressureB];
         adds area_b_m2;
         "The ring area at chamber B is not as declared (another rod diameter): swept flow, volume and force of the pressure are all wrong in the same proportion."
         "Look bore and rod up in the cylinder's data sheet and declare area_b in the rig file; the sensors stay as they are."

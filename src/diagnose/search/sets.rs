@@ -1,0 +1,209 @@
+//! The sets of effects beside the one that is named: some of it gone, others in their place. In each place alone the right effect can look no
+//! better than a wrong one as long as the others are wrong too; one effect can stand for two, and two for one.
+//!
+//! One Gram matrix says what every such set would leave, as far as it is linear about what is named. The nearest are fitted, and seen from
+//! both sides: what the named set loses by the exchange, and what the other one loses by taking it back.
+
+use super::candidates::{Candidates, critical_sigma, open, strongest_unlisted};
+use super::selection::{self, Rival, Selected, Selection};
+use crate::diagnose::fit::{Fit, Progress, Solution};
+use crate::diagnose::statistics;
+use crate::diagnose::thresholds::{
+    CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_SWAPS,
+};
+use crate::diagnose::weak_form::Unlisted;
+use pitchleak_core::effects::EffectConstants;
+
+/// Some named effects gone, and others in their place.
+#[derive(Clone, Debug)]
+struct Exchange {
+    gone: Vec<usize>,
+    new: Vec<(usize, EffectConstants<f64>)>,
+    /// By how much the sum of squares rises.
+    rise: f64,
+    /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise.
+    dearer: f64,
+}
+
+impl Exchange {
+    /// By how much the set is the worse one: twice the ln of the odds against it.
+    fn worse(&self, dispersion: f64) -> f64 {
+        self.rise / dispersion + self.dearer
+    }
+}
+
+/// Gives the named effects to a set that does better, until none does; holds each against the sets without it, and orders them by what the
+/// fit loses without them. Whether others were named.
+pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
+    let mut has_changed = false;
+    let mut exchanges = nearest(all, progress);
+    for _ in 0..MOST_SWAPS {
+        let dispersion = all.fit.dispersion(all.fit.free.chi2);
+        let is_better = |one: &&Exchange| {
+            let is_named = |(term, _): &(usize, _)| {
+                let size = all.fit.exchanged(&one.gone, &places(one)).increment(*term);
+                all.fit.problem.is_worth_a_name(*term, size.unwrap_or(0.0))
+            };
+            one.worse(dispersion) < 0.0 && one.new.iter().all(is_named)
+        };
+        let better = exchanges.iter().filter(is_better);
+        let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
+        let Some(best) = best else { break };
+        take(all, &best, progress);
+        has_changed = true;
+        exchanges = nearest(all, progress);
+    }
+    hold_against(all, &exchanges);
+    let fit = &all.fit;
+    all.effects.sort_by(|a, b| selection::loss(fit, &[b.term]).total_cmp(&selection::loss(fit, &[a.term])));
+    has_changed
+}
+
+fn places(one: &Exchange) -> Vec<usize> {
+    one.new.iter().map(|(term, _)| *term).collect()
+}
+
+/// Names the other set.
+fn take(all: &mut Selection<'_>, other: &Exchange, progress: Progress<'_>) {
+    all.fit = all.fit.changed(&other.gone, &other.new, progress);
+    for (term, _) in &other.new {
+        if let Some(better) = selection::with_better_constants(&all.fit, *term, progress) {
+            all.fit = better;
+        }
+    }
+    let mended = all.effects.iter().filter(|one| other.gone.contains(&one.term));
+    let mended = mended.filter_map(|one| one.mended_percent).reduce(f64::max);
+    all.effects.retain(|one| !other.gone.contains(&one.term));
+    let dispersion = all.fit.dispersion(all.fit.free.chi2);
+    for (term, _) in &other.new {
+        let p_value = statistics::chi2_p(selection::loss(&all.fit, &[*term]) / dispersion, 1.0);
+        all.effects.push(Selected { mended_percent: mended, ..Selected::new(*term, p_value) });
+    }
+}
+
+/// The exchanges that come near what is named, each fitted.
+fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
+    let fit = &all.fit;
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let named: Vec<usize> = all.effects.iter().map(|one| one.term).collect();
+    let mut candidates = Candidates::of(fit);
+    let mut near = vec![];
+    for gone in subsets(&named, MOST_EXCHANGED) {
+        let without = fit.solve_without(&gone);
+        let lost = without.chi2 - fit.free.chi2;
+        let margin = CONFUSABLE_CHI2 + CURVED_SHARE * lost / dispersion;
+        let singles = of_one(&mut candidates, &without, &gone);
+        let pairs = of_two(fit, &without, &gone);
+        near.extend(singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin));
+    }
+    near.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
+    near.truncate(MOST_EXCHANGES);
+    near.into_iter()
+        .filter_map(|one| Some(Exchange { rise: seen_from_both(fit, &one, progress)?, ..one }))
+        .collect()
+}
+
+/// All sets of one to `most` of these.
+fn subsets(of: &[usize], most: usize) -> Vec<Vec<usize>> {
+    let all = (1..1_usize << of.len()).filter(|bits| bits.count_ones() as usize <= most);
+    let chosen = |bits: usize| of.iter().enumerate().filter(move |(at, _)| bits >> at & 1 == 1);
+    all.map(|bits| chosen(bits).map(|(_, term)| *term).collect()).collect()
+}
+
+fn needed(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
+    critical_sigma(fit, constants).powi(2)
+}
+
+/// What those that go have to bring.
+fn spared(fit: &Fit<'_>, gone: &[usize]) -> f64 {
+    gone.iter().map(|term| needed(fit, fit.constants(*term))).sum()
+}
+
+/// Each candidate at its best in the place of those that are gone.
+fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
+    let fit = candidates.fit;
+    let lost = without.chi2 - fit.free.chi2;
+    let spared = spared(fit, gone);
+    let trials = candidates.trials(without).into_iter();
+    let exchange = |(term, constants, chi2_drop)| Exchange {
+        gone: gone.to_vec(),
+        new: vec![(term, constants)],
+        rise: lost - chi2_drop,
+        dearer: needed(fit, constants) - spared,
+    };
+    trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
+}
+
+/// Each pair of candidates in their place, neither of which would do alone.
+fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
+    let lost = without.chi2 - fit.free.chi2;
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let terms = open(fit);
+    let beside = fit.regression.beside(without, &terms);
+    let needed: Vec<f64> = terms.iter().map(|term| needed(fit, fit.constants(*term))).collect();
+    let spared = spared(fit, gone);
+    let pair = |(a, b): (usize, usize)| {
+        let both = beside.pair(a, b)?;
+        let alone = [(a, beside.alone(a)), (b, beside.alone(b))];
+        let is_for_both = alone.iter().all(|(at, drop)| {
+            let of_other = needed[a] + needed[b] - needed[*at];
+            both.chi2_drop - drop > of_other * dispersion
+        });
+        let allowed =
+            fit.problem.allows(terms[a], both.values[0]) && fit.problem.allows(terms[b], both.values[1]);
+        (is_for_both && allowed).then(|| Exchange {
+            gone: gone.to_vec(),
+            new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
+            rise: lost - both.chi2_drop,
+            dearer: needed[a] + needed[b] - spared,
+        })
+    };
+    let pairs = (0..terms.len()).flat_map(|a| (a + 1..terms.len()).map(move |b| (a, b)));
+    pairs.filter_map(pair).collect()
+}
+
+/// By how much the sum of squares rises with an exchange, once it is fitted: the mean of what either set's own linearisation says, so that
+/// what is quadratic in their distance drops out. Both are sums of squares from which the columns' noise is taken off: with more noise in
+/// its equations a set explains no more. None where the other set is no model: its fit does not settle, leaves more than noise where the
+/// named one does not, or has an effect at the end of its range or with nothing to do.
+fn seen_from_both(fit: &Fit<'_>, one: &Exchange, progress: Progress<'_>) -> Option<f64> {
+    let other = fit.in_place_of(&one.gone, &one.new, progress);
+    let dispersion = other.dispersion(other.free.chi2);
+    let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
+        selection::loss(&other, &[*term]) > needed(fit, *constants) * dispersion
+    };
+    let at_bound = |fit: &Fit<'_>| fit.active().iter().any(|term| fit.is_at_bound(*term));
+    let is_within = !at_bound(&other) || at_bound(fit);
+    let is_settled = other.stands_still() || !fit.stands_still();
+    let is_complete = !other.is_incomplete() || fit.is_incomplete();
+    let back = other.exchanged(&places(one), &one.gone).chi2 - other.free.chi2;
+    (is_settled && is_complete && is_within && one.new.iter().all(acts)).then_some((one.rise - back) / 2.0)
+}
+
+/// Gives each named effect its rivals and its probability among all that could stand in its place.
+fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
+    let fit = &all.fit;
+    let dispersion = fit.dispersion(fit.free.chi2);
+    let odds = |worse: f64| (-worse / 2.0).exp();
+    for one in &mut all.effects {
+        let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
+        let (unlisted, worse) = unlisted(fit, one.term).unzip();
+        let odds_against = against.clone().map(|other| odds(other.worse(dispersion))).sum::<f64>();
+        one.probability = 1.0 / (1.0 + odds_against + worse.map_or(0.0, odds));
+        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
+        let rival = |other: &Exchange| Rival {
+            effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
+            probability: one.probability * odds(other.worse(dispersion)),
+        };
+        one.rivals = against.filter(|other| other.worse(dispersion) < CONFUSABLE_CHI2).map(rival).collect();
+    }
+}
+
+/// The strongest law that the table does not list in an effect's place, and by how much it is the worse one.
+fn unlisted(fit: &Fit<'_>, term: usize) -> Option<(Unlisted, f64)> {
+    let without = fit.solve_without(&[term]);
+    let (law, chi2_drop) = strongest_unlisted(fit, &without)?;
+    let rise = without.chi2 - fit.free.chi2 - chi2_drop;
+    let dearer = needed(fit, fit.problem.usual_constants) - needed(fit, fit.constants(term));
+    Some((law, rise / fit.dispersion(fit.free.chi2) + dearer))
+}
