@@ -138,13 +138,6 @@ impl Correction {
             d2pb_pas2: pb.curvature(),
             pa_side: Sides::of(pa.value(), &mut self.sides.pa, self.sides.turned_pa),
             pb_side: Sides::of(pb.value(), &mut self.sides.pb, self.sides.turned_pa),
-            dpa_side_ps: 0.0,
-            dpb_side_ps: 0.0,
-            // Where in its play the position sensor lies is not seen here.
-            x_side: 0.0,
-            dx_side_ps: 0.0,
-            qa_unread: 0.0,
-            qb_unread: 0.0,
             qa_m3s: qa,
             qb_m3s: qb,
             dqa_m3s2: self.rates.qa.update(dt_s, qa).slope(),
@@ -152,6 +145,8 @@ impl Correction {
             force_n: sample.force_n.unwrap_or(0.0),
             temp_k: record.temperature_k.unwrap_or(USUAL_TEMPERATURE_K),
             t_s: self.time_s,
+            // Where in its play the position sensor lies is not seen here.
+            ..Signals::default()
         }
     }
 }
