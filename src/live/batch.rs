@@ -46,8 +46,7 @@ pub(super) fn parse<'a>(batch: &Batch<'a>) -> Result<Vec<Result<Fields<'a>, Stri
 
 /// All at once where each is a sample, else one by one.
 fn array(payload: &str) -> Result<Vec<Result<Fields<'_>, String>>, String> {
-    let all = json::plain_array(payload).or_else(|| serde_json::from_str::<Vec<Fields<'_>>>(payload).ok());
-    if let Some(samples) = all {
+    if let Ok(samples) = serde_json::from_str::<Vec<Fields<'_>>>(payload) {
         return Ok(samples.into_iter().map(Ok).collect());
     }
     let samples: Vec<&RawValue> =

@@ -47,13 +47,12 @@ pub(super) struct Fields<'a> {
 pub(super) const CYLINDER: &str = "cylinder";
 
 /// Cells of a line at the most, as a rule: all signals and a name.
-pub(super) const ROOM: usize = 16;
+const ROOM: usize = 16;
 
 impl<'a> Fields<'a> {
-    /// None yet, and so many to come.
-    pub(super) fn with_room(room: usize) -> Self {
-        let (names, cells) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        Self { cylinder: Cow::Borrowed(""), names, cells }
+    /// None yet, and room for those of a line.
+    pub(super) fn with_room() -> Self {
+        Self { names: Vec::with_capacity(ROOM), cells: Vec::with_capacity(ROOM), ..Self::default() }
     }
 
     /// That nothing else has to outlive.

@@ -103,13 +103,7 @@ impl Watch {
                 Some(_) => ("its rig is another: it begins anew", &mut self.replaced),
                 None => ("it is watched no more", &mut self.gone),
             };
-            events.push(Event::Notice(NoticeEvent {
-                cylinder: name.clone(),
-                t_s: None,
-                kind: "reload".to_owned(),
-                count: 1,
-                text: text.to_owned(),
-            }));
+            events.push(Event::Notice(NoticeEvent::once(name.clone(), "reload", text.to_owned())));
             place.insert(name, cylinder);
         }
         for (name, mut cylinder) in std::mem::take(&mut self.gone) {
@@ -153,7 +147,7 @@ impl Watch {
         for (_, fields) in &in_turn {
             self.lines += 1;
             let name = fields.cylinder_or(batch.cylinder);
-            refusals.extend(self.take_fields(fields, name, None, batch.resent, events));
+            refusals.extend(self.take_fields(fields, name, None, batch.resent, events).err());
         }
         for (kind, text) in refusals {
             self.notice(kind, text, events);
@@ -201,10 +195,7 @@ impl Watch {
         let taken = match parser.parse(line) {
             Err(why) => Err((UNREADABLE, why)),
             Ok(None) => Ok(()),
-            Ok(Some(fields)) => {
-                let refused = self.take_fields(&fields, &fields.cylinder, Some(self.lines), false, events);
-                refused.map_or(Ok(()), Err)
-            }
+            Ok(Some(fields)) => self.take_fields(&fields, &fields.cylinder, Some(self.lines), false, events),
         };
         self.parser = Some(parser);
         taken
@@ -218,7 +209,7 @@ impl Watch {
         number: Option<u64>,
         resent: bool,
         events: &mut Vec<Event>,
-    ) -> Option<Refusal> {
+    ) -> Result<(), Refusal> {
         if let Some(cylinder) = self.cylinders.get_mut(name) {
             match self.layouts.find(&fields.names, cylinder.rig()) {
                 Ok(layout) => {
@@ -227,10 +218,10 @@ impl Watch {
                 }
                 Err(why) => cylinder.notice(name, "columns", format!("line {}: {why}", self.lines), events),
             }
-            return None;
+            return Ok(());
         }
-        let begun = self.begin(fields, name);
-        begun.map_or_else(Some, |()| self.take_fields(fields, name, number, resent, events))
+        self.begin(fields, name)?;
+        self.take_fields(fields, name, number, resent, events)
     }
 
     /// A cylinder of which nothing came yet.
