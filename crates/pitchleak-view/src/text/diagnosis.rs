@@ -3,6 +3,7 @@
 use super::Text;
 use crate::Palette;
 use crate::bar::level;
+use crate::envelope::extremes;
 use crate::residuals::{name, people, people_unit, quantity, symbol};
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
@@ -206,9 +207,9 @@ pub(crate) fn companions(residual: &EquationResidual) -> String {
 
 fn line(binned: &BinnedResidual) -> String {
     let (factor, unit) = people_unit(binned.equation);
-    let [low, high] = extremes(&binned.mean);
+    let [low, high] = extremes(binned.mean.iter().copied());
     let bars: String = binned.mean.iter().map(|mean| level((mean - low) / (high - low))).collect();
-    let [from, to] = extremes(&binned.at);
+    let [from, to] = extremes(binned.at.iter().copied());
     let (scale, scale_unit) = people(binned.against);
     let space = if scale_unit.is_empty() { "" } else { " " };
     format!(
@@ -220,11 +221,6 @@ fn line(binned: &BinnedResidual) -> String {
         short(from * scale),
         short(to * scale)
     )
-}
-
-fn extremes(values: &[f64]) -> [f64; 2] {
-    let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
-    [fold(f64::min, f64::INFINITY), fold(f64::max, f64::NEG_INFINITY)]
 }
 
 fn probability(p: f64) -> String {

@@ -51,11 +51,15 @@ pub(crate) fn rig_line(rig: &str) -> String {
 /// How much of a hold test counts, and from which size on it finds each leak.
 pub(crate) fn hold_line(hold: &HoldSummary) -> String {
     let Some(leaks) = &hold.leaks else { return "nothing of it is usable".to_owned() };
-    let smallest = |(leak, held): (Leak, &FoundLeak)| {
-        format!("{} leaks from {} L/min", leak.label(), readable(held.smallest_lpm, 2))
+    format!("{} s usable; {}", readable(hold.usable_s, 3), finds(leaks.iter()))
+}
+
+/// From which size on each leak is found.
+pub(super) fn finds<'a>(leaks: impl Iterator<Item = (Leak, &'a FoundLeak)>) -> String {
+    let smallest = |(leak, found): (Leak, &FoundLeak)| {
+        format!("{} leaks from {} L/min", leak.label(), readable(found.smallest_lpm, 2))
     };
-    let smallest: Vec<_> = leaks.iter().map(smallest).collect();
-    format!("{} s usable; finds {} on", readable(hold.usable_s, 3), smallest.join(", "))
+    format!("finds {} on", leaks.map(smallest).collect::<Vec<_>>().join(", "))
 }
 
 /// More alarms than these are told as spells alone.
