@@ -3,7 +3,6 @@
 mod conditions;
 mod consistency;
 mod correction;
-mod effect_uncertainty;
 mod episodes;
 mod estimate_file;
 mod estimator;
@@ -31,8 +30,7 @@ use crate::valve::{CalibrationError, ValveMeter};
 use crate::wiring::Refused;
 use conditions::{OilTemperature, TracePressures};
 use consistency::Consistency;
-use correction::Correction;
-use effect_uncertainty::{EffectUncertainty, added_std};
+use correction::{Correction, EffectUncertainty, added_std};
 use episodes::Episodes;
 use pitchleak_core::continuity::Block;
 use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};

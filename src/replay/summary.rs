@@ -1,8 +1,7 @@
 //! From a finished replay to its report.
 
 use super::Replay;
-use super::correction::Correction;
-use super::effect_uncertainty::added_std;
+use super::correction::{Correction, added_std};
 use super::estimator::is_known;
 use crate::channels::{ChannelFault, ChannelFaultKind, ChannelMonitor};
 use crate::explain::Decision;
