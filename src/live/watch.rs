@@ -1,8 +1,7 @@
-use super::batch::{self, Batch};
 use super::config::LiveConfig;
 use super::cylinder::{Cylinder, Line};
 use super::event::{Event, NoticeEvent, Notices};
-use super::format::{Fields, LineFormat, Parser};
+use super::format::{Batch, Fields, LineFormat, Parser, parse_batch};
 use super::history::History;
 use super::{checkpoint, record};
 use crate::Rig;
@@ -130,7 +129,7 @@ impl Watch {
     /// Takes in a message, its samples in the order of their times and each once; what there is to say goes to `events`. No
     /// message is an error: what is of no use is counted. Says what could not be read first, if something could not.
     pub fn take_batch(&mut self, batch: &Batch<'_>, events: &mut Vec<Event>) -> Option<String> {
-        let samples = batch::parse(batch).unwrap_or_else(|why| vec![Err(why)]);
+        let samples = parse_batch(batch).unwrap_or_else(|why| vec![Err(why)]);
         let mut refusals: Vec<Refusal> = Vec::new();
         let mut in_turn = Vec::with_capacity(samples.len());
         for sample in samples {
