@@ -1,6 +1,7 @@
 //! A diagnosis as lines of text: the verdict, the effects, the error before and after, the residual, the leaks.
 
 use super::Text;
+use super::replay::per_bar;
 use crate::Palette;
 use crate::bar::level;
 use crate::envelope::extremes;
@@ -10,8 +11,7 @@ use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,
     Verdict,
 };
-use pitchleak::report::with_interval;
-use pitchleak::units::{LPM_PER_BAR, LPM_PER_M3S as LPM};
+use pitchleak::units::LPM_PER_M3S as LPM;
 use pitchleak::wiring::Wiring;
 use std::fmt::Write;
 
@@ -127,7 +127,7 @@ impl DiagnosisText<'_> {
         {
             let text = |leak: LeakEstimate| {
                 let mark = if leak.physical { "" } else { " (impossible)" };
-                with_interval(leak.value * LPM_PER_BAR, Some(leak.std * LPM_PER_BAR)) + mark
+                per_bar(leak.value, Some(leak.std)) + mark
             };
             let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
         }
@@ -141,9 +141,7 @@ impl DiagnosisText<'_> {
         }
         out.push_str("\nleaks that change, L/min/bar            before                  after\n");
         for change in changes.iter().take(MOST_CHANGES) {
-            let text = |level: &Estimate<f64>| {
-                with_interval(level.value * LPM_PER_BAR, Some(level.std * LPM_PER_BAR))
-            };
+            let text = |level: &Estimate<f64>| per_bar(level.value, Some(level.std));
             let leak = Leak::ALL.into_iter().find(|leak| leak.id() == change.fault).map_or("", Leak::label);
             let at = format!("{leak} at {:.1} s", change.time_s);
             let trace =
