@@ -24,7 +24,7 @@ fn row(cylinder: usize, zero_m3s: f64) -> FleetRow {
     let rig = Rig::paper();
     let opened = TraceReader::from_stream("trace", Box::new(Cursor::new(text)), &rig);
     let identity = TraceIdentity { cylinder: format!("T{cylinder}"), begins: None };
-    judge_opened("trace", &identity, &rig, opened, || true).unwrap()
+    judge_opened("trace", &identity, &rig, opened.map_err(Into::into), || true).unwrap()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A cylinder: what all its traces say together.
 
 use super::standing::{Answer, Standing};
-use super::{Beside, Counts, CylinderTrend, FleetLeak, FleetRow, LongTrend};
+use super::{Beside, Counts, FleetLeak, FleetRow, LongTrend};
 use crate::report::Status;
 use jiff::Timestamp;
 use pitchleak_core::{Leak, PerLeak};
@@ -99,8 +99,7 @@ impl FleetCylinder {
         let traces =
             Traces { rows: own.iter().filter_map(|place| Some((*place, rows.get(*place)?))).collect() };
         let (_, first) = traces.rows.first()?;
-        let trend = CylinderTrend::of(traces.all());
-        let leaks = PerLeak::from_fn(|leak| traces.leak(leak, trend[leak]));
+        let leaks = PerLeak::from_fn(|leak| traces.leak(leak));
         let mut faults: Vec<_> = Leak::ALL.into_iter().filter(|leak| leaks[*leak].stands).collect();
         let latest = traces.latest();
         let status =
@@ -205,7 +204,7 @@ impl<'a> Traces<'a> {
         Some((begins(standing.since), standing.other_until.and_then(begins)))
     }
 
-    fn leak(&self, leak: Leak, trend: Option<LongTrend>) -> CylinderLeak {
+    fn leak(&self, leak: Leak) -> CylinderLeak {
         let answer = |row: &FleetRow| Answer::on_leak(row, leak);
         let when = self.when(answer);
         let dated = when.is_some();
@@ -218,6 +217,7 @@ impl<'a> Traces<'a> {
             self.all().rev().find_map(|row| row.pinned(leak))
         };
         let (since, other_until) = when.unwrap_or_default();
+        let trend = LongTrend::of(self.all(), leak);
         CylinderLeak { stands, since, other_until, flow, trend, beside: None }
     }
 }

@@ -27,7 +27,7 @@ pub use odds::{FleetOdds, LearntShare};
 pub use report::{Counts, FleetReport, count};
 pub use row::{FleetExplanation, FleetLeak, FleetRow, Stopped, judge, judge_all, judge_opened};
 pub use table::{FleetColumn, FleetFile, FleetTable};
-pub use traces::{FleetRig, FleetTrace, RigTable};
+pub use traces::{FleetRig, FleetTrace};
 pub use trend::{CylinderTrend, LongTrend, Point};
 
 use crate::output::OutputError;
@@ -36,11 +36,11 @@ use crate::rig::RigError;
 /// Why a fleet is not judged at all; a trace that can't be read is a row instead.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
-    /// A malformed pattern.
-    #[error("{pattern}: {why}")]
-    Pattern {
-        /// As given.
-        pattern: String,
+    /// A malformed pattern, or a table of rigs or a file of the table that grows that can't be read.
+    #[error("{what}: {why}")]
+    Content {
+        /// The pattern or the file, as given.
+        what: String,
         /// What is wrong with it, and where.
         why: String,
     },
@@ -50,14 +50,6 @@ pub enum FleetError {
     /// A folder, which is no trace.
     #[error("{0} is a folder: name its traces, for instance '{0}/**/*.csv.gz'")]
     Folder(String),
-    /// The table of rigs can't be read.
-    #[error("{file}: {why}")]
-    RigTable {
-        /// As given.
-        file: String,
-        /// What is wrong with it, and where.
-        why: String,
-    },
     /// Traces that the table of rigs does not name.
     #[error("{table} names no rig for {trace}{}", and_others(*.others))]
     NotInTable {
@@ -67,14 +59,6 @@ pub enum FleetError {
         trace: String,
         /// How many more there are.
         others: usize,
-    },
-    /// A file of the table that grows can't be read.
-    #[error("{file}: {why}")]
-    Nights {
-        /// Its path.
-        file: String,
-        /// What is wrong with it.
-        why: String,
     },
     /// The rig file of all traces.
     #[error(transparent)]

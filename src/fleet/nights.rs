@@ -121,7 +121,7 @@ fn number(file: &Path) -> Option<u32> {
 }
 
 fn unread(file: &Path, why: &impl ToString) -> FleetError {
-    FleetError::Nights { file: file.display().to_string(), why: why.to_string() }
+    FleetError::Content { what: file.display().to_string(), why: why.to_string() }
 }
 
 /// What each row of a night's file was seen as, and the row.

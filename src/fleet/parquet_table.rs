@@ -2,58 +2,34 @@
 
 use crate::fleet::{FleetColumn, FleetTable};
 use crate::output::OutputFile;
-use parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical};
+use crate::output::parquet::{ParquetWriter, cause};
+use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::file::writer::SerializedColumnWriter;
 use parquet::schema::types::Type;
 use std::fs::File;
 use std::io;
-use std::sync::Arc;
 
 pub(super) fn write(table: &FleetTable, file: &mut OutputFile) -> io::Result<()> {
-    write_all(table, file).map_err(of_file)
+    let fields = table.columns().iter().map(|(name, column)| field(name, column));
+    let mut writer = ParquetWriter::begin(file, "fleet", fields)?;
+    writer.group(table.columns(), |writer, (_, column)| fill(writer, column))?;
+    writer.finish().map(drop)
 }
 
 /// The columns of these names, a row each; one that is not there, or has no text, is empty.
 pub(in crate::fleet) fn texts<const N: usize>(file: File, names: [&str; N]) -> io::Result<Vec<[String; N]>> {
-    let reader = SerializedFileReader::new(file).map_err(of_file)?;
-    let rows = reader.get_row_iter(None).map_err(of_file)?;
+    let reader = SerializedFileReader::new(file).map_err(cause)?;
+    let rows = reader.get_row_iter(None).map_err(cause)?;
     let named = |row: parquet::record::Row| {
         names.map(|name| match row.get_column_iter().find(|(column, _)| *column == name) {
             Some((_, parquet::record::Field::Str(text))) => text.clone(),
             _ => String::new(),
         })
     };
-    rows.map(|row| row.map(named).map_err(of_file)).collect()
-}
-
-fn of_file(error: ParquetError) -> io::Error {
-    match error {
-        ParquetError::External(source) => match source.downcast::<io::Error>() {
-            Ok(source) => *source,
-            Err(other) => io::Error::other(other),
-        },
-        other => io::Error::other(other),
-    }
-}
-
-fn write_all(table: &FleetTable, file: &mut OutputFile) -> Result<(), ParquetError> {
-    let fields = table.columns().iter().map(|(name, column)| Ok(Arc::new(field(name, column)?)));
-    let fields = fields.collect::<Result<Vec<_>, ParquetError>>()?;
-    let schema = Arc::new(Type::group_type_builder("fleet").with_fields(fields).build()?);
-    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties))?;
-    let mut group = writer.next_row_group()?;
-    let mut columns = table.columns().iter();
-    while let (Some(mut writer), Some((_, column))) = (group.next_column()?, columns.next()) {
-        fill(&mut writer, column)?;
-        writer.close()?;
-    }
-    group.close()?;
-    writer.close().map(|_| ())
+    rows.map(|row| row.map(named).map_err(cause)).collect()
 }
 
 fn field(name: &str, column: &FleetColumn) -> Result<Type, ParquetError> {

@@ -5,7 +5,7 @@ use crate::Rig;
 use crate::explain::Explained;
 use crate::replay::{ReplayError, replay};
 use crate::report::{LeakTrend, ReplayReport, Status};
-use crate::trace::{TraceError, TraceReader};
+use crate::trace::TraceReader;
 use crate::units::LPM_PER_M3S;
 use jiff::Timestamp;
 use pitchleak_core::{Estimate, Leak, PerLeak};
@@ -16,7 +16,7 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What one trace says of a cylinder: the report of its replay in short, or why it failed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FleetRow {
     /// Which cylinder.
     pub cylinder: String,
@@ -113,26 +113,8 @@ impl FleetRow {
 
     /// A trace that could not be judged.
     pub fn failed(identity: &TraceIdentity, path: String, error: String) -> Self {
-        Self {
-            cylinder: identity.cylinder.clone(),
-            path,
-            begins: identity.begins,
-            rig: None,
-            status: None,
-            faults: Vec::new(),
-            reasons: Vec::new(),
-            explanations: Vec::new(),
-            odds: BTreeMap::new(),
-            leaks: None,
-            alarms: 0,
-            samples: 0,
-            skipped: 0,
-            gaps: 0,
-            duration_s: None,
-            sample_rate_hz: None,
-            warnings: Vec::new(),
-            error: Some(error),
-        }
+        let (cylinder, begins) = (identity.cylinder.clone(), identity.begins);
+        Self { cylinder, path, begins, error: Some(error), ..Self::default() }
     }
 
     /// Bytes that [`from_bytes`](Self::from_bytes) reads back, numbers to the last bit: for a row that another process
@@ -219,7 +201,13 @@ impl From<ReplayError> for Ended {
 pub fn judge(trace: &FleetTrace, go_on: impl FnMut() -> bool) -> Result<FleetRow, Stopped> {
     let name = trace.path.display().to_string();
     match &trace.rig {
-        Ok(rig) => judge_opened(&name, &trace.identity, rig, TraceReader::open(&trace.path, rig), go_on),
+        Ok(rig) => judge_opened(
+            &name,
+            &trace.identity,
+            rig,
+            TraceReader::open(&trace.path, rig).map_err(ReplayError::from),
+            go_on,
+        ),
         Err(error) => Ok(FleetRow::failed(&trace.identity, name, error.to_string())),
     }
 }
@@ -232,11 +220,11 @@ pub fn judge_opened(
     name: &str,
     identity: &TraceIdentity,
     rig: &Rig,
-    opened: Result<TraceReader<'_>, TraceError>,
+    opened: Result<TraceReader<'_>, ReplayError>,
     mut go_on: impl FnMut() -> bool,
 ) -> Result<FleetRow, Stopped> {
     keep_freed_memory();
-    let replayed = opened.map_err(|error| Ended::Failed(error.into())).and_then(|mut reader| {
+    let replayed = opened.map_err(Ended::Failed).and_then(|mut reader| {
         let report = replay(&mut reader, rig, |_, _, _| if go_on() { Ok(()) } else { Err(Ended::Stopped) })?;
         let begins = reader.clock().and_then(|clock| clock.start()).or(identity.begins);
         Ok(FleetRow::of(&TraceIdentity { begins, ..identity.clone() }, &report, rig))

@@ -100,7 +100,7 @@ fn each_file_is_read_once_and_what_is_none_is_told() {
     let error = |name: &str| FleetTrace::find(&pattern(&farm, name), &FleetRig::Beside).unwrap_err();
     assert!(matches!(error("T8/*.csv"), FleetError::NoTrace(_)));
     assert!(matches!(error("T7"), FleetError::Folder(_)));
-    assert!(matches!(error("T7/[.csv"), FleetError::Pattern { .. }));
+    assert!(matches!(error("T7/[.csv"), FleetError::Content { .. }));
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn a_table_says_which_rig_and_whose_trace() {
     for wrong in ["rig,file\n", "trace,rig\n,r.toml\n", "trace,rig\na,b,c\n", "trace,rig\n***,r.toml\n"] {
         fs::write(&table, wrong).unwrap();
         let error = FleetTrace::find(&all, &FleetRig::Table(table.clone())).unwrap_err();
-        assert!(matches!(error, FleetError::RigTable { .. }), "{wrong}");
+        assert!(matches!(error, FleetError::Content { .. }), "{wrong}");
     }
 }
 

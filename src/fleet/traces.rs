@@ -149,7 +149,7 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>, FleetError> {
     if path.exists() {
         return Ok(vec![path.to_owned()]);
     }
-    let wrong = |why: String| FleetError::Pattern { pattern: pattern.to_owned(), why };
+    let wrong = |why: String| FleetError::Content { what: pattern.to_owned(), why };
     let entries = glob::glob(pattern).map_err(|error| wrong(error.to_string()))?;
     let files = entries.filter(|entry| !entry.as_ref().is_ok_and(|path| path.is_dir()));
     files.collect::<Result<_, _>>().map_err(|error| wrong(error.to_string()))
@@ -255,13 +255,11 @@ fn hash(path: &Path, most: u64) -> Option<u64> {
 
 /// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
 /// Paths count from the table's folder; the first row that fits a trace is taken.
-#[derive(Clone, Debug)]
-pub struct RigTable {
+struct RigTable {
     rows: Vec<RigRow>,
 }
 
 /// What the table says of a trace.
-#[derive(Clone, Debug)]
 struct RigRow {
     pattern: Pattern,
     rig: PathBuf,
@@ -269,13 +267,10 @@ struct RigRow {
 }
 
 impl RigTable {
-    /// Reads a table.
-    ///
-    /// # Errors
-    /// [`FleetError::RigTable`], with the row.
-    pub fn load(path: &Path) -> Result<Self, FleetError> {
-        let file = path.display().to_string();
-        read(path).map(|rows| Self { rows }).map_err(|why| FleetError::RigTable { file, why })
+    /// Reads a table; of one that can't be read the error names the row.
+    fn load(path: &Path) -> Result<Self, FleetError> {
+        let what = path.display().to_string();
+        read(path).map(|rows| Self { rows }).map_err(|why| FleetError::Content { what, why })
     }
 
     fn row_of(&self, trace: &Path) -> Option<&RigRow> {

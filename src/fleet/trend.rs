@@ -62,12 +62,6 @@ impl CylinderTrend {
         };
         order.into_iter().filter_map(trend).collect()
     }
-
-    /// Of each leak, from one cylinder's traces. Those whose verdict is doubtful are left out: their figures can't be
-    /// believed.
-    pub(super) fn of<'a>(rows: impl Iterator<Item = &'a FleetRow> + Clone) -> PerLeak<Option<LongTrend>> {
-        PerLeak::from_fn(|leak| LongTrend::of(rows.clone(), leak))
-    }
 }
 
 impl LongTrend {
@@ -91,7 +85,8 @@ impl LongTrend {
         format!("{} L/min a month over {} traces{reached}", with_interval(value, Some(std)), self.traces)
     }
 
-    fn of<'a>(rows: impl Iterator<Item = &'a FleetRow>, leak: Leak) -> Option<Self> {
+    /// Of one cylinder's traces. Those whose verdict is doubtful are left out: their figures can't be believed.
+    pub(super) fn of<'a>(rows: impl Iterator<Item = &'a FleetRow>, leak: Leak) -> Option<Self> {
         let mut points: Vec<_> = rows.filter_map(|row| Point::of(row, leak)).collect();
         points.sort_by_key(|point| point.at);
         let (first, last) = (points.first()?, points.last()?);

@@ -264,13 +264,7 @@ impl Checkpoint {
                 continue;
             }
             let restored = self.restore_one(watch, &name);
-            notices.extend(restored.err().map(|text| NoticeEvent {
-                cylinder: name,
-                t_s: None,
-                kind: "checkpoint".to_owned(),
-                count: 1,
-                text,
-            }));
+            notices.extend(restored.err().map(|text| NoticeEvent::once(name, "checkpoint", text)));
         }
         Ok(notices)
     }

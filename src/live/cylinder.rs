@@ -207,7 +207,7 @@ impl Cylinder {
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
-        events.extend(ended.into_iter().map(|summary| Event::Summary(summary.of(&estimate))));
+        events.extend(ended.into_iter().map(Event::Summary));
         events.push(Event::Estimate(Box::new(estimate)));
     }
 
@@ -235,18 +235,17 @@ impl Cylinder {
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
             let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));
-            let words = [serde_json::to_value(alarm.fault), serde_json::to_value(alarm.state)]
-                .map(|word| word.ok().and_then(|word| word.as_str().map(str::to_owned)).unwrap_or_default());
+            let (state, status) = match alarm.state {
+                AlarmState::Raised => ("raised", verdict.status_of(alarm.fault)),
+                AlarmState::Cleared => ("cleared", verdict.status),
+            };
             events.push(Event::Alarm(AlarmEvent {
-                id: format!("{name}:{}:{time}", words.join(":")),
+                id: format!("{name}:{}:{state}:{time}", alarm.fault.id()),
                 cylinder: name.to_owned(),
                 t_s: alarm.time_s,
                 fault: alarm.fault,
                 state: alarm.state,
-                status: match alarm.state {
-                    AlarmState::Raised => verdict.status_of(alarm.fault),
-                    AlarmState::Cleared => verdict.status,
-                },
+                status,
                 leakage: leakage[alarm.fault].into(),
                 time_ns,
             }));

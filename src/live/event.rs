@@ -175,6 +175,13 @@ pub struct NoticeEvent {
     pub text: String,
 }
 
+impl NoticeEvent {
+    /// Of a cylinder, said at once; no sample goes with it.
+    pub(super) fn once(cylinder: String, kind: &str, text: String) -> Self {
+        Self { cylinder, t_s: None, kind: kind.to_owned(), count: 1, text }
+    }
+}
+
 impl HoldEvent {
     /// Of a hold test's report; none of another.
     pub(super) fn new(cylinder: &str, t_s: f64, time_ns: Option<i64>, report: ReplayReport) -> Option<Self> {
@@ -200,79 +207,74 @@ impl Event {
     pub fn line(&self, format: OutputFormat) -> Result<String, serde_json::Error> {
         match format {
             OutputFormat::Ndjson => serde_json::to_string(self),
-            OutputFormat::Influx => self.influx(),
+            OutputFormat::Influx => Ok(self.influx()),
         }
     }
 
-    fn influx(&self) -> Result<String, serde_json::Error> {
-        let (name, cylinder, time_ns) = match self {
-            Self::Estimate(event) => ("pitchleak", &event.cylinder, event.time_ns),
-            Self::Alarm(event) => ("pitchleak_alarm", &event.cylinder, event.time_ns),
-            Self::Notice(event) => ("pitchleak_notice", &event.cylinder, None),
-            Self::Summary(event) => ("pitchleak_summary", &event.cylinder, event.time_ns),
-            Self::Hold(event) => ("pitchleak_hold", &event.cylinder, event.time_ns),
+    fn influx(&self) -> String {
+        let (name, cylinder, time_ns, [tag, value]) = match self {
+            Self::Estimate(event) => ("pitchleak", &event.cylinder, event.time_ns, [""; 2]),
+            Self::Alarm(event) => {
+                ("pitchleak_alarm", &event.cylinder, event.time_ns, ["fault", event.fault.id()])
+            }
+            Self::Notice(event) => ("pitchleak_notice", &event.cylinder, None, ["kind", &event.kind]),
+            Self::Summary(event) => {
+                ("pitchleak_summary", &event.cylinder, event.time_ns, ["span", event.span.id()])
+            }
+            Self::Hold(event) => ("pitchleak_hold", &event.cylinder, event.time_ns, [""; 2]),
         };
-        let mut line = tagged(name, "cylinder", cylinder);
+        let series = tagged(&tagged(name, "cylinder", cylinder), tag, value);
+        let time = time_ns.map(|time_ns| format!(" {time_ns}")).unwrap_or_default();
+        format!("{series} {}{time}", self.influx_fields())
+    }
+
+    fn influx_fields(&self) -> String {
         let quoted =
             |text: &str| text.replace(char::is_control, " ").replace('\\', "\\\\").replace('"', "\\\"");
+        let mut fields = String::new();
         // Writing to a string does not fail.
         let _ = match self {
             Self::Estimate(event) => {
-                let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
+                let _ = write!(fields, "t_s={},status=\"{}\"", event.t_s, event.status.id());
                 if let Some(reason) = event.reasons.first() {
-                    let _ = write!(values, ",reason=\"{}\"", reason.id.name());
+                    let _ = write!(fields, ",reason=\"{}\"", reason.id.name());
                 }
-                for leak in Leak::ALL {
-                    values.push_str(&event.leakage[leak].influx(leak));
+                Leak::ALL.into_iter().try_for_each(|leak| {
+                    fields.push_str(&event.leakage[leak].influx(leak));
                     if let Some(trend) = event.trend[leak] {
-                        let _ = write!(values, ",{}_slope_lpm_per_h={}", leak.id(), trend.slope_lpm_per_h);
+                        write!(fields, ",{}_slope_lpm_per_h={}", leak.id(), trend.slope_lpm_per_h)?;
                     }
-                    let _ = write!(values, ",{}_alarm={}", leak.id(), event.faults.contains(&leak));
-                }
-                write!(line, " {values}")
+                    write!(fields, ",{}_alarm={}", leak.id(), event.faults.contains(&leak))
+                })
             }
             Self::Alarm(event) => {
-                line = tagged(&line, "fault", event.fault.id());
                 let raised = event.state == AlarmState::Raised;
-                let (id, mean) = (quoted(&event.id), event.leakage.mean_lpm);
-                let status = event.status.id();
-                write!(
-                    line,
-                    " id=\"{id}\",t_s={},raised={raised},status=\"{status}\",mean_lpm={mean}",
-                    event.t_s
-                )
+                let (id, status, mean) = (quoted(&event.id), event.status.id(), event.leakage.mean_lpm);
+                let t_s = event.t_s;
+                write!(fields, "id=\"{id}\",t_s={t_s},raised={raised},status=\"{status}\",mean_lpm={mean}")
             }
-            Self::Notice(event) => {
-                line = tagged(&line, "kind", &event.kind);
-                write!(line, " count={}u,text=\"{}\"", event.count, quoted(&event.text))
-            }
+            Self::Notice(event) => write!(fields, "count={}u,text=\"{}\"", event.count, quoted(&event.text)),
             Self::Summary(event) => {
-                line = tagged(&line, "span", event.span.id());
-                let mut values = format!("estimates={}u", event.estimates);
-                for leak in Leak::ALL {
+                let _ = write!(fields, "estimates={}u", event.estimates);
+                Leak::ALL.into_iter().try_for_each(|leak| {
                     let (name, leakage) = (leak.id(), event.leakage[leak]);
                     let LeakSummary { mean_lpm, max_lpm, .. } = leakage;
-                    let _ = write!(values, ",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}");
-                    if let Some(trend) = leakage.trend_lpm_per_day {
-                        let _ = write!(values, ",{name}_slope_lpm_per_day={}", trend.slope);
-                    }
-                }
-                write!(line, " {values}")
+                    write!(fields, ",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}")?;
+                    leakage
+                        .trend_lpm_per_day
+                        .map_or(Ok(()), |trend| write!(fields, ",{name}_slope_lpm_per_day={}", trend.slope))
+                })
             }
             Self::Hold(event) => {
-                let mut values = format!("t_s={},status=\"{}\"", event.t_s, event.status.id());
-                let _ = write!(values, ",usable_s={},text=\"{}\"", event.hold.usable_s, quoted(&event.text));
-                for leak in Leak::ALL {
-                    values.push_str(&event.leakage[leak].influx(leak));
-                    let _ = write!(values, ",{}_found={}", leak.id(), event.faults.contains(&leak));
-                }
-                write!(line, " {values}")
+                let _ = write!(fields, "t_s={},status=\"{}\"", event.t_s, event.status.id());
+                let _ = write!(fields, ",usable_s={},text=\"{}\"", event.hold.usable_s, quoted(&event.text));
+                Leak::ALL.into_iter().try_for_each(|leak| {
+                    fields.push_str(&event.leakage[leak].influx(leak));
+                    write!(fields, ",{}_found={}", leak.id(), event.faults.contains(&leak))
+                })
             }
         };
-        if let Some(time_ns) = time_ns {
-            let _ = write!(line, " {time_ns}");
-        }
-        Ok(line)
+        fields
     }
 }
 
@@ -298,7 +300,7 @@ const EVERY_S: f64 = 60.0;
 #[derive(Clone, Default)]
 pub(super) struct Notices(BTreeMap<String, Kind>);
 
-#[derive(Clone)]
+#[derive(Clone, Default)]
 struct Kind {
     told_s: Option<f64>,
     count: u64,
@@ -317,22 +319,17 @@ impl Notices {
         kind: &str,
         text: String,
     ) -> Option<NoticeEvent> {
-        let Some(entry) = self.0.get_mut(kind) else {
-            self.0.insert(kind.to_owned(), Kind { told_s: seen_s, count: 0, total: 1, text: String::new() });
-            return Some(NoticeEvent {
-                cylinder: cylinder.to_owned(),
-                t_s,
-                kind: kind.to_owned(),
-                count: 1,
-                text,
-            });
-        };
+        let is_new = !self.0.contains_key(kind);
+        if is_new {
+            self.0.insert(kind.to_owned(), Kind::default());
+        }
+        let entry = self.0.get_mut(kind)?;
         if entry.count == 0 {
             entry.text = text;
         }
         entry.count += 1;
         entry.total += 1;
-        entry.due(seen_s).then(|| entry.tell(cylinder, [seen_s, t_s], kind))
+        (is_new || entry.due(seen_s)).then(|| entry.tell(cylinder, [seen_s, t_s], kind))
     }
 
     /// How many of each kind there were, told or not.

@@ -1,8 +1,9 @@
-//! How lines are written: JSON (`json.rs`), a header and rows, influx line protocol.
+//! How lines, and messages of many samples, are written: JSON (`json.rs`), a header and rows, influx line protocol.
 
 use super::json;
 use crate::header::shorten;
 use jiff::Timestamp;
+use serde_json::value::RawValue;
 use std::borrow::Cow;
 
 /// How a line says what was measured.
@@ -47,17 +48,16 @@ pub(super) struct Fields<'a> {
 pub(super) const CYLINDER: &str = "cylinder";
 
 /// Cells of a line at the most, as a rule: all signals and a name.
-pub(super) const ROOM: usize = 16;
+const ROOM: usize = 16;
 
 impl<'a> Fields<'a> {
-    /// None yet, and so many to come.
-    pub(super) fn with_room(room: usize) -> Self {
-        let (names, cells) = (Vec::with_capacity(room), Vec::with_capacity(room));
-        Self { cylinder: Cow::Borrowed(""), names, cells }
+    /// None yet, and room for those of a line.
+    pub(super) fn with_room() -> Self {
+        Self { names: Vec::with_capacity(ROOM), cells: Vec::with_capacity(ROOM), ..Self::default() }
     }
 
     /// That nothing else has to outlive.
-    pub(super) fn into_owned(self) -> Fields<'static> {
+    fn into_owned(self) -> Fields<'static> {
         let owned =
             |cells: Vec<Cow<'_, str>>| cells.into_iter().map(|cell| cell.into_owned().into()).collect();
         Fields {
@@ -83,34 +83,29 @@ impl<'a> Fields<'a> {
 }
 
 /// Takes lines apart.
-pub(super) enum Parser {
-    Ndjson,
-    Csv(Csv),
-    Influx,
+pub(super) struct Parser {
+    format: LineFormat,
+    csv: Csv,
 }
 
 impl Parser {
     pub(super) fn new(format: LineFormat) -> Self {
-        match format {
-            LineFormat::Ndjson => Self::Ndjson,
-            LineFormat::Csv => Self::Csv(Csv::default()),
-            LineFormat::Influx => Self::Influx,
-        }
+        Self { format, csv: Csv::default() }
     }
 
     /// The line's fields; none where it is a header or a comment.
     pub(super) fn parse<'a>(&'a mut self, line: &'a str) -> Result<Option<Fields<'a>>, String> {
-        match self {
-            Self::Ndjson => json::parse(line).map(Some),
-            Self::Csv(csv) => csv.parse(line),
-            Self::Influx => parse_influx(line),
+        match self.format {
+            LineFormat::Ndjson => json::parse(line).map(Some),
+            LineFormat::Csv => self.csv.parse(line),
+            LineFormat::Influx => parse_influx(line),
         }
     }
 }
 
 /// A header row, then rows.
 #[derive(Default)]
-pub(super) struct Csv {
+struct Csv {
     delimiter: char,
     /// Of the header; empty before it.
     names: Vec<String>,
@@ -118,7 +113,7 @@ pub(super) struct Csv {
 
 impl Csv {
     /// The first line is the header; so is one that repeats it, as after a feed began anew.
-    pub(super) fn parse<'a>(&'a mut self, line: &'a str) -> Result<Option<Fields<'a>>, String> {
+    fn parse<'a>(&'a mut self, line: &'a str) -> Result<Option<Fields<'a>>, String> {
         if self.names.is_empty() {
             let line = line.trim_start_matches('\u{feff}');
             let most = |delimiter: &char| line.matches(*delimiter).count();
@@ -228,6 +223,60 @@ fn plain(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().filter(kept).collect())
 }
 
+/// How a message holds its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BatchFormat {
+    /// A JSON array of objects such as the lines of [`LineFormat::Ndjson`], or those lines.
+    Json,
+    /// A header row, then rows.
+    Csv,
+    /// What Neuron uploads: one sample, in its values format or its tags format.
+    Neuron,
+}
+
+/// A message.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// Of the samples that name none themselves.
+    pub cylinder: &'a str,
+    /// How to read it.
+    pub format: BatchFormat,
+    /// What came.
+    pub payload: &'a [u8],
+    /// Whether it may have come before: then late samples in it say nothing about the sender's clock.
+    pub resent: bool,
+}
+
+/// The samples of a message, or why one is none; an error where the whole message is of no use.
+pub(super) fn parse_batch<'a>(batch: &Batch<'a>) -> Result<Vec<Result<Fields<'a>, String>>, String> {
+    let payload = std::str::from_utf8(batch.payload).map_err(|_| "not UTF-8".to_owned())?;
+    Ok(match batch.format {
+        BatchFormat::Json if payload.trim_start().starts_with('[') => array(payload)?,
+        BatchFormat::Json => lines(payload).map(json::parse).collect(),
+        BatchFormat::Csv => {
+            let mut csv = Csv::default();
+            let row = |line| csv.parse(line).map(|row| row.map(Fields::into_owned)).transpose();
+            lines(payload).filter_map(row).collect()
+        }
+        BatchFormat::Neuron => vec![json::parse_neuron(payload)],
+    })
+}
+
+/// All at once where each is a sample, else one by one.
+fn array(payload: &str) -> Result<Vec<Result<Fields<'_>, String>>, String> {
+    if let Ok(samples) = serde_json::from_str::<Vec<Fields<'_>>>(payload) {
+        return Ok(samples.into_iter().map(Ok).collect());
+    }
+    let samples: Vec<&RawValue> =
+        serde_json::from_str(payload).map_err(|error| format!("not a JSON array: {error}"))?;
+    Ok(samples.into_iter().map(|sample| json::parse(sample.get())).collect())
+}
+
+fn lines(payload: &str) -> impl Iterator<Item = &str> {
+    payload.lines().filter(|line| !line.trim().is_empty())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,5 +307,28 @@ mod tests {
         for line in ["pitch", "pitch x", "pitch =3", "pitch x=1=2", "pitch x=1 soon"] {
             assert!(parse_influx(line).is_err(), "{line}");
         }
+    }
+
+    fn cells(format: BatchFormat, payload: &str) -> Vec<Result<String, ()>> {
+        let batch = Batch { cylinder: "", format, payload: payload.as_bytes(), resent: false };
+        let joined =
+            |fields: Result<Fields<'_>, _>| fields.map(|fields| fields.cells.join(" ")).map_err(|_| ());
+        parse_batch(&batch)
+            .map_or_else(|_| vec![Err(())], |samples| samples.into_iter().map(joined).collect())
+    }
+
+    #[test]
+    fn samples_stand_in_an_array_in_lines_or_in_rows() {
+        let two = [Ok("1 2".to_owned()), Ok("2 3".to_owned())];
+        assert_eq!(cells(BatchFormat::Json, r#" [{"t_s": 1, "x_mm": 2}, {"t_s": 2, "x_mm": 3}]"#), two);
+        assert_eq!(cells(BatchFormat::Json, "{\"t_s\": 1, \"x_mm\": 2}\n\n{\"t_s\": 2, \"x_mm\": 3}\n"), two);
+        assert_eq!(cells(BatchFormat::Csv, "t_s,x_mm\n1,2\n2,3\n"), two);
+    }
+
+    #[test]
+    fn one_that_is_none_does_not_hide_the_others() {
+        assert_eq!(cells(BatchFormat::Json, r#"[{"t_s": 1}, 7, {"t_s": 2}]"#).len(), 3);
+        assert_eq!(cells(BatchFormat::Csv, "t_s,x_mm\n1\n2,3"), [Err(()), Ok("2 3".to_owned())]);
+        assert_eq!(cells(BatchFormat::Json, "[{\"t_s\": 1}"), [Err(())]);
     }
 }

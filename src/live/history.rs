@@ -65,16 +65,6 @@ pub struct DayTrend {
     pub days: usize,
 }
 
-/// A span that is over.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Summary {
-    pub span: Span,
-    /// Its first moment, on the axis of the times given.
-    pub from_s: f64,
-    pub estimates: u64,
-    pub leakage: PerLeak<LeakSummary>,
-}
-
 /// What is known of a cylinder's past.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct History {
@@ -107,20 +97,6 @@ struct DayMean {
     mean_lpm: PerLeak<f64>,
 }
 
-impl Summary {
-    /// As an event of the cylinder whose estimate came after it.
-    pub(super) fn of(self, after: &EstimateEvent) -> SummaryEvent {
-        SummaryEvent {
-            cylinder: after.cylinder.clone(),
-            span: self.span,
-            from_s: self.from_s,
-            estimates: self.estimates,
-            leakage: self.leakage,
-            time_ns: after.time_ns.map(|_| (self.from_s * 1e9) as i64),
-        }
-    }
-}
-
 impl History {
     /// Whether estimates can have led to it, as far as its counts tell.
     pub(super) fn is_possible(&self) -> bool {
@@ -134,24 +110,23 @@ impl History {
     }
 
     /// Takes in an estimate of the time `at_s`, s since any one moment; gives the spans that ended before it.
-    pub(super) fn add(&mut self, at_s: f64, estimate: &EstimateEvent) -> Vec<Summary> {
+    pub(super) fn add(&mut self, at_s: f64, estimate: &EstimateEvent) -> Vec<SummaryEvent> {
         let hour = self.hour.add(Span::Hour, at_s, estimate);
         let day = self.day.add(Span::Day, at_s, estimate).map(|day| self.with_trend(day));
         hour.into_iter().chain(day).collect()
     }
 
-    fn with_trend(&mut self, day: Summary) -> Summary {
+    fn with_trend(&mut self, mut day: SummaryEvent) -> SummaryEvent {
         let index = day.from_s / Span::Day.seconds();
         // A clock that was set back lives days again.
         self.days.retain(|known| known.index < index);
         self.days.push(DayMean { index, mean_lpm: day.leakage.map(|leak| leak.mean_lpm) });
         let beyond = self.days.len().saturating_sub(DAYS);
         self.days.drain(..beyond);
-        let mut leakage = day.leakage;
         for leak in Leak::ALL {
-            leakage[leak].trend_lpm_per_day = self.trend(leak);
+            day.leakage[leak].trend_lpm_per_day = self.trend(leak);
         }
-        Summary { leakage, ..day }
+        day
     }
 
     /// Least squares of a line through the days' means.
@@ -173,10 +148,10 @@ impl History {
 }
 
 impl Sums {
-    fn add(&mut self, span: Span, at_s: f64, estimate: &EstimateEvent) -> Option<Summary> {
+    fn add(&mut self, span: Span, at_s: f64, estimate: &EstimateEvent) -> Option<SummaryEvent> {
         let index = (at_s / span.seconds()).floor();
         let over = self.estimates > 0 && (index - self.index).abs() > 0.5;
-        let ended = over.then(|| std::mem::take(self).summary(span));
+        let ended = over.then(|| std::mem::take(self).summary(span, estimate));
         self.index = index;
         self.estimates = self.estimates.saturating_add(1);
         for leak in Leak::ALL {
@@ -186,7 +161,8 @@ impl Sums {
         ended
     }
 
-    fn summary(self, span: Span) -> Summary {
+    /// As an event of the cylinder whose estimate came after it.
+    fn summary(self, span: Span, after: &EstimateEvent) -> SummaryEvent {
         let count = self.estimates as f64;
         let leakage = self.leaks.map(|leak| LeakSummary {
             mean_lpm: leak.mean_lpm / count,
@@ -195,7 +171,15 @@ impl Sums {
             alarm_share: leak.alarms as f64 / count,
             trend_lpm_per_day: None,
         });
-        Summary { span, from_s: self.index * span.seconds(), estimates: self.estimates, leakage }
+        let from_s = self.index * span.seconds();
+        SummaryEvent {
+            cylinder: after.cylinder.clone(),
+            span,
+            from_s,
+            estimates: self.estimates,
+            leakage,
+            time_ns: after.time_ns.map(|_| (from_s * 1e9) as i64),
+        }
     }
 }
 

@@ -3,7 +3,6 @@
 //! [`Watch`] does no input or output of its own and reads no clock: what it says follows from the lines alone, and each
 //! cylinder's numbers are those of a [`replay`](mod@crate::replay) of its lines, to the last bit.
 
-mod batch;
 mod checkpoint;
 mod config;
 mod cylinder;
@@ -15,12 +14,11 @@ mod order;
 mod record;
 mod watch;
 
-pub use batch::{Batch, BatchFormat};
 pub use checkpoint::{Checkpoint, CheckpointError, Snapshot};
 pub use config::{ConfigError, LiveConfig, LiveDocument};
 pub use event::{
     AlarmEvent, EstimateEvent, Event, HoldEvent, LiveLeakage, NoticeEvent, OutputFormat, SummaryEvent,
 };
-pub use format::LineFormat;
+pub use format::{Batch, BatchFormat, LineFormat};
 pub use history::{DayTrend, LeakSummary, Span};
 pub use watch::Watch;

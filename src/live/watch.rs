@@ -1,8 +1,7 @@
-use super::batch::{self, Batch};
 use super::config::LiveConfig;
 use super::cylinder::{Cylinder, Line};
 use super::event::{Event, NoticeEvent, Notices};
-use super::format::{Fields, LineFormat, Parser};
+use super::format::{Batch, Fields, LineFormat, Parser, parse_batch};
 use super::history::History;
 use super::{checkpoint, record};
 use crate::Rig;
@@ -103,13 +102,7 @@ impl Watch {
                 Some(_) => ("its rig is another: it begins anew", &mut self.replaced),
                 None => ("it is watched no more", &mut self.gone),
             };
-            events.push(Event::Notice(NoticeEvent {
-                cylinder: name.clone(),
-                t_s: None,
-                kind: "reload".to_owned(),
-                count: 1,
-                text: text.to_owned(),
-            }));
+            events.push(Event::Notice(NoticeEvent::once(name.clone(), "reload", text.to_owned())));
             place.insert(name, cylinder);
         }
         for (name, mut cylinder) in std::mem::take(&mut self.gone) {
@@ -136,7 +129,7 @@ impl Watch {
     /// Takes in a message, its samples in the order of their times and each once; what there is to say goes to `events`. No
     /// message is an error: what is of no use is counted. Says what could not be read first, if something could not.
     pub fn take_batch(&mut self, batch: &Batch<'_>, events: &mut Vec<Event>) -> Option<String> {
-        let samples = batch::parse(batch).unwrap_or_else(|why| vec![Err(why)]);
+        let samples = parse_batch(batch).unwrap_or_else(|why| vec![Err(why)]);
         let mut refusals: Vec<Refusal> = Vec::new();
         let mut in_turn = Vec::with_capacity(samples.len());
         for sample in samples {
@@ -153,7 +146,7 @@ impl Watch {
         for (_, fields) in &in_turn {
             self.lines += 1;
             let name = fields.cylinder_or(batch.cylinder);
-            refusals.extend(self.take_fields(fields, name, None, batch.resent, events));
+            refusals.extend(self.take_fields(fields, name, None, batch.resent, events).err());
         }
         for (kind, text) in refusals {
             self.notice(kind, text, events);
@@ -201,10 +194,7 @@ impl Watch {
         let taken = match parser.parse(line) {
             Err(why) => Err((UNREADABLE, why)),
             Ok(None) => Ok(()),
-            Ok(Some(fields)) => {
-                let refused = self.take_fields(&fields, &fields.cylinder, Some(self.lines), false, events);
-                refused.map_or(Ok(()), Err)
-            }
+            Ok(Some(fields)) => self.take_fields(&fields, &fields.cylinder, Some(self.lines), false, events),
         };
         self.parser = Some(parser);
         taken
@@ -218,7 +208,7 @@ impl Watch {
         number: Option<u64>,
         resent: bool,
         events: &mut Vec<Event>,
-    ) -> Option<Refusal> {
+    ) -> Result<(), Refusal> {
         if let Some(cylinder) = self.cylinders.get_mut(name) {
             match self.layouts.find(&fields.names, cylinder.rig()) {
                 Ok(layout) => {
@@ -227,10 +217,10 @@ impl Watch {
                 }
                 Err(why) => cylinder.notice(name, "columns", format!("line {}: {why}", self.lines), events),
             }
-            return None;
+            return Ok(());
         }
-        let begun = self.begin(fields, name);
-        begun.map_or_else(Some, |()| self.take_fields(fields, name, number, resent, events))
+        self.begin(fields, name)?;
+        self.take_fields(fields, name, number, resent, events)
     }
 
     /// A cylinder of which nothing came yet.

@@ -5,6 +5,8 @@
 //! to as it is.
 
 mod fault;
+#[cfg(feature = "parquet")]
+pub(crate) mod parquet;
 mod replacement;
 
 pub use replacement::abandon;

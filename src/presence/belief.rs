@@ -4,7 +4,7 @@
 //! together with one at B. So each of the eight sets of leaks is weighed by its evidence: a leak of the set is half normal, one outside
 //! is zero. Shares and size are those of docs/explanations.md.
 
-use super::likelihood::{LEAK_UNIT_M3SPA, LeakLikelihood};
+use super::{LEAK_UNIT_M3SPA, LeakLikelihood};
 use crate::explain::{LEAK_SHARE, Orthant, POINTS, positive_orthant};
 use crate::units::LPM_PER_M3S;
 use nalgebra::{DMatrix, DVector, Matrix3};

@@ -1,11 +1,11 @@
 //! What was found of the leaks, in words and as a report.
 
+use super::Pressures;
 use super::belief::{Belief, Beliefs, Place, prior_std, weigh};
-use super::pressures::Pressures;
 use crate::hold::HoldSummary;
 use crate::report::{
     EstimateEntry, Estimates, Leakage, Reason, ReasonId, ReplayReport, Status, TraceSummary, Verdict, advice,
-    capital, join, with_interval,
+    capital, join, why, with_interval,
 };
 use crate::rig::Rig;
 use crate::units::{LPM_PER_M3S, readable};
@@ -312,10 +312,7 @@ fn bulk_modulus(kappa: &Estimate<f64>, rig: &Rig) -> EstimateEntry {
 
 /// First why it is in doubt, if it is, then what was found.
 pub(crate) fn told(status: Status, faults: Vec<Leak>, reasons: Vec<Reason>, found: &str) -> Verdict {
-    let sentence = |text: &str| capital(text) + ".";
-    let why = reasons.iter().take(1).flat_map(|reason| {
-        std::iter::once(sentence(&reason.text)).chain(reason.suggestion.as_deref().map(sentence))
-    });
+    let why = reasons.iter().take(1).flat_map(why);
     let text: Vec<String> = why.chain((!found.is_empty()).then(|| found.to_owned())).collect();
     Verdict { status, faults, text: text.join(" "), reasons, probability: None, explanations: Vec::new() }
 }

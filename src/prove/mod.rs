@@ -9,7 +9,7 @@
 
 mod bound;
 
-use crate::replay::{ReplayError, replay};
+use crate::replay::{ReplayError, leak_pressures_pa, replay};
 use crate::report::{Leakage, ReplayReport, Status, TraceSummary, Verdict};
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -255,7 +255,7 @@ impl<'r> Trial<'r> {
             if record.t_s < self.onset_s {
                 continue;
             }
-            let of_leaks = pressures([record.sample.pa_pa, record.sample.pb_pa]);
+            let of_leaks = leak_pressures_pa([record.sample.pa_pa, record.sample.pb_pa]);
             for leak in Leak::ALL {
                 self.drives[leak].add(of_leaks[leak]);
             }
@@ -302,7 +302,7 @@ impl<'r> Trial<'r> {
             if t_s < onset_s {
                 return flows;
             }
-            let flow = coefficient * drive.without_noise(pressures(of_chambers)[leak]);
+            let flow = coefficient * drive.without_noise(leak_pressures_pa(of_chambers)[leak]);
             let added = match leak {
                 Leak::Internal => [flow, -flow],
                 Leak::ExternalA => [flow, 0.0],
@@ -417,9 +417,4 @@ impl<'r> Trial<'r> {
         });
         sure.map(|(since_s, _)| since_s + alarms.hold_time_s)
     }
-}
-
-/// Pressures across the leaks: P_L, P_A, P_B.
-fn pressures([pa, pb]: [f64; 2]) -> PerLeak<f64> {
-    PerLeak { internal: pa - pb, external_a: pa, external_b: pb }
 }

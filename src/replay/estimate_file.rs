@@ -1,10 +1,55 @@
-use super::EstimateRow;
 use crate::output::{Inputs, OutputError, OutputFile};
+use crate::units::LPM_PER_M3S;
+use pitchleak_core::{Estimate, Leak, PerLeak};
 use std::io::Write;
 use std::path::Path;
 
 #[cfg(feature = "parquet")]
 mod parquet;
+
+/// The estimates after one record, for a file of estimates over time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimateRow {
+    /// Time in the trace, s.
+    pub t_s: f64,
+    /// Coefficients, m³/(s·Pa).
+    pub coefficients: PerLeak<Estimate<f64>>,
+    /// Leak flows at this instant's pressures, eq. (15), m³/s.
+    pub flows_m3s: PerLeak<f64>,
+    /// Active alarms.
+    pub active: PerLeak<bool>,
+}
+
+impl EstimateRow {
+    /// What [`values`](Self::values) are, as column headers: coefficients and their standard deviations in
+    /// m³/(s·Pa), flows in L/min, active alarms as 1.
+    pub const COLUMNS: [&str; 13] = [
+        "t_s",
+        "internal_leak_coefficient",
+        "internal_leak_coefficient_std",
+        "external_leak_a_coefficient",
+        "external_leak_a_coefficient_std",
+        "external_leak_b_coefficient",
+        "external_leak_b_coefficient_std",
+        "internal_leak_lpm",
+        "external_leak_a_lpm",
+        "external_leak_b_lpm",
+        "internal_alarm",
+        "external_a_alarm",
+        "external_b_alarm",
+    ];
+
+    /// A row of [`COLUMNS`](Self::COLUMNS).
+    pub fn values(&self) -> [f64; 13] {
+        let coefficients = Leak::ALL
+            .into_iter()
+            .flat_map(|leak| [self.coefficients[leak].value, self.coefficients[leak].std]);
+        let flows_lpm = Leak::ALL.map(|leak| self.flows_m3s[leak] * LPM_PER_M3S);
+        let alarms = Leak::ALL.map(|leak| f64::from(u8::from(self.active[leak])));
+        let mut all = [self.t_s].into_iter().chain(coefficients).chain(flows_lpm).chain(alarms);
+        std::array::from_fn(|_| all.next().unwrap_or(f64::NAN))
+    }
+}
 
 /// What estimates are written as.
 #[cfg(feature = "parquet")]
@@ -81,13 +126,8 @@ impl EstimateFile {
 
 fn write_row(file: &mut OutputFile, point: &EstimateRow) -> Result<(), EstimateFileError> {
     let [t_s, numbers @ .., internal, external_a, external_b] = point.values();
-    let [a, b, c, d, e, f, g, h, i] = numbers;
-    write_line(
-        file,
-        format_args!(
-            "{t_s},{a:e},{b:e},{c:e},{d:e},{e:e},{f:e},{g:e},{h:e},{i:e},{internal},{external_a},{external_b}",
-        ),
-    )
+    let numbers = numbers.map(|number| format!("{number:e}")).join(",");
+    write_line(file, format_args!("{t_s},{numbers},{internal},{external_a},{external_b}"))
 }
 
 fn write_line(file: &mut OutputFile, line: std::fmt::Arguments<'_>) -> Result<(), EstimateFileError> {

@@ -1,27 +1,22 @@
 //! Replay: a trace goes through the estimator and the leak detector, record by record, in constant memory.
 
+mod conditions;
 mod consistency;
 mod correction;
-mod draft;
-mod effect_uncertainty;
 mod episodes;
 mod estimate_file;
 mod estimator;
-mod fresh;
-mod known;
-mod pressures;
 mod scoring;
 mod spikes;
 mod state;
 mod stream;
 mod summary;
-mod temperature;
 
-pub use estimate_file::{EstimateFile, EstimateFileError};
+pub use estimate_file::{EstimateFile, EstimateFileError, EstimateRow};
 pub use estimator::{BulkModulus, Estimator};
-pub(crate) use fresh::Fresh;
 pub use state::RestoreError;
 pub(crate) use state::every_number;
+pub(crate) use stream::Fresh;
 pub use stream::{Stream, Taken};
 
 use crate::channels::ChannelMonitor;
@@ -31,74 +26,16 @@ use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::{EstimatorKind, Rig};
 use crate::told::Beside;
 use crate::trace::{Record, TraceError, TraceFault, TraceReader};
-use crate::units::LPM_PER_M3S;
 use crate::valve::{CalibrationError, ValveMeter};
 use crate::wiring::Refused;
+use conditions::{OilTemperature, TracePressures};
 use consistency::Consistency;
-use correction::Correction;
-use effect_uncertainty::{EffectUncertainty, added_std};
+use correction::{Correction, EffectUncertainty, added_std};
 use episodes::Episodes;
 use pitchleak_core::continuity::Block;
 use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
-use pressures::TracePressures;
 use scoring::Scoring;
 use spikes::{Sifted, Spikes};
-use temperature::OilTemperature;
-
-/// The estimates after one record, for a file of estimates over time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimateRow {
-    /// Time in the trace, s.
-    pub t_s: f64,
-    /// Coefficients, m³/(s·Pa).
-    pub coefficients: PerLeak<Estimate<f64>>,
-    /// Leak flows at this instant's pressures, eq. (15), m³/s.
-    pub flows_m3s: PerLeak<f64>,
-    /// Active alarms.
-    pub active: PerLeak<bool>,
-}
-
-impl EstimateRow {
-    /// What [`values`](Self::values) are, as column headers: coefficients and their standard deviations in
-    /// m³/(s·Pa), flows in L/min, active alarms as 1.
-    pub const COLUMNS: [&str; 13] = [
-        "t_s",
-        "internal_leak_coefficient",
-        "internal_leak_coefficient_std",
-        "external_leak_a_coefficient",
-        "external_leak_a_coefficient_std",
-        "external_leak_b_coefficient",
-        "external_leak_b_coefficient_std",
-        "internal_leak_lpm",
-        "external_leak_a_lpm",
-        "external_leak_b_lpm",
-        "internal_alarm",
-        "external_a_alarm",
-        "external_b_alarm",
-    ];
-
-    /// A row of [`COLUMNS`](Self::COLUMNS).
-    pub fn values(&self) -> [f64; 13] {
-        let c = &self.coefficients;
-        let flow = self.flows_m3s.map(|flow| flow * LPM_PER_M3S);
-        let alarm = self.active.map(|active| f64::from(u8::from(active)));
-        [
-            self.t_s,
-            c.internal.value,
-            c.internal.std,
-            c.external_a.value,
-            c.external_a.std,
-            c.external_b.value,
-            c.external_b.std,
-            flow.internal,
-            flow.external_a,
-            flow.external_b,
-            alarm.internal,
-            alarm.external_a,
-            alarm.external_b,
-        ]
-    }
-}
 
 /// A stream's verdict is held against so much of it: longer than a leak takes to show, shorter than a shift. Chosen.
 const HORIZON_S: f64 = 1200.0;
@@ -239,7 +176,7 @@ impl Replay {
         if self.knows_noise() {
             let fresh = &mut self.fresh;
             self.statistic.push_each(record.step_s(), &record.sample, &mut |block| {
-                if fresh.len() == fresh::MOST {
+                if fresh.len() == stream::MOST_FRESH {
                     fresh.clear();
                 }
                 fresh.push(*block);
@@ -368,7 +305,7 @@ impl Replay {
     /// The estimates as they stand after `record`.
     pub fn estimate_row(&self, record: &Record) -> EstimateRow {
         let coefficients = self.leak_coefficients();
-        let pressures = leak_pressures_pa(record, self.estimator.pressure_biases_pa());
+        let pressures = read_leak_pressures_pa(record, self.estimator.pressure_biases_pa());
         let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
     }
@@ -406,8 +343,12 @@ fn with_effects(correction: Option<&Correction>, flows: PerLeak<Estimate<f64>>) 
 }
 
 /// Pressure across each leak, Pa: P_L, P_A, P_B as read less the biases found of the sensors A and B.
-pub fn leak_pressures_pa(record: &Record, [bias_a, bias_b]: [f64; 2]) -> PerLeak<f64> {
-    let (pa, pb) = (record.sample.pa_pa - bias_a, record.sample.pb_pa - bias_b);
+fn read_leak_pressures_pa(record: &Record, [bias_a, bias_b]: [f64; 2]) -> PerLeak<f64> {
+    leak_pressures_pa([record.sample.pa_pa - bias_a, record.sample.pb_pa - bias_b])
+}
+
+/// Pressure across each leak, Pa: P_L, P_A, P_B, where the chambers have P_A and P_B.
+pub fn leak_pressures_pa([pa, pb]: [f64; 2]) -> PerLeak<f64> {
     PerLeak { internal: pa - pb, external_a: pa, external_b: pb }
 }
 
@@ -465,7 +406,7 @@ pub fn replay<E: From<ReplayError>>(
     let decision = replay.decision().map(|decision| decision.read_by(&columns, rig));
     let refused = refused.as_ref().and_then(Refused::wiring);
     let wiring = refused.or_else(|| weighed.wiring(decision.as_ref(), &columns, rig));
-    let mut report = replay.report_with(summary, &weighed, decision.as_ref(), wiring);
+    let mut report = replay.report_with(summary, weighed, decision.as_ref(), wiring);
     hold::advise(&mut report, reader.quality(), has_spool, rig);
     Ok(report)
 }

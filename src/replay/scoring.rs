@@ -1,7 +1,7 @@
-use super::leak_pressures_pa;
+use super::read_leak_pressures_pa;
 use crate::score::{Kept, LeakScore, Scorer};
 use crate::trace::Record;
-use pitchleak_core::{Butterworth, Estimate, PerLeak};
+use pitchleak_core::{Butterworth, Estimate, Leak, PerLeak};
 
 /// The paper's filter of measured leakage, Section IV.
 const CUTOFF_HZ: f64 = 5.0;
@@ -39,13 +39,13 @@ impl Scoring {
         if self.channels.is_none() && record.dt_s > 0.0 {
             self.channels = Channel::at_rate(1.0 / record.dt_s, record);
         }
-        let Some(PerLeak { internal, external_a, external_b }) = &mut self.channels else { return };
-        let p = leak_pressures_pa(record, self.pressure_biases_pa);
-        let (c, q) = (self.coefficients, reference);
-        let (t_s, mut kept) = (record.t_s, Kept::default());
-        internal.add(t_s, c.internal, q.internal, p.internal, &mut kept);
-        external_a.add(t_s, c.external_a, q.external_a, p.external_a, &mut kept);
-        external_b.add(t_s, c.external_b, q.external_b, p.external_b, &mut kept);
+        let Some(channels) = &mut self.channels else { return };
+        let pressures = read_leak_pressures_pa(record, self.pressure_biases_pa);
+        let mut kept = Kept::default();
+        for leak in Leak::ALL {
+            let (coefficient, reference) = (self.coefficients[leak], reference[leak]);
+            channels[leak].add(record.t_s, coefficient, reference, pressures[leak], &mut kept);
+        }
     }
 
     /// The scores, where there is a reference.
@@ -57,7 +57,7 @@ impl Scoring {
 impl Channel {
     fn at_rate(rate_hz: f64, record: &Record) -> Option<PerLeak<Self>> {
         let filter = Butterworth::new(CUTOFF_HZ.min(0.4 * rate_hz), rate_hz).ok()?;
-        Some(leak_pressures_pa(record, [0.0; 2]).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
+        Some(read_leak_pressures_pa(record, [0.0; 2]).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
             let (mut reference, mut pressure) = (filter, filter);
             reference.reset(start_m3s.unwrap_or(0.0));
             pressure.reset(start_pa);

@@ -1,7 +1,6 @@
-use super::fresh::Fresh;
 use super::state::{self, RestoreError};
 use super::{Replay, ReplayError};
-use crate::explain::Decision;
+use crate::explain::{Decision, SEGMENTS, Statistic};
 use crate::hold::{self, Recorder};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::{ColumnMap, Rig};
@@ -12,6 +11,20 @@ use crate::trace::{
 };
 use crate::valve::ValveStream;
 use crate::wiring::{Refused, Wiring};
+use pitchleak_core::continuity::{Block, Segment};
+use serde::{Deserialize, Serialize};
+
+/// So many fresh blocks take as much memory as the segments: beyond them those are as soon written.
+pub(super) const MOST_FRESH: usize = SEGMENTS * size_of::<Segment<f64>>() / size_of::<Block<f64>>();
+
+/// What a saved stream lacks: the blocks that came since, in their order. Segments follow from blocks alone and are a hundred
+/// times larger, so that a checkpoint need not hold them.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Fresh {
+    /// How many came before them.
+    before: u64,
+    blocks: Vec<Block<f64>>,
+}
 
 /// What became of a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +40,7 @@ pub enum Taken {
 
 /// A replay whose trace comes in parts, as in live operation: the parts together give what the whole trace
 /// would, to the last bit.
-#[derive(Clone, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Stream {
     replay: Replay,
     validator: Option<RowValidator>,
@@ -82,29 +95,38 @@ impl Stream {
         Err(RestoreError::Rig { saved: stream.rig().name.clone(), wanted: rig.name.clone() })
     }
 
-    /// How many blocks came before those that are fresh, and with them.
+    /// How many blocks came, those that are fresh left out, and with them.
     pub(crate) fn blocks(&self) -> [u64; 2] {
-        self.replay.blocks()
+        let taken = self.replay.statistic.taken();
+        [taken.saturating_sub(self.replay.fresh.len() as u64), taken]
     }
 
-    /// Gathers blocks anew: a checkpoint has those so far.
+    /// Begins to gather blocks anew: a checkpoint has those so far.
     pub(crate) fn forget_fresh(&mut self) {
-        self.replay.forget_fresh();
+        self.replay.fresh = Vec::new();
     }
 
-    /// Leaves it without what follows from an earlier state and these blocks.
+    /// Leaves it without segments; what they lack that were there before the fresh blocks.
     pub(crate) fn take_fresh(&mut self) -> Fresh {
-        self.replay.take_fresh()
+        let [before, _] = self.blocks();
+        let rig = self.rig();
+        let mut none = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &rig.sensors()));
+        self.replay.statistic.swap_segments(&mut none);
+        Fresh { before, blocks: std::mem::take(&mut self.replay.fresh) }
     }
 
-    /// Takes these blocks in, for what follows from blocks alone; says whether they are the next.
+    /// Takes these blocks in, for its segments alone; says whether they are the next.
     pub(crate) fn take_blocks(&mut self, fresh: &Fresh) -> bool {
-        self.replay.take_blocks(fresh)
+        let are_next = self.replay.statistic.taken() == fresh.before;
+        if are_next {
+            fresh.blocks.iter().for_each(|block| self.replay.statistic.take(block));
+        }
+        are_next
     }
 
-    /// Gives it what another one's blocks have made.
-    pub(crate) fn adopt_segments(&mut self, from: Self) {
-        self.replay.adopt_segments(from.replay);
+    /// Gives it the segments that another one's blocks have made.
+    pub(crate) fn adopt_segments(&mut self, mut from: Self) {
+        self.replay.statistic.swap_segments(&mut from.replay.statistic);
     }
 
     /// Whether rows are held against what this rig may read.
@@ -269,7 +291,7 @@ impl Stream {
         let weighed = self.replay.last_stretch();
         let refused = self.refused_for().filter(|_| quality.is_mostly_bad());
         let wiring = refused.or_else(|| weighed.wiring(decision, &self.rig().columns, self.rig()));
-        let mut report = self.replay.report_with(summary, &weighed, decision, wiring);
+        let mut report = self.replay.report_with(summary, weighed, decision, wiring);
         hold::advise(&mut report, quality, self.has_spool, self.rig());
         Some(report)
     }

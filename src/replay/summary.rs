@@ -1,14 +1,15 @@
 //! From a finished replay to its report.
 
 use super::Replay;
-use super::correction::Correction;
-use super::draft::{Draft, Weighed};
-use super::effect_uncertainty::added_std;
-use super::known::is_known;
-use crate::channels::{ChannelFault, ChannelMonitor};
+use super::correction::{Correction, added_std};
+use super::estimator::is_known;
+use crate::channels::{ChannelFault, ChannelFaultKind, ChannelMonitor};
 use crate::explain::Decision;
-use crate::report::{EstimateEntry, Estimates, LeakTrend, Leakage, ReplayReport, TraceSummary};
-use crate::rig::EstimatorKind;
+use crate::report::{
+    EstimateEntry, Estimates, Findings, FlowMeterOffsets, LeakTrend, Leakage, ReplayReport, Spell,
+    TraceSummary, Verdict,
+};
+use crate::rig::{ColumnMap, EstimatorKind, Rig};
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
 use crate::wiring::Wiring;
@@ -17,10 +18,38 @@ use pitchleak_core::{Estimate, Excitation, ExcitationReport, Parameter, PerLeak}
 /// Why an estimate says nothing that is no finite number.
 const NO_NUMBER: &str = "the readings lead to no finite number";
 
+/// Faults of the channels that a verdict is held against, and earlier ones that are only told.
+pub(super) struct Weighed {
+    channels: Vec<ChannelFault>,
+    earlier_channels: Vec<ChannelFault>,
+}
+
+impl Weighed {
+    /// The mistake that `decision` is sure of, of a trace whose columns were read by `columns`. No wiring explains what a
+    /// broken channel reads.
+    pub fn wiring(&self, decision: Option<&Decision>, columns: &ColumnMap, rig: &Rig) -> Option<Wiring> {
+        let is_broken = self.channels.iter().any(|fault| fault.kind != ChannelFaultKind::Coarse);
+        Wiring::of(decision?, columns, rig).filter(|_| !is_broken)
+    }
+}
+
 impl Replay {
+    /// A file's verdict: all that was read.
+    pub(super) fn whole_trace(&self) -> Weighed {
+        Weighed { channels: self.channel_faults(&self.channels), earlier_channels: Vec::new() }
+    }
+
+    /// A stream's: its last stretch. It may run for months, and what once misfitted is mended or forgotten.
+    pub(super) fn last_stretch(&self) -> Weighed {
+        let channels = self.channel_faults(&self.channels.lately());
+        let mut earlier_channels = self.channel_faults(&self.channels);
+        earlier_channels.retain(|one| channels.iter().all(|fault| fault.channel != one.channel));
+        Weighed { channels, earlier_channels }
+    }
+
     /// The report on the trace so far.
     pub fn report(&self, trace: TraceSummary) -> ReplayReport {
-        self.report_with(trace, &self.whole_trace(), self.decision().as_ref(), None)
+        self.report_with(trace, self.whole_trace(), self.decision().as_ref(), None)
     }
 
     /// The report with a verdict held against `weighed`, as `decision` has it; `wiring` is the mistake that explains the
@@ -28,17 +57,78 @@ impl Replay {
     pub(super) fn report_with(
         &self,
         trace: TraceSummary,
-        weighed: &Weighed,
+        weighed: Weighed,
         decision: Option<&Decision>,
         wiring: Option<Wiring>,
     ) -> ReplayReport {
-        let draft = Draft::new(self, weighed, decision, trace);
-        let verdict = draft.verdict(wiring.as_ref());
-        ReplayReport { wiring, ..draft.report(verdict) }
+        let found = self.estimator.estimates();
+        let excitation = found.as_ref().map(|found| found.excitation);
+        let findings = self.findings(found.as_ref(), trace, weighed, decision, wiring);
+        let verdict = Verdict::of(&findings);
+        let Findings { trace, episodes, leakage, trends: trend, changed_at_s, wiring, .. } = findings;
+        let is_finite = |offset: &Estimate<f64>| offset.value.is_finite() && offset.std.is_finite();
+        let offsets_m3s = found.as_ref().and_then(|found| found.flow_offsets_m3s);
+        ReplayReport {
+            schema: ReplayReport::SCHEMA,
+            rig: self.rig.name.clone(),
+            hold: None,
+            valve: None,
+            estimator: self.rig.estimator.kind,
+            verdict,
+            wiring,
+            trend,
+            spells: Spell::of(&episodes, trace.duration_s, self.end_s),
+            episodes,
+            trace,
+            estimates: self.estimates(excitation, decision),
+            leakage,
+            flow_meter_offsets: offsets_m3s
+                .filter(|offsets| offsets.iter().all(is_finite))
+                .map(FlowMeterOffsets::new),
+            normalised_innovation: found.map(|_| self.consistency.ratios()),
+            changed_at_s,
+            alarms: self.alarms.clone(),
+            score: self.scoring.scores(),
+        }
+    }
+
+    /// What the verdict rests on.
+    fn findings<'a>(
+        &self,
+        found: Option<&pitchleak_core::Estimates<f64>>,
+        mut trace: TraceSummary,
+        weighed: Weighed,
+        decision: Option<&'a Decision>,
+        wiring: Option<Wiring>,
+    ) -> Findings<'a> {
+        trace.warnings.extend(self.spikes.warning());
+        let leakage = self.leakage(found.is_some(), decision);
+        let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        Findings {
+            active: self.detector.active(),
+            trends: self.trend(found, &leakage, &threshold_lpm),
+            leakage,
+            episodes: self.episodes.list(),
+            threshold_lpm,
+            trace,
+            assumed: self.rig.assumed,
+            alpha: self.rig.decision.alpha,
+            end_s: self.end_s,
+            knows_noise: self.knows_noise(),
+            restarts_in_all: self.consistency.restarts(),
+            changed_at_s: match decision {
+                Some(decision) => decision.changed_ago_s.map(|ago_s| self.end_s - ago_s),
+                None => self.changed_at_s,
+            },
+            channels: weighed.channels,
+            earlier_channels: weighed.earlier_channels,
+            wiring,
+            decision,
+        }
     }
 
     /// How the leak flows change at the pressures of [`leakage`](Self::leakage).
-    pub(super) fn trend(
+    fn trend(
         &self,
         found: Option<&pitchleak_core::Estimates<f64>>,
         leakage: &PerLeak<Leakage>,
@@ -57,7 +147,7 @@ impl Replay {
     }
 
     /// Faults of the channels that are read: of the estimators only the paper's law reads the force.
-    pub(super) fn channel_faults(&self, channels: &ChannelMonitor) -> Vec<ChannelFault> {
+    fn channel_faults(&self, channels: &ChannelMonitor) -> Vec<ChannelFault> {
         let reads_force = self.rig.estimator.kind == EstimatorKind::Paper;
         let mut faults = channels.faults(&self.rig);
         faults.retain(|fault| reads_force || fault.channel != Signal::Force);
@@ -66,7 +156,7 @@ impl Replay {
 
     /// Flows since they changed last, as the posterior has them, or else as the estimator has; the internal one at the mean size
     /// of P_L, whatever its sign. With those of the rig file's effects.
-    pub(super) fn leakage(&self, knows_spread: bool, decision: Option<&Decision>) -> PerLeak<Leakage> {
+    fn leakage(&self, knows_spread: bool, decision: Option<&Decision>) -> PerLeak<Leakage> {
         let sizes = self.leak_flows_m3s(&self.pressures.sizes());
         let net = self.leak_flows_m3s(&self.pressures.net());
         let flows = sizes.zip(net);
@@ -94,11 +184,7 @@ impl Replay {
         })
     }
 
-    pub(super) fn estimates(
-        &self,
-        excitation: Option<ExcitationReport<f64>>,
-        decision: Option<&Decision>,
-    ) -> Estimates {
+    fn estimates(&self, excitation: Option<ExcitationReport<f64>>, decision: Option<&Decision>) -> Estimates {
         let per_leak = excitation.map_or(PerLeak::default(), |report| report.leaks.map(Some));
         let (coefficients, certain) = (self.leak_coefficients(), self.estimator.leak_coefficients());
         let coefficients = PerLeak::from_fn(|leak| match decision {
@@ -146,9 +232,7 @@ impl Replay {
         }
         excitation.map_or(entry.clone(), |excitation| judged(entry, &excitation))
     }
-}
 
-impl Replay {
     /// Says so where the trace asks for a bulk modulus that the rig file rules out, by three of its standard
     /// deviations: then something else in the chambers gives way.
     fn contradiction(&self, bulk_modulus_pa: f64) -> Option<String> {

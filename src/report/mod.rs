@@ -8,8 +8,8 @@ mod verdict;
 
 pub use reason::{Reason, ReasonId};
 pub use spell::{Episode, Spell};
-pub(crate) use statement::join;
 pub use statement::{advice, capital, interval, with_interval};
+pub(crate) use statement::{join, why};
 pub use trend::{LeakTrend, OilShare, ReachTime, Slope};
 pub use verdict::{Findings, Status, Verdict};
 

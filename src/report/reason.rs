@@ -109,7 +109,7 @@ pub(super) fn contradictions(findings: &Findings<'_>) -> Vec<Reason> {
 
 /// The mistake of wiring that explains the trace, with the lines that mend it.
 fn wiring(findings: &Findings<'_>) -> Option<Reason> {
-    if let Some(found) = findings.wiring {
+    if let Some(found) = &findings.wiring {
         let reason = Reason::new(ReasonId::Wiring, found.suggestion.clone(), remedy(&found.columns));
         return Some(reason.against(&found.sensors));
     }
@@ -216,7 +216,7 @@ fn undecided(findings: &Findings<'_>, decision: &Decision, leak: Leak) -> Reason
 
 /// What remains may not stand for the cylinder.
 fn mostly_bad_rows(findings: &Findings<'_>) -> Option<Reason> {
-    let trace = findings.trace;
+    let trace = &findings.trace;
     let rows = trace.samples + trace.skipped;
     (trace.skipped > trace.samples).then(|| {
         Reason::new(

@@ -42,9 +42,9 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
     sentences.join(" ")
 }
 
-fn why(reason: &Reason) -> impl Iterator<Item = String> {
-    let what = Some(sentence(&reason.text));
-    what.into_iter().chain(reason.suggestion.as_deref().map(sentence))
+/// What was seen, and what to check, a sentence each.
+pub(crate) fn why(reason: &Reason) -> impl Iterator<Item = String> {
+    std::iter::once(sentence(&reason.text)).chain(reason.suggestion.as_deref().map(sentence))
 }
 
 fn fault(findings: &Findings<'_>, leak: Leak) -> String {

@@ -30,21 +30,20 @@ impl Found {
     fn verdict(&self) -> Verdict {
         Verdict::of(&Findings {
             active: self.active,
-            leakage: &self.leakage,
-            estimates: &self.estimates,
-            trends: &self.trends,
-            episodes: &self.episodes,
+            leakage: self.leakage,
+            trends: self.trends,
+            episodes: self.episodes.clone(),
             threshold_lpm: PerLeak { internal: 0.1, external_a: 0.1, external_b: 0.1 },
-            trace: &self.trace,
+            trace: self.trace.clone(),
             assumed: crate::rig::Assumed::default(),
             alpha: 0.05,
             end_s: 60.0,
             knows_noise: self.knows_noise,
             restarts_in_all: self.restarts,
             changed_at_s: self.changed_at_s,
-            channels: &self.channels,
-            earlier_channels: &self.earlier_channels,
-            wiring: self.wiring.as_ref(),
+            channels: self.channels.clone(),
+            earlier_channels: self.earlier_channels.clone(),
+            wiring: self.wiring.clone(),
             decision: self.decision.as_ref(),
         })
     }

@@ -2,7 +2,7 @@
 
 use super::reason::{Reason, contradictions, gaps};
 use super::spell::comes_and_goes;
-use super::{Episode, Estimates, LeakTrend, Leakage, TraceSummary, statement};
+use super::{Episode, LeakTrend, Leakage, TraceSummary, statement};
 use crate::channels::ChannelFault;
 use crate::explain::{Decision, Explained};
 use crate::rig::Assumed;
@@ -69,22 +69,20 @@ pub struct Verdict {
 }
 
 /// All that a verdict rests on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Findings<'a> {
     /// Leaks whose alarm stands.
     pub active: PerLeak<bool>,
     /// Flows of the moment.
-    pub leakage: &'a PerLeak<Leakage>,
-    /// Parameters.
-    pub estimates: &'a Estimates,
+    pub leakage: PerLeak<Leakage>,
     /// How the leaks change.
-    pub trends: &'a PerLeak<Option<LeakTrend>>,
+    pub trends: PerLeak<Option<LeakTrend>>,
     /// When leaks showed.
-    pub episodes: &'a [Episode],
+    pub episodes: Vec<Episode>,
     /// Alarm thresholds, L/min.
     pub threshold_lpm: PerLeak<f64>,
     /// What was read.
-    pub trace: &'a TraceSummary,
+    pub trace: TraceSummary,
     /// What of the rig nobody declared.
     pub assumed: Assumed,
     /// How sure a verdict has to be.
@@ -93,17 +91,16 @@ pub struct Findings<'a> {
     pub end_s: f64,
     /// Whether the estimator knows how good its figures are.
     pub knows_noise: bool,
-
     /// How often the estimates began anew since the trace began, and when last.
     pub restarts_in_all: u64,
     /// See [`restarts_in_all`](Self::restarts_in_all).
     pub changed_at_s: Option<f64>,
     /// Faults of the channels that the estimator reads, …
-    pub channels: &'a [ChannelFault],
+    pub channels: Vec<ChannelFault>,
     /// … and those of before a stream's last stretch.
-    pub earlier_channels: &'a [ChannelFault],
+    pub earlier_channels: Vec<ChannelFault>,
     /// A mistake of wiring that explains the trace.
-    pub wiring: Option<&'a Wiring>,
+    pub wiring: Option<Wiring>,
     /// The posterior; none where there is too little to weigh.
     pub decision: Option<&'a Decision>,
 }
@@ -118,7 +115,7 @@ impl Findings<'_> {
                 _ => self.active[*leak],
             };
             let is_there = self.decision.is_none_or(|decision| decision.present[*leak] >= 1.0 - self.alpha);
-            now || is_there && comes_and_goes(self.episodes, *leak, self.end_s)
+            now || is_there && comes_and_goes(&self.episodes, *leak, self.end_s)
         };
         Leak::ALL.into_iter().filter(is_fault).collect()
     }

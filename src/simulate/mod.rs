@@ -5,7 +5,6 @@
 
 mod effects;
 mod leak;
-mod leak_course;
 mod oil_temperature;
 mod plan;
 mod recording;
@@ -16,8 +15,7 @@ mod valve;
 mod writer;
 
 pub use effects::{EffectSize, EffectsError, effects};
-pub use leak::{LeakSize, LeakSizeError};
-pub use leak_course::{LeakCourse, LeakCourseError, Opening};
+pub use leak::{LeakCourse, LeakCourseError, LeakSize, LeakSizeError, Opening};
 pub use oil_temperature::{OilTemperature, OilTemperatureError};
 pub use plan::{Followed, Noise, Plan, PlanError, ShareError, share_of_full_scale};
 pub use recording::{LeakTruth, Recording, RecordingError, TruthFile};

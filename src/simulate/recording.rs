@@ -162,22 +162,24 @@ impl Recording {
         path: &Path,
         done: impl FnMut(f64) -> ControlFlow<()>,
     ) -> Result<TruthFile, RecordingError> {
-        match kind(path).ok_or_else(|| RecordingError::Kind { path: path.to_owned() })? {
-            Kind::StandardOutput => {
-                let mut out = BufWriter::new(io::stdout());
-                let truth = self.write_rows(&mut out, done)?;
-                truth.and_then(|truth| out.flush().map(|()| truth)).map_err(RecordingError::StandardOutput)
-            }
-            Kind::Files => {
-                let mut trace = OutputFile::create(path, &self.inputs)?;
-                let mut beside = OutputFile::create(truth_path(path), &self.inputs)?;
-                let truth = self.write_rows(&mut trace, done)?.map_err(|source| trace.error(source))?;
-                let json = serde_json::to_string_pretty(&truth)?;
-                writeln!(beside, "{json}").map_err(|source| beside.error(source))?;
-                output::finish_all([trace, beside])?;
-                Ok(truth)
-            }
+        let name = path.to_string_lossy().to_ascii_lowercase();
+        if name == "-" {
+            let mut out = BufWriter::new(io::stdout());
+            let truth = self.write_rows(&mut out, done)?;
+            return truth
+                .and_then(|truth| out.flush().map(|()| truth))
+                .map_err(RecordingError::StandardOutput);
         }
+        if !name.ends_with(".csv") && !name.ends_with(".csv.gz") {
+            return Err(RecordingError::Kind { path: path.to_owned() });
+        }
+        let mut trace = OutputFile::create(path, &self.inputs)?;
+        let mut beside = OutputFile::create(truth_path(path), &self.inputs)?;
+        let truth = self.write_rows(&mut trace, done)?.map_err(|source| trace.error(source))?;
+        let json = serde_json::to_string_pretty(&truth)?;
+        writeln!(beside, "{json}").map_err(|source| beside.error(source))?;
+        output::finish_all([trace, beside])?;
+        Ok(truth)
     }
 
     /// Writes the trace; the output may fail, or what is simulated.
@@ -302,21 +304,4 @@ fn truth_path(path: &Path) -> PathBuf {
         path.to_owned()
     };
     plain.with_extension("json")
-}
-
-/// Where a trace is written.
-#[derive(Clone, Copy)]
-enum Kind {
-    StandardOutput,
-    Files,
-}
-
-/// What a file's name asks for.
-fn kind(path: &Path) -> Option<Kind> {
-    let name = path.to_string_lossy().to_ascii_lowercase();
-    match name.as_str() {
-        "-" => Some(Kind::StandardOutput),
-        name if name.ends_with(".csv") || name.ends_with(".csv.gz") => Some(Kind::Files),
-        _ => None,
-    }
 }

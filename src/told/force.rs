@@ -66,16 +66,10 @@ impl ForceSums {
     pub fn scaled(&self, rig: &Rig, [by_a, by_b]: [f64; 2]) -> Option<Scaled> {
         let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
         let ([[load, of_a, of_b], ..], weights) = (self.left(), [area_a_m2 / by_a, -area_b_m2 / by_b]);
-        let Left { as_read, without, zeros: [zero, _], .. } =
-            Left::of(self.left(), self.means(), weights, zero_std_n(rig));
+        let left = Left::of(self.left(), self.means(), weights, zero_std_n(rig));
         let slope = (weights[0] * of_a + weights[1] * of_b) / load;
-        (self.blocks >= LEAST_BLOCKS && load > 0.0).then(|| Scaled {
-            as_read,
-            without,
-            slope,
-            zero,
-            blocks: f64::from(self.blocks),
-        })
+        let blocks = f64::from(self.blocks);
+        (self.blocks >= LEAST_BLOCKS && load > 0.0).then_some(Scaled { left, slope, blocks })
     }
 
     /// Means of F, P_A and P_B.
@@ -104,12 +98,9 @@ impl ForceSums {
 /// The balance with pressures that are divided by factors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scaled {
-    as_read: f64,
-    without: f64,
+    left: Left,
     /// By how much the load force would have to be larger.
     slope: f64,
-    /// How far the sensors' zeros are off, standard deviations.
-    zero: f64,
     blocks: f64,
 }
 
@@ -119,13 +110,13 @@ const SLOPE: std::ops::RangeInclusive<f64> = 0.85..=1.18;
 impl Scaled {
     /// Whether the load force, as it is read, explains these pressures.
     pub fn balances(&self) -> bool {
-        let ratio = self.without / self.as_read.max(f64::MIN_POSITIVE);
+        let ratio = self.left.without / self.left.as_read.max(f64::MIN_POSITIVE);
         ratio >= CONTRAST && self.deviance_of(ratio) >= LEAST_DROP && SLOPE.contains(&self.slope)
     }
 
     /// Less twice the log-likelihood, where the noise is the residual.
     pub fn deviance(&self) -> f64 {
-        self.deviance_of(self.as_read.max(f64::MIN_POSITIVE)) + self.zero * self.zero
+        self.deviance_of(self.left.as_read.max(f64::MIN_POSITIVE)) + self.left.zeros[0].powi(2)
     }
 
     fn deviance_of(&self, square: f64) -> f64 {
@@ -134,11 +125,12 @@ impl Scaled {
 
     /// Root mean square without the force and with it, N.
     pub fn left_n(&self) -> [f64; 2] {
-        [self.without, self.as_read].map(|square| (square / self.blocks).sqrt())
+        [self.left.without, self.left.as_read].map(|square| (square / self.blocks).sqrt())
     }
 }
 
 /// The residual of one force balance.
+#[derive(Clone, Copy, Debug)]
 struct Left {
     /// Sum of squares with the load force as it is read, N², …
     as_read: f64,

@@ -1,4 +1,4 @@
-use crate::result::PitchleakResult;
+use crate::PitchleakResult;
 use pitchleak_core::{
     AlarmSettings, Cylinder, Fluid, LeakDetector, PerLeak, Rls, RlsError, RlsSettings, SensorSpread, Sensors,
 };

@@ -1,9 +1,9 @@
 //! What stands in the memory that the caller brings.
 
-use crate::result::PitchleakResult;
-use crate::state;
-use serde::Serialize;
+use crate::PitchleakResult;
+use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 /// Says that the memory holds an estimator of this kind.
 const fn mark(kind: u8) -> u64 {
@@ -121,7 +121,7 @@ pub(crate) unsafe fn save<M: Memory>(
         Err(why) => return why,
     };
     // SAFETY: not null, and as the caller promises.
-    match state::save(estimator, unsafe { core::slice::from_raw_parts_mut(bytes, *length) }) {
+    match packed(estimator, unsafe { core::slice::from_raw_parts_mut(bytes, *length) }) {
         Ok(written) => {
             *length = written;
             PitchleakResult::Ok
@@ -139,7 +139,7 @@ pub(crate) unsafe fn restore<M: Memory>(memory: *mut M, bytes: *const u8, length
         return PitchleakResult::NullPointer;
     }
     // SAFETY: not null, and as the caller promises.
-    match state::restore(unsafe { core::slice::from_raw_parts(bytes, length) }) {
+    match unpacked(unsafe { core::slice::from_raw_parts(bytes, length) }) {
         // SAFETY: as the caller promises.
         Ok(estimator) => unsafe { put(memory, estimator) },
         Err(why) => why,
@@ -170,4 +170,45 @@ unsafe fn running<M: Memory>(memory: *const M) -> Result<*const Running<M::Kept>
     // SAFETY: not null, large enough and aligned; the mark stands first.
     let begun = unsafe { memory.cast::<u64>().read() } == mark(M::Kept::KIND);
     if begun { Ok(memory.cast()) } else { Err(PitchleakResult::NotBegun) }
+}
+
+// The state as bytes: postcard of a name, a version, the number of unknowns and the estimator, then a CRC-32; the
+// same on every machine.
+
+/// Goes up whenever the estimator keeps other things: a test holds the form.
+const VERSION: u8 = 4;
+const NAME: [u8; 4] = *b"ptlk";
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Form {
+    name: [u8; 4],
+    version: u8,
+    parameters: u8,
+}
+
+impl Form {
+    const fn of(parameters: u8) -> Self {
+        Self { name: NAME, version: VERSION, parameters }
+    }
+}
+
+fn packed<E: Kept>(estimator: &E, bytes: &mut [u8]) -> Result<usize, PitchleakResult> {
+    let state = (Form::of(E::KIND), estimator);
+    let written = postcard::to_slice_crc32(&state, bytes, CRC.digest());
+    written.map(|written| written.len()).map_err(|_| PitchleakResult::TooSmall)
+}
+
+fn unpacked<E: Kept>(bytes: &[u8]) -> Result<E, PitchleakResult> {
+    let (form, _) = postcard::take_from_bytes::<Form>(bytes).map_err(|_| PitchleakResult::Damaged)?;
+    if form.name != NAME {
+        return Err(PitchleakResult::Damaged);
+    }
+    if form != Form::of(E::KIND) {
+        return Err(PitchleakResult::OtherVersion);
+    }
+    match postcard::take_from_bytes_crc32::<(Form, E)>(bytes, CRC.digest()) {
+        Ok(((_, estimator), [])) => Ok(estimator),
+        _ => Err(PitchleakResult::Damaged),
+    }
 }

@@ -1,7 +1,7 @@
 //! Leaks without flow meters, by a calibrated valve.
 
+use crate::PitchleakResult;
 use crate::reading::{PitchleakAlarms, PitchleakEstimate};
-use crate::result::PitchleakResult;
 use crate::rig::{PitchleakCylinder, PitchleakFluid, detector, possible};
 use crate::running::{self, Kept, Memory};
 use pitchleak_core::{

@@ -48,8 +48,7 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
         page.finish(&Page::of_check(&report, &trace.rig, &history))?;
     }
     bar.finish_and_clear();
-    output::note(&report.trace);
-    output::warn(&report.trace.warnings);
+    output::tell(&report.trace);
     let json = arguments.json.then(|| report.to_json()).transpose()?;
     trace.print(json, || match &sketch {
         Some(sketch) => sketch.to_text(&report, &output::palette()),

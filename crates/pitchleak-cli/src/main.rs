@@ -7,7 +7,6 @@ mod columns;
 mod diagnose;
 mod failure;
 mod fleet;
-mod init;
 mod input;
 mod output;
 mod prove;
@@ -48,8 +47,8 @@ enum Command {
     Check(check::Arguments),
     Prove(prove::Arguments),
     Calibrate(calibrate::Arguments),
-    Columns(columns::Arguments),
-    Init(init::Arguments),
+    Columns(columns::Columns),
+    Init(columns::Init),
     Fleet(fleet::Arguments),
     Explanations(about::Explanations),
     Watch(watch::Arguments),
@@ -145,8 +144,8 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Check(arguments) => check::run(arguments),
         Command::Prove(arguments) => prove::run(arguments),
         Command::Calibrate(arguments) => calibrate::run(arguments),
-        Command::Columns(arguments) => columns::run(arguments),
-        Command::Init(arguments) => init::run(arguments),
+        Command::Columns(arguments) => arguments.run(),
+        Command::Init(arguments) => arguments.run(),
         Command::Fleet(arguments) => fleet::run(arguments),
         Command::Explanations(arguments) => arguments.run(),
         Command::Watch(arguments) => watch::run(arguments),

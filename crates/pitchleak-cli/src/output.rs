@@ -32,14 +32,12 @@ fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// How a trace was read.
-pub fn note(trace: &TraceSummary) {
-    if is_quiet() {
-        return;
-    }
-    if let Some(reading) = &trace.reading {
+/// How a trace was read, and what to know of it.
+pub fn tell(trace: &TraceSummary) {
+    if let Some(reading) = trace.reading.as_ref().filter(|_| !is_quiet()) {
         complain("note", &format!("{} read with {reading}", trace.path));
     }
+    warn(&trace.warnings);
 }
 
 /// A warning line each.

@@ -70,8 +70,7 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     if let Some(page) = page {
         page.finish(&Page::of_proof(&proof, &trace.rig))?;
     }
-    output::note(&proof.trace);
-    output::warn(&proof.trace.warnings);
+    output::tell(&proof.trace);
     let json = arguments.json.then(|| proof.to_json()).transpose()?;
     trace.print(json, || proof.to_text(&output::palette()))?;
     Ok(Outcome::Done)

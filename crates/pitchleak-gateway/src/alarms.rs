@@ -23,7 +23,7 @@ pub struct Alarms {
     changed: bool,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 struct Alarm {
     cylinder: String,
     topic: String,
@@ -77,8 +77,8 @@ impl Alarms {
         self.changed = true;
         let number = self.next;
         self.next += 1;
-        let (sent, settled, raised) = (false, false, true);
-        let alarm = Alarm { cylinder: cylinder.to_owned(), topic, payload, sent, settled, number, raised };
+        let cylinder = cylinder.to_owned();
+        let alarm = Alarm { cylinder, topic, payload, number, raised: true, ..Alarm::default() };
         let message = alarm.message();
         self.by_id.insert(id.to_owned(), alarm);
         self.make_room(true, MOST_SENT);
@@ -109,9 +109,14 @@ impl Alarms {
 
     /// The broker has it.
     pub fn sent(&mut self, number: u64) {
+        self.mark(|alarm| alarm.sent |= alarm.number == number);
+    }
+
+    /// Forgets those that are both sent and settled by then.
+    fn mark(&mut self, mark: impl Fn(&mut Alarm)) {
         self.changed = true;
         self.by_id.retain(|_, alarm| {
-            alarm.sent |= alarm.number == number;
+            mark(alarm);
             !(alarm.sent && alarm.settled)
         });
     }
@@ -123,14 +128,9 @@ impl Alarms {
 
     /// The states with these are on the disk.
     pub fn settle(&mut self, numbers: &[u64]) {
-        if numbers.is_empty() {
-            return;
+        if !numbers.is_empty() {
+            self.mark(|alarm| alarm.settled |= numbers.contains(&alarm.number));
         }
-        self.changed = true;
-        self.by_id.retain(|_, alarm| {
-            alarm.settled |= numbers.contains(&alarm.number);
-            !(alarm.sent && alarm.settled)
-        });
     }
 
     /// A clock that was set back may raise the same again, and mean it.

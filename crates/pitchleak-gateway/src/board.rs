@@ -131,16 +131,12 @@ impl Board {
     /// All cylinders as JSON, with what is wrong with the service itself.
     pub fn lines(&self, trouble: Option<&str>) -> String {
         let cards = self.cards();
-        let line = |(name, card): (&'_ String, &'_ Card)| {
+        let mut cylinders = Vec::new();
+        for (name, card) in cards.iter() {
             let silent_s = self.is_silent(card).then(|| card.heard.elapsed().as_secs());
-            serde_json::to_value(Line {
-                name,
-                silent_s,
-                alarm_lpm: card.alarm_lpm,
-                estimate: card.estimate.as_ref(),
-            })
-        };
-        let cylinders: Vec<_> = cards.iter().map(line).filter_map(Result::ok).collect();
+            let (alarm_lpm, estimate) = (card.alarm_lpm, card.estimate.as_ref());
+            cylinders.push(Line { name, silent_s, alarm_lpm, estimate });
+        }
         serde_json::json!({ "trouble": trouble, "cylinders": cylinders }).to_string()
     }
 

@@ -1,27 +1,11 @@
-//! What the service needs of a message broker, whichever program or crate stands behind it: messages, and letters about those
-//! that could not be read.
+//! What goes to a message broker and comes from it, whichever program or crate stands behind it, and letters about what could
+//! not be read.
 
 use crate::topics;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
-
-/// A way to a broker. Nothing here waits.
-pub trait Broker {
-    /// Hands over a message, to be sent once the connection allows, with the next [`send`](Self::send) at the latest.
-    fn publish(&self, message: Message);
-
-    /// Has sent what was handed over: many messages at once cost less than each by itself.
-    fn send(&self);
-
-    /// Acknowledges deliveries in the order in which they came. Those of a connection that is gone are passed over: they
-    /// will come again.
-    fn acknowledge(&self, tickets: Vec<Ticket>);
-
-    /// Sends what it can within `wait`, and says goodbye.
-    fn close(self, wait: Duration);
-}
 
 /// What goes out.
 #[derive(Clone, Debug, PartialEq, Eq)]

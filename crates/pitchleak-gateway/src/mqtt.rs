@@ -1,7 +1,7 @@
 //! MQTT 5 by the crate rumqttc, in a thread of its own that waits for the network alone.
 
 use crate::Failure;
-use crate::broker::{Broker, Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{BrokerConfig, Tls};
 use crate::outbox::{Next, Outbox};
 use crate::run::Input;
@@ -37,61 +37,34 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// Between attempts to hand something to a queue that is full.
 const BEAT: Duration = Duration::from_millis(1);
 
-pub struct Mqtt {
+/// Connects, and again whenever the connection is lost, until the outbox is closed and empty, and then tells that it has
+/// ended; what comes goes to `inbox`. `gone` is what the broker says of us when we are.
+pub fn connect(
+    config: &BrokerConfig,
+    filters: Vec<String>,
+    gone: Message,
     outbox: Arc<Outbox>,
-    ended: Receiver<()>,
-}
-
-impl Mqtt {
-    /// Connects, and again whenever the connection is lost, until [`close`](Broker::close); what comes goes to `inbox`.
-    /// `gone` is what the broker says of us when we are.
-    pub fn connect(
-        config: &BrokerConfig,
-        filters: Vec<String>,
-        gone: Message,
-        inbox: SyncSender<Input>,
-    ) -> Result<Self, Failure> {
-        let options = options(config, gone, reach(config)?);
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(|source| Failure::System { what: "start the network thread", source })?;
-        let outbox = Arc::new(Outbox::default());
-        let (end, ended) = sync_channel(1);
-        let its_outbox = Arc::clone(&outbox);
-        let run = move || {
-            runtime.block_on(async {
-                let (client, connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
-                let shared = Arc::new(Shared::default());
-                tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
-                tokio::spawn(send(client, its_outbox, Arc::clone(&shared), inbox.clone()));
-                listen(connection, &shared, &inbox).await;
-            });
-            let _ = end.send(());
-        };
-        let spawned = std::thread::Builder::new().name("mqtt".to_owned()).spawn(run);
-        spawned.map_err(|source| Failure::System { what: "start the network thread", source })?;
-        Ok(Self { outbox, ended })
-    }
-}
-
-impl Broker for Mqtt {
-    fn publish(&self, message: Message) {
-        self.outbox.put(message);
-    }
-
-    fn send(&self) {
-        self.outbox.send();
-    }
-
-    fn acknowledge(&self, tickets: Vec<Ticket>) {
-        self.outbox.acknowledge(tickets);
-    }
-
-    fn close(self, wait: Duration) {
-        self.outbox.close();
-        let _ = self.ended.recv_timeout(wait);
-    }
+    inbox: SyncSender<Input>,
+) -> Result<Receiver<()>, Failure> {
+    let options = options(config, gone, reach(config)?);
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|source| Failure::System { what: "start the network thread", source })?;
+    let (end, ended) = sync_channel(1);
+    let run = move || {
+        runtime.block_on(async {
+            let (client, connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
+            let shared = Arc::new(Shared::default());
+            tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
+            tokio::spawn(send(client, outbox, Arc::clone(&shared), inbox.clone()));
+            listen(connection, &shared, &inbox).await;
+        });
+        let _ = end.send(());
+    };
+    let spawned = std::thread::Builder::new().name("mqtt".to_owned()).spawn(run);
+    spawned.map_err(|source| Failure::System { what: "start the network thread", source })?;
+    Ok(ended)
 }
 
 /// Of the connection that lasts.

@@ -10,7 +10,7 @@ const MOST_EACH: usize = 10_000;
 /// Topics at most of which the last message counts.
 const MOST_TOPICS: usize = 50_000;
 
-/// Filled by the service, emptied by the network thread.
+/// Filled by the service, emptied by the network thread. To fill it takes no time.
 #[derive(Default)]
 pub struct Outbox {
     waiting: Mutex<Waiting>,
@@ -43,6 +43,7 @@ impl Outbox {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Hands over a message, to be sent with the next [`send`](Self::send) at the latest.
     pub fn put(&self, message: Message) {
         let mut waiting = self.waiting();
         waiting.unsaid = true;
@@ -63,13 +64,15 @@ impl Outbox {
         }
     }
 
-    /// Wakes the network thread if something was put since.
+    /// Wakes the network thread if something was put since: many messages at once cost less than each by itself.
     pub fn send(&self) {
         if std::mem::take(&mut self.waiting().unsaid) {
             self.filled.notify_one();
         }
     }
 
+    /// Acknowledges deliveries in the order in which they came. Those of a connection that is gone are passed over: they will
+    /// come again.
     pub fn acknowledge(&self, tickets: Vec<Ticket>) {
         self.waiting().tickets.extend(tickets);
         self.filled.notify_one();

@@ -2,15 +2,15 @@
 
 use crate::alarms::Alarms;
 use crate::board::Board;
-use crate::broker::{Broker, Inbound};
+use crate::broker::Inbound;
 use crate::config::{Config, Tls};
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
-use crate::mqtt::Mqtt;
+use crate::outbox::Outbox;
 use crate::pace::Pace;
 use crate::saver::{Disk, Saved, Summaries};
 use crate::service::{Service, Waiting, status};
-use crate::{Failure, http, saver};
+use crate::{Failure, http, mqtt, saver};
 use pitchleak::live::{Checkpoint, Watch};
 use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -60,7 +60,9 @@ pub fn run(path: &Path, config: Config) -> Result<(), Failure> {
     }
     listen_for_signals(inbox.clone())?;
     let filters = config.samples.iter().map(|samples| samples.topic.clone()).collect();
-    let broker = Mqtt::connect(&config.broker, filters, status(&config.base, "offline"), inbox.clone())?;
+    let outbox = Arc::new(Outbox::default());
+    let gone = status(&config.base, "offline");
+    let ended = mqtt::connect(&config.broker, filters, gone, Arc::clone(&outbox), inbox.clone())?;
     let disk = Disk { checkpoint: Arc::clone(&checkpoint), summaries, alarms: alarms_file };
     let (jobs, saver) = saver::start(disk, inbox)?;
 
@@ -69,7 +71,7 @@ pub fn run(path: &Path, config: Config) -> Result<(), Failure> {
     let (samples, base) = (config.samples.clone(), config.base.clone());
     let waiting = Waiting::default();
     let mut service =
-        Service { watch, broker, jobs, checkpoint, alarms, samples, base, pace, metrics, log, waiting };
+        Service { watch, outbox, jobs, checkpoint, alarms, samples, base, pace, metrics, log, waiting };
     service.begin()?;
     let mut reloader = Reloader::new(path, config);
     say(&[NotifyState::Ready]);
@@ -80,7 +82,7 @@ pub fn run(path: &Path, config: Config) -> Result<(), Failure> {
         say(&[NotifyState::Ready]);
     }
     say(&[NotifyState::Stopping]);
-    end(service, inputs);
+    end(service, inputs, &ended);
     let _ = saver.join();
     Ok(())
 }
@@ -125,12 +127,12 @@ fn known_alarms(file: &Path, log: &Log) -> Alarms {
 }
 
 /// Until the service is to end, or, which it says, to be reloaded.
-fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, reloader: &mut Reloader) -> bool {
+fn serve(service: &mut Service, inputs: &Receiver<Input>, reloader: &mut Reloader) -> bool {
     let watchdog = sd_notify::watchdog_enabled().map(|period| period / 2);
     let (mut ticked, mut sent, mut told) = (Instant::now(), Instant::now(), Instant::now());
     loop {
         let input = inputs.try_recv().or_else(|_| {
-            service.broker.send();
+            service.outbox.send();
             inputs.recv_timeout(TICK)
         });
         match input {
@@ -146,7 +148,7 @@ fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, reloader
         let now = Instant::now();
         if now.duration_since(sent) >= TOGETHER {
             sent = now;
-            service.broker.send();
+            service.outbox.send();
         }
         // A flood leaves no pause.
         if now.duration_since(ticked) >= TICK / 10 {
@@ -162,7 +164,7 @@ fn serve<B: Broker>(service: &mut Service<B>, inputs: &Receiver<Input>, reloader
 }
 
 /// The last checkpoint, then what the broker should have.
-fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
+fn end(mut service: Service, inputs: Receiver<Input>, ended: &Receiver<()>) {
     let until = Instant::now() + LAST_CHECKPOINT;
     while Instant::now() < until && (service.is_saving() || service.has_changed()) {
         if !service.is_saving() {
@@ -174,11 +176,12 @@ fn end<B: Broker>(mut service: Service<B>, inputs: Receiver<Input>) {
         }
     }
     let connected = service.metrics.connected.get() != 0;
-    let Service { broker, base, jobs, .. } = service;
+    let Service { outbox, base, jobs, .. } = service;
     // The network thread and the saver no longer wait for us.
     drop((jobs, inputs));
-    broker.publish(status(&base, "offline"));
-    broker.close(if connected { GOODBYE } else { Duration::ZERO });
+    outbox.put(status(&base, "offline"));
+    outbox.close();
+    let _ = ended.recv_timeout(if connected { GOODBYE } else { Duration::ZERO });
 }
 
 /// What a configuration asks for.
@@ -227,7 +230,7 @@ impl Reloader {
     }
 
     /// Reads the file. One that cannot be used changes nothing.
-    fn reload<B: Broker>(&mut self, service: &mut Service<B>) {
+    fn reload(&mut self, service: &mut Service) {
         match Config::load(&self.path) {
             Ok(config) => self.go_on_by(config, service),
             Err(failure) => {
@@ -239,7 +242,7 @@ impl Reloader {
     }
 
     /// Once in a while, where the configuration asks for it: goes on by what has changed and stays so.
-    fn look<B: Broker>(&mut self, service: &mut Service<B>, now: Instant) {
+    fn look(&mut self, service: &mut Service, now: Instant) {
         if self.every.is_none_or(|every| now.duration_since(self.looked) < every) {
             return;
         }
@@ -251,7 +254,7 @@ impl Reloader {
         }
     }
 
-    fn go_on_by<B: Broker>(&mut self, config: Config, service: &mut Service<B>) {
+    fn go_on_by(&mut self, config: Config, service: &mut Service) {
         let later = self.running.needs_a_start(&config);
         if !later.is_empty() {
             let text = format!("{}: as before until the next start", later.join(", "));

@@ -1,7 +1,7 @@
 use crate::errors::value_error;
 use crate::rig::Rig;
 use crate::signals::{Signals, detached};
-use crate::table::{NAME, Source};
+use crate::table::Source;
 use pitchleak::diagnose::{
     Declared, Equation, PerEquation, Roles, Series, Traces, diagnose as engine_diagnose,
 };
@@ -29,7 +29,7 @@ pub fn diagnose(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Found> {
     let roles = Roles::of(&paths(&train), &paths(&test)).map_err(value_error)?;
-    let names: Vec<String> = train.iter().chain(&test).map(name).collect();
+    let names: Vec<String> = train.iter().chain(&test).map(Source::name).collect();
     let read_all = |sources: &[Source<'_>], once: &[PathBuf]| -> PyResult<Vec<Series>> {
         let (mut traces, mut once) = (Traces::default(), once.iter().peekable());
         for source in sources {
@@ -67,13 +67,6 @@ pub fn diagnose(
         residuals(&diagnosis.after.residual_over_time),
         roles.repeated.iter().map(ToString::to_string).collect(),
     ))
-}
-
-fn name(source: &Source<'_>) -> String {
-    match source {
-        Source::Path(path) => path.display().to_string(),
-        Source::Table(_) => NAME.to_owned(),
-    }
 }
 
 fn paths(sources: &[Source<'_>]) -> Vec<PathBuf> {

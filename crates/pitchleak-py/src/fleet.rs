@@ -3,14 +3,13 @@
 use crate::errors::{output_error, rig_error, value_error};
 use crate::rig::Rig;
 use crate::signals::{Signals, Stop, Stopped};
-use crate::table::{NAME, NOT_A_TIME, Source};
+use crate::table::{NOT_A_TIME, Source};
 use numpy::PyArray1;
 use pitchleak::fleet::{
-    Counts, FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetOdds, FleetReport, FleetRig,
+    FleetColumn, FleetError, FleetFile, FleetNights as Nights, FleetOdds, FleetReport, FleetRig,
     FleetRow as Row, FleetTable, FleetTrace, TraceIdentity, judge_opened,
 };
 use pitchleak::output::Inputs;
-use pitchleak::trace::TraceReader;
 use pitchleak_view::page::Page;
 use pitchleak_view::{Palette, Text};
 use pyo3::exceptions::{PyFileNotFoundError, PyIsADirectoryError};
@@ -83,31 +82,18 @@ pub fn fleet_row(
     rig: &Rig,
     stop: Option<&Stop>,
 ) -> PyResult<FleetRow> {
-    let identity = identity(cylinder, begins)?;
+    let (name, identity) = (source.name(), identity(cylinder, begins)?);
     let mut signals = Signals::new(stop);
-    let mut asked = None;
-    let go_on = || signals.heed().map_err(|stopped| asked = stopped.asked()).is_ok();
-    let judged = match &source {
-        Source::Path(path) => py.detach(|| {
-            let opened = TraceReader::open(path, &rig.0);
-            judge_opened(&path.display().to_string(), &identity, &rig.0, opened, go_on)
-        }),
-        Source::Table(table) => {
-            let table = table.get();
-            let lent = table.lend(py)?;
-            let batches = table.slices(&lent)?;
-            py.detach(|| {
-                let opened = TraceReader::from_table(NAME, table.layout(), batches, &rig.0)
-                    .map(|reader| reader.since(table.first_ns()));
-                judge_opened(NAME, &identity, &rig.0, opened, go_on)
-            })
-        }
-    };
-    match (judged, asked) {
-        (Ok(row), _) => Ok(FleetRow(row)),
-        (Err(_), Some(error)) => Err(error),
-        (Err(_), None) => Err(Stopped::interrupted()),
-    }
+    source.read_again(py, &rig.0, false, |open| {
+        let opened = match open() {
+            Err(Stopped::Failed(error)) => Err(error),
+            opened => Ok(opened?),
+        };
+        let mut asked = None;
+        let go_on = || signals.heed().map_err(|stopped| asked = stopped.asked()).is_ok();
+        let judged = judge_opened(&name, &identity, &rig.0, opened, go_on);
+        judged.map(FleetRow).map_err(|_| Stopped::Asked(asked.unwrap_or_else(Stopped::interrupted)))
+    })
 }
 
 /// The table of all nights so far in a folder.
@@ -141,12 +127,6 @@ impl FleetNights {
     }
 }
 
-/// Traces by status, and `error`, as JSON.
-#[pyfunction]
-pub fn fleet_counts(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
-    serde_json::to_string(&Counts::of(rows.iter().map(|row| row.0.status))).map_err(value_error)
-}
-
 /// Rows as columns: header, kind (`numbers`, `texts`, `times`, `counts`, `flags`), values. Numbers are an array with NaN for
 /// none, times an array of milliseconds since 1970 with the least integer for none, as numpy has it.
 #[pyfunction]
@@ -174,18 +154,6 @@ pub fn fleet_table<'py>(
     table.columns().iter().map(column).collect()
 }
 
-/// What the traces of each cylinder say together, the worst first, as JSON.
-#[pyfunction]
-pub fn fleet_cylinders(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
-    serde_json::to_string(&FleetReport::of(&cloned(&rows)).by_cylinder).map_err(value_error)
-}
-
-/// Trends by cylinder as JSON.
-#[pyfunction]
-pub fn fleet_trends(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
-    serde_json::to_string(&FleetReport::of(&cloned(&rows)).trends).map_err(value_error)
-}
-
 /// How often each explanation is true in the fleet: as JSON, and as lines of a rig file.
 #[pyfunction]
 pub fn fleet_odds(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<(String, Option<String>)> {
@@ -193,7 +161,7 @@ pub fn fleet_odds(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<(String, Option<St
     Ok((serde_json::to_string(&odds).map_err(value_error)?, odds.to_toml()))
 }
 
-/// Counts, trends and rows as JSON.
+/// Counts, cylinders, trends and rows as JSON.
 #[pyfunction]
 pub fn fleet_json(rows: Vec<PyRef<'_, FleetRow>>) -> PyResult<String> {
     FleetReport::of(&cloned(&rows)).to_json().map_err(value_error)

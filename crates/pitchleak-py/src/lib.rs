@@ -7,7 +7,6 @@ mod estimator;
 mod fleet;
 mod linkage;
 mod replay;
-mod reproduce;
 mod rig;
 mod rig_arguments;
 mod signals;
@@ -27,8 +26,8 @@ mod _pitchleak {
     use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::fleet::{
-        FleetNights, FleetRow, fleet_counts, fleet_cylinders, fleet_json, fleet_odds, fleet_page, fleet_row,
-        fleet_save, fleet_table, fleet_text, fleet_traces, fleet_trends,
+        FleetNights, FleetRow, fleet_json, fleet_odds, fleet_page, fleet_row, fleet_save, fleet_table,
+        fleet_text, fleet_traces,
     };
     #[pymodule_export]
     use crate::linkage::Linkage;
@@ -37,13 +36,11 @@ mod _pitchleak {
         calibrate, check, check_page, explanations, over_time, prove, replay, replay_page, write_page,
     };
     #[pymodule_export]
-    use crate::reproduce::reproduce;
-    #[pymodule_export]
     use crate::rig::Rig;
     #[pymodule_export]
     use crate::signals::Stop;
     #[pymodule_export]
-    use crate::simulate::simulate;
+    use crate::simulate::{reproduce, simulate};
     #[pymodule_export]
     use crate::table::{Layout, Table};
 

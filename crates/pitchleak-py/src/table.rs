@@ -236,6 +236,14 @@ pub enum Source<'py> {
 }
 
 impl Source<'_> {
+    /// How messages call it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Path(path) => path.display().to_string(),
+            Self::Table(_) => NAME.to_owned(),
+        }
+    }
+
     /// Gives `work` a reader of the trace, with the interpreter released.
     pub fn read<T: Send>(
         &self,

@@ -1,5 +1,7 @@
 //! Marks in a line of text: an interval beside an alarm level, and heights.
 
+use pitchleak::report::Leakage;
+
 pub(crate) const ZERO: char = '│';
 pub(crate) const INTERVAL: char = '━';
 pub(crate) const LIMIT: char = '┊';
@@ -31,6 +33,11 @@ pub(crate) fn scale_text([low, high]: [f64; 2]) -> String {
 }
 
 impl Bar {
+    /// Of a leak beside its alarm level, L/min.
+    pub(crate) fn of(leakage: &Leakage, threshold_lpm: f64) -> Self {
+        Self { interval: leakage.ci95(), value: (leakage.mean_lpm, VALUE), limit: threshold_lpm }
+    }
+
     /// So many cells from one end of the scale to the other; later marks over earlier ones.
     pub(crate) fn text(&self, [low, high]: [f64; 2], cells: usize) -> String {
         let cell = |value: f64| {

@@ -30,6 +30,12 @@ impl Spot {
     }
 }
 
+/// The least and the greatest; of none, infinities the other way round.
+pub(crate) fn extremes(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.into_iter().fold(none, |[low, high], value| [low.min(value), high.max(value)])
+}
+
 /// `N` quantities over time.
 #[derive(Clone, Debug)]
 pub struct Envelopes<const N: usize> {

@@ -1,5 +1,6 @@
 //! Figures of curves over time, as SVG text: panels on a grid, each with its axes, units and legend.
 
+use crate::envelope::extremes;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
@@ -200,7 +201,7 @@ fn within(a: (f64, f64), b: (f64, f64), low: f64, high: f64) -> Option<[(f64, f6
 
 /// Least and greatest value, widened by `share` of their distance; never empty.
 fn range(values: impl Iterator<Item = f64>, share: f64) -> (f64, f64) {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let [low, high] = extremes(values);
     let room = (high - low).max(1e-9 * high.abs().max(low.abs())).max(1e-12);
     if low <= high { (low - share * room, high + share * room) } else { (0.0, 1.0) }
 }

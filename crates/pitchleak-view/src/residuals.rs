@@ -26,14 +26,19 @@ pub fn residual_figures(diagnosis: &Diagnosis) -> Result<Vec<(String, String)>, 
             autocorrelation(equation, before, after),
             distribution(equation, before, after),
         ];
-        let bins = diagnosis.before.binned_residuals.iter().zip(&diagnosis.after.binned_residuals);
-        let own = bins.filter(|(before, _)| {
-            before.equation == equation && before.varies() && before.against != "direction"
-        });
-        panels.extend(own.map(|(before, after)| against(before, after)));
+        panels.extend(drawn_bins(diagnosis, equation).map(|(before, after)| against(before, after)));
         figures.push((format!("residual_{}.svg", equation.id()), svg(&panels, COLUMNS)?));
     }
     Ok(figures)
+}
+
+/// An equation's residual against each variable that is drawn, before and after.
+pub(crate) fn drawn_bins(
+    diagnosis: &Diagnosis,
+    equation: Equation,
+) -> impl Iterator<Item = (&BinnedResidual, &BinnedResidual)> {
+    let bins = diagnosis.before.binned_residuals.iter().zip(&diagnosis.after.binned_residuals);
+    bins.filter(move |(one, _)| one.equation == equation && one.varies() && one.against != "direction")
 }
 
 fn over_time(diagnosis: &Diagnosis, equation: Equation) -> Panel {
@@ -123,14 +128,14 @@ fn histogram(white: &[f64]) -> Vec<(f64, f64)> {
 /// Means in bins; thin lines: two standard errors about the residual with the effects.
 fn against(before: &BinnedResidual, after: &BinnedResidual) -> Panel {
     let (factor, _) = people_unit(after.equation);
-    let (scale, _) = people(after.against);
+    let (x_label, scale) = axis(after.against);
     let points = |bins: &BinnedResidual, errors: f64| {
         let values = bins.at.iter().zip(&bins.mean).zip(&bins.std_error);
         values.map(|((at, mean), error)| (at * scale, (mean + errors * error) * factor)).collect()
     };
     Panel {
         title: format!("{} against {}", name(after.equation), symbol(after.against)),
-        x_label: axis(after.against),
+        x_label,
         y_label: label(after.equation),
         lines: vec![
             line("", Ink::Measured, points(before, 0.0)),
@@ -139,22 +144,6 @@ fn against(before: &BinnedResidual, after: &BinnedResidual) -> Panel {
             line("", Ink::Ours, points(after, 0.0)),
         ],
         y_range: None,
-    }
-}
-
-fn axis(variable: &str) -> &'static str {
-    match variable {
-        "load_pressure_pa" => "P_L (bar)",
-        "pa_pa" => "P_A (bar)",
-        "pb_pa" => "P_B (bar)",
-        "x_m" => "x (mm)",
-        "v_mps" => "speed (mm/s)",
-        "direction" => "direction of motion",
-        "qa_m3s" => "Q_A (L/min)",
-        "qb_m3s" => "Q_B (L/min)",
-        "force_n" => "force (kN)",
-        "temp_k" => "temperature (K)",
-        _ => "time (s)",
     }
 }
 
@@ -200,35 +189,36 @@ pub(crate) fn people_unit(equation: Equation) -> (f64, &'static str) {
     if equation == Equation::Force { (1.0, "N") } else { (LPM_PER_M3S, "L/min") }
 }
 
+/// Variables with their axes, and the factor from SI to the axis' unit.
+const VARIABLES: [(&str, &str, f64); 10] = [
+    ("load_pressure_pa", "P_L (bar)", 1e-5),
+    ("pa_pa", "P_A (bar)", 1e-5),
+    ("pb_pa", "P_B (bar)", 1e-5),
+    ("x_m", "x (mm)", 1e3),
+    ("v_mps", "speed (mm/s)", 1e3),
+    ("direction", "direction", 1.0),
+    ("qa_m3s", "Q_A (L/min)", LPM_PER_M3S),
+    ("qb_m3s", "Q_B (L/min)", LPM_PER_M3S),
+    ("force_n", "force (kN)", 1e-3),
+    ("temp_k", "temperature (K)", 1.0),
+];
+
+/// The axis of a variable, and the factor to its unit.
+fn axis(variable: &str) -> (&'static str, f64) {
+    let known = VARIABLES.into_iter().find(|(id, ..)| *id == variable);
+    known.map_or(("time (s)", 1.0), |(_, axis, factor)| (axis, factor))
+}
+
 /// Name of a variable in text and figures.
 pub(crate) fn symbol(variable: &str) -> &'static str {
-    match variable {
-        "load_pressure_pa" => "P_L",
-        "pa_pa" => "P_A",
-        "pb_pa" => "P_B",
-        "x_m" => "x",
-        "v_mps" => "speed",
-        "direction" => "direction",
-        "qa_m3s" => "Q_A",
-        "qb_m3s" => "Q_B",
-        "force_n" => "force",
-        "temp_k" => "temperature",
-        _ => "time",
-    }
+    let (axis, _) = axis(variable);
+    axis.split_once(" (").map_or(axis, |(symbol, _)| symbol)
 }
 
 /// Factor to people's unit, and that unit.
 pub(crate) fn people(variable: &str) -> (f64, &'static str) {
-    match variable {
-        "load_pressure_pa" | "pa_pa" | "pb_pa" => (1e-5, "bar"),
-        "x_m" => (1e3, "mm"),
-        "v_mps" => (1e3, "mm/s"),
-        "qa_m3s" | "qb_m3s" => (LPM_PER_M3S, "L/min"),
-        "force_n" => (1e-3, "kN"),
-        "temp_k" => (1.0, "K"),
-        "direction" => (1.0, ""),
-        _ => (1.0, "s"),
-    }
+    let (axis, factor) = axis(variable);
+    (factor, axis.split_once(" (").map_or("", |(_, unit)| unit.trim_end_matches(')')))
 }
 
 /// With its 95 % interval, in people's units.

@@ -17,17 +17,19 @@ const CHANNELS: [Signal; 8] = [
     Signal::Temperature,
 ];
 
+/// Ways without a quantity.
+const BARE: [(&str, Distortion); 6] = [
+    ("dead", Distortion::Dead),
+    ("stuck", Distortion::Stuck),
+    ("missing", Distortion::Missing),
+    ("reversed", Distortion::Reversed),
+    ("absolute", Distortion::Absolute),
+    ("other_end", Distortion::OtherEnd),
+];
+
 /// How, for the message.
 const WAYS: &str = "dead, stuck, missing, reversed, absolute, other_end, offset Q, drift Q/h, gain 20 %, times 10, \
                     in UNIT, clipped Q, held 200 ms, late 100 ms, spikes 0.1 %";
-
-/// Units that meters of other makes have, and traces do not: name, size in SI.
-const FOREIGN_UNITS: [(Dimension, &str, f64); 4] = [
-    (Dimension::Pressure, "psi", 6_894.757_293_168),
-    (Dimension::Flow, "m3/h", 1.0 / 3600.0),
-    (Dimension::Flow, "gal/min", 3.785_411_784e-3 / 60.0),
-    (Dimension::Length, "in", 0.0254),
-];
 
 /// Why a text is no mistake that sensors make.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -115,13 +117,13 @@ fn swap(one: Signal, other: Signal) -> Result<Mistake, SensorFaultError> {
 /// The way `way` with its quantity `text`, for one channel.
 fn distortion(channel: Signal, way: &str, text: &str) -> Result<Distortion, SensorFaultError> {
     let measures = channel.dimension().unwrap_or(Dimension::Time);
-    let way_is_known = match way {
-        "dead" => Distortion::Dead,
-        "stuck" => Distortion::Stuck,
-        "missing" => Distortion::Missing,
-        "reversed" => Distortion::Reversed,
-        "absolute" => Distortion::Absolute,
-        "other_end" => Distortion::OtherEnd,
+    if let Some((_, distortion)) = BARE.into_iter().find(|(bare, _)| *bare == way) {
+        if !text.is_empty() {
+            return Err(SensorFaultError::Way(format!("{way} {text}")));
+        }
+        return fitting(channel, way, distortion);
+    }
+    let distortion = match way {
         "offset" => Distortion::Offset(amount(text, measures)?),
         "drift" => Distortion::Drift(amount(per_hour(text)?, measures)?),
         "gain" => Distortion::Times(1.0 + units::parse(text, Dimension::Share)?),
@@ -133,19 +135,12 @@ fn distortion(channel: Signal, way: &str, text: &str) -> Result<Distortion, Sens
         "spikes" => Distortion::Spikes(positive(text, Dimension::Share)?),
         _ => return Err(SensorFaultError::Way(way.to_owned())),
     };
-    let with_quantity = !matches!(
-        way_is_known,
-        Distortion::Dead
-            | Distortion::Stuck
-            | Distortion::Missing
-            | Distortion::Reversed
-            | Distortion::Absolute
-            | Distortion::OtherEnd
-    );
-    if !with_quantity && !text.is_empty() {
-        return Err(SensorFaultError::Way(format!("{way} {text}")));
-    }
-    let fits = match (channel, way_is_known) {
+    fitting(channel, way, distortion)
+}
+
+/// The distortion, where the channel can have it.
+fn fitting(channel: Signal, way: &str, distortion: Distortion) -> Result<Distortion, SensorFaultError> {
+    let fits = match (channel, distortion) {
         (Signal::Time, distortion) => matches!(distortion, Distortion::Times(_) | Distortion::Offset(_)),
         (Signal::Position, Distortion::OtherEnd) => true,
         (_, Distortion::OtherEnd) => false,
@@ -153,7 +148,7 @@ fn distortion(channel: Signal, way: &str, text: &str) -> Result<Distortion, Sens
         (_, distortion) => distortion != Distortion::Missing,
     };
     let unfit = || SensorFaultError::Unfit { channel: channel.name(), way: way.to_owned() };
-    if fits { Ok(way_is_known) } else { Err(unfit()) }
+    if fits { Ok(distortion) } else { Err(unfit()) }
 }
 
 fn amount(text: &str, measures: Dimension) -> Result<Amount, UnitError> {
@@ -184,11 +179,8 @@ fn header_unit(channel: Signal) -> f64 {
     }
 }
 
+/// Size in SI of a unit.
 fn size_of(unit: &str, measures: Dimension) -> Result<f64, UnitError> {
-    let plain = unit.replace('³', "3").replace("m^3", "m3");
-    let foreign = FOREIGN_UNITS.iter().find(|(dimension, name, _)| *dimension == measures && *name == plain);
-    match foreign {
-        Some((.., size)) => Ok(*size),
-        None => Ok(units::unit(unit, measures)?.to_si(1.0) - units::unit(unit, measures)?.to_si(0.0)),
-    }
+    let unit = units::unit(unit, measures)?;
+    Ok(unit.to_si(1.0) - unit.to_si(0.0))
 }

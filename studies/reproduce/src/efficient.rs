@@ -6,8 +6,8 @@
 //! each step adds the difference of two bounds. Scored like a real estimator, it tells what the figures of
 //! the table can be at best, start and definition of steady state included.
 
-use super::protocol::{SAMPLE_RATE_HZ, driving_pressures_pa};
-use super::trial::{EstimateHistory, Filters};
+use super::protocol::SAMPLE_RATE_HZ;
+use super::trial::EstimateHistory;
 use crate::cramer_rao::{CramerRaoModel, PARAMETERS};
 use nalgebra::{SMatrix, SVector, SymmetricEigen};
 use pitchleak::core::{Estimate, FilterError, PerLeak, Sample};
@@ -72,27 +72,19 @@ impl Efficient {
     pub fn history(
         &self,
         window: &[Truth],
-        mut sensing: Sensing,
+        sensing: Sensing,
         normal: &mut Normal,
     ) -> Result<EstimateHistory, FilterError> {
         let errors = self.draw(normal);
-        let mut history = EstimateHistory::default();
-        let mut filters = Filters::default();
-        for (index, truth) in window.iter().enumerate() {
+        EstimateHistory::of(window, sensing, |index, _| {
             let place = self.place(index + 1).unwrap_or(0);
             let error = errors.get(place).copied().unwrap_or_default();
             let [_, internal, external_a, external_b, _, _, bias_a, bias_b, _] = error.into();
             let off = PerLeak { internal, external_a, external_b };
-            let unseen = PerLeak { internal: bias_a - bias_b, external_a: bias_a, external_b: bias_b };
-            let std = self.leak_std(index + 1);
-            let coefficients = self.coefficients.zip(off).map(|(c, off)| c + off).zip(std);
-            let coefficients = coefficients.map(|(value, std)| Estimate { value, std });
-            let read = driving_pressures_pa(&sensing.read(&truth.sample));
-            let (pressures, references) = filters.advance(read, truth.leaks_m3s)?;
-            let flows = coefficients.zip(pressures.zip(unseen)).map(|(c, (p, off))| c.value * (p - off));
-            history.push(index, coefficients, flows, references);
-        }
-        Ok(history)
+            let coefficients =
+                self.coefficients.zip(off).map(|(c, off)| c + off).zip(self.leak_std(index + 1));
+            (coefficients.map(|(value, std)| Estimate { value, std }), [bias_a, bias_b])
+        })
     }
 }
 

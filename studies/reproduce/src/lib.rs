@@ -16,7 +16,7 @@ pub use figures::Drawing;
 pub use page::page;
 pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
 pub use search::{Candidate, best_gains, paper_rig};
-pub use table::{Bound, ErrorMetrics, Row, Scored};
+pub use table::{Bound, Row, Scored};
 pub use trial::{EstimateHistory, TrialScore};
 
 use crate::cramer_rao::CramerRaoModel;

@@ -187,7 +187,7 @@ fn cells(row: &Row) -> [String; 5] {
         Some(value) if value >= 100.0 => format!("{value:.0}"),
         Some(value) => format!("{value:.2}"),
     };
-    let (medians, worst) = (row.median.values(), Scored::from(worst).values());
+    let (medians, worst) = (row.median.values(), worst.values());
     std::array::from_fn(|at| format!("{} ({})", text(medians[at]), text(worst[at])))
 }
 

@@ -1,7 +1,7 @@
 //! The paper's experiment (Section IV), and what stands here for what it does not print.
 
 use pitchleak::Rig;
-use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError, Sample};
+use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError};
 use pitchleak::output::OutputError;
 use pitchleak::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use pitchleak::units::LPM_PER_BAR;
@@ -148,11 +148,6 @@ impl Run {
         let start = (index % WINDOWS) * WINDOW_SAMPLES;
         self.truths.get(start..start + WINDOW_SAMPLES).unwrap_or(&self.truths)
     }
-}
-
-/// P_L, P_A and P_B, which drive the leaks, Pa.
-pub fn driving_pressures_pa(sample: &Sample<f64>) -> PerLeak<f64> {
-    PerLeak { internal: sample.load_pressure_pa(), external_a: sample.pa_pa, external_b: sample.pb_pa }
 }
 
 /// `work` on every item, on all cores; results in the items' order whatever the thread count. `done` is

@@ -5,17 +5,17 @@ use super::trial::{TrialScore, mean};
 use pitchleak::core::{Estimate, ExcitationSettings};
 use serde::Serialize;
 
-/// The five figures of the paper.
+/// The five figures of the paper, or nulls where the row is not identifiable.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize)]
-pub struct ErrorMetrics<T = f64> {
+pub struct Scored {
     /// Mean leakage error in steady state, % of the window's mean |Q|.
-    pub leakage_mean_error_percent: T,
+    pub leakage_mean_error_percent: Option<f64>,
     /// Peak leakage error in steady state, % of the window's mean |Q|.
-    pub leakage_peak_error_percent: T,
+    pub leakage_peak_error_percent: Option<f64>,
     /// Mean coefficient error in steady state, %.
-    pub coefficient_mean_error_percent: T,
+    pub coefficient_mean_error_percent: Option<f64>,
     /// Peak coefficient error in steady state, %.
-    pub coefficient_peak_error_percent: T,
+    pub coefficient_peak_error_percent: Option<f64>,
     /// Time until the coefficient stays within 5 %, s; `null` where it does not.
     pub convergence_time_s: Option<f64>,
 }
@@ -54,7 +54,7 @@ pub struct Row {
     #[serde(flatten)]
     pub median: Scored,
     /// Worst over all seeds; `null` where not identifiable.
-    pub worst: Option<ErrorMetrics>,
+    pub worst: Option<Scored>,
     /// Share of the seeds that converged, %.
     pub converged_percent: f64,
     /// Share of the seeds whose 95 % interval at the end of the window holds the truth, %; `null` for
@@ -63,9 +63,6 @@ pub struct Row {
     /// The bound beside it.
     pub bound: Bound,
 }
-
-/// The five figures, or nulls where the row is not identifiable.
-pub type Scored = ErrorMetrics<Option<f64>>;
 
 /// What one seed adds to a row.
 #[derive(Clone, Copy, Debug)]
@@ -101,18 +98,14 @@ impl WindowBound {
 }
 
 /// The five figures of all seeds, by `pick`.
-fn error_metrics<'a>(
-    scores: impl Iterator<Item = &'a TrialScore> + Clone,
-    pick: fn(Vec<f64>) -> f64,
-) -> ErrorMetrics {
-    let all = |of: fn(&TrialScore) -> f64| pick(scores.clone().map(of).collect());
-    let time = all(|s| s.convergence_s.unwrap_or(f64::INFINITY));
-    ErrorMetrics {
+fn scored<'a>(scores: impl Iterator<Item = &'a TrialScore> + Clone, pick: fn(Vec<f64>) -> f64) -> Scored {
+    let all = |of: fn(&TrialScore) -> f64| Some(pick(scores.clone().map(of).collect()));
+    Scored {
         leakage_mean_error_percent: all(|s| s.leakage_mean),
         leakage_peak_error_percent: all(|s| s.leakage_peak),
         coefficient_mean_error_percent: all(|s| s.coefficient_mean),
         coefficient_peak_error_percent: all(|s| s.coefficient_peak),
-        convergence_time_s: Some(time).filter(|t| t.is_finite()),
+        convergence_time_s: all(|s| s.convergence_s.unwrap_or(f64::INFINITY)).filter(|t| t.is_finite()),
     }
 }
 
@@ -126,7 +119,8 @@ impl Row {
     ) -> Self {
         let identifiable = 2 * entries.iter().filter(|e| e.window.identifiable).count() >= entries.len();
         let scores = entries.iter().map(|e| &e.score);
-        let best = error_metrics(entries.iter().map(|e| &e.efficient), median);
+        let efficient = entries.iter().map(|e| &e.efficient);
+        let known = |scored: Scored| if identifiable { scored } else { Scored::default() };
         let covered: Vec<f64> = entries
             .iter()
             .filter_map(|e| e.score.covered)
@@ -141,32 +135,16 @@ impl Row {
             leak,
             estimator,
             identifiable,
-            median: if identifiable {
-                error_metrics(scores.clone(), median).into()
-            } else {
-                Scored::default()
-            },
-            worst: identifiable.then(|| error_metrics(scores.clone(), worst)),
+            median: known(scored(scores.clone(), median)),
+            worst: identifiable.then(|| scored(scores.clone(), worst)),
             converged_percent: 100.0 * mean(scores.map(|s| f64::from(u8::from(s.convergence_s.is_some())))),
             coverage_percent: (!covered.is_empty()).then(|| mean(covered.into_iter())),
             bound: Bound {
-                median: if identifiable { best.into() } else { Scored::default() },
+                median: known(scored(efficient, median)),
                 coefficient_std_percent: 100.0 * of_windows(|w| w.coefficient),
                 coefficient_std_after_2s_percent: 100.0 * of_windows(|w| w.coefficient_early),
                 error_over_bound: mean(entries.iter().map(ratio)).sqrt(),
             },
-        }
-    }
-}
-
-impl From<ErrorMetrics> for Scored {
-    fn from(figures: ErrorMetrics) -> Self {
-        Self {
-            leakage_mean_error_percent: Some(figures.leakage_mean_error_percent),
-            leakage_peak_error_percent: Some(figures.leakage_peak_error_percent),
-            coefficient_mean_error_percent: Some(figures.coefficient_mean_error_percent),
-            coefficient_peak_error_percent: Some(figures.coefficient_peak_error_percent),
-            convergence_time_s: figures.convergence_time_s,
         }
     }
 }
@@ -217,7 +195,7 @@ fn line(row: &Row) -> String {
         return format!("{head}not identifiable: bound {:.1} %\n", bound.coefficient_std_percent);
     };
     let [a, b, c, d, e] = row.median.cells();
-    let [wa, wb, wc, wd, we] = Scored::from(worst).cells();
+    let [wa, wb, wc, wd, we] = worst.cells();
     let pair = |median: String, worst: String| format!("{median} ({worst})");
     format!(
         "{head}{:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",

@@ -1,9 +1,9 @@
 //! One estimator on one noisy 20 s window, and how far off it was.
 
-use super::protocol::{ReproduceError, SAMPLE_RATE_HZ, driving_pressures_pa};
+use super::protocol::{ReproduceError, SAMPLE_RATE_HZ};
 use pitchleak::Rig;
-use pitchleak::core::{Butterworth, Estimate, FilterError, Leak, PerLeak};
-use pitchleak::replay::Estimator;
+use pitchleak::core::{Butterworth, Estimate, FilterError, Leak, PerLeak, Sample};
+use pitchleak::replay::{Estimator, leak_pressures_pa};
 use pitchleak::simulate::{Sensing, Truth};
 use pitchleak::trace::Record;
 
@@ -51,39 +51,42 @@ impl EstimateHistory {
     ///
     /// # Errors
     /// Where the rig has no estimator, or the filter does not exist at the protocol's rate.
-    pub fn run(rig: &Rig, window: &[Truth], mut sensing: Sensing) -> Result<Self, ReproduceError> {
+    pub fn run(rig: &Rig, window: &[Truth], sensing: Sensing) -> Result<Self, ReproduceError> {
         let mut estimator = Estimator::new(rig)?;
-        let mut history = Self::default();
-        let mut filters = Filters::default();
         let dt_s = 1.0 / SAMPLE_RATE_HZ;
-        for (index, truth) in window.iter().enumerate() {
-            let sample = sensing.read(&truth.sample);
-            let t_s = index as f64 * dt_s;
-            let record =
-                Record { t_s, dt_s: if index == 0 { 0.0 } else { dt_s }, sample, ..Record::default() };
-            estimator.update(&record);
-            let (read, references) = filters.advance(driving_pressures_pa(&sample), truth.leaks_m3s)?;
-            let coefficients = estimator.leak_coefficients();
-            let [bias_a, bias_b] = estimator.pressure_biases_pa();
-            let found = PerLeak { internal: bias_a - bias_b, external_a: bias_a, external_b: bias_b };
-            let flows = coefficients.zip(read.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
-            history.push(index, coefficients, flows, references);
-        }
-        Ok(history)
+        let history = Self::of(window, sensing, |index, sample| {
+            let (t_s, dt_s) = (index as f64 * dt_s, if index == 0 { 0.0 } else { dt_s });
+            estimator.update(&Record { t_s, dt_s, sample: *sample, ..Record::default() });
+            (estimator.leak_coefficients(), estimator.pressure_biases_pa())
+        });
+        Ok(history?)
     }
 
-    /// Adds what stands after sample `index`.
-    pub(super) fn push(
-        &mut self,
-        index: usize,
-        coefficients: PerLeak<Estimate<f64>>,
-        flows_m3s: PerLeak<f64>,
-        references_m3s: PerLeak<f64>,
-    ) {
-        self.t_s.push(index as f64 / SAMPLE_RATE_HZ);
-        self.coefficients.push(coefficients);
-        self.flows_m3s.push(flows_m3s);
-        self.references_m3s.push(references_m3s);
+    /// What `estimate` makes of each sample of a window that `sensing` reads: leak coefficients, and biases of the pressure
+    /// sensors A and B, Pa.
+    ///
+    /// # Errors
+    /// Where the filter does not exist at the protocol's rate.
+    pub(super) fn of(
+        window: &[Truth],
+        mut sensing: Sensing,
+        mut estimate: impl FnMut(usize, &Sample<f64>) -> (PerLeak<Estimate<f64>>, [f64; 2]),
+    ) -> Result<Self, FilterError> {
+        let mut history = Self::default();
+        let mut filters = Filters::default();
+        for (index, truth) in window.iter().enumerate() {
+            let sample = sensing.read(&truth.sample);
+            let (coefficients, biases_pa) = estimate(index, &sample);
+            let read = leak_pressures_pa([sample.pa_pa, sample.pb_pa]);
+            let (pressures, references) = filters.advance(read, truth.leaks_m3s)?;
+            let found = leak_pressures_pa(biases_pa);
+            let flows = coefficients.zip(pressures.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
+            history.t_s.push(index as f64 / SAMPLE_RATE_HZ);
+            history.coefficients.push(coefficients);
+            history.flows_m3s.push(flows);
+            history.references_m3s.push(references);
+        }
+        Ok(history)
     }
 
     /// Mean of |Ĉ/C − 1| over the second half of the window.

@@ -1,10 +1,11 @@
 //! The service: samples in, estimates and alarms out, acknowledged once they are on the disk.
 
 use crate::alarms::Alarms;
-use crate::broker::{Broker, DeadLetters, Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{DeadLetters, Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{Config, Samples};
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
+use crate::outbox::Outbox;
 use crate::pace::{Due, Pace};
 use crate::run::Input;
 use crate::saver::{Job, Saved};
@@ -25,9 +26,10 @@ const COUNT: Duration = Duration::from_millis(200);
 /// Between two accounts of what was left out and not said.
 const ACCOUNT: Duration = Duration::from_secs(60);
 
-pub struct Service<B> {
+pub struct Service {
     pub watch: Watch,
-    pub broker: B,
+    /// What goes to the broker.
+    pub outbox: Arc<Outbox>,
     pub jobs: SyncSender<Job>,
     /// From which a cylinder that is watched again goes on.
     pub checkpoint: Arc<Checkpoint>,
@@ -58,11 +60,11 @@ pub struct Waiting {
     dead_letters: DeadLetters,
 }
 
-impl<B: Broker> Service<B> {
+impl Service {
     /// Goes on from the checkpoint, says what is wrong with it, and sends what a run before could not.
     pub fn begin(&mut self) -> Result<(), CheckpointError> {
         self.restore()?;
-        self.alarms.unsent().into_iter().for_each(|alarm| self.broker.publish(alarm));
+        self.alarms.unsent().into_iter().for_each(|alarm| self.outbox.put(alarm));
         Ok(())
     }
 
@@ -122,7 +124,7 @@ impl<B: Broker> Service<B> {
         self.metrics.connected.set(1);
         let session = if session_kept { "goes on" } else { "is new" };
         self.log.say(Level::Info, "broker", &format!("connected; the session {session}"));
-        self.broker.publish(status(&self.base, "online"));
+        self.outbox.put(status(&self.base, "online"));
     }
 
     fn down(&mut self, why: &str) {
@@ -167,7 +169,7 @@ impl<B: Broker> Service<B> {
         };
         if let Some((kind, why)) = dead {
             let letter = self.waiting.dead_letters.letter(&self.base, delivery, kind, &why, Instant::now());
-            letter.into_iter().for_each(|letter| self.broker.publish(letter));
+            letter.into_iter().for_each(|letter| self.outbox.put(letter));
         }
         let told = events.iter().any(|event| matches!(event, Event::Estimate(_)));
         self.tell(events);
@@ -248,7 +250,7 @@ impl<B: Broker> Service<B> {
             Ok(Some(bytes)) => {
                 self.metrics.saved(bytes, took);
                 self.alarms.settle(&job.raised);
-                self.broker.acknowledge(job.tickets);
+                self.outbox.acknowledge(job.tickets);
                 self.pace.acknowledged(Instant::now());
                 self.write_alarms();
             }
@@ -293,7 +295,7 @@ impl<B: Broker> Service<B> {
                     if lost {
                         self.metrics.left_out("alarm", 1);
                     }
-                    message.into_iter().for_each(|message| self.broker.publish(message));
+                    message.into_iter().for_each(|message| self.outbox.put(message));
                     continue;
                 }
                 Event::Estimate(estimate) => {
@@ -329,7 +331,7 @@ impl<B: Broker> Service<B> {
                     (topic, Keeping::Latest)
                 }
             };
-            self.broker.publish(Message { topic, payload, keeping });
+            self.outbox.put(Message { topic, payload, keeping });
         }
     }
 

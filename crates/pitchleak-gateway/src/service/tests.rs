@@ -2,40 +2,51 @@
 
 use super::*;
 use crate::board::Board;
+use crate::outbox::Next;
 use pitchleak::live::{BatchFormat, LiveConfig};
-use std::sync::Mutex;
+use std::cell::RefCell;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Remembers what it is told.
-#[derive(Clone, Default)]
-struct Fake {
-    published: Arc<Mutex<Vec<Message>>>,
-    acknowledged: Arc<Mutex<Vec<Ticket>>>,
-    /// Of the service's state: it goes with the last of both.
-    _folder: Option<Arc<tempfile::TempDir>>,
+/// The network's end of the service's outbox, and the folder of its state.
+struct Network {
+    outbox: Arc<Outbox>,
+    published: RefCell<Vec<Message>>,
+    acknowledged: RefCell<Vec<Ticket>>,
+    _folder: tempfile::TempDir,
 }
 
-impl Broker for Fake {
-    fn publish(&self, message: Message) {
-        self.published.lock().expect("no panic").push(message);
+impl Network {
+    /// Takes all that waits.
+    fn send(&self) {
+        let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+        self.outbox.close();
+        loop {
+            match runtime.block_on(self.outbox.next()) {
+                Next::Acknowledge(ticket) => self.acknowledged.borrow_mut().push(ticket),
+                Next::Publish(message) => self.published.borrow_mut().push(message),
+                Next::Close => return,
+            }
+        }
     }
 
-    fn send(&self) {}
-
-    fn acknowledge(&self, tickets: Vec<Ticket>) {
-        self.acknowledged.lock().expect("no panic").extend(tickets);
+    fn published(&self) -> Vec<Message> {
+        self.send();
+        self.published.borrow().clone()
     }
 
-    fn close(self, _: Duration) {}
+    fn acknowledged(&self) -> Vec<Ticket> {
+        self.send();
+        self.acknowledged.borrow().clone()
+    }
 }
 
-fn service() -> (Service<Fake>, Fake, Receiver<Job>) {
-    let folder = Arc::new(tempfile::tempdir().expect("a folder"));
-    let broker = Fake { _folder: Some(Arc::clone(&folder)), ..Fake::default() };
+fn service() -> (Service, Network, Receiver<Job>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let outbox = Arc::new(Outbox::default());
     let (jobs, queue) = sync_channel(1);
     let service = Service {
         watch: Watch::new(LiveConfig::of(Rig::paper()), None),
-        broker: broker.clone(),
+        outbox: Arc::clone(&outbox),
         jobs,
         checkpoint: Arc::new(Checkpoint::new(folder.path()).expect("a folder")),
         alarms: Alarms::default(),
@@ -46,7 +57,8 @@ fn service() -> (Service<Fake>, Fake, Receiver<Job>) {
         log: Arc::default(),
         waiting: Waiting::default(),
     };
-    (service, broker, queue)
+    let (published, acknowledged) = (RefCell::default(), RefCell::default());
+    (service, Network { outbox, published, acknowledged, _folder: folder }, queue)
 }
 
 fn ticket(id: u16) -> Ticket {
@@ -96,7 +108,7 @@ fn saved(mut job: Job, takes_it: bool) -> Input {
 #[test]
 fn a_message_is_acknowledged_once_a_checkpoint_holds_it_and_not_before() {
     let (mut service, broker, queue) = service();
-    let acknowledged = || broker.acknowledged.lock().expect("no panic").clone();
+    let acknowledged = || broker.acknowledged();
     service.take(delivery("pitch/B1/samples", Ok(&samples(0)), 1));
     service.save();
     let first = queue.recv().expect("a job");
@@ -117,12 +129,12 @@ fn what_came_over_a_connection_that_is_gone_is_not_acknowledged_over_the_next() 
     service.take(Input::Broker(Inbound::Down("gone".to_owned())));
     service.save();
     service.take(saved(queue.recv().expect("a job"), true));
-    assert!(broker.acknowledged.lock().expect("no panic").is_empty());
+    assert!(broker.acknowledged().is_empty());
 }
 
-fn alarms(broker: &Fake) -> Vec<Message> {
-    let published = broker.published.lock().expect("no panic");
-    published.iter().filter(|message| message.topic == "pitchleak/B1/alarm").cloned().collect()
+fn alarms(broker: &Network) -> Vec<Message> {
+    let published = broker.published();
+    published.into_iter().filter(|message| message.topic == "pitchleak/B1/alarm").collect()
 }
 
 #[test]
@@ -166,7 +178,7 @@ fn samples_that_come_again_send_no_alarm_twice() {
 
 #[test]
 fn late_samples_are_counted_one_by_one() {
-    let (mut service, _, _queue) = service();
+    let (mut service, _broker, _queue) = service();
     (0..21).for_each(|_| _ = service.take(delivery("pitch/B1/samples", Ok(&samples(0)), 1)));
     service.tick(Instant::now());
     let text = service.metrics.text();
@@ -189,7 +201,7 @@ fn a_reload_waits_for_the_checkpoint_that_is_being_written_and_keeps_what_is_the
     assert_eq!(service.watch.cylinders(), 1);
     service.take(saved(job, true));
     assert_eq!(service.watch.cylinders(), 0);
-    let published = broker.published.lock().expect("no panic");
+    let published = broker.published();
     assert!(published.iter().any(|message| message.topic == "pitchleak/B1/notice/reload"), "{published:?}");
     assert!(service.metrics.text().contains("silent_seconds{cylinder=\"B2\"}"));
 }
@@ -202,12 +214,12 @@ fn what_is_of_no_use_is_acknowledged_too_or_it_would_come_for_ever() {
     service.take(delivery("pitch/B1/samples", Ok("{{{"), 3));
     service.save();
     service.take(saved(queue.recv().expect("a job"), true));
-    assert_eq!(broker.acknowledged.lock().expect("no panic").len(), 3);
+    assert_eq!(broker.acknowledged().len(), 3);
     service.tick(Instant::now());
     let text = service.metrics.text();
     for kind in ["too_large", "unknown_topic", "unreadable"] {
         assert!(text.contains(&format!("kind=\"{kind}\"")), "{kind} in {text}");
-        let letters = broker.published.lock().expect("no panic");
+        let letters = broker.published();
         let topic = format!("pitchleak/dead_letter/{kind}");
         assert!(letters.iter().any(|letter| letter.topic == topic), "{kind} in {letters:?}");
     }
@@ -219,7 +231,7 @@ fn control_characters_of_a_topic_are_told_escaped() {
     let (mut service, broker, _queue) = service();
     service.take(delivery("else\nwhere\u{1b}[31m\u{2028}é", Ok("[]"), 1));
     service.take(delivery("pitch/a\rb/samples", Err(100_000_000), 2));
-    let published = broker.published.lock().expect("no panic");
+    let published = broker.published();
     let notices = published.iter().filter(|message| message.topic.contains("/notice/"));
     let texts = notices.map(|message| {
         let notice: serde_json::Value = serde_json::from_str(&message.payload).expect("JSON");
@@ -234,7 +246,7 @@ fn control_characters_of_a_topic_are_told_escaped() {
 
 #[test]
 fn a_broker_that_waits_gets_its_checkpoint_within_a_second() {
-    let (mut service, _, queue) = service();
+    let (mut service, _broker, queue) = service();
     let begin = Instant::now();
     (0..20).for_each(|id| _ = service.take(delivery("pitch/B1/samples", Ok("[]"), id)));
     service.tick(begin);

@@ -228,27 +228,26 @@ class Fleet(Paged, Tabular):
     @cached_property
     def rows(self) -> tuple[FleetRow, ...]:
         """A row per cylinder and trace."""
-        return tuple(record(FleetRow, raw) for raw in self.to_dict()["rows"])
+        return tuple(record(FleetRow, raw) for raw in self._report["rows"])
+
+    @cached_property
+    def _report(self) -> dict[str, Any]:
+        return self.to_dict()
 
     @property
     def counts(self) -> dict[str, int]:
         """Traces by status, and ``error``."""
-        counts: dict[str, int] = json.loads(_pitchleak.fleet_counts(self._rows))
-        return counts
+        return dict(self._report["counts"])
 
     @cached_property
     def cylinders(self) -> dict[str, FleetCylinder]:
         """What the traces of each cylinder say together, by its name, the worst first."""
-        entries = json.loads(_pitchleak.fleet_cylinders(self._rows))
-        return {e["cylinder"]: record(FleetCylinder, e) for e in entries}
+        return {e["cylinder"]: record(FleetCylinder, e) for e in self._report["by_cylinder"]}
 
     @property
     def cylinder_counts(self) -> dict[str, int]:
         """Cylinders by status, and ``error``."""
-        counts = dict.fromkeys(self.counts, 0)
-        for cylinder in self.cylinders.values():
-            counts[cylinder.status or "error"] += 1
-        return counts
+        return dict(self._report["cylinder_counts"])
 
     @cached_property
     def trends(self) -> dict[str, PerLeak[LongTrend | None]]:
@@ -258,8 +257,8 @@ class Fleet(Paged, Tabular):
         def long(raw: dict[str, Any] | None) -> LongTrend | None:
             return None if raw is None else record(LongTrend, raw)
 
-        entries = json.loads(_pitchleak.fleet_trends(self._rows))
-        return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in entries}
+        trends = self._report["trends"]
+        return {e["cylinder"]: PerLeak(*(long(e["leaks"][leak]) for leak in LABELS)) for e in trends}
 
     @cached_property
     def odds(self) -> FleetOdds:

@@ -1,6 +1,6 @@
 //! Charts of a page: what is drawn, as numbers for the page's script and as a table for those who read or print it.
 
-use crate::envelope::Range;
+use crate::envelope::{Range, extremes};
 use maud::{Markup, html};
 use pitchleak::times::Clock;
 use serde::Serialize;
@@ -144,14 +144,10 @@ impl Line {
 /// Numbers with the decimals that their span asks for: short in the page, and no eye can tell.
 fn rounded(values: impl Iterator<Item = Option<f64>>) -> Vec<Option<f64>> {
     let finite: Vec<_> = values.map(|value| value.filter(|value| value.is_finite())).collect();
-    let (low, high) = extremes(finite.iter().flatten());
+    let [low, high] = extremes(finite.iter().flatten().copied());
     let span = (high - low).max(1e-6 * high.abs().max(low.abs())).max(1e-12);
     let scale = 10f64.powf((DIGITS - span.log10()).floor());
     finite.into_iter().map(|value| value.map(|value| (value * scale).round() / scale)).collect()
-}
-
-fn extremes<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)))
 }
 
 /// The charts of a page, in the order of their places, and the time that those over time share, s.
@@ -255,8 +251,8 @@ fn cells(line: &Line, start: usize, count: usize) -> Vec<Option<f64>> {
     if line.low.is_none() {
         return vec![median];
     }
-    let (low, _) = extremes(of(&line.low).iter());
-    let (_, high) = extremes(of(&line.high).iter());
+    let [low, _] = extremes(of(&line.low));
+    let [_, high] = extremes(of(&line.high));
     let known = |value: f64| Some(value).filter(|value| value.is_finite());
     vec![known(low), median, known(high)]
 }

@@ -1,6 +1,6 @@
 //! The page of a check.
 
-use super::machine::{channels, facts, prose, rig, rough, short, table, trace};
+use super::machine::{channels, made, prose, rig, rough, short, table};
 use super::{Card, Head, History, Page, Section, Tone};
 use crate::text::{data_line, misfit};
 use maud::{Markup, html};
@@ -25,7 +25,7 @@ impl Page {
             },
             Section { id: "residuals", title: "Residuals", body: drawn.residuals(&mut charts) },
             Section { id: "rig", title: "Rig", body: rig(machine) },
-            Section { id: "made", title: "How this was made", body: made(report) },
+            Section { id: "made", title: "How this was made", body: made(&report.trace, report.schema) },
         ];
         Self { kind: "check", subject: report.trace.path.clone(), head: head(report), sections, charts }
     }
@@ -193,12 +193,5 @@ fn readings(readings: &[Reading]) -> Markup {
                 }
             }
         }))
-    }
-}
-
-fn made(report: &CheckReport) -> Markup {
-    html! {
-        (trace(&report.trace))
-        (facts(&[("Program", super::generator()), ("Form of the data", report.schema.to_owned())]))
     }
 }

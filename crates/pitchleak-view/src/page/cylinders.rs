@@ -3,7 +3,7 @@
 use super::Tone;
 use super::history::ink;
 use super::machine::{prose, short};
-use crate::envelope::{Envelopes, Row, Spot};
+use crate::envelope::{Envelopes, Row, Spot, extremes};
 use crate::text;
 use jiff::Timestamp;
 use maud::{Markup, html};
@@ -192,11 +192,7 @@ impl Scale {
     fn of(cylinders: &[&FleetCylinder], report: &FleetReport<'_>) -> Self {
         let rows: Vec<_> = cylinders.iter().flat_map(|cylinder| judged(cylinder, report)).collect();
         let times: Option<Vec<f64>> = rows.iter().map(|row| begin_s(row)).collect();
-        let ends = times.map(|times| {
-            times
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(*t), high.max(*t)))
-        });
+        let ends = times.map(extremes);
         let most = cylinders.iter().map(|cylinder| judged(cylinder, report).count()).max().unwrap_or(0);
         let flows =
             || rows.iter().filter_map(|row| row.leaks).flat_map(|leaks| Leak::ALL.map(|leak| leaks[leak]));
@@ -205,8 +201,8 @@ impl Scale {
         thresholds_lpm.sort_by(f64::total_cmp);
         thresholds_lpm.dedup();
         Self {
-            from_s: ends.map(|(from, _)| from),
-            length: ends.map_or(most.saturating_sub(1) as f64, |(from, to)| to - from),
+            from_s: ends.map(|[from, _]| from),
+            length: ends.map_or(most.saturating_sub(1) as f64, |[from, to]| to - from),
             top_lpm: seen.chain(thresholds_lpm.iter().copied()).fold(0.0, f64::max),
             thresholds_lpm,
         }

@@ -10,43 +10,23 @@ use pitchleak::units::LPM_PER_M3S;
 
 const KELVIN: f64 = 273.15;
 
-/// What is gathered, in the order of the columns below.
-#[derive(Clone, Copy, Debug)]
-enum Quantity {
-    Position,
-    PressureA,
-    PressureB,
-    FlowA,
-    FlowB,
-    Force,
-    Temperature,
-    /// The flow balance's innovation, in its own standard deviations.
-    Balance,
-    /// The position equation's squared innovation over its variance, a running mean.
-    PositionResidual,
-    Leak(Leak),
-    Reference(Leak),
-}
-
+// Columns of what is gathered.
+const POSITION: usize = 0;
+const PRESSURE_A: usize = 1;
+const PRESSURE_B: usize = 2;
+const FLOW_A: usize = 3;
+const FLOW_B: usize = 4;
+const FORCE: usize = 5;
+const TEMPERATURE: usize = 6;
+/// The flow balance's innovation, in its own standard deviations.
+const BALANCE: usize = 7;
+/// The position equation's squared innovation over its variance, a running mean.
+const POSITION_RESIDUAL: usize = 8;
+/// The first of the leaks' …
+const LEAKS: usize = 9;
+/// … and of their reference meters'.
+const REFERENCES: usize = 12;
 const QUANTITIES: usize = 15;
-
-impl Quantity {
-    fn column(self) -> usize {
-        match self {
-            Self::Position => 0,
-            Self::PressureA => 1,
-            Self::PressureB => 2,
-            Self::FlowA => 3,
-            Self::FlowB => 4,
-            Self::Force => 5,
-            Self::Temperature => 6,
-            Self::Balance => 7,
-            Self::PositionResidual => 8,
-            Self::Leak(leak) => 9 + leak as usize,
-            Self::Reference(leak) => 12 + leak as usize,
-        }
-    }
-}
 
 /// Signals, estimates and residuals of a replay as a screen can show them, however long the trace.
 #[derive(Clone, Debug, Default)]
@@ -74,24 +54,19 @@ impl History {
     fn spots(&self, replay: &Replay, record: &Record) -> [Option<Spot>; QUANTITIES] {
         let s = &record.sample;
         let mut spots = [None; QUANTITIES];
-        let mut put = |quantity: Quantity, spot: Option<Spot>| {
-            if let Some(place) = spots.get_mut(quantity.column()) {
-                *place = spot;
-            }
-        };
         let scaled = |value: Option<f64>, factor: f64| value.map(|value| Spot::at(value * factor));
-        put(Quantity::Position, scaled(Some(s.x_m), 1e3));
-        put(Quantity::PressureA, scaled(Some(s.pa_pa), 1e-5));
-        put(Quantity::PressureB, scaled(Some(s.pb_pa), 1e-5));
-        put(Quantity::FlowA, scaled(s.qa_m3s, LPM_PER_M3S));
-        put(Quantity::FlowB, scaled(s.qb_m3s, LPM_PER_M3S));
-        put(Quantity::Force, scaled(s.force_n, 1e-3));
-        put(Quantity::Temperature, record.temperature_k.map(|kelvin| Spot::at(kelvin - KELVIN)));
-        put(Quantity::Balance, replay.innovation().map(Spot::at));
-        put(Quantity::PositionResidual, self.position_residual);
+        spots[POSITION] = scaled(Some(s.x_m), 1e3);
+        spots[PRESSURE_A] = scaled(Some(s.pa_pa), 1e-5);
+        spots[PRESSURE_B] = scaled(Some(s.pb_pa), 1e-5);
+        spots[FLOW_A] = scaled(s.qa_m3s, LPM_PER_M3S);
+        spots[FLOW_B] = scaled(s.qb_m3s, LPM_PER_M3S);
+        spots[FORCE] = scaled(s.force_n, 1e-3);
+        spots[TEMPERATURE] = record.temperature_k.map(|kelvin| Spot::at(kelvin - KELVIN));
+        spots[BALANCE] = replay.innovation().map(Spot::at);
+        spots[POSITION_RESIDUAL] = self.position_residual;
         for leak in Leak::ALL {
-            put(Quantity::Leak(leak), self.leaks_lpm[leak]);
-            put(Quantity::Reference(leak), scaled(record.leak_m3s[leak], LPM_PER_M3S));
+            spots[LEAKS + leak as usize] = self.leaks_lpm[leak];
+            spots[REFERENCES + leak as usize] = scaled(record.leak_m3s[leak], LPM_PER_M3S);
         }
         spots
     }
@@ -126,17 +101,17 @@ impl Drawn {
         Charts::over(self.0.iter().map(|row| row.t_s))
     }
 
-    fn line(&self, name: impl Into<String>, ink: Ink, quantity: Quantity) -> Line {
-        let of = |row: &Row<QUANTITIES>| row.ranges.get(quantity.column()).copied().flatten();
+    fn line(&self, name: impl Into<String>, ink: Ink, column: usize) -> Line {
+        let of = |row: &Row<QUANTITIES>| row.ranges.get(column).copied().flatten();
         let ranges: Vec<Option<Range>> = self.0.iter().map(of).collect();
         Line::over_time(name, ink, &ranges)
     }
 
     /// Leak flows with their bands, beside reference meters where there are any.
     pub fn leaks(&self) -> Vec<Line> {
-        let line = |leak: Leak| self.line(leak.label(), ink(leak), Quantity::Leak(leak));
+        let line = |leak: Leak| self.line(leak.label(), ink(leak), LEAKS + leak as usize);
         let reference = |leak: Leak| {
-            let line = self.line("reference meters", Ink::Grey, Quantity::Reference(leak));
+            let line = self.line("reference meters", Ink::Grey, REFERENCES + leak as usize);
             // A meter's scatter would hide the estimates.
             Line { low: None, high: None, ..line.dashed() }
         };
@@ -149,17 +124,17 @@ impl Drawn {
             charts.place(Chart { title: title.to_owned(), unit, lines, ..Chart::default() })
         };
         html! {
-            (chart("Piston position", "mm", vec![self.line("x", Ink::Blue, Quantity::Position)]))
+            (chart("Piston position", "mm", vec![self.line("x", Ink::Blue, POSITION)]))
             (chart("Chamber pressures", "bar", vec![
-                self.line("P_A", Ink::Blue, Quantity::PressureA),
-                self.line("P_B", Ink::Vermilion, Quantity::PressureB),
+                self.line("P_A", Ink::Blue, PRESSURE_A),
+                self.line("P_B", Ink::Vermilion, PRESSURE_B),
             ]))
             (chart("Flows into the chambers", "L/min", vec![
-                self.line("Q_A", Ink::Blue, Quantity::FlowA),
-                self.line("Q_B", Ink::Vermilion, Quantity::FlowB),
+                self.line("Q_A", Ink::Blue, FLOW_A),
+                self.line("Q_B", Ink::Vermilion, FLOW_B),
             ]))
-            (chart("Load force against extension", "kN", vec![self.line("force", Ink::Blue, Quantity::Force)]))
-            (chart("Oil temperature", "°C", vec![self.line("temperature", Ink::Blue, Quantity::Temperature)]))
+            (chart("Load force against extension", "kN", vec![self.line("force", Ink::Blue, FORCE)]))
+            (chart("Oil temperature", "°C", vec![self.line("temperature", Ink::Blue, TEMPERATURE)]))
         }
     }
 
@@ -169,7 +144,7 @@ impl Drawn {
             title: "Residual of the flow balance".to_owned(),
             unit: "σ",
             note: "In standard deviations of the declared noise. As long as model and declared noise hold, 95 % stay between the dashed lines.",
-            lines: vec![self.line("flow balance", Ink::Blue, Quantity::Balance)],
+            lines: vec![self.line("flow balance", Ink::Blue, BALANCE)],
             limits: [2.0, -2.0].map(|value| Limit { value, label: format!("{value:+.0} σ") }).to_vec(),
             ..Chart::default()
         };
@@ -177,7 +152,7 @@ impl Drawn {
             title: "Position against the flows".to_owned(),
             unit: "",
             note: "Square of the residual over its variance, running mean. About 1 where position and flows agree, far above where they do not.",
-            lines: vec![self.line("position residual", Ink::Vermilion, Quantity::PositionResidual)],
+            lines: vec![self.line("position residual", Ink::Vermilion, POSITION_RESIDUAL)],
             limits: vec![Limit { value: 1.0, label: "expected".to_owned() }],
             ..Chart::default()
         };

@@ -157,6 +157,14 @@ pub fn trace(trace: &TraceSummary) -> Markup {
     }
 }
 
+/// What was read, and by what, for data of the form `schema`.
+pub fn made(of: &TraceSummary, schema: &str) -> Markup {
+    html! {
+        (trace(of))
+        (facts(&[("Program", super::generator()), ("Form of the data", schema.to_owned())]))
+    }
+}
+
 /// Two significant digits: how well something is known.
 pub fn rough(value: f64) -> String {
     let decimals = (1.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 7.0) as usize;

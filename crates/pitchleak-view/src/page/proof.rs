@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Charts, Ink, Line};
 use super::history::ink;
-use super::machine::{facts, prose, rig, table, trace};
+use super::machine::{made, prose, rig, table};
 use super::{Card, Head, Page, Section, Tone};
 use crate::text::data_line;
 use crate::text::proof::{best_possible, found, from, proof_word, seconds, sentence};
@@ -20,7 +20,7 @@ impl Page {
             Section { id: "cases", title: "Put in and found", body: cases(proof, &mut charts) },
             Section { id: "recorded", title: "As it was recorded", body: recorded(proof) },
             Section { id: "rig", title: "Rig", body: rig(machine) },
-            Section { id: "made", title: "How this was made", body: made(proof) },
+            Section { id: "made", title: "How this was made", body: made(&proof.trace, proof.schema) },
         ];
         Self { kind: "prove", subject: proof.trace.path.clone(), head: head(proof), sections, charts }
     }
@@ -90,12 +90,5 @@ fn recorded(proof: &Proof) -> Markup {
         p { strong { (proof.verdict.status.word()) } ". " (prose(&proof.verdict.text)) }
         p { "The same samples, the same decision: only the flows of the leak were added to what the meters read. The trace keeps its \
              noise, its zeros and its lags. “The best possible” is the Cramér–Rao bound of these flows." }
-    }
-}
-
-fn made(proof: &Proof) -> Markup {
-    html! {
-        (trace(&proof.trace))
-        (facts(&[("Program", super::generator()), ("Form of the data", proof.schema.to_owned())]))
     }
 }

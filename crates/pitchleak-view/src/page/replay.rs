@@ -5,15 +5,16 @@ use super::drawing::Drawing;
 use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, table, trace};
 use super::{Card, Head, History, Page, Section};
-use crate::text::{data_line, hold_line, missing_rig, valve_line};
+use crate::bar::{Bar, scale};
+use crate::text::{data_line, gpa, hold_line, known, missing_rig, per_bar, unknown, valve_line};
 use maud::{Markup, html};
-use pitchleak::core::{AlarmState, Leak};
+use pitchleak::core::{AlarmState, Leak, PerLeak};
 use pitchleak::report::{
     EstimateEntry, Reason, ReasonId, ReplayReport, Status, TraceSummary, advice, capital, interval,
     with_interval,
 };
 use pitchleak::rig::Rig;
-use pitchleak::units::{LPM_PER_BAR, LPM_PER_M3S, duration};
+use pitchleak::units::{LPM_PER_M3S, duration};
 
 impl Page {
     /// The report of a replay of `rig`, with what was gathered on the way.
@@ -92,7 +93,7 @@ fn open(report: &ReplayReport) -> Markup {
         } @else {
             ul {
                 @for (name, entry) in &open {
-                    li { strong { (capital(name)) } ": " (entry.reason.as_deref().unwrap_or("not enough excitation")) "." }
+                    li { strong { (capital(name)) } ": " (unknown(entry)) "." }
                 }
             }
         }
@@ -156,23 +157,21 @@ fn probability_bar(share: f64) -> Markup {
 
 /// The leaks as bars on a common scale.
 fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
-    let ends = |leak: Leak| {
-        let [low, high] = report.leakage[leak].ci95();
-        [low, high, rig.alarms.threshold_m3s[leak] * LPM_PER_M3S]
-    };
-    let known = |leak: &Leak| report.estimates.leaks()[*leak].identifiable;
-    let all = Leak::ALL.into_iter().filter(known).flat_map(ends).filter(|end| end.is_finite());
-    let (low, high) = all.fold((0.0_f64, 0.0_f64), |(low, high), end| (low.min(end), high.max(end)));
+    let bars = PerLeak::from_fn(|leak| {
+        let known = report.estimates.leaks()[leak].identifiable;
+        known.then(|| Bar::of(&report.leakage[leak], rig.alarms.threshold_m3s[leak] * LPM_PER_M3S))
+    });
+    let ends = scale(bars.iter().filter_map(|(_, bar)| bar.as_ref())).unwrap_or_default();
     html! {
         (Drawing::of(report, rig).svg())
         table {
             tbody {
-                @for leak in Leak::ALL {
+                @for (leak, known) in bars.iter() {
                     tr {
                         th scope="row" { (leak.label()) }
-                        @if known(&leak) {
+                        @if let Some(known) = known {
                             td .number { (interval(&report.leakage[leak])) }
-                            td { (bar(ends(leak), report.leakage[leak].mean_lpm, [low, high])) }
+                            td { (bar(known, ends)) }
                         } @else {
                             td .number { "not identified" }
                             td {}
@@ -187,7 +186,7 @@ fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
 
 const BAR_WIDTH: f64 = 176.0;
 
-fn bar([low, high, limit]: [f64; 3], value: f64, [from, to]: [f64; 2]) -> Markup {
+fn bar(&Bar { interval: [low, high], value: (value, _), limit }: &Bar, [from, to]: [f64; 2]) -> Markup {
     let at = |value: f64| 4.0 + (BAR_WIDTH - 8.0) * ((value - from) / (to - from).max(1e-9)).clamp(0.0, 1.0);
     let tenths = |value: f64| format!("{value:.1}");
     html! {
@@ -247,14 +246,14 @@ fn at_the_end(report: &ReplayReport) -> Markup {
                 tr {
                     th scope="row" { (leak.label()) }
                     td .number { (known(entry, || interval(&report.leakage[leak]))) }
-                    td .number { (known(entry, || with_interval(entry.value * LPM_PER_BAR, entry.std.map(|std| std * LPM_PER_BAR)))) }
+                    td .number { (known(entry, || per_bar(entry.value, entry.std))) }
                     td { (trend(report, leak)) }
                     td { (doubt(entry)) }
                 }
             }
             tr {
                 th scope="row" { "bulk modulus" }
-                td .number colspan="2" { (known(bulk, || format!("{} GPa", with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9))))) }
+                td .number colspan="2" { (known(bulk, || gpa(bulk))) }
                 td {}
                 td { (doubt(bulk)) }
             }
@@ -266,15 +265,8 @@ fn at_the_end(report: &ReplayReport) -> Markup {
     }
 }
 
-fn known(entry: &EstimateEntry, text: impl Fn() -> String) -> String {
-    if entry.identifiable { text() } else { "–".to_owned() }
-}
-
 fn doubt(entry: &EstimateEntry) -> String {
-    if entry.identifiable {
-        return String::new();
-    }
-    format!("not identified: {}", entry.reason.as_deref().unwrap_or("not enough excitation"))
+    if entry.identifiable { String::new() } else { format!("not identified: {}", unknown(entry)) }
 }
 
 fn trend(report: &ReplayReport, leak: Leak) -> String {

@@ -1,16 +1,17 @@
 //! A diagnosis as lines of text: the verdict, the effects, the error before and after, the residual, the leaks.
 
 use super::Text;
+use super::replay::per_bar;
 use crate::Palette;
 use crate::bar::level;
+use crate::envelope::extremes;
 use crate::residuals::{name, people, people_unit, quantity, symbol};
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,
     Verdict,
 };
-use pitchleak::report::with_interval;
-use pitchleak::units::{LPM_PER_BAR, LPM_PER_M3S as LPM};
+use pitchleak::units::LPM_PER_M3S as LPM;
 use pitchleak::wiring::Wiring;
 use std::fmt::Write;
 
@@ -126,7 +127,7 @@ impl DiagnosisText<'_> {
         {
             let text = |leak: LeakEstimate| {
                 let mark = if leak.physical { "" } else { " (impossible)" };
-                with_interval(leak.value * LPM_PER_BAR, Some(leak.std * LPM_PER_BAR)) + mark
+                per_bar(leak.value, Some(leak.std)) + mark
             };
             let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
         }
@@ -140,9 +141,7 @@ impl DiagnosisText<'_> {
         }
         out.push_str("\nleaks that change, L/min/bar            before                  after\n");
         for change in changes.iter().take(MOST_CHANGES) {
-            let text = |level: &Estimate<f64>| {
-                with_interval(level.value * LPM_PER_BAR, Some(level.std * LPM_PER_BAR))
-            };
+            let text = |level: &Estimate<f64>| per_bar(level.value, Some(level.std));
             let leak = Leak::ALL.into_iter().find(|leak| leak.id() == change.fault).map_or("", Leak::label);
             let at = format!("{leak} at {:.1} s", change.time_s);
             let trace =
@@ -206,9 +205,9 @@ pub(crate) fn companions(residual: &EquationResidual) -> String {
 
 fn line(binned: &BinnedResidual) -> String {
     let (factor, unit) = people_unit(binned.equation);
-    let [low, high] = extremes(&binned.mean);
+    let [low, high] = extremes(binned.mean.iter().copied());
     let bars: String = binned.mean.iter().map(|mean| level((mean - low) / (high - low))).collect();
-    let [from, to] = extremes(&binned.at);
+    let [from, to] = extremes(binned.at.iter().copied());
     let (scale, scale_unit) = people(binned.against);
     let space = if scale_unit.is_empty() { "" } else { " " };
     format!(
@@ -220,11 +219,6 @@ fn line(binned: &BinnedResidual) -> String {
         short(from * scale),
         short(to * scale)
     )
-}
-
-fn extremes(values: &[f64]) -> [f64; 2] {
-    let fold = |f: fn(f64, f64) -> f64, start| values.iter().copied().fold(start, f);
-    [fold(f64::min, f64::INFINITY), fold(f64::max, f64::NEG_INFINITY)]
 }
 
 fn probability(p: f64) -> String {

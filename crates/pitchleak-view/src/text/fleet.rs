@@ -57,41 +57,24 @@ impl FleetText<'_> {
     fn write_worst(&self, text: &mut String) {
         // A cylinder without any verdict stands below, by its traces.
         let worst: Vec<_> = self.report.worst().filter(|cylinder| cylinder.status.is_some()).collect();
-        let (shown, more) = worst.split_at(worst.len().min(LINES));
-        let bars = Bars::of(shown).filter(|_| self.draws);
-        if !shown.is_empty() {
-            text.push('\n');
-        }
-        text.push_str(&bars.as_ref().map_or_else(String::new, |bars| bars.legend(self.palette)));
-        for cylinder in shown {
+        let bars = Bars::of(&worst[..worst.len().min(LINES)]).filter(|_| self.draws);
+        let legend = bars.as_ref().map_or_else(String::new, |bars| bars.legend(self.palette));
+        write_lines(text, &legend, &worst, |cylinder| {
             let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(cylinder));
-            text.push_str(&self.line(cylinder, &bar));
-        }
-        write_more(text, more.len());
+            self.line(cylinder, &bar)
+        });
     }
 
     fn write_failed(&self, text: &mut String) {
         let (colour, reset) = self.palette.caution();
         let failed: Vec<_> = self.report.failed().filter_map(|row| row.error.as_ref()).collect();
-        if !failed.is_empty() {
-            text.push('\n');
-        }
-        for error in failed.iter().take(LINES) {
-            let _ = writeln!(text, "{colour}ERROR{reset}     {error}");
-        }
-        write_more(text, failed.len().saturating_sub(LINES));
+        write_lines(text, "", &failed, |error| format!("{colour}ERROR{reset}     {error}"));
     }
 
     fn write_differing(&self, text: &mut String) {
-        let differing = self.report.differing();
-        if !differing.is_empty() {
-            text.push('\n');
-        }
-        for (cylinder, leak, beside) in differing.iter().take(LINES) {
-            let (name, leak, said) = (&cylinder.cylinder, leak.label(), beside.text());
-            let _ = writeln!(text, "DIFFERS   {name}  {leak} {said}");
-        }
-        write_more(text, differing.len().saturating_sub(LINES));
+        write_lines(text, "", &self.report.differing(), |(cylinder, leak, beside)| {
+            format!("DIFFERS   {}  {} {}", cylinder.cylinder, leak.label(), beside.text())
+        });
     }
 
     fn line(&self, cylinder: &FleetCylinder, bar: &str) -> String {
@@ -99,23 +82,18 @@ impl FleetText<'_> {
         let (colour, reset) =
             cylinder.status.map_or(self.palette.caution(), |status| self.palette.verdict(status));
         let found = found(cylinder, self.report);
-        format!("{colour}{word:<8}{reset}  {bar}{}  {found}\n", cylinder.cylinder)
+        format!("{colour}{word:<8}{reset}  {bar}{}  {found}", cylinder.cylinder)
     }
 
     fn write_trends(&self, text: &mut String) {
-        let growing = self.report.growing();
-        if !growing.is_empty() {
-            text.push('\n');
-        }
-        for (cylinder, leak, long) in growing.iter().take(LINES) {
+        write_lines(text, "", &self.report.growing(), |(cylinder, leak, long)| {
             let course = if self.draws {
                 format!("{:<CELLS$}  ", course_of(self.report, cylinder, *leak))
             } else {
                 String::new()
             };
-            let _ = writeln!(text, "GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate());
-        }
-        write_more(text, growing.len().saturating_sub(LINES));
+            format!("GROWS     {course}{cylinder}  {} by {}", leak.label(), long.rate())
+        });
     }
 
     fn write_odds(&self, text: &mut String) {
@@ -129,7 +107,16 @@ impl FleetText<'_> {
     }
 }
 
-fn write_more(text: &mut String, more: usize) {
+/// A line for each, under an empty one and `legend`; beyond so many, how many more there are.
+fn write_lines<T>(text: &mut String, legend: &str, all: &[T], line: impl Fn(&T) -> String) {
+    if !all.is_empty() {
+        text.push('\n');
+    }
+    text.push_str(legend);
+    for one in all.iter().take(LINES) {
+        let _ = writeln!(text, "{}", line(one));
+    }
+    let more = all.len().saturating_sub(LINES);
     if more > 0 {
         let _ = writeln!(text, "… and {more} more");
     }

@@ -14,7 +14,7 @@ pub use diagnosis::sentence;
 pub use fleet::fleet_terminal;
 pub(crate) use fleet::found;
 pub use replay::data_line;
-pub(crate) use replay::{hold_line, misfit, missing_rig, rig_line};
+pub(crate) use replay::{gpa, hold_line, known, misfit, missing_rig, per_bar, rig_line, unknown};
 pub use replay_terminal::ReplaySketch;
 pub(crate) use valve::valve_line;
 

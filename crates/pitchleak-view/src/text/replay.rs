@@ -51,11 +51,15 @@ pub(crate) fn rig_line(rig: &str) -> String {
 /// How much of a hold test counts, and from which size on it finds each leak.
 pub(crate) fn hold_line(hold: &HoldSummary) -> String {
     let Some(leaks) = &hold.leaks else { return "nothing of it is usable".to_owned() };
-    let smallest = |(leak, held): (Leak, &FoundLeak)| {
-        format!("{} leaks from {} L/min", leak.label(), readable(held.smallest_lpm, 2))
+    format!("{} s usable; {}", readable(hold.usable_s, 3), finds(leaks.iter()))
+}
+
+/// From which size on each leak is found.
+pub(super) fn finds<'a>(leaks: impl Iterator<Item = (Leak, &'a FoundLeak)>) -> String {
+    let smallest = |(leak, found): (Leak, &FoundLeak)| {
+        format!("{} leaks from {} L/min", leak.label(), readable(found.smallest_lpm, 2))
     };
-    let smallest: Vec<_> = leaks.iter().map(smallest).collect();
-    format!("{} s usable; finds {} on", readable(hold.usable_s, 3), smallest.join(", "))
+    format!("finds {} on", leaks.map(smallest).collect::<Vec<_>>().join(", "))
 }
 
 /// More alarms than these are told as spells alone.
@@ -141,19 +145,13 @@ impl ReplayText<'_> {
         let ((faint, reset), (caution, _)) = (self.palette.faint(), self.palette.caution());
         let _ = writeln!(out, "{faint}{:<12}{:<24}L/min/bar, 95 %{reset}", "leak", "L/min, 95 %");
         for (leak, entry) in self.report.estimates.leaks() {
-            let flow = interval(&self.report.leakage[leak]);
-            let scaled = entry.std.map(|std| std * LPM_PER_BAR);
-            let coefficient = with_interval(entry.value * LPM_PER_BAR, scaled);
-            let figures =
-                [flow, coefficient].map(|text| if entry.identifiable { text } else { "–".to_owned() });
-            let [flow, coefficient] = figures;
+            let flow = known(entry, || interval(&self.report.leakage[leak]));
+            let coefficient = known(entry, || per_bar(entry.value, entry.std));
             let line = format!("{:<12}{flow:<24}{coefficient:<24}", leak.label());
             write_row(out, &line, entry, caution, reset);
         }
         let bulk = &self.report.estimates.bulk_modulus;
-        let gpa = with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9));
-        let text =
-            if bulk.identifiable { format!("bulk modulus {gpa} GPa") } else { "bulk modulus –".to_owned() };
+        let text = format!("bulk modulus {}", known(bulk, || gpa(bulk)));
         write_row(out, &format!("{:<12}{text:<48}", "oil"), bulk, caution, reset);
     }
 
@@ -215,12 +213,31 @@ impl ReplayText<'_> {
     }
 }
 
+/// A figure, where the trace tells it.
+pub(crate) fn known(entry: &EstimateEntry, text: impl Fn() -> String) -> String {
+    if entry.identifiable { text() } else { "–".to_owned() }
+}
+
+/// Why a trace does not tell a figure.
+pub(crate) fn unknown(entry: &EstimateEntry) -> &str {
+    entry.reason.as_deref().unwrap_or("not enough excitation")
+}
+
+/// A bulk modulus with its 95 % interval.
+pub(crate) fn gpa(bulk: &EstimateEntry) -> String {
+    format!("{} GPa", with_interval(bulk.value / 1e9, bulk.std.map(|std| std / 1e9)))
+}
+
+/// A leak coefficient of m³/(s·Pa) with its 95 % interval, L/min/bar.
+pub(crate) fn per_bar(value: f64, std: Option<f64>) -> String {
+    with_interval(value * LPM_PER_BAR, std.map(|std| std * LPM_PER_BAR))
+}
+
 /// A row of the table, and why it is to be doubted.
 fn write_row(out: &mut String, line: &str, entry: &EstimateEntry, caution: &str, reset: &str) {
     let _ = if entry.identifiable {
         writeln!(out, "{}", line.trim_end())
     } else {
-        let reason = entry.reason.as_deref().unwrap_or("not enough excitation");
-        writeln!(out, "{line}{caution}not identifiable: {reason}{reset}")
+        writeln!(out, "{line}{caution}not identifiable: {}{reset}", unknown(entry))
     };
 }

@@ -5,7 +5,7 @@ use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
 use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::Replay;
-use pitchleak::report::{Leakage, ReplayReport};
+use pitchleak::report::ReplayReport;
 use pitchleak::rig::Rig;
 use pitchleak::trace::Record;
 use pitchleak::units::LPM_PER_M3S;
@@ -20,7 +20,7 @@ const COURSE: usize = 60;
 pub(super) fn write_bars(out: &mut String, report: &ReplayReport, sketch: &ReplaySketch, palette: &Palette) {
     let known = Leak::ALL.into_iter().filter(|leak| report.estimates.leaks()[*leak].identifiable);
     let bars: Vec<(Leak, Bar)> =
-        known.map(|leak| (leak, bar(&report.leakage[leak], sketch.threshold_lpm[leak]))).collect();
+        known.map(|leak| (leak, Bar::of(&report.leakage[leak], sketch.threshold_lpm[leak]))).collect();
     let Some(ends) = scale(bars.iter().map(|(_, bar)| bar)) else { return };
     let (faint, reset) = palette.faint();
     let range = scale_text(ends);
@@ -33,10 +33,6 @@ pub(super) fn write_bars(out: &mut String, report: &ReplayReport, sketch: &Repla
     for (leak, bar) in bars {
         let _ = writeln!(out, "{:<12}{}", leak.label(), bar.text(ends, BAR).trim_end());
     }
-}
-
-fn bar(leakage: &Leakage, threshold_lpm: f64) -> Bar {
-    Bar { interval: leakage.ci95(), value: (leakage.mean_lpm, VALUE), limit: threshold_lpm }
 }
 
 /// Writes how large each leak was over the trace; what is above the alarm level stands out.

@@ -1,9 +1,9 @@
 //! A valve's calibration, and what its flows are worth, as text.
 
 use super::Text;
+use super::replay::finds;
 use crate::Palette;
 use pitchleak::core::Leak;
-use pitchleak::presence::FoundLeak;
 use pitchleak::units::{duration, readable};
 use pitchleak::valve::{Calibration, EdgeFound, LeaksThen, ValveSummary};
 use std::fmt::Write;
@@ -17,13 +17,9 @@ pub(crate) fn valve_line(valve: &ValveSummary) -> String {
     };
     let head = format!("{basis}; spool from {least} to {most} %");
     let Some(leaks) = &valve.leaks else { return format!("{head}; tells of no leaks") };
-    let smallest = |(leak, found): (Leak, &FoundLeak)| {
-        format!("{} leaks from {} L/min", leak.label(), readable(found.smallest_lpm, 2))
-    };
     // Of the leak at a chamber whose pressure is not measured nothing is told.
     let untold = valve.unread.map(|name| if name == "pa" { Leak::ExternalA } else { Leak::ExternalB });
-    let smallest: Vec<_> = leaks.iter().filter(|(leak, _)| Some(*leak) != untold).map(smallest).collect();
-    format!("{head}; finds {} on", smallest.join(", "))
+    format!("{head}; {}", finds(leaks.iter().filter(|(leak, _)| Some(*leak) != untold)))
 }
 
 impl Text for Calibration {

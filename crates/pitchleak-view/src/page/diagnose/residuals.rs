@@ -3,8 +3,7 @@
 use super::super::chart::{Chart, Charts, Ink, Line};
 use super::super::machine::table;
 use crate::envelope::{Envelopes, Range, Spot};
-use crate::residuals::in_a_row;
-use crate::residuals::{name, people, people_unit, symbol};
+use crate::residuals::{drawn_bins, in_a_row, name, people, people_unit, symbol};
 use maud::{Markup, html};
 use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation};
 use pitchleak::report::capital;
@@ -82,10 +81,7 @@ fn mended_most(diagnosis: &Diagnosis) -> Vec<(usize, Equation)> {
 }
 
 fn against(diagnosis: &Diagnosis, equation: Equation, charts: &mut Charts) -> Markup {
-    let bins = diagnosis.before.binned_residuals.iter().zip(&diagnosis.after.binned_residuals);
-    let mut own: Vec<_> = bins
-        .filter(|(one, _)| one.equation == equation && one.varies() && one.against != "direction")
-        .collect();
+    let mut own: Vec<_> = drawn_bins(diagnosis, equation).collect();
     own.sort_by(|a, b| b.0.strength().total_cmp(&a.0.strength()));
     let mut drawn = html! {};
     for (before, after) in own.into_iter().take(MOST_DRAWN) {
