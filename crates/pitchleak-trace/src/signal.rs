@@ -1,6 +1,6 @@
 //! The signals that a trace may hold, and what each measures.
 
-use crate::units::Dimension;
+use crate::units::{Dimension, Unit};
 
 /// The table of the signals: what each is, its name in a column header, and what it measures.
 macro_rules! signals {
@@ -75,6 +75,16 @@ impl Signal {
     /// The signal of this name.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|signal| signal.name() == name)
+    }
+
+    /// Its SI unit.
+    pub(crate) fn si(self) -> Option<Unit> {
+        self.dimension()?.units().first().copied()
+    }
+
+    /// Whether it is the time: a timestamp is as good as a number.
+    pub fn is_time(self) -> bool {
+        matches!(self, Self::Time | Self::Timestamp)
     }
 
     /// Whether a sensor of the cylinder reads it, not one of its valve.

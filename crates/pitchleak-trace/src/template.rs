@@ -31,8 +31,7 @@ pub fn template(rig: &Rig, lines: &[ProposedLine], given: &[Signal]) -> String {
         let _ = writeln!(out, "{line}   # {why}");
     }
     for signal in missing {
-        let unit =
-            signal.dimension().and_then(|dimension| dimension.units().first()).map_or("", |unit| unit.text);
+        let unit = signal.si().map_or("", |unit| unit.text);
         let rests = matches!(signal, Signal::FlowA | Signal::FlowB);
         let note =
             if rests { "without it this chamber's equation rests" } else { "no column was recognised" };

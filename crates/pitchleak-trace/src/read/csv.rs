@@ -135,14 +135,16 @@ pub(super) fn read_cells<'a>(
             return Err(Fault { column: None, reason: BadReason::ShortRow });
         }
         let read = match &column.content {
-            Content::Number(signal, unit) => {
+            Some(Content { signal: Signal::Timestamp, .. }) => {
+                epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds))
+            }
+            Some(Content { signal, unit }) => {
                 cells.number().map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value))))
             }
-            Content::Ignored => {
+            None => {
                 cells.cell();
                 Ok(())
             }
-            Content::Timestamp => epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds)),
         };
         read.map_err(|reason| Fault { column: Some(index), reason })?;
     }

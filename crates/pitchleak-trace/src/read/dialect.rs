@@ -1,11 +1,11 @@
 //! How a text file of numbers is written: found in its first lines, said where it is not as this program writes one, and
 //! refused where it can be read in two ways.
 
-use super::columns::{Content, Layout, REQUIRED, partly};
+use super::columns::{Column, Layout, REQUIRED};
 use super::error::TraceFault;
 use super::format::{Stream, mistaken};
 use super::number::decimal;
-use super::proposal::{Proposal, proposals};
+use super::proposal::{Proposal, partly, proposals};
 use super::records::{Encoding, Records, Stop, stopped_early};
 use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
@@ -74,7 +74,7 @@ impl Dialect {
             Some(decimal) => decimal,
             None => decimal(&numbers(&table, &layout))?,
         };
-        if let Some(index) = layout.columns.iter().position(|column| column.content == Content::Timestamp) {
+        if let Some(index) = layout.columns.iter().position(Column::is_timestamp) {
             layout.time = time_format(&table.column(index), &layout, &foreign, rig)?;
         }
         check_steps(&table, &layout, decimal)?;
@@ -107,7 +107,7 @@ fn hinted(mut fault: TraceFault, table: &TextTable, rig: &Rig) -> TraceFault {
         Signal::Timestamp => signal == "time",
         other => REQUIRED.iter().any(|(required, words)| *required == other && words == signal),
     };
-    *hint = match proposals(table, &partly(&table.headers, rig), rig).iter().find(is_missing) {
+    *hint = match proposals(table, &partly(table, rig), rig).iter().find(is_missing) {
         Some(Proposal { signal, column, .. }) => format!(
             "; if `{}` is it, say {} = {} under [columns] of the rig file (`pitchleak columns` proposes all)",
             shorten(&column.name, 40),
@@ -155,20 +155,17 @@ fn check_shape(table: &TextTable) -> Result<(), TraceFault> {
 /// The cells of every column of numbers.
 fn numbers<'a>(table: &'a TextTable, layout: &Layout) -> Vec<Vec<&'a str>> {
     let columns = layout.columns.iter().enumerate();
-    let numbers = columns.filter(|(_, column)| matches!(column.content, Content::Number(..)));
+    let numbers = columns.filter(|(_, column)| column.content.is_some() && !column.is_timestamp());
     numbers.map(|(index, _)| table.column(index)).collect()
 }
 
 /// A clock that shows whole seconds only leaves one row of a second.
 fn check_steps(table: &TextTable, layout: &Layout, decimal: Decimal) -> Result<(), TraceFault> {
-    let is_time = |signal| matches!(signal, Some(Signal::Time | Signal::Timestamp));
-    let Some(index) = layout.columns.iter().position(|column| is_time(column.content.signal())) else {
-        return Ok(());
-    };
+    let is_time = |(_, column): &(usize, &Column)| column.is_time();
+    let Some((index, column)) = layout.columns.iter().enumerate().find(is_time) else { return Ok(()) };
     let cells = table.column(index);
-    let stamped = layout.columns.get(index).is_some_and(|column| column.content == Content::Timestamp);
     let mut epoch = Epoch::new(layout.time.clone());
-    let seconds = |cell: &&str| match (stamped, decimal) {
+    let seconds = |cell: &&str| match (column.is_timestamp(), decimal) {
         (true, _) => epoch.seconds(cell.as_bytes()).ok(),
         (false, Decimal::Point) => fast_float2::parse::<f64, _>(cell.as_bytes()).ok(),
         (false, Decimal::Comma) => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
@@ -178,9 +175,12 @@ fn check_steps(table: &TextTable, layout: &Layout, decimal: Decimal) -> Result<(
     if still < 10 || 5 * still < 3 * times.len() {
         return Ok(());
     }
-    let name = layout.columns.get(index).map_or("", |column| &column.header);
     Err(TraceFault::Ambiguous {
-        what: format!("column `{}` says the same time in {still} of {} rows", shorten(name, 40), times.len()),
+        what: format!(
+            "column `{}` says the same time in {still} of {} rows",
+            shorten(&column.header, 40),
+            times.len()
+        ),
         settle: "export it with fractions of a second".to_owned(),
     })
 }

@@ -1,11 +1,11 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::columns::{Bound, Content, partly};
+use super::columns::{Bound, Content};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::format;
 use super::number::decimal;
-use super::proposal::{Proposal, Why, proposals};
+use super::proposal::{Proposal, Why, partly, proposals};
 use super::table_text::TextTable;
 use crate::header::{near, shorten};
 use crate::rig::{ColumnMap, Decimal, ForeignColumn, Rig};
@@ -112,7 +112,7 @@ impl FileReading {
         let named = table.bound.as_ref().map(|bound| named(&bound.foreign)).unwrap_or_default();
         let found = match &table.bound {
             Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
-            Err(_) => partly(&table.headers, rig),
+            Err(_) => partly(&table, rig),
         };
         let columns = table.headers.iter().zip(found.iter()).enumerate().map(|(index, (header, content))| {
             let first =
@@ -149,16 +149,14 @@ impl FileReading {
     }
 }
 
-fn read_column(header: &str, content: Content, first: Vec<String>) -> ColumnReading {
-    let (signal, unit) = match content {
-        Content::Number(signal, unit) => {
-            let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
-            (Some(signal.name()), unit.or_else(si).map(|unit| unit.text))
-        }
-        Content::Timestamp => (Some(Signal::Timestamp.name()), None),
-        Content::Ignored => (None, None),
-    };
-    ColumnReading { header: shorten(header, 60), signal, unit, first }
+fn read_column(header: &str, content: Option<Content>, first: Vec<String>) -> ColumnReading {
+    let unit = content.and_then(|Content { signal, unit }| unit.or_else(|| signal.si()));
+    ColumnReading {
+        header: shorten(header, 60),
+        signal: content.map(|content| content.signal.name()),
+        unit: unit.map(|unit| unit.text),
+        first,
+    }
 }
 
 fn line(proposal: &Proposal) -> ProposedLine {

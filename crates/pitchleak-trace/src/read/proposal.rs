@@ -1,6 +1,6 @@
 //! What foreign columns may be, by their names and by their values: proposed to a person, never read.
 
-use super::columns::{Content, bare_unit};
+use super::columns::{Content, bare_unit, content_of};
 use super::number::decimal;
 use super::table_text::TextTable;
 use crate::header::{self, HeaderUnit, lists};
@@ -149,13 +149,17 @@ pub(super) fn propose(
     proposals
 }
 
+/// What the headers say one by one, where they do not make a trace together.
+pub(super) fn partly(table: &TextTable, rig: &Rig) -> Vec<Option<Content>> {
+    table.headers.iter().map(|header| content_of(header.trim(), &rig.columns)).collect()
+}
+
 /// What the columns that are not read may be.
-pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<Proposal> {
-    let has = |signal: Signal| found.iter().any(|content| content.signal() == Some(signal));
+pub(super) fn proposals(table: &TextTable, found: &[Option<Content>], rig: &Rig) -> Vec<Proposal> {
+    let has = |signal: Signal| found.iter().flatten().any(|content| content.signal == signal);
     let has_time = has(Signal::Time) || has(Signal::Timestamp);
-    let is_time = |signal: &Signal| matches!(signal, Signal::Time | Signal::Timestamp);
-    let wanted: Vec<Signal> =
-        Signal::ALL.into_iter().filter(|signal| !(has(*signal) || has_time && is_time(signal))).collect();
+    let is_given = |signal: &Signal| has(*signal) || has_time && signal.is_time();
+    let wanted: Vec<Signal> = Signal::ALL.into_iter().filter(|signal| !is_given(signal)).collect();
     let unit = |index: usize| {
         let cell = table.units.as_ref().and_then(|row| row.cells.get(index));
         cell.map(|cell| bare_unit(cell)).unwrap_or_default()
@@ -163,7 +167,7 @@ pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<
     let unread: Vec<Unread<'_>> = (0..)
         .zip(&table.headers)
         .zip(found)
-        .filter(|(_, content)| **content == Content::Ignored)
+        .filter(|(_, content)| content.is_none())
         .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
         .collect();
     let cells: Vec<Vec<&str>> = unread.iter().map(|column| column.cells.clone()).collect();

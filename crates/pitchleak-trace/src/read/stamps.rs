@@ -1,6 +1,6 @@
 //! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
 
-use super::columns::{Content, Layout, TextRow};
+use super::columns::{Column, Layout, TextRow};
 use super::error::{BadReason, TraceFault};
 use super::table::Cells;
 use crate::header::shorten;
@@ -85,7 +85,7 @@ pub(super) fn cells(
     rig: &Rig,
     columns: Vec<Vec<f64>>,
 ) -> Result<Vec<Cells<'static>>, TraceFault> {
-    let stamps = layout.columns.iter().position(|column| column.content == Content::Timestamp);
+    let stamps = layout.columns.iter().position(Column::is_timestamp);
     layout.time = match stamps.and_then(|index| columns.get(index)) {
         None => TimeFormat::default(),
         Some(values) => {
@@ -97,12 +97,12 @@ pub(super) fn cells(
     let mut epoch = Epoch::new(layout.time.clone());
     let mut cells = Vec::new();
     for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
-        let Some((signal, unit)) = column.content.cells() else { continue };
-        let values = match column.content {
-            Content::Timestamp => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
-            _ => values,
+        let Some(content) = column.content else { continue };
+        let values = match column.is_timestamp() {
+            true => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
+            false => values,
         };
-        cells.push(Cells { signal, unit, values: Cow::Owned(values), index });
+        cells.push(Cells::of(content, Cow::Owned(values), index));
     }
     Ok(cells)
 }

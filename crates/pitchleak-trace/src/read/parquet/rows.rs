@@ -11,6 +11,7 @@ use crate::read::stamps::{Epoch, seconds_between, time_format};
 use crate::read::table::{Cells, TableRows};
 use crate::read::table_text::TextTable;
 use crate::rig::Rig;
+use crate::signal::Signal;
 use crate::times::TimeFormat;
 use bytes::Bytes;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -45,6 +46,12 @@ struct Read {
     content: Content,
 }
 
+impl Read {
+    fn is_stamp(&self) -> bool {
+        self.content.signal == Signal::Timestamp
+    }
+}
+
 pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     guarded(|| open_unguarded(stream, rig))
 }
@@ -77,10 +84,10 @@ fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let mut layout = Layout { counted: Counted::Rows, ..bound.layout };
     let mut read = Vec::new();
     for (index, (field, bound_column)) in fields.iter().zip(&layout.columns).enumerate() {
-        let fits = match bound_column.content {
-            Content::Ignored => continue,
-            Content::Number(..) => matches!(field.kind, Kind::Number | Kind::Decimal(_)),
-            Content::Timestamp => !matches!(field.kind, Kind::Other | Kind::Int96),
+        let Some(content) = bound_column.content else { continue };
+        let fits = match bound_column.is_timestamp() {
+            true => !matches!(field.kind, Kind::Other | Kind::Int96),
+            false => matches!(field.kind, Kind::Number | Kind::Decimal(_)),
         };
         if field.kind == Kind::Int96 {
             return Err(TraceFault::Ambiguous {
@@ -101,9 +108,9 @@ fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
             });
         }
         let Field { place, optional, kind, .. } = *field;
-        read.push(Read { field: index, place, optional, kind, content: bound_column.content });
+        read.push(Read { field: index, place, optional, kind, content });
     }
-    layout.time = match read.iter().find(|read| read.content == Content::Timestamp) {
+    layout.time = match read.iter().find(|read| read.is_stamp()) {
         Some(stamps) if !matches!(stamps.kind, Kind::Stamp(_)) => {
             time_format(&column(&sample, stamps.field), &layout, &bound.foreign, rig)?
         }
@@ -151,7 +158,7 @@ fn fields(file: &dyn Columns) -> Vec<Field> {
 /// Whether a column's header alone says that it holds numbers, and of which signal.
 fn is_plain(field: &Field, rig: &Rig) -> bool {
     let is_mapped = || rig.columns.values().any(|column| column.name.trim() == field.name.trim());
-    matches!(standard(field.name.trim()), Some((_, Some(_)))) && !is_mapped()
+    standard(field.name.trim()).is_some_and(|standard| standard.unit.is_some()) && !is_mapped()
 }
 
 /// The first rows as text, as those of a file of text are looked at; without the columns whose cells nobody asks, because
@@ -237,9 +244,8 @@ impl Batches {
     fn batch(&mut self) -> Result<Vec<Cells<'static>>, TraceFault> {
         let mut cells = Vec::with_capacity(self.read.len());
         for (read, reader) in self.read.iter().zip(&mut self.open) {
-            let Some((signal, unit)) = read.content.cells() else { continue };
-            let values = match (read.content, read.kind) {
-                (Content::Timestamp, Kind::Stamp(ns)) => {
+            let values = match (read.is_stamp(), read.kind) {
+                (true, Kind::Stamp(ns)) => {
                     let stamps = stamps(reader, read.optional)?;
                     let first_ns = &mut self.first_ns;
                     let seconds = |stamp: Option<i64>| {
@@ -249,17 +255,17 @@ impl Batches {
                     };
                     stamps.into_iter().map(seconds).collect()
                 }
-                (Content::Timestamp, Kind::Text) => {
+                (true, Kind::Text) => {
                     let texts = texts(reader, read.optional, BATCH)?;
                     texts.iter().map(|text| self.epoch.seconds(text.data()).unwrap_or(f64::NAN)).collect()
                 }
-                (Content::Timestamp, _) => {
+                (true, _) => {
                     let values = numbers(reader, read.kind, read.optional, BATCH)?;
                     values.into_iter().map(|value| self.epoch.seconds_of(value)).collect()
                 }
-                _ => numbers(reader, read.kind, read.optional, BATCH)?,
+                (false, _) => numbers(reader, read.kind, read.optional, BATCH)?,
             };
-            cells.push(Cells { signal, unit, values: Cow::Owned(values), index: read.field });
+            cells.push(Cells::of(read.content, Cow::Owned(values), read.field));
         }
         Ok(cells)
     }
