@@ -3,24 +3,32 @@
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
 use super::error::{BadReason, BadRow, Counted, TraceFault};
-use super::format::{Format, Reading, Stream};
+use super::format::{Rows, Stream};
 use super::number::plain_number;
 use super::records::{Record, Records, Stop, Text, stopped_early};
 use super::row::{Fault, Next, Row, RowSource, check_time};
 use super::stamps::Epoch;
+use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::{Decimal, Rig};
 use crate::signal::Signal;
 use crate::times::TimeKind;
 
-/// Text is whatever no other format knows as its own.
-pub(super) const FORMAT: Format = Format {
-    starts_with: b"",
-    reading: Reading::Rows {
-        open: |stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?)),
-        look: |stream, rig| Dialect::first_lines(stream, rig).map(|(_, _, table)| table),
-    },
-};
+pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+    Dialect::first_lines(stream, rig).map(|(_, _, table)| table)
+}
+
+/// Reads all before the first row.
+pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    let gzip = stream.gzip;
+    let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
+    let dialect = Dialect::of(table, encoding, rig)?;
+    dialect.skip_header(&mut records).map_err(stopped_early)?;
+    let Dialect { delimiter, decimal, layout, .. } = dialect;
+    let epoch = Epoch::new(layout.time.clone());
+    let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
+    Ok(Box::new(CsvRows { records, splitting, gzip }))
+}
 
 struct CsvRows {
     records: Records,
@@ -39,18 +47,6 @@ struct Splitting {
 }
 
 impl CsvRows {
-    /// Reads all before the first row.
-    fn open(stream: Stream, rig: &Rig) -> Result<Self, TraceFault> {
-        let gzip = stream.gzip;
-        let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
-        let dialect = Dialect::of(table, encoding, rig)?;
-        dialect.skip_header(&mut records).map_err(stopped_early)?;
-        let Dialect { delimiter, decimal, layout, .. } = dialect;
-        let epoch = Epoch::new(layout.time.clone());
-        let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
-        Ok(Self { records, splitting, gzip })
-    }
-
     #[cold]
     fn stopped(&self, stop: Stop) -> Result<Next, TraceFault> {
         let line = self.records.next_line();

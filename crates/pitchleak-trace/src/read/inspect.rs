@@ -1,6 +1,7 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::columns::{Bound, Content};
+use super::bind::Bound;
+use super::columns::Content;
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::format;
@@ -97,7 +98,7 @@ impl FileReading {
             let file = File::open(path).map_err(TraceFault::Open)?;
             format::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
         };
-        Ok(Self::of_table(format.look(stream, rig)?, rig))
+        Ok(Self::of_table((format.look)(stream, rig)?, rig))
     }
 
     fn of_table(table: TextTable, rig: &Rig) -> Self {

@@ -5,9 +5,8 @@
 mod hdf5;
 mod vector;
 
-use super::columns::bind;
 use super::error::{Counted, TraceFault};
-use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
+use super::format::{MOST_HELD, Rows, Stream};
 use super::stamps::{self, sample};
 use super::table::TableRows;
 use super::table_text::TextTable;
@@ -16,8 +15,6 @@ use crate::rig::Rig;
 use flate2::read::ZlibDecoder;
 use std::io::{self, Read};
 use std::sync::Arc;
-
-pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows { open, look } };
 
 /// Types of data elements that hold others.
 const MATRIX: u32 = 14;
@@ -41,17 +38,17 @@ enum Values {
     Other(&'static str),
 }
 
-fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let Vectors { names, values, short, others } = vectors(stream)?;
-    let bound =
-        bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
+    let table = TextTable::of_columns(names, sample(&values), rig);
+    let bound = table.bound.map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
     layout.counted = Counted::Rows;
     let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, values)?);
     Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 
-fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
     let Vectors { names, values, .. } = vectors(stream)?;
     Ok(TextTable::of_columns(names, sample(&values), rig))
 }

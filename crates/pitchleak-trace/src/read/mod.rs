@@ -1,6 +1,7 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
 mod ahead;
+mod bind;
 mod clock;
 mod columns;
 mod csv;
@@ -13,6 +14,7 @@ mod line;
 mod mat;
 mod number;
 mod own_clocks;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod proposal;
 mod quality;

@@ -1,8 +1,8 @@
 //! What foreign columns may be, by their names and by their values: proposed to a person, never read.
 
-use super::columns::{Content, bare_unit, content_of};
+use super::columns::{Content, content_of};
 use super::number::decimal;
-use super::table_text::TextTable;
+use super::table_text::{TextTable, bare_unit};
 use crate::header::{self, HeaderUnit, lists};
 use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;

@@ -1,8 +1,9 @@
 //! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
 
-use super::columns::{Column, Layout, TextRow};
+use super::columns::{Column, Layout};
 use super::error::{BadReason, TraceFault};
 use super::table::Cells;
+use super::table_text::TextRow;
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
@@ -65,12 +66,15 @@ pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
 /// So many rows say how times are written.
 const ROWS: usize = 100;
 
+/// A number as text; none is an empty cell.
+pub(super) fn cell_text(value: &f64) -> String {
+    if value.is_nan() { String::new() } else { value.to_string() }
+}
+
 /// The first rows as text, as those of a file of text are looked at.
 pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
     let rows = columns.iter().map(Vec::len).max().unwrap_or(0).min(ROWS);
-    let text = |row: usize, column: &Vec<f64>| {
-        column.get(row).filter(|value| !value.is_nan()).map_or_else(String::new, f64::to_string)
-    };
+    let text = |row: usize, column: &Vec<f64>| column.get(row).map(cell_text).unwrap_or_default();
     let row = |row: usize| TextRow {
         line: row as u64,
         cells: columns.iter().map(|column| text(row, column)).collect(),

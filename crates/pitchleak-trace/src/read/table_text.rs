@@ -1,6 +1,6 @@
 //! The first lines of a text file as a table: where its header is, and what its first rows say.
 
-use super::columns::{Bound, TextRow, bare_unit, bind, column, name_part};
+use super::bind::{Bound, bind, name_part};
 use super::error::TraceFault;
 use super::records::{Records, text};
 use crate::header::HeaderUnit;
@@ -13,6 +13,30 @@ const LONGEST_PREAMBLE: usize = 100;
 const ROWS: usize = 1000;
 /// A trace has this many columns at least: time, position, two pressures.
 const LEAST_CELLS: usize = 4;
+
+/// One record, its cells without blanks around them.
+#[derive(Clone, Debug)]
+pub(super) struct TextRow {
+    /// From 1.
+    pub(super) line: u64,
+    pub(super) cells: Vec<String>,
+}
+
+/// What stands in a column of `rows`, empty cells left out.
+pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
+    rows.iter()
+        .filter_map(|row| row.cells.get(index))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
+        .collect()
+}
+
+/// Without brackets and dashes around it.
+pub(super) fn bare_unit(cell: &str) -> &str {
+    let cell = cell.trim_matches(['-', ' ']);
+    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
+}
 
 /// A header, and rows below it.
 pub(super) struct TextTable {

@@ -22,24 +22,27 @@ const DATA: i64 = 0;
 const DICTIONARY: i64 = 2;
 const DATA_2: i64 = 3;
 
-pub(super) struct Pages<R> {
-    file: Arc<R>,
+/// So many bytes of a file from a place on.
+pub(super) type ReadAt = Arc<dyn Fn(u64, usize) -> Result<Bytes> + Send + Sync>;
+
+struct Pages {
+    bytes: ReadAt,
     codec: Codec,
     /// Where the next one begins, and the bytes from there to the column's end.
     at: u64,
     left: u64,
 }
 
-impl<R: ChunkReader> Pages<R> {
-    pub(super) fn of(file: Arc<R>, chunk: Chunk) -> Result<Self> {
-        Ok(Self { file, codec: Codec::of(chunk.codec)?, at: chunk.start, left: chunk.length })
+impl Pages {
+    fn of(bytes: ReadAt, chunk: Chunk) -> Result<Self> {
+        Ok(Self { bytes, codec: Codec::of(chunk.codec)?, at: chunk.start, left: chunk.length })
     }
 
     fn take(&mut self, length: u64) -> Result<Bytes> {
         if length > self.left || length > MOST_HELD {
             return Err(damaged("a page is longer than its column"));
         }
-        let bytes = self.file.get_bytes(self.at, length as usize)?;
+        let bytes = (self.bytes)(self.at, length as usize)?;
         self.at += length;
         self.left -= length;
         Ok(bytes)
@@ -49,7 +52,7 @@ impl<R: ChunkReader> Pages<R> {
     fn head<T>(&mut self, read: impl Fn(&Fields<'_>) -> Result<T>) -> Result<T> {
         let mut look = HEAD;
         loop {
-            let bytes = self.file.get_bytes(self.at, look.min(self.left) as usize)?;
+            let bytes = (self.bytes)(self.at, look.min(self.left) as usize)?;
             match structure(&bytes) {
                 Ok((fields, length)) => {
                     let head = read(&fields)?;
@@ -169,7 +172,7 @@ impl Content {
     }
 }
 
-impl<R: ChunkReader> PageReader for Pages<R> {
+impl PageReader for Pages {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         while self.left > 0 {
             let head = self.head(Head::of)?;
@@ -191,7 +194,7 @@ impl<R: ChunkReader> PageReader for Pages<R> {
     }
 }
 
-impl<R: ChunkReader> Iterator for Pages<R> {
+impl Iterator for Pages {
     type Item = Result<Page>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -225,40 +228,34 @@ fn encoded(number: u32) -> Result<Encoding> {
     })
 }
 
-/// A file of columns, on a disk or in memory.
-pub(super) trait Columns: Send + Sync {
-    fn leaves(&self) -> &[Leaf];
+/// A file of columns.
+pub(super) struct Columns {
+    bytes: ReadAt,
+    /// Without those that have a nest.
+    pub(super) leaves: Vec<Leaf>,
+    groups: Vec<Vec<Chunk>>,
+}
+
+impl Columns {
+    /// Of a file on a disk or in memory.
+    pub(super) fn of(file: impl ChunkReader + 'static) -> Result<Self> {
+        let length = file.len();
+        let bytes: ReadAt = Arc::new(move |start, length| file.get_bytes(start, length));
+        let Footer { leaves, groups } = Footer::of(&bytes, length)?;
+        Ok(Self { bytes, leaves: leaves.into_iter().filter(Leaf::is_flat).collect(), groups })
+    }
 
     /// How many groups of rows there are.
-    fn groups(&self) -> usize;
-
-    /// The column at `place` of a group of rows.
-    fn read(&self, group: usize, place: usize) -> Result<ColumnReader>;
-}
-
-pub(super) fn open(bytes: impl ChunkReader + 'static) -> Result<Arc<dyn Columns>> {
-    let footer = Footer::of(&bytes)?;
-    Ok(Arc::new(InFile { bytes: Arc::new(bytes), footer }))
-}
-
-struct InFile<R> {
-    bytes: Arc<R>,
-    footer: Footer,
-}
-
-impl<R: ChunkReader + 'static> Columns for InFile<R> {
-    fn leaves(&self) -> &[Leaf] {
-        &self.footer.leaves
+    pub(super) fn groups(&self) -> usize {
+        self.groups.len()
     }
 
-    fn groups(&self) -> usize {
-        self.footer.groups.len()
-    }
-
-    fn read(&self, group: usize, place: usize) -> Result<ColumnReader> {
-        let chunk = self.footer.groups.get(group).and_then(|chunks| chunks.get(place));
-        let (Some(chunk), Some(leaf)) = (chunk, self.footer.leaves.get(place)) else {
-            return Err(ParquetError::General("a column that is not there".to_owned()));
+    /// The flat column at `index` of a group of rows.
+    pub(super) fn read(&self, group: usize, index: usize) -> Result<ColumnReader> {
+        let leaf = self.leaves.get(index);
+        let chunk = leaf.and_then(|leaf| self.groups.get(group)?.get(leaf.place));
+        let (Some(chunk), Some(leaf)) = (chunk, leaf) else {
+            return Err(damaged("a column that is not there"));
         };
         let pages = Pages::of(Arc::clone(&self.bytes), *chunk)?;
         Ok(get_column_reader(leaf.descriptor()?, Box::new(pages)))

@@ -4,10 +4,9 @@
 use super::merged::{Merged, Times};
 use super::{Recast, Shape, Source, Text};
 use crate::header::letters;
-use crate::read::columns::bare_unit;
 use crate::read::error::TraceFault;
 use crate::read::records::{Stop, stopped_early};
-use crate::read::table_text::TextTable;
+use crate::read::table_text::{TextTable, bare_unit};
 
 pub(super) const SHAPE: Shape = Shape { name: "a column of times for each channel", told };
 
