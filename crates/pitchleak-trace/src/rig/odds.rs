@@ -2,7 +2,6 @@
 
 use super::bound;
 use super::document::{Fault, RigError, Section};
-use crate::units::Dimension;
 use std::collections::BTreeMap;
 
 /// Prior probabilities of explanations, each within its kind.
@@ -44,7 +43,7 @@ impl Odds {
                 let allowed = "an id of `pitchleak explanations`".to_owned();
                 return Err(section.fail(key, Fault::UnknownKey { key: section.path(key), allowed }));
             }
-            let share = section.required(key, Dimension::Share, bound::ODDS)?;
+            let share = section.required(key, bound::ODDS)?;
             let part = share / ids.len() as f64;
             for id in ids {
                 own.0.insert(id, bound::ODDS.nearest(part));
@@ -52,7 +51,7 @@ impl Odds {
             let sum = kind(key).map_or(0.0, |kind| own.sum(kind));
             if sum > bound::ODDS.most() {
                 let with = format!("{sum:.3} together with the others of its kind");
-                return Err(section.impossible(key, &with, &bound::ODDS.text(Dimension::Share)));
+                return Err(section.impossible(key, &with, &bound::ODDS.text()));
             }
         }
         Ok(own)
