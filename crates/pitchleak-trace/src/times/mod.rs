@@ -90,11 +90,6 @@ impl TimeKind {
         NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
     }
 
-    /// Whether cells are numbers.
-    pub fn is_number(&self) -> bool {
-        matches!(self, Self::Epoch(_) | Self::Excel)
-    }
-
     /// Reads a cell; none where it is no such time.
     pub fn read(&self, text: &str) -> Option<Reading> {
         match self {
