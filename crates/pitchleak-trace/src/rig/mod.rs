@@ -13,7 +13,7 @@ mod write;
 pub use document::{Fault, Place, RigError};
 pub use effects::{EffectMap, EffectValue};
 pub use instruments::{Instrument, Instruments};
-pub use odds::{EXPLANATIONS, Odds};
+pub use odds::{Odds, explanations};
 pub use settings::{
     ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
     ForeignColumn,
