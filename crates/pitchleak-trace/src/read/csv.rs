@@ -198,15 +198,8 @@ pub(super) trait Cells<'a> {
     /// Bytes of the cell read last, without blanks around it.
     fn length(&self) -> usize;
 
-    /// What stands before the decimals.
-    fn decimal(&self) -> Decimal;
-
     /// Reads a cell as a number; NaN where it is empty.
-    #[inline]
-    fn number(&mut self) -> Result<f64, BadReason> {
-        let decimal = self.decimal();
-        read_number(self.cell(), decimal)
-    }
+    fn number(&mut self) -> Result<f64, BadReason>;
 }
 
 /// A record without quotes.
@@ -244,10 +237,6 @@ impl<'a> Plain<'a> {
 }
 
 impl<'a> Cells<'a> for Plain<'a> {
-    fn decimal(&self) -> Decimal {
-        self.decimal
-    }
-
     #[inline(always)]
     fn ended(&self) -> bool {
         self.ended
@@ -300,10 +289,6 @@ pub(super) struct Split<'a> {
 }
 
 impl<'a> Cells<'a> for Split<'a> {
-    fn decimal(&self) -> Decimal {
-        self.decimal
-    }
-
     fn ended(&self) -> bool {
         self.at >= self.cells.len()
     }
@@ -316,6 +301,10 @@ impl<'a> Cells<'a> for Split<'a> {
 
     fn length(&self) -> usize {
         self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
+    }
+
+    fn number(&mut self) -> Result<f64, BadReason> {
+        read_number(self.cell(), self.decimal)
     }
 }
 

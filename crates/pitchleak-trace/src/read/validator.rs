@@ -372,18 +372,8 @@ impl Ranges {
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
         let source = match signal {
             Signal::Position => "the stroke",
-            Signal::Temperature
-            | Signal::Speed
-            | Signal::Time
-            | Signal::Spool
-            | Signal::Command
-            | Signal::Supply
-            | Signal::Tank
-            | Signal::Shut
-            | Signal::LeakInternal
-            | Signal::LeakExternalA
-            | Signal::LeakExternalB => "what is possible",
-            _ => "the range of the sensor in the rig file",
+            signal if signal.is_sensor() => "the range of the sensor in the rig file",
+            _ => "what is possible",
         };
         let text = |value: f64| readable(unit.map_or(value, |unit| unit.from_si(value)), 6);
         let name = unit.map_or_else(|| signal.dimension().map_or("", Dimension::si), |unit| unit.text);

@@ -173,15 +173,16 @@ pub struct CsvSettings {
 
 /// What stands between two cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Delimiter {
     /// `,`
-    Comma,
+    Comma = b',',
     /// `;`
-    Semicolon,
+    Semicolon = b';',
     /// A tab.
-    Tab,
+    Tab = b'\t',
     /// `|`
-    Bar,
+    Bar = b'|',
 }
 
 impl Delimiter {
@@ -191,12 +192,7 @@ impl Delimiter {
 
     /// The byte itself.
     pub fn byte(self) -> u8 {
-        match self {
-            Self::Comma => b',',
-            Self::Semicolon => b';',
-            Self::Tab => b'\t',
-            Self::Bar => b'|',
-        }
+        self as u8
     }
 
     /// As it is called.
