@@ -5,7 +5,7 @@ use super::dialect::Dialect;
 use super::error::{BadReason, BadRow, Counted, TraceFault};
 use super::format::{Rows, Stream};
 use super::number::plain_number;
-use super::records::{Record, Records, Stop, Text, stopped_early};
+use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_time};
 use super::stamps::Epoch;
 use super::table_text::TextTable;
@@ -23,10 +23,10 @@ pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let gzip = stream.gzip;
     let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
     let dialect = Dialect::of(table, encoding, rig)?;
-    dialect.skip_header(&mut records).map_err(stopped_early)?;
-    let Dialect { delimiter, decimal, layout, .. } = dialect;
-    let epoch = Epoch::new(layout.time.clone());
-    let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
+    let Dialect { delimiter, decimal, layout, last_header_line } = dialect;
+    let (delimiter, epoch) = (delimiter.byte(), Epoch::new(layout.time.clone()));
+    records.skip_header(delimiter, last_header_line)?;
+    let splitting = Splitting { delimiter, decimal, layout, epoch, last_cells: [0; 2] };
     Ok(Box::new(CsvRows { records, splitting, gzip }))
 }
 

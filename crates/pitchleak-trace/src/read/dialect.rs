@@ -6,7 +6,7 @@ use super::error::TraceFault;
 use super::format::{Stream, mistaken};
 use super::number::decimal;
 use super::proposal::{Proposal, partly, proposals};
-use super::records::{Encoding, Records, Stop, stopped_early};
+use super::records::{Encoding, Records, stopped_early};
 use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;
@@ -23,7 +23,7 @@ pub(super) struct Dialect {
     pub(super) delimiter: Delimiter,
     pub(super) decimal: Decimal,
     pub(super) layout: Layout,
-    last_header_line: u64,
+    pub(super) last_header_line: u64,
 }
 
 impl Dialect {
@@ -80,15 +80,6 @@ impl Dialect {
         check_steps(&table, &layout, decimal)?;
         layout.reading = reading(&table, &layout, &foreign, decimal, encoding);
         Ok(Self { delimiter: table.delimiter, decimal, layout, last_header_line })
-    }
-
-    /// Passes over all that stands before the first row.
-    pub(super) fn skip_header(&self, records: &mut Records) -> Result<(), Stop> {
-        records.split_at(self.delimiter.byte());
-        while records.next_line() <= self.last_header_line {
-            records.next()?;
-        }
-        Ok(())
     }
 }
 
