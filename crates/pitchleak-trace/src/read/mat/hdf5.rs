@@ -4,7 +4,7 @@
 //! headers of version 1, data in B-trees of version 1.
 
 use super::vector::vector;
-use super::{Named, Values, Variables};
+use super::{Values, Variables};
 use crate::read::error::TraceFault;
 use crate::read::format::MOST_HELD;
 
@@ -76,7 +76,6 @@ struct Object<'a> {
     attributes: Vec<&'a [u8]>,
 }
 
-/// The vectors of a file, and what else is in it.
 pub(super) fn read(bytes: &[u8]) -> Result<Variables, TraceFault> {
     variables(bytes).map_err(|trouble| match trouble {
         Trouble::Damaged => TraceFault::Damaged("the MAT file of version 7.3 contradicts itself".to_owned()),
@@ -90,19 +89,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Variables, TraceFault> {
 fn variables(bytes: &[u8]) -> Found<Variables> {
     let (mut file, root) = File::open(bytes)?;
     let mut budget = MOST_HELD / 8;
-    let (mut vectors, mut others): (Named<Vec<f64>>, Named<&'static str>) = (Vec::new(), Vec::new());
+    let mut variables = Vec::new();
     let root = file.object(root)?.symbol_table.ok_or(Trouble::Form)?;
     for (name, address) in file.members(root)? {
-        // What other variables point at.
-        if name.starts_with('#') {
-            continue;
-        }
-        match file.variable(address, &mut budget)? {
-            Values::Vector(values) => vectors.push((name, values)),
-            Values::Other(kind) => others.push((name, kind)),
+        // Others are what variables point at.
+        if !name.starts_with('#') {
+            variables.push((name, file.variable(address, &mut budget)?));
         }
     }
-    Ok((vectors, others))
+    Ok(variables)
 }
 
 impl<'a> File<'a> {
@@ -233,11 +228,11 @@ impl<'a> File<'a> {
     fn variable(&mut self, address: u64, budget: &mut u64) -> Found<Values> {
         let object = self.object(address)?;
         if let Some(kind) = object.kind() {
-            return Ok(Values::Other(kind));
+            return Ok(Err(kind));
         }
         let (Some(space), Some(data), Some(layout)) = (object.dataspace, object.datatype, object.layout)
         else {
-            return Ok(Values::Other("variable of an unknown class"));
+            return Ok(Err("variable of an unknown class"));
         };
         vector(self, space, data, layout, object.filters, budget)
     }
