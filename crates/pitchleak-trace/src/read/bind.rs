@@ -98,9 +98,7 @@ fn plain(header: &str, unit: &str, cells: &[&str]) -> Option<(Signal, ForeignCol
     let name_and_unit = |name: &str, unit: &str| {
         let signal = header::signal(name)?;
         let found = HeaderUnit::by_name(unit, signal.dimension()?)?;
-        let column =
-            ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(header, Some(found.unit)) };
-        Some((signal, column))
+        Some((signal, ForeignColumn::with_unit(header, found)))
     };
     name_and_unit(header, unit)
         .or_else(|| header::parts(header).find_map(|(name, unit)| name_and_unit(name, unit)))

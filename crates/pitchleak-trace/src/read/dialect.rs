@@ -4,7 +4,7 @@
 use super::columns::{Column, Layout, REQUIRED};
 use super::error::TraceFault;
 use super::format::{Stream, mistaken};
-use super::number::decimal;
+use super::number::{decimal, number};
 use super::proposal::{Proposal, partly, proposals};
 use super::records::{Encoding, Records, stopped_early};
 use super::shapes::{self, Source};
@@ -156,10 +156,9 @@ fn check_steps(table: &TextTable, layout: &Layout, decimal: Decimal) -> Result<(
     let Some((index, column)) = layout.columns.iter().enumerate().find(is_time) else { return Ok(()) };
     let cells = table.column(index);
     let mut epoch = Epoch::new(layout.time.clone());
-    let seconds = |cell: &&str| match (column.is_timestamp(), decimal) {
-        (true, _) => epoch.seconds(cell.as_bytes()).ok(),
-        (false, Decimal::Point) => fast_float2::parse::<f64, _>(cell.as_bytes()).ok(),
-        (false, Decimal::Comma) => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
+    let seconds = |cell: &&str| match column.is_timestamp() {
+        true => epoch.seconds(cell.as_bytes()).ok(),
+        false => number(cell, decimal),
     };
     let times: Vec<f64> = cells.iter().filter_map(seconds).collect();
     let still = times.windows(2).filter(|pair| pair.first() == pair.last()).count();

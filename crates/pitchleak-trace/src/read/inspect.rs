@@ -110,7 +110,8 @@ impl FileReading {
             header_line: table.header_line,
             units_line: table.units.as_ref().map(|row| row.line),
         });
-        let named = table.bound.as_ref().map(|bound| named(&bound.foreign)).unwrap_or_default();
+        let foreign = table.bound.iter().flat_map(|bound| &bound.foreign);
+        let named = foreign.map(|(signal, column)| ProposedLine::of(*signal, column, Why::Name)).collect();
         let found = match &table.bound {
             Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
             Err(_) => partly(&table, rig),
@@ -121,7 +122,9 @@ impl FileReading {
             read_column(header, *content, first)
         });
         let columns = columns.collect();
-        let proposals = proposals(&table, &found, rig).iter().map(line).collect();
+        let proposals = proposals(&table, &found, rig);
+        let line = |one: &Proposal| ProposedLine::of(one.signal, &one.column, one.why);
+        let proposals = proposals.iter().map(line).collect();
         let misspelt = misspelt(&table.headers, &rig.columns);
         let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
@@ -160,17 +163,10 @@ fn read_column(header: &str, content: Option<Content>, first: Vec<String>) -> Co
     }
 }
 
-fn line(proposal: &Proposal) -> ProposedLine {
-    let line = format!("{} = {}", proposal.signal.name(), proposal.column.to_toml(proposal.signal));
-    ProposedLine { line, why: proposal.why.text() }
-}
-
-fn named(foreign: &ColumnMap) -> Vec<ProposedLine> {
-    let line = |(signal, column): (&Signal, &ForeignColumn)| ProposedLine {
-        line: format!("{} = {}", signal.name(), column.to_toml(*signal)),
-        why: Why::Name.text(),
-    };
-    foreign.iter().map(line).collect()
+impl ProposedLine {
+    fn of(signal: Signal, column: &ForeignColumn, why: Why) -> Self {
+        Self { line: format!("{} = {}", signal.name(), column.to_toml(signal)), why: why.text() }
+    }
 }
 
 fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {

@@ -5,7 +5,7 @@ use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
 use super::keys::{Done, Keys};
 use super::odds::Odds;
-use crate::header;
+use crate::header::{self, HeaderUnit};
 use crate::signal::Signal;
 use crate::times::{TimeFormat, TimeKind, Zone};
 use crate::units::{self, Dimension, Unit};
@@ -83,8 +83,12 @@ impl ForeignColumn {
 
     /// `Head pressure [bar]`, with the unit that it ends with.
     fn by_header(header: &str, dimension: Dimension) -> Option<Self> {
-        let (_, found) = header::split(header, dimension)?;
-        Some(Self { offset: found.offset_si, ..Self::new(header, Some(found.unit)) })
+        header::split(header, dimension).map(|(_, unit)| Self::with_unit(header, unit))
+    }
+
+    /// A column whose header says its unit.
+    pub(crate) fn with_unit(header: &str, found: HeaderUnit) -> Self {
+        Self { offset: found.offset_si, ..Self::new(header, Some(found.unit)) }
     }
 
     /// The unit of its numbers, scale and offset included.

@@ -4,8 +4,10 @@
 
 use super::{Recast, Shape, Source, Text, own_times};
 use crate::read::error::TraceFault;
+use crate::read::number::number;
 use crate::read::records::text;
 use crate::read::table_text::TextTable;
+use crate::rig::Decimal;
 use std::borrow::Cow;
 
 pub(super) const SHAPE: Shape = Shape { name: "LabVIEW's measurement file", told };
@@ -29,17 +31,17 @@ impl Head {
             preamble.lines().find_map(|line| line.strip_prefix(key)).filter(|rest| !rest.is_empty())
         };
         let delimiter = *named("Separator")?.as_bytes().first()?;
-        let number = |key: &str| {
+        let number_of = |key: &str| {
             let cell = named(key)?.split(char::from(delimiter)).nth(1)?;
-            fast_float2::parse::<f64, _>(cell.trim().replace(',', ".")).ok()
+            number(cell.trim(), Decimal::Comma)
         };
         let (line, header) = (1..).zip(preamble.lines()).find(|(_, line)| line.starts_with(X_VALUE))?;
         Some(Self {
             line,
             delimiter,
             headers: header.split(char::from(delimiter)).map(|header| header.trim().to_owned()).collect(),
-            start_s: number("X0").unwrap_or(0.0),
-            step_s: number("Delta_X").unwrap_or(0.0),
+            start_s: number_of("X0").unwrap_or(0.0),
+            step_s: number_of("Delta_X").unwrap_or(0.0),
         })
     }
 }

@@ -6,8 +6,10 @@ use super::merged::{Merged, Times};
 use super::{Recast, Shape, Source, Text, place};
 use crate::header::{letters, lists};
 use crate::read::error::TraceFault;
+use crate::read::number::number;
 use crate::read::records::text;
 use crate::read::table_text::TextTable;
+use crate::rig::Decimal;
 
 pub(super) const SHAPE: Shape = Shape { name: "a reading per row", told };
 
@@ -96,8 +98,8 @@ fn recast(source: Source, places: &Places, mut times: Times) -> Result<Text, Tra
 
 /// WinCC's millionths of days as a spreadsheet's days.
 fn in_days(cell: &str, is_wincc: bool) -> String {
-    match fast_float2::parse::<f64, _>(cell.replace(',', ".")) {
-        Ok(millionths) if is_wincc => format!("{:.11}", millionths / 1e6),
+    match number(cell, Decimal::Comma) {
+        Some(millionths) if is_wincc => format!("{:.11}", millionths / 1e6),
         _ => cell.to_owned(),
     }
 }

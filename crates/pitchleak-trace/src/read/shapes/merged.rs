@@ -4,7 +4,9 @@
 use super::{Source, Text, write_cell};
 use crate::read::error::TraceFault;
 use crate::read::format::MOST_HELD;
+use crate::read::number::number;
 use crate::read::records::{Stop, Written, stopped_early};
+use crate::rig::Decimal;
 use crate::times::{self, TimeFault, TimeFormat};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -35,7 +37,7 @@ impl Times {
     /// A time, ns since any one instant.
     fn ns(&mut self, cell: &str) -> Option<i128> {
         let Some(format) = &self.format else {
-            let number = fast_float2::parse::<f64, _>(cell.replace(',', ".")).ok()?;
+            let number = number(cell, Decimal::Comma)?;
             return (number.abs() < 1e18).then_some((number * 1e9).round() as i128);
         };
         self.last_ns = Some(format.instant_ns(format.kind.read(cell)?, self.last_ns)?);
