@@ -90,8 +90,7 @@ impl<'a> Section<'a> {
             if let Some((offset, note)) = self.blank(key) {
                 return self.document.fail(Some(offset), Fault::Blank { key: self.path(key), note });
             }
-            let wanted = bound.text();
-            self.document.fail(self.offset, Fault::MissingKey { key: self.path(key), wanted })
+            self.missing(key, &bound.text())
         })
     }
 
