@@ -46,15 +46,8 @@ pub(super) fn bind(
     }
     let mut map = rig.columns.clone();
     map.extend(foreign.clone());
-    let layout = match rig.csv.part {
-        None => Layout::new(headers, &map)?,
-        Some(_) => {
-            let layout = Layout::of_part(headers, &map)?;
-            layout.check(&map, &REQUIRED[..1])?;
-            layout
-        }
-    };
-    Ok(Bound { layout: layout.of_stroke(rig)?, foreign })
+    let required = if rig.csv.part.is_some() { &REQUIRED[..1] } else { &REQUIRED[..] };
+    Ok(Bound { layout: Layout::new(headers, &map, required, rig)?, foreign })
 }
 
 /// What a channel is called whose name is its file's.

@@ -53,11 +53,26 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Reads the header row of a trace.
-    pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
-        let layout = Self::of_part(headers, map)?;
-        layout.check(map, &REQUIRED)?;
-        Ok(layout)
+    /// Reads the header row of a trace, which must have what is `required`.
+    pub(super) fn new(
+        headers: &[String],
+        map: &ColumnMap,
+        required: &[(Signal, &str)],
+        rig: &Rig,
+    ) -> Result<Self, TraceFault> {
+        let column = |header: &str| Column { header: header.to_owned(), content: content_of(header, map) };
+        let mut columns: Vec<_> = headers.iter().map(|header| column(header.trim())).collect();
+        prefer_time(&mut columns);
+        let layout = Self {
+            columns,
+            absent: absent(headers, map),
+            counted: Counted::Lines,
+            time: declared_time(map),
+            reading: None,
+        };
+        layout.check_units()?;
+        layout.check(map, required)?;
+        layout.of_stroke(rig)
     }
 
     /// Of the parts of one recording.
@@ -79,27 +94,11 @@ impl Layout {
         whole
     }
 
-    /// Reads the header row of a part of a trace.
-    pub(super) fn of_part(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
-        let column = |header: &str| Column { header: header.to_owned(), content: content_of(header, map) };
-        let mut columns: Vec<_> = headers.iter().map(|header| column(header.trim())).collect();
-        prefer_time(&mut columns);
-        let layout = Self {
-            columns,
-            absent: absent(headers, map),
-            counted: Counted::Lines,
-            time: declared_time(map),
-            reading: None,
-        };
-        layout.check_units()?;
-        Ok(layout)
-    }
-
     /// As shares of its stroke what is read of the spool in millimetres. Without a valve nothing asks for them.
     ///
     /// # Errors
     /// Where `[valve]` does not say the stroke.
-    pub(super) fn of_stroke(mut self, rig: &Rig) -> Result<Self, TraceFault> {
+    fn of_stroke(mut self, rig: &Rig) -> Result<Self, TraceFault> {
         let Some(valve) = &rig.valve else { return Ok(self) };
         for column in &mut self.columns {
             let Some(Content { signal: Signal::Spool | Signal::Command, unit: Some(unit) }) =

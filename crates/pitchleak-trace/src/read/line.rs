@@ -1,8 +1,8 @@
 //! Rows that come one by one as text, such as the lines of a live feed.
 
-use super::columns::Layout;
+use super::columns::{Layout, REQUIRED};
 use super::csv::{Cells, Split, describe, read_cells};
-use super::error::{BadReason, BadRow, Counted, TraceFault};
+use super::error::{BadReason, BadRow, TraceFault};
 use super::row::{BadRows, NEEDED, Record, Row};
 use super::stamps::Epoch;
 use super::validator::{MOST_TIME_S, RowValidator, missing};
@@ -18,10 +18,9 @@ impl LineLayout {
     /// # Errors
     /// As for the header row of a trace.
     pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
-        Layout::new(names, &rig.columns)?.of_stroke(rig).map(|layout| {
-            let time = rig.csv.time.clone().unwrap_or(layout.time);
-            Self(Layout { counted: Counted::Lines, time, ..layout })
-        })
+        let layout = Layout::new(names, &rig.columns, &REQUIRED, rig)?;
+        let time = rig.csv.time.clone().unwrap_or(layout.time);
+        Ok(Self(Layout { time, ..layout }))
     }
 
     /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); or why it has none.

@@ -1,6 +1,6 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
-use super::columns::{Column, Content, Layout};
+use super::columns::{Column, Content, Layout, REQUIRED};
 use super::error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
@@ -36,8 +36,7 @@ impl TableLayout {
     /// # Errors
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
-        let layout = Layout::new(headers, &rig.columns).and_then(|layout| layout.of_stroke(rig));
-        let layout = layout.map_err(|fault| fault.of(name))?;
+        let layout = Layout::new(headers, &rig.columns, &REQUIRED, rig).map_err(|fault| fault.of(name))?;
         Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout })))
     }
 
