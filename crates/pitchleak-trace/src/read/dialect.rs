@@ -199,8 +199,7 @@ fn reading(
     }
     parts.extend(table.units.as_ref().map(|units| format!("units in line {}", units.line)));
     if layout.has(Signal::Timestamp) && layout.time != TimeFormat::default() {
-        let zone = layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-        parts.push(format!("times as `{}`{zone}", layout.time.kind));
+        parts.push(format!("times as `{}`{}", layout.time.kind, layout.time.zone_text()));
     }
     for (signal, column) in foreign {
         let gauge = if column.offset < 0.0 { ", absolute" } else { "" };

@@ -132,9 +132,7 @@ impl FileReading {
         } else {
             match Dialect::of(table, super::records::Encoding::Utf8, rig) {
                 Ok(Dialect { layout, .. }) if layout.has(Signal::Timestamp) => {
-                    let zone =
-                        layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-                    time_format = Some(format!("{}{zone}", layout.time.kind));
+                    time_format = Some(format!("{}{}", layout.time.kind, layout.time.zone_text()));
                 }
                 Ok(_) => {}
                 Err(fault) => problem = Some(fault.to_string()),
