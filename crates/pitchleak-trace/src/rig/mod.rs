@@ -136,18 +136,7 @@ impl Rig {
             document.fail(error.span().map(|span| span.start), Fault::Syntax(message))
         })?;
         let root = Section::root(&document, table.get_ref());
-        root.allow(&[
-            "cylinder",
-            "fluid",
-            "sensors",
-            "estimator",
-            "alarms",
-            "decision",
-            "columns",
-            "csv",
-            "effects",
-            "valve",
-        ])?;
+        root.allow(&SECTIONS.split(' ').collect::<Vec<_>>())?;
         let cylinder = root.section("cylinder")?.read(Cylinder::paper(), cylinder_keys)?;
         let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
         Ok(Self {
@@ -180,6 +169,9 @@ impl Rig {
         self.instruments.spread()
     }
 }
+
+/// What a rig file may have.
+const SECTIONS: &str = "cylinder fluid sensors estimator alarms decision columns csv effects valve";
 
 /// No rig file is longer, bytes; a device or a trace given for one may have no end.
 const LONGEST_FILE: u64 = 1 << 20;

@@ -156,19 +156,17 @@ impl Level {
     }
 }
 
+/// The types by their numbers.
+const PHYSICAL: [Physical; 8] = {
+    use Physical::*;
+    [BOOLEAN, INT32, INT64, INT96, FLOAT, DOUBLE, BYTE_ARRAY, FIXED_LEN_BYTE_ARRAY]
+};
+
 impl Leaf {
     fn of(place: usize, element: &Fields<'_>, level: Level) -> Result<Self> {
-        let physical = match element.whole(1)? {
-            Some(0) => Physical::BOOLEAN,
-            Some(1) => Physical::INT32,
-            Some(2) => Physical::INT64,
-            Some(3) => Physical::INT96,
-            Some(4) => Physical::FLOAT,
-            Some(5) => Physical::DOUBLE,
-            Some(6) => Physical::BYTE_ARRAY,
-            Some(7) => Physical::FIXED_LEN_BYTE_ARRAY,
-            _ => return Err(ParquetError::General("a column of an unknown type".to_owned())),
-        };
+        let number = element.whole(1)?.and_then(|number| usize::try_from(number).ok());
+        let physical = number.and_then(|number| PHYSICAL.get(number).copied());
+        let physical = physical.ok_or_else(|| damaged("a column of an unknown type"))?;
         Ok(Self {
             place,
             name: String::from_utf8_lossy(element.needed(4)?.bytes()?).into_owned(),
