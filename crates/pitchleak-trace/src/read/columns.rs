@@ -1,6 +1,6 @@
 //! Which column of a file holds which signal, and in which unit, by the names of the contract and those of `[columns]`.
 
-use super::error::{Counted, TraceFault};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
 use crate::header::{near, shorten};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
@@ -65,7 +65,9 @@ impl Layout {
         prefer_time(&mut columns);
         let layout = Self {
             columns,
-            absent: absent(headers, map),
+            absent: absent(headers, map)
+                .map(|(_, name, near)| near.map_or(name.clone(), |near| format!("{name} (`{near}` is near)")))
+                .collect(),
             counted: Counted::Lines,
             time: declared_time(map),
             reading: None,
@@ -153,7 +155,20 @@ impl Layout {
         self.columns.iter().filter_map(entry).collect()
     }
 
-    fn column_of(&self, signal: Signal) -> Option<&Column> {
+    /// A row that is bad for what stands in `column`, or as a whole.
+    #[cold]
+    pub(super) fn bad_row(
+        &self,
+        line: u64,
+        column: Option<&Column>,
+        reason: BadReason,
+        detail: String,
+    ) -> BadRow {
+        let column = column.map(|column| shorten(&column.header, 40));
+        BadRow { line, counted: self.counted, column, reason, detail }
+    }
+
+    pub(super) fn column_of(&self, signal: Signal) -> Option<&Column> {
         self.columns.iter().find(|column| column.signal() == Some(signal))
     }
 
@@ -296,14 +311,17 @@ fn foreign_unit(header: &str) -> Option<(Signal, &str)> {
     Signal::by_name(name).map(|signal| (signal, unit))
 }
 
-fn absent(headers: &[String], map: &ColumnMap) -> Vec<String> {
-    let absent = map.values().filter(|column| !headers.iter().any(|h| h.trim() == column.name.trim()));
-    let text = |column: &ForeignColumn| {
-        let near = near(&column.name, headers.iter().map(|header| header.trim()));
-        let near = near.map_or_else(String::new, |near| format!(" (`{}` is near)", shorten(near, 40)));
-        shorten(&column.name, 40) + &near
-    };
-    absent.map(text).collect()
+/// Mapped columns that are not among the headers: the signal, its name, and one that is near.
+pub(super) fn absent(
+    headers: &[String],
+    map: &ColumnMap,
+) -> impl Iterator<Item = (Signal, String, Option<String>)> {
+    let names = || headers.iter().map(|header| header.trim());
+    let absent = map.iter().filter(move |(_, column)| !names().any(|name| name == column.name.trim()));
+    absent.map(move |(signal, column)| {
+        let near = near(&column.name, names()).map(|near| shorten(near, 40));
+        (*signal, shorten(&column.name, 40), near)
+    })
 }
 
 fn accepted(signal: Signal, map: &ColumnMap) -> String {

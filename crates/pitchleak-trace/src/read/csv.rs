@@ -2,7 +2,7 @@
 
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
-use super::error::{BadReason, BadRow, Counted, TraceFault};
+use super::error::{BadReason, BadRow, TraceFault};
 use super::format::{Rows, Stream};
 use super::number::plain_number;
 use super::records::{Record, Records, Stop, Text};
@@ -175,9 +175,7 @@ pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Faul
             }
         }
     };
-    let column = fault.column.and_then(|index| columns.get(index));
-    let column = column.map(|column| shorten(&column.header, 40));
-    BadRow { line, counted: Counted::Lines, column, reason: fault.reason, detail }
+    layout.bad_row(line, fault.column.and_then(|index| columns.get(index)), fault.reason, detail)
 }
 
 fn expected_time(kind: &TimeKind) -> String {

@@ -1,15 +1,15 @@
 //! How a file would be read, for a person to look at before it is.
 
 use super::bind::Bound;
-use super::columns::Content;
+use super::columns::{Content, absent};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::format;
 use super::number::decimal;
 use super::proposal::{Proposal, Why, partly, proposals};
 use super::table_text::TextTable;
-use crate::header::{near, shorten};
-use crate::rig::{ColumnMap, Decimal, ForeignColumn, Rig};
+use crate::header::shorten;
+use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
 use serde::Serialize;
 use std::fmt::Write;
@@ -125,7 +125,7 @@ impl FileReading {
         let proposals = proposals(&table, &found, rig);
         let line = |one: &Proposal| ProposedLine::of(one.signal, &one.column, one.why);
         let proposals = proposals.iter().map(line).collect();
-        let misspelt = misspelt(&table.headers, &rig.columns);
+        let misspelt = absent(&table.headers, &rig.columns).map(misspelt).collect();
         let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
             problem = table.bound.err().map(|fault| fault.to_string());
@@ -167,14 +167,9 @@ impl ProposedLine {
     }
 }
 
-fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {
-    let absent = map.iter().filter(|(_, column)| !headers.iter().any(|header| header == column.name.trim()));
-    let text = |(signal, column): (&Signal, &ForeignColumn)| {
-        let near = near(&column.name, headers.iter().map(String::as_str));
-        let near = near.map_or_else(String::new, |near| format!("; `{}` is near", shorten(near, 40)));
-        format!("{}: the file has no column `{}`{near}", signal.name(), shorten(&column.name, 40))
-    };
-    absent.map(text).collect()
+fn misspelt((signal, name, near): (Signal, String, Option<String>)) -> String {
+    let near = near.map(|near| format!("; `{near}` is near")).unwrap_or_default();
+    format!("{}: the file has no column `{name}`{near}", signal.name())
 }
 
 impl FileReading {

@@ -131,13 +131,7 @@ impl<'a> TableRows<'a> {
             },
         };
         let column = index.and_then(|index| self.layout.columns.get(index));
-        BadRow {
-            line: row.line,
-            counted: Counted::Rows,
-            column: column.map(|column| shorten(&column.header, 40)),
-            reason,
-            detail: detail.to_owned(),
-        }
+        self.layout.bad_row(row.line, column, reason, detail.to_owned())
     }
 }
 
