@@ -34,11 +34,11 @@ type Variables = Vec<(String, Values)>;
 
 pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let Vectors { names, values, short, others } = vectors(stream)?;
-    let table = TextTable::of_columns(names, sample(&values), rig);
-    let bound = table.bound.map_err(|fault| with_others(fault, &others, &short))?;
+    let TextTable { bound, rows, .. } = TextTable::of_columns(names, sample(&values), rig);
+    let bound = bound.map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
     layout.counted = Counted::Rows;
-    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, values)?);
+    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, &rows, values)?);
     Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 

@@ -3,7 +3,7 @@
 use super::columns::{Column, Layout};
 use super::error::{BadReason, TraceFault};
 use super::table::Cells;
-use super::table_text::TextRow;
+use super::table_text::{TextRow, column};
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
@@ -82,21 +82,17 @@ pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
     (0..rows).map(row).collect()
 }
 
-/// The columns that are read; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
+/// The columns that are read, with their first `rows` as text; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
 pub(super) fn cells(
     layout: &mut Layout,
     foreign: &ColumnMap,
     rig: &Rig,
+    rows: &[TextRow],
     columns: Vec<Vec<f64>>,
 ) -> Result<Vec<Cells<'static>>, TraceFault> {
-    let stamps = layout.columns.iter().position(Column::is_timestamp);
-    layout.time = match stamps.and_then(|index| columns.get(index)) {
+    layout.time = match layout.columns.iter().position(Column::is_timestamp) {
+        Some(index) => time_format(&column(rows, index), layout, foreign, rig)?,
         None => TimeFormat::default(),
-        Some(values) => {
-            let known = values.iter().take(ROWS).filter(|value| !value.is_nan());
-            let cells: Vec<String> = known.map(f64::to_string).collect();
-            time_format(&cells.iter().map(String::as_str).collect::<Vec<_>>(), layout, foreign, rig)?
-        }
     };
     let mut epoch = Epoch::new(layout.time.clone());
     let mut cells = Vec::new();
