@@ -13,38 +13,19 @@ pub struct HeaderUnit {
     pub offset_si: f64,
 }
 
-/// Other spellings of units.
-const SPELLINGS: [(&str, &str); 30] = [
-    ("sec", "s"),
-    ("secs", "s"),
-    ("second", "s"),
-    ("seconds", "s"),
-    ("sek", "s"),
-    ("sekunden", "s"),
-    ("msec", "ms"),
-    ("millis", "ms"),
-    ("milliseconds", "ms"),
-    ("µs", "us"),
-    ("μs", "us"),
-    ("usec", "us"),
-    ("microseconds", "us"),
-    ("meter", "m"),
-    ("metre", "m"),
-    ("millimeter", "mm"),
-    ("millimetre", "mm"),
-    ("pascal", "Pa"),
-    ("ltr/min", "L/min"),
-    ("lit/min", "L/min"),
-    ("liter/min", "L/min"),
-    ("litre/min", "L/min"),
-    ("l/m", "L/min"),
-    ("usgpm", "gpm"),
-    ("newton", "N"),
-    ("deg c", "°C"),
-    ("deg. c", "°C"),
-    ("celsius", "°C"),
-    ("℃", "°C"),
-    ("kelvin", "K"),
+/// Other spellings of units, in small letters.
+const SPELLINGS: [(&str, &[&str]); 11] = [
+    ("s", &["sec", "secs", "second", "seconds", "sek", "sekunden"]),
+    ("ms", &["msec", "millis", "milliseconds"]),
+    ("us", &["µs", "μs", "usec", "microseconds"]),
+    ("m", &["meter", "metre"]),
+    ("mm", &["millimeter", "millimetre"]),
+    ("Pa", &["pascal"]),
+    ("L/min", &["ltr/min", "lit/min", "liter/min", "litre/min", "l/m"]),
+    ("gpm", &["usgpm"]),
+    ("N", &["newton"]),
+    ("°C", &["deg c", "deg. c", "celsius", "℃"]),
+    ("K", &["kelvin"]),
 ];
 
 impl HeaderUnit {
@@ -84,7 +65,7 @@ fn spelt(text: &str, dimension: Dimension) -> Option<Unit> {
         return Some(unit);
     }
     let lower = text.to_lowercase();
-    if let Some((_, known)) = SPELLINGS.iter().find(|(spelling, _)| *spelling == lower) {
+    if let Some((known, _)) = SPELLINGS.iter().find(|(_, spellings)| spellings.contains(&lower.as_str())) {
         return units::unit(known, dimension).ok();
     }
     // Thousandths are no millions.

@@ -1,29 +1,10 @@
 use super::{Channel, Problem, Run, bare_unit, latin1};
 
-/// How a binary file stores its samples: the two-byte id it begins with.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Layout {
-    /// 1: 16-bit channels, 32-bit time.
-    CompressedWithTime,
-    /// 2: 16-bit channels, time by first value and step.
-    Compressed,
-    /// 3: 64-bit channels, time by first value and step.
-    Uncompressed,
-    /// 4: as 2, with the length of the channel names in the header.
-    CompressedNamed,
-}
-
-impl Layout {
-    fn of_id(id: i16) -> Result<Self, Problem> {
-        match id {
-            1 => Ok(Self::CompressedWithTime),
-            2 => Ok(Self::Compressed),
-            3 => Ok(Self::Uncompressed),
-            4 => Ok(Self::CompressedNamed),
-            _ => Err(Problem::FileId(id)),
-        }
-    }
-}
+/// Ids, the two bytes that a file begins with. 1: 16-bit channels, 32-bit time; 2: time by first value and step; 3: 64-bit
+/// channels; 4: as 2, with the length of the channel names in the header.
+const WITH_TIME: i16 = 1;
+const UNCOMPRESSED: i16 = 3;
+const NAMED: i16 = 4;
 
 /// Length of a channel name where the header gives none, `ChanLen` of WrBinFAST.
 const DEFAULT_NAME_LENGTH: usize = 10;
@@ -33,48 +14,55 @@ const DEFAULT_NAME_LENGTH: usize = 10;
 /// Every count is held against the bytes that are left before memory is asked for.
 pub(super) fn parse(bytes: &[u8]) -> Result<Run, Problem> {
     let mut cursor = Cursor { rest: bytes, length: bytes.len() };
-    let layout = Layout::of_id(cursor.i16("file id")?)?;
-    let name_length = match layout {
-        Layout::CompressedNamed => positive("length of channel names", cursor.i16("header")?.into())?,
+    let id = cursor.one("file id", i16::from_le_bytes)?;
+    if !(1..=4).contains(&id) {
+        return Err(Problem::FileId(id));
+    }
+    let name_length = match id {
+        NAMED => positive("length of channel names", cursor.one("header", i16::from_le_bytes)?.into())?,
         _ => DEFAULT_NAME_LENGTH,
     };
-    let channels = positive("number of channels", cursor.i32("header")?.into())?;
+    let count = positive("number of channels", cursor.i32("header")?.into())?;
     let samples = not_negative("number of samples", cursor.i32("header")?.into())?;
     // Of packed time the scale and offset, else the first value and the step, s.
     let (time_first, time_second) = (cursor.f64("header")?, cursor.f64("header")?);
-    let scaling = match layout {
-        Layout::Uncompressed => Vec::new(),
-        _ => {
-            let scales = cursor.array(channels, "channel scales", f32::from_le_bytes)?;
-            let offsets = cursor.array(channels, "channel offsets", f32::from_le_bytes)?;
-            scales.into_iter().zip(offsets).collect()
-        }
+    let scaling = match id {
+        UNCOMPRESSED => None,
+        _ => Some([
+            cursor.array(count, "channel scales", f32::from_le_bytes)?,
+            cursor.array(count, "channel offsets", f32::from_le_bytes)?,
+        ]),
     };
     let description_length = not_negative("length of the description", cursor.i32("header")?.into())?;
     let description = latin1(cursor.take(description_length, "description")?).trim().to_owned();
-    let mut channels = named_channels(&mut cursor, channels, name_length)?;
-    let packed_time = match layout {
-        Layout::CompressedWithTime => Some(cursor.array(samples, "time", i32::from_le_bytes)?),
+    let mut channels = named_channels(&mut cursor, count, name_length)?;
+    let packed_time = match id {
+        WITH_TIME => Some(cursor.array(samples, "time", i32::from_le_bytes)?),
         _ => None,
     };
-    if layout == Layout::Uncompressed {
-        uncompressed(&mut cursor, &mut channels, samples)?;
-    } else {
-        compressed(&mut cursor, &mut channels, &scaling, samples)?;
+    match scaling {
+        Some(scaling) => compressed(&mut cursor, &mut channels, scaling, samples)?,
+        None => uncompressed(&mut cursor, &mut channels, samples)?,
     }
     // Only now is `samples` known to be backed by that many rows.
     let time_s = match packed_time {
-        Some(packed) => unpacked_time(&packed, time_first, time_second)?,
+        Some(packed) => unpacked(packed.into_iter().map(f64::from), time_first, time_second, "Time")?,
         None => (0..samples).map(|k| time_first + time_second * k as f64).collect(),
     };
     Ok(Run { description, time_s, channels })
 }
 
-fn unpacked_time(packed: &[i32], scale: f64, offset: f64) -> Result<Vec<f64>, Problem> {
+/// Numbers of which the file has scale and offset.
+fn unpacked(
+    packed: impl Iterator<Item = f64>,
+    scale: f64,
+    offset: f64,
+    channel: &str,
+) -> Result<Vec<f64>, Problem> {
     if scale == 0.0 || !scale.is_finite() || !offset.is_finite() {
-        return Err(Problem::Scale { channel: "Time".into() });
+        return Err(Problem::Scale { channel: channel.to_owned() });
     }
-    Ok(packed.iter().map(|&p| (f64::from(p) - offset) / scale).collect())
+    Ok(packed.map(|packed| (packed - offset) / scale).collect())
 }
 
 /// The names, then the units, of time and of every channel.
@@ -91,9 +79,8 @@ fn named_channels(cursor: &mut Cursor, count: usize, length: usize) -> Result<Ve
 }
 
 fn uncompressed(cursor: &mut Cursor, channels: &mut [Channel], samples: usize) -> Result<(), Problem> {
-    let cells = samples.saturating_mul(channels.len());
-    let data = cursor.array(cells, "samples", f64::from_le_bytes)?;
     let count = channels.len();
+    let data = cursor.array(samples.saturating_mul(count), "samples", f64::from_le_bytes)?;
     for (column, channel) in channels.iter_mut().enumerate() {
         channel.values = data.iter().skip(column).step_by(count).copied().collect();
     }
@@ -103,18 +90,16 @@ fn uncompressed(cursor: &mut Cursor, channels: &mut [Channel], samples: usize) -
 fn compressed(
     cursor: &mut Cursor,
     channels: &mut [Channel],
-    scaling: &[(f32, f32)],
+    [scales, offsets]: [Vec<f32>; 2],
     samples: usize,
 ) -> Result<(), Problem> {
-    let cells = samples.saturating_mul(channels.len());
-    let data = cursor.array(cells, "samples", i16::from_le_bytes)?;
     let count = channels.len();
-    for (column, (channel, &(scale, offset))) in channels.iter_mut().zip(scaling).enumerate() {
-        if scale == 0.0 || !scale.is_finite() || !offset.is_finite() {
-            return Err(Problem::Scale { channel: channel.name.clone() });
-        }
-        let value = |&packed: &i16| (f64::from(packed) - f64::from(offset)) / f64::from(scale);
-        channel.values = data.iter().skip(column).step_by(count).map(value).collect();
+    let data = cursor.array(samples.saturating_mul(count), "samples", i16::from_le_bytes)?;
+    for (column, (channel, (scale, offset))) in
+        channels.iter_mut().zip(scales.into_iter().zip(offsets)).enumerate()
+    {
+        let packed = data.iter().skip(column).step_by(count).copied().map(f64::from);
+        channel.values = unpacked(packed, scale.into(), offset.into(), &channel.name)?;
     }
     Ok(())
 }
@@ -173,10 +158,6 @@ impl<'a> Cursor<'a> {
         let (head, rest) = self.rest.split_first_chunk::<N>().ok_or(Problem::Truncated { part, length })?;
         self.rest = rest;
         Ok(from_le(*head))
-    }
-
-    fn i16(&mut self, part: &'static str) -> Result<i16, Problem> {
-        self.one(part, i16::from_le_bytes)
     }
 
     fn i32(&mut self, part: &'static str) -> Result<i32, Problem> {

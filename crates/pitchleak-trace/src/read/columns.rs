@@ -1,45 +1,40 @@
-//! Which column of a file holds which signal, and in which unit: by the names of the contract, those of `[columns]`, and
-//! foreign ones that name signal and unit.
+//! Which column of a file holds which signal, and in which unit, by the names of the contract and those of `[columns]`.
 
-use super::error::{Counted, TraceFault};
-use crate::header::{self, HeaderUnit, near, shorten};
+use super::error::{BadReason, BadRow, Counted, TraceFault};
+use crate::header::{near, shorten};
 use crate::rig::{ColumnMap, ForeignColumn, Rig};
 use crate::signal::Signal;
-use crate::times::{self, TimeFault, TimeFormat, Zone};
+use crate::times::TimeFormat;
 use crate::units::Unit;
 
-/// What one column of the file is read as.
+/// One column of the file.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     /// As in the header row.
     pub(super) header: String,
-    pub(super) content: Content,
+    /// None where it is not read.
+    pub(super) content: Option<Content>,
 }
 
+/// What is read from a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Content {
-    /// A number; without a unit it is SI already.
-    Number(Signal, Option<Unit>),
-    Timestamp,
-    Ignored,
+pub(super) struct Content {
+    pub(super) signal: Signal,
+    /// Of numbers; none where they are SI already, and of time stamps.
+    pub(super) unit: Option<Unit>,
 }
 
-impl Content {
-    pub(super) fn signal(self) -> Option<Signal> {
-        match self {
-            Self::Number(signal, _) => Some(signal),
-            Self::Timestamp => Some(Signal::Timestamp),
-            Self::Ignored => None,
-        }
+impl Column {
+    pub(super) fn signal(&self) -> Option<Signal> {
+        self.content.map(|content| content.signal)
     }
 
-    /// What a column of numbers in memory is read as: a signal and its unit, a time stamp as the time; none of what is not read.
-    pub(super) fn cells(self) -> Option<(Signal, Option<Unit>)> {
-        match self {
-            Self::Number(signal, unit) => Some((signal, unit)),
-            Self::Timestamp => Some((Signal::Time, None)),
-            Self::Ignored => None,
-        }
+    pub(super) fn is_time(&self) -> bool {
+        self.signal().is_some_and(Signal::is_time)
+    }
+
+    pub(super) fn is_timestamp(&self) -> bool {
+        self.signal() == Some(Signal::Timestamp)
     }
 }
 
@@ -58,11 +53,28 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Reads the header row of a trace.
-    pub(super) fn new(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
-        let layout = Self::of_part(headers, map)?;
-        layout.check(map, &REQUIRED)?;
-        Ok(layout)
+    /// Reads the header row of a trace, which must have what is `required`.
+    pub(super) fn new(
+        headers: &[String],
+        map: &ColumnMap,
+        required: &[(Signal, &str)],
+        rig: &Rig,
+    ) -> Result<Self, TraceFault> {
+        let column = |header: &str| Column { header: header.to_owned(), content: content_of(header, map) };
+        let mut columns: Vec<_> = headers.iter().map(|header| column(header.trim())).collect();
+        prefer_time(&mut columns);
+        let layout = Self {
+            columns,
+            absent: absent(headers, map)
+                .map(|(_, name, near)| near.map_or(name.clone(), |near| format!("{name} (`{near}` is near)")))
+                .collect(),
+            counted: Counted::Lines,
+            time: declared_time(map),
+            reading: None,
+        };
+        layout.check_units()?;
+        layout.check(map, required)?;
+        layout.of_stroke(rig)
     }
 
     /// Of the parts of one recording.
@@ -77,38 +89,23 @@ impl Layout {
         for part in parts {
             // Each file has a time of its own.
             let known = whole.gives(Signal::Time);
-            let is_time =
-                |column: &Column| matches!(column.content.signal(), Some(Signal::Time | Signal::Timestamp));
-            whole.columns.extend(part.columns.iter().filter(|column| !(known && is_time(column))).cloned());
+            whole.columns.extend(part.columns.iter().filter(|column| !(known && column.is_time())).cloned());
             whole.reading = whole.reading.or_else(|| part.reading.clone());
             whole.time = part.time.clone();
         }
         whole
     }
 
-    /// Reads the header row of a part of a trace.
-    fn of_part(headers: &[String], map: &ColumnMap) -> Result<Self, TraceFault> {
-        let mut columns: Vec<_> = headers.iter().map(|header| column_of(header.trim(), map)).collect();
-        prefer_time(&mut columns);
-        let layout = Self {
-            columns,
-            absent: absent(headers, map),
-            counted: Counted::Lines,
-            time: declared_time(map),
-            reading: None,
-        };
-        layout.check_units()?;
-        Ok(layout)
-    }
-
     /// As shares of its stroke what is read of the spool in millimetres. Without a valve nothing asks for them.
     ///
     /// # Errors
     /// Where `[valve]` does not say the stroke.
-    pub(super) fn of_stroke(mut self, rig: &Rig) -> Result<Self, TraceFault> {
+    fn of_stroke(mut self, rig: &Rig) -> Result<Self, TraceFault> {
         let Some(valve) = &rig.valve else { return Ok(self) };
         for column in &mut self.columns {
-            let Content::Number(Signal::Spool | Signal::Command, Some(unit)) = &mut column.content else {
+            let Some(Content { signal: Signal::Spool | Signal::Command, unit: Some(unit) }) =
+                &mut column.content
+            else {
                 continue;
             };
             if !unit.is_length() {
@@ -148,44 +145,51 @@ impl Layout {
 
     /// Each signal's column as a rig file's `[columns]` would name it.
     pub(super) fn column_map(&self, map: &ColumnMap) -> ColumnMap {
-        let entry = |column: &Column| match column.content {
-            Content::Number(signal, unit) => {
-                let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
-                let read = map.get(&signal).filter(|mapped| mapped.name.trim() == column.header);
-                let own = || ForeignColumn::new(&column.header, unit.or_else(si));
-                Some((signal, read.cloned().unwrap_or_else(own)))
-            }
-            Content::Timestamp => {
-                let own = || ForeignColumn::new(&column.header, None);
-                Some((Signal::Timestamp, map.get(&Signal::Timestamp).cloned().unwrap_or_else(own)))
-            }
-            Content::Ignored => None,
+        let entry = |column: &Column| {
+            let Content { signal, unit } = column.content?;
+            let is_it =
+                |mapped: &&ForeignColumn| column.is_timestamp() || mapped.name.trim() == column.header;
+            let own = || ForeignColumn::new(&column.header, unit.or_else(|| signal.si()));
+            Some((signal, map.get(&signal).filter(is_it).cloned().unwrap_or_else(own)))
         };
         self.columns.iter().filter_map(entry).collect()
     }
 
+    /// A row that is bad for what stands in `column`, or as a whole.
+    #[cold]
+    pub(super) fn bad_row(
+        &self,
+        line: u64,
+        column: Option<&Column>,
+        reason: BadReason,
+        detail: String,
+    ) -> BadRow {
+        let column = column.map(|column| shorten(&column.header, 40));
+        BadRow { line, counted: self.counted, column, reason, detail }
+    }
+
+    pub(super) fn column_of(&self, signal: Signal) -> Option<&Column> {
+        self.columns.iter().find(|column| column.signal() == Some(signal))
+    }
+
     /// The header of the column that holds `signal`.
     pub(super) fn header_of(&self, signal: Signal) -> Option<&str> {
-        let column = self.columns.iter().find(|column| column.content.signal() == Some(signal));
-        column.map(|column| column.header.as_str())
+        self.column_of(signal).map(|column| column.header.as_str())
     }
 
     /// The unit of the column that holds `signal`; none where it is SI.
     pub(super) fn unit_of(&self, signal: Signal) -> Option<Unit> {
-        self.columns.iter().find_map(|column| match column.content {
-            Content::Number(known, unit) if known == signal => unit,
-            _ => None,
-        })
+        self.column_of(signal)?.content?.unit
     }
 
     pub(super) fn ignored(&self) -> Vec<String> {
-        let is_named = |column: &&Column| column.content == Content::Ignored && !column.header.is_empty();
+        let is_named = |column: &&Column| column.content.is_none() && !column.header.is_empty();
         self.columns.iter().filter(is_named).map(|column| shorten(&column.header, 40)).collect()
     }
 
     fn check_doubled(&self) -> Result<(), TraceFault> {
         for signal in Signal::ALL {
-            let mut columns = self.columns.iter().filter(|column| column.content.signal() == Some(signal));
+            let mut columns = self.columns.iter().filter(|column| column.signal() == Some(signal));
             if let (Some(first), Some(second)) = (columns.next(), columns.next()) {
                 return Err(TraceFault::DoubledColumn {
                     signal: signal.name(),
@@ -199,7 +203,7 @@ impl Layout {
 
     /// A column such as `pa_psi` is an error, unless the signal also comes in a unit that is known.
     fn check_units(&self) -> Result<(), TraceFault> {
-        let ignored = self.columns.iter().filter(|column| column.content == Content::Ignored);
+        let ignored = self.columns.iter().filter(|column| column.content.is_none());
         for column in ignored {
             let Some((signal, unit)) = foreign_unit(&column.header) else { continue };
             let Some(dimension) = signal.dimension() else { continue };
@@ -255,43 +259,31 @@ pub(super) const REQUIRED: [(Signal, &str); 4] = [
     (Signal::PressureB, "pressure B"),
 ];
 
-/// What the headers say one by one, where they do not make a trace together.
-pub(super) fn partly(headers: &[String], rig: &Rig) -> Vec<Content> {
-    headers.iter().map(|header| column_of(header.trim(), &rig.columns).content).collect()
-}
-
-fn column_of(header: &str, map: &ColumnMap) -> Column {
-    let mapped = map.iter().find(|(_, column)| column.name.trim() == header);
-    let content = match mapped {
-        Some((Signal::Timestamp, _)) => Content::Timestamp,
-        Some((Signal::Shut, _)) => SHUT,
-        Some((signal, column)) => column.reading().map_or(Content::Ignored, |unit| number(*signal, unit)),
-        None => bind_by_suffix(header),
+/// What a header says by itself.
+pub(super) fn content_of(header: &str, map: &ColumnMap) -> Option<Content> {
+    let Content { signal, unit } = match mapped(header, map) {
+        Some((signal, column)) => Content { signal, unit: column.reading() },
+        None => standard(header)?,
     };
-    Column { header: header.to_owned(), content }
+    let is_whole = unit.is_some() || signal.dimension().is_none();
+    is_whole.then_some(Content { signal, unit: unit.filter(|unit| !unit.is_si()) })
 }
 
-fn bind_by_suffix(header: &str) -> Content {
-    match standard(header) {
-        Some((signal, Some(unit))) => number(signal, unit),
-        Some((Signal::Shut, None)) => SHUT,
-        Some(_) => Content::Timestamp,
-        None => Content::Ignored,
-    }
+/// The entry of `map` that names this header.
+pub(super) fn mapped<'m>(header: &str, map: &'m ColumnMap) -> Option<(Signal, &'m ForeignColumn)> {
+    let entry = map.iter().find(|(_, column)| column.name.trim() == header);
+    entry.map(|(signal, column)| (*signal, column))
 }
-
-/// It has no unit: 0 or 1.
-const SHUT: Content = Content::Number(Signal::Shut, None);
 
 /// The signal of a header as the contract writes it, and its unit; a timestamp has none, nor has `shut`.
-pub(super) fn standard(header: &str) -> Option<(Signal, Option<Unit>)> {
+pub(super) fn standard(header: &str) -> Option<Content> {
     let unitless = [Signal::Timestamp, Signal::Shut].into_iter().find(|signal| header == signal.name());
     if let Some(signal) = unitless {
-        return Some((signal, None));
+        return Some(Content { signal, unit: None });
     }
     let (name, suffix) = header.rsplit_once('_')?;
     let signal = Signal::by_name(name)?;
-    Some((signal, Some(signal.dimension()?.by_suffix(suffix)?)))
+    Some(Content { signal, unit: Some(signal.dimension()?.by_suffix(suffix)?) })
 }
 
 /// As `[columns]` says it; ISO 8601 where it doesn't.
@@ -303,15 +295,10 @@ fn declared_time(map: &ColumnMap) -> TimeFormat {
     }
 }
 
-fn number(signal: Signal, unit: Unit) -> Content {
-    Content::Number(signal, (!unit.is_si()).then_some(unit))
-}
-
 /// Where both a number and a timestamp give the time, the number does.
 fn prefer_time(columns: &mut [Column]) {
-    if columns.iter().any(|column| column.content.signal() == Some(Signal::Time)) {
-        let stamps = columns.iter_mut().filter(|column| column.content == Content::Timestamp);
-        stamps.for_each(|column| column.content = Content::Ignored);
+    if columns.iter().any(|column| column.signal() == Some(Signal::Time)) {
+        columns.iter_mut().filter(|column| column.is_timestamp()).for_each(|column| column.content = None);
     }
 }
 
@@ -324,14 +311,17 @@ fn foreign_unit(header: &str) -> Option<(Signal, &str)> {
     Signal::by_name(name).map(|signal| (signal, unit))
 }
 
-fn absent(headers: &[String], map: &ColumnMap) -> Vec<String> {
-    let absent = map.values().filter(|column| !headers.iter().any(|h| h.trim() == column.name.trim()));
-    let text = |column: &ForeignColumn| {
-        let near = near(&column.name, headers.iter().map(|header| header.trim()));
-        let near = near.map_or_else(String::new, |near| format!(" (`{}` is near)", shorten(near, 40)));
-        shorten(&column.name, 40) + &near
-    };
-    absent.map(text).collect()
+/// Mapped columns that are not among the headers: the signal, its name, and one that is near.
+pub(super) fn absent(
+    headers: &[String],
+    map: &ColumnMap,
+) -> impl Iterator<Item = (Signal, String, Option<String>)> {
+    let names = || headers.iter().map(|header| header.trim());
+    let absent = map.iter().filter(move |(_, column)| !names().any(|name| name == column.name.trim()));
+    absent.map(move |(signal, column)| {
+        let near = near(&column.name, names()).map(|near| shorten(near, 40));
+        (*signal, shorten(&column.name, 40), near)
+    })
 }
 
 fn accepted(signal: Signal, map: &ColumnMap) -> String {
@@ -346,145 +336,4 @@ fn accepted(signal: Signal, map: &ColumnMap) -> String {
     }
     names.extend(map.get(&signal).map(|column| format!("`{}` of [columns]", shorten(&column.name, 40))));
     names.join(" or ")
-}
-
-/// What the columns of a file hold.
-pub(super) struct Bound {
-    pub(super) layout: Layout,
-    /// Signals that were found by a foreign header, and the headers.
-    pub(super) foreign: ColumnMap,
-}
-
-/// Binds `headers`; `units` is the row below them, and `rows` are the first ones.
-pub(super) fn bind(
-    headers: &[String],
-    units: Option<&[String]>,
-    rows: &[TextRow],
-    rig: &Rig,
-) -> Result<Bound, TraceFault> {
-    let mut foreign = ColumnMap::new();
-    for (index, header) in headers.iter().enumerate() {
-        let unit = units.and_then(|units| units.get(index)).map(|unit| bare_unit(unit)).unwrap_or_default();
-        if let Some((signal, bound)) = known(header, rig) {
-            check_unit(header, signal, bound, unit)?;
-            continue;
-        }
-        let Some((signal, found)) = plain(header, unit, &column(rows, index)) else { continue };
-        let is_given = rig.columns.contains_key(&signal)
-            || headers.iter().any(|header| known(header, rig).is_some_and(|(known, _)| known == signal));
-        if is_given {
-            continue;
-        }
-        if let Some(first) = foreign.insert(signal, found) {
-            return Err(TraceFault::DoubledColumn {
-                signal: signal.name(),
-                first: shorten(&first.name, 40),
-                second: shorten(header, 40),
-            });
-        }
-    }
-    let mut map = rig.columns.clone();
-    map.extend(foreign.clone());
-    let layout = match rig.csv.part {
-        None => Layout::new(headers, &map)?,
-        Some(_) => {
-            let layout = Layout::of_part(headers, &map)?;
-            layout.check(&map, &REQUIRED[..1])?;
-            layout
-        }
-    };
-    Ok(Bound { layout: layout.of_stroke(rig)?, foreign })
-}
-
-/// What a channel is called whose name is its file's.
-const NAMELESS: [&str; 5] = ["value", "values", "wert", "data", "y"];
-
-/// Names the channel of a file that holds one.
-pub(super) fn name_part(headers: &mut [String], rig: &Rig) {
-    let Some(part) = &rig.csv.part else { return };
-    let is_nameless = |header: &&mut String| NAMELESS.contains(&header.trim().to_lowercase().as_str());
-    headers.iter_mut().filter(is_nameless).for_each(|header| header.clone_from(part));
-}
-
-/// The signal of a header that the contract or the rig file names.
-fn known(header: &str, rig: &Rig) -> Option<(Signal, Option<crate::units::Unit>)> {
-    let mapped = rig.columns.iter().find(|(_, column)| column.name.trim() == header);
-    mapped.map(|(signal, column)| (*signal, column.unit)).or_else(|| standard(header))
-}
-
-/// The row of units and the header must say the same.
-fn check_unit(
-    header: &str,
-    signal: Signal,
-    bound: Option<crate::units::Unit>,
-    unit: &str,
-) -> Result<(), TraceFault> {
-    let found = signal.dimension().and_then(|dimension| HeaderUnit::by_name(unit, dimension));
-    let (Some(bound), Some(found)) = (bound, found) else { return Ok(()) };
-    if (found.unit.over(&bound) - 1.0).abs() < 1e-9 && found.offset_si.abs() < 1e-9 {
-        return Ok(());
-    }
-    let header = shorten(header, 40);
-    Err(TraceFault::Ambiguous {
-        what: format!(
-            "column `{header}` is read in {}, and the row of units says {}",
-            bound.text,
-            shorten(unit, 20)
-        ),
-        settle: "take that row out, or correct it or the name".to_owned(),
-    })
-}
-
-/// What a foreign header says without a doubt, together with the unit below it.
-fn plain(header: &str, unit: &str, cells: &[&str]) -> Option<(Signal, ForeignColumn)> {
-    let name_and_unit = |name: &str, unit: &str| {
-        let signal = header::signal(name)?;
-        let found = HeaderUnit::by_name(unit, signal.dimension()?)?;
-        let column =
-            ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(header, Some(found.unit)) };
-        Some((signal, column))
-    };
-    name_and_unit(header, unit)
-        .or_else(|| header::parts(header).find_map(|(name, unit)| name_and_unit(name, unit)))
-        .or_else(|| plain_time(header, cells))
-}
-
-/// A column called time whose cells are times of day, dates or epochs; its header may name the zone.
-fn plain_time(header: &str, cells: &[&str]) -> Option<(Signal, ForeignColumn)> {
-    let is_time = |name: &str| matches!(header::signal(name), Some(Signal::Time | Signal::Timestamp));
-    let behind = header::parts(header).find(|(name, _)| is_time(name)).map(|(_, behind)| behind);
-    if behind.is_none() && !is_time(header) {
-        return None;
-    }
-    match times::guess(cells) {
-        Err(TimeFault::BareNumber(_) | TimeFault::Unknown(_)) => None,
-        Ok(_) | Err(_) => {
-            let zone = behind.and_then(Zone::by_name);
-            Some((Signal::Timestamp, ForeignColumn { zone, ..ForeignColumn::new(header, None) }))
-        }
-    }
-}
-
-/// One record, its cells without blanks around them.
-#[derive(Clone, Debug)]
-pub(super) struct TextRow {
-    /// From 1.
-    pub(super) line: u64,
-    pub(super) cells: Vec<String>,
-}
-
-/// What stands in a column of `rows`, empty cells left out.
-pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
-    rows.iter()
-        .filter_map(|row| row.cells.get(index))
-        .map(String::as_str)
-        .filter(|cell| !cell.is_empty())
-        .collect()
-}
-
-/// Without brackets and dashes around it.
-pub(super) fn bare_unit(cell: &str) -> &str {
-    let cell = cell.trim_matches(['-', ' ']);
-    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
-    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
 }

@@ -2,25 +2,33 @@
 
 use super::columns::{Content, Layout};
 use super::dialect::Dialect;
-use super::error::{BadReason, BadRow, Counted, TraceFault};
-use super::format::{Format, Reading, Stream};
+use super::error::{BadReason, BadRow, TraceFault};
+use super::format::{Rows, Stream};
 use super::number::plain_number;
-use super::records::{Record, Records, Stop, Text, stopped_early};
+use super::records::{Record, Records, Stop, Text};
 use super::row::{Fault, Next, Row, RowSource, check_time};
 use super::stamps::Epoch;
+use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::{Decimal, Rig};
 use crate::signal::Signal;
 use crate::times::TimeKind;
 
-/// Text is whatever no other format knows as its own.
-pub(super) const FORMAT: Format = Format {
-    starts_with: b"",
-    reading: Reading::Rows {
-        open: |stream, rig| Ok(Box::new(CsvRows::open(stream, rig)?)),
-        look: |stream, rig| Dialect::first_lines(stream, rig).map(|(_, _, table)| table),
-    },
-};
+pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+    Dialect::first_lines(stream, rig).map(|(_, _, table)| table)
+}
+
+/// Reads all before the first row.
+pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+    let gzip = stream.gzip;
+    let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
+    let dialect = Dialect::of(table, encoding, rig)?;
+    let Dialect { delimiter, decimal, layout, last_header_line } = dialect;
+    let (delimiter, epoch) = (delimiter.byte(), Epoch::new(layout.time.clone()));
+    records.skip_header(delimiter, last_header_line)?;
+    let splitting = Splitting { delimiter, decimal, layout, epoch, last_cells: [0; 2] };
+    Ok(Box::new(CsvRows { records, splitting, gzip }))
+}
 
 struct CsvRows {
     records: Records,
@@ -39,18 +47,6 @@ struct Splitting {
 }
 
 impl CsvRows {
-    /// Reads all before the first row.
-    fn open(stream: Stream, rig: &Rig) -> Result<Self, TraceFault> {
-        let gzip = stream.gzip;
-        let (mut records, encoding, table) = Dialect::first_lines(stream, rig)?;
-        let dialect = Dialect::of(table, encoding, rig)?;
-        dialect.skip_header(&mut records).map_err(stopped_early)?;
-        let Dialect { delimiter, decimal, layout, .. } = dialect;
-        let epoch = Epoch::new(layout.time.clone());
-        let splitting = Splitting { delimiter: delimiter.byte(), decimal, layout, epoch, last_cells: [0; 2] };
-        Ok(Self { records, splitting, gzip })
-    }
-
     #[cold]
     fn stopped(&self, stop: Stop) -> Result<Next, TraceFault> {
         let line = self.records.next_line();
@@ -135,14 +131,16 @@ pub(super) fn read_cells<'a>(
             return Err(Fault { column: None, reason: BadReason::ShortRow });
         }
         let read = match &column.content {
-            Content::Number(signal, unit) => {
+            Some(Content { signal: Signal::Timestamp, .. }) => {
+                epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds))
+            }
+            Some(Content { signal, unit }) => {
                 cells.number().map(|value| row.set(*signal, unit.map_or(value, |unit| unit.to_si(value))))
             }
-            Content::Ignored => {
+            None => {
                 cells.cell();
                 Ok(())
             }
-            Content::Timestamp => epoch.seconds(cells.cell()).map(|seconds| row.set(Signal::Time, seconds)),
         };
         read.map_err(|reason| Fault { column: Some(index), reason })?;
     }
@@ -177,9 +175,7 @@ pub(super) fn describe(layout: &Layout, line: u64, cells: &[&[u8]], fault: &Faul
             }
         }
     };
-    let column = fault.column.and_then(|index| columns.get(index));
-    let column = column.map(|column| shorten(&column.header, 40));
-    BadRow { line, counted: Counted::Lines, column, reason: fault.reason, detail }
+    layout.bad_row(line, fault.column.and_then(|index| columns.get(index)), fault.reason, detail)
 }
 
 fn expected_time(kind: &TimeKind) -> String {
@@ -200,15 +196,8 @@ pub(super) trait Cells<'a> {
     /// Bytes of the cell read last, without blanks around it.
     fn length(&self) -> usize;
 
-    /// What stands before the decimals.
-    fn decimal(&self) -> Decimal;
-
     /// Reads a cell as a number; NaN where it is empty.
-    #[inline]
-    fn number(&mut self) -> Result<f64, BadReason> {
-        let decimal = self.decimal();
-        read_number(self.cell(), decimal)
-    }
+    fn number(&mut self) -> Result<f64, BadReason>;
 }
 
 /// A record without quotes.
@@ -246,10 +235,6 @@ impl<'a> Plain<'a> {
 }
 
 impl<'a> Cells<'a> for Plain<'a> {
-    fn decimal(&self) -> Decimal {
-        self.decimal
-    }
-
     #[inline(always)]
     fn ended(&self) -> bool {
         self.ended
@@ -302,10 +287,6 @@ pub(super) struct Split<'a> {
 }
 
 impl<'a> Cells<'a> for Split<'a> {
-    fn decimal(&self) -> Decimal {
-        self.decimal
-    }
-
     fn ended(&self) -> bool {
         self.at >= self.cells.len()
     }
@@ -318,6 +299,10 @@ impl<'a> Cells<'a> for Split<'a> {
 
     fn length(&self) -> usize {
         self.at.checked_sub(1).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.trim_ascii().len())
+    }
+
+    fn number(&mut self) -> Result<f64, BadReason> {
+        read_number(self.cell(), self.decimal)
     }
 }
 

@@ -1,12 +1,12 @@
 //! How a text file of numbers is written: found in its first lines, said where it is not as this program writes one, and
 //! refused where it can be read in two ways.
 
-use super::columns::{Content, Layout, REQUIRED, partly};
+use super::columns::{Column, Layout, REQUIRED};
 use super::error::TraceFault;
 use super::format::{Stream, mistaken};
-use super::number::decimal;
-use super::proposal::{Proposal, proposals};
-use super::records::{Encoding, Records, Stop, stopped_early};
+use super::number::{decimal, number};
+use super::proposal::{Proposal, partly, proposals};
+use super::records::{Encoding, Records, stopped_early};
 use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;
@@ -23,7 +23,7 @@ pub(super) struct Dialect {
     pub(super) delimiter: Delimiter,
     pub(super) decimal: Decimal,
     pub(super) layout: Layout,
-    last_header_line: u64,
+    pub(super) last_header_line: u64,
 }
 
 impl Dialect {
@@ -74,21 +74,12 @@ impl Dialect {
             Some(decimal) => decimal,
             None => decimal(&numbers(&table, &layout))?,
         };
-        if let Some(index) = layout.columns.iter().position(|column| column.content == Content::Timestamp) {
+        if let Some(index) = layout.columns.iter().position(Column::is_timestamp) {
             layout.time = time_format(&table.column(index), &layout, &foreign, rig)?;
         }
         check_steps(&table, &layout, decimal)?;
         layout.reading = reading(&table, &layout, &foreign, decimal, encoding);
         Ok(Self { delimiter: table.delimiter, decimal, layout, last_header_line })
-    }
-
-    /// Passes over all that stands before the first row.
-    pub(super) fn skip_header(&self, records: &mut Records) -> Result<(), Stop> {
-        records.split_at(self.delimiter.byte());
-        while records.next_line() <= self.last_header_line {
-            records.next()?;
-        }
-        Ok(())
     }
 }
 
@@ -107,7 +98,7 @@ fn hinted(mut fault: TraceFault, table: &TextTable, rig: &Rig) -> TraceFault {
         Signal::Timestamp => signal == "time",
         other => REQUIRED.iter().any(|(required, words)| *required == other && words == signal),
     };
-    *hint = match proposals(table, &partly(&table.headers, rig), rig).iter().find(is_missing) {
+    *hint = match proposals(table, &partly(table, rig), rig).iter().find(is_missing) {
         Some(Proposal { signal, column, .. }) => format!(
             "; if `{}` is it, say {} = {} under [columns] of the rig file (`pitchleak columns` proposes all)",
             shorten(&column.name, 40),
@@ -155,32 +146,31 @@ fn check_shape(table: &TextTable) -> Result<(), TraceFault> {
 /// The cells of every column of numbers.
 fn numbers<'a>(table: &'a TextTable, layout: &Layout) -> Vec<Vec<&'a str>> {
     let columns = layout.columns.iter().enumerate();
-    let numbers = columns.filter(|(_, column)| matches!(column.content, Content::Number(..)));
+    let numbers = columns.filter(|(_, column)| column.content.is_some() && !column.is_timestamp());
     numbers.map(|(index, _)| table.column(index)).collect()
 }
 
 /// A clock that shows whole seconds only leaves one row of a second.
 fn check_steps(table: &TextTable, layout: &Layout, decimal: Decimal) -> Result<(), TraceFault> {
-    let is_time = |signal| matches!(signal, Some(Signal::Time | Signal::Timestamp));
-    let Some(index) = layout.columns.iter().position(|column| is_time(column.content.signal())) else {
-        return Ok(());
-    };
+    let is_time = |(_, column): &(usize, &Column)| column.is_time();
+    let Some((index, column)) = layout.columns.iter().enumerate().find(is_time) else { return Ok(()) };
     let cells = table.column(index);
-    let stamped = layout.columns.get(index).is_some_and(|column| column.content == Content::Timestamp);
     let mut epoch = Epoch::new(layout.time.clone());
-    let seconds = |cell: &&str| match (stamped, decimal) {
-        (true, _) => epoch.seconds(cell.as_bytes()).ok(),
-        (false, Decimal::Point) => fast_float2::parse::<f64, _>(cell.as_bytes()).ok(),
-        (false, Decimal::Comma) => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
+    let seconds = |cell: &&str| match column.is_timestamp() {
+        true => epoch.seconds(cell.as_bytes()).ok(),
+        false => number(cell, decimal),
     };
     let times: Vec<f64> = cells.iter().filter_map(seconds).collect();
     let still = times.windows(2).filter(|pair| pair.first() == pair.last()).count();
     if still < 10 || 5 * still < 3 * times.len() {
         return Ok(());
     }
-    let name = layout.columns.get(index).map_or("", |column| &column.header);
     Err(TraceFault::Ambiguous {
-        what: format!("column `{}` says the same time in {still} of {} rows", shorten(name, 40), times.len()),
+        what: format!(
+            "column `{}` says the same time in {still} of {} rows",
+            shorten(&column.header, 40),
+            times.len()
+        ),
         settle: "export it with fractions of a second".to_owned(),
     })
 }
@@ -209,8 +199,7 @@ fn reading(
     }
     parts.extend(table.units.as_ref().map(|units| format!("units in line {}", units.line)));
     if layout.has(Signal::Timestamp) && layout.time != TimeFormat::default() {
-        let zone = layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-        parts.push(format!("times as `{}`{zone}", layout.time.kind));
+        parts.push(format!("times as `{}`{}", layout.time.kind, layout.time.zone_text()));
     }
     for (signal, column) in foreign {
         let gauge = if column.offset < 0.0 { ", absolute" } else { "" };

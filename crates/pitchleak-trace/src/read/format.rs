@@ -2,10 +2,12 @@
 //! trace's place by mistake, with what to do about each: asked only where no trace was found.
 
 use super::error::TraceFault;
+#[cfg(feature = "parquet")]
+use super::parquet;
 use super::records::text;
 use super::row::RowSource;
 use super::table_text::TextTable;
-use super::{csv, mat, parquet};
+use super::{csv, mat};
 use crate::rig::Rig;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -13,40 +15,11 @@ use std::io::{BufReader, Cursor, Read};
 /// One format, registered in [`FORMATS`].
 pub(super) struct Format {
     /// First bytes of every such file, four at most; none of text.
-    pub(super) starts_with: &'static [u8],
-    pub(super) reading: Reading,
-}
-
-/// How the rows of a format are read.
-pub(super) enum Reading {
-    /// In this way; `look` gives the names of its columns and their first cells, also where they make no trace yet.
-    Rows {
-        open: fn(Stream, &Rig) -> Result<Rows, TraceFault>,
-        look: fn(Stream, &Rig) -> Result<TextTable, TraceFault>,
-    },
-    /// Not at all: what to do instead.
-    Refused(&'static str),
-}
-
-impl Format {
-    /// A format that is known, and not read.
-    pub(super) const fn refused(starts_with: &'static [u8], instead: &'static str) -> Self {
-        Self { starts_with, reading: Reading::Refused(instead) }
-    }
-
-    pub(super) fn open(&self, stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
-        match self.reading {
-            Reading::Rows { open, .. } => open(stream, rig),
-            Reading::Refused(instead) => Err(TraceFault::Format(instead)),
-        }
-    }
-
-    pub(super) fn look(&self, stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
-        match self.reading {
-            Reading::Rows { look, .. } => look(stream, rig),
-            Reading::Refused(instead) => Err(TraceFault::Format(instead)),
-        }
-    }
+    starts_with: &'static [u8],
+    /// How its rows are read.
+    pub(super) open: fn(Stream, &Rig) -> Result<Rows, TraceFault>,
+    /// The names of its columns and their first cells, also where they make no trace yet.
+    pub(super) look: fn(Stream, &Rig) -> Result<TextTable, TraceFault>,
 }
 
 pub(super) type Rows = Box<dyn RowSource + Send>;
@@ -151,23 +124,25 @@ pub(super) fn mistaken(start: &[u8]) -> Option<TraceFault> {
     KINDS.iter().find(fits).map(|kind| TraceFault::Format(kind.line))
 }
 
-/// Every format; the first that fits is taken.
+/// Every format that is read; the first that fits is taken.
 const FORMATS: &[Format] = &[
-    parquet::FORMAT,
-    mat::FORMAT,
-    Format::refused(
-        b"\x89HDF",
-        "HDF5 cannot be read but in MAT files: export the trace as .csv, .parquet or .mat",
-    ),
-    Format::refused(b"PK\x03\x04", "an Excel workbook or a zip archive: save the sheet as CSV"),
-    Format::refused(b"\xd0\xcf\x11\xe0", "an Excel workbook: save the sheet as CSV"),
-    Format::refused(b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it (zstd -d), or compress it by gzip"),
-    Format::refused(b"\xfd7zX", "compressed by xz: unpack it (xz -d), or compress it by gzip"),
-    Format::refused(
-        b"TDSm",
-        "TDMS, of LabVIEW: export it as CSV; in Python, examples/mdf4_and_tdms.py reads it",
-    ),
-    csv::FORMAT,
+    #[cfg(feature = "parquet")]
+    Format { starts_with: b"PAR1", open: parquet::open, look: parquet::look },
+    Format { starts_with: b"MATL", open: mat::open, look: mat::look },
+    // Text is whatever no other format knows as its own.
+    Format { starts_with: b"", open: csv::open, look: csv::look },
+];
+
+/// Formats that are known and not read, by their first bytes, and what to do instead.
+const REFUSED: &[(&[u8], &str)] = &[
+    #[cfg(not(feature = "parquet"))]
+    (b"PAR1", "Parquet needs a build with the cargo feature `parquet`: export the trace as .csv or .csv.gz"),
+    (b"\x89HDF", "HDF5 cannot be read but in MAT files: export the trace as .csv, .parquet or .mat"),
+    (b"PK\x03\x04", "an Excel workbook or a zip archive: save the sheet as CSV"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook: save the sheet as CSV"),
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd: unpack it (zstd -d), or compress it by gzip"),
+    (b"\xfd7zX", "compressed by xz: unpack it (xz -d), or compress it by gzip"),
+    (b"TDSm", "TDMS, of LabVIEW: export it as CSV; in Python, examples/mdf4_and_tdms.py reads it"),
 ];
 
 /// Bytes by which a format is told.
@@ -176,10 +151,13 @@ const MAGIC: usize = 4;
 /// Opens a trace file of any format, compressed or not; `file` is the same where it is one on a disk.
 pub(super) fn open(bytes: Box<dyn Read + Send>, file: Option<File>, rig: &Rig) -> Result<Rows, TraceFault> {
     let (format, stream) = start(bytes, file)?;
-    format.open(stream, rig)
+    (format.open)(stream, rig)
 }
 
 /// Tells the format.
+///
+/// # Errors
+/// Where it is none that is read.
 pub(super) fn start(
     bytes: Box<dyn Read + Send>,
     file: Option<File>,
@@ -191,10 +169,12 @@ pub(super) fn start(
         (start, bytes) = peek(Box::new(flate2::bufread::MultiGzDecoder::new(buffered)))?;
     }
     let file = file.filter(|_| !gzip);
-    match FORMATS.iter().find(|format| start.starts_with(format.starts_with)) {
-        Some(format) => Ok((format, Stream { start, bytes, gzip, file })),
-        None => Err(TraceFault::Empty),
+    if let Some((_, instead)) = REFUSED.iter().find(|(first, _)| start.starts_with(first)) {
+        return Err(TraceFault::Format(instead));
     }
+    let format = FORMATS.iter().find(|format| start.starts_with(format.starts_with));
+    let format = format.ok_or(TraceFault::Empty)?;
+    Ok((format, Stream { start, bytes, gzip, file }))
 }
 
 /// The first bytes, and all of them.

@@ -1,14 +1,15 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::columns::{Bound, Content, partly};
+use super::bind::Bound;
+use super::columns::{Content, absent};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::format;
 use super::number::decimal;
-use super::proposal::{Proposal, Why, proposals};
+use super::proposal::{Proposal, Why, partly, proposals};
 use super::table_text::TextTable;
-use crate::header::{near, shorten};
-use crate::rig::{ColumnMap, Decimal, ForeignColumn, Rig};
+use crate::header::shorten;
+use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
 use serde::Serialize;
 use std::fmt::Write;
@@ -97,7 +98,7 @@ impl FileReading {
             let file = File::open(path).map_err(TraceFault::Open)?;
             format::start(Box::new(file.try_clone().map_err(TraceFault::Open)?), Some(file))?
         };
-        Ok(Self::of_table(format.look(stream, rig)?, rig))
+        Ok(Self::of_table((format.look)(stream, rig)?, rig))
     }
 
     fn of_table(table: TextTable, rig: &Rig) -> Self {
@@ -109,10 +110,11 @@ impl FileReading {
             header_line: table.header_line,
             units_line: table.units.as_ref().map(|row| row.line),
         });
-        let named = table.bound.as_ref().map(|bound| named(&bound.foreign)).unwrap_or_default();
+        let foreign = table.bound.iter().flat_map(|bound| &bound.foreign);
+        let named = foreign.map(|(signal, column)| ProposedLine::of(*signal, column, Why::Name)).collect();
         let found = match &table.bound {
             Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
-            Err(_) => partly(&table.headers, rig),
+            Err(_) => partly(&table, rig),
         };
         let columns = table.headers.iter().zip(found.iter()).enumerate().map(|(index, (header, content))| {
             let first =
@@ -120,17 +122,17 @@ impl FileReading {
             read_column(header, *content, first)
         });
         let columns = columns.collect();
-        let proposals = proposals(&table, &found, rig).iter().map(line).collect();
-        let misspelt = misspelt(&table.headers, &rig.columns);
+        let proposals = proposals(&table, &found, rig);
+        let line = |one: &Proposal| ProposedLine::of(one.signal, &one.column, one.why);
+        let proposals = proposals.iter().map(line).collect();
+        let misspelt = absent(&table.headers, &rig.columns).map(misspelt).collect();
         let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
             problem = table.bound.err().map(|fault| fault.to_string());
         } else {
             match Dialect::of(table, super::records::Encoding::Utf8, rig) {
                 Ok(Dialect { layout, .. }) if layout.has(Signal::Timestamp) => {
-                    let zone =
-                        layout.time.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default();
-                    time_format = Some(format!("{}{zone}", layout.time.kind));
+                    time_format = Some(format!("{}{}", layout.time.kind, layout.time.zone_text()));
                 }
                 Ok(_) => {}
                 Err(fault) => problem = Some(fault.to_string()),
@@ -149,39 +151,25 @@ impl FileReading {
     }
 }
 
-fn read_column(header: &str, content: Content, first: Vec<String>) -> ColumnReading {
-    let (signal, unit) = match content {
-        Content::Number(signal, unit) => {
-            let si = || signal.dimension().and_then(|dimension| dimension.units().first().copied());
-            (Some(signal.name()), unit.or_else(si).map(|unit| unit.text))
-        }
-        Content::Timestamp => (Some(Signal::Timestamp.name()), None),
-        Content::Ignored => (None, None),
-    };
-    ColumnReading { header: shorten(header, 60), signal, unit, first }
+fn read_column(header: &str, content: Option<Content>, first: Vec<String>) -> ColumnReading {
+    let unit = content.and_then(|Content { signal, unit }| unit.or_else(|| signal.si()));
+    ColumnReading {
+        header: shorten(header, 60),
+        signal: content.map(|content| content.signal.name()),
+        unit: unit.map(|unit| unit.text),
+        first,
+    }
 }
 
-fn line(proposal: &Proposal) -> ProposedLine {
-    let line = format!("{} = {}", proposal.signal.name(), proposal.column.to_toml(proposal.signal));
-    ProposedLine { line, why: proposal.why.text() }
+impl ProposedLine {
+    fn of(signal: Signal, column: &ForeignColumn, why: Why) -> Self {
+        Self { line: format!("{} = {}", signal.name(), column.to_toml(signal)), why: why.text() }
+    }
 }
 
-fn named(foreign: &ColumnMap) -> Vec<ProposedLine> {
-    let line = |(signal, column): (&Signal, &ForeignColumn)| ProposedLine {
-        line: format!("{} = {}", signal.name(), column.to_toml(*signal)),
-        why: Why::Name.text(),
-    };
-    foreign.iter().map(line).collect()
-}
-
-fn misspelt(headers: &[String], map: &ColumnMap) -> Vec<String> {
-    let absent = map.iter().filter(|(_, column)| !headers.iter().any(|header| header == column.name.trim()));
-    let text = |(signal, column): (&Signal, &ForeignColumn)| {
-        let near = near(&column.name, headers.iter().map(String::as_str));
-        let near = near.map_or_else(String::new, |near| format!("; `{}` is near", shorten(near, 40)));
-        format!("{}: the file has no column `{}`{near}", signal.name(), shorten(&column.name, 40))
-    };
-    absent.map(text).collect()
+fn misspelt((signal, name, near): (Signal, String, Option<String>)) -> String {
+    let near = near.map(|near| format!("; `{near}` is near")).unwrap_or_default();
+    format!("{}: the file has no column `{name}`{near}", signal.name())
 }
 
 impl FileReading {

@@ -87,21 +87,16 @@ impl Part {
     /// Reads its next row; what is none is given back.
     fn read(&mut self, epoch_ns: Option<i64>) -> Result<Option<Next>, TraceFault> {
         let mut row = Row::empty();
-        match self.rows.next_row(&mut row)? {
+        let next = self.rows.next_row(&mut row)?;
+        self.ended = matches!(next, Next::End | Next::CutOff(_));
+        match next {
             Next::Row => {
                 row.set(Signal::Time, row.get(Signal::Time) + self.since_s(epoch_ns));
                 self.next = Some(row);
                 Ok(None)
             }
-            Next::End => {
-                self.ended = true;
-                Ok(None)
-            }
-            Next::CutOff(why) => {
-                self.ended = true;
-                Ok(Some(Next::CutOff(why)))
-            }
-            bad => Ok(Some(bad)),
+            Next::End => Ok(None),
+            other => Ok(Some(other)),
         }
     }
 }

@@ -1,13 +1,12 @@
 //! Rows that come one by one as text, such as the lines of a live feed.
 
-use super::columns::{Column, Content, Layout};
+use super::columns::{Layout, REQUIRED};
 use super::csv::{Cells, Split, describe, read_cells};
-use super::error::{BadReason, BadRow, Counted, TraceFault};
+use super::error::{BadReason, BadRow, TraceFault};
 use super::row::{BadRows, NEEDED, Record, Row};
 use super::stamps::Epoch;
 use super::validator::{MOST_TIME_S, RowValidator, missing};
 use crate::rig::{ColumnMap, Decimal, Rig};
-use crate::signal::Signal;
 
 /// What the cells of a line hold, by their names, which are those of a trace's columns.
 #[derive(Clone, Debug)]
@@ -19,24 +18,21 @@ impl LineLayout {
     /// # Errors
     /// As for the header row of a trace.
     pub fn new(names: &[String], rig: &Rig) -> Result<Self, TraceFault> {
-        Layout::new(names, &rig.columns)?.of_stroke(rig).map(|layout| {
-            let time = rig.csv.time.clone().unwrap_or(layout.time);
-            Self(Layout { counted: Counted::Lines, time, ..layout })
-        })
+        let layout = Layout::new(names, &rig.columns, &REQUIRED, rig)?;
+        let time = rig.csv.time.clone().unwrap_or(layout.time);
+        Ok(Self(Layout { time, ..layout }))
     }
 
     /// Time of a line, s since `epoch_ns` (its first own stamp where there is none yet); or why it has none.
     pub fn time_s(&self, epoch_ns: Option<i64>, cells: &[&[u8]]) -> Result<f64, BadReason> {
-        let is_time =
-            |column: &Column| matches!(column.content, Content::Timestamp | Content::Number(Signal::Time, _));
-        let times = self.0.columns.iter().enumerate().find(|(_, column)| is_time(column));
+        let times = self.0.columns.iter().enumerate().find(|(_, column)| column.is_time());
         let (at, column) = times.ok_or(BadReason::Missing)?;
         let mut cells = Split { cells, decimal: Decimal::Point, at };
-        let time_s = match column.content {
-            Content::Timestamp => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell()),
-            Content::Number(_, unit) => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time))),
-            Content::Ignored => Ok(f64::NAN),
-        }?;
+        let unit = column.content.and_then(|content| content.unit);
+        let time_s = match column.is_timestamp() {
+            true => Epoch::since(epoch_ns, self.0.time.clone()).seconds(cells.cell())?,
+            false => cells.number().map(|time| unit.map_or(time, |unit| unit.to_si(time)))?,
+        };
         match time_s {
             _ if time_s.is_nan() => Err(BadReason::Missing),
             _ if time_s.abs() > MOST_TIME_S => Err(BadReason::OutOfRange),

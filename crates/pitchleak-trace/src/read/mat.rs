@@ -5,9 +5,8 @@
 mod hdf5;
 mod vector;
 
-use super::columns::bind;
 use super::error::{Counted, TraceFault};
-use super::format::{Format, MOST_HELD, Reading, Rows, Stream};
+use super::format::{MOST_HELD, Rows, Stream};
 use super::stamps::{self, sample};
 use super::table::TableRows;
 use super::table_text::TextTable;
@@ -16,8 +15,6 @@ use crate::rig::Rig;
 use flate2::read::ZlibDecoder;
 use std::io::{self, Read};
 use std::sync::Arc;
-
-pub(super) const FORMAT: Format = Format { starts_with: b"MATL", reading: Reading::Rows { open, look } };
 
 /// Types of data elements that hold others.
 const MATRIX: u32 = 14;
@@ -29,29 +26,23 @@ const VERSION_7_3: [u8; 2] = [0, 2];
 /// No name or list of dimensions is longer, bytes.
 const LONGEST_HEADER: u32 = 4096;
 
-/// A variable of the file.
-struct Variable {
-    name: String,
-    values: Values,
-}
+/// The numbers of a vector, or what a variable is instead.
+type Values = Result<Vec<f64>, &'static str>;
 
-enum Values {
-    Vector(Vec<f64>),
-    /// What it is instead.
-    Other(&'static str),
-}
+/// Each variable of a file by its name.
+type Variables = Vec<(String, Values)>;
 
-fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
+pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let Vectors { names, values, short, others } = vectors(stream)?;
-    let bound =
-        bind(&names, None, &sample(&values), rig).map_err(|fault| with_others(fault, &others, &short))?;
+    let TextTable { bound, rows, .. } = TextTable::of_columns(names, sample(&values), rig);
+    let bound = bound.map_err(|fault| with_others(fault, &others, &short))?;
     let mut layout = bound.layout;
     layout.counted = Counted::Rows;
-    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, values)?);
+    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, &rows, values)?);
     Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 
-fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
+pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
     let Vectors { names, values, .. } = vectors(stream)?;
     Ok(TextTable::of_columns(names, sample(&values), rig))
 }
@@ -60,15 +51,21 @@ fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
 struct Vectors {
     names: Vec<String>,
     values: Vec<Vec<f64>>,
-    short: Named<Vec<f64>>,
-    others: Named<&'static str>,
+    short: Vec<(String, Vec<f64>)>,
+    others: Vec<(String, &'static str)>,
 }
 
 fn vectors(stream: Stream) -> Result<Vectors, TraceFault> {
-    let (variables, others) = read(stream)?;
-    let longest = variables.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+    let (mut vectors, mut others) = (Vec::new(), Vec::new());
+    for (name, values) in read(stream)? {
+        match values {
+            Ok(values) => vectors.push((name, values)),
+            Err(kind) => others.push((name, kind)),
+        }
+    }
+    let longest = vectors.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
     let (columns, short): (Vec<_>, Vec<_>) =
-        variables.into_iter().partition(|(_, values)| values.len() == longest);
+        vectors.into_iter().partition(|(_, values)| values.len() == longest);
     let (names, values) = columns.into_iter().unzip();
     Ok(Vectors { names, values, short, others })
 }
@@ -99,14 +96,8 @@ fn with_others(
     }
 }
 
-type Named<T> = Vec<(String, T)>;
-
-/// The vectors of a file, and what else is in it.
-type Variables = (Named<Vec<f64>>, Named<&'static str>);
-
 const TOO_LARGE: &str = "more than a gigabyte of numbers: save the trace in parts, or as CSV or Parquet";
 
-/// The vectors of a file, and what else is in it.
 fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
     let mut header = [0; 128];
     stream.bytes.read_exact(&mut header).map_err(damaged)?;
@@ -124,7 +115,7 @@ fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
         }
     };
     let mut budget = MOST_HELD / 8;
-    let (mut vectors, mut others) = (Vec::new(), Vec::new());
+    let mut variables = Vec::new();
     let mut elements = Elements { bytes: stream.bytes, big_endian };
     while let Some((kind, size)) = elements.outer_tag()? {
         let mut inside = elements.bytes.by_ref().take(u64::from(size));
@@ -137,7 +128,7 @@ fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
                     _ => None,
                 };
                 // Its checksum stands at its end.
-                if matches!(variable, Some(Variable { values: Values::Vector(_), .. })) {
+                if matches!(variable, Some((_, Ok(_)))) {
                     inflated.bytes.read(&mut [0]).map_err(damaged)?;
                 }
                 variable
@@ -148,13 +139,9 @@ fn read(mut stream: Stream) -> Result<Variables, TraceFault> {
         if inside.limit() > 0 {
             return Err(damaged(io::ErrorKind::UnexpectedEof.into()));
         }
-        match variable {
-            Some(Variable { name, values: Values::Vector(values) }) => vectors.push((name, values)),
-            Some(Variable { name, values: Values::Other(kind) }) => others.push((name, kind)),
-            None => {}
-        }
+        variables.extend(variable);
     }
-    Ok((vectors, others))
+    Ok(variables)
 }
 
 fn damaged(error: io::Error) -> TraceFault {
@@ -219,7 +206,7 @@ impl<R: Read> Elements<R> {
     }
 
     /// A variable after its own tag; none where it has no name.
-    fn variable(&mut self, budget: &mut u64) -> Result<Option<Variable>, TraceFault> {
+    fn variable(&mut self, budget: &mut u64) -> Result<Option<(String, Values)>, TraceFault> {
         let (_, flags) = self.short()?;
         let flags = flags.first_chunk().map_or(0, |bytes| self.u32(*bytes));
         let (_, sizes) = self.short()?;
@@ -229,7 +216,7 @@ impl<R: Read> Elements<R> {
         if name.is_empty() {
             return Ok(None);
         }
-        let other = |kind| Ok(Some(Variable { name: name.clone(), values: Values::Other(kind) }));
+        let other = |kind| Ok(Some((name.clone(), Err(kind))));
         match flags & 0xff {
             1 => return other("cell array"),
             2 => return other("struct"),
@@ -259,7 +246,7 @@ impl<R: Read> Elements<R> {
         }
         *budget = budget.checked_sub(length).ok_or(TraceFault::Format(TOO_LARGE))?;
         let values = self.numbers(written, size, padding(size, small))?;
-        Ok(Some(Variable { name, values: Values::Vector(values) }))
+        Ok(Some((name, Ok(values))))
     }
 
     /// Numbers in pieces: memory is taken as they come, whatever the tag promises.

@@ -1,6 +1,7 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
 mod ahead;
+mod bind;
 mod clock;
 mod columns;
 mod csv;
@@ -13,6 +14,7 @@ mod line;
 mod mat;
 mod number;
 mod own_clocks;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod proposal;
 mod quality;
@@ -116,11 +118,7 @@ impl TraceReader<'static> {
         let rows = format::open(stream, file, rig).map_err(|fault| fault.of(name))?;
         Ok(Self::over(name, rows, rig))
     }
-}
 
-const FOLDER: &str = "a folder, not a trace: name the files in it, e.g. by `*.csv`";
-
-impl TraceReader<'static> {
     /// Reads a long trace in a thread of its own, a little ahead of the records that are taken, where there is a second core.
     /// Records, their order and errors are the same, memory stays constant.
     #[must_use]
@@ -132,6 +130,8 @@ impl TraceReader<'static> {
         }
     }
 }
+
+const FOLDER: &str = "a folder, not a trace: name the files in it, e.g. by `*.csv`";
 
 impl<'a> TraceReader<'a> {
     /// Reads columns in memory without copying them: `layout` says what they hold, `batches` are their

@@ -64,6 +64,14 @@ fn decimals(bytes: &[u8]) -> Option<(u64, usize)> {
     Some((upper.wrapping_add(lower) >> 32, bits as usize / 8))
 }
 
+/// A cell as a number, whatever stands around its decimals; of the first rows, which are looked at.
+pub(super) fn number(cell: &str, decimal: Decimal) -> Option<f64> {
+    match decimal {
+        Decimal::Point => fast_float2::parse(cell).ok(),
+        Decimal::Comma => fast_float2::parse(cell.replace(',', ".")).ok(),
+    }
+}
+
 /// What the marks in the cells of a column, or of all, speak for.
 #[derive(Default)]
 struct Marks {

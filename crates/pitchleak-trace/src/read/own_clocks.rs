@@ -13,21 +13,6 @@ use super::validator::missing;
 use crate::signal::Signal;
 use std::collections::VecDeque;
 
-/// What a row may lack, and is read by a meter.
-const OTHERS: [Signal; 12] = [
-    Signal::FlowA,
-    Signal::FlowB,
-    Signal::Force,
-    Signal::Speed,
-    Signal::Temperature,
-    Signal::Spool,
-    Signal::Command,
-    Signal::Supply,
-    Signal::Tank,
-    Signal::LeakInternal,
-    Signal::LeakExternalA,
-    Signal::LeakExternalB,
-];
 /// So many rows are looked at ahead (chosen): 300 kB, and two readings of a channel a thousand times slower than another.
 const AHEAD: usize = 2048;
 /// A channel without a reading for so many of its own steps is not measured there (chosen).
@@ -219,8 +204,9 @@ impl<'a> OwnClocks<'a> {
                 }
             }
         }
-        for signal in OTHERS {
-            let is_new = row.get(signal).is_nan() && !self.clock(signal).given;
+        for signal in Signal::ALL {
+            // A port is shut or open until it is said not to be.
+            let is_new = row.get(signal).is_nan() && !self.clock(signal).given && signal != Signal::Shut;
             if let Some(value) = is_new.then(|| self.between(row, signal)).flatten() {
                 row.set(signal, value);
             }

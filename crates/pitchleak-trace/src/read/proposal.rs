@@ -1,8 +1,8 @@
 //! What foreign columns may be, by their names and by their values: proposed to a person, never read.
 
-use super::columns::{Content, bare_unit};
-use super::number::decimal;
-use super::table_text::TextTable;
+use super::columns::{Content, content_of};
+use super::number::{decimal, number};
+use super::table_text::{TextTable, bare_unit};
 use crate::header::{self, HeaderUnit, lists};
 use crate::rig::{Decimal, ForeignColumn, Rig};
 use crate::signal::Signal;
@@ -66,11 +66,6 @@ impl Unread<'_> {
         let dimensions = Signal::ALL.into_iter().filter_map(Signal::dimension);
         dimensions.filter(|dimension| *dimension != Dimension::Time).any(|one| self.unit(one).is_some())
     }
-
-    /// As `[columns]` would name it with the unit that it says.
-    fn named(&self, found: HeaderUnit) -> ForeignColumn {
-        ForeignColumn { offset: found.offset_si, ..ForeignColumn::new(self.header, Some(found.unit)) }
-    }
 }
 
 /// What a word says of a quantity, and of a side; blanks between the words.
@@ -79,8 +74,9 @@ const WORDS: [(Signal, &str); 5] = [
     (Signal::FlowA, "q flow flowrate volumenstrom durchfluss"),
     (Signal::Position, "x position pos stroke weg hub kolbenweg stellweg kolbenhub displacement lvdt travel"),
     (Signal::Force, "force load kraft"),
-    (Signal::Time, "t time zeit date datum timestamp elapsed clock"),
+    (Signal::Time, TIMES),
 ];
+const TIMES: &str = "t time zeit date datum timestamp elapsed clock";
 const SIDE_A: &str = "a 1 head cap bore piston kolben blind";
 const SIDE_B: &str = "b 2 rod annulus ring stange";
 
@@ -118,27 +114,22 @@ pub(super) fn propose(
     rig: &Rig,
 ) -> Vec<Proposal> {
     let mut proposals: Vec<Proposal> = Vec::new();
-    let mut left: Vec<&Unread<'_>> = Vec::new();
+    let is_open = |known: &[Proposal], signal: Signal| {
+        wanted.contains(&signal) && !known.iter().any(|known| known.signal == signal)
+    };
+    let mut left = Vec::new();
     for column in unread {
-        let open = |signal: &Signal| {
-            wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
-        };
-        match by_name(column, decimal, rig).filter(|proposal| open(&proposal.signal)) {
+        match by_name(column, decimal, rig).filter(|found| is_open(&proposals, found.signal)) {
             Some(proposal) => proposals.push(proposal),
             None => left.push(column),
         }
     }
     for column in left {
         let words = words(column.header);
-        let is_time = WORDS
-            .iter()
-            .any(|(signal, known)| *signal == Signal::Time && words.iter().any(|word| lists(known, word)));
-        if !may_be_a_reading(&words) || is_time {
+        if !may_be_a_reading(&words) || words.iter().any(|word| lists(TIMES, word)) {
             continue;
         }
-        let open = |signal: &Signal| {
-            wanted.contains(signal) && !proposals.iter().any(|known| known.signal == *signal)
-        };
+        let open = |signal: &Signal| is_open(&proposals, *signal);
         let proposal = match column.says_unit() {
             true => by_unit(column, open),
             false => by_values(column, decimal, rig, open),
@@ -149,13 +140,17 @@ pub(super) fn propose(
     proposals
 }
 
+/// What the headers say one by one, where they do not make a trace together.
+pub(super) fn partly(table: &TextTable, rig: &Rig) -> Vec<Option<Content>> {
+    table.headers.iter().map(|header| content_of(header.trim(), &rig.columns)).collect()
+}
+
 /// What the columns that are not read may be.
-pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<Proposal> {
-    let has = |signal: Signal| found.iter().any(|content| content.signal() == Some(signal));
+pub(super) fn proposals(table: &TextTable, found: &[Option<Content>], rig: &Rig) -> Vec<Proposal> {
+    let has = |signal: Signal| found.iter().flatten().any(|content| content.signal == signal);
     let has_time = has(Signal::Time) || has(Signal::Timestamp);
-    let is_time = |signal: &Signal| matches!(signal, Signal::Time | Signal::Timestamp);
-    let wanted: Vec<Signal> =
-        Signal::ALL.into_iter().filter(|signal| !(has(*signal) || has_time && is_time(signal))).collect();
+    let is_given = |signal: &Signal| has(*signal) || has_time && signal.is_time();
+    let wanted: Vec<Signal> = Signal::ALL.into_iter().filter(|signal| !is_given(signal)).collect();
     let unit = |index: usize| {
         let cell = table.units.as_ref().and_then(|row| row.cells.get(index));
         cell.map(|cell| bare_unit(cell)).unwrap_or_default()
@@ -163,7 +158,7 @@ pub(super) fn proposals(table: &TextTable, found: &[Content], rig: &Rig) -> Vec<
     let unread: Vec<Unread<'_>> = (0..)
         .zip(&table.headers)
         .zip(found)
-        .filter(|(_, content)| **content == Content::Ignored)
+        .filter(|(_, content)| content.is_none())
         .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
         .collect();
     let cells: Vec<Vec<&str>> = unread.iter().map(|column| column.cells.clone()).collect();
@@ -179,7 +174,11 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     let words = words(column.header);
     if let Some(signal) = of_the_valve(&words) {
         let found = column.unit(Dimension::Spool)?;
-        return Some(Proposal { signal, column: column.named(found), why: Why::Name });
+        return Some(Proposal {
+            signal,
+            column: ForeignColumn::with_unit(column.header, found),
+            why: Why::Name,
+        });
     }
     if !may_be_a_reading(&words) {
         return None;
@@ -198,7 +197,11 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     };
     let dimension = signal.dimension()?;
     if let Some(found) = column.unit(dimension) {
-        return Some(Proposal { signal, column: column.named(found), why: Why::Name });
+        return Some(Proposal {
+            signal,
+            column: ForeignColumn::with_unit(column.header, found),
+            why: Why::Name,
+        });
     }
     if signal == Signal::Time && times::guess(&column.cells).is_ok() {
         let foreign = ForeignColumn::new(column.header, None);
@@ -216,7 +219,7 @@ fn by_unit(column: &Unread<'_>, open: impl Fn(&Signal) -> bool) -> Option<Propos
     let in_order = [Position, PressureA, PressureB, FlowA, FlowB, Force];
     in_order.into_iter().filter(open).find_map(|signal| {
         let found = column.unit(signal.dimension()?)?;
-        Some(Proposal { signal, column: column.named(found), why: Why::Unit })
+        Some(Proposal { signal, column: ForeignColumn::with_unit(column.header, found), why: Why::Unit })
     })
 }
 
@@ -240,11 +243,8 @@ fn by_values(
     };
     tried.iter().filter(|signal| open(signal)).find_map(|signal| {
         let unit = possible_unit(*signal, &values, rig)?;
-        Some(Proposal {
-            signal: *signal,
-            column: ForeignColumn::new(column.header, Some(unit)),
-            why: Why::Values,
-        })
+        let column = ForeignColumn::new(column.header, Some(unit));
+        Some(Proposal { signal: *signal, column, why: Why::Values })
     })
 }
 
@@ -279,11 +279,8 @@ fn possible_unit(signal: Signal, values: &[f64], rig: &Rig) -> Option<Unit> {
 }
 
 fn values(column: &Unread<'_>, decimal: Decimal) -> Vec<f64> {
-    let read = |cell: &&str| match decimal {
-        Decimal::Point => fast_float2::parse::<f64, _>(cell.as_bytes()).ok(),
-        Decimal::Comma => fast_float2::parse::<f64, _>(cell.replace(',', ".").as_bytes()).ok(),
-    };
-    column.cells.iter().filter_map(read).filter(|value| value.is_finite()).collect()
+    let values = column.cells.iter().filter_map(|cell| number(cell, decimal));
+    values.filter(|value| value.is_finite()).collect()
 }
 
 fn rises(values: &[f64]) -> bool {

@@ -90,6 +90,15 @@ impl Records {
         }
     }
 
+    /// Passes over all that stands before the first row; from there on, cells are split at `delimiter`.
+    pub(super) fn skip_header(&mut self, delimiter: u8, last_line: u64) -> Result<(), TraceFault> {
+        self.split_at(delimiter);
+        while self.next_line() <= last_line {
+            self.next().map_err(stopped_early)?;
+        }
+        Ok(())
+    }
+
     /// Splits at `delimiter` from here on.
     pub(super) fn split_at(&mut self, delimiter: u8) {
         (self.delimiter, self.unquoter) = (delimiter, None);
@@ -285,14 +294,10 @@ impl Encoding {
     pub(super) fn decode(self, bytes: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
         match self {
             Self::Utf8 => bytes,
-            Self::Utf16 { big_endian } => Box::new(Utf16 {
-                source: bytes,
-                big_endian,
-                odd: None,
-                high: None,
-                text: Vec::new(),
-                given: 0,
-            }),
+            Self::Utf16 { big_endian } => {
+                let mut utf16 = Utf16 { source: bytes, big_endian, odd: None, high: None };
+                Box::new(Written::by(move |text| utf16.decode(text)))
+            }
         }
     }
 }
@@ -312,33 +317,26 @@ struct Utf16 {
     odd: Option<u8>,
     /// First unit of a pair that is not whole yet.
     high: Option<u16>,
-    text: Vec<u8>,
-    /// How much of `text` was given on.
-    given: usize,
 }
 
 impl Utf16 {
-    /// Reads on until there is text; `false` at the end.
-    fn refill(&mut self) -> io::Result<bool> {
+    /// Decodes what is read next; `false` at the end.
+    fn decode(&mut self, text: &mut Vec<u8>) -> io::Result<bool> {
         let mut chunk = [0; 16 * 1024];
-        self.text.clear();
-        self.given = 0;
-        while self.text.is_empty() {
-            let read = self.source.read(&mut chunk)?;
-            if read == 0 {
-                return Ok(false);
-            }
-            for byte in chunk.iter().take(read) {
-                match self.odd.take() {
-                    None => self.odd = Some(*byte),
-                    Some(first) => self.push(first, *byte),
-                }
+        let read = match self.source.read(&mut chunk) {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => return Ok(true),
+            read => read?,
+        };
+        for byte in chunk.iter().take(read) {
+            match self.odd.take() {
+                None => self.odd = Some(*byte),
+                Some(first) => self.push(first, *byte, text),
             }
         }
-        Ok(true)
+        Ok(read > 0)
     }
 
-    fn push(&mut self, first: u8, second: u8) {
+    fn push(&mut self, first: u8, second: u8, text: &mut Vec<u8>) {
         let bytes = [first, second];
         let unit = if self.big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) };
         if self.high.is_none() && (0xd800..0xdc00).contains(&unit) {
@@ -347,15 +345,39 @@ impl Utf16 {
         }
         for c in char::decode_utf16(self.high.take().into_iter().chain([unit])) {
             let c = c.unwrap_or(char::REPLACEMENT_CHARACTER);
-            self.text.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes());
+            text.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes());
         }
     }
 }
 
-impl Read for Utf16 {
+/// Text that is written as it is read, piece by piece.
+pub(super) struct Written<F> {
+    /// Writes on; `false` at the end.
+    more: F,
+    text: Vec<u8>,
+    given: usize,
+    /// What comes behind it: the end, or why it is not read on.
+    then: Option<io::Result<()>>,
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Written<F> {
+    pub(super) fn by(more: F) -> Self {
+        Self { more, text: Vec::new(), given: 0, then: None }
+    }
+}
+
+impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Read for Written<F> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if self.given == self.text.len() && !self.refill()? {
-            return Ok(0);
+        if self.given == self.text.len() {
+            self.text.clear();
+            self.given = 0;
+            while self.then.is_none() && self.text.len() < into.len() {
+                self.then = (self.more)(&mut self.text).map(|more| (!more).then_some(())).transpose();
+            }
+            // What was written before is given before.
+            if self.text.is_empty() && self.then.as_ref().is_some_and(Result::is_err) {
+                self.then.replace(Ok(())).unwrap_or(Ok(()))?;
+            }
         }
         let mut rest = self.text.get(self.given..).unwrap_or_default();
         let count = rest.read(into)?;

@@ -169,9 +169,8 @@ pub(super) fn check_time(columns: &[Column], row: &Row) -> Result<(), Fault> {
 
 #[cold]
 fn blame(columns: &[Column], time: f64) -> Fault {
-    let is_time = |column: &Column| matches!(column.content.signal(), Some(Signal::Time | Signal::Timestamp));
     let reason = if time.is_nan() { BadReason::Missing } else { BadReason::OutOfRange };
-    Fault { column: columns.iter().position(is_time), reason }
+    Fault { column: columns.iter().position(Column::is_time), reason }
 }
 
 /// Readings of flow, m³/s, from the time, s, the pressures, Pa, and the flows that were read, those of A first.

@@ -1,8 +1,9 @@
 //! Time stamps as seconds since the first of a trace, in rows of text and in columns of numbers.
 
-use super::columns::{Content, Layout, TextRow};
+use super::columns::{Column, Layout};
 use super::error::{BadReason, TraceFault};
 use super::table::Cells;
+use super::table_text::{TextRow, column};
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
@@ -65,12 +66,15 @@ pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
 /// So many rows say how times are written.
 const ROWS: usize = 100;
 
+/// A number as text; none is an empty cell.
+pub(super) fn cell_text(value: &f64) -> String {
+    if value.is_nan() { String::new() } else { value.to_string() }
+}
+
 /// The first rows as text, as those of a file of text are looked at.
 pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
     let rows = columns.iter().map(Vec::len).max().unwrap_or(0).min(ROWS);
-    let text = |row: usize, column: &Vec<f64>| {
-        column.get(row).filter(|value| !value.is_nan()).map_or_else(String::new, f64::to_string)
-    };
+    let text = |row: usize, column: &Vec<f64>| column.get(row).map(cell_text).unwrap_or_default();
     let row = |row: usize| TextRow {
         line: row as u64,
         cells: columns.iter().map(|column| text(row, column)).collect(),
@@ -78,31 +82,27 @@ pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
     (0..rows).map(row).collect()
 }
 
-/// The columns that are read; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
+/// The columns that are read, with their first `rows` as text; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
 pub(super) fn cells(
     layout: &mut Layout,
     foreign: &ColumnMap,
     rig: &Rig,
+    rows: &[TextRow],
     columns: Vec<Vec<f64>>,
 ) -> Result<Vec<Cells<'static>>, TraceFault> {
-    let stamps = layout.columns.iter().position(|column| column.content == Content::Timestamp);
-    layout.time = match stamps.and_then(|index| columns.get(index)) {
+    layout.time = match layout.columns.iter().position(Column::is_timestamp) {
+        Some(index) => time_format(&column(rows, index), layout, foreign, rig)?,
         None => TimeFormat::default(),
-        Some(values) => {
-            let known = values.iter().take(ROWS).filter(|value| !value.is_nan());
-            let cells: Vec<String> = known.map(f64::to_string).collect();
-            time_format(&cells.iter().map(String::as_str).collect::<Vec<_>>(), layout, foreign, rig)?
-        }
     };
     let mut epoch = Epoch::new(layout.time.clone());
     let mut cells = Vec::new();
     for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
-        let Some((signal, unit)) = column.content.cells() else { continue };
-        let values = match column.content {
-            Content::Timestamp => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
-            _ => values,
+        let Some(content) = column.content else { continue };
+        let values = match column.is_timestamp() {
+            true => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
+            false => values,
         };
-        cells.push(Cells { signal, unit, values: Cow::Owned(values), index });
+        cells.push(Cells::of(content, Cow::Owned(values), index));
     }
     Ok(cells)
 }

@@ -1,6 +1,6 @@
 //! Rows of columns that are in memory already, such as those of a data frame.
 
-use super::columns::{Column, Content, Layout};
+use super::columns::{Column, Content, Layout, REQUIRED};
 use super::error::{BadReason, BadRow, Counted, TraceError, TraceFault};
 use super::row::{Next, Row, RowSource, check_time};
 use crate::header::shorten;
@@ -36,25 +36,22 @@ impl TableLayout {
     /// # Errors
     /// Where a signal is missing, comes twice or in an unknown unit.
     pub fn new(name: &str, headers: &[String], rig: &Rig) -> Result<Self, TraceError> {
-        let layout = Layout::new(headers, &rig.columns).and_then(|layout| layout.of_stroke(rig));
-        let layout = layout.map_err(|fault| fault.of(name))?;
+        let layout = Layout::new(headers, &rig.columns, &REQUIRED, rig).map_err(|fault| fault.of(name))?;
         Ok(Self(Arc::new(Layout { counted: Counted::Rows, ..layout })))
     }
 
     /// What each column is read as, in the order of the headers.
     pub fn contents(&self) -> impl Iterator<Item = ColumnContent> {
-        self.0.columns.iter().map(|column| match column.content {
-            Content::Number(..) => ColumnContent::Numbers,
-            Content::Timestamp => ColumnContent::Timestamps,
-            Content::Ignored => ColumnContent::Ignored,
+        self.0.columns.iter().map(|column| match column.signal() {
+            None => ColumnContent::Ignored,
+            Some(Signal::Timestamp) => ColumnContent::Timestamps,
+            Some(_) => ColumnContent::Numbers,
         })
     }
 
     /// Which of the headers is that of the time.
     pub fn time(&self) -> Option<usize> {
-        let is_time =
-            |column: &Column| column.content.cells().is_some_and(|(signal, _)| signal == Signal::Time);
-        self.0.columns.iter().position(is_time)
+        self.0.columns.iter().position(Column::is_time)
     }
 }
 
@@ -66,6 +63,15 @@ pub(super) struct Cells<'a> {
     pub(super) values: Cow<'a, [f64]>,
     /// Its place among the headers.
     pub(super) index: usize,
+}
+
+impl<'a> Cells<'a> {
+    /// Of a column that is read as `content`; time stamps were made seconds before.
+    pub(super) fn of(content: Content, values: Cow<'a, [f64]>, index: usize) -> Self {
+        let Content { signal, unit } = content;
+        let signal = if signal == Signal::Timestamp { Signal::Time } else { signal };
+        Self { signal, unit, values, index }
+    }
 }
 
 /// Gives neighbouring rows, a column for each that is read, all of one length; none at the end.
@@ -125,13 +131,7 @@ impl<'a> TableRows<'a> {
             },
         };
         let column = index.and_then(|index| self.layout.columns.get(index));
-        BadRow {
-            line: row.line,
-            counted: Counted::Rows,
-            column: column.map(|column| shorten(&column.header, 40)),
-            reason,
-            detail: detail.to_owned(),
-        }
+        self.layout.bad_row(row.line, column, reason, detail.to_owned())
     }
 }
 
@@ -176,7 +176,7 @@ impl RowSource for TableRows<'_> {
 fn bind<'a>(layout: &Layout, batch: &Batch<'a>) -> Result<Vec<Cells<'a>>, TraceFault> {
     let mut read: Vec<Cells<'a>> = Vec::new();
     for (index, column) in layout.columns.iter().enumerate() {
-        let Some((signal, unit)) = column.content.cells() else { continue };
+        let Some(content) = column.content else { continue };
         let values = batch.get(index).copied().unwrap_or_default();
         if let Some(first) = read.first().filter(|first| first.values.len() != values.len()) {
             let other = layout.columns.get(first.index).map_or("", |column| &column.header);
@@ -187,7 +187,7 @@ fn bind<'a>(layout: &Layout, batch: &Batch<'a>) -> Result<Vec<Cells<'a>>, TraceF
                 other_rows: first.values.len(),
             });
         }
-        read.push(Cells { signal, unit, values: Cow::Borrowed(values), index });
+        read.push(Cells::of(content, Cow::Borrowed(values), index));
     }
     Ok(read)
 }

@@ -1,6 +1,6 @@
 //! The first lines of a text file as a table: where its header is, and what its first rows say.
 
-use super::columns::{Bound, TextRow, bare_unit, bind, column, name_part};
+use super::bind::{Bound, bind, name_part};
 use super::error::TraceFault;
 use super::records::{Records, text};
 use crate::header::HeaderUnit;
@@ -13,6 +13,30 @@ const LONGEST_PREAMBLE: usize = 100;
 const ROWS: usize = 1000;
 /// A trace has this many columns at least: time, position, two pressures.
 const LEAST_CELLS: usize = 4;
+
+/// One record, its cells without blanks around them.
+#[derive(Clone, Debug)]
+pub(super) struct TextRow {
+    /// From 1.
+    pub(super) line: u64,
+    pub(super) cells: Vec<String>,
+}
+
+/// What stands in a column of `rows`, empty cells left out.
+pub(super) fn column(rows: &[TextRow], index: usize) -> Vec<&str> {
+    rows.iter()
+        .filter_map(|row| row.cells.get(index))
+        .map(String::as_str)
+        .filter(|cell| !cell.is_empty())
+        .collect()
+}
+
+/// Without brackets and dashes around it.
+pub(super) fn bare_unit(cell: &str) -> &str {
+    let cell = cell.trim_matches(['-', ' ']);
+    let inner = |open, close| cell.strip_prefix(open)?.strip_suffix(close);
+    inner('[', ']').or_else(|| inner('(', ')')).unwrap_or(cell).trim_matches(['-', ' '])
+}
 
 /// A header, and rows below it.
 pub(super) struct TextTable {
@@ -56,60 +80,19 @@ impl TextTable {
 
     fn split(ahead: &[u8], whole: bool, delimiter: Delimiter, rig: &Rig) -> Option<Self> {
         let mut rows = rows(ahead, whole, delimiter);
-        let (head, headless) = Head::among(&rows, rig)?;
-        let Head { line, headers, units, bound, first } = head;
-        let rows = rows.split_off(first);
-        Some(Self { delimiter, header_line: line, headers, units, rows, bound, headless, shape: None })
+        let (table, first) = Self::among(&rows, rig)?;
+        Some(Self { delimiter, rows: rows.split_off(first), ..table })
     }
 
-    /// Columns of a file that is no text, with their first cells.
-    pub(super) fn of_columns(mut headers: Vec<String>, rows: Vec<TextRow>, rig: &Rig) -> Self {
-        name_part(&mut headers, rig);
-        let bound = bind(&headers, None, &rows, rig);
-        Self {
-            delimiter: Delimiter::Comma,
-            header_line: 0,
-            headers,
-            units: None,
-            rows,
-            bound,
-            headless: false,
-            shape: None,
-        }
-    }
-
-    /// The last line before the rows.
-    pub(super) fn last_header_line(&self) -> u64 {
-        self.units.as_ref().map_or(self.header_line, |row| row.line)
-    }
-
-    /// What stands in a column, empty cells left out.
-    pub(super) fn column(&self, index: usize) -> Vec<&str> {
-        column(&self.rows, index)
-    }
-}
-
-/// What stands above the rows.
-struct Head {
-    line: u64,
-    headers: Vec<String>,
-    units: Option<TextRow>,
-    bound: Result<Bound, TraceFault>,
-    /// The first row below it.
-    first: usize,
-}
-
-impl Head {
-    /// The header that makes a trace of the rows, or the likeliest one, and whether that row holds numbers instead of
-    /// names.
-    fn among(rows: &[TextRow], rig: &Rig) -> Option<(Self, bool)> {
+    /// The header that makes a trace of the rows, or the likeliest one, and the first row below it.
+    fn among(rows: &[TextRow], rig: &Rig) -> Option<(Self, usize)> {
         let wide = |row: &TextRow| row.cells.len() >= LEAST_CELLS;
         let may_name = |row: &TextRow| wide(row) && !is_data(&row.cells);
         let named = rows.iter().take(LONGEST_PREAMBLE).enumerate().filter(|(_, row)| may_name(row));
         for (index, _) in named {
-            let head = Self::at(rows, index, rig)?;
-            if head.bound.is_ok() {
-                return Some((head, false));
+            let table = Self::at(rows, index, rig)?;
+            if table.0.bound.is_ok() {
+                return Some(table);
             }
         }
         let is_data_row = |row: &TextRow| wide(row) && is_data(&row.cells);
@@ -122,11 +105,12 @@ impl Head {
             }
             _ => 0,
         };
-        Some((Self::at(rows, header, rig)?, first_data == Some(0)))
+        let (table, first) = Self::at(rows, header, rig)?;
+        Some((Self { headless: first_data == Some(0), ..table }, first))
     }
 
-    /// The header that this row is.
-    fn at(rows: &[TextRow], header: usize, rig: &Rig) -> Option<Self> {
+    /// The header that this row is, without the rows below it, and the first of those.
+    fn at(rows: &[TextRow], header: usize, rig: &Rig) -> Option<(Self, usize)> {
         let row = rows.get(header)?;
         let mut headers = row.cells.clone();
         if let Some(first) = headers.first_mut() {
@@ -136,9 +120,37 @@ impl Head {
         let first = header + 1 + usize::from(units.is_some());
         let rows = rows.get(first..).unwrap_or_default();
         fit_trailing(&mut headers, rows);
+        Some((Self::below(row.line, headers, units, rows, rig), first))
+    }
+
+    /// Columns of a file that is no text, with their first cells.
+    pub(super) fn of_columns(headers: Vec<String>, rows: Vec<TextRow>, rig: &Rig) -> Self {
+        let table = Self::below(0, headers, None, &rows, rig);
+        Self { rows, ..table }
+    }
+
+    /// What the headers say of the rows below them.
+    fn below(
+        header_line: u64,
+        mut headers: Vec<String>,
+        units: Option<TextRow>,
+        rows: &[TextRow],
+        rig: &Rig,
+    ) -> Self {
         name_part(&mut headers, rig);
         let bound = bind(&headers, units.as_ref().map(|row| row.cells.as_slice()), rows, rig);
-        Some(Self { line: row.line, headers, units, bound, first })
+        let (delimiter, rows) = (Delimiter::Comma, Vec::new());
+        Self { delimiter, header_line, headers, units, rows, bound, headless: false, shape: None }
+    }
+
+    /// The last line before the rows.
+    pub(super) fn last_header_line(&self) -> u64 {
+        self.units.as_ref().map_or(self.header_line, |row| row.line)
+    }
+
+    /// What stands in a column, empty cells left out.
+    pub(super) fn column(&self, index: usize) -> Vec<&str> {
+        column(&self.rows, index)
     }
 }
 

@@ -5,7 +5,6 @@ use super::columns::Layout;
 use super::error::{BadReason, BadRow, Counted, TraceFault};
 use super::quality::TraceQuality;
 use super::row::{BadRows, Record, Row, ValveReading};
-use crate::header::shorten;
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::{Dimension, Unit, readable};
@@ -244,9 +243,8 @@ fn readings(row: &Row) -> Record {
 
 #[cold]
 fn bad_cell(row: &Row, layout: &Layout, signal: Signal, reason: BadReason, detail: String) -> BadRow {
-    let header = layout.header_of(signal).or_else(|| layout.header_of(Signal::Timestamp));
-    let column = header.map(|header| shorten(header, 40));
-    BadRow { line: row.line, counted: layout.counted, column, reason, detail }
+    let column = layout.column_of(signal).or_else(|| layout.column_of(Signal::Timestamp));
+    layout.bad_row(row.line, column, reason, detail)
 }
 
 /// A row without a reading that it must have.
@@ -308,38 +306,31 @@ impl From<Ranges> for [Range; RANGES] {
 impl Ranges {
     pub(super) fn of(rig: &Rig) -> Self {
         let sheets = &rig.instruments;
-        let slack_m = SLACK * rig.cylinder.stroke_m.max(sheets.position.full_scale);
-        let position =
-            Range { signal: Signal::Position, least: -slack_m, most: rig.cylinder.stroke_m + slack_m };
-        let pressure = |signal| Range {
-            signal,
-            least: VACUUM_PA - SLACK * sheets.pressure.full_scale,
-            most: OVERRANGE * sheets.pressure.full_scale,
-        };
+        let range = |signal, least, most| Range { signal, least, most };
+        let both_ways = |signal, most: f64| range(signal, -OVERRANGE * most, OVERRANGE * most);
+        let stroke_m = rig.cylinder.stroke_m;
+        let slack_m = SLACK * stroke_m.max(sheets.position.full_scale);
+        let pressure_pa = sheets.pressure.full_scale;
+        let pressure = |signal| range(signal, VACUUM_PA - SLACK * pressure_pa, OVERRANGE * pressure_pa);
         // No data sheet need be declared of these: as much as any sensor that a rig may have.
-        let valve_pressure = |signal| Range { signal, least: 2.0 * VACUUM_PA, most: 1e9 };
-        let both_ways = |signal, full_scale: f64| Range {
-            signal,
-            least: -OVERRANGE * full_scale,
-            most: OVERRANGE * full_scale,
-        };
+        let valve_pressure = |signal| range(signal, 2.0 * VACUUM_PA, 1e9);
         Self::from([
-            position,
+            range(Signal::Position, -slack_m, stroke_m + slack_m),
             pressure(Signal::PressureA),
             pressure(Signal::PressureB),
             both_ways(Signal::FlowA, sheets.flow_a.full_scale),
             both_ways(Signal::FlowB, sheets.flow_b.full_scale),
             both_ways(Signal::Force, sheets.force.full_scale),
             // Absolute zero, and where oil burns.
-            Range { signal: Signal::Temperature, least: 0.0, most: 700.0 },
+            range(Signal::Temperature, 0.0, 700.0),
             both_ways(Signal::Speed, 100.0),
-            Range { signal: Signal::Time, least: -MOST_TIME_S, most: MOST_TIME_S },
+            range(Signal::Time, -MOST_TIME_S, MOST_TIME_S),
             // A share of the stroke, with what a sensor may read beyond its ends.
             both_ways(Signal::Spool, 1.0),
             both_ways(Signal::Command, 1.0),
             valve_pressure(Signal::Supply),
             valve_pressure(Signal::Tank),
-            Range { signal: Signal::Shut, least: 0.0, most: 1.0 },
+            range(Signal::Shut, 0.0, 1.0),
             // As much as the largest meter that a rig may have.
             both_ways(Signal::LeakInternal, 10.0),
             both_ways(Signal::LeakExternalA, 10.0),
@@ -372,18 +363,8 @@ impl Ranges {
         let (least, most) = range.map_or((f64::NAN, f64::NAN), |range| (range.least, range.most));
         let source = match signal {
             Signal::Position => "the stroke",
-            Signal::Temperature
-            | Signal::Speed
-            | Signal::Time
-            | Signal::Spool
-            | Signal::Command
-            | Signal::Supply
-            | Signal::Tank
-            | Signal::Shut
-            | Signal::LeakInternal
-            | Signal::LeakExternalA
-            | Signal::LeakExternalB => "what is possible",
-            _ => "the range of the sensor in the rig file",
+            signal if signal.is_sensor() => "the range of the sensor in the rig file",
+            _ => "what is possible",
         };
         let text = |value: f64| readable(unit.map_or(value, |unit| unit.from_si(value)), 6);
         let name = unit.map_or_else(|| signal.dimension().map_or("", Dimension::si), |unit| unit.text);

@@ -1,7 +1,7 @@
 //! A rig file as spanned TOML: every read names section, key and line when it fails.
 
 use super::bound::Bound;
-use crate::units::{self, Dimension, UnitError};
+use crate::units::{self, UnitError};
 use std::fmt;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -64,12 +64,8 @@ impl<'a> Section<'a> {
     }
 
     /// The number under `key`, in SI and within `bound`.
-    pub(super) fn quantity(
-        &self,
-        key: &str,
-        dimension: Dimension,
-        bound: Bound,
-    ) -> Result<Option<f64>, RigError> {
+    pub(super) fn quantity(&self, key: &str, bound: Bound) -> Result<Option<f64>, RigError> {
+        let dimension = bound.dimension;
         let Some(value) = self.value(key) else { return Ok(None) };
         let si = match value.get_ref() {
             DeValue::String(text) => units::parse(text, dimension)
@@ -85,17 +81,16 @@ impl<'a> Section<'a> {
         if bound.holds(si) {
             return Ok(Some(si));
         }
-        Err(self.impossible(key, &format!("{si} {}", dimension.si()), &bound.text(dimension)))
+        Err(self.impossible(key, &format!("{si} {}", dimension.si()), &bound.text()))
     }
 
     /// As [`quantity`](Self::quantity), where the key must be there.
-    pub(super) fn required(&self, key: &str, dimension: Dimension, bound: Bound) -> Result<f64, RigError> {
-        self.quantity(key, dimension, bound)?.ok_or_else(|| {
+    pub(super) fn required(&self, key: &str, bound: Bound) -> Result<f64, RigError> {
+        self.quantity(key, bound)?.ok_or_else(|| {
             if let Some((offset, note)) = self.blank(key) {
                 return self.document.fail(Some(offset), Fault::Blank { key: self.path(key), note });
             }
-            let wanted = bound.text(dimension);
-            self.document.fail(self.offset, Fault::MissingKey { key: self.path(key), wanted })
+            self.missing(key, &bound.text())
         })
     }
 

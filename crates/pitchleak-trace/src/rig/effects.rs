@@ -53,7 +53,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
         let size = if section.is_table(id) {
             read_table(effect, &section.section(id)?)?
         } else {
-            EffectValue::new(section.required(id, Dimension::Share, size(effect))?, None)
+            EffectValue::new(section.required(id, size(effect))?, None)
         };
         if set.set(effect, size.value, size.constants).is_err() {
             return Err(section.impossible(id, &size.value.to_string(), "at most eight effects at a time"));
@@ -67,13 +67,13 @@ fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigErr
     let shape_ids = effect.constants().iter().map(|parameter| parameter.spec().id);
     let keys: Vec<&str> = ["value", "std"].into_iter().chain(shape_ids).collect();
     entry.allow(&keys)?;
-    let value = entry.required("value", Dimension::Share, size(effect))?;
-    let std = entry.quantity("std", Dimension::Share, bound::EFFECT_STD)?;
+    let value = entry.required("value", size(effect))?;
+    let std = entry.quantity("std", bound::EFFECT_STD)?;
     let mut size = EffectValue::new(value, std);
     for parameter in effect.constants() {
         let spec = EffectConstant::spec(*parameter);
-        let within = Bound::between(spec.lower, spec.upper);
-        if let Some(constant) = entry.quantity(spec.id, Dimension::Share, within)? {
+        let within = Bound::between(Dimension::Share, spec.lower, spec.upper);
+        if let Some(constant) = entry.quantity(spec.id, within)? {
             size.constants = size.constants.with(*parameter, constant);
         }
     }
@@ -81,5 +81,5 @@ fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigErr
 }
 
 pub(super) fn size(effect: Effect) -> Bound {
-    Bound::between(effect.spec().lower, effect.spec().upper)
+    Bound::between(Dimension::Share, effect.spec().lower, effect.spec().upper)
 }

@@ -1,6 +1,7 @@
 use super::bound::{self, Bound};
 use super::document::{RigError, Section};
-use crate::units::{Dimension, LPM_PER_M3S};
+use super::keys::{Done, Keys};
+use crate::units::LPM_PER_M3S;
 use pitchleak_core::{Cylinder, SensorSpread, Sensors};
 
 /// One sensor as its data sheet declares it.
@@ -55,39 +56,22 @@ impl Instrument {
             ..SensorSpread::of_full_scale(self.full_scale, self.accuracy)
         }
     }
+}
 
-    fn read(
-        sensors: &Section<'_>,
-        key: &str,
-        dimension: Dimension,
-        full_scale: Bound,
-    ) -> Result<Option<Self>, RigError> {
-        let sheet = sensors.section(key)?;
-        if !sheet.is_present() {
-            return Ok(None);
-        }
-        sheet.allow(&["full_scale", "accuracy", "bias", "gain", "drift"])?;
-        let full_scale = sheet.required("full_scale", dimension, full_scale)?;
-        Self::shares(&sheet, full_scale).map(Some)
+/// The keys of a sensor whose full scale is declared.
+fn sheet(scale: Bound) -> impl Fn(&mut Keys<'_>, &mut Instrument) -> Done {
+    move |keys, own| {
+        keys.needed("full_scale", scale, &mut own.full_scale)?;
+        shares(keys, own)
     }
+}
 
-    /// The spool's full scale is its stroke.
-    fn read_spool(sensors: &Section<'_>) -> Result<Option<Self>, RigError> {
-        let sheet = sensors.section("spool")?;
-        sheet.allow(&["accuracy", "bias", "gain", "drift"])?;
-        sheet.is_present().then(|| Self::shares(&sheet, 1.0)).transpose()
-    }
-
-    fn shares(sheet: &Section<'_>, full_scale: f64) -> Result<Self, RigError> {
-        let share = |key| sheet.quantity(key, Dimension::Share, bound::SHARE);
-        Ok(Self {
-            full_scale,
-            accuracy: share("accuracy")?.unwrap_or(Self::PAPER_ACCURACY),
-            bias: share("bias")?.unwrap_or(0.0),
-            gain: share("gain")?.unwrap_or(0.0),
-            drift: sheet.quantity("drift", Dimension::Share, bound::DRIFT_PER_HOUR)?.unwrap_or(0.0),
-        })
-    }
+/// Those of the spool, whose full scale is its stroke.
+fn shares(keys: &mut Keys<'_>, own: &mut Instrument) -> Done {
+    keys.share("accuracy", &mut own.accuracy, Instrument::PAPER_ACCURACY)?;
+    keys.share("bias", &mut own.bias, 0.0)?;
+    keys.share("gain", &mut own.gain, 0.0)?;
+    keys.number("drift", bound::DRIFT_PER_HOUR, &mut own.drift, 0.0)
 }
 
 impl Instruments {
@@ -131,31 +115,38 @@ impl Instruments {
         self.flow_a.full_scale.max(self.flow_b.full_scale)
     }
 
+    /// The sensors of the cylinder.
+    pub(super) fn keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
+        keys.sheet("flow_a", &mut own.flow_a, sheet(bound::FLOW_SCALE))?;
+        keys.sheet("flow_b", &mut own.flow_b, sheet(bound::FLOW_SCALE))?;
+        keys.sheet("pressure", &mut own.pressure, sheet(bound::PRESSURE_SCALE))?;
+        keys.sheet("position", &mut own.position, sheet(bound::POSITION_SCALE))?;
+        keys.sheet("force", &mut own.force, sheet(bound::FORCE_SCALE))
+    }
+
+    /// Those of its valve.
+    pub(super) fn valve_keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
+        keys.sheet("supply", &mut own.supply, sheet(bound::PRESSURE_SCALE))?;
+        keys.sheet("spool", &mut own.spool, shares)
+    }
+
     /// A sensor that the file leaves out is the paper's; that of the supply is as those of the chambers.
     pub(super) fn read(sensors: &Section<'_>, cylinder: &Cylinder<f64>) -> Result<Self, RigError> {
         sensors.allow(&["flow", "flow_a", "flow_b", "pressure", "position", "force", "spool", "supply"])?;
-        let default = Self::paper(cylinder);
-        let flow = |key| Instrument::read(sensors, key, Dimension::Flow, bound::FLOW_SCALE);
-        let (both, flow_a, flow_b) = (flow("flow")?, flow("flow_a")?, flow("flow_b")?);
-        if both.is_some() && (flow_a.is_some() || flow_b.is_some()) {
+        let mut own = Self::paper(cylinder);
+        let mut keys = Keys::Read(sensors);
+        keys.sheet("flow", &mut own.flow_a, sheet(bound::FLOW_SCALE))?;
+        own.flow_b = own.flow_a;
+        if sensors.has("flow") && (sensors.has("flow_a") || sensors.has("flow_b")) {
             return Err(sensors.impossible(
                 "flow",
                 "declared twice",
                 "either `flow` or `flow_a` and `flow_b`",
             ));
         }
-        let other = |key, dimension, full_scale| Instrument::read(sensors, key, dimension, full_scale);
-        let pressure =
-            other("pressure", Dimension::Pressure, bound::PRESSURE_SCALE)?.unwrap_or(default.pressure);
-        Ok(Self {
-            flow_a: flow_a.or(both).unwrap_or(default.flow_a),
-            flow_b: flow_b.or(both).unwrap_or(default.flow_b),
-            pressure,
-            position: other("position", Dimension::Length, bound::POSITION_SCALE)?
-                .unwrap_or(default.position),
-            force: other("force", Dimension::Force, bound::FORCE_SCALE)?.unwrap_or(default.force),
-            spool: Instrument::read_spool(sensors)?.unwrap_or(default.spool),
-            supply: other("supply", Dimension::Pressure, bound::PRESSURE_SCALE)?.unwrap_or(pressure),
-        })
+        Self::keys(&mut keys, &mut own)?;
+        own.supply = own.pressure;
+        Self::valve_keys(&mut keys, &mut own)?;
+        Ok(own)
     }
 }

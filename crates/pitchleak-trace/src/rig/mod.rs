@@ -4,6 +4,7 @@ mod bound;
 mod document;
 mod effects;
 mod instruments;
+mod keys;
 mod odds;
 mod settings;
 mod valve;
@@ -12,7 +13,7 @@ mod write;
 pub use document::{Fault, Place, RigError};
 pub use effects::{EffectMap, EffectValue};
 pub use instruments::{Instrument, Instruments};
-pub use odds::{EXPLANATIONS, Odds};
+pub use odds::{Odds, explanations};
 pub use settings::{
     ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
     ForeignColumn,
@@ -20,8 +21,8 @@ pub use settings::{
 
 pub use valve::{ValveDrift, ValveSheet};
 
-use crate::units::Dimension;
 use document::{Document, Section};
+use keys::{Done, Keys};
 use pitchleak_core::{AlarmSettings, Cylinder, EffectSet, Fluid, Sensors};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -135,30 +136,23 @@ impl Rig {
             document.fail(error.span().map(|span| span.start), Fault::Syntax(message))
         })?;
         let root = Section::root(&document, table.get_ref());
-        root.allow(&[
-            "cylinder",
-            "fluid",
-            "sensors",
-            "estimator",
-            "alarms",
-            "decision",
-            "columns",
-            "csv",
-            "effects",
-            "valve",
-        ])?;
-        let cylinder = read_cylinder(&root.section("cylinder")?)?;
+        root.allow(&SECTIONS.split(' ').collect::<Vec<_>>())?;
+        let cylinder = root.section("cylinder")?.read(Cylinder::paper(), cylinder_keys)?;
         let instruments = Instruments::read(&root.section("sensors")?, &cylinder)?;
         Ok(Self {
             name: file.to_owned(),
             cylinder,
-            fluid: read_fluid(&root.section("fluid")?)?,
+            fluid: root.section("fluid")?.read(Fluid::paper(), fluid_keys)?,
             instruments,
-            estimator: EstimatorSettings::read(&root.section("estimator")?)?,
-            alarms: settings::read_alarms(&root.section("alarms")?, &instruments)?,
+            estimator: root
+                .section("estimator")?
+                .read(EstimatorSettings::default(), EstimatorSettings::keys)?,
+            alarms: root.section("alarms")?.read(AlarmSettings::default(), |keys, alarms| {
+                settings::alarm_keys(keys, alarms, &instruments)
+            })?,
             decision: DecisionSettings::read(&root.section("decision")?)?,
             columns: settings::read_columns(&root.section("columns")?)?,
-            csv: CsvSettings::read(&root.section("csv")?)?,
+            csv: root.section("csv")?.read(CsvSettings::default(), CsvSettings::keys)?,
             effects: effects::read(&root.section("effects")?)?,
             valve: ValveSheet::read(&root.section("valve")?)?,
             assumed: Assumed { rig: false, sensors: !root.section("sensors")?.is_present() },
@@ -176,6 +170,9 @@ impl Rig {
     }
 }
 
+/// What a rig file may have.
+const SECTIONS: &str = "cylinder fluid sensors estimator alarms decision columns csv effects valve";
+
 /// No rig file is longer, bytes; a device or a trace given for one may have no end.
 const LONGEST_FILE: u64 = 1 << 20;
 
@@ -188,26 +185,20 @@ fn read_bounded(path: &Path) -> std::io::Result<String> {
     Ok(text)
 }
 
-fn read_cylinder(section: &Section<'_>) -> Result<Cylinder<f64>, RigError> {
-    section.allow(&["area_a", "area_b", "stroke", "moving_mass", "dead_volume_a", "dead_volume_b"])?;
-    let area = |key| section.required(key, Dimension::Area, bound::AREA);
-    let volume = |key| section.quantity(key, Dimension::Volume, bound::DEAD_VOLUME);
-    Ok(Cylinder {
-        area_a_m2: area("area_a")?,
-        area_b_m2: area("area_b")?,
-        stroke_m: section.required("stroke", Dimension::Length, bound::STROKE)?,
-        moving_mass_kg: section.required("moving_mass", Dimension::Mass, bound::MOVING_MASS)?,
-        dead_volume_a_m3: volume("dead_volume_a")?.unwrap_or(0.0),
-        dead_volume_b_m3: volume("dead_volume_b")?.unwrap_or(0.0),
-    })
+fn cylinder_keys(keys: &mut Keys<'_>, cylinder: &mut Cylinder<f64>) -> Done {
+    keys.needed("area_a", bound::AREA, &mut cylinder.area_a_m2)?;
+    keys.needed("area_b", bound::AREA, &mut cylinder.area_b_m2)?;
+    keys.needed("stroke", bound::STROKE, &mut cylinder.stroke_m)?;
+    keys.needed("moving_mass", bound::MOVING_MASS, &mut cylinder.moving_mass_kg)?;
+    keys.number("dead_volume_a", bound::DEAD_VOLUME, &mut cylinder.dead_volume_a_m3, 0.0)?;
+    keys.number("dead_volume_b", bound::DEAD_VOLUME, &mut cylinder.dead_volume_b_m3, 0.0)
 }
 
 /// A prior of a quarter of β where the file gives none, as for the paper's rig.
-fn read_fluid(section: &Section<'_>) -> Result<Fluid<f64>, RigError> {
-    section.allow(&["bulk_modulus", "bulk_modulus_std"])?;
-    let bulk_modulus_pa = section.required("bulk_modulus", Dimension::Pressure, bound::BULK_MODULUS)?;
-    let std = section.quantity("bulk_modulus_std", Dimension::Pressure, bound::BULK_MODULUS_STD)?;
-    Ok(Fluid { bulk_modulus_pa, bulk_modulus_std_pa: std.unwrap_or(bulk_modulus_pa / 4.0) })
+fn fluid_keys(keys: &mut Keys<'_>, fluid: &mut Fluid<f64>) -> Done {
+    keys.needed("bulk_modulus", bound::BULK_MODULUS, &mut fluid.bulk_modulus_pa)?;
+    let usual_pa = fluid.bulk_modulus_pa / 4.0;
+    keys.number("bulk_modulus_std", bound::BULK_MODULUS_STD, &mut fluid.bulk_modulus_std_pa, usual_pa)
 }
 
 #[cfg(test)]

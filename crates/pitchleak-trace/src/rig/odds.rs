@@ -2,7 +2,6 @@
 
 use super::bound;
 use super::document::{Fault, RigError, Section};
-use crate::units::Dimension;
 use std::collections::BTreeMap;
 
 /// Prior probabilities of explanations, each within its kind.
@@ -15,7 +14,7 @@ impl Odds {
 
     /// Of these explanations. Those that the list lacks are left out.
     pub fn new<'a>(shares: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
-        let known = |id: &str| EXPLANATIONS.iter().flat_map(|(_, ids)| *ids).copied().find(|one| *one == id);
+        let known = |id: &str| explanations().find(|(_, known)| *known == id).map(|(_, id)| id);
         let within = |(id, share)| Some((known(id)?, bound::ODDS.nearest(share)));
         Self(shares.into_iter().filter_map(within).collect())
     }
@@ -40,106 +39,60 @@ impl Odds {
         let mut own = Self::default();
         for key in section.keys() {
             let ids = named(key);
-            if ids.is_empty() {
+            let Some((kind, _)) = ids.first().copied() else {
                 let allowed = "an id of `pitchleak explanations`".to_owned();
                 return Err(section.fail(key, Fault::UnknownKey { key: section.path(key), allowed }));
-            }
-            let share = section.required(key, Dimension::Share, bound::ODDS)?;
+            };
+            let share = section.required(key, bound::ODDS)?;
             let part = share / ids.len() as f64;
-            for id in ids {
+            for (_, id) in ids {
                 own.0.insert(id, bound::ODDS.nearest(part));
             }
-            let sum = kind(key).map_or(0.0, |kind| own.sum(kind));
+            let sum = own.sum(kind);
             if sum > bound::ODDS.most() {
                 let with = format!("{sum:.3} together with the others of its kind");
-                return Err(section.impossible(key, &with, &bound::ODDS.text(Dimension::Share)));
+                return Err(section.impossible(key, &with, &bound::ODDS.text()));
             }
         }
         Ok(own)
     }
 
-    fn sum(&self, ids: &[&str]) -> f64 {
-        self.iter().filter(|(id, _)| ids.contains(id)).map(|(_, share)| share).sum()
+    /// Of the explanations of a kind.
+    fn sum(&self, kind: &str) -> f64 {
+        let is_of_kind = |id: &str| explanations().any(|known| known == (kind, id));
+        self.iter().filter(|(id, _)| is_of_kind(id)).map(|(_, share)| share).sum()
     }
 }
 
-fn named(key: &str) -> Vec<&'static str> {
-    let all = EXPLANATIONS.iter().flat_map(|(_, ids)| ids.iter().copied());
-    match all.clone().find(|id| *id == key) {
-        Some(id) => vec![id],
-        None => all.filter(|id| *id == format!("{key}_a") || *id == format!("{key}_b")).collect(),
+/// Kinds and ids of the explanations that a key stands for.
+fn named(key: &str) -> Vec<(&'static str, &'static str)> {
+    match explanations().find(|(_, id)| *id == key) {
+        Some(one) => vec![one],
+        None => explanations().filter(|(_, id)| matches!(id.strip_prefix(key), Some("_a" | "_b"))).collect(),
     }
 }
 
-/// The ids of the kind that has an explanation.
-fn kind(key: &str) -> Option<&'static [&'static str]> {
-    let has = |ids: &&[&str]| named(key).first().is_some_and(|id| ids.contains(id));
-    EXPLANATIONS.iter().map(|(_, ids)| *ids).find(has)
+/// What `pitchleak explanations` lists: the kind of each, which is one choice, and its id.
+pub fn explanations() -> impl Iterator<Item = (&'static str, &'static str)> {
+    EXPLANATIONS.into_iter().flat_map(|(kind, ids)| ids.split(' ').map(move |id| (kind, id)))
 }
 
-/// What `pitchleak explanations` lists: each kind is one choice.
-pub const EXPLANATIONS: [(&str, &[&str]); 5] = [
-    ("course", &["constant", "cracking", "orifice", "growing", "sudden", "wandering", "creeping"]),
-    ("zeros", &["zeros_usual", "flow_zeros", "flow_zero_a", "flow_zero_b", "flow_zeros_gross"]),
+/// By kind, blanks between them.
+const EXPLANATIONS: [(&str, &str); 5] = [
+    ("course", "constant cracking orifice growing sudden wandering creeping"),
+    ("zeros", "zeros_usual flow_zeros flow_zero_a flow_zero_b flow_zeros_gross"),
     (
         "departure",
-        &[
-            "as_declared",
-            "flow_lag",
-            "flow_lag_a",
-            "flow_lag_b",
-            "flow_lag_gross",
-            "flow_gain_a",
-            "flow_gain_b",
-            "flow_gain",
-            "flow_drift_a",
-            "flow_drift_b",
-            "area_a",
-            "area_b",
-            "position_gain",
-            "position_zero",
-            "dead_volume_a",
-            "dead_volume_b",
-            "bulk_modulus",
-            "flow_lag_and_gains",
-            "pressure_noise",
-            "pressure_zero_gross_a",
-            "pressure_zero_gross_b",
-            "pressure_zero_a",
-            "pressure_zero_b",
-            "pressure_gain_a",
-            "pressure_gain_b",
-        ],
+        "as_declared flow_lag flow_lag_a flow_lag_b flow_lag_gross flow_gain_a flow_gain_b flow_gain flow_drift_a \
+         flow_drift_b area_a area_b position_gain position_zero dead_volume_a dead_volume_b bulk_modulus \
+         flow_lag_and_gains pressure_noise pressure_zero_gross_a pressure_zero_gross_b pressure_zero_a \
+         pressure_zero_b pressure_gain_a pressure_gain_b",
     ),
-    ("wander", &["wandering_zeros"]),
+    ("wander", "wandering_zeros"),
     (
         "wiring",
-        &[
-            "exchanged_flows",
-            "exchanged_pressures",
-            "exchanged_chambers",
-            "exchanged_turned_flows",
-            "sign_qa",
-            "sign_qb",
-            "sign_flows",
-            "lost_sign_qa",
-            "lost_sign_qb",
-            "lost_sign_flows",
-            "other_end",
-            "absolute_pressures",
-            "absolute_pa",
-            "absolute_pb",
-            "areas_exchanged",
-            "unit_flows",
-            "unit_qa",
-            "unit_qb",
-            "unit_pressures",
-            "unit_pa",
-            "unit_pb",
-            "unit_x",
-            "unit_t",
-            "unit_area_a",
-            "unit_area_b",
-        ],
+        "exchanged_flows exchanged_pressures exchanged_chambers exchanged_turned_flows sign_qa sign_qb sign_flows \
+         lost_sign_qa lost_sign_qb lost_sign_flows other_end absolute_pressures absolute_pa absolute_pb \
+         areas_exchanged unit_flows unit_qa unit_qb unit_pressures unit_pa unit_pb unit_x unit_t unit_area_a unit_area_b",
     ),
 ];

@@ -3,12 +3,13 @@
 use super::bound;
 use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
+use super::keys::{Done, Keys};
 use super::odds::Odds;
-use crate::header;
+use crate::header::{self, HeaderUnit};
 use crate::signal::Signal;
 use crate::times::{TimeFormat, TimeKind, Zone};
 use crate::units::{self, Dimension, Unit};
-use pitchleak_core::{AlarmSettings, PerLeak};
+use pitchleak_core::{AlarmSettings, Leak};
 use std::collections::BTreeMap;
 
 /// Which estimator a replay runs.
@@ -82,8 +83,12 @@ impl ForeignColumn {
 
     /// `Head pressure [bar]`, with the unit that it ends with.
     fn by_header(header: &str, dimension: Dimension) -> Option<Self> {
-        let (_, found) = header::split(header, dimension)?;
-        Some(Self { offset: found.offset_si, ..Self::new(header, Some(found.unit)) })
+        header::split(header, dimension).map(|(_, unit)| Self::with_unit(header, unit))
+    }
+
+    /// A column whose header says its unit.
+    pub(crate) fn with_unit(header: &str, found: HeaderUnit) -> Self {
+        Self { offset: found.offset_si, ..Self::new(header, Some(found.unit)) }
     }
 
     /// The unit of its numbers, scale and offset included.
@@ -96,47 +101,39 @@ impl ForeignColumn {
 pub type ColumnMap = BTreeMap<Signal, ForeignColumn>;
 
 impl EstimatorSettings {
-    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
-        section.allow(&["kind", "forgetting_time", "filter_cutoff", "block_time", "gains"])?;
-        let kind = section.named("kind", EstimatorKind::by_name, &EstimatorKind::NAMES.join(" or "))?;
-        let gains = section.section("gains")?;
-        gains.allow(&["lambda", "gamma"])?;
-        Ok(Self {
-            kind: kind.unwrap_or_default(),
-            forgetting_time_s: section.quantity("forgetting_time", Dimension::Time, bound::MEMORY)?,
-            filter_cutoff_hz: section.quantity("filter_cutoff", Dimension::Frequency, bound::CUTOFF)?,
-            block_time_s: section.quantity("block_time", Dimension::Time, bound::MEMORY)?,
-            lambda_per_s: gains.quantity("lambda", Dimension::Share, bound::GAIN)?,
-            gamma: gains.quantity("gamma", Dimension::Share, bound::GAIN)?,
+    pub(super) fn keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
+        let (mut kind, allowed) = (Some(own.kind), EstimatorKind::NAMES.join(" or "));
+        keys.word("kind", EstimatorKind::by_name, |kind| kind.name().to_owned(), &allowed, &mut kind)?;
+        own.kind = kind.unwrap_or_default();
+        keys.optional("forgetting_time", bound::MEMORY, &mut own.forgetting_time_s)?;
+        keys.optional("filter_cutoff", bound::CUTOFF, &mut own.filter_cutoff_hz)?;
+        keys.optional("block_time", bound::MEMORY, &mut own.block_time_s)?;
+        keys.table("gains", own, |keys, own| {
+            keys.optional("lambda", bound::GAIN, &mut own.lambda_per_s)?;
+            keys.optional("gamma", bound::GAIN, &mut own.gamma)
         })
     }
 }
 
-/// Reads `[alarms]`: a threshold per leak, `hysteresis` as the share of it that a leak must fall below
-/// it to clear the alarm, and how long the evidence must last.
-pub(super) fn read_alarms(
-    section: &Section<'_>,
+/// `[alarms]`: a threshold per leak, `hysteresis` as the share of it that a leak must fall below it to clear the alarm, and how
+/// long the evidence must last.
+pub(super) fn alarm_keys(
+    keys: &mut Keys<'_>,
+    alarms: &mut AlarmSettings<f64>,
     instruments: &Instruments,
-) -> Result<AlarmSettings<f64>, RigError> {
-    section.allow(&["internal", "external_a", "external_b", "hysteresis", "hold_time"])?;
-    let default = AlarmSettings::default();
-    let within = bound::threshold(instruments.largest_flow_m3s());
-    let flow = |key, usual: f64| {
-        section.quantity(key, Dimension::Flow, within).map(|given| given.unwrap_or(within.nearest(usual)))
-    };
-    let hysteresis = section.quantity("hysteresis", Dimension::Share, bound::SHARE)?;
-    let hold_time = section.quantity("hold_time", Dimension::Time, bound::HOLD_TIME)?;
-    let usual = default.threshold_m3s;
-    Ok(AlarmSettings {
-        threshold_m3s: PerLeak {
-            internal: flow("internal", usual.internal)?,
-            external_a: flow("external_a", usual.external_a)?,
-            external_b: flow("external_b", usual.external_b)?,
-        },
-        clear_share: hysteresis.map_or(default.clear_share, |share| 1.0 - share),
-        hold_time_s: hold_time.unwrap_or(default.hold_time_s),
-        ..default
-    })
+) -> Done {
+    let usual = AlarmSettings::default();
+    let within = bound::threshold(bound::FLOW_SCALE.nearest(instruments.largest_flow_m3s()));
+    for (key, leak) in
+        [("internal", Leak::Internal), ("external_a", Leak::ExternalA), ("external_b", Leak::ExternalB)]
+    {
+        let default = within.nearest(usual.threshold_m3s[leak]);
+        keys.number(key, within, &mut alarms.threshold_m3s[leak], default)?;
+    }
+    let mut hysteresis = 1.0 - alarms.clear_share;
+    keys.share("hysteresis", &mut hysteresis, 1.0 - usual.clear_share)?;
+    alarms.clear_share = 1.0 - hysteresis;
+    keys.number("hold_time", bound::HOLD_TIME, &mut alarms.hold_time_s, usual.hold_time_s)
 }
 
 /// `[decision]`: when a verdict is sure.
@@ -158,7 +155,7 @@ impl Default for DecisionSettings {
 impl DecisionSettings {
     pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
         section.allow(&["alpha", "odds"])?;
-        let alpha = section.quantity("alpha", Dimension::Share, bound::ALPHA)?;
+        let alpha = section.quantity("alpha", bound::ALPHA)?;
         let odds = Odds::read(&section.section("odds")?)?;
         Ok(Self { alpha: alpha.unwrap_or(Self::default().alpha), odds })
     }
@@ -180,15 +177,16 @@ pub struct CsvSettings {
 
 /// What stands between two cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Delimiter {
     /// `,`
-    Comma,
+    Comma = b',',
     /// `;`
-    Semicolon,
+    Semicolon = b';',
     /// A tab.
-    Tab,
+    Tab = b'\t',
     /// `|`
-    Bar,
+    Bar = b'|',
 }
 
 impl Delimiter {
@@ -198,12 +196,7 @@ impl Delimiter {
 
     /// The byte itself.
     pub fn byte(self) -> u8 {
-        match self {
-            Self::Comma => b',',
-            Self::Semicolon => b';',
-            Self::Tab => b'\t',
-            Self::Bar => b'|',
-        }
+        self as u8
     }
 
     /// As it is called.
@@ -248,26 +241,23 @@ impl Decimal {
     }
 }
 
+/// The zones that are taken, for messages.
+const ZONES: &str = "a zone such as Europe/Berlin, CET or +01:00";
+
 impl CsvSettings {
-    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
-        section.allow(&["delimiter", "decimal", "time_format", "zone"])?;
+    pub(super) fn keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
         let delimiters = Delimiter::NAMES.map(|(name, _)| name).join(" or ");
-        let delimiter = section.named("delimiter", Delimiter::by_name, &delimiters)?;
-        let decimal = section.named("decimal", Decimal::by_name, "point or comma")?;
-        let kind = read_time_kind(section, "time_format")?;
-        let zone = read_zone(section)?;
-        let time =
-            (kind.is_some() || zone.is_some()).then(|| TimeFormat { kind: kind.unwrap_or_default(), zone });
-        Ok(Self { delimiter, decimal, time, part: None })
+        let (delimiter, decimal) = (&mut own.delimiter, &mut own.decimal);
+        keys.word("delimiter", Delimiter::by_name, |one| one.name().to_owned(), &delimiters, delimiter)?;
+        keys.word("decimal", Decimal::by_name, |one| one.name().to_owned(), "point or comma", decimal)?;
+        let time = own.time.take();
+        let (mut kind, mut zone) = time.map_or((None, None), |time| (Some(time.kind), time.zone));
+        keys.word("time_format", TimeKind::by_name, TimeKind::to_string, TimeKind::ALLOWED, &mut kind)?;
+        keys.word("zone", Zone::by_name, Zone::to_string, ZONES, &mut zone)?;
+        let is_given = kind.is_some() || zone.is_some();
+        own.time = is_given.then(|| TimeFormat { kind: kind.unwrap_or_default(), zone });
+        Ok(())
     }
-}
-
-fn read_time_kind(section: &Section<'_>, key: &str) -> Result<Option<TimeKind>, RigError> {
-    section.named(key, TimeKind::by_name, TimeKind::ALLOWED)
-}
-
-fn read_zone(section: &Section<'_>) -> Result<Option<Zone>, RigError> {
-    section.named("zone", Zone::by_name, "a zone such as Europe/Berlin, CET or +01:00")
 }
 
 /// Reads `[columns]`, e.g. `pa = { name = "Head pressure", unit = "bar", scale = -1.0, offset = "2 bar" }`: minus
@@ -289,7 +279,7 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
         let name =
             entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
         let unit = read_unit(&entry, signal)?;
-        let scale = entry.quantity("scale", Dimension::Share, bound::OFFSET)?.unwrap_or(1.0);
+        let scale = entry.quantity("scale", bound::offset(Dimension::Share))?.unwrap_or(1.0);
         if !bound::SCALE.holds(scale.abs()) {
             let value = scale.to_string();
             return Err(entry.impossible(
@@ -299,11 +289,12 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
             ));
         }
         let offset = match signal.dimension() {
-            Some(dimension) => entry.quantity("offset", dimension, bound::OFFSET)?,
+            Some(dimension) => entry.quantity("offset", bound::offset(dimension))?,
             None => None,
         };
         let offset = offset.unwrap_or(0.0);
-        let (format, zone) = (read_time_kind(&entry, "format")?, read_zone(&entry)?);
+        let format = entry.named("format", TimeKind::by_name, TimeKind::ALLOWED)?;
+        let zone = entry.named("zone", Zone::by_name, ZONES)?;
         let name = name.to_owned();
         columns.insert(signal, ForeignColumn { name, unit, scale, offset, format, zone });
     }

@@ -164,7 +164,7 @@ proptest! {
         let unit = dimension.units().iter().find(|unit| unit.suffix.is_some()).copied();
         for offset in [offset, f64::from(few) / 60e6, f64::from(few) * 1e2] {
             let mut rig = Rig::paper();
-            let expected = bound::OFFSET.nearest(offset);
+            let expected = bound::offset(crate::units::Dimension::Pressure).nearest(offset);
             rig.columns.insert(signal, ForeignColumn { offset, ..ForeignColumn::new("c", unit) });
             let again = Rig::parse(&rig.to_toml(), "rig.toml").map_err(|error| TestCaseError::fail(error.to_string()))?;
             prop_assert_eq!(again.columns[&signal].offset.abs().to_bits(), expected.abs().to_bits(), "{}", rig.to_toml());

@@ -2,10 +2,11 @@
 
 use super::bound::{self, Bound};
 use super::document::{RigError, Section};
+use super::keys::{Done, Keys};
 use crate::units::{self, Dimension};
 
 /// The valve between supply and cylinder, of four edges: supply to A, A to tank, supply to B, B to tank.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ValveSheet {
     /// Flow over one fully open edge …
     pub rated_flow_m3s: f64,
@@ -40,7 +41,7 @@ pub struct ValveSheet {
 }
 
 /// By how much a valve changes after its calibration, 1 σ: shares of each edge's gain, of the stroke, and of `null_leak`.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ValveDrift {
     /// Of each edge's gain.
     pub gain: f64,
@@ -59,80 +60,49 @@ const DRIFT: ValveDrift = ValveDrift { gain: 0.03, lap: 0.001, null_leak: 0.1 };
 /// Where neither a sensor nor its spread is given: a tenth of the supply pressure.
 const SUPPLY_STD: f64 = 0.1;
 /// Over an edge, Pa: from hoses to hammers.
-const DROP: Bound = Bound::between(1e3, 1e8);
-const LAP: Bound = Bound::between(-1.0, 1.0);
-const STROKE_M: Bound = Bound::between(1e-6, 1.0);
-const LAG_S: Bound = Bound::between(-1.0, 1.0);
-const TANK_PA: Bound = Bound::between(-1.01325e5, 1e8);
-const SUPPLY_PA: Bound = Bound::between(1e4, 1e9);
+const DROP: Bound = Bound::between(Dimension::Pressure, 1e3, 1e8);
+const LAP: Bound = Bound::between(Dimension::Share, -1.0, 1.0);
+const STROKE_M: Bound = Bound::between(Dimension::Length, 1e-6, 1.0);
+const LAG_S: Bound = Bound::between(Dimension::Time, -1.0, 1.0);
+const TANK_PA: Bound = Bound::between(Dimension::Pressure, -1.01325e5, 1e8);
+const SUPPLY_PA: Bound = Bound::between(Dimension::Pressure, 1e4, 1e9);
 
 impl ValveSheet {
     pub(super) fn read(section: &Section<'_>) -> Result<Option<Self>, RigError> {
         if !section.is_present() {
             return Ok(None);
         }
-        section.allow(&[
-            "rated_flow",
-            "rated_drop",
-            "gain_std",
-            "lap",
-            "lap_std",
-            "null_leak",
-            "stroke",
-            "shut",
-            "hysteresis",
-            "spool_lag",
-            "drift",
-            "supply",
-            "supply_std",
-            "tank",
-            "calibration",
-        ])?;
-        let share = |key| section.quantity(key, Dimension::Share, bound::SHARE);
-        let pressure = |key, bound| section.quantity(key, Dimension::Pressure, bound);
-        let supply_pa = pressure("supply", SUPPLY_PA)?;
-        Ok(Some(Self {
-            rated_flow_m3s: section.required("rated_flow", Dimension::Flow, bound::FLOW_SCALE)?,
-            rated_drop_pa: section.required("rated_drop", Dimension::Pressure, DROP)?,
-            gain_std: share("gain_std")?.unwrap_or(GAIN_STD),
-            lap: section.quantity("lap", Dimension::Share, LAP)?.unwrap_or(0.0),
-            lap_std: share("lap_std")?.unwrap_or(LAP_STD),
-            null_leak: share("null_leak")?.unwrap_or(NULL_LEAK),
-            stroke_m: section.quantity("stroke", Dimension::Length, STROKE_M)?,
-            shut_below: read_shut(section)?,
-            hysteresis: share("hysteresis")?.unwrap_or(HYSTERESIS),
-            spool_lag_s: section.quantity("spool_lag", Dimension::Time, LAG_S)?.unwrap_or(0.0),
-            drift: ValveDrift::read(&section.section("drift")?)?,
-            supply_std_pa: pressure("supply_std", bound::BULK_MODULUS_STD)?
-                .unwrap_or(SUPPLY_STD * supply_pa.unwrap_or(0.0)),
-            supply_pa,
-            tank_pa: pressure("tank", TANK_PA)?.unwrap_or(0.0),
-            calibration: section.text("calibration")?.map(str::to_owned),
-        }))
+        section.read(Self::default(), Self::keys).map(Some)
+    }
+
+    pub(super) fn keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
+        keys.needed("rated_flow", bound::FLOW_SCALE, &mut own.rated_flow_m3s)?;
+        keys.needed("rated_drop", DROP, &mut own.rated_drop_pa)?;
+        keys.share("gain_std", &mut own.gain_std, GAIN_STD)?;
+        keys.number("lap", LAP, &mut own.lap, 0.0)?;
+        keys.share("lap_std", &mut own.lap_std, LAP_STD)?;
+        keys.share("null_leak", &mut own.null_leak, NULL_LEAK)?;
+        keys.optional("stroke", STROKE_M, &mut own.stroke_m)?;
+        keys.word("shut", shut_below, |share| format!("below {share:?}"), SHUT, &mut own.shut_below)?;
+        keys.share("hysteresis", &mut own.hysteresis, HYSTERESIS)?;
+        keys.number("spool_lag", LAG_S, &mut own.spool_lag_s, 0.0)?;
+        keys.table("drift", &mut own.drift, |keys, drift| {
+            keys.share("gain", &mut drift.gain, DRIFT.gain)?;
+            keys.share("lap", &mut drift.lap, DRIFT.lap)?;
+            keys.share("null_leak", &mut drift.null_leak, DRIFT.null_leak)
+        })?;
+        keys.optional("supply", SUPPLY_PA, &mut own.supply_pa)?;
+        let usual_pa = SUPPLY_STD * own.supply_pa.unwrap_or(0.0);
+        keys.number("supply_std", bound::BULK_MODULUS_STD, &mut own.supply_std_pa, usual_pa)?;
+        keys.number("tank", TANK_PA, &mut own.tank_pa, 0.0)?;
+        keys.word("calibration", |name| Some(name.to_owned()), String::clone, "", &mut own.calibration)
     }
 }
 
-/// Reads `shut = "below 0.5 %"`.
-fn read_shut(section: &Section<'_>) -> Result<Option<f64>, RigError> {
-    let Some(text) = section.text("shut")? else { return Ok(None) };
-    let below =
-        text.trim().strip_prefix("below ").and_then(|share| units::parse(share, Dimension::Share).ok());
-    let below = below.filter(|share| *share > 0.0 && *share < 1.0);
-    below
-        .map(Some)
-        .ok_or_else(|| section.impossible("shut", text, "\"below 0.5 %\", a share of the spool's stroke"))
-}
+/// What `shut` may be.
+const SHUT: &str = "\"below 0.5 %\", a share of the spool's stroke";
 
-impl ValveDrift {
-    fn read(section: &Section<'_>) -> Result<Self, RigError> {
-        section.allow(&["gain", "lap", "null_leak"])?;
-        let share = |key, default| {
-            section.quantity(key, Dimension::Share, bound::SHARE).map(|given| given.unwrap_or(default))
-        };
-        Ok(Self {
-            gain: share("gain", DRIFT.gain)?,
-            lap: share("lap", DRIFT.lap)?,
-            null_leak: share("null_leak", DRIFT.null_leak)?,
-        })
-    }
+fn shut_below(text: &str) -> Option<f64> {
+    let share = units::parse(text.trim().strip_prefix("below ")?, Dimension::Share).ok()?;
+    (share > 0.0 && share < 1.0).then_some(share)
 }

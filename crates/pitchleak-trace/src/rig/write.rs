@@ -1,5 +1,10 @@
 use super::bound::{self, Bound};
-use super::{CsvSettings, DecisionSettings, ForeignColumn, Instrument, Rig, effects};
+use super::keys::{Keys, lines_of, quantity, toml_text};
+use super::settings::alarm_keys;
+use super::{
+    CsvSettings, DecisionSettings, EstimatorSettings, ForeignColumn, Instruments, Rig, ValveSheet,
+    cylinder_keys, effects, fluid_keys,
+};
 use crate::signal::Signal;
 use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;
@@ -7,41 +12,16 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use toml_edit::{DocumentMut, Item, TableLike};
 
-/// A quantity that reads back to the same number.
-fn quantity(value: f64, dimension: Dimension) -> String {
-    toml_text(format!("{value} {}", dimension.si()).trim_end())
-}
-
-/// A quantity as text, within what the reader takes.
-fn within(value: f64, dimension: Dimension, bound: Bound) -> String {
-    quantity(bound.nearest(value), dimension)
-}
-
-/// As [`within`], in the unit that people read it in where few digits say the same number there.
-fn for_people(value: f64, dimension: Dimension, bound: Bound) -> String {
-    let si = bound.nearest(value);
+/// A quantity as text, within what the reader takes: in the unit that people read it in where few digits say the same number
+/// there.
+fn for_people(value: f64, bound: Bound) -> String {
+    let (si, dimension) = (bound.nearest(value), bound.dimension);
     let text = dimension.difference_for_people().and_then(|unit| {
         let text = format!("{} {}", rounded(unit.from_si(si), FEW_DIGITS), unit.text);
         let read = units::parse(&text, dimension).ok()?;
         (read.to_bits() == si.to_bits()).then(|| toml_text(&text))
     });
     text.unwrap_or_else(|| quantity(si, dimension))
-}
-
-fn toml_text(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
-}
-
-fn instrument(key: &str, sheet: &Instrument, dimension: Dimension, scale: Bound) -> String {
-    let full_scale = within(sheet.full_scale, dimension, scale);
-    format!("{key} = {{ full_scale = {full_scale}, {} }}\n", shares(sheet))
-}
-
-fn shares(sheet: &Instrument) -> String {
-    let [accuracy, bias, gain] =
-        [sheet.accuracy, sheet.bias, sheet.gain].map(|share| bound::SHARE.nearest(share));
-    let drift = bound::DRIFT_PER_HOUR.nearest(sheet.drift);
-    format!("accuracy = {accuracy:?}, bias = {bias:?}, gain = {gain:?}, drift = {drift:?}")
 }
 
 impl Rig {
@@ -67,82 +47,26 @@ impl Rig {
     /// The rig as a file that reads back to the same numbers; of a rig made by hand, to the nearest that a file may
     /// have.
     pub fn to_toml(&self) -> String {
+        let mut rig = self.clone();
         let mut out = String::new();
-        self.write_machine(&mut out);
-        self.write_settings(&mut out);
+        put(&mut out, "cylinder", lines_of(&mut rig.cylinder, cylinder_keys));
+        put(&mut out, "fluid", lines_of(&mut rig.fluid, fluid_keys));
+        let mut sensors = lines_of(&mut rig.instruments, Instruments::keys);
+        if self.valve.is_some() {
+            sensors.extend(lines_of(&mut rig.instruments, Instruments::valve_keys));
+        }
+        put(&mut out, "sensors", sensors);
+        put(&mut out, "estimator", lines_of(&mut rig.estimator, EstimatorSettings::keys));
+        let alarms = |keys: &mut Keys<'_>, alarms: &mut _| alarm_keys(keys, alarms, &self.instruments);
+        put(&mut out, "alarms", lines_of(&mut rig.alarms, alarms));
         self.write_decision(&mut out);
         self.write_columns(&mut out);
         self.write_csv(&mut out);
         self.write_effects(&mut out);
-        self.write_valve(&mut out);
-        out
-    }
-
-    fn write_machine(&self, out: &mut String) {
-        let cylinder = &self.cylinder;
-        let keys = [
-            ("area_a", cylinder.area_a_m2, Dimension::Area, bound::AREA),
-            ("area_b", cylinder.area_b_m2, Dimension::Area, bound::AREA),
-            ("stroke", cylinder.stroke_m, Dimension::Length, bound::STROKE),
-            ("moving_mass", cylinder.moving_mass_kg, Dimension::Mass, bound::MOVING_MASS),
-            ("dead_volume_a", cylinder.dead_volume_a_m3, Dimension::Volume, bound::DEAD_VOLUME),
-            ("dead_volume_b", cylinder.dead_volume_b_m3, Dimension::Volume, bound::DEAD_VOLUME),
-        ];
-        out.push_str("[cylinder]\n");
-        put(out, &keys.map(|(key, value, dimension, bound)| (key, Some(within(value, dimension, bound)))));
-        out.push_str("\n[fluid]\n");
-        let pressure = |value, bound| Some(within(value, Dimension::Pressure, bound));
-        put(
-            out,
-            &[
-                ("bulk_modulus", pressure(self.fluid.bulk_modulus_pa, bound::BULK_MODULUS)),
-                ("bulk_modulus_std", pressure(self.fluid.bulk_modulus_std_pa, bound::BULK_MODULUS_STD)),
-            ],
-        );
-        let sheets = &self.instruments;
-        out.push_str("\n[sensors]\n");
-        out.push_str(&instrument("flow_a", &sheets.flow_a, Dimension::Flow, bound::FLOW_SCALE));
-        out.push_str(&instrument("flow_b", &sheets.flow_b, Dimension::Flow, bound::FLOW_SCALE));
-        out.push_str(&instrument("pressure", &sheets.pressure, Dimension::Pressure, bound::PRESSURE_SCALE));
-        out.push_str(&instrument("position", &sheets.position, Dimension::Length, bound::POSITION_SCALE));
-        out.push_str(&instrument("force", &sheets.force, Dimension::Force, bound::FORCE_SCALE));
-        if self.valve.is_some() {
-            let supply = instrument("supply", &sheets.supply, Dimension::Pressure, bound::PRESSURE_SCALE);
-            let _ = writeln!(out, "{supply}spool = {{ {} }}", shares(&sheets.spool));
+        if let Some(valve) = &mut rig.valve {
+            put(&mut out, "valve", lines_of(valve, ValveSheet::keys));
         }
-    }
-
-    fn write_settings(&self, out: &mut String) {
-        let estimator = &self.estimator;
-        let seconds = |value: Option<f64>, bound| value.map(|v| within(v, Dimension::Time, bound));
-        let number = |value: Option<f64>, bound: Bound| value.map(|v| format!("{:?}", bound.nearest(v)));
-        let cutoff = |v| within(v, Dimension::Frequency, bound::CUTOFF);
-        out.push_str("\n[estimator]\n");
-        put(
-            out,
-            &[
-                ("kind", Some(toml_text(estimator.kind.name()))),
-                ("forgetting_time", seconds(estimator.forgetting_time_s, bound::MEMORY)),
-                ("filter_cutoff", estimator.filter_cutoff_hz.map(cutoff)),
-                ("block_time", seconds(estimator.block_time_s, bound::MEMORY)),
-                ("gains.lambda", number(estimator.lambda_per_s, bound::GAIN)),
-                ("gains.gamma", number(estimator.gamma, bound::GAIN)),
-            ],
-        );
-        let threshold = self.alarms.threshold_m3s;
-        let most = bound::FLOW_SCALE.nearest(self.instruments.largest_flow_m3s());
-        let flow = |value| Some(within(value, Dimension::Flow, bound::threshold(most)));
-        out.push_str("\n[alarms]\n");
-        put(
-            out,
-            &[
-                ("internal", flow(threshold.internal)),
-                ("external_a", flow(threshold.external_a)),
-                ("external_b", flow(threshold.external_b)),
-                ("hysteresis", number(Some(1.0 - self.alarms.clear_share), bound::SHARE)),
-                ("hold_time", seconds(Some(self.alarms.hold_time_s), bound::HOLD_TIME)),
-            ],
-        );
+        out
     }
 
     fn write_decision(&self, out: &mut String) {
@@ -168,49 +92,7 @@ impl Rig {
     }
 
     pub(crate) fn write_csv(&self, out: &mut String) {
-        if self.csv == CsvSettings::default() {
-            return;
-        }
-        let CsvSettings { delimiter, decimal, time, part: _ } = &self.csv;
-        out.push_str("\n[csv]\n");
-        put(
-            out,
-            &[
-                ("delimiter", delimiter.map(|delimiter| toml_text(delimiter.name()))),
-                ("decimal", decimal.map(|decimal| toml_text(decimal.name()))),
-                ("time_format", time.as_ref().map(|time| toml_text(&time.kind.to_string()))),
-                ("zone", time.as_ref().and_then(|time| Some(toml_text(&time.zone.as_ref()?.to_string())))),
-            ],
-        );
-    }
-
-    fn write_valve(&self, out: &mut String) {
-        let Some(valve) = &self.valve else { return };
-        let share = |value: f64| Some(format!("{value:?}"));
-        let with = |value, dimension| Some(quantity(value, dimension));
-        out.push_str("\n[valve]\n");
-        put(
-            out,
-            &[
-                ("rated_flow", with(valve.rated_flow_m3s, Dimension::Flow)),
-                ("rated_drop", with(valve.rated_drop_pa, Dimension::Pressure)),
-                ("gain_std", share(valve.gain_std)),
-                ("lap", share(valve.lap)),
-                ("lap_std", share(valve.lap_std)),
-                ("null_leak", share(valve.null_leak)),
-                ("stroke", valve.stroke_m.and_then(|stroke_m| with(stroke_m, Dimension::Length))),
-                ("shut", valve.shut_below.map(|share| toml_text(&format!("below {share:?}")))),
-                ("hysteresis", share(valve.hysteresis)),
-                ("spool_lag", with(valve.spool_lag_s, Dimension::Time)),
-                ("drift.gain", share(valve.drift.gain)),
-                ("drift.lap", share(valve.drift.lap)),
-                ("drift.null_leak", share(valve.drift.null_leak)),
-                ("supply", valve.supply_pa.and_then(|pressure| with(pressure, Dimension::Pressure))),
-                ("supply_std", with(valve.supply_std_pa, Dimension::Pressure)),
-                ("tank", with(valve.tank_pa, Dimension::Pressure)),
-                ("calibration", valve.calibration.as_deref().map(toml_text)),
-            ],
-        );
+        put(out, "csv", lines_of(&mut self.csv.clone(), CsvSettings::keys));
     }
 
     fn write_effects(&self, out: &mut String) {
@@ -223,7 +105,11 @@ impl Rig {
             let value = effects::size(*effect).nearest(size.value);
             let constants = effect.constants().iter().map(|constant| {
                 let spec = constant.spec();
-                (spec.id, Bound::between(spec.lower, spec.upper).nearest(size.constants.get(*constant)))
+                (
+                    spec.id,
+                    Bound::between(Dimension::Share, spec.lower, spec.upper)
+                        .nearest(size.constants.get(*constant)),
+                )
             });
             if room.set(*effect, value, Default::default()).is_err() {
                 let _ = writeln!(out, "# {effect}: no room for more");
@@ -252,7 +138,7 @@ impl ForeignColumn {
             let _ = write!(out, ", scale = {scale:?}");
         }
         if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
-            let _ = write!(out, ", offset = {}", for_people(self.offset, dimension, bound::OFFSET));
+            let _ = write!(out, ", offset = {}", for_people(self.offset, bound::offset(dimension)));
         }
         if let Some(format) = &self.format {
             let _ = write!(out, ", format = {}", toml_text(&format.to_string()));
@@ -296,11 +182,14 @@ fn set(section: &mut dyn TableLike, key: &str, item: Option<&Item>) {
     section.insert(key, item);
 }
 
-fn put(out: &mut String, keys: &[(&str, Option<String>)]) {
-    for (key, value) in keys {
-        if let Some(value) = value {
-            let _ = writeln!(out, "{key} = {value}");
-        }
+/// Writes a section, where there is anything in it.
+fn put(out: &mut String, section: &str, lines: Vec<(String, String)>) {
+    if lines.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "{}[{section}]", if out.is_empty() { "" } else { "\n" });
+    for (key, value) in lines {
+        let _ = writeln!(out, "{key} = {value}");
     }
 }
 

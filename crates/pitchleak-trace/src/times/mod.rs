@@ -90,11 +90,6 @@ impl TimeKind {
         NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind)
     }
 
-    /// Whether cells are numbers.
-    pub fn is_number(&self) -> bool {
-        matches!(self, Self::Epoch(_) | Self::Excel)
-    }
-
     /// Reads a cell; none where it is no such time.
     pub fn read(&self, text: &str) -> Option<Reading> {
         match self {
@@ -121,6 +116,11 @@ impl fmt::Display for TimeKind {
 }
 
 impl TimeFormat {
+    /// Behind its kind, where the zone is known.
+    pub(crate) fn zone_text(&self) -> String {
+        self.zone.as_ref().map(|zone| format!(" in {zone}")).unwrap_or_default()
+    }
+
     /// The instant of a reading, ns since 1970, or since the first midnight where there is no date; `last_ns` is the
     /// instant before. Where clocks were set back, an hour comes twice: then it is the one that is after the last.
     pub(crate) fn instant_ns(&self, reading: Reading, last_ns: Option<i128>) -> Option<i128> {

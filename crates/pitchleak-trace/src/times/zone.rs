@@ -1,4 +1,5 @@
 use super::{TimeFormat, TimeKind};
+use crate::header::lists;
 use jiff::civil::DateTime;
 use jiff::tz::{Offset, TimeZone};
 use jiff::{SignedDuration, Timestamp, Zoned};
@@ -12,30 +13,20 @@ pub struct Zone {
     pub(super) zone: TimeZone,
 }
 
-/// Abbreviations that mean one offset only, h. CST, IST and BST mean several.
-const ABBREVIATIONS: [(&str, i8); 22] = [
-    ("Z", 0),
-    ("UTC", 0),
-    ("GMT", 0),
-    ("WET", 0),
-    ("WEST", 1),
-    ("CET", 1),
-    ("MEZ", 1),
-    ("CEST", 2),
-    ("MESZ", 2),
-    ("EET", 2),
-    ("EEST", 3),
-    ("MSK", 3),
-    ("JST", 9),
-    ("AEST", 10),
-    ("AEDT", 11),
-    ("EST", -5),
-    ("EDT", -4),
-    ("CDT", -5),
-    ("MST", -7),
-    ("MDT", -6),
-    ("PST", -8),
-    ("PDT", -7),
+/// Abbreviations that mean one offset only, h; blanks between them. CST, IST and BST mean several.
+const ABBREVIATIONS: [(i8, &str); 12] = [
+    (0, "Z UTC GMT WET"),
+    (1, "WEST CET MEZ"),
+    (2, "CEST MESZ EET"),
+    (3, "EEST MSK"),
+    (9, "JST"),
+    (10, "AEST"),
+    (11, "AEDT"),
+    (-4, "EDT"),
+    (-5, "EST CDT"),
+    (-6, "MDT"),
+    (-7, "MST PDT"),
+    (-8, "PST"),
 ];
 
 impl Zone {
@@ -75,7 +66,7 @@ impl fmt::Display for Zone {
 
 /// `Z`, `CET`, `+01:00`, `+0100`, `+01`, `UTC+1`.
 pub(super) fn offset(text: &str) -> Option<Offset> {
-    if let Some((_, hours)) = ABBREVIATIONS.iter().find(|(name, _)| *name == text) {
+    if let Some((hours, _)) = ABBREVIATIONS.iter().find(|(_, names)| lists(names, text)) {
         return Offset::from_hours(*hours).ok();
     }
     let text = text.strip_prefix("UTC").or_else(|| text.strip_prefix("GMT")).unwrap_or(text);

@@ -4,7 +4,7 @@
 //! headers of version 1, data in B-trees of version 1.
 
 use super::vector::vector;
-use super::{Named, Values, Variables};
+use super::{Values, Variables};
 use crate::read::error::TraceFault;
 use crate::read::format::MOST_HELD;
 
@@ -65,18 +65,9 @@ pub(super) struct File<'a> {
     looks: usize,
 }
 
-/// What the header of an object says.
-#[derive(Default)]
-struct Object<'a> {
-    dataspace: Option<&'a [u8]>,
-    datatype: Option<&'a [u8]>,
-    layout: Option<&'a [u8]>,
-    filters: Option<&'a [u8]>,
-    symbol_table: Option<&'a [u8]>,
-    attributes: Vec<&'a [u8]>,
-}
+/// What the header of an object says: messages, each with its type.
+struct Object<'a>(Vec<(u64, &'a [u8])>);
 
-/// The vectors of a file, and what else is in it.
 pub(super) fn read(bytes: &[u8]) -> Result<Variables, TraceFault> {
     variables(bytes).map_err(|trouble| match trouble {
         Trouble::Damaged => TraceFault::Damaged("the MAT file of version 7.3 contradicts itself".to_owned()),
@@ -90,19 +81,15 @@ pub(super) fn read(bytes: &[u8]) -> Result<Variables, TraceFault> {
 fn variables(bytes: &[u8]) -> Found<Variables> {
     let (mut file, root) = File::open(bytes)?;
     let mut budget = MOST_HELD / 8;
-    let (mut vectors, mut others): (Named<Vec<f64>>, Named<&'static str>) = (Vec::new(), Vec::new());
-    let root = file.object(root)?.symbol_table.ok_or(Trouble::Form)?;
+    let mut variables = Vec::new();
+    let root = file.object(root)?.message(SYMBOL_TABLE).ok_or(Trouble::Form)?;
     for (name, address) in file.members(root)? {
-        // What other variables point at.
-        if name.starts_with('#') {
-            continue;
-        }
-        match file.variable(address, &mut budget)? {
-            Values::Vector(values) => vectors.push((name, values)),
-            Values::Other(kind) => others.push((name, kind)),
+        // Others are what variables point at.
+        if !name.starts_with('#') {
+            variables.push((name, file.variable(address, &mut budget)?));
         }
     }
-    Ok((vectors, others))
+    Ok(variables)
 }
 
 impl<'a> File<'a> {
@@ -153,7 +140,7 @@ impl<'a> File<'a> {
         head.take(4)?;
         let size = head.number(4)?;
         head.take(4)?;
-        let (mut object, mut blocks, mut seen) = (Object::default(), vec![Front(head.take(size)?)], 0);
+        let (mut messages, mut blocks, mut seen) = (Vec::new(), vec![Front(head.take(size)?)], 0);
         while let Some(mut block) = blocks.pop() {
             while seen < count && block.0.len() >= 8 {
                 seen += 1;
@@ -166,11 +153,11 @@ impl<'a> File<'a> {
                     let mut next = self.at(data.number(8)?)?;
                     blocks.push(Front(next.take(data.number(8)?)?));
                 } else if flags & 2 == 0 {
-                    object.add(kind, data);
+                    messages.push((kind, data));
                 }
             }
         }
-        Ok(object)
+        Ok(Object(messages))
     }
 
     /// Names and addresses of what is in a group.
@@ -233,35 +220,28 @@ impl<'a> File<'a> {
     fn variable(&mut self, address: u64, budget: &mut u64) -> Found<Values> {
         let object = self.object(address)?;
         if let Some(kind) = object.kind() {
-            return Ok(Values::Other(kind));
+            return Ok(Err(kind));
         }
-        let (Some(space), Some(data), Some(layout)) = (object.dataspace, object.datatype, object.layout)
-        else {
-            return Ok(Values::Other("variable of an unknown class"));
+        let [space, data, layout] = [DATASPACE, DATATYPE, LAYOUT].map(|kind| object.message(kind));
+        let (Some(space), Some(data), Some(layout)) = (space, data, layout) else {
+            return Ok(Err("variable of an unknown class"));
         };
-        vector(self, space, data, layout, object.filters, budget)
+        vector(self, space, data, layout, object.message(FILTERS), budget)
     }
 }
 
 impl<'a> Object<'a> {
-    fn add(&mut self, kind: u64, data: &'a [u8]) {
-        match kind {
-            DATASPACE => self.dataspace = Some(data),
-            DATATYPE => self.datatype = Some(data),
-            LAYOUT => self.layout = Some(data),
-            FILTERS => self.filters = Some(data),
-            ATTRIBUTE => self.attributes.push(data),
-            SYMBOL_TABLE => self.symbol_table = Some(data),
-            _ => {}
-        }
+    /// The last one of a type.
+    fn message(&self, kind: u64) -> Option<&'a [u8]> {
+        self.0.iter().rfind(|(known, _)| *known == kind).map(|(_, data)| *data)
     }
 
     /// What it is where it is no array of numbers.
     fn kind(&self) -> Option<&'static str> {
-        let value = |name: &[u8]| {
-            self.attributes.iter().filter_map(|one| attribute(one).ok()).find(|one| one.0 == name)
-        };
-        let is_group = self.symbol_table.is_some();
+        let attributes = || self.0.iter().filter(|(kind, _)| *kind == ATTRIBUTE);
+        let value =
+            |name: &[u8]| attributes().filter_map(|(_, one)| attribute(one).ok()).find(|one| one.0 == name);
+        let is_group = self.message(SYMBOL_TABLE).is_some();
         let class = value(b"MATLAB_class").map(|(_, class)| class.trim_ascii_end());
         match class {
             _ if is_group && value(b"MATLAB_sparse").is_some() => Some("sparse matrix"),

@@ -39,10 +39,10 @@ pub(super) fn vector(
     filters: Option<&[u8]>,
     budget: &mut u64,
 ) -> Found<Values> {
-    let Some(shape) = Shape::of(dataspace)? else { return Ok(Values::Other("matrix")) };
+    let Some(shape) = Shape::of(dataspace)? else { return Ok(Err("matrix")) };
     let written = match written(datatype)? {
         Ok(written) => written,
-        Err(other) => return Ok(Values::Other(other)),
+        Err(other) => return Ok(Err(other)),
     };
     *budget = budget.checked_sub(shape.length).ok_or(Trouble::TooLarge)?;
     let mut layout = Front(layout);
@@ -59,13 +59,13 @@ pub(super) fn vector(
             let (mut at, held) = (file.at(layout.number(8)?)?, layout.number(8)?);
             at.take(held)?
         }
-        CHUNKED => return chunks(file, layout, &shape, written, filters).map(Values::Vector),
+        CHUNKED => return chunks(file, layout, &shape, written, filters).map(Ok),
         _ => return Err(Trouble::Form),
     };
     if plain.len() as u64 != size {
         return Err(Trouble::Damaged);
     }
-    Ok(Values::Vector(written.numbers(plain, 1).collect()))
+    Ok(Ok(written.numbers(plain, 1).collect()))
 }
 
 impl Shape {

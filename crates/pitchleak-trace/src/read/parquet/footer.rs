@@ -2,10 +2,10 @@
 //! recursion and believes its counts, so that a forged footer ends the process.
 //! <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift>
 
+use super::pages::ReadAt;
 use super::thrift::{Fields, Value, structure};
 use parquet::basic::{Repetition, Type as Physical};
 use parquet::errors::{ParquetError, Result};
-use parquet::file::reader::ChunkReader;
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor, ColumnPath, Type};
 use std::sync::Arc;
 
@@ -29,9 +29,9 @@ pub(super) struct Chunk {
 }
 
 impl Footer {
-    pub(super) fn of(file: &impl ChunkReader) -> Result<Self> {
-        let before_end = file.len().checked_sub(END).ok_or_else(|| damaged("too short"))?;
-        let end = file.get_bytes(before_end, END as usize)?;
+    pub(super) fn of(bytes: &ReadAt, file_length: u64) -> Result<Self> {
+        let before_end = file_length.checked_sub(END).ok_or_else(|| damaged("too short"))?;
+        let end = bytes(before_end, END as usize)?;
         let length = match end.split_first_chunk::<4>() {
             Some((length, b"PAR1")) => u64::from(u32::from_le_bytes(*length)),
             Some((_, b"PARE")) => return Err(damaged("encrypted")),
@@ -39,13 +39,13 @@ impl Footer {
         };
         let start = before_end.checked_sub(length).filter(|_| length <= LONGEST);
         let start = start.ok_or_else(|| damaged("a footer longer than the file, or than 64 MB"))?;
-        let bytes = file.get_bytes(start, length as usize)?;
+        let bytes = bytes(start, length as usize)?;
         let (metadata, _) = structure(&bytes)?;
         let leaves = leaves(metadata.needed(2)?)?;
         let mut groups = Vec::new();
         for group in metadata.needed(4)?.items()? {
             let chunks = group?.fields()?.needed(1)?.items()?;
-            let chunks = chunks.map(|chunk| Chunk::of(&chunk?.fields()?, file.len()));
+            let chunks = chunks.map(|chunk| Chunk::of(&chunk?.fields()?, file_length));
             let chunks = chunks.collect::<Result<Vec<_>>>()?;
             if chunks.len() != leaves.len() {
                 return Err(damaged("a group of rows has other columns than the file"));
@@ -94,7 +94,7 @@ fn leaves(schema: Value<'_>) -> Result<Vec<Leaf>> {
         };
         match children {
             0 if place == 0 => {}
-            0 if element.get(1).is_some() => leaves.push(Leaf::of(&element, above)?),
+            0 if element.get(1).is_some() => leaves.push(Leaf::of(leaves.len(), &element, above)?),
             0 => {}
             1.. => open.push((children, above)),
             _ => return Err(damaged("a number of columns below zero")),
@@ -134,6 +134,8 @@ pub(super) struct Level {
 }
 
 pub(super) struct Leaf {
+    /// Its place among the chunks of a group.
+    pub(super) place: usize,
     pub(super) name: String,
     pub(super) kind: Kind,
     level: Level,
@@ -154,20 +156,19 @@ impl Level {
     }
 }
 
+/// The types by their numbers.
+const PHYSICAL: [Physical; 8] = {
+    use Physical::*;
+    [BOOLEAN, INT32, INT64, INT96, FLOAT, DOUBLE, BYTE_ARRAY, FIXED_LEN_BYTE_ARRAY]
+};
+
 impl Leaf {
-    pub(super) fn of(element: &Fields<'_>, level: Level) -> Result<Self> {
-        let physical = match element.whole(1)? {
-            Some(0) => Physical::BOOLEAN,
-            Some(1) => Physical::INT32,
-            Some(2) => Physical::INT64,
-            Some(3) => Physical::INT96,
-            Some(4) => Physical::FLOAT,
-            Some(5) => Physical::DOUBLE,
-            Some(6) => Physical::BYTE_ARRAY,
-            Some(7) => Physical::FIXED_LEN_BYTE_ARRAY,
-            _ => return Err(ParquetError::General("a column of an unknown type".to_owned())),
-        };
+    fn of(place: usize, element: &Fields<'_>, level: Level) -> Result<Self> {
+        let number = element.whole(1)?.and_then(|number| usize::try_from(number).ok());
+        let physical = number.and_then(|number| PHYSICAL.get(number).copied());
+        let physical = physical.ok_or_else(|| damaged("a column of an unknown type"))?;
         Ok(Self {
+            place,
             name: String::from_utf8_lossy(element.needed(4)?.bytes()?).into_owned(),
             kind: kind(physical, element)?,
             level,

@@ -22,24 +22,27 @@ const DATA: i64 = 0;
 const DICTIONARY: i64 = 2;
 const DATA_2: i64 = 3;
 
-pub(super) struct Pages<R> {
-    file: Arc<R>,
+/// So many bytes of a file from a place on.
+pub(super) type ReadAt = Arc<dyn Fn(u64, usize) -> Result<Bytes> + Send + Sync>;
+
+struct Pages {
+    bytes: ReadAt,
     codec: Codec,
     /// Where the next one begins, and the bytes from there to the column's end.
     at: u64,
     left: u64,
 }
 
-impl<R: ChunkReader> Pages<R> {
-    pub(super) fn of(file: Arc<R>, chunk: Chunk) -> Result<Self> {
-        Ok(Self { file, codec: Codec::of(chunk.codec)?, at: chunk.start, left: chunk.length })
+impl Pages {
+    fn of(bytes: ReadAt, chunk: Chunk) -> Result<Self> {
+        Ok(Self { bytes, codec: Codec::of(chunk.codec)?, at: chunk.start, left: chunk.length })
     }
 
     fn take(&mut self, length: u64) -> Result<Bytes> {
         if length > self.left || length > MOST_HELD {
             return Err(damaged("a page is longer than its column"));
         }
-        let bytes = self.file.get_bytes(self.at, length as usize)?;
+        let bytes = (self.bytes)(self.at, length as usize)?;
         self.at += length;
         self.left -= length;
         Ok(bytes)
@@ -49,7 +52,7 @@ impl<R: ChunkReader> Pages<R> {
     fn head<T>(&mut self, read: impl Fn(&Fields<'_>) -> Result<T>) -> Result<T> {
         let mut look = HEAD;
         loop {
-            let bytes = self.file.get_bytes(self.at, look.min(self.left) as usize)?;
+            let bytes = (self.bytes)(self.at, look.min(self.left) as usize)?;
             match structure(&bytes) {
                 Ok((fields, length)) => {
                     let head = read(&fields)?;
@@ -68,114 +71,86 @@ impl<R: ChunkReader> Pages<R> {
 struct Head {
     packed: u64,
     size: u64,
-    /// None of pages that hold no values.
-    content: Option<Content>,
-}
-
-enum Content {
-    Data {
-        num_values: u32,
-        encoding: Encoding,
-        levels: Encoding,
-    },
-    Data2 {
-        num_values: u32,
-        num_nulls: u32,
-        num_rows: u32,
-        encoding: Encoding,
-        levels: [u32; 2],
-        is_packed: bool,
-    },
-    Dictionary {
-        num_values: u32,
-        encoding: Encoding,
-    },
+    /// The page without what it holds; none of one that holds no values.
+    page: Option<Page>,
 }
 
 impl Head {
     fn of(fields: &Fields<'_>) -> Result<Self> {
         let size = |id| Ok::<_, ParquetError>(u64::try_from(fields.needed(id)?.whole()?)?);
-        let content = match fields.needed(1)?.whole()? {
-            DATA => Some(Content::data(&fields.needed(5)?.fields()?)?),
-            DICTIONARY => Some(Content::dictionary(&fields.needed(7)?.fields()?)?),
-            DATA_2 => Some(Content::data_2(&fields.needed(8)?.fields()?)?),
+        let page = match fields.needed(1)?.whole()? {
+            DATA => Some(data(&fields.needed(5)?.fields()?)?),
+            DICTIONARY => Some(dictionary(&fields.needed(7)?.fields()?)?),
+            DATA_2 => Some(data_2(&fields.needed(8)?.fields()?)?),
             _ => None,
         };
-        Ok(Self { packed: size(3)?, size: size(2)?, content })
+        Ok(Self { packed: size(3)?, size: size(2)?, page })
     }
 }
 
-impl Content {
-    fn data(fields: &Fields<'_>) -> Result<Self> {
-        let [num_values, encoding, levels] = [1, 2, 3].map(|id| count(fields, id));
-        Ok(Self::Data { num_values: num_values?, encoding: encoded(encoding?)?, levels: encoded(levels?)? })
-    }
+fn data(fields: &Fields<'_>) -> Result<Page> {
+    let [num_values, encoding, levels] = [1, 2, 3].map(|id| count(fields, id));
+    let (num_values, encoding, levels) = (num_values?, encoded(encoding?)?, encoded(levels?)?);
+    Ok(Page::DataPage {
+        buf: Bytes::new(),
+        num_values,
+        encoding,
+        def_level_encoding: levels,
+        rep_level_encoding: levels,
+        statistics: None,
+    })
+}
 
-    fn data_2(fields: &Fields<'_>) -> Result<Self> {
-        let [num_values, num_nulls, num_rows, encoding, definition, repetition] =
-            [1, 2, 3, 4, 5, 6].map(|id| count(fields, id));
-        Ok(Self::Data2 {
-            num_values: num_values?,
-            num_nulls: num_nulls?,
-            num_rows: num_rows?,
-            encoding: encoded(encoding?)?,
-            levels: [repetition?, definition?],
-            is_packed: fields.get(7).is_none_or(|packed| packed.is_true()),
-        })
-    }
+fn data_2(fields: &Fields<'_>) -> Result<Page> {
+    let [num_values, num_nulls, num_rows, encoding, definition, repetition] =
+        [1, 2, 3, 4, 5, 6].map(|id| count(fields, id));
+    Ok(Page::DataPageV2 {
+        buf: Bytes::new(),
+        num_values: num_values?,
+        num_nulls: num_nulls?,
+        num_rows: num_rows?,
+        encoding: encoded(encoding?)?,
+        rep_levels_byte_len: repetition?,
+        def_levels_byte_len: definition?,
+        is_compressed: fields.get(7).is_none_or(|packed| packed.is_true()),
+        statistics: None,
+    })
+}
 
-    fn dictionary(fields: &Fields<'_>) -> Result<Self> {
-        Ok(Self::Dictionary { num_values: count(fields, 1)?, encoding: encoded(count(fields, 2)?)? })
-    }
+fn dictionary(fields: &Fields<'_>) -> Result<Page> {
+    let (num_values, encoding) = (count(fields, 1)?, encoded(count(fields, 2)?)?);
+    Ok(Page::DictionaryPage { buf: Bytes::new(), num_values, encoding, is_sorted: false })
+}
 
-    /// The page of these bytes, which are `size` once they are unpacked.
-    fn page(self, bytes: &Bytes, size: u64, codec: Codec) -> Result<Page> {
-        match self {
-            Self::Data { num_values, encoding, levels } => Ok(Page::DataPage {
-                buf: codec.unpacked(&[], bytes, size)?,
-                num_values,
-                encoding,
-                def_level_encoding: levels,
-                rep_level_encoding: levels,
-                statistics: None,
-            }),
-            Self::Data2 { num_values, num_nulls, num_rows, encoding, levels, is_packed } => {
-                let [repetition, definition] = levels;
-                // Levels stand before what is compressed.
-                let split = u64::from(repetition) + u64::from(definition);
-                let split = usize::try_from(split).ok().and_then(|split| bytes.split_at_checked(split));
-                let (before, values) = split.ok_or_else(|| damaged("levels longer than their page"))?;
-                let codec = if is_packed { codec } else { Codec::Plain };
-                Ok(Page::DataPageV2 {
-                    buf: codec.unpacked(before, values, size)?,
-                    num_values,
-                    encoding,
-                    num_nulls,
-                    num_rows,
-                    def_levels_byte_len: definition,
-                    rep_levels_byte_len: repetition,
-                    is_compressed: is_packed,
-                    statistics: None,
-                })
-            }
-            Self::Dictionary { num_values, encoding } => {
-                let buf = codec.unpacked(&[], bytes, size)?;
-                if num_values as usize > buf.len() {
-                    return Err(damaged("a dictionary has fewer values than it says"));
-                }
-                Ok(Page::DictionaryPage { buf, num_values, encoding, is_sorted: false })
+/// The page with what it holds: these bytes, which are `size` once they are unpacked.
+fn filled(mut page: Page, bytes: &Bytes, size: u64, codec: Codec) -> Result<Page> {
+    match &mut page {
+        Page::DataPage { buf, .. } => *buf = codec.unpacked(&[], bytes, size)?,
+        Page::DataPageV2 { buf, rep_levels_byte_len, def_levels_byte_len, is_compressed, .. } => {
+            // Levels stand before what is compressed.
+            let split = u64::from(*rep_levels_byte_len) + u64::from(*def_levels_byte_len);
+            let split = usize::try_from(split).ok().and_then(|split| bytes.split_at_checked(split));
+            let (before, values) = split.ok_or_else(|| damaged("levels longer than their page"))?;
+            let codec = if *is_compressed { codec } else { Codec::Plain };
+            *buf = codec.unpacked(before, values, size)?;
+        }
+        Page::DictionaryPage { buf, num_values, .. } => {
+            *buf = codec.unpacked(&[], bytes, size)?;
+            if *num_values as usize > buf.len() {
+                return Err(damaged("a dictionary has fewer values than it says"));
             }
         }
     }
+    Ok(page)
 }
 
-impl<R: ChunkReader> PageReader for Pages<R> {
+impl PageReader for Pages {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         while self.left > 0 {
             let head = self.head(Head::of)?;
             let bytes = self.take(head.packed)?;
-            if let Some(content) = head.content {
-                return content.page(&bytes, head.size, self.codec).map(Some);
+            if let Some(page) = head.page {
+                return filled(page, &bytes, head.size, self.codec).map(Some);
             }
         }
         Ok(None)
@@ -191,7 +166,7 @@ impl<R: ChunkReader> PageReader for Pages<R> {
     }
 }
 
-impl<R: ChunkReader> Iterator for Pages<R> {
+impl Iterator for Pages {
     type Item = Result<Page>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -225,40 +200,34 @@ fn encoded(number: u32) -> Result<Encoding> {
     })
 }
 
-/// A file of columns, on a disk or in memory.
-pub(super) trait Columns: Send + Sync {
-    fn leaves(&self) -> &[Leaf];
+/// A file of columns.
+pub(super) struct Columns {
+    bytes: ReadAt,
+    /// Without those that have a nest.
+    pub(super) leaves: Vec<Leaf>,
+    groups: Vec<Vec<Chunk>>,
+}
+
+impl Columns {
+    /// Of a file on a disk or in memory.
+    pub(super) fn of(file: impl ChunkReader + 'static) -> Result<Self> {
+        let length = file.len();
+        let bytes: ReadAt = Arc::new(move |start, length| file.get_bytes(start, length));
+        let Footer { leaves, groups } = Footer::of(&bytes, length)?;
+        Ok(Self { bytes, leaves: leaves.into_iter().filter(Leaf::is_flat).collect(), groups })
+    }
 
     /// How many groups of rows there are.
-    fn groups(&self) -> usize;
-
-    /// The column at `place` of a group of rows.
-    fn read(&self, group: usize, place: usize) -> Result<ColumnReader>;
-}
-
-pub(super) fn open(bytes: impl ChunkReader + 'static) -> Result<Arc<dyn Columns>> {
-    let footer = Footer::of(&bytes)?;
-    Ok(Arc::new(InFile { bytes: Arc::new(bytes), footer }))
-}
-
-struct InFile<R> {
-    bytes: Arc<R>,
-    footer: Footer,
-}
-
-impl<R: ChunkReader + 'static> Columns for InFile<R> {
-    fn leaves(&self) -> &[Leaf] {
-        &self.footer.leaves
+    pub(super) fn groups(&self) -> usize {
+        self.groups.len()
     }
 
-    fn groups(&self) -> usize {
-        self.footer.groups.len()
-    }
-
-    fn read(&self, group: usize, place: usize) -> Result<ColumnReader> {
-        let chunk = self.footer.groups.get(group).and_then(|chunks| chunks.get(place));
-        let (Some(chunk), Some(leaf)) = (chunk, self.footer.leaves.get(place)) else {
-            return Err(ParquetError::General("a column that is not there".to_owned()));
+    /// The flat column at `index` of a group of rows.
+    pub(super) fn read(&self, group: usize, index: usize) -> Result<ColumnReader> {
+        let leaf = self.leaves.get(index);
+        let chunk = leaf.and_then(|leaf| self.groups.get(group)?.get(leaf.place));
+        let (Some(chunk), Some(leaf)) = (chunk, leaf) else {
+            return Err(damaged("a column that is not there"));
         };
         let pages = Pages::of(Arc::clone(&self.bytes), *chunk)?;
         Ok(get_column_reader(leaf.descriptor()?, Box::new(pages)))

@@ -9,6 +9,7 @@ use parquet::data_type::{
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
+use pitchleak_core::Sample;
 use std::io::Cursor;
 use std::sync::Arc;
 
@@ -121,6 +122,22 @@ fn with_time(name: &'static str, time: Column) -> Vec<(&'static str, Column)> {
         ("Pressure B [bar]", doubles(|_| 40.0)),
         ("qa_lpm", Column::Doubles((0..ROWS).map(|i| (i != 3).then_some(6.0)).collect())),
     ]
+}
+
+/// As of a file of text.
+#[test]
+fn a_column_value_is_called_as_its_file_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["x_mm", "pa_bar", "pb_bar"].map(|name| folder.path().join(name).with_extension("parquet"));
+    for path in &paths {
+        let columns = [("t_s", doubles(|i| 0.01 * i)), ("value", doubles(|_| 40.0))];
+        std::fs::write(path, file(&columns, ROWS)).unwrap();
+    }
+    let mut reader = TraceReader::join(&paths, &Rig::paper()).unwrap();
+    let mut record = Record::default();
+    assert!(reader.next_record(&mut record).unwrap());
+    let Sample { x_m, pa_pa, pb_pa, .. } = record.sample;
+    assert!((x_m - 0.04).abs() < 1e-12 && (pa_pa - 4e6).abs() < 1e-3 && (pb_pa - 4e6).abs() < 1e-3);
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Rows of samples whose cells need a hand: a unit behind each number, as Grafana exports a table (`50.1 bar`), or date and
 //! time of day in columns of their own.
 
-use super::{Recast, Shape, place, write_cell};
+use super::{Recast, Shape, place};
 use crate::header::HeaderUnit;
 use crate::read::table_text::TextTable;
 use crate::times::{TimeKind, guess};
+use std::borrow::Cow;
 
 pub(super) const UNITS_IN_CELLS: Shape = Shape { name: "units in the cells", told: units };
 pub(super) const DATE_AND_TIME_APART: Shape = Shape { name: "date and time apart", told: date_and_time };
@@ -38,15 +39,13 @@ fn units(table: &TextTable, _: &[u8]) -> Option<Recast> {
         })
         .collect();
     Some(Box::new(move |source| {
-        source.row_by_row(&header, move |cells, text| {
-            for (index, cell) in cells.iter().enumerate() {
-                if index > 0 {
-                    text.push(b'\t');
-                }
+        source.row_by_row(&header, move |cells| {
+            let bare = cells.iter().copied().enumerate().map(|(index, cell)| {
                 let unit = units.get(index).and_then(Option::as_ref);
                 let bare = unit.and_then(|unit| cell.trim_ascii().strip_suffix(unit.as_bytes()));
-                write_cell(bare.unwrap_or(cell), text);
-            }
+                Cow::Borrowed(bare.unwrap_or(cell))
+            });
+            bare.collect()
         })
     }))
 }
@@ -64,18 +63,14 @@ fn date_and_time(table: &TextTable, _: &[u8]) -> Option<Recast> {
     };
     let header: Vec<String> = table.headers.iter().enumerate().filter_map(named).collect();
     Some(Box::new(move |source| {
-        source.row_by_row(&header, move |cells, text| {
+        source.row_by_row(&header, move |cells| {
+            let time_of_day = cells.get(time).copied().unwrap_or_default().trim_ascii();
             let kept = cells.iter().enumerate().filter(|(index, _)| *index != time);
-            for (number, (index, cell)) in kept.enumerate() {
-                if number > 0 {
-                    text.push(b'\t');
-                }
-                write_cell(cell, text);
-                if index == date {
-                    text.push(b' ');
-                    write_cell(cells.get(time).copied().unwrap_or_default(), text);
-                }
-            }
+            kept.map(|(index, cell)| match index == date {
+                true => Cow::Owned([cell.trim_ascii(), time_of_day].join(&b' ')),
+                false => Cow::Borrowed(*cell),
+            })
+            .collect()
         })
     }))
 }

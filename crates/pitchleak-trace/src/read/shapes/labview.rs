@@ -2,9 +2,13 @@
 //! are not written but follow from `X0` and `Delta_X`, with *Multi* each channel has its own.
 //! National Instruments, "Specification for the LabVIEW Measurement File (.lvm)".
 
-use super::{Recast, Shape, Source, own_times, write_cell};
+use super::{Recast, Shape, Source, Text, own_times};
+use crate::read::error::TraceFault;
+use crate::read::number::number;
 use crate::read::records::text;
 use crate::read::table_text::TextTable;
+use crate::rig::Decimal;
+use std::borrow::Cow;
 
 pub(super) const SHAPE: Shape = Shape { name: "LabVIEW's measurement file", told };
 
@@ -27,17 +31,17 @@ impl Head {
             preamble.lines().find_map(|line| line.strip_prefix(key)).filter(|rest| !rest.is_empty())
         };
         let delimiter = *named("Separator")?.as_bytes().first()?;
-        let number = |key: &str| {
+        let number_of = |key: &str| {
             let cell = named(key)?.split(char::from(delimiter)).nth(1)?;
-            fast_float2::parse::<f64, _>(cell.trim().replace(',', ".")).ok()
+            number(cell.trim(), Decimal::Comma)
         };
         let (line, header) = (1..).zip(preamble.lines()).find(|(_, line)| line.starts_with(X_VALUE))?;
         Some(Self {
             line,
             delimiter,
             headers: header.split(char::from(delimiter)).map(|header| header.trim().to_owned()).collect(),
-            start_s: number("X0").unwrap_or(0.0),
-            step_s: number("Delta_X").unwrap_or(0.0),
+            start_s: number_of("X0").unwrap_or(0.0),
+            step_s: number_of("Delta_X").unwrap_or(0.0),
         })
     }
 }
@@ -65,7 +69,7 @@ fn told(_: &TextTable, ahead: &[u8]) -> Option<Recast> {
 }
 
 /// One time for all channels; the last column may be a comment.
-fn rows(source: Source, head: Head) -> Result<super::Text, crate::read::error::TraceFault> {
+fn rows(source: Source, head: Head) -> Result<Text, TraceFault> {
     let is_kept = |header: &&String| !header.is_empty() && *header != "Comment";
     let header: Vec<String> = head
         .headers
@@ -75,21 +79,14 @@ fn rows(source: Source, head: Head) -> Result<super::Text, crate::read::error::T
         .collect();
     let kept: Vec<bool> = head.headers.iter().map(|header| is_kept(&header)).collect();
     let mut row = 0_u64;
-    source.row_by_row(&header, move |cells, text| {
+    source.row_by_row(&header, move |cells| {
         let kept = kept.iter().enumerate().filter(|(_, kept)| **kept);
-        for (number, (index, _)) in kept.enumerate() {
-            let cell = cells.get(index).copied().unwrap_or_default();
-            match number {
-                0 if cell.trim_ascii().is_empty() => {
-                    text.extend(format!("{:.9}", head.start_s + head.step_s * row as f64).bytes());
-                }
-                0 => write_cell(cell, text),
-                _ => {
-                    text.push(b'\t');
-                    write_cell(cell, text);
-                }
-            }
+        let mut kept: Vec<Cow<'_, [u8]>> =
+            kept.map(|(index, _)| Cow::Borrowed(cells.get(index).copied().unwrap_or_default())).collect();
+        if let Some(time) = kept.first_mut().filter(|time| time.trim_ascii().is_empty()) {
+            *time = Cow::Owned(format!("{:.9}", head.start_s + head.step_s * row as f64).into_bytes());
         }
         row += 1;
+        kept
     })
 }

@@ -6,8 +6,10 @@ use super::merged::{Merged, Times};
 use super::{Recast, Shape, Source, Text, place};
 use crate::header::{letters, lists};
 use crate::read::error::TraceFault;
-use crate::read::records::{Stop, stopped_early, text};
+use crate::read::number::number;
+use crate::read::records::text;
 use crate::read::table_text::TextTable;
+use crate::rig::Decimal;
 
 pub(super) const SHAPE: Shape = Shape { name: "a reading per row", told };
 
@@ -67,26 +69,18 @@ fn told(table: &TextTable, _: &[u8]) -> Option<Recast> {
     Some(Box::new(move |source| recast(source, &places, times)))
 }
 
-fn recast(mut source: Source, places: &Places, mut times: Times) -> Result<Text, TraceFault> {
-    source.skip_header()?;
+fn recast(source: Source, places: &Places, mut times: Times) -> Result<Text, TraceFault> {
     // A bare number stays what the file calls it, so that a unit can be given by its name.
     let own = places.header.get(places.time).map_or("timestamp", String::as_str);
-    let time_name = if times.are_numbers() { own.to_owned() } else { "timestamp".to_owned() };
-    let mut merged = Merged::default();
-    loop {
-        let record = match source.records.next() {
-            Ok(record) => record,
-            Err(Stop::End) => return Ok(merged.text(&time_name)),
-            Err(stop) => return Err(stopped_early(stop)),
-        };
-        let cells = record.cells(source.delimiter);
+    let time_name = if times.are_numbers() { own } else { "timestamp" };
+    Merged::default().of(source, time_name, |merged, cells| {
         let cell = |place: usize| text(cells.get(place).copied().unwrap_or_default()).trim().to_owned();
         let name = cell(places.channel);
         let is_reading =
             !name.is_empty() && !name.starts_with("$RT_") && cell(0).bytes().next() != Some(b'#');
         // InfluxDB begins each table with its header.
         if !is_reading || places.header.get(places.channel) == Some(&name) {
-            continue;
+            return Ok(());
         }
         let name = match places.unit.map(cell).filter(|unit| !unit.is_empty()) {
             Some(unit) => format!("{name} [{unit}]"),
@@ -94,17 +88,18 @@ fn recast(mut source: Source, places: &Places, mut times: Times) -> Result<Text,
         };
         let channel = merged.channel(&name);
         let is_good = places.quality.is_none_or(|(place, good)| lists(good, &cell(place).to_lowercase()));
-        if is_good {
-            let time = in_days(&cell(places.time), places.time_is_wincc);
-            merged.add(&mut times, time.as_bytes(), channel, cell(places.value).as_bytes())?;
+        if !is_good {
+            return Ok(());
         }
-    }
+        let time = in_days(&cell(places.time), places.time_is_wincc);
+        merged.add(&mut times, time.as_bytes(), channel, cell(places.value).as_bytes())
+    })
 }
 
 /// WinCC's millionths of days as a spreadsheet's days.
 fn in_days(cell: &str, is_wincc: bool) -> String {
-    match fast_float2::parse::<f64, _>(cell.replace(',', ".")) {
-        Ok(millionths) if is_wincc => format!("{:.11}", millionths / 1e6),
+    match number(cell, Decimal::Comma) {
+        Some(millionths) if is_wincc => format!("{:.11}", millionths / 1e6),
         _ => cell.to_owned(),
     }
 }

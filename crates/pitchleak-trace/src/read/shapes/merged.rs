@@ -1,9 +1,12 @@
 //! Readings that come one by one, each with its time, as rows: a row for each time, an empty cell where a channel has no
 //! reading then. They are held, because a channel may come after all of another.
 
-use super::{Text, Written, write_cell};
+use super::{Source, Text, write_cell};
 use crate::read::error::TraceFault;
 use crate::read::format::MOST_HELD;
+use crate::read::number::number;
+use crate::read::records::{Stop, Written, stopped_early};
+use crate::rig::Decimal;
 use crate::times::{self, TimeFault, TimeFormat};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -34,7 +37,7 @@ impl Times {
     /// A time, ns since any one instant.
     fn ns(&mut self, cell: &str) -> Option<i128> {
         let Some(format) = &self.format else {
-            let number = fast_float2::parse::<f64, _>(cell.replace(',', ".")).ok()?;
+            let number = number(cell, Decimal::Comma)?;
             return (number.abs() < 1e18).then_some((number * 1e9).round() as i128);
         };
         self.last_ns = Some(format.instant_ns(format.kind.read(cell)?, self.last_ns)?);
@@ -59,6 +62,23 @@ pub(super) struct Merged {
 }
 
 impl Merged {
+    /// The rows of a source, as `add` takes in the readings of each of its records; `time` is what their times are called.
+    pub(super) fn of(
+        mut self,
+        mut source: Source,
+        time: &str,
+        mut add: impl FnMut(&mut Self, &[&[u8]]) -> Result<(), TraceFault>,
+    ) -> Result<Text, TraceFault> {
+        source.skip_header()?;
+        loop {
+            match source.records.next() {
+                Ok(record) => add(&mut self, &record.cells(source.delimiter))?,
+                Err(Stop::End) => return Ok(self.text(time)),
+                Err(stop) => return Err(stopped_early(stop)),
+            }
+        }
+    }
+
     /// The place of a channel, which is a new one where none is called so.
     pub(super) fn channel(&mut self, name: &str) -> usize {
         if let Some(place) = self.places.get(name) {
@@ -111,7 +131,7 @@ impl Merged {
     }
 
     /// The rows in the order of their times, under `time` and the channels' names.
-    pub(super) fn text(mut self, time: &str) -> Text {
+    fn text(mut self, time: &str) -> Text {
         self.at = HashMap::new();
         self.rows.sort_by_key(|row| row.ns);
         let mut next = None;

@@ -10,9 +10,10 @@ mod merged;
 mod own_times;
 
 use super::error::TraceFault;
-use super::records::{Records, Stop, stopped_early};
+use super::records::{Records, Stop, Written};
 use super::table_text::TextTable;
 use crate::header::{letters, lists};
+use std::borrow::Cow;
 use std::io::{self, Read};
 
 /// A shape of tables.
@@ -47,18 +48,14 @@ pub(super) struct Source {
 impl Source {
     /// Passes over all that stands before the first row.
     fn skip_header(&mut self) -> Result<(), TraceFault> {
-        self.records.split_at(self.delimiter);
-        while self.records.next_line() <= self.last_header_line {
-            self.records.next().map_err(stopped_early)?;
-        }
-        Ok(())
+        self.records.skip_header(self.delimiter, self.last_header_line)
     }
 
     /// The rows one by one, each in the line that it had; `header` stands in the last line before them.
     fn row_by_row(
         mut self,
         header: &[String],
-        mut recast: impl FnMut(&[&[u8]], &mut Vec<u8>) + Send + 'static,
+        mut recast: impl for<'c> FnMut(&[&'c [u8]]) -> Vec<Cow<'c, [u8]>> + Send + 'static,
     ) -> Result<Text, TraceFault> {
         self.skip_header()?;
         let mut start = vec![b'\n'; self.last_header_line.saturating_sub(1) as usize];
@@ -74,8 +71,7 @@ impl Source {
                 Ok(record) => {
                     text.extend((line..record.line).map(|_| b'\n'));
                     line = record.line + 1;
-                    recast(&record.cells(self.delimiter), text);
-                    text.push(b'\n');
+                    write_row(&recast(&record.cells(self.delimiter)), text);
                     Ok(true)
                 }
                 Err(Stop::End) => Ok(false),
@@ -86,35 +82,14 @@ impl Source {
     }
 }
 
-/// Text that is written as it is read, piece by piece.
-struct Written<F> {
-    /// Writes on; `false` at the end.
-    more: F,
-    text: Vec<u8>,
-    given: usize,
-    ended: bool,
-}
-
-impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Written<F> {
-    fn by(more: F) -> Self {
-        Self { more, text: Vec::new(), given: 0, ended: false }
-    }
-}
-
-impl<F: FnMut(&mut Vec<u8>) -> io::Result<bool>> Read for Written<F> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if self.given == self.text.len() {
-            self.text.clear();
-            self.given = 0;
-            while !self.ended && self.text.len() < into.len() {
-                self.ended = !(self.more)(&mut self.text)?;
-            }
+fn write_row(cells: &[Cow<'_, [u8]>], text: &mut Vec<u8>) {
+    for (index, cell) in cells.iter().enumerate() {
+        if index > 0 {
+            text.push(b'\t');
         }
-        let mut rest = self.text.get(self.given..).unwrap_or_default();
-        let count = rest.read(into)?;
-        self.given += count;
-        Ok(count)
+        write_cell(cell, text);
     }
+    text.push(b'\n');
 }
 
 /// The first column that is called by one of the names, letters and digits only; blanks between the names.

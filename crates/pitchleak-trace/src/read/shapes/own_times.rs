@@ -4,10 +4,8 @@
 use super::merged::{Merged, Times};
 use super::{Recast, Shape, Source, Text};
 use crate::header::letters;
-use crate::read::columns::bare_unit;
 use crate::read::error::TraceFault;
-use crate::read::records::{Stop, stopped_early};
-use crate::read::table_text::TextTable;
+use crate::read::table_text::{TextTable, bare_unit};
 
 pub(super) const SHAPE: Shape = Shape { name: "a column of times for each channel", told };
 
@@ -50,21 +48,14 @@ pub(super) fn of_columns(headers: &[String], units: &[String], first_times: &[&s
     Some(Box::new(move |source| recast(source, &pairs, &named, &times)))
 }
 
-fn recast(mut source: Source, pairs: &[Pair], named: &[String], times: &Times) -> Result<Text, TraceFault> {
-    source.skip_header()?;
+fn recast(source: Source, pairs: &[Pair], named: &[String], times: &Times) -> Result<Text, TraceFault> {
     let name = |index: usize| named.get(index).map_or("", String::as_str);
     let time_name = if times.are_numbers() { name(0) } else { "timestamp" };
     let mut merged = Merged::default();
     // A clock of its own each, for times of day that pass midnight.
     let mut channels: Vec<_> =
         pairs.iter().map(|pair| (merged.channel(name(pair.channel)), times.clone())).collect();
-    loop {
-        let record = match source.records.next() {
-            Ok(record) => record,
-            Err(Stop::End) => return Ok(merged.text(time_name)),
-            Err(stop) => return Err(stopped_early(stop)),
-        };
-        let cells = record.cells(source.delimiter);
+    merged.of(source, time_name, |merged, cells| {
         for (pair, (channel, times)) in pairs.iter().zip(&mut channels) {
             if let (Some(time), Some(value)) = (cells.get(pair.time), cells.get(pair.channel))
                 && !value.trim_ascii().is_empty()
@@ -72,5 +63,6 @@ fn recast(mut source: Source, pairs: &[Pair], named: &[String], times: &Times) -
                 merged.add(times, time, *channel, value)?;
             }
         }
-    }
+        Ok(())
+    })
 }

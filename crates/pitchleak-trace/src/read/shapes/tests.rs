@@ -211,3 +211,23 @@ fn date_and_time_apart_are_one() {
     }
     assert_is_the_trace(&text, "date and time apart");
 }
+
+/// As of any other text that breaks off.
+#[test]
+fn the_rows_before_a_stream_breaks_off_are_read() {
+    let mut text = "LabVIEW Measurement\t\nSeparator\tTab\nX_Value\tx_mm\tpa_bar\tpb_bar\n".to_owned();
+    for i in 0..5000_u32 {
+        let noise = f64::from(i.wrapping_mul(2_654_435_761) % 1000) / 1000.0;
+        text.push_str(&format!("{:.2}\t{}\t{}\t40\n", f64::from(i) / 100.0, 100.0 + noise, 50.0 - noise));
+    }
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut gzip, text.as_bytes()).unwrap();
+    let mut bytes = gzip.finish().unwrap();
+    bytes.truncate(bytes.len() / 2);
+    let mut reader =
+        TraceReader::from_stream("trace", Box::new(std::io::Cursor::new(bytes)), &Rig::paper()).unwrap();
+    let mut record = Record::default();
+    while reader.next_record(&mut record).unwrap() {}
+    assert!(reader.quality().rows > 1000, "{:?}", reader.quality());
+    assert!(reader.quality().cut_off.is_some());
+}
