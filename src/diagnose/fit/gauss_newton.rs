@@ -7,7 +7,7 @@ use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
-use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm};
+use crate::diagnose::weak_form::{Columns, Covariances, Linearisation, Term, WeakForm, Whitening};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
 use std::sync::OnceLock;
@@ -87,7 +87,7 @@ impl<'a> Fit<'a> {
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
-    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: with the columns of both.
+    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: see [`left_beyond`](Self::left_beyond).
     pub(crate) fn in_place_of(
         &self,
         old: &[usize],
@@ -98,19 +98,34 @@ impl<'a> Fit<'a> {
         let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
         let error = self.assumed_error;
         let next = |fit: &Self| (!fit.stands_still()).then_some(error);
-        let fit = Self::linearised(self.problem, &structure, (at, error), next, progress);
-        let places = [&structure.active, old].concat();
-        fit.with_columns(structure, &places)
+        Self::linearised(self.problem, &structure, (at, error), next, progress)
     }
 
-    /// The fit with some effects held at zero and others free: no new pass over the data.
-    pub(crate) fn exchanged(&self, gone: &[usize], new: &[usize]) -> Solution {
-        let mut priors = self.problem.increments(&self.weak_form.at);
-        for term in gone {
-            let mean = -self.weak_form.at.value(self.problem.terms[*term]);
-            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
-        }
-        self.regression.solve(&[self.active(), new].concat(), &priors)
+    /// By how much more it leaves than another fit of the same traces: squares of what is left over, each fit's at the noise that its own
+    /// model gives the rows that count for both, and what the priors pay. So an equation times a constant is the same equation.
+    pub(crate) fn left_beyond(&self, other: &Self) -> f64 {
+        let counts = self.regression.counted.iter().zip(&other.regression.counted);
+        let counts: Vec<bool> = counts.map(|(own, others)| *own && *others).collect();
+        self.squares_left(&counts) + self.paid() - other.squares_left(&counts) - other.paid()
+    }
+
+    /// Of the entries that count.
+    fn squares_left(&self, counts: &[bool]) -> f64 {
+        let noise = self.weak_form.noise(self.assumed_error);
+        let covariances = Covariances::of(&noise).counting(counts);
+        let left = regression::residual(self.rows(), &self.free);
+        let white = Whitening::of(&covariances, &self.assumed_error).whiten(&left);
+        white.iter().zip(counts).filter(|(_, counts)| **counts).map(|(value, _)| value * value).sum()
+    }
+
+    /// What the priors add to the sum of squares.
+    fn paid(&self) -> f64 {
+        let priors = self.problem.increments(&self.weak_form.at);
+        let terms = self.free.terms.iter().zip(&self.free.value);
+        let of = |(term, value): (&usize, &f64)| {
+            priors[*term].map_or(0.0, |prior| ((value - prior.mean) / prior.std).powi(2))
+        };
+        terms.map(of).sum()
     }
 
     /// The fit with an effect's place empty, at the noise of the fit with it: where its rivals are scored.
@@ -199,15 +214,13 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
         let fit = Self::linearised(problem, &structure, (at, assumed_error), next, progress);
-        fit.with_columns(structure, &problem.every_place())
-    }
-
-    /// The same linearisation and its solution with other columns.
-    fn with_columns(self, structure: Structure, places: &[usize]) -> Self {
-        let Self { problem, weak_form, assumed_error, .. } = self;
-        let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
-        let weak_form = weak_form.with_columns(columns);
-        Self::solving(weak_form, columns, problem, structure.clone(), assumed_error)
+        let columns = Columns {
+            terms: &problem.terms,
+            constants: &structure.constants,
+            places: &problem.every_place(),
+        };
+        let weak_form = fit.weak_form.with_columns(columns);
+        Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
     }
 
     /// Linearises anew, with the equations' error that `next` gives, until that gives none.
@@ -362,7 +375,12 @@ impl<'a> Fit<'a> {
 
     /// The fit with some effects held at zero: no new pass over the data.
     pub(crate) fn solve_without(&self, terms: &[usize]) -> Solution {
-        self.exchanged(terms, &[])
+        let mut priors = self.problem.increments(&self.weak_form.at);
+        for term in terms {
+            let mean = -self.weak_form.at.value(self.problem.terms[*term]);
+            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
+        }
+        self.regression.solve(&self.structure.active, &priors)
     }
 
     /// By how much one further term would move the value of a fitted one: no new pass over the data.

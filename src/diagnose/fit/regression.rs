@@ -17,13 +17,6 @@ pub(crate) struct Prior {
     pub(crate) std: f64,
 }
 
-impl Solution {
-    /// Of a term that is fitted, from the linearisation.
-    pub(crate) fn increment(&self, term: usize) -> Option<f64> {
-        self.terms.iter().position(|one| *one == term).map(|at| self.value[at])
-    }
-}
-
 /// Whitened columns and their products.
 #[derive(Clone)]
 pub(crate) struct Regression {

@@ -1,8 +1,7 @@
 //! The sets of effects beside the one that is named: some of it gone, others in their place. In each place alone the right effect can look no
 //! better than a wrong one as long as the others are wrong too; one effect can stand for two, and two for one.
 //!
-//! One Gram matrix says what every such set would leave, as far as it is linear about what is named. The nearest are fitted, and seen from
-//! both sides: what the named set loses by the exchange, and what the other one loses by taking it back.
+//! One Gram matrix says what every such set would leave, as far as it is linear about what is named. The nearest are fitted.
 
 use super::candidates::{Candidates, critical_sigma, open, strongest_unlisted};
 use super::selection::{self, Rival, Selected, Selection};
@@ -23,6 +22,8 @@ struct Exchange {
     rise: f64,
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise.
     dearer: f64,
+    /// Whether each of the new ones is large enough for a name.
+    is_worth_names: bool,
 }
 
 impl Exchange {
@@ -39,13 +40,7 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let mut exchanges = nearest(all, progress);
     for _ in 0..MOST_SWAPS {
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
-        let is_better = |one: &&Exchange| {
-            let is_named = |(term, _): &(usize, _)| {
-                let size = all.fit.exchanged(&one.gone, &places(one)).increment(*term);
-                all.fit.problem.is_worth_a_name(*term, size.unwrap_or(0.0))
-            };
-            one.worse(dispersion) < 0.0 && one.new.iter().all(is_named)
-        };
+        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && one.is_worth_names;
         let better = exchanges.iter().filter(is_better);
         let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
         let Some(best) = best else { break };
@@ -57,10 +52,6 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let fit = &all.fit;
     all.effects.sort_by(|a, b| selection::loss(fit, &[b.term]).total_cmp(&selection::loss(fit, &[a.term])));
     has_changed
-}
-
-fn places(one: &Exchange) -> Vec<usize> {
-    one.new.iter().map(|(term, _)| *term).collect()
 }
 
 /// Names the other set.
@@ -98,9 +89,7 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     }
     near.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
     near.truncate(MOST_EXCHANGES);
-    near.into_iter()
-        .filter_map(|one| Some(Exchange { rise: seen_from_both(fit, &one, progress)?, ..one }))
-        .collect()
+    near.into_iter().filter_map(|one| fitted(fit, one, progress)).collect()
 }
 
 /// All sets of one to `most` of these.
@@ -130,6 +119,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
         new: vec![(term, constants)],
         rise: lost - chi2_drop,
         dearer: needed(fit, constants) - spared,
+        is_worth_names: true,
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
 }
@@ -156,28 +146,35 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
             rise: lost - both.chi2_drop,
             dearer: needed[a] + needed[b] - spared,
+            is_worth_names: true,
         })
     };
     let pairs = (0..terms.len()).flat_map(|a| (a + 1..terms.len()).map(move |b| (a, b)));
     pairs.filter_map(pair).collect()
 }
 
-/// By how much the sum of squares rises with an exchange, once it is fitted: the mean of what either set's own linearisation says, so that
-/// what is quadratic in their distance drops out. Both are sums of squares from which the columns' noise is taken off: with more noise in
-/// its equations a set explains no more. None where the other set is no model: its fit does not settle, leaves more than noise where the
-/// named one does not, or has an effect at the end of its range or with nothing to do.
-fn seen_from_both(fit: &Fit<'_>, one: &Exchange, progress: Progress<'_>) -> Option<f64> {
+/// The exchange once it is fitted. None where the other set is no model: its fit does not settle, leaves more than noise where the named one
+/// does not, has an effect at the end of its range, or one that has nothing to do.
+fn fitted(fit: &Fit<'_>, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
         selection::loss(&other, &[*term]) > needed(fit, *constants) * dispersion
     };
-    let at_bound = |fit: &Fit<'_>| fit.active().iter().any(|term| fit.is_at_bound(*term));
-    let is_within = !at_bound(&other) || at_bound(fit);
     let is_settled = other.stands_still() || !fit.stands_still();
     let is_complete = !other.is_incomplete() || fit.is_incomplete();
-    let back = other.exchanged(&places(one), &one.gone).chi2 - other.free.chi2;
-    (is_settled && is_complete && is_within && one.new.iter().all(acts)).then_some((one.rise - back) / 2.0)
+    let is_within = !is_at_bound(&other) || is_at_bound(fit);
+    let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
+    let is_named = |(term, _): &(usize, _)| {
+        let size = other.estimate(*term).map_or(0.0, |own| own.value);
+        fit.problem.is_worth_a_name(*term, size)
+    };
+    let is_worth_names = one.new.iter().all(is_named);
+    is_model.then(|| Exchange { rise: other.left_beyond(fit), is_worth_names, ..one })
+}
+
+fn is_at_bound(fit: &Fit<'_>) -> bool {
+    fit.active().iter().any(|term| fit.is_at_bound(*term))
 }
 
 /// Gives each named effect its rivals and its probability among all that could stand in its place.

@@ -164,6 +164,13 @@ impl Line {
 pub(crate) struct Covariances(Vec<Line>);
 
 impl Covariances {
+    /// The same where only some of the entries count.
+    #[must_use]
+    pub(crate) fn counting(mut self, counts: &[bool]) -> Self {
+        self.0.iter_mut().zip(counts).for_each(|(line, counts)| line.counts = *counts);
+        self
+    }
+
     pub(crate) fn of(noise: &NoiseModel<'_>) -> Self {
         let rows = noise.rows;
         let held = |row: usize| PerEquation::from_fn(|equation| noise.sensitivity(row, equation));
