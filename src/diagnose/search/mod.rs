@@ -105,7 +105,7 @@ fn reduction_percent(before: &PerEquation<Option<f64>>, after: &PerEquation<Opti
 mod tests {
     use super::*;
     use crate::diagnose::data::Series;
-    use crate::diagnose::testing::{TURBULENT, declared, sound, torn_seal};
+    use crate::diagnose::testing::{TURBULENT, declared, seen, sound, torn_seal};
     use crate::diagnose::weak_form::Term;
     use pitchleak_core::Effect;
 
@@ -124,6 +124,22 @@ mod tests {
     fn the_missing_effect_is_selected_and_nothing_in_a_sound_rig() {
         assert_eq!(found_in(torn_seal(60)), [TURBULENT.0]);
         assert_eq!(found_in(sound(60)), []);
+    }
+
+    #[test]
+    fn one_effect_that_stands_for_two_gives_way_to_them() {
+        let traces = [seen(60, |sample| {
+            sample.pb_pa -= 2e4;
+            sample.qb_m3s = sample.qb_m3s.map(|q| 1.006 * q);
+        })];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let area = problem.place(Term::Effect(Effect::AreaB)).expect("is a term");
+        let fit = Fit::declared(&problem, &|| ()).with(area, problem.usual_constants, &|| ());
+        let mut all = Selection { fit, effects: vec![Selected::new(area, 1.0)] };
+        assert!(sets::weigh(&mut all, &|| ()));
+        let names = names(&all);
+        assert!(names.contains(&Effect::FlowMeterGainB) && !names.contains(&Effect::AreaB), "{names:?}");
+        assert!(names.contains(&Effect::PressureOffsetB), "{names:?}");
     }
 
     #[test]
