@@ -38,6 +38,8 @@ pub(crate) struct Selected {
     pub(crate) unlisted_rival: Option<Unlisted>,
     /// A product of signals that the table does not list would have fitted better.
     pub(crate) is_below_unlisted: bool,
+    /// A number of the cylinder that explains more in its place, and is too small for a name.
+    pub(crate) below_rounding: Option<Effect>,
 }
 
 impl Selected {
@@ -51,6 +53,7 @@ impl Selected {
             probability: 0.0,
             unlisted_rival: None,
             is_below_unlisted: false,
+            below_rounding: None,
         }
     }
 }

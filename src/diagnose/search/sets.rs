@@ -22,8 +22,8 @@ struct Exchange {
     rise: f64,
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise.
     dearer: f64,
-    /// Whether each of the new ones is large enough for a name.
-    is_worth_names: bool,
+    /// One of the new that is too small for a name: it may be the rounding of a data sheet.
+    rounding: Option<usize>,
 }
 
 impl Exchange {
@@ -40,7 +40,7 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let mut exchanges = nearest(all, progress);
     for _ in 0..MOST_SWAPS {
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
-        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && one.is_worth_names;
+        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && one.rounding.is_none();
         let better = exchanges.iter().filter(is_better);
         let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
         let Some(best) = best else { break };
@@ -119,7 +119,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
         new: vec![(term, constants)],
         rise: lost - chi2_drop,
         dearer: needed(fit, constants) - spared,
-        is_worth_names: true,
+        rounding: None,
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
 }
@@ -146,7 +146,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
             rise: lost - both.chi2_drop,
             dearer: needed[a] + needed[b] - spared,
-            is_worth_names: true,
+            rounding: None,
         })
     };
     let pairs = (0..terms.len()).flat_map(|a| (a + 1..terms.len()).map(move |b| (a, b)));
@@ -165,12 +165,12 @@ fn fitted(fit: &Fit<'_>, one: Exchange, progress: Progress<'_>) -> Option<Exchan
     let is_complete = !other.is_incomplete() || fit.is_incomplete();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
     let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
-    let is_named = |(term, _): &(usize, _)| {
+    let is_rounding = |term: &usize| {
         let size = other.estimate(*term).map_or(0.0, |own| own.value);
-        fit.problem.is_worth_a_name(*term, size)
+        !fit.problem.is_worth_a_name(*term, size)
     };
-    let is_worth_names = one.new.iter().all(is_named);
-    is_model.then(|| Exchange { rise: other.left_beyond(fit), is_worth_names, ..one })
+    let rounding = one.new.iter().map(|(term, _)| *term).find(is_rounding);
+    is_model.then(|| Exchange { rise: other.left_beyond(fit), rounding, ..one })
 }
 
 fn is_at_bound(fit: &Fit<'_>) -> bool {
@@ -188,6 +188,9 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
         let odds_against = against.clone().map(|other| odds(other.worse(dispersion))).sum::<f64>();
         one.probability = 1.0 / (1.0 + odds_against + worse.map_or(0.0, odds));
         one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
+        let better = |other: &Exchange| (other.worse(dispersion) < 0.0).then_some(other.rounding).flatten();
+        one.below_rounding =
+            against.clone().find_map(better).and_then(|term| fit.problem.terms[term].effect());
         let rival = |other: &Exchange| Rival {
             effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
             probability: one.probability * odds(other.worse(dispersion)),
