@@ -7,7 +7,7 @@ use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
-use crate::diagnose::weak_form::{Columns, Covariances, Linearisation, Term, WeakForm, Whitening};
+use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm, Whitening};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
 use std::sync::OnceLock;
@@ -82,8 +82,7 @@ impl<'a> Fit<'a> {
         new: &[(usize, EffectConstants<f64>)],
         progress: Progress<'_>,
     ) -> Self {
-        let (structure, at) = self.left_by(old);
-        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
+        let (structure, at) = self.exchanged(old, new);
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
@@ -94,8 +93,7 @@ impl<'a> Fit<'a> {
         new: &[(usize, EffectConstants<f64>)],
         progress: Progress<'_>,
     ) -> Self {
-        let (structure, at) = self.left_by(old);
-        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
+        let (structure, at) = self.exchanged(old, new);
         let error = self.assumed_error;
         let next = |fit: &Self| (!fit.stands_still()).then_some(error);
         Self::linearised(self.problem, &structure, (at, error), next, progress)
@@ -111,8 +109,7 @@ impl<'a> Fit<'a> {
 
     /// Of the entries that count.
     fn squares_left(&self, counts: &[bool]) -> f64 {
-        let noise = self.weak_form.noise(self.assumed_error);
-        let covariances = Covariances::of(&noise).counting(counts);
+        let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);
         let left = regression::residual(self.rows(), &self.free);
         let white = Whitening::of(&covariances, &self.assumed_error).whiten(&left);
         white.iter().zip(counts).filter(|(_, counts)| **counts).map(|(value, _)| value * value).sum()
@@ -139,6 +136,12 @@ impl<'a> Fit<'a> {
             self.equation_error,
         );
         Self { equation_error: self.equation_error, ..vacated }
+    }
+
+    /// Structure and linearisation without the `old` effects and with the `new` ones, these at zero.
+    fn exchanged(&self, old: &[usize], new: &[(usize, EffectConstants<f64>)]) -> (Structure, Linearisation) {
+        let (structure, at) = self.left_by(old);
+        (new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants)), at)
     }
 
     /// Structure and linearisation once some effects are gone.

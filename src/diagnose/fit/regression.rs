@@ -371,8 +371,7 @@ pub(super) fn equation_error(
         }
         squares.zip(counts, |sum, count| sum / count)
     };
-    let covariances = |equation_error| Covariances::of(&weak_form.noise(equation_error));
-    let sensors_only = levels(&covariances(PerEquation::default()), PerEquation::default());
+    let sensors_only = levels(&weak_form.covariances(PerEquation::default()), PerEquation::default());
     let mut high = PerEquation::from_fn(|equation| {
         let by_chance = CHANCE_SIGMA * (2.0 / counts[equation]).sqrt();
         if sensors_only[equation] <= 1.0 + by_chance {
@@ -387,7 +386,7 @@ pub(super) fn equation_error(
     if high.iter().all(|(_, error)| *error <= 0.0) {
         return high;
     }
-    let covariances = covariances(high);
+    let covariances = weak_form.covariances(high);
     let mut low = PerEquation::<f64>::default();
     for _ in 0..BISECTIONS {
         let middle = low.zip(high, |low, high| (low + high) / 2.0);

@@ -26,6 +26,7 @@ use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
@@ -39,6 +40,10 @@ pub(crate) struct WeakForm<'a> {
     /// Where the noise is taken.
     noise_at: Linearisation,
     sensitivities: Vec<PerEquation<Sensitivity>>,
+    /// That it was made with.
+    equation_error: PerEquation<f64>,
+    /// Of the rows with that.
+    covariances: Covariances,
     pub(crate) whitening: Whitening,
 }
 
@@ -60,7 +65,8 @@ impl<'a> WeakForm<'a> {
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
-        let whitening = Whitening::new(&noise);
+        let covariances = Covariances::of(&noise);
+        let whitening = Whitening::of(&covariances, &equation_error);
         Self {
             traces,
             sensors,
@@ -70,6 +76,8 @@ impl<'a> WeakForm<'a> {
             rows,
             noise_at,
             sensitivities,
+            equation_error,
+            covariances,
             whitening,
         }
     }
@@ -86,6 +94,15 @@ impl<'a> WeakForm<'a> {
     /// The noise of these rows, had the equations this error.
     pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
         self.noise_with(&self.sensitivities, equation_error)
+    }
+
+    /// The covariances of these rows, had the equations this error.
+    pub(crate) fn covariances(&self, equation_error: PerEquation<f64>) -> Cow<'_, Covariances> {
+        if equation_error == self.equation_error {
+            Cow::Borrowed(&self.covariances)
+        } else {
+            Cow::Owned(Covariances::of(&self.noise(equation_error)))
+        }
     }
 
     /// The rows' noise at other sensitivities.

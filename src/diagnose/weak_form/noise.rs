@@ -145,6 +145,7 @@ impl NoiseModel<'_> {
 const BAND: usize = 5;
 
 /// Covariances of an entry with itself and with those before it, by their distance.
+#[derive(Clone, Copy)]
 struct Line {
     sensors: [f64; BAND + 1],
     /// By an error of its equation of variance one.
@@ -161,14 +162,15 @@ impl Line {
 }
 
 /// Covariances of all entries, for any error of the equations that the sensitivities were held for.
+#[derive(Clone)]
 pub(crate) struct Covariances(Vec<Line>);
 
 impl Covariances {
     /// The same where only some of the entries count.
     #[must_use]
-    pub(crate) fn counting(mut self, counts: &[bool]) -> Self {
-        self.0.iter_mut().zip(counts).for_each(|(line, counts)| line.counts = *counts);
-        self
+    pub(crate) fn counting(&self, counts: &[bool]) -> Self {
+        let lines = self.0.iter().zip(counts);
+        Self(lines.map(|(line, counts)| Line { counts: *counts, ..*line }).collect())
     }
 
     pub(crate) fn of(noise: &NoiseModel<'_>) -> Self {
