@@ -1,5 +1,6 @@
 //! The declared model and its effects, fitted to all traces together.
 
+mod emptied;
 mod gauss_newton;
 mod leak_levels;
 mod predict;
@@ -8,6 +9,7 @@ mod regression;
 mod score;
 mod widening;
 
+pub(crate) use emptied::Emptied;
 pub(crate) use gauss_newton::Fit;
 pub use gauss_newton::Progress;
 pub(crate) use leak_levels::LeakProducts;

@@ -2,7 +2,7 @@
 //! (Jackson et al. 2005, "An algorithm for optimal partitioning of data on an interval", IEEE Signal Processing Letters 12).
 
 use super::candidates::critical_sigma;
-use crate::diagnose::fit::{Fit, LeakProducts, Problem, Progress};
+use crate::diagnose::fit::{Emptied, Fit, LeakProducts, Problem, Progress};
 use crate::diagnose::thresholds::{CHANGE_CHI2, COLLINEAR_RIDGE, MOST_CHANGE_PLACES, MOST_CHANGE_ROUNDS};
 use crate::diagnose::weak_form::{ChangeKind, LeakChange};
 use nalgebra::{Cholesky, Matrix6};
@@ -54,15 +54,13 @@ fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
 pub(super) fn needless(fit: &Fit<'_>) -> Vec<usize> {
     let mut kept: Vec<usize> = fit.leak_changes().map(|(place, _)| place).collect();
     let mut gone = Vec::new();
+    let mut without = Emptied::of(fit);
     let needs = critical_sigma(fit, fit.problem.usual_constants).powi(2) * fit.dispersion(fit.free.chi2);
     loop {
-        let present = fit.solve_without(&gone).chi2;
-        let loss = |place: usize| {
-            let without: Vec<usize> = gone.iter().copied().chain([place]).collect();
-            (place, fit.solve_without(&without).chi2 - present)
-        };
-        match kept.iter().copied().map(loss).min_by(|a, b| a.1.total_cmp(&b.1)) {
+        let losses = kept.iter().map(|place| (*place, without.loss(*place)));
+        match losses.min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((place, loss)) if loss < needs => {
+                without.hold(place);
                 kept.retain(|other| *other != place);
                 gone.push(place);
             }
