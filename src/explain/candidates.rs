@@ -169,7 +169,9 @@ impl<'a, 'p> Candidates<'a, 'p> {
         least_ln: f64,
     ) {
         let mut courses = courses.to_vec();
-        courses.retain(|(course, _)| matches!(course, LeakCourse::Growing | LeakCourse::Sudden(_)));
+        courses.retain(|(course, _)| {
+            matches!(course, LeakCourse::Growing | LeakCourse::Accelerating | LeakCourse::Sudden(_))
+        });
         courses.push((LeakCourse::Constant, self.pass.tables.ln_course(LeakCourse::Constant)));
         let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
         for (course, ln_one) in &courses {

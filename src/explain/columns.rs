@@ -89,6 +89,8 @@ pub enum Course {
     FromBegin,
     /// From 0 at the begin to 1 at the end.
     ToEnd,
+    /// From 0 at the begin to 1 at the end, by the square of time.
+    Accelerating,
     /// Before this segment.
     Before(usize),
     /// From this segment on.
@@ -259,6 +261,10 @@ impl Course {
             Self::Drift => [2.0 * begin_s / total_s - 1.0, 2.0 / total_s],
             Self::FromBegin => [1.0 - begin_s / total_s, -1.0 / total_s],
             Self::ToEnd => [begin_s / total_s, 1.0 / total_s],
+            // Within a segment by its secant.
+            Self::Accelerating => {
+                [(begin_s / total_s).powi(2), (2.0 * begin_s + time_s) / (total_s * total_s)]
+            }
             Self::Before(border) => within(segment < border),
             Self::Since(border) => within(segment >= border),
             Self::Within(only) => within(segment == only),

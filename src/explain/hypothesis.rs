@@ -17,6 +17,8 @@ pub(super) enum LeakCourse {
     Cracking,
     /// Linear, from start ≥ 0 to end ≥ 0.
     Growing,
+    /// From start ≥ 0 on, linear and by the square of time.
+    Accelerating,
     /// Another level from this segment on.
     Sudden(usize),
     /// A random walk at the segments' borders.
@@ -33,6 +35,7 @@ impl LeakCourse {
             Self::Orifice => "orifice",
             Self::Cracking => "cracking",
             Self::Growing => "growing",
+            Self::Accelerating => "accelerating",
             Self::Sudden(_) => "sudden",
             Self::Wandering => "wandering",
             Self::Creeping => "creeping",
@@ -70,6 +73,9 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
             std::iter::once(level()).chain(less).collect()
         }
         Some(LeakCourse::Growing) => vec![own(Course::FromBegin, 0.0), own(Course::ToEnd, 1.0)],
+        Some(LeakCourse::Accelerating) => {
+            vec![level(), own(Course::ToEnd, 1.0), own(Course::Accelerating, 1.0)]
+        }
         Some(LeakCourse::Sudden(border)) => {
             vec![own(Course::Before(border), 0.0), own(Course::Since(border), 1.0)]
         }

@@ -12,8 +12,8 @@ use std::sync::LazyLock;
 pub(crate) const POINTS: usize = 512;
 /// The same of what weighs little: to ten percent or so.
 pub(super) const FEW_POINTS: usize = 64;
-/// Variables at the most: two of each leak.
-pub(super) const MOST: usize = 6;
+/// Variables at the most: three of each leak.
+pub(super) const MOST: usize = 9;
 const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
 /// A sample worth fewer points than this is drawn anew; numerical.
 const LEAST_POINTS: f64 = 20.0;
@@ -45,7 +45,7 @@ fn normal_quantile(probability: f64) -> f64 {
 
 /// Standard normals beside a sample of leaks, independent of its points and of each other.
 pub(super) static NORMALS: LazyLock<Vec<[f64; MOST]>> = LazyLock::new(|| {
-    let strides = [197, 197, 197, 59, 59, 59];
+    let strides = [197, 197, 197, 59, 59, 59, 83, 83, 83];
     let normal = |point: usize, i: usize| normal_quantile(uniform((point * strides[i]) % POINTS, 8 + i));
     (0..POINTS).map(|point| std::array::from_fn(|i| normal(point, i))).collect()
 });

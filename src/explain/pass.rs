@@ -154,7 +154,10 @@ impl<'a, 's> Pass<'a, 's> {
         let mistaken = self.mistakes().flat_map(|(_, mistake, _)| mistake.as_columns());
         columns.extend(mistaken.map(|column| (*column, Course::Constant)));
         for leak in LEAK_COLUMNS {
-            columns.extend([Course::Constant, Course::FromBegin, Course::ToEnd].map(|course| (leak, course)));
+            columns.extend(
+                [Course::Constant, Course::FromBegin, Course::ToEnd, Course::Accelerating]
+                    .map(|course| (leak, course)),
+            );
             columns.extend(
                 (1..self.segments).flat_map(|k| [(leak, Course::Before(k)), (leak, Course::Since(k))]),
             );
@@ -179,7 +182,9 @@ impl<'a, 's> Pass<'a, 's> {
             let (course, ln_course) = with_prior(LeakCourse::Sudden(border));
             (course, ln_course - ln_borders)
         });
-        let others = [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing].map(with_prior);
+        let others =
+            [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing, LeakCourse::Accelerating]
+                .map(with_prior);
         others.into_iter().chain(sudden).collect()
     }
 

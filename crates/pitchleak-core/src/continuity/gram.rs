@@ -113,6 +113,11 @@ impl<T: Real> Segment<T> {
             }
         }
         self.blocks += 1;
+        self.pass(block);
+    }
+
+    /// Time that passes with a block, whether its rows are taken in or not.
+    pub(super) fn pass(&mut self, block: &Block<T>) {
         self.time_s += block.sums[RawSum::Time as usize];
         let [pa, pb] = [RawSum::PressureA, RawSum::PressureB].map(|raw| block.sums[raw as usize]);
         let sizes = PerLeak { internal: (pa - pb).abs(), external_a: pa.abs(), external_b: pb.abs() };

@@ -54,15 +54,18 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         self.end_segment(self.waiting.blocks().len(), 0);
     }
 
-    /// Makes a segment of the oldest waiting blocks, and leaves out some that follow.
+    /// Makes a segment of the oldest waiting blocks; of some that follow only the time counts.
     fn end_segment(&mut self, blocks: usize, left_out: usize) {
         if blocks == 0 {
             return;
         }
         self.begin_segment();
-        for place in 0..blocks {
-            if let Some(block) = self.waiting.blocks().get(place).copied() {
+        for place in 0..blocks + left_out {
+            let Some(block) = self.waiting.blocks().get(place).copied() else { break };
+            if place < blocks {
                 self.add(&block);
+            } else if let Some(segment) = self.segments.last_mut() {
+                segment.pass(&block);
             }
         }
         self.waiting.release(blocks + left_out);
