@@ -117,6 +117,15 @@ fn a_missing_flow_rests() {
     assert!((rows(1) - 119.0).abs() < 4.0, "{}", rows(1));
 }
 
+/// When segments end, s.
+fn ends_s(samples: &[Sample<f64>]) -> Vec<f64> {
+    let mut ends = vec![0.0];
+    for segment in statistic::<12>(samples).segments() {
+        ends.push(ends.last().unwrap() + segment.time_s());
+    }
+    ends
+}
+
 /// A leak that opens at once ends a segment there, whatever time that is; noise alone ends none.
 #[test]
 fn a_sudden_leak_ends_a_segment() {
@@ -125,14 +134,40 @@ fn a_sudden_leak_ends_a_segment() {
         for sample in &mut samples[onset..] {
             sample.qa_m3s = sample.qa_m3s.map(|q| q + 0.5 / 60e3);
         }
-        let mut ends = vec![0.0];
-        for segment in statistic::<12>(&samples).segments() {
-            ends.push(ends.last().unwrap() + segment.time_s());
-        }
+        let ends = ends_s(&samples);
         let onset_s = STEP_S * onset as f64;
         assert!(ends.iter().any(|end| (end - onset_s).abs() < 0.6), "{onset_s} {ends:?}");
+        // The block left out is time all the same.
+        assert!((ends.last().unwrap() - 29.75).abs() < 0.3, "{ends:?}");
         let calm = statistic::<12>(&at_rest(seed, 3000));
         let usual = calm.segments().iter().filter(|segment| (segment.time_s() / 4.0).fract() < 0.01).count();
         assert!(usual + 1 >= calm.segments().len(), "{usual}");
+    }
+}
+
+/// A leak takes away the pressure that drives it, and is fed by what was stored: no falling pressure hides the block in which it opened.
+#[test]
+fn a_leak_that_takes_its_own_pressure_ends_a_segment_where_it_opens() {
+    const FALLS_IN_S: f64 = 0.08;
+    let (cylinder, fluid) = (cylinder(), Fluid::<f64>::paper());
+    let by_volume = |x_m: f64| {
+        let [a, b] = [cylinder.area_a_m2 * x_m, cylinder.area_b_m2 * (cylinder.stroke_m - x_m)];
+        [cylinder.dead_volume_a_m3 + a, cylinder.dead_volume_b_m3 + b].map(|v| v / fluid.bulk_modulus_pa)
+    };
+    for seed in 21..27 {
+        let mut samples = at_rest(seed, 3000);
+        let [stored_a, stored_b] = by_volume(0.07);
+        for (k, sample) in samples[1850..].iter_mut().enumerate() {
+            let left = (-STEP_S * k as f64 / FALLS_IN_S).exp();
+            let fall = [1.5e6, 1.6e6];
+            let rate = fall.map(|fall| -fall * left / FALLS_IN_S);
+            sample.pa_pa -= fall[0] * (1.0 - left);
+            sample.pb_pa -= fall[1] * (1.0 - left);
+            let leak = 0.5 / 60e3 * (3e6 - fall[1] * (1.0 - left)) / 1.4e6;
+            sample.qa_m3s = sample.qa_m3s.map(|q| q + stored_a * rate[0]);
+            sample.qb_m3s = sample.qb_m3s.map(|q| q + stored_b * rate[1] + leak);
+        }
+        let ends = ends_s(&samples);
+        assert!(ends.iter().any(|end| (end - 18.625).abs() < 0.13), "{seed}: {ends:?}");
     }
 }
