@@ -68,7 +68,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let knows_zeros = pass.sizes.zeros.iter().all(|zero| *zero > 0.0);
         for (rank, zeros) in pass.tables.zeros.iter().enumerate() {
             // Who declares zeros knows them: they fail, but are not slightly off.
-            if knows_zeros && zeros.id == "flow_zeros" {
+            if knows_zeros && zeros.id == "flow_zeros" || zeros.jumps() {
                 continue;
             }
             for (place, departure) in pass.departures().into_iter().enumerate() {
@@ -76,7 +76,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
                     if wander.0 > 0.0 && (rank > 1 || place > 1) {
                         continue;
                     }
-                    own.add_constant_leaks(State { zeros, departure, wander: *wander });
+                    own.add_constant_leaks(State { zeros, departure, wander: *wander, border: 0 });
                 }
             }
         }
@@ -186,6 +186,34 @@ impl<'a, 'p> Candidates<'a, 'p> {
         }
     }
 
+    /// Zeros that jump, beside constant leaks and the best states of the rest. Zeros that wander may do all that they do: where even that
+    /// raises the likelihood by too little, none is asked.
+    pub fn add_jumps(&mut self, least_ln: f64) {
+        let tables = self.pass.tables;
+        let Some(wander) = tables.wanders.last() else { return };
+        let borders = 1..self.pass.segments;
+        let ln_borders = (borders.len().max(1) as f64).ln();
+        self.sort();
+        let mut states = best_states(&self.all);
+        states.retain(|state| state.wander.0 <= 0.0 && state.zeros.id == "zeros_usual");
+        for (state, subset) in states.into_iter().flat_map(|state| subsets().map(move |own| (state, own))) {
+            let Some(steady) = find(&self.all, state, subset) else { continue };
+            let (ln_steady, ln_likelihood) = (steady.ln_posterior - steady.ln_sign, steady.ln_likelihood);
+            let leaks = together(subset, LeakCourse::Constant);
+            let ln_constant = self.ln_constant(subset);
+            let most = self.add(State { wander: *wander, ..state }, leaks, ln_constant);
+            for zeros in tables.zeros.iter().filter(|zeros| zeros.jumps()) {
+                let ln_odds = (zeros.share / state.zeros.share).ln() - ln_borders;
+                if ln_steady + ln_odds + most - ln_likelihood + BEYOND_WANDERING <= self.best_ln - least_ln {
+                    continue;
+                }
+                for border in borders.clone() {
+                    self.add(State { zeros, border, ..state }, leaks, ln_constant - ln_borders);
+                }
+            }
+        }
+    }
+
     /// Mistakes of wiring, beside slightly wrong zeros and constant leaks; their equations.
     pub fn add_mistakes(&mut self, least_ln: f64) -> Vec<Mended> {
         let tables = self.pass.tables;
@@ -194,7 +222,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         else {
             return Vec::new();
         };
-        let state = State { zeros, departure, wander: *wander };
+        let state = State { zeros, departure, wander: *wander, border: 0 };
         let least = self.best_ln - least_ln;
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);

@@ -97,6 +97,8 @@ pub(super) struct State<'a> {
     pub departure: &'a Entry,
     /// Standard deviation of the zeros of each segment, share of full scale; and how often.
     pub wander: (f64, f64),
+    /// The segment from which on a zero that jumps is off.
+    pub border: usize,
 }
 
 /// An explanation, ready to be weighed.
@@ -137,9 +139,10 @@ impl State<'_> {
         let mut chosen: Vec<(Column, Course, f64)> =
             USUAL.iter().map(|usual| sizes.declared(*usual)).collect();
         for (column, course, std) in self.zeros.free.iter().chain(&self.departure.free) {
-            match chosen.iter_mut().find(|known| (known.0, known.1) == (*column, *course)) {
+            let course = if let Course::Since(_) = course { Course::Since(self.border) } else { *course };
+            match chosen.iter_mut().find(|known| (known.0, known.1) == (*column, course)) {
                 Some(known) => known.2 = known.2.max(*std),
-                None => chosen.push((*column, *course, *std)),
+                None => chosen.push((*column, course, *std)),
             }
         }
         if self.wander.0 > 0.0 {

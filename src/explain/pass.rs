@@ -167,6 +167,7 @@ impl<'a, 's> Pass<'a, 's> {
         columns.extend(by_law.map(|law| (law, Course::Constant)));
         for zero in [Column::ZeroA, Column::ZeroB] {
             columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
+            columns.extend((1..self.segments).map(|border| (zero, Course::Since(border))));
         }
         let mut seen = std::collections::HashSet::new();
         columns.retain(|key| seen.insert(*key));

@@ -95,6 +95,7 @@ fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
 fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64) -> Posterior<'a> {
     let mut candidates = Candidates::with_constant_leaks(pass, declared);
     candidates.add_courses(LEAST_LN);
+    candidates.add_jumps(LEAST_LN);
     let mended = candidates.add_mistakes(LEAST_LN);
     let Louder { flows, position, .. } = pass.over_sheet.louder();
     let as_declared = Weighing { equations: declared, loudness: [flows * flows, position * position] };

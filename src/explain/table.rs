@@ -17,6 +17,8 @@ mod share {
     pub const RARE: f64 = 0.01;
     /// Two at once.
     pub const VERY_RARE: f64 = 0.002;
+    /// What a leak that opens at once is always taken for, unless the pressures tell it from one.
+    pub const FREAK: f64 = 3e-5;
 }
 
 /// Prior probability of each leak. A guess.
@@ -108,6 +110,17 @@ impl Entry {
         self.free.iter().any(|free| matches!(free.0, Column::ThroughSealA | Column::ThroughSealB))
     }
 
+    /// From a moment on, which is found.
+    fn jumping(mut self, column: Column, std: f64) -> Self {
+        self.free.push((column, Course::Since(0), std));
+        self
+    }
+
+    /// Whether it begins at a moment.
+    pub(super) fn jumps(&self) -> bool {
+        self.free.iter().any(|free| matches!(free.1, Course::Since(_)))
+    }
+
     fn drifting(mut self, column: Column, std: f64) -> Self {
         self.free.push((column, Course::Drift, std));
         self
@@ -172,12 +185,19 @@ pub(super) fn zeros() -> Vec<Entry> {
             .free(Column::ZeroB, b)
             .remedy(REZERO, Some("qa = { name = \"qa\", offset = \"{} L/min\" }"))
     };
+    let jump = |id, text, column| {
+        Entry::new(id, Kind::Zeros, share::FREAK, text)
+            .jumping(column, gross)
+            .remedy("Look for what befell the meter at that time: a restart, air in it, a lost range.", None)
+    };
     vec![
         entry("zeros_usual", 0.75, "both flow meters' zeros are as usual", USUAL_ZERO, USUAL_ZERO),
         entry("flow_zeros", 0.20, "the flow meters' zeros are slightly off", slight, slight),
         entry("flow_zero_a", share::UNCOMMON, "flow meter A's zero is off", gross, USUAL_ZERO),
         entry("flow_zero_b", share::UNCOMMON, "flow meter B's zero is off", USUAL_ZERO, gross),
         entry("flow_zeros_gross", share::RARE, "both flow meters' zeros are off", gross, gross),
+        jump("flow_zero_jump_a", "flow meter A's zero jumped", Column::ZeroA),
+        jump("flow_zero_jump_b", "flow meter B's zero jumped", Column::ZeroB),
     ]
 }
 

@@ -145,7 +145,8 @@ fn a_sudden_leak_ends_a_segment() {
     }
 }
 
-/// A leak takes away the pressure that drives it, and is fed by what was stored: no falling pressure hides the block in which it opened.
+/// A leak takes away the pressure that drives it, and is fed by what was stored: no falling pressure hides the block in which it opened,
+/// and no long trace the border there.
 #[test]
 fn a_leak_that_takes_its_own_pressure_ends_a_segment_where_it_opens() {
     const FALLS_IN_S: f64 = 0.08;
@@ -154,20 +155,20 @@ fn a_leak_that_takes_its_own_pressure_ends_a_segment_where_it_opens() {
         let [a, b] = [cylinder.area_a_m2 * x_m, cylinder.area_b_m2 * (cylinder.stroke_m - x_m)];
         [cylinder.dead_volume_a_m3 + a, cylinder.dead_volume_b_m3 + b].map(|v| v / fluid.bulk_modulus_pa)
     };
-    for seed in 21..27 {
-        let mut samples = at_rest(seed, 3000);
+    for seed in 21..33 {
+        let mut samples = at_rest(seed, 6000);
         let [stored_a, stored_b] = by_volume(0.07);
-        for (k, sample) in samples[1850..].iter_mut().enumerate() {
+        for (k, sample) in samples[3050..].iter_mut().enumerate() {
             let left = (-STEP_S * k as f64 / FALLS_IN_S).exp();
             let fall = [1.5e6, 1.6e6];
             let rate = fall.map(|fall| -fall * left / FALLS_IN_S);
             sample.pa_pa -= fall[0] * (1.0 - left);
             sample.pb_pa -= fall[1] * (1.0 - left);
-            let leak = 0.5 / 60e3 * (3e6 - fall[1] * (1.0 - left)) / 1.4e6;
+            let leak = 0.2 / 60e3 * (3e6 - fall[1] * (1.0 - left)) / 1.4e6;
             sample.qa_m3s = sample.qa_m3s.map(|q| q + stored_a * rate[0]);
             sample.qb_m3s = sample.qb_m3s.map(|q| q + stored_b * rate[1] + leak);
         }
         let ends = ends_s(&samples);
-        assert!(ends.iter().any(|end| (end - 18.625).abs() < 0.13), "{seed}: {ends:?}");
+        assert!(ends.iter().any(|end| (30.49..31.26).contains(end)), "{seed}: {ends:?}");
     }
 }

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block_sums::{Block, RawSum};
+use super::leak_fit::LeakFit;
 use crate::number::Filled;
 use crate::{Cylinder, Real, Sensors};
 
@@ -17,11 +18,8 @@ const LEAST_SIDE: usize = 4;
 const CHANGE_SIGMAS: f64 = 5.0;
 /// Constant flow, the leaks, and the change.
 const REGRESSORS: usize = 5;
-/// The sign of each in the balance where leaks let no oil in; none may have either. What falls with the pressure that a leak takes away
-/// is the leak that opened, and no other one that lets oil in.
-const SIGNS: [f64; REGRESSORS] = [0.0, -1.0, 1.0, 1.0, 0.0];
-/// Keeps pressures that do not change solvable.
-const RIDGE: f64 = 1e-6;
+/// Those that let no oil in. What falls with the pressure that a leak takes away is the leak that opened, and no other one that does.
+const ARE_LEAKS: [bool; REGRESSORS] = [false, true, true, true, false];
 
 /// The waiting blocks.
 #[derive(Clone, Debug)]
@@ -108,8 +106,9 @@ impl<T: Real> Waiting<T> {
             rows += T::one();
         }
         let freedom = rows - T::lit(REGRESSORS as f64);
-        let (last, variance_share, explained) = solve_last(&matrix, &vector)?;
-        let variance = ((square - explained) / freedom).at_least(declared / rows);
+        let fit = LeakFit::of(&matrix, &vector, &ARE_LEAKS);
+        let (last, variance_share) = fit.last()?;
+        let variance = ((square - fit.explained) / freedom).at_least(declared / rows);
         Some(last * last / (variance * variance_share))
     }
 
@@ -120,75 +119,6 @@ impl<T: Real> Waiting<T> {
         let (pa, pb, time) = (sum(RawSum::PressureA), sum(RawSum::PressureB), sum(RawSum::Time));
         let changed = if internal { pa - pb } else { time };
         let changed = if after { changed } else { T::zero() };
-        (sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b, [time, pa - pb, pa, pb, changed])
-    }
-}
-
-/// Least squares: the last coefficient, its variance for unit noise, and how much of the squares is explained; without those whose sign
-/// is wrong.
-fn solve_last<T: Real>(
-    matrix: &[[T; REGRESSORS]; REGRESSORS],
-    vector: &[T; REGRESSORS],
-) -> Option<(T, T, T)> {
-    let mut is_free = [true; REGRESSORS];
-    let mut found = Solution::of(matrix, vector, &is_free)?;
-    while let Some(wrong) = (0..REGRESSORS).find(|i| T::lit(SIGNS[*i]) * found.coefficients[*i] < T::zero()) {
-        is_free[wrong] = false;
-        found = Solution::of(matrix, vector, &is_free)?;
-    }
-    let pivot = found.last_pivot;
-    Some((found.coefficients[REGRESSORS - 1], T::one() / (pivot * pivot), found.explained))
-}
-
-/// Of normal equations.
-struct Solution<T> {
-    coefficients: [T; REGRESSORS],
-    last_pivot: T,
-    explained: T,
-}
-
-impl<T: Real> Solution<T> {
-    fn of(
-        matrix: &[[T; REGRESSORS]; REGRESSORS],
-        vector: &[T; REGRESSORS],
-        is_free: &[bool; REGRESSORS],
-    ) -> Option<Self> {
-        let mut factor = [[T::zero(); REGRESSORS]; REGRESSORS];
-        let mut half = [T::zero(); REGRESSORS];
-        let mut explained = T::zero();
-        for i in 0..REGRESSORS {
-            if !is_free[i] {
-                factor[i][i] = T::one();
-                continue;
-            }
-            for j in 0..=i {
-                let mut value = if is_free[j] { matrix[i][j] } else { T::zero() };
-                if i == j {
-                    value += value * T::lit(RIDGE);
-                }
-                for k in 0..j {
-                    value -= factor[i][k] * factor[j][k];
-                }
-                factor[i][j] = if i == j { value.at_least(T::zero()).sqrt() } else { value / factor[j][j] };
-            }
-            if factor[i][i] <= T::zero() {
-                return None;
-            }
-            let mut value = vector[i];
-            for k in 0..i {
-                value -= factor[i][k] * half[k];
-            }
-            half[i] = value / factor[i][i];
-            explained += half[i] * half[i];
-        }
-        let mut coefficients = [T::zero(); REGRESSORS];
-        for i in (0..REGRESSORS).rev() {
-            let mut value = half[i];
-            for k in i + 1..REGRESSORS {
-                value -= factor[k][i] * coefficients[k];
-            }
-            coefficients[i] = value / factor[i][i];
-        }
-        Some(Self { coefficients, last_pivot: factor[REGRESSORS - 1][REGRESSORS - 1], explained })
+        (sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b, [time, pb - pa, pa, pb, changed])
     }
 }

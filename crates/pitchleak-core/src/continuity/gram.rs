@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block_sums::{Block, MPA_PER_PA, RAW_SUMS, RawSum};
+use super::leak_fit::LeakFit;
 use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS};
 use crate::{PerLeak, Real};
 
@@ -11,8 +12,6 @@ use crate::{PerLeak, Real};
 const PACKED: usize = COLUMNS * (COLUMNS + 1) / 2;
 /// Two neighbours that differ by so many standard deviations are as dear to merge as two of twice the length; chosen.
 const DIFFERENCE_SIGMAS: f64 = 3.0;
-/// Keeps pressures that do not change solvable; numerical.
-const DESCRIPTION_RIDGE: f64 = 1e-4;
 
 /// Gram matrices of a stretch of the trace.
 #[derive(Clone, Copy, Debug)]
@@ -186,16 +185,17 @@ impl<T: Real> Segment<T> {
     }
 }
 
-/// Leaks and zeros that a stretch is described by, for the sake of comparison; the left side first.
-const DESCRIPTION: usize = 6;
+/// Zeros and leaks that a stretch is described by, for the sake of comparison.
+const DESCRIPTION: usize = 5;
+const ARE_LEAKS: [bool; DESCRIPTION] = [false, false, true, true, true];
 
 /// χ² that leaks and zeros of its own explain of a stretch.
 fn explained<T: Real>(product: impl Fn(usize, usize, usize) -> T) -> T {
     use RawSum as R;
     let one = T::one();
     let at = column;
+    let left_side = [(at(R::ResidualA, 0), one), (at(R::ResidualB, 1), one)];
     let columns: [&[(usize, T)]; DESCRIPTION] = [
-        &[(at(R::ResidualA, 0), one), (at(R::ResidualB, 1), one)],
         &[(at(R::Time, 0), one)],
         &[(at(R::Time, 1), one)],
         &[
@@ -207,42 +207,24 @@ fn explained<T: Real>(product: impl Fn(usize, usize, usize) -> T) -> T {
         &[(at(R::PressureA, 0), one)],
         &[(at(R::PressureB, 1), one)],
     ];
-    let entry = |i: usize, j: usize| {
+    let entry = |of_one: &[(usize, T)], of_other: &[(usize, T)]| {
         let mut sum = T::zero();
-        for (one, of_one) in columns[i] {
-            for (other, of_other) in columns[j] {
+        for (one, by) in of_one {
+            for (other, by_other) in of_other {
                 for equation in 0..EQUATIONS {
-                    sum += *of_one * *of_other * product(equation, *one, *other);
+                    sum += *by * *by_other * product(equation, *one, *other);
                 }
             }
         }
         sum
     };
-    let mut factor = [[T::zero(); DESCRIPTION]; DESCRIPTION];
-    let mut half = [T::zero(); DESCRIPTION];
-    let mut sum = T::zero();
-    for i in 1..DESCRIPTION {
-        for j in 1..=i {
-            let mut value = entry(i, j);
-            if i == j {
-                value += T::lit(DESCRIPTION_RIDGE) * value;
-            }
-            for k in 1..j {
-                value -= factor[i][k] * factor[j][k];
-            }
-            factor[i][j] = if i == j { value.at_least(T::zero()).sqrt() } else { value / factor[j][j] };
+    let mut matrix = [[T::zero(); DESCRIPTION]; DESCRIPTION];
+    let mut vector = [T::zero(); DESCRIPTION];
+    for i in 0..DESCRIPTION {
+        for j in 0..=i {
+            matrix[i][j] = entry(columns[i], columns[j]);
         }
-        let mut value = entry(i, 0);
-        for k in 1..i {
-            value -= factor[i][k] * half[k];
-        }
-        if factor[i][i] > T::zero() {
-            half[i] = value / factor[i][i];
-        } else {
-            // A column that is not there.
-            factor[i][i] = T::one();
-        }
-        sum += half[i] * half[i];
+        vector[i] = entry(columns[i], &left_side);
     }
-    sum
+    LeakFit::of(&matrix, &vector, &ARE_LEAKS).explained
 }

@@ -49,6 +49,7 @@ mod clocks;
 mod equation;
 mod gram;
 mod integrals;
+mod leak_fit;
 mod moving_average;
 mod noise;
 mod pressure_means;

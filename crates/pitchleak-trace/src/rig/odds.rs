@@ -79,8 +79,11 @@ pub fn explanations() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// By kind, blanks between them.
 const EXPLANATIONS: [(&str, &str); 5] = [
-    ("course", "constant cracking orifice growing sudden wandering creeping"),
-    ("zeros", "zeros_usual flow_zeros flow_zero_a flow_zero_b flow_zeros_gross"),
+    ("course", "constant cracking orifice growing accelerating sudden wandering creeping"),
+    (
+        "zeros",
+        "zeros_usual flow_zeros flow_zero_a flow_zero_b flow_zeros_gross flow_zero_jump_a flow_zero_jump_b",
+    ),
     (
         "departure",
         "as_declared flow_lag flow_lag_a flow_lag_b flow_lag_gross flow_gain_a flow_gain_b flow_gain flow_drift_a \
