@@ -1,5 +1,6 @@
 //! The paper's experiment (Section IV), and what stands here for what it does not print.
 
+use super::Progress;
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError};
 use pitchleak::output::OutputError;
@@ -150,21 +151,24 @@ impl Run {
     }
 }
 
-/// `work` on every item, on all cores; results in the items' order whatever the thread count. `done` is
-/// called with the number of items finished, from any thread.
+/// `work` on every item, on all cores; results in the items' order whatever the thread count. `progress` hears of each
+/// that is done, from any thread.
 pub(super) fn map_counted<I: Sync, O: Send>(
+    stage: &'static str,
     items: &[I],
-    done: impl Fn(usize) + Sync,
-    work: impl Fn(&I) -> O + Sync,
-) -> Vec<O> {
+    progress: impl Fn(Progress) + Sync,
+    work: impl Fn(&I) -> Result<O, ReproduceError> + Sync,
+) -> Result<Vec<O>, ReproduceError> {
     let finished = AtomicUsize::new(0);
     let counted = |item| {
         let result = work(item);
-        done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+        let done = finished.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(Progress { stage, done, count: items.len() });
         result
     };
     // Items take seconds each: none waits behind another while a core is free.
-    items.par_iter().with_max_len(1).map(counted).collect()
+    let results: Vec<_> = items.par_iter().with_max_len(1).map(counted).collect();
+    results.into_iter().collect()
 }
 
 #[cfg(test)]
@@ -175,12 +179,13 @@ mod tests {
     fn results_come_in_order_and_all_are_counted() {
         let items: Vec<u64> = (0..100).collect();
         let counted = AtomicUsize::new(0);
-        let count = |_| {
+        let count = |progress: Progress| {
+            assert_eq!((progress.stage, progress.count), ("squares", 100));
             counted.fetch_add(1, Ordering::Relaxed);
         };
-        let squares = map_counted(&items, count, |n| n * n);
+        let squares = map_counted("squares", &items, count, |n| Ok(n * n)).expect("none fails");
         assert_eq!(squares, items.iter().map(|n| n * n).collect::<Vec<_>>());
         assert_eq!(counted.into_inner(), 100);
-        assert!(map_counted(&[] as &[u8], |_| (), |_| 0).is_empty());
+        assert!(map_counted("none", &[] as &[u8], |_| (), |_| Ok(0)).expect("none fails").is_empty());
     }
 }
