@@ -1,8 +1,8 @@
 use super::valve::ValveSensors;
 use super::writer::Columns;
 use super::{
-    Biases, Opening, Reading, Row, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
-    TraceWriter,
+    Biases, Opening, Reading, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
+    TraceWriter, Truth,
 };
 use crate::output::{self, Inputs, OutputError, OutputFile};
 use crate::reference::AfterEnd;
@@ -194,8 +194,8 @@ impl Recording {
             Err(error) => return Ok(Err(error)),
         };
         let mut failure = None;
-        let truth = self.run(&leaks_m3spa, done, |row| {
-            failure = writer.row(row).err();
+        let truth = self.run(leaks_m3spa, done, |truth, shown| {
+            failure = writer.row(truth, shown).err();
             failure.is_none()
         })?;
         Ok(failure.map_or(Ok(truth), Err))
@@ -211,20 +211,19 @@ impl Recording {
     ) -> Result<(Columns, TruthFile), RecordingError> {
         let layout = TraceLayout::of(&self.scenario);
         let mut columns = layout.columns();
-        let leaks_m3spa = self.scenario.leak_coefficients()?;
-        let truth = self.run(&leaks_m3spa, done, |row| {
-            layout.push(row, &mut columns);
+        let truth = self.run(self.scenario.leak_coefficients()?, done, |truth, shown| {
+            layout.push(truth, shown, &mut columns);
             true
         })?;
         Ok((columns, truth))
     }
 
-    /// Hands each row to `each` until that has had enough.
+    /// Hands each instant, and what is recorded of it, to `each` until that has had enough.
     fn run(
         &self,
-        leaks_m3spa: &PerLeak<f64>,
+        leaks_m3spa: PerLeak<f64>,
         mut done: impl FnMut(f64) -> ControlFlow<()>,
-        mut each: impl FnMut(&Row) -> bool,
+        mut each: impl FnMut(&Truth, &Reading) -> bool,
     ) -> Result<TruthFile, SimulateError> {
         let Self { scenario, instruments, biases, sensor_faults, seed, .. } = self;
         let mut sensing = Sensing::new(instruments.spread(), *biases, *seed);
@@ -233,12 +232,12 @@ impl Recording {
         let mut valve_sensors = ValveSensors::of(rig, instruments, &scenario.valve_flaws, *seed);
         let mut totals = Totals::default();
         let mut stopped = false;
-        scenario.run_while(*leaks_m3spa, |truth| {
+        scenario.run_while(leaks_m3spa, |truth| {
             let valve =
                 valve_sensors.as_mut().and_then(|sensors| sensors.read(truth, truth.t_s / duration_s));
             let honest = Reading { valve, ..Reading::at(truth, sensing.read(&truth.sample)) };
             let shown = faults.show(&honest);
-            if shown.is_some_and(|shown| !each(&Row::new(truth, shown))) {
+            if shown.is_some_and(|shown| !each(truth, &shown)) {
                 return false;
             }
             totals.rows += u64::from(shown.is_some());
@@ -255,10 +254,10 @@ impl Recording {
         Ok(self.truth(leaks_m3spa, &totals))
     }
 
-    fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
+    fn truth(&self, leaks_m3spa: PerLeak<f64>, totals: &Totals) -> TruthFile {
         let Self { followed, scenario, instruments, biases, sensor_faults, seed, .. } = self;
         let noise = instruments.spread();
-        let leaky = scenario.leaks.zip(*leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
+        let leaky = scenario.leaks.zip(leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
         let onset_s = leaky.map(|(_, (leak, _))| leak.opening.onset_s()).reduce(f64::min).unwrap_or(0.0);
         let count = totals.samples.max(1) as f64;
         TruthFile {

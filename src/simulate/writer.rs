@@ -1,7 +1,7 @@
 use super::{Scenario, Truth, ValveTruth};
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{PerLeak, Sample};
+use pitchleak_core::Sample;
 use std::io::{self, Write};
 
 /// One column of a simulated trace.
@@ -11,26 +11,12 @@ struct Column {
     /// Rounding stays below any sensor (10 nm, 1 Pa, 1e-6 L/min, 1 mN). Times are shares of a second: rounding to
     /// 1 ns shows them as they are.
     decimals: usize,
-    /// NaN where there is no reading.
-    value: fn(&Row) -> f64,
+    /// Of what is true and what sensors and clock show; NaN where there is no reading.
+    value: fn(&Truth, &Reading) -> f64,
 }
 
-/// What a row of a simulated trace is made of.
-#[derive(Clone, Copy, Debug)]
-pub struct Row {
-    /// What sensors and clock show.
-    pub shown: Reading,
-    /// Whether both ports are shut, where there is a hold.
-    pub is_shut: Option<bool>,
-    /// The true leak flows, m³/s.
-    pub leaks_m3s: PerLeak<f64>,
-}
-
-impl Row {
-    /// The reading of an instant, with its leak flows.
-    pub fn new(truth: &Truth, shown: Reading) -> Self {
-        Self { shown, is_shut: truth.is_shut, leaks_m3s: truth.leaks_m3s }
-    }
+const fn column(header: &'static str, decimals: usize, value: fn(&Truth, &Reading) -> f64) -> Column {
+    Column { header, decimals, value }
 }
 
 fn or_nan(reading: Option<f64>, per_unit: f64) -> f64 {
@@ -38,42 +24,26 @@ fn or_nan(reading: Option<f64>, per_unit: f64) -> f64 {
 }
 
 const READINGS: [Column; 7] = [
-    Column { header: "t_s", decimals: 9, value: |row| row.shown.t_s },
-    Column { header: "x_mm", decimals: 5, value: |row| row.shown.sample.x_m * 1e3 },
-    Column { header: "pa_bar", decimals: 5, value: |row| row.shown.sample.pa_pa / 1e5 },
-    Column { header: "pb_bar", decimals: 5, value: |row| row.shown.sample.pb_pa / 1e5 },
-    Column { header: "qa_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qa_m3s, LPM_PER_M3S) },
-    Column { header: "qb_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qb_m3s, LPM_PER_M3S) },
-    Column { header: "force_n", decimals: 3, value: |row| or_nan(row.shown.sample.force_n, 1.0) },
+    column("t_s", 9, |_, shown| shown.t_s),
+    column("x_mm", 5, |_, shown| shown.sample.x_m * 1e3),
+    column("pa_bar", 5, |_, shown| shown.sample.pa_pa / 1e5),
+    column("pb_bar", 5, |_, shown| shown.sample.pb_pa / 1e5),
+    column("qa_lpm", 6, |_, shown| or_nan(shown.sample.qa_m3s, LPM_PER_M3S)),
+    column("qb_lpm", 6, |_, shown| or_nan(shown.sample.qb_m3s, LPM_PER_M3S)),
+    column("force_n", 3, |_, shown| or_nan(shown.sample.force_n, 1.0)),
 ];
-const TEMPERATURE: Column =
-    Column { header: "temp_c", decimals: 3, value: |row| row.shown.temp_k.map_or(f64::NAN, |k| k - 273.15) };
-const SHUT: Column = Column {
-    header: "shut",
-    decimals: 0,
-    value: |row| row.is_shut.map_or(f64::NAN, |is| f64::from(u8::from(is))),
-};
+const TEMPERATURE: Column = column("temp_c", 3, |_, shown| shown.temp_k.map_or(f64::NAN, |k| k - 273.15));
+const SHUT: Column =
+    column("shut", 0, |truth, _| truth.is_shut.map_or(f64::NAN, |is| f64::from(u8::from(is))));
 const VALVE: [Column; 3] = [
-    Column {
-        header: "spool_percent",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.spool), 100.0),
-    },
-    Column {
-        header: "valve_command_percent",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.command), 100.0),
-    },
-    Column {
-        header: "ps_bar",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.supply_pa), 1e-5),
-    },
+    column("spool_percent", 5, |_, shown| or_nan(shown.valve.map(|valve| valve.spool), 100.0)),
+    column("valve_command_percent", 5, |_, shown| or_nan(shown.valve.map(|valve| valve.command), 100.0)),
+    column("ps_bar", 5, |_, shown| or_nan(shown.valve.map(|valve| valve.supply_pa), 1e-5)),
 ];
 const LEAKS: [Column; 3] = [
-    Column { header: "q_int_lpm", decimals: 6, value: |row| row.leaks_m3s.internal * LPM_PER_M3S },
-    Column { header: "q_ext_a_lpm", decimals: 6, value: |row| row.leaks_m3s.external_a * LPM_PER_M3S },
-    Column { header: "q_ext_b_lpm", decimals: 6, value: |row| row.leaks_m3s.external_b * LPM_PER_M3S },
+    column("q_int_lpm", 6, |truth, _| truth.leaks_m3s.internal * LPM_PER_M3S),
+    column("q_ext_a_lpm", 6, |truth, _| truth.leaks_m3s.external_a * LPM_PER_M3S),
+    column("q_ext_b_lpm", 6, |truth, _| truth.leaks_m3s.external_b * LPM_PER_M3S),
 ];
 
 /// Up to here each number of units is a double of its own.
@@ -81,13 +51,13 @@ const MOST_UNITS: f64 = 9e15;
 
 impl Column {
     /// The double nearest to the rounded decimal number: what a reader of its text gets.
-    fn rounded(&self, row: &Row) -> f64 {
-        self.units(row) / self.scale()
+    fn rounded(&self, truth: &Truth, shown: &Reading) -> f64 {
+        self.units(truth, shown) / self.scale()
     }
 
     /// The value in units of its last decimal.
-    fn units(&self, row: &Row) -> f64 {
-        ((self.value)(row) * self.scale()).round()
+    fn units(&self, truth: &Truth, shown: &Reading) -> f64 {
+        ((self.value)(truth, shown) * self.scale()).round()
     }
 
     fn scale(&self) -> f64 {
@@ -95,8 +65,8 @@ impl Column {
     }
 
     /// Its text, digit by digit: a third of the time that formatting a float takes, and the same.
-    fn write(&self, row: &Row, out: &mut impl Write) -> io::Result<()> {
-        let units = self.units(row);
+    fn write(&self, truth: &Truth, shown: &Reading, out: &mut impl Write) -> io::Result<()> {
+        let units = self.units(truth, shown);
         if units.is_nan() {
             return Ok(());
         }
@@ -152,9 +122,9 @@ impl TraceLayout {
     }
 
     /// Adds a row to columns of this layout.
-    pub(super) fn push(&self, row: &Row, columns: &mut Columns) {
+    pub(super) fn push(&self, truth: &Truth, shown: &Reading, columns: &mut Columns) {
         for (column, (_, values)) in self.0.iter().zip(columns) {
-            values.push(column.rounded(row));
+            values.push(column.rounded(truth, shown));
         }
     }
 }
@@ -179,18 +149,18 @@ impl<W: Write> TraceWriter<W> {
         Ok(Self { out, layout })
     }
 
-    /// Writes one row.
+    /// Writes the row of an instant, of which sensors and clock have shown this.
     ///
     /// # Errors
     /// Where the output cannot be written to.
-    pub fn row(&mut self, row: &Row) -> io::Result<()> {
+    pub fn row(&mut self, truth: &Truth, shown: &Reading) -> io::Result<()> {
         for (index, column) in self.layout.0.iter().enumerate() {
             if index > 0 {
                 self.out.write_all(b",")?;
-                column.write(row, &mut self.out)?;
+                column.write(truth, shown, &mut self.out)?;
                 continue;
             }
-            let time_s = column.rounded(row);
+            let time_s = column.rounded(truth, shown);
             if !time_s.is_nan() {
                 write!(self.out, "{time_s}")?;
             }
@@ -267,12 +237,12 @@ mod tests {
         let values = [0.0, -0.0, -1e-9, 9.999_999_7, -0.05, 123_456.789, 4e9, -7e14, 3e300, 0.1 + 0.2];
         for decimals in [0, 3, 5, 6, 9] {
             for value in values {
-                let column = Column { header: "", decimals, value: |row| row.leaks_m3s.internal };
-                let leaks_m3s = PerLeak { internal: value, ..PerLeak::default() };
-                let row = Row { shown: Reading::default(), is_shut: None, leaks_m3s };
+                let column = column("", decimals, |truth, _| truth.t_s);
+                let (truth, shown) = (Truth { t_s: value, ..Truth::default() }, Reading::default());
                 let mut text = Vec::new();
-                column.write(&row, &mut text).unwrap();
-                assert_eq!(String::from_utf8(text).unwrap(), format!("{:.decimals$}", column.rounded(&row)));
+                column.write(&truth, &shown, &mut text).unwrap();
+                let rounded = column.rounded(&truth, &shown);
+                assert_eq!(String::from_utf8(text).unwrap(), format!("{rounded:.decimals$}"));
             }
         }
     }

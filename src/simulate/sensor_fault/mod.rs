@@ -90,8 +90,6 @@ impl std::fmt::Display for SensorFault {
 /// The same seed loses the same rows and spikes the same readings.
 #[derive(Clone, Debug)]
 pub struct SensorFaults {
-    instruments: Instruments,
-    stroke_m: f64,
     running: Vec<Running>,
     random: ChaCha8Rng,
 }
@@ -101,6 +99,9 @@ pub struct SensorFaults {
 struct Running {
     mistake: Mistake,
     during: Span,
+    /// Of the channel's sensor.
+    full_scale: f64,
+    stroke_m: f64,
     /// Time and reading that a channel is stuck or held at.
     kept: Option<(f64, f64)>,
     /// Times and readings that a late channel has still to show, the oldest first.
@@ -113,18 +114,23 @@ impl SensorFaults {
         let running = |fault: &SensorFault| Running {
             mistake: fault.mistake,
             during: fault.during,
+            full_scale: match fault.mistake {
+                Mistake::Channel(channel, _) => full_scale(instruments, channel),
+                Mistake::Swap(..) | Mistake::RowsLost(_) => 1.0,
+            },
+            stroke_m,
             kept: None,
             waiting: VecDeque::new(),
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // Streams 0 and 1 are those of noise and biases.
         random.set_stream(2);
-        Self { instruments: *instruments, stroke_m, running: faults.iter().map(running).collect(), random }
+        Self { running: faults.iter().map(running).collect(), random }
     }
 
     /// What is recorded of an honest reading; none where the row is lost.
     pub fn show(&mut self, honest: &Reading) -> Option<Reading> {
-        let Self { instruments, stroke_m, running, random } = self;
+        let Self { running, random } = self;
         let mut shown = *honest;
         let mut kept = true;
         for one in running {
@@ -144,9 +150,7 @@ impl SensorFaults {
                 Mistake::Channel(channel, distortion) => {
                     let chance = unit(random);
                     if let Some(reading) = shown.get(channel) {
-                        let full_scale = full_scale(instruments, channel);
-                        let scale = Scale { full_scale, stroke_m: *stroke_m, chance };
-                        shown.set(channel, one.distorted(distortion, honest.t_s, reading, &scale));
+                        shown.set(channel, one.distorted(distortion, honest.t_s, reading, chance));
                     }
                 }
             }
@@ -155,17 +159,10 @@ impl SensorFaults {
     }
 }
 
-/// What a distortion needs of the rig and of chance.
-struct Scale {
-    full_scale: f64,
-    stroke_m: f64,
-    /// 0 to 1.
-    chance: f64,
-}
-
 impl Running {
-    fn distorted(&mut self, distortion: Distortion, t_s: f64, reading: f64, scale: &Scale) -> Option<f64> {
-        let Scale { full_scale, stroke_m, chance } = *scale;
+    /// What the channel shows instead; `chance` is drawn from 0 to 1.
+    fn distorted(&mut self, distortion: Distortion, t_s: f64, reading: f64, chance: f64) -> Option<f64> {
+        let Self { full_scale, stroke_m, .. } = *self;
         Some(match distortion {
             Distortion::Missing => return None,
             Distortion::Dead => 0.0,
