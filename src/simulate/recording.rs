@@ -99,11 +99,8 @@ pub struct LeakTruth {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// A file of another kind.
-    #[error("{path}: a simulated trace is written as .csv or .csv.gz, or to `-` (standard output)", path = path.display())]
-    Kind {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{path}: a simulated trace is written as .csv or .csv.gz, or to `-` (standard output)", path = .0.display())]
+    Kind(PathBuf),
     /// The simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -171,7 +168,7 @@ impl Recording {
                 .map_err(RecordingError::StandardOutput);
         }
         if !name.ends_with(".csv") && !name.ends_with(".csv.gz") {
-            return Err(RecordingError::Kind { path: path.to_owned() });
+            return Err(RecordingError::Kind(path.to_owned()));
         }
         let mut trace = OutputFile::create(path, &self.inputs)?;
         let mut beside = OutputFile::create(truth_path(path), &self.inputs)?;

@@ -38,8 +38,6 @@ enum Mistake {
 enum Distortion {
     /// Zero.
     Dead,
-    /// The first reading, again and again.
-    Stuck,
     /// No reading.
     Missing,
     Reversed,
@@ -53,7 +51,7 @@ enum Distortion {
     Times(f64),
     /// Never more than this, either way.
     Clipped(Amount),
-    /// One reading for this long, s.
+    /// One reading for this long, s: the first again and again where it is infinite.
     Held(f64),
     /// The reading of this time ago, s.
     Late(f64),
@@ -166,7 +164,6 @@ impl Running {
         Some(match distortion {
             Distortion::Missing => return None,
             Distortion::Dead => 0.0,
-            Distortion::Stuck => self.kept_for(f64::INFINITY, t_s, reading),
             Distortion::Held(time_s) => self.kept_for(time_s, t_s, reading),
             Distortion::Late(time_s) => self.late_by(time_s, t_s, reading),
             Distortion::Reversed => -reading,

@@ -20,7 +20,7 @@ const CHANNELS: [Signal; 8] = [
 /// Ways without a quantity.
 const BARE: [(&str, Distortion); 6] = [
     ("dead", Distortion::Dead),
-    ("stuck", Distortion::Stuck),
+    ("stuck", Distortion::Held(f64::INFINITY)),
     ("missing", Distortion::Missing),
     ("reversed", Distortion::Reversed),
     ("absolute", Distortion::Absolute),

@@ -1,6 +1,6 @@
 //! How soon a leak that opens raises its alarm, and how often a sound cylinder raises one.
 
-use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, map_counted, rig};
+use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, map_counted, reference, rig};
 use super::{Law, Progress};
 use pitchleak::Rig;
 use pitchleak::core::{AlarmState, Leak, PerLeak, RlsError};
@@ -8,7 +8,7 @@ use pitchleak::replay::Replay;
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
 use pitchleak::units::LPM_PER_M3S;
-use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak::wind::WindCase;
 use serde::Serialize;
 
 /// Sizes of the leaks, L/min at the run's mean pressures.
@@ -123,8 +123,6 @@ impl Watch {
 
 fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceError> {
     let rig = rig();
-    let reference =
-        Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?;
     let size = |which| {
         let size = LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
         LeakCourse::from_onset(size, ONSET_S)
@@ -133,7 +131,7 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
         leaks: PerLeak::from_fn(size),
         duration_s: ONSET_S + WATCH_S,
         sample_rate_hz: SAMPLE_RATE_HZ,
-        ..Scenario::new(rig.clone(), reference)
+        ..Scenario::new(rig.clone(), reference(wind, &rig)?)
     };
     // The mean is taken where the leak is open.
     let open = Scenario { start_s: 10.0 + ONSET_S, ..scenario.clone() };

@@ -22,7 +22,7 @@ pub use trial::{EstimateHistory, TrialScore};
 use crate::cramer_rao::CramerRaoModel;
 use efficient::Efficient;
 use pitchleak::Rig;
-use pitchleak::core::{ExcitationSettings, Leak, PerLeak, Sample};
+use pitchleak::core::{Estimate, ExcitationSettings, Leak, PerLeak, Sample};
 use pitchleak::replay::leak_pressures_pa;
 use pitchleak::rig::{Instrument, Instruments};
 use pitchleak::simulate::{Biases, Normal, Sensing};
@@ -31,7 +31,7 @@ use pitchleak::wind::WindCase;
 use protocol::map_counted;
 use rayon::prelude::*;
 use serde::Serialize;
-use table::{Entry, WindowBound};
+use table::Entry;
 use trial::mean;
 
 /// Greatest bias of a sensor in the runs with biases, share of full scale.
@@ -201,10 +201,14 @@ impl Law {
             Ok(PerLeak::from_fn(|leak| {
                 // Nothing leaks out of B here; its errors are relative to 1.
                 let coefficient = if leak == Leak::ExternalB { 1.0 } else { truth[leak] };
+                let (std, early) = stds[leak];
+                let flow_m3s = Estimate { value: coefficient, std }.scaled(sizes[leak]);
                 Entry {
                     score: history.score(coefficient, leak),
                     efficient: best.score(coefficient, leak),
-                    window: WindowBound::new(coefficient, stds[leak], sizes[leak]),
+                    bound: std / coefficient,
+                    bound_early: early / coefficient,
+                    identifiable: ExcitationSettings::default().resolves(&flow_m3s),
                 }
             }))
         })

@@ -1,5 +1,6 @@
 //! The page of the reproduced experiment: the paper's figures beside ours, and the charts behind them.
 
+use crate::table::five_digits;
 use crate::{BulkModulusBound, Detection, Drawing, Report, ReproduceError, Reproduction, Row, Scored};
 use maud::{Markup, html};
 use pitchleak_view::figure::{self, Panel};
@@ -173,12 +174,7 @@ fn cells(row: &Row) -> [String; 5] {
     let Some(worst) = row.worst else {
         return ["not identifiable", "", "", "", ""].map(str::to_owned);
     };
-    let text = |value: Option<f64>| match value {
-        None => "–".to_owned(),
-        Some(value) if value >= 1000.0 => "> 999".to_owned(),
-        Some(value) if value >= 100.0 => format!("{value:.0}"),
-        Some(value) => format!("{value:.2}"),
-    };
+    let text = |value: Option<f64>| value.map_or("–".to_owned(), five_digits).replace('>', "> ");
     let (medians, worst) = (row.median.values(), worst.values());
     std::array::from_fn(|at| format!("{} ({})", text(medians[at]), text(worst[at])))
 }

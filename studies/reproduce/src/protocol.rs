@@ -4,6 +4,7 @@ use super::Progress;
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError};
 use pitchleak::output::OutputError;
+use pitchleak::reference::Reference;
 use pitchleak::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use pitchleak::units::LPM_PER_BAR;
 use pitchleak::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
@@ -31,17 +32,14 @@ const M3SPA_PER_LPM_BAR: f64 = 1.0 / LPM_PER_BAR;
 #[serde(into = "u8")]
 pub enum Case {
     /// Large internal, small external leak.
-    One,
+    One = 1,
     /// Small internal, large external leak.
-    Two,
+    Two = 2,
 }
 
 impl From<Case> for u8 {
     fn from(case: Case) -> Self {
-        match case {
-            Case::One => 1,
-            Case::Two => 2,
-        }
+        case as Self
     }
 }
 
@@ -57,11 +55,7 @@ impl Case {
             Self::One => (0.3, 0.04),
             Self::Two => (0.12, 0.1),
         };
-        PerLeak {
-            internal: internal * M3SPA_PER_LPM_BAR,
-            external_a: external_a * M3SPA_PER_LPM_BAR,
-            external_b: 0.0,
-        }
+        PerLeak { internal, external_a, external_b: 0.0 }.map(|leak| leak * M3SPA_PER_LPM_BAR)
     }
 }
 
@@ -74,6 +68,11 @@ pub fn rig() -> Rig {
         cylinder: Cylinder { dead_volume_a_m3: hose_m3, dead_volume_b_m3: hose_m3, ..paper.cylinder },
         ..paper
     }
+}
+
+/// What a rig follows in this wind.
+pub(super) fn reference(wind: WindCase, rig: &Rig) -> Result<Reference, ReproduceError> {
+    Ok(Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?)
 }
 
 /// Why the experiment cannot be run.
@@ -127,8 +126,7 @@ impl Run {
     /// [`ReproduceError`].
     pub fn simulate(wind: WindCase, leaks_m3spa: PerLeak<f64>) -> Result<Self, ReproduceError> {
         let rig = rig();
-        let history = History::of(&Wind::BuiltIn(wind))?;
-        let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
+        let reference = reference(wind, &rig)?;
         let wind_curve = reference.wind_mps.clone();
         let scenario = Scenario {
             leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
