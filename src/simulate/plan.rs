@@ -71,10 +71,10 @@ impl std::str::FromStr for Noise {
         match text {
             "none" => Ok(Self::None),
             "rig" => Ok(Self::Rig),
-            _ => match share_of_full_scale(text) {
-                Ok(share) => Ok(Self::Share(share)),
-                Err(error) => Err(format!("{error}; or `none`, or `rig`")),
-            },
+            _ => {
+                let share = share_of_full_scale(text).map(Self::Share);
+                share.map_err(|error| format!("{error}; or `none`, or `rig`"))
+            }
         }
     }
 }

@@ -2,7 +2,7 @@ use super::valve::ValveSensors;
 use super::writer::Columns;
 use super::{
     Biases, Opening, Reading, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
-    TraceWriter, Truth,
+    TraceWriter,
 };
 use crate::output::{self, Inputs, OutputError, OutputFile};
 use crate::reference::AfterEnd;
@@ -191,8 +191,8 @@ impl Recording {
             Err(error) => return Ok(Err(error)),
         };
         let mut failure = None;
-        let truth = self.run(leaks_m3spa, done, |truth, shown| {
-            failure = writer.row(truth, shown).err();
+        let truth = self.run(leaks_m3spa, done, |row| {
+            failure = writer.row(row).err();
             failure.is_none()
         })?;
         Ok(failure.map_or(Ok(truth), Err))
@@ -208,19 +208,19 @@ impl Recording {
     ) -> Result<(Columns, TruthFile), RecordingError> {
         let layout = TraceLayout::of(&self.scenario);
         let mut columns = layout.columns();
-        let truth = self.run(self.scenario.leak_coefficients()?, done, |truth, shown| {
-            layout.push(truth, shown, &mut columns);
+        let truth = self.run(self.scenario.leak_coefficients()?, done, |row| {
+            layout.push(row, &mut columns);
             true
         })?;
         Ok((columns, truth))
     }
 
-    /// Hands each instant, and what is recorded of it, to `each` until that has had enough.
+    /// Hands each row to `each` until that has had enough.
     fn run(
         &self,
         leaks_m3spa: PerLeak<f64>,
         mut done: impl FnMut(f64) -> ControlFlow<()>,
-        mut each: impl FnMut(&Truth, &Reading) -> bool,
+        mut each: impl FnMut(&Reading) -> bool,
     ) -> Result<TruthFile, SimulateError> {
         let Self { scenario, instruments, biases, sensor_faults, seed, .. } = self;
         let mut sensing = Sensing::new(instruments.spread(), *biases, *seed);
@@ -232,9 +232,8 @@ impl Recording {
         scenario.run_while(leaks_m3spa, |truth| {
             let valve =
                 valve_sensors.as_mut().and_then(|sensors| sensors.read(truth, truth.t_s / duration_s));
-            let honest = Reading { valve, ..Reading::at(truth, sensing.read(&truth.sample)) };
-            let shown = faults.show(&honest);
-            if shown.is_some_and(|shown| !each(truth, &shown)) {
+            let shown = faults.show(&Reading::at(truth, &sensing.read(&truth.sample), valve));
+            if shown.is_some_and(|row| !each(&row)) {
                 return false;
             }
             totals.rows += u64::from(shown.is_some());

@@ -303,7 +303,5 @@ impl ValveMeter {
             self.at = self.at.filter(|_| !taken.is_mixed);
             self.last = Some(taken);
         }
-        self.runs.clear();
-        self.count = 0;
     }
 }

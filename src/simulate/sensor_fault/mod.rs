@@ -130,10 +130,11 @@ impl SensorFaults {
     pub fn show(&mut self, honest: &Reading) -> Option<Reading> {
         let Self { running, random } = self;
         let mut shown = *honest;
+        // The mistake's own times are true times, whatever the clock shows.
+        let t_s = honest.get(Signal::Time).unwrap_or(f64::NAN);
         let mut kept = true;
         for one in running {
-            // The mistake's own times are true times, whatever the clock shows.
-            if !one.during.contains(honest.t_s) {
+            if !one.during.contains(t_s) {
                 one.kept = None;
                 one.waiting.clear();
                 continue;
@@ -148,7 +149,7 @@ impl SensorFaults {
                 Mistake::Channel(channel, distortion) => {
                     let chance = unit(random);
                     if let Some(reading) = shown.get(channel) {
-                        shown.set(channel, one.distorted(distortion, honest.t_s, reading, chance));
+                        shown.set(channel, one.distorted(distortion, t_s, reading, chance));
                     }
                 }
             }

@@ -137,28 +137,15 @@ fn worst(values: Vec<f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Above the columns of [`line`].
+const HEAD: [&str; 2] = [
+    "                                 |        leakage error %        |      coefficient error %      |  within 5 %   | coefficient's bound",
+    " m/s case  leak        law      |           mean           peak |           mean           peak |       after s | 1s, 2 s 1s, end  ratio",
+];
+
 /// The table for people: medians, worst case in brackets; below each leak the efficient estimator.
 pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
-    let mut out = format!(
-        "{title}\n{:33}| {:^29} | {:^29} | {:^13} | coefficient's bound\n\
-         {:>4} {:>4}  {:<10}  {:<9}| {:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
-        "",
-        "leakage error %",
-        "coefficient error %",
-        "within 5 %",
-        "m/s",
-        "case",
-        "leak",
-        "law",
-        "mean",
-        "peak",
-        "mean",
-        "peak",
-        "after s",
-        "1s, 2 s",
-        "1s, end",
-        "ratio"
-    );
+    let mut out = format!("{title}\n{}\n", HEAD.join("\n"));
     for leak in rows.chunk_by(|a, b| (a.wind_mps, a.case, a.leak) == (b.wind_mps, b.case, b.leak)) {
         leak.iter().for_each(|row| out += &line(row));
         leak.last().into_iter().filter(|row| row.identifiable).for_each(|row| out += &limit_line(row));
