@@ -5,8 +5,7 @@ use pitchleak::core::effects::EffectConstants;
 use pitchleak::core::{Effect, EffectSet, PerLeak};
 use pitchleak::reference::Reference;
 use pitchleak::simulate::{
-    LeakCourse, LeakSize, OilTemperature, Reading, Row, Scenario, SimulateError, TraceLayout, TraceWriter,
-    Truth,
+    LeakCourse, LeakSize, OilTemperature, Reading, Scenario, SimulateError, TraceLayout, TraceWriter, Truth,
 };
 use pitchleak::trace::{Record, TraceReader};
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
@@ -117,7 +116,7 @@ fn a_written_trace_reads_back_with_its_leaks() {
     let truths = run(&Scenario { leaks, duration_s: 1.0, ..scenario() });
     let mut writer = TraceWriter::new(Vec::new(), TraceLayout::default()).expect("writes");
     for truth in &truths {
-        writer.row(&Row::new(truth, Reading::at(truth, truth.sample))).expect("writes");
+        writer.row(&Reading::at(truth, &truth.sample, None)).expect("writes");
     }
     let bytes = std::io::Cursor::new(writer.into_inner());
     let mut reader = TraceReader::from_stream("trace", Box::new(bytes), &Rig::paper()).expect("a trace");

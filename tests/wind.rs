@@ -1,7 +1,7 @@
 //! From wind to the rig's references: built-in cases, OpenFAST files, and what goes wrong.
 
 use pitchleak::openfast;
-use pitchleak::wind::{Emulation, History, HistoryError, Wind, WindCase};
+use pitchleak::wind::{Emulation, History, HistoryError, HistoryFault, Wind, WindCase};
 use std::path::{Path, PathBuf};
 
 const STROKE_M: f64 = 0.2;
@@ -52,7 +52,10 @@ fn a_missing_channel_and_a_strange_unit_are_named() {
     };
     let read = |channels| History::from_run(&run(channels), Path::new("run.outb"));
     let missing = read(vec![channel("BldPitch1", "deg"), channel("RootMzb2", "kN-m")]);
-    assert!(matches!(missing, Err(HistoryError::Missing { .. })), "blades must match");
+    assert!(
+        matches!(missing, Err(HistoryError::File { fault: HistoryFault::Missing(_), .. })),
+        "blades must match"
+    );
     let unit = read(vec![channel("BldPitch2", "deg"), channel("RootMzb2", "lbf-ft")]).expect_err("bad unit");
     assert_eq!(unit.to_string(), "run.outb: RootMzb2 is in \"lbf-ft\"; kN-m or N-m is needed");
     let good = read(vec![channel("BldPitch2", "deg"), channel("RootMzb2", "kN-m")]).expect("reads");

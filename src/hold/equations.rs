@@ -145,26 +145,19 @@ impl Row {
         let (dense_a, dense_b) = ((kappa_ppa * at.pa_pa).exp(), (kappa_ppa * at.pb_pa).exp());
         let oil_a = cylinder.volume_a_m3(at.x_m) * dense_a;
         let oil_b = cylinder.volume_b_m3(at.x_m) * dense_b;
-        let slopes = Matrix2x3::new(
-            cylinder.area_a_m2 * dense_a,
-            kappa_ppa * oil_a,
-            0.0,
-            -cylinder.area_b_m2 * dense_b,
-            0.0,
-            kappa_ppa * oil_b,
-        );
+        let slopes = Matrix2x3::from([
+            [cylinder.area_a_m2 * dense_a, -cylinder.area_b_m2 * dense_b],
+            [kappa_ppa * oil_a, 0.0],
+            [0.0, kappa_ppa * oil_b],
+        ]);
         let [through_a, out_a, through_b, out_b] = (*integrals).into();
         let units = &known.units;
-        let columns = Matrix2x4::new(
-            units[0] * oil_a * at.pa_pa,
-            units[1] * through_a,
-            units[2] * out_a,
-            0.0,
-            units[0] * oil_b * at.pb_pa,
-            -units[1] * through_b,
-            0.0,
-            units[3] * out_b,
-        );
+        let columns = Matrix2x4::from([
+            [units[0] * oil_a * at.pa_pa, units[0] * oil_b * at.pb_pa],
+            [units[1] * through_a, -units[1] * through_b],
+            [units[2] * out_a, 0.0],
+            [0.0, units[3] * out_b],
+        ]);
         let off = Vector3::new(seen.x_m - at.x_m, seen.pa_pa - at.pa_pa, seen.pb_pa - at.pb_pa);
         let noise = slopes * Matrix3::from_diagonal(&known.variances) * slopes.transpose();
         Self {

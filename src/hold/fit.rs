@@ -6,14 +6,13 @@
 //! (errors in variables by Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
 
 use super::equations::{Known, Normal, Unknowns};
-use super::nodes::{Cooling, Search};
-use super::profile::Profile;
+use super::profile::{Cooling, Profile, Search};
 use super::recorder::{Held, LEAST_READINGS, Reading};
 use crate::presence::{
     Found, LEAK_UNIT_M3SPA, LEAST_INFORMATION, LeakLikelihood, Place, Pressures, RESOLUTION,
 };
 use crate::rig::Rig;
-use nalgebra::{Matrix4, Vector2, Vector3, Vector4};
+use nalgebra::{Vector2, Vector3, Vector4};
 use pitchleak_core::Estimate;
 
 /// Rounds in all, and those of them in which κ is held.
@@ -120,20 +119,14 @@ fn known(rig: &Rig, declared_ppa: f64) -> Known<'_> {
 pub(super) fn solve(normal: &Normal, is_held: bool) -> Option<Unknowns> {
     let Normal { mut information, mut right, .. } = *normal;
     if is_held {
-        for other in 1..4 {
-            information[(0, other)] = 0.0;
-            information[(other, 0)] = 0.0;
-        }
+        information.row_mut(0).fill(0.0);
+        information.column_mut(0).fill(0.0);
         (information[(0, 0)], right[0]) = (1.0, 0.0);
     }
-    Some(factor(&information)?.solve(&right))
-}
-
-/// A leak that nothing tells of has next to no information, but never less than none.
-fn factor(information: &Matrix4<f64>) -> Option<nalgebra::Cholesky<f64, nalgebra::U4>> {
+    // A leak that nothing tells of has next to no information, but never less than none.
     let least = LEAST_INFORMATION + RESOLUTION * information.trace();
-    let ridge = Matrix4::from_diagonal(&Vector4::new(0.0, least, least, least));
-    (information + ridge).cholesky()
+    (1..4).for_each(|leak| information[(leak, leak)] += least);
+    Some(information.cholesky()?.solve(&right))
 }
 
 /// A leak's volume has the noise of the pressures summed over the hold, C σ √(T h), beside κ V σ of a reading: squares of both.
@@ -153,19 +146,13 @@ fn of_leak(rig: &Rig, holds: &[&Held], kappa_ppa: f64, leaks: &Vector3<f64>) -> 
 /// Running means over a tenth of the hold, turned about its end points where it ends.
 pub(super) fn running_means(readings: &[Reading]) -> Vec<Reading> {
     let reach = (readings.len() / 20).max(1).min(readings.len() - 1) as isize;
+    let vector = |k: isize| {
+        let r = &readings[k as usize];
+        Vector3::new(r.x_m, r.pa_pa, r.pb_pa)
+    };
     let at = |index: isize| -> Vector3<f64> {
-        let last = readings.len() as isize - 1;
-        let vector = |k: isize| {
-            let r = &readings[k as usize];
-            Vector3::new(r.x_m, r.pa_pa, r.pb_pa)
-        };
-        if index < 0 {
-            2.0 * vector(0) - vector(-index)
-        } else if index > last {
-            2.0 * vector(last) - vector(2 * last - index)
-        } else {
-            vector(index)
-        }
+        let within = index.clamp(0, readings.len() as isize - 1);
+        2.0 * vector(within) - vector(2 * within - index)
     };
     let count = (2 * reach + 1) as f64;
     let mut sum: Vector3<f64> = (-reach..=reach).map(&at).sum();

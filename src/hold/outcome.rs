@@ -1,8 +1,9 @@
-//! What a hold test found.
+//! What a hold test found, and its report.
 
 use super::fit::{Fit, fit, usable};
 use super::recorder::{EndedBy, Held, Recorder};
-use crate::presence::FoundLeak;
+use crate::presence::{self, FoundLeak};
+use crate::report::{ReplayReport, Status, TraceSummary};
 use crate::rig::Rig;
 use pitchleak_core::PerLeak;
 use serde::Serialize;
@@ -38,7 +39,7 @@ impl Recorder {
 
     /// The hold test that has ended since this was asked last; none where none did.
     pub fn ended(&mut self, rig: &Rig) -> Option<HoldTest> {
-        HoldTest::of(&self.take_ended(), rig)
+        HoldTest::of(&std::mem::take(&mut self.done), rig)
     }
 }
 
@@ -59,6 +60,18 @@ impl HoldTest {
     /// How much of it was usable, and what it could find.
     pub fn summary(&self) -> &HoldSummary {
         &self.summary
+    }
+
+    /// Whether a report on holds is worth telling: where the spool shuts the ports by itself it often rests, and mostly too shortly.
+    pub(crate) fn tells(report: &ReplayReport, rig: &Rig) -> bool {
+        report.verdict.status != Status::NotSure
+            || rig.valve.as_ref().is_none_or(|valve| valve.shut_below.is_none())
+    }
+
+    /// The report on a trace that is a hold test.
+    pub fn report(&self, trace: TraceSummary, rig: &Rig) -> ReplayReport {
+        let found = self.fit.as_ref().map(|fit| &fit.found);
+        presence::report(trace, rig, found, self.verdict(rig), Some(self.summary))
     }
 }
 

@@ -69,7 +69,7 @@ pub struct Recorder {
     now: Option<Held>,
     /// Over: what follows until a port opens is not usable.
     is_over: bool,
-    done: Vec<Held>,
+    pub(super) done: Vec<Held>,
     was_shut: bool,
 }
 
@@ -153,11 +153,6 @@ impl Recorder {
     pub fn keep_last(&mut self) {
         let first = self.done.len().saturating_sub(1);
         self.done.drain(..first);
-    }
-
-    /// The holds that have ended since they were asked for last.
-    pub(super) fn take_ended(&mut self) -> Vec<Held> {
-        std::mem::take(&mut self.done)
     }
 }
 

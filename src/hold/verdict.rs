@@ -1,12 +1,13 @@
-//! What a technician acts on after a hold test.
+//! What a technician acts on after a hold test, or where there is neither that nor a flow meter.
 
 use super::fit::Fit;
 use super::outcome::HoldTest;
 use super::recorder::EndedBy;
 use crate::channels::ChannelFaultKind;
 use crate::presence::{Wording, told};
-use crate::report::{Reason, ReasonId, Status, Verdict, join};
+use crate::report::{Reason, ReasonId, ReplayReport, Status, Verdict, capital, join};
 use crate::rig::Rig;
+use crate::trace::TraceQuality;
 use crate::units::readable;
 use pitchleak_core::Leak;
 
@@ -127,4 +128,28 @@ fn which_way() -> Reason {
         "oil leaks, but the hold does not tell which way",
         "hold longer, or again under another load",
     )
+}
+
+const ADVICE: &str = "no flow is recorded: shut both ports for ten seconds and record it in a column `shut` (a hold test), record the valve's spool and the supply pressure (docs/valve.md), or the flow into a chamber";
+const DECLARE: &str = "no flow is recorded, but a valve's spool is: declare the valve in the rig file ([valve] with rated_flow and rated_drop), or shut both ports for ten seconds and record it in a column `shut` (a hold test)";
+const SUPPLY: &str = "no flow is recorded, and the valve's spool tells nothing without its supply pressure: record it (`ps_bar`), or declare it ([valve] supply); a stream also needs the valve calibrated (`pitchleak calibrate`)";
+
+/// A trace without any flow tells nothing of leaks, however long it is: says so, and what would.
+pub fn advise(report: &mut ReplayReport, quality: &TraceQuality, has_spool: bool, rig: &Rig) {
+    let advice = match (has_spool, &rig.valve) {
+        (false, _) => ADVICE,
+        (true, None) => DECLARE,
+        (true, Some(_)) => SUPPLY,
+    };
+    let has_flow = quality.flow_rests.iter().any(|rests| *rests < quality.rows);
+    if has_flow || report.hold.is_some() {
+        return;
+    }
+    let told = |advice: &str| capital(advice) + ".";
+    let verdict = &mut report.verdict;
+    for reason in verdict.reasons.iter_mut().filter(|reason| reason.id == ReasonId::NotIdentifiable) {
+        if let Some(before) = reason.suggestion.replace(advice.to_owned()) {
+            verdict.text = verdict.text.replace(&told(&before), &told(advice));
+        }
+    }
 }

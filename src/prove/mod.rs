@@ -140,7 +140,7 @@ pub fn prove<'a, E: From<ProveError>>(
     sizes_lpm: &PerLeak<Vec<f64>>,
     mut step: impl FnMut(),
 ) -> Result<Proof, E> {
-    let trial = Trial::of(&open, rig)?;
+    let trial = Trial::of(open, rig)?;
     let asked = sizes_lpm.iter().any(|(_, sizes)| !sizes.is_empty());
     let mut cases = Vec::new();
     let mut found_from = PerLeak::<Least>::default();
@@ -153,10 +153,10 @@ pub fn prove<'a, E: From<ProveError>>(
         let usual = USUAL_SIZES.map(|times| times * threshold_lpm);
         let sizes: &[f64] = if asked { &sizes_lpm[leak] } else { &usual };
         for size_lpm in sizes {
-            cases.push(trial.put_in(&open, leak, *size_lpm)?);
+            cases.push(trial.put_in(leak, *size_lpm)?);
             step();
         }
-        found_from[leak] = trial.least(&open, leak, threshold_lpm, &mut step)?;
+        found_from[leak] = trial.least(leak, threshold_lpm, &mut step)?;
     }
     let ReplayReport { trace, rig, verdict, leakage, .. } = trial.recorded;
     Ok(Proof {
@@ -208,7 +208,9 @@ impl Drive {
 }
 
 /// A trace into which leaks are put.
-struct Trial<'r> {
+struct Trial<'r, F> {
+    /// Opens it from its begin.
+    open: F,
     rig: &'r Rig,
     recorded: ReplayReport,
     onset_s: f64,
@@ -220,11 +222,8 @@ struct Trial<'r> {
     bounds: Vec<(f64, PerLeak<Option<f64>>)>,
 }
 
-impl<'r> Trial<'r> {
-    fn of<'a, E: From<ProveError>>(
-        open: &impl Fn() -> Result<TraceReader<'a>, E>,
-        rig: &'r Rig,
-    ) -> Result<Self, E> {
+impl<'r, 'a, E: From<ProveError>, F: Fn() -> Result<TraceReader<'a>, E>> Trial<'r, F> {
+    fn of(open: F, rig: &'r Rig) -> Result<Self, E> {
         let mut reader = open()?;
         let has_flow = [Signal::FlowA, Signal::FlowB].map(|flow| reader.has(flow));
         let mut first_s = None;
@@ -240,15 +239,17 @@ impl<'r> Trial<'r> {
             return Err(ProveError::NoFlows(recorded.trace.path).into());
         }
         let onset_s = first_s.unwrap_or(0.0) + ONSET_SHARE * recorded.trace.duration_s;
-        let mut trial =
-            Self { rig, recorded, onset_s, drives: PerLeak::default(), has_flow, bounds: Vec::new() };
-        trial.follow(&mut open()?).map_err(ProveError::from)?;
+        let drives = PerLeak::default();
+        let mut trial = Self { open, rig, recorded, onset_s, drives, has_flow, bounds: Vec::new() };
+        trial.follow(&mut (trial.open)()?).map_err(ProveError::from)?;
         Ok(trial)
     }
 
     /// Follows pressures and bound through the trace as it was recorded.
     fn follow(&mut self, reader: &mut TraceReader<'_>) -> Result<(), ReplayError> {
-        let (mut bound, mut record) = (self.bound(), Record::default());
+        let duration_s = self.recorded.trace.duration_s;
+        let mut bound = Bound::new(self.rig, self.onset_s, duration_s);
+        let mut record = Record::default();
         let mut next_s = self.onset_s;
         while reader.next_record(&mut record)? {
             bound.add(&record);
@@ -276,10 +277,6 @@ impl<'r> Trial<'r> {
         if drive.gain() > 0.5 { drive.mean_size } else { drive.mean.abs() }
     }
 
-    fn bound(&self) -> Bound<'r> {
-        Bound::new(self.rig, self.onset_s, self.recorded.trace.duration_s)
-    }
-
     /// Why no such leak can be put in; none where one can.
     fn hidden(&self, leak: Leak) -> Option<&'static str> {
         let noise_pa = self.rig.sensors().pressure.noise_std;
@@ -293,12 +290,12 @@ impl<'r> Trial<'r> {
     }
 
     /// The trace with a leak of this mean size put in.
-    fn with_leak<'a>(&self, reader: TraceReader<'a>, leak: Leak, size_lpm: f64) -> TraceReader<'a> {
+    fn with_leak(&self, leak: Leak, size_lpm: f64) -> Result<TraceReader<'a>, E> {
         let coefficient = size_lpm / LPM_PER_M3S / self.pressure_pa(leak).max(1.0);
         let (onset_s, drive) = (self.onset_s, self.drives[leak]);
         let sheets = &self.rig.instruments;
         let full_m3s = [sheets.flow_a.full_scale, sheets.flow_b.full_scale];
-        reader.with_flows(Box::new(move |t_s, of_chambers, flows| {
+        Ok((self.open)()?.with_flows(Box::new(move |t_s, of_chambers, flows| {
             if t_s < onset_s {
                 return flows;
             }
@@ -317,18 +314,12 @@ impl<'r> Trial<'r> {
                     (flows[side] + added[side]).clamp(-most, most)
                 }
             })
-        }))
+        })))
     }
 
-    fn put_in<'a, E: From<ProveError>>(
-        &self,
-        open: &impl Fn() -> Result<TraceReader<'a>, E>,
-        leak: Leak,
-        size_lpm: f64,
-    ) -> Result<Case, E> {
+    fn put_in(&self, leak: Leak, size_lpm: f64) -> Result<Case, E> {
         let mut course = Vec::new();
-        let mut reader = self.with_leak(open()?, leak, size_lpm);
-        let report = replay(&mut reader, self.rig, |replay, record, renewed| {
+        let report = replay(&mut self.with_leak(leak, size_lpm)?, self.rig, |replay, record, renewed| {
             if renewed {
                 course.push((record.t_s, replay.watched_flows_m3s()[leak].value * LPM_PER_M3S));
             }
@@ -369,13 +360,7 @@ impl<'r> Trial<'r> {
     }
 
     /// The least size that is found, by halving on a scale of ratios.
-    fn least<'a, E: From<ProveError>>(
-        &self,
-        open: &impl Fn() -> Result<TraceReader<'a>, E>,
-        leak: Leak,
-        threshold_lpm: f64,
-        step: &mut impl FnMut(),
-    ) -> Result<Least, E> {
+    fn least(&self, leak: Leak, threshold_lpm: f64, step: &mut impl FnMut()) -> Result<Least, E> {
         let leaks_already = self.recorded.verdict.faults.contains(&leak);
         let std_lpm = self.bound_std_lpm(leak);
         let least_lpm = if leaks_already { 0.0 } else { threshold_lpm };
@@ -383,7 +368,7 @@ impl<'r> Trial<'r> {
         let (mut low, mut high) = (bound_lpm.unwrap_or(threshold_lpm) / 2.0, MOST_THRESHOLDS * threshold_lpm);
         let mut found = |size_lpm: f64| {
             step();
-            Ok::<bool, E>(self.put_in(open, leak, size_lpm)?.found)
+            Ok::<bool, E>(self.put_in(leak, size_lpm)?.found)
         };
         // Doubled up to a size that is found: a leak far above it may not be what the meters can read.
         let mut size_lpm = 2.0 * low;

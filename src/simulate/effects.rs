@@ -26,14 +26,12 @@ pub enum EffectsError {
         source: UnknownEffect,
     },
     /// A leak of the model itself.
-    #[error("`{id}` is a leak of the model, not an effect: use --leak-{leak} (in Python `{argument}`)")]
+    #[error("`{id}` is a leak of the model, not an effect: use --leak-{} (in Python `leak_{}`)", .leak.id().replace('_', "-"), .leak.id())]
     ModelLeak {
         /// As named.
         id: String,
-        /// The leak, as the command line has it.
-        leak: String,
-        /// The leak, as Python has it.
-        argument: String,
+        /// The leak.
+        leak: Leak,
     },
     /// Which of two sizes is meant?
     #[error("`{0}` is given twice")]
@@ -51,11 +49,7 @@ impl EffectSize {
     pub fn new(id: &str, value: f64) -> Result<Self, EffectsError> {
         let own = ["internal_leak", "external_leak_a", "external_leak_b"];
         if let Some((_, leak)) = own.into_iter().zip(Leak::ALL).find(|(name, _)| *name == id) {
-            return Err(EffectsError::ModelLeak {
-                id: id.to_owned(),
-                leak: leak.id().replace('_', "-"),
-                argument: format!("leak_{}", leak.id()),
-            });
+            return Err(EffectsError::ModelLeak { id: id.to_owned(), leak });
         }
         let effect = id.parse().map_err(|source| EffectsError::Unknown { id: id.to_owned(), source })?;
         Ok(Self { effect, value })

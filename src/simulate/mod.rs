@@ -23,7 +23,7 @@ pub use sensing::{Biases, Normal, Sensing};
 pub use sensor_fault::{SensorFault, SensorFaults};
 pub use span::{Span, SpanError};
 pub use valve::{ValveFlaw, ValveFlawError, ValveTruth};
-pub use writer::{Columns, Reading, Row, TraceLayout, TraceWriter};
+pub use writer::{Columns, Reading, TraceLayout, TraceWriter};
 
 use crate::Rig;
 use crate::reference::Reference;
@@ -106,6 +106,8 @@ pub enum SimulateError {
     Stopped,
 }
 
+/// Time for which the loops run before a trace begins, s.
+const WARM_UP_S: f64 = 10.0;
 /// Longest step between two looks at the reference, s; the emulator divides it further.
 const STEP_S: f64 = 1e-3;
 /// Coefficients of a leak given by its mean flow are found on this much of a run, s.
@@ -129,7 +131,7 @@ impl Scenario {
             effects: EffectSet::default(),
             valve_flaws: Vec::new(),
             start_s: 10.0,
-            warm_up_s: 10.0,
+            warm_up_s: WARM_UP_S,
             duration_s: 60.0,
             sample_rate_hz: 100.0,
         }

@@ -1,6 +1,6 @@
 use super::{
     Biases, EffectSize, EffectsError, LeakCourse, LeakCourseError, OilTemperature, OilTemperatureError,
-    Recording, Scenario, SensorFault, Span, ValveFlaw, effects,
+    Recording, Scenario, SensorFault, Span, ValveFlaw, WARM_UP_S, effects,
 };
 use crate::Rig;
 use crate::output::Inputs;
@@ -12,8 +12,6 @@ use pitchleak_core::PerLeak;
 use std::fmt;
 use std::path::Path;
 
-/// Time for which the loops run before a trace begins, s.
-const WARM_UP_S: f64 = 10.0;
 /// Length of a trace where nothing says another, s.
 const DURATION_S: f64 = 60.0;
 
@@ -73,10 +71,10 @@ impl std::str::FromStr for Noise {
         match text {
             "none" => Ok(Self::None),
             "rig" => Ok(Self::Rig),
-            _ => match share_of_full_scale(text) {
-                Ok(share) => Ok(Self::Share(share)),
-                Err(error) => Err(format!("{error}; or `none`, or `rig`")),
-            },
+            _ => {
+                let share = share_of_full_scale(text).map(Self::Share);
+                share.map_err(|error| format!("{error}; or `none`, or `rig`"))
+            }
         }
     }
 }
@@ -190,15 +188,13 @@ impl Plan {
             scenario: Scenario {
                 effects: effects(&rig, &self.effects)?,
                 valve_flaws: self.valve_flaws.clone(),
-                rig,
                 leaks: leaks.map(|leak| leak.within_trace(duration_s)),
                 oil_temperature: oil_temperature.transpose()?,
                 shut: self.shut,
                 start_s,
-                warm_up_s: WARM_UP_S,
                 duration_s,
                 sample_rate_hz: self.sample_rate_hz,
-                reference,
+                ..Scenario::new(rig, reference)
             },
         })
     }
@@ -225,7 +221,7 @@ pub enum Followed {
 }
 
 impl Followed {
-    pub(super) fn reference(&self, rig: &Rig) -> Result<Reference, PlanError> {
+    fn reference(&self, rig: &Rig) -> Result<Reference, PlanError> {
         match self {
             Self::Wind(wind, emulation) => {
                 Ok(emulation.reference(&History::of(wind)?, rig.cylinder.stroke_m)?)
@@ -248,11 +244,9 @@ impl Followed {
             }
         }
     }
-}
 
-impl Followed {
     /// What may be the path of a file.
-    pub(super) fn files(&self) -> Vec<&Path> {
+    fn files(&self) -> Vec<&Path> {
         match self {
             Self::Wind(Wind::File(path), _) => vec![path],
             Self::Wind(..) => Vec::new(),

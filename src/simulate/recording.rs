@@ -1,7 +1,7 @@
 use super::valve::ValveSensors;
 use super::writer::Columns;
 use super::{
-    Biases, Opening, Reading, Row, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
+    Biases, Opening, Reading, Scenario, Sensing, SensorFault, SensorFaults, SimulateError, TraceLayout,
     TraceWriter,
 };
 use crate::output::{self, Inputs, OutputError, OutputFile};
@@ -99,11 +99,8 @@ pub struct LeakTruth {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// A file of another kind.
-    #[error("{path}: a simulated trace is written as .csv or .csv.gz, or to `-` (standard output)", path = path.display())]
-    Kind {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{path}: a simulated trace is written as .csv or .csv.gz, or to `-` (standard output)", path = .0.display())]
+    Kind(PathBuf),
     /// The simulation.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
@@ -171,7 +168,7 @@ impl Recording {
                 .map_err(RecordingError::StandardOutput);
         }
         if !name.ends_with(".csv") && !name.ends_with(".csv.gz") {
-            return Err(RecordingError::Kind { path: path.to_owned() });
+            return Err(RecordingError::Kind(path.to_owned()));
         }
         let mut trace = OutputFile::create(path, &self.inputs)?;
         let mut beside = OutputFile::create(truth_path(path), &self.inputs)?;
@@ -194,7 +191,7 @@ impl Recording {
             Err(error) => return Ok(Err(error)),
         };
         let mut failure = None;
-        let truth = self.run(&leaks_m3spa, done, |row| {
+        let truth = self.run(leaks_m3spa, done, |row| {
             failure = writer.row(row).err();
             failure.is_none()
         })?;
@@ -211,8 +208,7 @@ impl Recording {
     ) -> Result<(Columns, TruthFile), RecordingError> {
         let layout = TraceLayout::of(&self.scenario);
         let mut columns = layout.columns();
-        let leaks_m3spa = self.scenario.leak_coefficients()?;
-        let truth = self.run(&leaks_m3spa, done, |row| {
+        let truth = self.run(self.scenario.leak_coefficients()?, done, |row| {
             layout.push(row, &mut columns);
             true
         })?;
@@ -222,9 +218,9 @@ impl Recording {
     /// Hands each row to `each` until that has had enough.
     fn run(
         &self,
-        leaks_m3spa: &PerLeak<f64>,
+        leaks_m3spa: PerLeak<f64>,
         mut done: impl FnMut(f64) -> ControlFlow<()>,
-        mut each: impl FnMut(&Row) -> bool,
+        mut each: impl FnMut(&Reading) -> bool,
     ) -> Result<TruthFile, SimulateError> {
         let Self { scenario, instruments, biases, sensor_faults, seed, .. } = self;
         let mut sensing = Sensing::new(instruments.spread(), *biases, *seed);
@@ -233,12 +229,11 @@ impl Recording {
         let mut valve_sensors = ValveSensors::of(rig, instruments, &scenario.valve_flaws, *seed);
         let mut totals = Totals::default();
         let mut stopped = false;
-        scenario.run_while(*leaks_m3spa, |truth| {
+        scenario.run_while(leaks_m3spa, |truth| {
             let valve =
                 valve_sensors.as_mut().and_then(|sensors| sensors.read(truth, truth.t_s / duration_s));
-            let honest = Reading { valve, ..Reading::at(truth, sensing.read(&truth.sample)) };
-            let shown = faults.show(&honest);
-            if shown.is_some_and(|shown| !each(&Row::new(truth, shown))) {
+            let shown = faults.show(&Reading::at(truth, &sensing.read(&truth.sample), valve));
+            if shown.is_some_and(|row| !each(&row)) {
                 return false;
             }
             totals.rows += u64::from(shown.is_some());
@@ -255,10 +250,10 @@ impl Recording {
         Ok(self.truth(leaks_m3spa, &totals))
     }
 
-    fn truth(&self, leaks_m3spa: &PerLeak<f64>, totals: &Totals) -> TruthFile {
+    fn truth(&self, leaks_m3spa: PerLeak<f64>, totals: &Totals) -> TruthFile {
         let Self { followed, scenario, instruments, biases, sensor_faults, seed, .. } = self;
         let noise = instruments.spread();
-        let leaky = scenario.leaks.zip(*leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
+        let leaky = scenario.leaks.zip(leaks_m3spa).into_iter().filter(|(_, (_, most))| *most > 0.0);
         let onset_s = leaky.map(|(_, (leak, _))| leak.opening.onset_s()).reduce(f64::min).unwrap_or(0.0);
         let count = totals.samples.max(1) as f64;
         TruthFile {

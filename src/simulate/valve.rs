@@ -110,12 +110,11 @@ impl ValveSensors {
         let mut shown = valve;
         for flaw in &self.flaws {
             match *flaw {
-                ValveFlaw::Clearance(_) => {}
                 ValveFlaw::Hysteresis(half) if half > 0.0 => {
                     self.play = (self.play + moved / half).clamp(-1.0, 1.0);
                     shown.spool += half * self.play;
                 }
-                ValveFlaw::Hysteresis(_) => {}
+                ValveFlaw::Hysteresis(_) | ValveFlaw::Clearance(_) => {}
                 ValveFlaw::Drift(drift) => shown.spool += drift * share,
                 ValveFlaw::Droop(droop_pa) => shown.supply_pa += droop_pa * drawn_m3s / self.rated_flow_m3s,
             }

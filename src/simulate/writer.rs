@@ -1,93 +1,63 @@
 use super::{Scenario, Truth, ValveTruth};
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
-use pitchleak_core::{PerLeak, Sample};
+use pitchleak_core::Sample;
 use std::io::{self, Write};
 
 /// One column of a simulated trace.
 #[derive(Clone, Copy, Debug)]
 struct Column {
+    signal: Signal,
     header: &'static str,
     /// Rounding stays below any sensor (10 nm, 1 Pa, 1e-6 L/min, 1 mN). Times are shares of a second: rounding to
     /// 1 ns shows them as they are.
     decimals: usize,
-    /// NaN where there is no reading.
-    value: fn(&Row) -> f64,
+    /// From SI to the header's unit.
+    in_unit: fn(f64) -> f64,
 }
 
-/// What a row of a simulated trace is made of.
-#[derive(Clone, Copy, Debug)]
-pub struct Row {
-    /// What sensors and clock show.
-    pub shown: Reading,
-    /// Whether both ports are shut, where there is a hold.
-    pub is_shut: Option<bool>,
-    /// The true leak flows, m³/s.
-    pub leaks_m3s: PerLeak<f64>,
-}
-
-impl Row {
-    /// The reading of an instant, with its leak flows.
-    pub fn new(truth: &Truth, shown: Reading) -> Self {
-        Self { shown, is_shut: truth.is_shut, leaks_m3s: truth.leaks_m3s }
-    }
-}
-
-fn or_nan(reading: Option<f64>, per_unit: f64) -> f64 {
-    reading.map_or(f64::NAN, |value| value * per_unit)
+const fn column(signal: Signal, header: &'static str, decimals: usize, in_unit: fn(f64) -> f64) -> Column {
+    Column { signal, header, decimals, in_unit }
 }
 
 const READINGS: [Column; 7] = [
-    Column { header: "t_s", decimals: 9, value: |row| row.shown.t_s },
-    Column { header: "x_mm", decimals: 5, value: |row| row.shown.sample.x_m * 1e3 },
-    Column { header: "pa_bar", decimals: 5, value: |row| row.shown.sample.pa_pa / 1e5 },
-    Column { header: "pb_bar", decimals: 5, value: |row| row.shown.sample.pb_pa / 1e5 },
-    Column { header: "qa_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qa_m3s, LPM_PER_M3S) },
-    Column { header: "qb_lpm", decimals: 6, value: |row| or_nan(row.shown.sample.qb_m3s, LPM_PER_M3S) },
-    Column { header: "force_n", decimals: 3, value: |row| or_nan(row.shown.sample.force_n, 1.0) },
+    column(Signal::Time, "t_s", 9, |s| s),
+    column(Signal::Position, "x_mm", 5, |m| m * 1e3),
+    column(Signal::PressureA, "pa_bar", 5, |pa| pa / 1e5),
+    column(Signal::PressureB, "pb_bar", 5, |pa| pa / 1e5),
+    column(Signal::FlowA, "qa_lpm", 6, lpm),
+    column(Signal::FlowB, "qb_lpm", 6, lpm),
+    column(Signal::Force, "force_n", 3, |n| n),
 ];
-const TEMPERATURE: Column =
-    Column { header: "temp_c", decimals: 3, value: |row| row.shown.temp_k.map_or(f64::NAN, |k| k - 273.15) };
-const SHUT: Column = Column {
-    header: "shut",
-    decimals: 0,
-    value: |row| row.is_shut.map_or(f64::NAN, |is| f64::from(u8::from(is))),
-};
+const TEMPERATURE: Column = column(Signal::Temperature, "temp_c", 3, |k| k - 273.15);
+const SHUT: Column = column(Signal::Shut, "shut", 0, |is| is);
 const VALVE: [Column; 3] = [
-    Column {
-        header: "spool_percent",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.spool), 100.0),
-    },
-    Column {
-        header: "valve_command_percent",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.command), 100.0),
-    },
-    Column {
-        header: "ps_bar",
-        decimals: 5,
-        value: |row| or_nan(row.shown.valve.map(|valve| valve.supply_pa), 1e-5),
-    },
+    column(Signal::Spool, "spool_percent", 5, |share| share * 100.0),
+    column(Signal::Command, "valve_command_percent", 5, |share| share * 100.0),
+    column(Signal::Supply, "ps_bar", 5, |pa| pa * 1e-5),
 ];
 const LEAKS: [Column; 3] = [
-    Column { header: "q_int_lpm", decimals: 6, value: |row| row.leaks_m3s.internal * LPM_PER_M3S },
-    Column { header: "q_ext_a_lpm", decimals: 6, value: |row| row.leaks_m3s.external_a * LPM_PER_M3S },
-    Column { header: "q_ext_b_lpm", decimals: 6, value: |row| row.leaks_m3s.external_b * LPM_PER_M3S },
+    column(Signal::LeakInternal, "q_int_lpm", 6, lpm),
+    column(Signal::LeakExternalA, "q_ext_a_lpm", 6, lpm),
+    column(Signal::LeakExternalB, "q_ext_b_lpm", 6, lpm),
 ];
+
+fn lpm(m3s: f64) -> f64 {
+    m3s * LPM_PER_M3S
+}
 
 /// Up to here each number of units is a double of its own.
 const MOST_UNITS: f64 = 9e15;
 
 impl Column {
     /// The double nearest to the rounded decimal number: what a reader of its text gets.
-    fn rounded(&self, row: &Row) -> f64 {
+    fn rounded(&self, row: &Reading) -> f64 {
         self.units(row) / self.scale()
     }
 
-    /// The value in units of its last decimal.
-    fn units(&self, row: &Row) -> f64 {
-        ((self.value)(row) * self.scale()).round()
+    /// The value in units of its last decimal; NaN where there is none.
+    fn units(&self, row: &Reading) -> f64 {
+        (row.get(self.signal).map_or(f64::NAN, self.in_unit) * self.scale()).round()
     }
 
     fn scale(&self) -> f64 {
@@ -95,7 +65,7 @@ impl Column {
     }
 
     /// Its text, digit by digit: a third of the time that formatting a float takes, and the same.
-    fn write(&self, row: &Row, out: &mut impl Write) -> io::Result<()> {
+    fn write(&self, row: &Reading, out: &mut impl Write) -> io::Result<()> {
         let units = self.units(row);
         if units.is_nan() {
             return Ok(());
@@ -138,7 +108,7 @@ impl TraceLayout {
     /// `[valve]` has no flow meters.
     pub fn of(scenario: &Scenario) -> Self {
         let has_valve = scenario.rig.valve.is_some();
-        let is_flow = |column: &Column| matches!(column.header, "qa_lpm" | "qb_lpm");
+        let is_flow = |column: &Column| matches!(column.signal, Signal::FlowA | Signal::FlowB);
         let readings = READINGS.into_iter().filter(|column| !(has_valve && is_flow(column)));
         let valve = VALVE.into_iter().filter(|_| has_valve);
         let temperature = scenario.oil_temperature.as_ref().map(|_| TEMPERATURE);
@@ -152,7 +122,7 @@ impl TraceLayout {
     }
 
     /// Adds a row to columns of this layout.
-    pub(super) fn push(&self, row: &Row, columns: &mut Columns) {
+    pub(super) fn push(&self, row: &Reading, columns: &mut Columns) {
         for (column, (_, values)) in self.0.iter().zip(columns) {
             values.push(column.rounded(row));
         }
@@ -183,7 +153,7 @@ impl<W: Write> TraceWriter<W> {
     ///
     /// # Errors
     /// Where the output cannot be written to.
-    pub fn row(&mut self, row: &Row) -> io::Result<()> {
+    pub fn row(&mut self, row: &Reading) -> io::Result<()> {
         for (index, column) in self.layout.0.iter().enumerate() {
             if index > 0 {
                 self.out.write_all(b",")?;
@@ -204,56 +174,45 @@ impl<W: Write> TraceWriter<W> {
     }
 }
 
-/// One row of a recording, as the sensors and the clock have it.
+/// One row of a recording by its signals, SI: what sensors and clock show, and what is true of ports and leaks.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Reading {
-    /// Time since the trace began, s.
-    pub t_s: f64,
-    /// Readings of the cylinder's sensors.
-    pub sample: Sample<f64>,
-    /// Oil temperature, K, where there is a thermometer.
-    pub temp_k: Option<f64>,
-    /// Spool, command and supply, where the rig has `[valve]`.
-    pub valve: Option<ValveTruth>,
-}
+pub struct Reading([Option<f64>; Signal::ALL.len()]);
 
 impl Reading {
-    /// The readings `sample` at an instant.
-    pub fn at(truth: &Truth, sample: Sample<f64>) -> Self {
-        Self { t_s: truth.t_s, sample, temp_k: truth.temp_k, valve: truth.valve }
+    /// An instant of which the sensors show `sample`, and those of the valve `valve`, where the rig has one.
+    pub fn at(truth: &Truth, sample: &Sample<f64>, valve: Option<ValveTruth>) -> Self {
+        let mut row = Self::default();
+        let [x_m, pa_pa, pb_pa, qa_m3s, qb_m3s] = sample.readings();
+        for (signal, value) in [
+            (Signal::Time, Some(truth.t_s)),
+            (Signal::Position, x_m),
+            (Signal::PressureA, pa_pa),
+            (Signal::PressureB, pb_pa),
+            (Signal::FlowA, qa_m3s),
+            (Signal::FlowB, qb_m3s),
+            (Signal::Force, sample.force_n),
+            (Signal::Temperature, truth.temp_k),
+            (Signal::Spool, valve.map(|valve| valve.spool)),
+            (Signal::Command, valve.map(|valve| valve.command)),
+            (Signal::Supply, valve.map(|valve| valve.supply_pa)),
+            (Signal::Shut, truth.is_shut.map(|is| f64::from(u8::from(is)))),
+            (Signal::LeakInternal, Some(truth.leaks_m3s.internal)),
+            (Signal::LeakExternalA, Some(truth.leaks_m3s.external_a)),
+            (Signal::LeakExternalB, Some(truth.leaks_m3s.external_b)),
+        ] {
+            row.set(signal, value);
+        }
+        row
     }
 
     /// What a channel shows; none where it shows nothing or is not recorded.
     pub fn get(&self, channel: Signal) -> Option<f64> {
-        let Self { t_s, sample, temp_k, .. } = self;
-        match channel {
-            Signal::Time => Some(*t_s),
-            Signal::Position => Some(sample.x_m),
-            Signal::PressureA => Some(sample.pa_pa),
-            Signal::PressureB => Some(sample.pb_pa),
-            Signal::FlowA => sample.qa_m3s,
-            Signal::FlowB => sample.qb_m3s,
-            Signal::Force => sample.force_n,
-            Signal::Temperature => *temp_k,
-            _ => None,
-        }
+        self.0[channel as usize]
     }
 
-    /// Makes a channel show something else; a channel that every row must have becomes NaN for nothing.
+    /// Makes a channel show something else, or nothing.
     pub fn set(&mut self, channel: Signal, value: Option<f64>) {
-        let Self { t_s, sample, temp_k, .. } = self;
-        let needed = value.unwrap_or(f64::NAN);
-        match channel {
-            Signal::Time => *t_s = needed,
-            Signal::Position => sample.x_m = needed,
-            Signal::PressureA => sample.pa_pa = needed,
-            Signal::PressureB => sample.pb_pa = needed,
-            Signal::FlowA => sample.qa_m3s = value,
-            Signal::FlowB => sample.qb_m3s = value,
-            Signal::Force => sample.force_n = value,
-            Signal::Temperature => *temp_k = value,
-            _ => {}
-        }
+        self.0[channel as usize] = value;
     }
 }
 
@@ -267,12 +226,12 @@ mod tests {
         let values = [0.0, -0.0, -1e-9, 9.999_999_7, -0.05, 123_456.789, 4e9, -7e14, 3e300, 0.1 + 0.2];
         for decimals in [0, 3, 5, 6, 9] {
             for value in values {
-                let column = Column { header: "", decimals, value: |row| row.leaks_m3s.internal };
-                let leaks_m3s = PerLeak { internal: value, ..PerLeak::default() };
-                let row = Row { shown: Reading::default(), is_shut: None, leaks_m3s };
-                let mut text = Vec::new();
+                let column = column(Signal::Time, "", decimals, |s| s);
+                let (mut row, mut text) = (Reading::default(), Vec::new());
+                row.set(Signal::Time, Some(value));
                 column.write(&row, &mut text).unwrap();
-                assert_eq!(String::from_utf8(text).unwrap(), format!("{:.decimals$}", column.rounded(&row)));
+                let rounded = column.rounded(&row);
+                assert_eq!(String::from_utf8(text).unwrap(), format!("{rounded:.decimals$}"));
             }
         }
     }

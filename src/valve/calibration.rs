@@ -30,11 +30,8 @@ impl LeaksThen {
 
     /// By one of [`Self::NAMES`].
     pub fn by_name(name: &str) -> Option<Self> {
-        [Self::Zero, Self::Unknown]
-            .into_iter()
-            .zip(Self::NAMES)
-            .find(|(_, own)| *own == name)
-            .map(|(then, _)| then)
+        let place = Self::NAMES.iter().position(|own| *own == name);
+        place.map(|place| [Self::Zero, Self::Unknown][place])
     }
 }
 
@@ -81,31 +78,22 @@ pub struct Calibration {
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The rig has no `[valve]`.
-    #[error("{rig} has no [valve]: give at least its rated_flow and rated_drop")]
-    NoValve {
-        /// The rig's name.
-        rig: String,
-    },
+    #[error("{0} has no [valve]: give at least its rated_flow and rated_drop")]
+    NoValve(String),
     /// A trace cannot be read.
     #[error(transparent)]
     Trace(#[from] TraceError),
     /// A trace has no spool or no supply pressure.
     #[error(
-        "{trace}: no row has a spool position (`spool_percent`) and a supply pressure (`ps_bar`, or `supply` in [valve])"
+        "{0}: no row has a spool position (`spool_percent`) and a supply pressure (`ps_bar`, or `supply` in [valve])"
     )]
-    NoSpool {
-        /// The trace's name.
-        trace: String,
-    },
+    NoSpool(String),
     /// The traces are too short, or nothing fits them.
     #[error("the traces say nothing of the valve: record a minute or more, in motion and both ways")]
     Nothing,
-    /// A leak set in while it was recorded.
-    #[error("a leak changed {at_s:.0} s into the traces: calibrate with traces in which nothing changes")]
-    LeakChanged {
-        /// When, s.
-        at_s: f64,
-    },
+    /// A leak set in while it was recorded: when, s.
+    #[error("a leak changed {0:.0} s into the traces: calibrate with traces in which nothing changes")]
+    LeakChanged(f64),
     /// A trace that was to show that nothing leaks does not.
     #[error("{trace} is no evidence that nothing leaks: {text}")]
     NoEvidence {
@@ -134,11 +122,8 @@ pub enum CalibrationError {
     #[error("the calibration has no TOML form: {0}")]
     Form(#[from] toml::ser::Error),
     /// The file is of another rig.
-    #[error("{}: made for another rig: areas, stroke, volumes or the valve's rated flow differ; calibrate anew", file.display())]
-    OtherRig {
-        /// The file.
-        file: PathBuf,
-    },
+    #[error("{}: made for another rig: areas, stroke, volumes or the valve's rated flow differ; calibrate anew", .0.display())]
+    OtherRig(PathBuf),
 }
 
 const SCHEMA: &str = "pitchleak.valve/1";
@@ -148,8 +133,6 @@ const LEAK_IN_CLEARANCE: f64 = 1.0;
 /// Calibrates the valve of a rig with traces of it.
 #[derive(Clone, Debug)]
 pub struct Calibrator {
-    rig: Rig,
-    sheet: ValveSheet,
     leaks: LeaksThen,
     meter: ValveMeter,
     traces: Vec<String>,
@@ -162,9 +145,9 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::NoValve`].
     pub fn new(rig: &Rig, leaks: LeaksThen) -> Result<Self, CalibrationError> {
-        let sheet = rig.valve.clone().ok_or_else(|| CalibrationError::NoValve { rig: rig.name.clone() })?;
-        let meter = ValveMeter::with(rig, &sheet, before(rig, &sheet, leaks), None);
-        Ok(Self { rig: rig.clone(), sheet, leaks, meter, traces: Vec::new(), evidence: None })
+        let sheet = rig.valve.as_ref().ok_or_else(|| CalibrationError::NoValve(rig.name.clone()))?;
+        let meter = ValveMeter::with(rig, sheet, before(rig, sheet, leaks), None);
+        Ok(Self { leaks, meter, traces: Vec::new(), evidence: None })
     }
 
     /// Takes in a trace of this rig.
@@ -172,7 +155,7 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::Trace`], [`CalibrationError::NoSpool`].
     pub fn read(&mut self, reader: &mut TraceReader<'_>) -> Result<(), CalibrationError> {
-        reader.need_both_pressures(&self.rig.columns)?;
+        reader.need_both_pressures(&self.meter.rig.columns)?;
         let mut record = Record::default();
         let (mut is_first, mut rows) = (true, 0);
         while reader.next_record(&mut record)? {
@@ -180,7 +163,7 @@ impl Calibrator {
             rows += usize::from(self.meter.push(&record));
         }
         self.traces.push(reader.name().to_owned());
-        if rows > 0 { Ok(()) } else { Err(CalibrationError::NoSpool { trace: reader.name().to_owned() }) }
+        if rows > 0 { Ok(()) } else { Err(CalibrationError::NoSpool(reader.name().to_owned())) }
     }
 
     /// Rests the calibration on a hold test that shows that nothing leaks.
@@ -203,7 +186,7 @@ impl Calibrator {
     pub fn finish(mut self) -> Result<Calibration, CalibrationError> {
         let taken = self.meter.taken().ok_or(CalibrationError::Nothing)?;
         if let Some(at_s) = taken.changed_at_s {
-            return Err(CalibrationError::LeakChanged { at_s });
+            return Err(CalibrationError::LeakChanged(at_s));
         }
         let covariance = taken.summary.belief.covariance().ok_or(CalibrationError::Nothing)?;
         let widened = covariance * taken.summary.noise.max(1.0);
@@ -212,7 +195,7 @@ impl Calibrator {
             date: Zoned::now().date(),
             leaks: self.leaks,
             evidence: self.evidence,
-            rig: rig_hash(&self.rig, &self.sheet),
+            rig: rig_hash(&self.meter.rig, &self.meter.sheet),
             seconds: taken.summary.pressures.time_s,
             spool_range: self.meter.spool_range().ok_or(CalibrationError::Nothing)?,
             scatter: taken.summary.noise.sqrt(),
@@ -338,7 +321,7 @@ pub(super) fn of_rig(rig: &Rig, sheet: &ValveSheet) -> Result<Option<Calibration
     let beside = rig.file().and_then(Path::parent).unwrap_or(Path::new(""));
     let file = beside.join(name);
     let found = Calibration::load(&file)?;
-    if found.rig == rig_hash(rig, sheet) { Ok(Some(found)) } else { Err(CalibrationError::OtherRig { file }) }
+    if found.rig == rig_hash(rig, sheet) { Ok(Some(found)) } else { Err(CalibrationError::OtherRig(file)) }
 }
 
 /// A checksum over the numbers that a calibration depends on.

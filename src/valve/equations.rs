@@ -10,7 +10,7 @@
 //! Every reading stands in two steps, and the spool's noise in both chambers with opposite signs: their covariance G R Gᵀ is block
 //! tridiagonal, of 2 × 2 blocks.
 
-use super::edges::{Flow, PA, PB, Signals, Spool, X, flows};
+use super::edges::{PA, PB, Signals, Spool, X, flows};
 use super::unknowns::{KAPPA, LEAK_UNIT_M3SPA, LEAKS, UNKNOWNS, Unknowns};
 use crate::rig::{Rig, ValveSheet};
 use nalgebra::{Matrix2x5, SMatrix, Vector2};
@@ -89,12 +89,10 @@ impl Rates {
             by_signals: Matrix2x5::zeros(),
             by_unknowns: Slopes::zeros(),
         };
-        let mut take = |row: usize, flow: &Flow| {
+        for (row, flow) in [a, b].iter().enumerate() {
             rates.by_signals.set_row(row, &-flow.by_signals.transpose());
             rates.by_unknowns.set_row(row, &-flow.by_unknowns.transpose());
-        };
-        take(0, &a);
-        take(1, &b);
+        }
         rates.by_signals[(0, PA)] += leaks[0] + leaks[1];
         rates.by_signals[(0, PB)] -= leaks[0];
         rates.by_signals[(1, PA)] -= leaks[0];

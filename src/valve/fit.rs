@@ -38,7 +38,7 @@ const PART_S: f64 = 5.0;
 /// Readings without a pause.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Run {
-    readings: Vec<Node>,
+    pub readings: Vec<Node>,
 }
 
 /// A run on its way to the likeliest signals.
@@ -61,11 +61,6 @@ pub(super) struct Fit {
 }
 
 impl Run {
-    /// Adds a reading at the end.
-    pub fn push(&mut self, reading: Node) {
-        self.readings.push(reading);
-    }
-
     /// The readings from one time up to another, s, as a run of its own.
     pub fn between(&self, from_s: f64, to_s: f64) -> Option<Self> {
         let readings: Vec<Node> =
@@ -79,10 +74,6 @@ impl Run {
             [first, .., last] => last.t_s - first.t_s,
             _ => 0.0,
         }
-    }
-
-    pub fn readings(&self) -> &[Node] {
-        &self.readings
     }
 }
 

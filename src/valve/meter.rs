@@ -32,8 +32,8 @@ const LEAST_WINDOW: usize = 50;
 /// The flows of a valve as a meter for leaks.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ValveMeter {
-    rig: Rig,
-    sheet: ValveSheet,
+    pub(super) rig: Rig,
+    pub(super) sheet: ValveSheet,
     /// Before the window.
     before: Belief,
     /// Where the last search ended; none before the first.
@@ -41,14 +41,15 @@ pub struct ValveMeter {
     runs: Vec<Run>,
     count: usize,
     /// … and spans so many seconds at the most.
-    window_s: f64,
+    pub(super) window_s: f64,
     /// Least and greatest spool.
     spool_range: [f64; 2],
     /// The chamber whose pressure is not measured.
     unread: Option<usize>,
-    since: Option<Since>,
-    /// What the windows before this one said.
-    last: Option<Taken>,
+    /// The calibration that it goes by.
+    pub(super) since: Option<Since>,
+    /// What the windows that have ended said.
+    pub(super) last: Option<Taken>,
 }
 
 /// What a window said.
@@ -133,14 +134,6 @@ impl ValveMeter {
         Ok(Some(Self::with(rig, sheet, before, calibration.as_ref().map(Calibration::since))))
     }
 
-    pub(super) fn sheet(&self) -> &ValveSheet {
-        &self.sheet
-    }
-
-    pub(super) fn calibrated(&self) -> Option<Since> {
-        self.since
-    }
-
     /// Least and greatest position of the spool; none where it was never read.
     pub(super) fn spool_range(&self) -> Option<[f64; 2]> {
         self.spool_range[0].is_finite().then_some(self.spool_range)
@@ -174,12 +167,11 @@ impl ValveMeter {
     /// Takes in a record of a rig that may have a valve; with the first flow of a meter it has no say any more.
     #[inline]
     pub fn record(meter: &mut Option<Self>, record: &Record) {
+        if record.has_flow() {
+            *meter = None;
+        }
         if let Some(valve) = meter {
-            if record.has_flow() {
-                *meter = None;
-            } else {
-                valve.push(record);
-            }
+            valve.push(record);
         }
     }
 
@@ -187,7 +179,7 @@ impl ValveMeter {
     pub fn push(&mut self, record: &Record) -> bool {
         let is_apart = record.after_gap || record.shut == Some(true);
         if is_apart || self.runs.is_empty() {
-            self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
+            self.runs.retain(|run| run.readings.len() >= LEAST_READINGS);
             self.runs.push(Run::default());
         }
         let Some(node) = self.node(record).filter(|_| record.shut != Some(true)) else { return false };
@@ -197,15 +189,13 @@ impl ValveMeter {
             self.lose(unread::chamber(&node.signals));
         }
         if let Some(run) = self.runs.last_mut() {
-            run.push(node);
+            run.readings.push(node);
             self.count += 1;
         }
         let is_timed = self.window_s.is_finite();
         if self.count >= MOST_READINGS || is_timed && self.seconds() >= self.window_s {
             self.next_window();
-            let mut next = Run::default();
-            next.push(node);
-            (self.runs, self.count) = (vec![next], 1);
+            (self.runs, self.count) = (vec![Run { readings: vec![node] }], 1);
         }
         true
     }
@@ -215,20 +205,9 @@ impl ValveMeter {
         self.runs.iter().map(Run::seconds).sum()
     }
 
-    /// The same, a window for each so many seconds.
-    #[must_use]
-    pub(super) fn every(self, window_s: f64) -> Self {
-        Self { window_s, ..self }
-    }
-
     /// Whether a window ended with the last reading.
     pub(super) fn has_ended(&self) -> bool {
         self.count == 1 && self.last.is_some()
-    }
-
-    /// What the windows that have ended say.
-    pub(super) fn last(&self) -> Option<&Taken> {
-        self.last.as_ref()
     }
 
     fn node(&self, record: &Record) -> Option<Node> {
@@ -253,11 +232,11 @@ impl ValveMeter {
             return None;
         }
         let (start, is_cold) = self.at.map_or((self.before.mean, true), |at| (at, false));
-        self.runs.retain(|run| run.readings().len() >= LEAST_READINGS);
+        self.runs.retain(|run| run.readings.len() >= LEAST_READINGS);
         let mut taken = self.settled(&self.runs, &self.before, start, is_cold, MOST_CHANGES)?;
         self.at = Some(taken.at);
         let Some(last) = &self.last else { return Some(taken) };
-        let begin_s = self.runs.first()?.readings().first()?.t_s;
+        let begin_s = self.runs.first()?.readings.first()?.t_s;
         let limit = CHANGED * taken.summary.noise.max(1.0);
         if taken.changes == 0 && moved(&self.before, &taken.summary.belief).is_some_and(|far| far > limit) {
             let before = self.before.with_new_leaks()?;
@@ -324,7 +303,5 @@ impl ValveMeter {
             self.at = self.at.filter(|_| !taken.is_mixed);
             self.last = Some(taken);
         }
-        self.runs.clear();
-        self.count = 0;
     }
 }

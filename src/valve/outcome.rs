@@ -3,7 +3,7 @@
 use super::calibration::{LeaksThen, Since};
 use super::meter::{Taken, ValveMeter};
 use super::parts::Summary;
-use super::unknowns::{KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_m3s};
+use super::unknowns::{KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_std};
 use crate::presence::{self, Found, FoundLeak, LeakLikelihood, Place};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
@@ -63,10 +63,8 @@ impl ValveMeter {
 
     /// What the windows that have ended say of a rig; none where there was nothing of the valve.
     pub(super) fn so_far(&self, rig: &Rig) -> Option<ValveTest> {
-        self.test(
-            self.last().filter(|taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained()).cloned(),
-            rig,
-        )
+        let is_telling = |taken: &&Taken| taken.summary.parts >= LEAST_PARTS || !taken.is_explained();
+        self.test(self.last.as_ref().filter(is_telling).cloned(), rig)
     }
 
     fn test(&self, taken: Option<Taken>, rig: &Rig) -> Option<ValveTest> {
@@ -76,29 +74,25 @@ impl ValveMeter {
         let told = taken.as_ref().filter(|taken| self.can_tell(taken));
         let found = told.and_then(|taken| found(&taken.summary, untold, rig));
         let pressures_pa = fit.map(|fit| fit.pressures.sizes_pa()).unwrap_or_default();
-        let clearance = |pressure_pa: f64| clearance_m3s(self.sheet(), pressure_pa) * LPM_PER_M3S;
+        let clearance =
+            |pressure_pa: f64| clearance_std(&self.sheet) * LEAK_UNIT_M3SPA * pressure_pa * LPM_PER_M3S;
         let summary = ValveSummary {
             usable_s: fit.map_or(0.0, |fit| fit.pressures.time_s),
             spool_range,
             clearance_lpm: [clearance(pressures_pa.external_a), clearance(pressures_pa.external_b)],
             scatter: fit.map_or(1.0, |fit| fit.noise.sqrt()),
             unread: self.unread().map(Signal::name),
-            calibrated: self.calibrated(),
+            calibrated: self.since,
             leaks: found.as_ref().map(Found::leaks),
         };
         Some(ValveTest { summary, found, taken, untold })
     }
 }
 
-/// By how much what noise does not explain widens each leak's standard deviation.
-fn widening(fit: &Summary) -> [f64; 3] {
-    fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt())
-}
-
 /// Means and covariances of the leaks, widened by what noise does not explain; of one that is untold they say nothing.
 fn leaks(fit: &Summary, untold: Option<Leak>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let (mean, covariance) = fit.belief.leaks()?;
-    let wider = widening(fit);
+    let wider = fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt());
     let mut covariance = Matrix3::from_fn(|i, j| covariance[(i, j)] * wider[i] * wider[j]);
     if let Some(leak) = untold {
         covariance[(leak as usize, leak as usize)] += LEAK_STD * LEAK_STD;
@@ -134,13 +128,8 @@ impl ValveTest {
         let fit = &self.taken.as_ref()?.summary;
         let (mean, covariance) = leaks(fit, self.untold)?;
         let at = |i: usize| Estimate { value: mean[i], std: covariance[(i, i)].sqrt() };
-        let coefficients = PerLeak { internal: at(0), external_a: at(1), external_b: at(2) };
         let pressures_pa = fit.pressures.sizes_pa();
-        Some(
-            coefficients
-                .zip(pressures_pa)
-                .map(|(one, pressure_pa)| one.scaled(LEAK_UNIT_M3SPA * pressure_pa)),
-        )
+        Some(PerLeak::from_fn(|leak| at(leak as usize).scaled(LEAK_UNIT_M3SPA * pressures_pa[leak])))
     }
 
     /// The report on a trace without flow meters.

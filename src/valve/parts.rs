@@ -210,7 +210,8 @@ fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Op
     let (mut information, mut right) = (Both::zeros(), BothRight::zeros());
     // What was believed before is of the leaks before, which stand last.
     let early = |unknown: usize| {
-        if (LEAKS..LEAKS + 3).contains(&unknown) { UNKNOWNS + unknown - LEAKS } else { unknown }
+        let is_apart = place > 0 && (LEAKS..LEAKS + 3).contains(&unknown);
+        if is_apart { UNKNOWNS + unknown - LEAKS } else { unknown }
     };
     let mut add = |normal: &Normal, to: &dyn Fn(usize) -> usize| {
         for j in 0..UNKNOWNS {
@@ -224,11 +225,7 @@ fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Op
     normals[..place].iter().for_each(|normal| first.add(normal));
     let mut second = Normal::none();
     normals[place..].iter().for_each(|normal| second.add(normal));
-    if place == 0 {
-        add(&first, &|unknown| unknown);
-    } else {
-        add(&first, &early);
-    }
+    add(&first, &early);
     add(&second, &|unknown| unknown);
     for (leak, std) in before.leak_std.into_iter().enumerate() {
         let (free, old, known) = (LEAKS + leak, UNKNOWNS + leak, std.powi(-2));

@@ -27,35 +27,29 @@ impl ValveStream {
     /// # Errors
     /// Where the calibration cannot be read, or is of another rig.
     pub fn of(rig: &Rig) -> Result<Option<Self>, CalibrationError> {
-        let meter = ValveMeter::of(rig)?.filter(|meter| meter.calibrated().is_some());
-        Ok(meter.map(|meter| Self {
-            meter: meter.every(WINDOW_S),
-            detector: LeakDetector::new(rig.alarms),
-            judged_s: None,
+        let meter = ValveMeter::of(rig)?.filter(|meter| meter.since.is_some());
+        Ok(meter.map(|mut meter| {
+            meter.window_s = WINDOW_S;
+            Self { meter, detector: LeakDetector::new(rig.alarms), judged_s: None }
         }))
     }
 
     /// Takes in a record of a rig that may have a valve; with the first flow of a meter it has no say any more. Says whether a window
     /// has ended, and adds the alarms that changed with it.
     pub fn record(valve: &mut Option<Self>, record: &Record, rig: &Rig, alarms: &mut Vec<Alarm>) -> bool {
-        let Some(stream) = valve else { return false };
         if record.has_flow() {
             *valve = None;
-            return false;
         }
-        stream.push(record, rig, alarms)
-    }
-
-    fn push(&mut self, record: &Record, rig: &Rig, alarms: &mut Vec<Alarm>) -> bool {
-        if !self.meter.push(record) || !self.meter.has_ended() {
+        let Some(stream) = valve else { return false };
+        if !stream.meter.push(record) || !stream.meter.has_ended() {
             return false;
         }
         let t_s = record.t_s;
-        let elapsed_s = self.judged_s.replace(t_s).map_or(WINDOW_S, |before_s| (t_s - before_s).max(0.0));
-        let test = self.test(rig);
+        let elapsed_s = stream.judged_s.replace(t_s).map_or(WINDOW_S, |before_s| (t_s - before_s).max(0.0));
+        let test = stream.test(rig);
         let is_explained = test.as_ref().is_some_and(ValveTest::is_explained);
         if let Some(flows_m3s) = test.and_then(|test| test.flows_m3s()).filter(|_| is_explained) {
-            for (fault, change) in self.detector.update(elapsed_s, &flows_m3s) {
+            for (fault, change) in stream.detector.update(elapsed_s, &flows_m3s) {
                 alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
             }
         }

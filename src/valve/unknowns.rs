@@ -112,11 +112,6 @@ pub(super) fn clearance_std(sheet: &ValveSheet) -> f64 {
     0.5 * sheet.null_leak * sheet.rated_flow_m3s / sheet.rated_drop_pa / LEAK_UNIT_M3SPA
 }
 
-/// What the data sheet allows an edge to leak by its clearance, at a pressure, m³/s.
-pub(super) fn clearance_m3s(sheet: &ValveSheet, pressure_pa: f64) -> f64 {
-    clearance_std(sheet) * LEAK_UNIT_M3SPA * pressure_pa
-}
-
 /// A supply that is read is off by its sensor's zero.
 fn supply_std_pa(rig: &Rig, sheet: &ValveSheet) -> f64 {
     if sheet.supply_pa.is_some() {

@@ -28,20 +28,33 @@ impl ValveTest {
     }
 
     fn cannot_tell(&self) -> Reason {
-        match self.unread() {
-            Some(name) if self.summary.calibrated.is_none() => uncalibrated_without(name),
-            Some(name) => Reason::new(
-                ReasonId::NotIdentifiable,
+        let (text, remedy) = match self.unread() {
+            Some(name) if self.summary.calibrated.is_none() => (
+                format!(
+                    "{name} is not measured, and by its data sheet alone the valve does not tell it well enough to find leaks"
+                ),
+                "measure both chamber pressures, or calibrate the valve while they are (`pitchleak calibrate`)",
+            ),
+            Some(name) => (
                 format!("{name} is not measured, and this trace does not tell it well enough to find leaks"),
                 "measure both chamber pressures, or record longer, with the piston moving both ways",
             ),
-            None => too_short(),
-        }
+            None => (
+                "this trace is too short to tell leaks from the valve's own gains and laps".to_owned(),
+                "record 20 s or more, in motion and both ways",
+            ),
+        };
+        Reason::new(ReasonId::NotIdentifiable, text, remedy)
     }
 
     /// An external leak is told against what the valve's own clearance may leak, or against a calibration.
     fn against(&self, leak: Leak) -> Option<String> {
-        let (edge, clearance_lpm) = self.edge(leak)?;
+        let [a, b] = self.summary.clearance_lpm;
+        let (edge, clearance_lpm) = match leak {
+            Leak::Internal => return None,
+            Leak::ExternalA => ("A–T", a),
+            Leak::ExternalB => ("B–T", b),
+        };
         Some(match self.summary.calibrated {
             Some(since) if since.leaks == LeaksThen::Unknown => {
                 format!("It is more than on {}: what leaked then is not in it.", since.date)
@@ -55,16 +68,6 @@ impl ValveTest {
                 readable(clearance_lpm, 2)
             ),
         })
-    }
-
-    /// The edge to the tank at a chamber, and what its clearance may leak.
-    fn edge(&self, leak: Leak) -> Option<(&'static str, f64)> {
-        let [a, b] = self.summary.clearance_lpm;
-        match leak {
-            Leak::Internal => None,
-            Leak::ExternalA => Some(("A–T", a)),
-            Leak::ExternalB => Some(("B–T", b)),
-        }
     }
 
     /// What the verdict rests on.
@@ -120,24 +123,6 @@ impl ValveTest {
             remedy,
         )
     }
-}
-
-fn uncalibrated_without(name: &str) -> Reason {
-    Reason::new(
-        ReasonId::NotIdentifiable,
-        format!(
-            "{name} is not measured, and by its data sheet alone the valve does not tell it well enough to find leaks"
-        ),
-        "measure both chamber pressures, or calibrate the valve while they are (`pitchleak calibrate`)",
-    )
-}
-
-fn too_short() -> Reason {
-    Reason::new(
-        ReasonId::NotIdentifiable,
-        "this trace is too short to tell leaks from the valve's own gains and laps",
-        "record 20 s or more, in motion and both ways",
-    )
 }
 
 const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";

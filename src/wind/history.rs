@@ -20,42 +20,37 @@ pub struct History {
 /// Why a file gives no wind history.
 #[derive(Debug, thiserror::Error)]
 pub enum HistoryError {
-    /// The file cannot be read.
-    #[error("{path}: {source}", path = path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// Neither built in nor a file.
-    #[error("{path}: no such file; built in are the winds 5, 13, 21 and 30 (m/s)", path = path.display())]
-    NoSuchWind {
-        /// As given.
-        path: PathBuf,
-    },
-    /// More than any history has: a device, or the wrong file.
-    #[error("{path}: longer than {} MiB: no wind history is", LARGEST_BYTES >> 20, path = path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-    },
     /// An OpenFAST file that cannot be read.
     #[error(transparent)]
     OpenFast(#[from] openfast::Error),
-    /// A needed channel or column is not there.
-    #[error("{path}: has no {missing}", path = path.display())]
-    Missing {
+    /// Another one.
+    #[error("{path}: {fault}", path = path.display())]
+    File {
         /// The file.
         path: PathBuf,
-        /// What was looked for.
-        missing: &'static str,
+        /// What is wrong with it.
+        fault: HistoryFault,
     },
+}
+
+/// What is wrong with a file of a wind history.
+#[derive(Debug, thiserror::Error)]
+pub enum HistoryFault {
+    /// It cannot be read.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// Neither built in nor a file.
+    #[error("no such file; built in are the winds 5, 13, 21 and 30 (m/s)")]
+    NoSuchWind,
+    /// More than any history has: a device, or the wrong file.
+    #[error("longer than {} MiB: no wind history is", LARGEST_BYTES >> 20)]
+    TooLarge,
+    /// A needed channel or column is not there.
+    #[error("has no {0}")]
+    Missing(&'static str),
     /// A channel has a unit the program does not know.
-    #[error("{path}: {channel} is in {unit:?}; {allowed} is needed", path = path.display())]
+    #[error("{channel} is in {unit:?}; {allowed} is needed")]
     Unit {
-        /// The file.
-        path: PathBuf,
         /// Name of the channel.
         channel: String,
         /// Its unit in the file.
@@ -64,23 +59,16 @@ pub enum HistoryError {
         allowed: &'static str,
     },
     /// A cell of a CSV file is not a number.
-    #[error("{path}: line {line}, column {column}: not a finite number", path = path.display())]
+    #[error("line {line}, column {column}: not a finite number")]
     Cell {
-        /// The file.
-        path: PathBuf,
         /// Line, from 1.
         line: u64,
         /// Name of the column.
         column: &'static str,
     },
     /// The samples do not make a history.
-    #[error("{path}: {why}", path = path.display())]
-    Samples {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with them.
-        why: &'static str,
-    },
+    #[error("{0}")]
+    Samples(&'static str),
 }
 
 /// More than an hour of OpenFAST output with a hundred channels at 80 Hz, in text.
@@ -92,20 +80,16 @@ impl History {
     /// # Errors
     /// [`HistoryError`]; a built-in case gives none.
     pub fn of(wind: &Wind) -> Result<Self, HistoryError> {
-        match wind {
-            Wind::BuiltIn(case) => Self::from_csv(built_in(*case), Path::new("(built-in wind)")),
-            Wind::File(path) => Self::from_file(path),
-        }
-    }
-
-    fn from_file(path: &Path) -> Result<Self, HistoryError> {
-        let bytes = std::fs::File::open(path).and_then(bounded).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => HistoryError::NoSuchWind { path: path.to_owned() },
-            _ => HistoryError::Io { path: path.to_owned(), source },
-        })?;
-        let bytes = bytes.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?;
+        let path = match wind {
+            Wind::BuiltIn(case) => {
+                return Self::from_csv(built_in(*case)).map_err(in_file("(built-in wind)"));
+            }
+            Wind::File(path) => path,
+        };
+        let bytes = std::fs::File::open(path).map_err(HistoryFault::opening).and_then(bounded);
+        let bytes = bytes.map_err(in_file(path))?;
         if is_csv(path) {
-            return Self::from_csv(&bytes, path);
+            return Self::from_csv(&bytes).map_err(in_file(path));
         }
         let run = openfast::parse(&bytes)
             .map_err(|problem| openfast::Error::Content { path: path.into(), problem })?;
@@ -116,56 +100,42 @@ impl History {
     /// `RootMzc1`…). `path` is named in errors.
     ///
     /// # Errors
-    /// [`HistoryError::Missing`], [`HistoryError::Unit`], [`HistoryError::Samples`].
+    /// [`HistoryFault::Missing`], [`HistoryFault::Unit`], [`HistoryFault::Samples`].
     pub fn from_run(run: &openfast::Run, path: &Path) -> Result<Self, HistoryError> {
         let find = |names: [String; 2]| names.iter().find_map(|name| run.channel(name));
-        let (pitch, moment) = (1..=3)
-            .find_map(|blade| {
-                let pitch = find([format!("BldPitch{blade}"), format!("PtchPMzc{blade}")])?;
-                Some((pitch, find([format!("RootMzb{blade}"), format!("RootMzc{blade}")])?))
-            })
-            .ok_or_else(|| HistoryError::Missing {
-                path: path.into(),
-                missing: "pair of BldPitchN and RootMzbN (or RootMzcN) of one blade",
-            })?;
+        let of_blade = |blade: u8| {
+            let pitch = find([format!("BldPitch{blade}"), format!("PtchPMzc{blade}")])?;
+            Some((pitch, find([format!("RootMzb{blade}"), format!("RootMzc{blade}")])?))
+        };
         let wind = find(["Wind1VelX".into(), "RtVAvgxh".into()]);
-        Self {
-            t_s: run.time_s.clone(),
-            wind_mps: wind.map(|channel| channel.values.clone()),
-            pitch_rad: in_si(pitch, &[("deg", 1.0_f64.to_radians()), ("rad", 1.0)], "deg or rad", path)?,
-            moment_nm: in_si(
-                moment,
-                &[
-                    ("kN-m", 1e3),
-                    ("kN\u{b7}m", 1e3),
-                    ("kNm", 1e3),
-                    ("N-m", 1.0),
-                    ("N\u{b7}m", 1.0),
-                    ("Nm", 1.0),
-                ],
-                "kN-m or N-m",
-                path,
-            )?,
-        }
-        .checked(path)
+        let read = || {
+            let (pitch, moment) = (1..=3)
+                .find_map(of_blade)
+                .ok_or(HistoryFault::Missing("pair of BldPitchN and RootMzbN (or RootMzcN) of one blade"))?;
+            Self {
+                t_s: run.time_s.clone(),
+                wind_mps: wind.map(|channel| channel.values.clone()),
+                pitch_rad: in_si(pitch, &PITCH_UNITS, "deg or rad")?,
+                moment_nm: in_si(moment, &MOMENT_UNITS, "kN-m or N-m")?,
+            }
+            .checked()
+        };
+        read().map_err(in_file(path))
     }
 
     /// CSV, plain or gzip, with the columns of `data/wind/README.md`.
-    fn from_csv(bytes: &[u8], path: &Path) -> Result<Self, HistoryError> {
-        let io = |source| HistoryError::Io { path: path.to_owned(), source };
+    fn from_csv(bytes: &[u8]) -> Result<Self, HistoryFault> {
         let plain = if bytes.starts_with(&[0x1f, 0x8b]) {
-            let inflated = bounded(flate2::read::MultiGzDecoder::new(bytes)).map_err(io)?;
-            inflated.ok_or_else(|| HistoryError::TooLarge { path: path.to_owned() })?
+            bounded(flate2::read::MultiGzDecoder::new(bytes))?
         } else {
             bytes.to_vec()
         };
-        let csv_io = |e: csv::Error| io(std::io::Error::other(e));
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(plain.as_slice());
-        let headers = reader.byte_headers().map_err(csv_io)?.clone();
+        let headers = reader.byte_headers().map_err(std::io::Error::other)?.clone();
         let find = |name: &'static str| {
             headers.iter().position(|h| h.eq_ignore_ascii_case(name.as_bytes())).map(|index| (index, name))
         };
-        let need = |missing| find(missing).ok_or(HistoryError::Missing { path: path.into(), missing });
+        let need = |name| find(name).ok_or(HistoryFault::Missing(name));
         let (t, pitch, moment) = (need("t_s")?, need("pitch_deg")?, need("pitch_moment_Nm")?);
         let wind = find("wind_mps");
         let mut history = Self {
@@ -175,13 +145,13 @@ impl History {
             moment_nm: Vec::new(),
         };
         for record in reader.byte_records() {
-            let record = record.map_err(csv_io)?;
+            let record = record.map_err(std::io::Error::other)?;
             let cell = |(index, column)| {
                 let text = record.get(index).and_then(|cell| std::str::from_utf8(cell).ok());
                 let line = record.position().map_or(0, csv::Position::line);
                 text.and_then(|text| text.parse().ok())
                     .filter(|value: &f64| value.is_finite())
-                    .ok_or_else(|| HistoryError::Cell { path: path.into(), line, column })
+                    .ok_or(HistoryFault::Cell { line, column })
             };
             history.t_s.push(cell(t)?);
             history.pitch_rad.push(cell(pitch)?.to_radians());
@@ -190,7 +160,7 @@ impl History {
                 values.push(cell(column)?);
             }
         }
-        history.checked(path)
+        history.checked()
     }
 
     /// Step between samples, s.
@@ -201,8 +171,8 @@ impl History {
         }
     }
 
-    fn checked(self, path: &Path) -> Result<Self, HistoryError> {
-        let wrong = |why| Err(HistoryError::Samples { path: path.into(), why });
+    fn checked(self) -> Result<Self, HistoryFault> {
+        let wrong = |why| Err(HistoryFault::Samples(why));
         let step = self.step_s();
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         if self.t_s.len() < 5 {
@@ -223,12 +193,27 @@ impl History {
     }
 }
 
-/// All there is to read; none where that is more than any history has.
-fn bounded(from: impl Read) -> std::io::Result<Option<Vec<u8>>> {
+fn in_file(path: impl Into<PathBuf>) -> impl FnOnce(HistoryFault) -> HistoryError {
+    |fault| HistoryError::File { path: path.into(), fault }
+}
+
+impl HistoryFault {
+    fn opening(error: std::io::Error) -> Self {
+        if error.kind() == std::io::ErrorKind::NotFound { Self::NoSuchWind } else { Self::Io(error) }
+    }
+}
+
+/// All there is to read.
+fn bounded(from: impl Read) -> Result<Vec<u8>, HistoryFault> {
     let mut bytes = Vec::new();
     from.take(LARGEST_BYTES + 1).read_to_end(&mut bytes)?;
-    Ok((bytes.len() as u64 <= LARGEST_BYTES).then_some(bytes))
+    if bytes.len() as u64 > LARGEST_BYTES { Err(HistoryFault::TooLarge) } else { Ok(bytes) }
 }
+
+/// Units of OpenFAST's channels, in SI.
+const PITCH_UNITS: [(&str, f64); 2] = [("deg", 1.0_f64.to_radians()), ("rad", 1.0)];
+const MOMENT_UNITS: [(&str, f64); 6] =
+    [("kN-m", 1e3), ("kN\u{b7}m", 1e3), ("kNm", 1e3), ("N-m", 1.0), ("N\u{b7}m", 1.0), ("Nm", 1.0)];
 
 fn built_in(case: WindCase) -> &'static [u8] {
     match case {
@@ -249,16 +234,12 @@ fn in_si(
     channel: &openfast::Channel,
     factors: &[(&str, f64)],
     allowed: &'static str,
-    path: &Path,
-) -> Result<Vec<f64>, HistoryError> {
-    let factor =
-        factors.iter().find(|(unit, _)| channel.unit.eq_ignore_ascii_case(unit)).ok_or_else(|| {
-            HistoryError::Unit {
-                path: path.into(),
-                channel: channel.name.clone(),
-                unit: channel.unit.clone(),
-                allowed,
-            }
-        })?;
+) -> Result<Vec<f64>, HistoryFault> {
+    let known = factors.iter().find(|(unit, _)| channel.unit.eq_ignore_ascii_case(unit));
+    let strange = || {
+        let (channel, unit) = (channel.name.clone(), channel.unit.clone());
+        HistoryFault::Unit { channel, unit, allowed }
+    };
+    let factor = known.ok_or_else(strange)?;
     Ok(channel.values.iter().map(|value| value * factor.1).collect())
 }

@@ -6,7 +6,7 @@
 
 mod history;
 
-pub use history::{History, HistoryError};
+pub use history::{History, HistoryError, HistoryFault};
 
 use crate::curve::{Curve, CurveError};
 use crate::reference::{AfterEnd, Reference};
@@ -27,13 +27,13 @@ pub enum Wind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum WindCase {
     /// 5 m/s, 20 % turbulence: below rated power, the pitch stands still.
-    Mps5,
+    Mps5 = 5,
     /// 13 m/s, 20 % turbulence.
-    Mps13,
+    Mps13 = 13,
     /// 21 m/s, 20 % turbulence.
-    Mps21,
+    Mps21 = 21,
     /// 30 m/s, 20 % turbulence: the extreme case, above cut-out.
-    Mps30,
+    Mps30 = 30,
 }
 
 impl WindCase {
@@ -42,12 +42,7 @@ impl WindCase {
 
     /// Mean wind speed, m/s.
     pub fn mean_mps(self) -> u32 {
-        match self {
-            Self::Mps5 => 5,
-            Self::Mps13 => 13,
-            Self::Mps21 => 21,
-            Self::Mps30 => 30,
-        }
+        self as u32
     }
 }
 
@@ -154,18 +149,15 @@ impl Emulation {
     }
 
     fn check(&self) -> Result<(), EmulationError> {
-        let not_negative = |value: f64| value.is_finite() && value >= 0.0;
-        let positive = |value: f64| not_negative(value) && value > 0.0;
-        if !positive(self.position_scale) {
-            Err(EmulationError::Setting("the position scale"))
-        } else if !positive(self.load_scale) {
-            Err(EmulationError::Setting("the load scale"))
-        } else if !not_negative(self.blade_inertia_kgm2) {
-            Err(EmulationError::Setting("the blade inertia"))
-        } else if !positive(self.guard_m) {
-            Err(EmulationError::Setting("the guard distance"))
-        } else {
-            Ok(self.linkage.check()?)
+        let is_set = [
+            ("the position scale", self.position_scale > 0.0 && self.position_scale.is_finite()),
+            ("the load scale", self.load_scale > 0.0 && self.load_scale.is_finite()),
+            ("the blade inertia", self.blade_inertia_kgm2 >= 0.0 && self.blade_inertia_kgm2.is_finite()),
+            ("the guard distance", self.guard_m > 0.0 && self.guard_m.is_finite()),
+        ];
+        match is_set.into_iter().find(|(_, is_set)| !is_set) {
+            Some((setting, _)) => Err(EmulationError::Setting(setting)),
+            None => Ok(self.linkage.check()?),
         }
     }
 }

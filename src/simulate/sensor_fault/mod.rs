@@ -38,8 +38,6 @@ enum Mistake {
 enum Distortion {
     /// Zero.
     Dead,
-    /// The first reading, again and again.
-    Stuck,
     /// No reading.
     Missing,
     Reversed,
@@ -53,7 +51,7 @@ enum Distortion {
     Times(f64),
     /// Never more than this, either way.
     Clipped(Amount),
-    /// One reading for this long, s.
+    /// One reading for this long, s: the first again and again where it is infinite.
     Held(f64),
     /// The reading of this time ago, s.
     Late(f64),
@@ -90,8 +88,6 @@ impl std::fmt::Display for SensorFault {
 /// The same seed loses the same rows and spikes the same readings.
 #[derive(Clone, Debug)]
 pub struct SensorFaults {
-    instruments: Instruments,
-    stroke_m: f64,
     running: Vec<Running>,
     random: ChaCha8Rng,
 }
@@ -101,6 +97,9 @@ pub struct SensorFaults {
 struct Running {
     mistake: Mistake,
     during: Span,
+    /// Of the channel's sensor.
+    full_scale: f64,
+    stroke_m: f64,
     /// Time and reading that a channel is stuck or held at.
     kept: Option<(f64, f64)>,
     /// Times and readings that a late channel has still to show, the oldest first.
@@ -113,23 +112,29 @@ impl SensorFaults {
         let running = |fault: &SensorFault| Running {
             mistake: fault.mistake,
             during: fault.during,
+            full_scale: match fault.mistake {
+                Mistake::Channel(channel, _) => full_scale(instruments, channel),
+                Mistake::Swap(..) | Mistake::RowsLost(_) => 1.0,
+            },
+            stroke_m,
             kept: None,
             waiting: VecDeque::new(),
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // Streams 0 and 1 are those of noise and biases.
         random.set_stream(2);
-        Self { instruments: *instruments, stroke_m, running: faults.iter().map(running).collect(), random }
+        Self { running: faults.iter().map(running).collect(), random }
     }
 
     /// What is recorded of an honest reading; none where the row is lost.
     pub fn show(&mut self, honest: &Reading) -> Option<Reading> {
-        let Self { instruments, stroke_m, running, random } = self;
+        let Self { running, random } = self;
         let mut shown = *honest;
+        // The mistake's own times are true times, whatever the clock shows.
+        let t_s = honest.get(Signal::Time).unwrap_or(f64::NAN);
         let mut kept = true;
         for one in running {
-            // The mistake's own times are true times, whatever the clock shows.
-            if !one.during.contains(honest.t_s) {
+            if !one.during.contains(t_s) {
                 one.kept = None;
                 one.waiting.clear();
                 continue;
@@ -144,9 +149,7 @@ impl SensorFaults {
                 Mistake::Channel(channel, distortion) => {
                     let chance = unit(random);
                     if let Some(reading) = shown.get(channel) {
-                        let full_scale = full_scale(instruments, channel);
-                        let scale = Scale { full_scale, stroke_m: *stroke_m, chance };
-                        shown.set(channel, one.distorted(distortion, honest.t_s, reading, &scale));
+                        shown.set(channel, one.distorted(distortion, t_s, reading, chance));
                     }
                 }
             }
@@ -155,21 +158,13 @@ impl SensorFaults {
     }
 }
 
-/// What a distortion needs of the rig and of chance.
-struct Scale {
-    full_scale: f64,
-    stroke_m: f64,
-    /// 0 to 1.
-    chance: f64,
-}
-
 impl Running {
-    fn distorted(&mut self, distortion: Distortion, t_s: f64, reading: f64, scale: &Scale) -> Option<f64> {
-        let Scale { full_scale, stroke_m, chance } = *scale;
+    /// What the channel shows instead; `chance` is drawn from 0 to 1.
+    fn distorted(&mut self, distortion: Distortion, t_s: f64, reading: f64, chance: f64) -> Option<f64> {
+        let Self { full_scale, stroke_m, .. } = *self;
         Some(match distortion {
             Distortion::Missing => return None,
             Distortion::Dead => 0.0,
-            Distortion::Stuck => self.kept_for(f64::INFINITY, t_s, reading),
             Distortion::Held(time_s) => self.kept_for(time_s, t_s, reading),
             Distortion::Late(time_s) => self.late_by(time_s, t_s, reading),
             Distortion::Reversed => -reading,

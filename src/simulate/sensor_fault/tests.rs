@@ -1,6 +1,6 @@
 use super::*;
 use crate::rig::Rig;
-use crate::simulate::Reading;
+use crate::simulate::{Reading, Truth};
 use pitchleak_core::Sample;
 use proptest::prelude::*;
 
@@ -18,7 +18,11 @@ fn honest(t_s: f64) -> Reading {
         qb_m3s: Some(-8e-5 * wave(1.1)),
         force_n: Some(2e3 * wave(1.7)),
     };
-    Reading { t_s, sample, temp_k: Some(313.15), valve: None }
+    Reading::at(&Truth { t_s, temp_k: Some(313.15), ..Truth::default() }, &sample, None)
+}
+
+fn value(reading: &Reading, channel: Signal) -> f64 {
+    reading.get(channel).unwrap_or(f64::NAN)
 }
 
 /// What is recorded of ten seconds at 100 Hz; none where a row is lost.
@@ -31,9 +35,12 @@ fn recorded(faults: &[&str], seed: u64) -> Vec<(Reading, Option<Reading>)> {
 
 /// Each row's true and shown value of one channel.
 fn channel(fault: &str, channel: Signal) -> Vec<(f64, f64, f64)> {
-    let value = |reading: &Reading| reading.get(channel).unwrap_or(f64::NAN);
+    let of = |reading: &Reading| value(reading, channel);
     let rows = recorded(&[fault], 1).into_iter();
-    rows.map(|(honest, shown)| (honest.t_s, value(&honest), shown.map_or(f64::NAN, |s| value(&s)))).collect()
+    rows.map(|(honest, shown)| {
+        (value(&honest, Signal::Time), of(&honest), shown.map_or(f64::NAN, |shown| of(&shown)))
+    })
+    .collect()
 }
 
 fn near(one: f64, other: f64) -> bool {
@@ -72,16 +79,17 @@ fn each_way_to_lie_shows_what_it_says() {
 
 #[test]
 fn time_is_kept_by_what_is_stuck_held_or_late() {
+    let pa_pa = |t_s: f64| value(&honest(t_s), Signal::PressureA);
     for (t_s, value, shown) in channel("pa stuck 2 s..4 s", Signal::PressureA) {
-        let expected = if (1.995..3.995).contains(&t_s) { honest(2.0).sample.pa_pa } else { value };
+        let expected = if (1.995..3.995).contains(&t_s) { pa_pa(2.0) } else { value };
         assert!(near(shown, expected), "stuck at {t_s} s");
     }
     for (t_s, _, shown) in channel("pa held 200 ms", Signal::PressureA) {
         let taken = 0.2 * (t_s / 0.2 + 1e-6).floor();
-        assert!(near(shown, honest(taken).sample.pa_pa), "held at {t_s} s");
+        assert!(near(shown, pa_pa(taken)), "held at {t_s} s");
     }
     for (t_s, _, shown) in channel("pa late 100 ms", Signal::PressureA) {
-        assert!((shown - honest((t_s - 0.1).max(0.0)).sample.pa_pa).abs() < 1.0, "late at {t_s} s");
+        assert!((shown - pa_pa((t_s - 0.1).max(0.0))).abs() < 1.0, "late at {t_s} s");
     }
 }
 
@@ -93,7 +101,8 @@ fn chance_loses_rows_and_makes_spikes_as_often_as_it_should_and_by_the_seed() {
     assert!((150..250).contains(&count), "{count} of 1000");
     assert!(lost(1) == lost(1) && lost(1) != lost(2));
     let gap = recorded(&["rows lost 2 s..5 s"], 1);
-    assert!(gap.iter().all(|(honest, shown)| shown.is_none() == (1.995..4.995).contains(&honest.t_s)));
+    let is_lost = |honest: &Reading| (1.995..4.995).contains(&value(honest, Signal::Time));
+    assert!(gap.iter().all(|(honest, shown)| shown.is_none() == is_lost(honest)));
     let spikes = channel("pa spikes 10 %", Signal::PressureA);
     let count = spikes.iter().filter(|(_, value, shown)| !near(*value, *shown)).count();
     assert!((60..140).contains(&count), "{count} of 1000");
@@ -102,9 +111,12 @@ fn chance_loses_rows_and_makes_spikes_as_often_as_it_should_and_by_the_seed() {
 #[test]
 fn mistakes_pass_on_what_the_one_before_left() {
     for (honest, shown) in recorded(&["swap qa qb", "qa gain 50 %"], 1) {
-        let (honest, shown) = (honest.sample, shown.expect("no row is lost").sample);
-        assert_eq!((shown.qb_m3s, shown.qa_m3s), (honest.qa_m3s, honest.qb_m3s.map(|q| 1.5 * q)));
-        assert_eq!((shown.x_m, shown.pa_pa), (honest.x_m, honest.pa_pa));
+        let shown = shown.expect("no row is lost");
+        let [of_honest, of_shown] = [honest, shown].map(|row| {
+            [Signal::FlowA, Signal::FlowB, Signal::Position, Signal::PressureA].map(|one| row.get(one))
+        });
+        let [qa, qb, x, pa] = of_honest;
+        assert_eq!(of_shown, [qb.map(|q| 1.5 * q), qa, x, pa]);
     }
 }
 
@@ -143,7 +155,7 @@ proptest! {
         for text in INVOLUTIONS {
             for (honest, shown) in recorded(&[text, text], seed) {
                 let shown = shown.expect("no row is lost");
-                prop_assert!((honest.sample.x_m - shown.sample.x_m).abs() < 1e-15, "{}", text);
+                prop_assert!((value(&honest, Signal::Position) - value(&shown, Signal::Position)).abs() < 1e-15, "{}", text);
                 let same = |channel| honest.get(channel) == shown.get(channel);
                 prop_assert!(Signal::ALL.into_iter().filter(|c| *c != Signal::Position).all(same), "{}", text);
             }
@@ -160,7 +172,8 @@ proptest! {
                    "qb offset 1 L/min", "rows lost 50 %"][which];
         let to = from + length;
         for (honest, shown) in recorded(&[&format!("{way} @ {from} s..{to} s")], 1) {
-            prop_assert!((from..to).contains(&(honest.t_s + 1e-9)) || shown == Some(honest));
+            let t_s = value(&honest, Signal::Time);
+            prop_assert!((from..to).contains(&(t_s + 1e-9)) || shown == Some(honest));
         }
     }
 

@@ -20,7 +20,7 @@ const CHANNELS: [Signal; 8] = [
 /// Ways without a quantity.
 const BARE: [(&str, Distortion); 6] = [
     ("dead", Distortion::Dead),
-    ("stuck", Distortion::Stuck),
+    ("stuck", Distortion::Held(f64::INFINITY)),
     ("missing", Distortion::Missing),
     ("reversed", Distortion::Reversed),
     ("absolute", Distortion::Absolute),
@@ -117,13 +117,11 @@ fn swap(one: Signal, other: Signal) -> Result<Mistake, SensorFaultError> {
 /// The way `way` with its quantity `text`, for one channel.
 fn distortion(channel: Signal, way: &str, text: &str) -> Result<Distortion, SensorFaultError> {
     let measures = channel.dimension().unwrap_or(Dimension::Time);
-    if let Some((_, distortion)) = BARE.into_iter().find(|(bare, _)| *bare == way) {
-        if !text.is_empty() {
+    let bare = BARE.into_iter().find(|(bare, _)| *bare == way);
+    let distortion = match way {
+        _ if bare.is_some() && !text.is_empty() => {
             return Err(SensorFaultError::Way(format!("{way} {text}")));
         }
-        return fitting(channel, way, distortion);
-    }
-    let distortion = match way {
         "offset" => Distortion::Offset(amount(text, measures)?),
         "drift" => Distortion::Drift(amount(per_hour(text)?, measures)?),
         "gain" => Distortion::Times(1.0 + units::parse(text, Dimension::Share)?),
@@ -133,13 +131,8 @@ fn distortion(channel: Signal, way: &str, text: &str) -> Result<Distortion, Sens
         "held" => Distortion::Held(positive(text, Dimension::Time)?),
         "late" => Distortion::Late(positive(text, Dimension::Time)?),
         "spikes" => Distortion::Spikes(positive(text, Dimension::Share)?),
-        _ => return Err(SensorFaultError::Way(way.to_owned())),
+        _ => bare.map(|(_, distortion)| distortion).ok_or_else(|| SensorFaultError::Way(way.to_owned()))?,
     };
-    fitting(channel, way, distortion)
-}
-
-/// The distortion, where the channel can have it.
-fn fitting(channel: Signal, way: &str, distortion: Distortion) -> Result<Distortion, SensorFaultError> {
     let fits = match (channel, distortion) {
         (Signal::Time, distortion) => matches!(distortion, Distortion::Times(_) | Distortion::Offset(_)),
         (Signal::Position, Distortion::OtherEnd) => true,

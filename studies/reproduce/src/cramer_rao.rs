@@ -134,18 +134,13 @@ impl CramerRaoModel<'_> {
         let (own_a, own_b) = (leaks.internal + leaks.external_a, leaks.internal + leaks.external_b);
         // `end` is −1 at the start of the step and +1 at its end.
         let noise_at = |end: f64| {
-            Matrix2x5::new(
-                -end * aa - 0.5 * kappa * aa * rise_a,
-                -end * kappa * va - half * own_a,
-                half * leaks.internal,
-                half,
-                0.0,
-                end * ab + 0.5 * kappa * ab * rise_b,
-                half * leaks.internal,
-                -end * kappa * vb - half * own_b,
-                0.0,
-                half,
-            )
+            Matrix2x5::from([
+                [-end * aa - 0.5 * kappa * aa * rise_a, end * ab + 0.5 * kappa * ab * rise_b],
+                [-end * kappa * va - half * own_a, half * leaks.internal],
+                [half * leaks.internal, -end * kappa * vb - half * own_b],
+                [half, 0.0],
+                [0.0, half],
+            ])
         };
         let pressure_a = half * (first.pa_pa + second.pa_pa);
         let pressure_b = half * (first.pb_pa + second.pb_pa);
@@ -154,25 +149,16 @@ impl CramerRaoModel<'_> {
         // Readings that are b too high: the true pressures are lower, and so are the leaks they drive.
         let (own_a, own_b, cross) = (-own_a * dt_s, -own_b * dt_s, leaks.internal * dt_s);
         let (stroke_a, stroke_b) = (-kappa * aa * rise_a, kappa * ab * rise_b);
-        let columns = Columns::from_row_slice(&[
-            va * rise_a,
-            load,
-            pressure_a,
-            0.0,
-            dt_s,
-            0.0,
-            own_a,
-            cross,
-            stroke_a, //
-            vb * rise_b,
-            -load,
-            0.0,
-            pressure_b,
-            0.0,
-            dt_s,
-            cross,
-            own_b,
-            stroke_b,
+        let columns = Columns::from([
+            [va * rise_a, vb * rise_b],
+            [load, -load],
+            [pressure_a, 0.0],
+            [0.0, pressure_b],
+            [dt_s, 0.0],
+            [0.0, dt_s],
+            [own_a, cross],
+            [cross, own_b],
+            [stroke_a, stroke_b],
         ]) * Information::from_diagonal(units);
         Some(StepModel { left: noise_at(-1.0), right: noise_at(1.0), columns })
     }

@@ -1,14 +1,14 @@
 //! How soon a leak that opens raises its alarm, and how often a sound cylinder raises one.
 
-use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, map_counted, rig};
+use super::protocol::{ReproduceError, Run, SAMPLE_RATE_HZ, map_counted, reference, rig};
 use super::{Law, Progress};
 use pitchleak::Rig;
-use pitchleak::core::{Leak, PerLeak, RlsError};
+use pitchleak::core::{AlarmState, Leak, PerLeak, RlsError};
 use pitchleak::replay::Replay;
 use pitchleak::simulate::{Biases, LeakCourse, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::trace::Record;
 use pitchleak::units::LPM_PER_M3S;
-use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak::wind::WindCase;
 use serde::Serialize;
 
 /// Sizes of the leaks, L/min at the run's mean pressures.
@@ -63,42 +63,31 @@ pub struct Detection {
 /// # Errors
 /// [`ReproduceError`].
 pub fn detection(hours: f64, progress: impl Fn(Progress) + Sync) -> Result<Detection, ReproduceError> {
-    let report = |stage, count| move |done| Progress { stage, done, count };
     let mut jobs = Vec::new();
     for wind in WindCase::ALL {
         for leak in Leak::ALL {
             jobs.extend(SIZES_LPM.map(|size| (wind, leak, size)));
         }
     }
-    let opening = report("leaks that open", jobs.len());
-    let delays = map_counted(&jobs, |n| progress(opening(n)), |&(wind, leak, size)| delay(wind, leak, size));
-    let watching = report("simulating sound cylinders", WindCase::ALL.len());
-    let runs = map_counted(
-        &WindCase::ALL,
-        |n| progress(watching(n)),
-        |wind| Run::simulate(*wind, PerLeak::default()),
-    );
-    let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let delays =
+        map_counted("leaks that open", &jobs, &progress, |&(wind, leak, size)| delay(wind, leak, size))?;
+    let runs = map_counted("simulating sound cylinders", &WindCase::ALL, &progress, |wind| {
+        Run::simulate(*wind, PerLeak::default())
+    })?;
     let run_hours = runs.first().map_or(1.0, |run| run.truths.len() as f64 / SAMPLE_RATE_HZ / 3600.0);
     let count = (hours / run_hours).ceil() as u64;
     let (plain, biased) = (Law::default_estimator(), Law::with_biases());
     let sound: Vec<(&Law, u64)> =
         (0..count).map(|seed| (&plain, seed)).chain((0..BIASED_RUNS).map(|seed| (&biased, seed))).collect();
-    let step = report("watching sound cylinders", sound.len());
-    let watched = map_counted(
-        &sound,
-        |n| progress(step(n)),
-        |(law, seed)| {
-            let run = runs.get(*seed as usize % runs.len()).ok_or(ReproduceError::Empty)?;
-            let biases = Biases::drawn(&law.rig.instruments, law.bias_share, *seed);
-            Ok(Watch::over(&law.rig, &run.truths, Sensing::new(law.rig.sensors(), biases, *seed))?)
-        },
-    );
-    let watched = watched.into_iter().collect::<Result<Vec<Watch>, ReproduceError>>()?;
+    let watched = map_counted("watching sound cylinders", &sound, &progress, |(law, seed)| {
+        let run = runs.get(*seed as usize % runs.len()).ok_or(ReproduceError::Empty)?;
+        let biases = Biases::drawn(&law.rig.instruments, law.bias_share, *seed);
+        Ok(Watch::over(&law.rig, &run.truths, Sensing::new(law.rig.sensors(), biases, *seed))?)
+    })?;
     let (plain, biased) = watched.split_at(count as usize);
     let held: usize = biased.iter().map(|watch| watch.intervals_with_zero).sum();
     Ok(Detection {
-        delays: delays.into_iter().collect::<Result<_, _>>()?,
+        delays,
         sound_hours: count as f64 * run_hours,
         false_alarms: plain.iter().map(|watch| watch.raised.len() as u64).sum(),
         biased_runs: BIASED_RUNS,
@@ -118,21 +107,13 @@ struct Watch {
 impl Watch {
     fn over(rig: &Rig, truths: &[Truth], mut sensing: Sensing) -> Result<Self, RlsError> {
         let mut replay = Replay::new(rig)?;
-        let mut raised = Vec::new();
-        let mut before = PerLeak::<bool>::default();
-        let mut record = Record::default();
-        for truth in truths {
-            let first = record.t_s.to_bits() == 0 && truth.t_s.to_bits() == 0;
-            let dt_s = if first { 0.0 } else { 1.0 / SAMPLE_RATE_HZ };
-            record =
-                Record { t_s: truth.t_s, dt_s, sample: sensing.read(&truth.sample), ..Record::default() };
-            if replay.push(&record) {
-                let active = replay.estimate_row(&record).active;
-                let new = Leak::ALL.into_iter().filter(|leak| active[*leak] && !before[*leak]);
-                raised.extend(new.map(|leak| (leak, truth.t_s)));
-                before = active;
-            }
+        for (index, truth) in truths.iter().enumerate() {
+            let dt_s = if index == 0 { 0.0 } else { 1.0 / SAMPLE_RATE_HZ };
+            let sample = sensing.read(&truth.sample);
+            replay.push(&Record { t_s: truth.t_s, dt_s, sample, ..Record::default() });
         }
+        let raised = replay.alarms().iter().filter(|alarm| alarm.state == AlarmState::Raised);
+        let raised = raised.map(|alarm| (alarm.fault, alarm.time_s)).collect();
         let coefficients = replay.estimator().leak_coefficients();
         let holds_zero = |[low, high]: [f64; 2]| low <= 0.0 && high >= 0.0;
         let intervals_with_zero = coefficients.iter().filter(|(_, c)| holds_zero(c.ci95())).count();
@@ -142,8 +123,6 @@ impl Watch {
 
 fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceError> {
     let rig = rig();
-    let reference =
-        Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?;
     let size = |which| {
         let size = LeakSize::MeanFlow(if which == leak { size_lpm / LPM_PER_M3S } else { 0.0 });
         LeakCourse::from_onset(size, ONSET_S)
@@ -152,7 +131,7 @@ fn delay(wind: WindCase, leak: Leak, size_lpm: f64) -> Result<Delay, ReproduceEr
         leaks: PerLeak::from_fn(size),
         duration_s: ONSET_S + WATCH_S,
         sample_rate_hz: SAMPLE_RATE_HZ,
-        ..Scenario::new(rig.clone(), reference)
+        ..Scenario::new(rig.clone(), reference(wind, &rig)?)
     };
     // The mean is taken where the leak is open.
     let open = Scenario { start_s: 10.0 + ONSET_S, ..scenario.clone() };

@@ -1,6 +1,6 @@
 //! Figures like the paper's Fig. 5 to 8, of one window of each wind.
 
-use super::protocol::{Case, ReproduceError, Run};
+use super::protocol::{Case, ReproduceError, Run, WINDOW_SAMPLES};
 use super::search::paper_rig;
 use super::trial::EstimateHistory;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
@@ -47,54 +47,39 @@ impl Reproduction {
     /// # Errors
     /// [`ReproduceError`], where a window cannot be estimated.
     pub fn drawings(&self) -> Result<Vec<Drawing>, ReproduceError> {
-        let of_case = |case: Case| -> Vec<&Run> {
-            self.runs
-                .iter()
-                .zip(Case::ALL.iter().cycle())
-                .filter(|(_, c)| **c == case)
-                .map(|(run, _)| run)
-                .collect()
+        let of_case = |case: Case| {
+            let cases = self.runs.iter().zip(Case::ALL.into_iter().cycle());
+            cases.filter(move |(_, own)| *own == case).map(|(run, _)| run)
         };
-        let first = of_case(Case::One);
-        let mut drawings = vec![
-            Drawing {
-                id: "wind",
-                name: "fig5_wind.svg",
-                title: "Wind, as Fig. 5",
-                panels: first.iter().map(|run| wind(run)).collect(),
-            },
-            Drawing {
-                id: "tracking",
-                name: "fig6_tracking.svg",
-                title: "What the rig followed, as Fig. 6",
-                panels: first.iter().flat_map(|run| followed(run)).collect(),
-            },
-        ];
-        let names = [
-            [
-                ("leakage-1", "fig7a_leakage_case1.svg", "Leak flows, case 1, as Fig. 7"),
-                ("coefficients-1", "fig7b_coefficients_case1.svg", "Leak coefficients, case 1, as Fig. 7"),
-            ],
-            [
-                ("leakage-2", "fig8a_leakage_case2.svg", "Leak flows, case 2, as Fig. 8"),
-                ("coefficients-2", "fig8b_coefficients_case2.svg", "Leak coefficients, case 2, as Fig. 8"),
-            ],
-        ];
-        for (case, [leakage, coefficients]) in Case::ALL.into_iter().zip(names) {
-            let histories =
-                of_case(case).into_iter().map(|run| self.histories(run)).collect::<Result<Vec<_>, _>>()?;
-            let mut add = |(id, name, title), panels: fn(&Histories) -> [Panel; 2]| {
-                drawings.push(Drawing {
-                    id,
-                    name,
-                    title,
-                    panels: histories.iter().flat_map(panels).collect(),
-                });
-            };
-            add(leakage, leak_flows);
-            add(coefficients, leak_coefficients);
-        }
-        Ok(drawings)
+        let histories =
+            |case| of_case(case).map(|run| self.histories(run)).collect::<Result<Vec<Histories>, _>>();
+        let (one, two) = (histories(Case::One)?, histories(Case::Two)?);
+        let flows = |histories: &[Histories]| histories.iter().flat_map(leak_flows).collect();
+        let coefficients = |histories: &[Histories]| histories.iter().flat_map(leak_coefficients).collect();
+        let drawing = |id, name, title, panels| Drawing { id, name, title, panels };
+        Ok(vec![
+            drawing("wind", "fig5_wind.svg", "Wind, as Fig. 5", of_case(Case::One).map(wind).collect()),
+            drawing(
+                "tracking",
+                "fig6_tracking.svg",
+                "What the rig followed, as Fig. 6",
+                of_case(Case::One).flat_map(followed).collect(),
+            ),
+            drawing("leakage-1", "fig7a_leakage_case1.svg", "Leak flows, case 1, as Fig. 7", flows(&one)),
+            drawing(
+                "coefficients-1",
+                "fig7b_coefficients_case1.svg",
+                "Leak coefficients, case 1, as Fig. 7",
+                coefficients(&one),
+            ),
+            drawing("leakage-2", "fig8a_leakage_case2.svg", "Leak flows, case 2, as Fig. 8", flows(&two)),
+            drawing(
+                "coefficients-2",
+                "fig8b_coefficients_case2.svg",
+                "Leak coefficients, case 2, as Fig. 8",
+                coefficients(&two),
+            ),
+        ])
     }
 
     /// Writes the figures, `table.txt` and `reproduce.json` into `directory`, which is made if need be.
@@ -136,53 +121,39 @@ struct Histories {
     ours: EstimateHistory,
 }
 
-fn over_time(truths: &[Truth], value: impl Fn(&Truth) -> f64) -> Points {
-    (0..).zip(truths).map(|(k, truth)| (f64::from(k) / SAMPLE_RATE_HZ, value(truth))).collect()
+fn over_time(values: impl Iterator<Item = f64>) -> Points {
+    (0..).zip(values).map(|(k, value)| (f64::from(k) / SAMPLE_RATE_HZ, value)).collect()
 }
 
 fn line(label: &'static str, ink: Ink, points: Points) -> Line {
     Line { label, ink, points }
 }
 
+/// A panel over time whose range is that of its lines.
+fn panel(title: String, y_label: &'static str, lines: Vec<Line>) -> Panel {
+    Panel { title, x_label: "time (s)", y_label, lines, y_range: None }
+}
+
 fn wind(run: &Run) -> Panel {
-    let start = WINDOW * super::protocol::WINDOW_SAMPLES;
-    let speeds = run.wind_mps.iter().skip(start).take(super::protocol::WINDOW_SAMPLES);
-    let points = (0..).zip(speeds).map(|(k, speed)| (f64::from(k) / SAMPLE_RATE_HZ, *speed)).collect();
-    Panel {
-        title: format!("Mean wind {} m/s", run.wind.mean_mps()),
-        x_label: "time (s)",
-        y_label: "wind (m/s)",
-        lines: vec![line("", Ink::Ours, points)],
-        y_range: None,
-    }
+    let speeds = run.wind_mps.iter().skip(WINDOW * WINDOW_SAMPLES).take(WINDOW_SAMPLES);
+    let lines = vec![line("", Ink::Ours, over_time(speeds.copied()))];
+    panel(format!("Mean wind {} m/s", run.wind.mean_mps()), "wind (m/s)", lines)
 }
 
 fn followed(run: &Run) -> [Panel; 2] {
     let truths = run.window(WINDOW);
-    let wind = run.wind.mean_mps();
-    let panel = |what, y_label, reference, output| Panel {
-        title: format!("{wind} m/s: {what}"),
-        x_label: "time (s)",
-        y_label,
-        lines: vec![line("reference", Ink::Measured, reference), line("output", Ink::Ours, output)],
-        y_range: None,
+    let over = |of: fn(&Truth) -> f64| over_time(truths.iter().map(of));
+    let both = |what: &str, y_label, reference, output| {
+        let lines = vec![line("reference", Ink::Measured, reference), line("output", Ink::Ours, output)];
+        panel(format!("{} m/s: {what}", run.wind.mean_mps()), y_label, lines)
     };
-    let position = over_time(truths, |t| 1e3 * t.signals.x_m);
-    let mut tracking = panel(
-        "piston position",
-        "position (mm)",
-        over_time(truths, |t| 1e3 * t.position_reference_m),
-        position.clone(),
-    );
-    tracking.y_range = Some(at_least(1.0, &position));
+    let position = over(|t| 1e3 * t.signals.x_m);
+    let y_range = Some(at_least(1.0, &position));
+    let asked = over(|t| 1e3 * t.position_reference_m);
+    let [load_asked, load] = [over(|t| 1e-3 * t.load_reference_n), over(|t| 1e-3 * t.signals.force_n)];
     [
-        tracking,
-        panel(
-            "load",
-            "load (kN)",
-            over_time(truths, |t| 1e-3 * t.load_reference_n),
-            over_time(truths, |t| 1e-3 * t.signals.force_n),
-        ),
+        Panel { y_range, ..both("piston position", "position (mm)", asked, position) },
+        both("load", "load (kN)", load_asked, load),
     ]
 }
 
@@ -202,48 +173,53 @@ fn at_least(least: f64, points: &Points) -> (f64, f64) {
     (0.5 * (low + high) - half, 0.5 * (low + high) + half)
 }
 
+/// One leak: as it was, by the paper's law, and by the default estimator.
+fn compared(
+    title: String,
+    y_label: &'static str,
+    y_range: (f64, f64),
+    [was, paper, ours]: [Points; 3],
+) -> Panel {
+    let lines = vec![
+        line("measured", Ink::Measured, was),
+        line("paper's law", Ink::Paper, paper),
+        line("ours", Ink::Ours, ours),
+    ];
+    Panel { y_range: Some(y_range), ..panel(title, y_label, lines) }
+}
+
 fn leak_flows(histories: &Histories) -> [Panel; 2] {
-    let panel = |leak: Leak| {
+    let Histories { mean_mps, paper, ours, .. } = histories;
+    [Leak::Internal, Leak::ExternalA].map(|leak| {
         let points = |flows: &[PerLeak<f64>]| -> Points {
-            histories.ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM_PER_M3S * q[leak])).collect()
+            ours.t_s.iter().zip(flows).map(|(t, q)| (*t, LPM_PER_M3S * q[leak])).collect()
         };
-        let reference = points(&histories.ours.references_m3s);
+        let reference = points(&ours.references_m3s);
         let (low, high) = at_least(0.1, &reference);
         let room = 0.3 * (high - low);
-        Panel {
-            title: format!("{} m/s: {} leakage", histories.mean_mps, leak.label()),
-            x_label: "time (s)",
-            y_label: "leakage (L/min)",
-            y_range: Some((low - room, high + room)),
-            lines: vec![
-                line("measured", Ink::Measured, reference),
-                line("paper's law", Ink::Paper, points(&histories.paper.flows_m3s)),
-                line("ours", Ink::Ours, points(&histories.ours.flows_m3s)),
-            ],
-        }
-    };
-    [panel(Leak::Internal), panel(Leak::ExternalA)]
+        compared(
+            format!("{mean_mps} m/s: {} leakage", leak.label()),
+            "leakage (L/min)",
+            (low - room, high + room),
+            [reference, points(&paper.flows_m3s), points(&ours.flows_m3s)],
+        )
+    })
 }
 
 fn leak_coefficients(histories: &Histories) -> [Panel; 2] {
-    let panel = |leak: Leak| {
+    let Histories { mean_mps, paper, ours, truth } = histories;
+    [Leak::Internal, Leak::ExternalA].map(|leak| {
         let points = |history: &EstimateHistory| -> Points {
             let values = history.coefficients.iter().map(|c| LPM_PER_BAR * c[leak].value);
             history.t_s.iter().copied().zip(values).collect()
         };
-        let truth = LPM_PER_BAR * histories.truth[leak];
-        let end = histories.ours.t_s.last().copied().unwrap_or(0.0);
-        Panel {
-            title: format!("{} m/s: {} leak coefficient", histories.mean_mps, leak.label()),
-            x_label: "time (s)",
-            y_label: "coefficient (L/min/bar)",
-            y_range: Some((-0.2 * truth, 2.0 * truth)),
-            lines: vec![
-                line("measured", Ink::Measured, vec![(0.0, truth), (end, truth)]),
-                line("paper's law", Ink::Paper, points(&histories.paper)),
-                line("ours", Ink::Ours, points(&histories.ours)),
-            ],
-        }
-    };
-    [panel(Leak::Internal), panel(Leak::ExternalA)]
+        let truth = LPM_PER_BAR * truth[leak];
+        let end = ours.t_s.last().copied().unwrap_or(0.0);
+        compared(
+            format!("{mean_mps} m/s: {} leak coefficient", leak.label()),
+            "coefficient (L/min/bar)",
+            (-0.2 * truth, 2.0 * truth),
+            [vec![(0.0, truth), (end, truth)], points(paper), points(ours)],
+        )
+    })
 }

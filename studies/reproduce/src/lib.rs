@@ -22,7 +22,8 @@ pub use trial::{EstimateHistory, TrialScore};
 use crate::cramer_rao::CramerRaoModel;
 use efficient::Efficient;
 use pitchleak::Rig;
-use pitchleak::core::{ExcitationSettings, Leak, PerLeak, Sample};
+use pitchleak::core::{Estimate, ExcitationSettings, Leak, PerLeak, Sample};
+use pitchleak::replay::leak_pressures_pa;
 use pitchleak::rig::{Instrument, Instruments};
 use pitchleak::simulate::{Biases, Normal, Sensing};
 use pitchleak::units::LPM_PER_M3S;
@@ -30,7 +31,7 @@ use pitchleak::wind::WindCase;
 use protocol::map_counted;
 use rayon::prelude::*;
 use serde::Serialize;
-use table::{Entry, WindowBound};
+use table::Entry;
 use trial::mean;
 
 /// Greatest bias of a sensor in the runs with biases, share of full scale.
@@ -124,31 +125,19 @@ pub struct Reproduction {
 /// # Errors
 /// [`ReproduceError`].
 pub fn reproduce(seeds: u64, progress: impl Fn(Progress) + Sync) -> Result<Reproduction, ReproduceError> {
-    let at = |stage, count| move |done| Progress { stage, done, count };
     let settings: Vec<(WindCase, Case)> =
         WindCase::ALL.into_iter().flat_map(|wind| Case::ALL.map(|case| (wind, case))).collect();
-    let simulating = at("simulating", settings.len());
-    let runs =
-        map_counted(&settings, |n| progress(simulating(n)), |(w, c)| Run::simulate(*w, c.leaks_m3spa()));
-    let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let paper_gains = best_gains(&runs, |done, count| {
-        progress(Progress { stage: "searching gains of the paper's law", done, count });
-    })?;
+    let runs = map_counted("simulating", &settings, &progress, |(w, c)| Run::simulate(*w, c.leaks_m3spa()))?;
+    let paper_gains = best_gains(&runs, &progress)?;
     let best = paper_gains.first().map_or((10.0, 1.0), |best| (best.lambda_per_s, best.gamma));
 
     let jobs: Vec<(usize, usize)> = (0..runs.len()).flat_map(|r| (0..WINDOWS).map(move |w| (r, w))).collect();
-    let estimating = at("estimating", jobs.len());
     let laws = [Law::paper(best), Law::default_estimator(), Law::with_biases()];
     let [paper, plain, biased] = &laws;
-    let trials = map_counted(
-        &jobs,
-        |n| progress(estimating(n)),
-        |&(run, window)| {
-            let run = runs.get(run).ok_or(ReproduceError::Empty)?;
-            laws.iter().map(|law| law.trials(run, window, seeds)).collect::<Result<Vec<_>, _>>()
-        },
-    );
-    let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let trials = map_counted("estimating", &jobs, &progress, |&(run, window)| {
+        let run = runs.get(run).ok_or(ReproduceError::Empty)?;
+        laws.iter().map(|law| law.trials(run, window, seeds)).collect::<Result<Vec<_>, _>>()
+    })?;
 
     let rows = |laws: &[(usize, &Law)]| rows(&settings, &trials, laws);
     let cases: Vec<(Case, &Run)> = settings.iter().map(|(_, case)| *case).zip(&runs).collect();
@@ -170,8 +159,6 @@ struct Law {
     name: &'static str,
     rig: Rig,
     bias_share: f64,
-    /// The bound's sensors; the paper's law is held against the same bound.
-    bound_rig: Rig,
 }
 
 /// Both leaks' entries of one window, one per seed.
@@ -179,11 +166,11 @@ type Trials = Vec<PerLeak<Entry>>;
 
 impl Law {
     fn paper((lambda_per_s, gamma): (f64, f64)) -> Self {
-        Self { name: "paper", rig: paper_rig(lambda_per_s, gamma), bias_share: 0.0, bound_rig: rig() }
+        Self { name: "paper", rig: paper_rig(lambda_per_s, gamma), bias_share: 0.0 }
     }
 
     fn default_estimator() -> Self {
-        Self { name: "rls", rig: rig(), bias_share: 0.0, bound_rig: rig() }
+        Self { name: "rls", rig: rig(), bias_share: 0.0 }
     }
 
     /// The rig file then says so: a bias uniform within ± 1 % has a standard deviation of 1 %/√3.
@@ -192,37 +179,36 @@ impl Law {
         let biased = |sheet: &mut Instrument| sheet.bias = BIAS / f64::sqrt(3.0);
         let Instruments { flow_a, flow_b, pressure, position, force, .. } = &mut rig.instruments;
         [flow_a, flow_b, pressure, position, force].into_iter().for_each(biased);
-        Self { name: "rls", bias_share: BIAS, bound_rig: rig.clone(), rig }
+        Self { name: "rls", bias_share: BIAS, rig }
     }
 
     fn trials(&self, run: &Run, window: usize, seeds: u64) -> Result<Trials, ReproduceError> {
         let truths = run.window(window);
         let truth = run.leaks_m3spa;
         let samples: Vec<Sample<f64>> = truths.iter().map(|truth| truth.sample).collect();
-        let sensors = self.bound_rig.sensors();
-        let model = CramerRaoModel {
-            cylinder: &self.bound_rig.cylinder,
-            fluid: &self.bound_rig.fluid,
-            sensors: &sensors,
-            leaks: &truth,
-        };
+        let Rig { cylinder, fluid, .. } = &self.rig;
+        let sensors = self.rig.sensors();
+        let model = CramerRaoModel { cylinder, fluid, sensors: &sensors, leaks: &truth };
         let efficient = Efficient::new(&model, &samples).ok_or(ReproduceError::Empty)?;
         let stds = efficient.leak_std(samples.len()).zip(efficient.leak_std(EARLY_SAMPLES));
         let sizes = mean_pressures_pa(&samples);
         let mine = (0..seeds).filter(|seed| (seed % WINDOWS as u64) as usize == window);
         mine.map(|seed| {
             let biases = Biases::drawn(&self.rig.instruments, self.bias_share, seed);
-            let history =
-                EstimateHistory::run(&self.rig, truths, Sensing::new(self.rig.sensors(), biases, seed))?;
+            let history = EstimateHistory::run(&self.rig, truths, Sensing::new(sensors, biases, seed))?;
             let unbiased = Sensing::new(sensors, Biases::default(), seed);
             let best = efficient.history(truths, unbiased, &mut Normal::stream(seed, EFFICIENT_STREAM))?;
             Ok(PerLeak::from_fn(|leak| {
                 // Nothing leaks out of B here; its errors are relative to 1.
                 let coefficient = if leak == Leak::ExternalB { 1.0 } else { truth[leak] };
+                let (std, early) = stds[leak];
+                let flow_m3s = Estimate { value: coefficient, std }.scaled(sizes[leak]);
                 Entry {
                     score: history.score(coefficient, leak),
                     efficient: best.score(coefficient, leak),
-                    window: WindowBound::new(coefficient, stds[leak], sizes[leak]),
+                    bound: std / coefficient,
+                    bound_early: early / coefficient,
+                    identifiable: ExcitationSettings::default().resolves(&flow_m3s),
                 }
             }))
         })
@@ -232,12 +218,8 @@ impl Law {
 
 /// Means of |P_L|, P_A, P_B, Pa.
 fn mean_pressures_pa(samples: &[Sample<f64>]) -> PerLeak<f64> {
-    let mean = |of: fn(&Sample<f64>) -> f64| mean(samples.iter().map(of));
-    PerLeak {
-        internal: mean(|sample| sample.load_pressure_pa().abs()),
-        external_a: mean(|sample| sample.pa_pa),
-        external_b: mean(|sample| sample.pb_pa),
-    }
+    let of = |leak, sample: &Sample<f64>| leak_pressures_pa([sample.pa_pa, sample.pb_pa])[leak].abs();
+    PerLeak::from_fn(|leak| mean(samples.iter().map(|sample| of(leak, sample))))
 }
 
 /// The rows of `laws` (and their places in the trials), in the order wind, case, leak, estimator;
@@ -258,10 +240,8 @@ fn rows(settings: &[(WindCase, Case)], trials: &[Vec<Trials>], laws: &[(usize, &
 
 fn bulk_modulus(case: Case, run: &Run) -> BulkModulusBound {
     let rig = rig();
-    let sensors = rig.sensors();
-    let leaks = run.leaks_m3spa;
-    let model =
-        CramerRaoModel { cylinder: &rig.cylinder, fluid: &rig.fluid, sensors: &sensors, leaks: &leaks };
+    let (Rig { cylinder, fluid, .. }, sensors) = (&rig, rig.sensors());
+    let model = CramerRaoModel { cylinder, fluid, sensors: &sensors, leaks: &run.leaks_m3spa };
     let spread = |window: usize| {
         let samples: Vec<Sample<f64>> = run.window(window).iter().map(|truth| truth.sample).collect();
         let bound = model.bound(1.0 / SAMPLE_RATE_HZ, &samples);

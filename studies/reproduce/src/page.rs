@@ -1,5 +1,6 @@
 //! The page of the reproduced experiment: the paper's figures beside ours, and the charts behind them.
 
+use crate::table::five_digits;
 use crate::{BulkModulusBound, Detection, Drawing, Report, ReproduceError, Reproduction, Row, Scored};
 use maud::{Markup, html};
 use pitchleak_view::figure::{self, Panel};
@@ -44,8 +45,8 @@ pub fn page(reproduction: &Reproduction) -> Result<Page, ReproduceError> {
 }
 
 fn head(report: &Report) -> Head {
-    let [least, most] = coefficient_errors(report, "rls");
-    let [law_least, law_most] = coefficient_errors(report, "paper");
+    let errors = |estimator| range(report, estimator, |scored| scored.coefficient_mean_error_percent);
+    let ([least, most], [law_least, law_most]) = (errors("rls"), errors("paper"));
     let [told, rows] = [true, false].map(|only| {
         report.rows.iter().filter(|row| row.estimator == "rls" && (row.identifiable || !only)).count()
     });
@@ -76,19 +77,15 @@ fn head(report: &Report) -> Head {
     }
 }
 
-/// Mean coefficient errors of an estimator, %: least and greatest over the rows.
-fn coefficient_errors(report: &Report, estimator: &str) -> [f64; 2] {
-    let errors = told(report, estimator).filter_map(|row| row.median.coefficient_mean_error_percent);
-    errors.fold([f64::INFINITY, 0.0], |[low, high], error| [low.min(error), high.max(error)])
+/// Least and greatest of a figure over the rows of an estimator in which the leak can be told.
+fn range(report: &Report, estimator: &str, of: fn(&Scored) -> Option<f64>) -> [f64; 2] {
+    let told = report.rows.iter().filter(|row| row.estimator == estimator && row.identifiable);
+    let values = told.filter_map(|row| of(&row.median));
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 fn short_percent(value: f64) -> String {
     if value.is_finite() { rough(value) } else { "–".to_owned() }
-}
-
-/// Rows of an estimator in which the leak can be told.
-fn told<'a>(report: &'a Report, estimator: &'a str) -> impl Iterator<Item = &'a Row> + Clone {
-    report.rows.iter().filter(move |row| row.estimator == estimator && row.identifiable)
 }
 
 fn open(report: &Report) -> Markup {
@@ -111,11 +108,7 @@ fn leak(id: &str) -> String {
 }
 
 fn brief(report: &Report) -> Markup {
-    let range = |estimator: &'static str, of: fn(&Scored) -> Option<f64>| {
-        let values = told(report, estimator).filter_map(|row| of(&row.median));
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        format!("{} – {}", short_percent(low), short_percent(high))
-    };
+    let text = |estimator, of| range(report, estimator, of).map(short_percent).join(" – ");
     html! {
         table {
             thead { tr { td {} th .number scope="col" { "leakage" } th .number scope="col" { "coefficient" } } }
@@ -124,8 +117,8 @@ fn brief(report: &Report) -> Markup {
                 @for (name, id) in [("its law, here", "paper"), ("default estimator", "rls")] {
                     tr {
                         th scope="row" { (name) }
-                        td .number { (range(id, |scored| scored.leakage_mean_error_percent)) }
-                        td .number { (range(id, |scored| scored.coefficient_mean_error_percent)) }
+                        td .number { (text(id, |scored| scored.leakage_mean_error_percent)) }
+                        td .number { (text(id, |scored| scored.coefficient_mean_error_percent)) }
                     }
                 }
             }
@@ -181,12 +174,7 @@ fn cells(row: &Row) -> [String; 5] {
     let Some(worst) = row.worst else {
         return ["not identifiable", "", "", "", ""].map(str::to_owned);
     };
-    let text = |value: Option<f64>| match value {
-        None => "–".to_owned(),
-        Some(value) if value >= 1000.0 => "> 999".to_owned(),
-        Some(value) if value >= 100.0 => format!("{value:.0}"),
-        Some(value) => format!("{value:.2}"),
-    };
+    let text = |value: Option<f64>| value.map_or("–".to_owned(), five_digits).replace('>', "> ");
     let (medians, worst) = (row.median.values(), worst.values());
     std::array::from_fn(|at| format!("{} ({})", text(medians[at]), text(worst[at])))
 }

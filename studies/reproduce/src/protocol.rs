@@ -1,8 +1,10 @@
 //! The paper's experiment (Section IV), and what stands here for what it does not print.
 
+use super::Progress;
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, FilterError, PerLeak, RlsError};
 use pitchleak::output::OutputError;
+use pitchleak::reference::Reference;
 use pitchleak::simulate::{LeakSize, Scenario, SimulateError, Truth};
 use pitchleak::units::LPM_PER_BAR;
 use pitchleak::wind::{Emulation, EmulationError, History, HistoryError, Wind, WindCase};
@@ -30,17 +32,14 @@ const M3SPA_PER_LPM_BAR: f64 = 1.0 / LPM_PER_BAR;
 #[serde(into = "u8")]
 pub enum Case {
     /// Large internal, small external leak.
-    One,
+    One = 1,
     /// Small internal, large external leak.
-    Two,
+    Two = 2,
 }
 
 impl From<Case> for u8 {
     fn from(case: Case) -> Self {
-        match case {
-            Case::One => 1,
-            Case::Two => 2,
-        }
+        case as Self
     }
 }
 
@@ -56,11 +55,7 @@ impl Case {
             Self::One => (0.3, 0.04),
             Self::Two => (0.12, 0.1),
         };
-        PerLeak {
-            internal: internal * M3SPA_PER_LPM_BAR,
-            external_a: external_a * M3SPA_PER_LPM_BAR,
-            external_b: 0.0,
-        }
+        PerLeak { internal, external_a, external_b: 0.0 }.map(|leak| leak * M3SPA_PER_LPM_BAR)
     }
 }
 
@@ -73,6 +68,11 @@ pub fn rig() -> Rig {
         cylinder: Cylinder { dead_volume_a_m3: hose_m3, dead_volume_b_m3: hose_m3, ..paper.cylinder },
         ..paper
     }
+}
+
+/// What a rig follows in this wind.
+pub(super) fn reference(wind: WindCase, rig: &Rig) -> Result<Reference, ReproduceError> {
+    Ok(Emulation::paper().reference(&History::of(&Wind::BuiltIn(wind))?, rig.cylinder.stroke_m)?)
 }
 
 /// Why the experiment cannot be run.
@@ -126,8 +126,7 @@ impl Run {
     /// [`ReproduceError`].
     pub fn simulate(wind: WindCase, leaks_m3spa: PerLeak<f64>) -> Result<Self, ReproduceError> {
         let rig = rig();
-        let history = History::of(&Wind::BuiltIn(wind))?;
-        let reference = Emulation::paper().reference(&history, rig.cylinder.stroke_m)?;
+        let reference = reference(wind, &rig)?;
         let wind_curve = reference.wind_mps.clone();
         let scenario = Scenario {
             leaks: leaks_m3spa.map(|leak| LeakSize::Coefficient(leak).into()),
@@ -150,21 +149,24 @@ impl Run {
     }
 }
 
-/// `work` on every item, on all cores; results in the items' order whatever the thread count. `done` is
-/// called with the number of items finished, from any thread.
+/// `work` on every item, on all cores; results in the items' order whatever the thread count. `progress` hears of each
+/// that is done, from any thread.
 pub(super) fn map_counted<I: Sync, O: Send>(
+    stage: &'static str,
     items: &[I],
-    done: impl Fn(usize) + Sync,
-    work: impl Fn(&I) -> O + Sync,
-) -> Vec<O> {
+    progress: impl Fn(Progress) + Sync,
+    work: impl Fn(&I) -> Result<O, ReproduceError> + Sync,
+) -> Result<Vec<O>, ReproduceError> {
     let finished = AtomicUsize::new(0);
     let counted = |item| {
         let result = work(item);
-        done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+        let done = finished.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(Progress { stage, done, count: items.len() });
         result
     };
     // Items take seconds each: none waits behind another while a core is free.
-    items.par_iter().with_max_len(1).map(counted).collect()
+    let results: Vec<_> = items.par_iter().with_max_len(1).map(counted).collect();
+    results.into_iter().collect()
 }
 
 #[cfg(test)]
@@ -175,12 +177,13 @@ mod tests {
     fn results_come_in_order_and_all_are_counted() {
         let items: Vec<u64> = (0..100).collect();
         let counted = AtomicUsize::new(0);
-        let count = |_| {
+        let count = |progress: Progress| {
+            assert_eq!((progress.stage, progress.count), ("squares", 100));
             counted.fetch_add(1, Ordering::Relaxed);
         };
-        let squares = map_counted(&items, count, |n| n * n);
+        let squares = map_counted("squares", &items, count, |n| Ok(n * n)).expect("none fails");
         assert_eq!(squares, items.iter().map(|n| n * n).collect::<Vec<_>>());
         assert_eq!(counted.into_inner(), 100);
-        assert!(map_counted(&[] as &[u8], |_| (), |_| 0).is_empty());
+        assert!(map_counted("none", &[] as &[u8], |_| (), |_| Ok(0)).expect("none fails").is_empty());
     }
 }

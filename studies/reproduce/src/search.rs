@@ -1,5 +1,6 @@
 //! The paper does not print λ and γ: the best ones are searched for, in the same runs.
 
+use super::Progress;
 use super::protocol::{ReproduceError, Run, WINDOWS, map_counted, rig};
 use super::trial::{EstimateHistory, mean};
 use pitchleak::Rig;
@@ -36,12 +37,13 @@ pub struct Candidate {
 /// [`ReproduceError`].
 pub fn best_gains(
     runs: &[Run],
-    done: impl Fn(usize, usize) + Sync,
+    progress: impl Fn(Progress) + Sync,
 ) -> Result<Vec<Candidate>, ReproduceError> {
     let pairs: Vec<(f64, f64)> = LAMBDAS.iter().flat_map(|&l| RATIOS.map(|ratio| (l, l * ratio))).collect();
-    let count = pairs.len();
-    let results = map_counted(&pairs, |n| done(n, count), |&(lambda, gamma)| try_gains(runs, lambda, gamma));
-    let mut candidates = results.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut candidates =
+        map_counted("searching gains of the paper's law", &pairs, progress, |&(lambda, gamma)| {
+            try_gains(runs, lambda, gamma)
+        })?;
     candidates.sort_by(|a, b| a.coefficient_mean_error_percent.total_cmp(&b.coefficient_mean_error_percent));
     Ok(candidates)
 }

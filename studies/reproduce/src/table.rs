@@ -2,7 +2,6 @@
 
 use super::protocol::Case;
 use super::trial::{TrialScore, mean};
-use pitchleak::core::{Estimate, ExcitationSettings};
 use serde::Serialize;
 
 /// The five figures of the paper, or nulls where the row is not identifiable.
@@ -70,31 +69,12 @@ pub(super) struct Entry {
     pub score: TrialScore,
     /// Score of an efficient estimator.
     pub efficient: TrialScore,
-    pub window: WindowBound,
-}
-
-/// The bound of one leak in one window.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WindowBound {
-    /// Standard deviation of the coefficient, share of the truth.
-    pub coefficient: f64,
-    /// Standard deviation of the coefficient after the first 2 s.
-    pub coefficient_early: f64,
+    /// Bound on the coefficient's standard deviation in this window, share of the truth.
+    pub bound: f64,
+    /// The same after the first 2 s.
+    pub bound_early: f64,
     /// Whether the leak is identifiable in it: 95 % within 0.1 L/min or a tenth of itself.
     pub identifiable: bool,
-}
-
-impl WindowBound {
-    /// From the bounds on the coefficient `leak` at the end and early on, m³/(s·Pa), and the mean size of
-    /// the pressure that drives it.
-    pub fn new(leak: f64, (std, early): (f64, f64), pressure_pa: f64) -> Self {
-        let flow_m3s = Estimate { value: leak, std }.scaled(pressure_pa);
-        Self {
-            coefficient: std / leak,
-            coefficient_early: early / leak,
-            identifiable: ExcitationSettings::default().resolves(&flow_m3s),
-        }
-    }
 }
 
 /// The five figures of all seeds, by `pick`.
@@ -117,7 +97,7 @@ impl Row {
         estimator: &'static str,
         entries: &[Entry],
     ) -> Self {
-        let identifiable = 2 * entries.iter().filter(|e| e.window.identifiable).count() >= entries.len();
+        let identifiable = 2 * entries.iter().filter(|e| e.identifiable).count() >= entries.len();
         let scores = entries.iter().map(|e| &e.score);
         let efficient = entries.iter().map(|e| &e.efficient);
         let known = |scored: Scored| if identifiable { scored } else { Scored::default() };
@@ -126,9 +106,8 @@ impl Row {
             .filter_map(|e| e.score.covered)
             .map(|yes| 100.0 * f64::from(u8::from(yes)))
             .collect();
-        let of_windows =
-            |of: fn(&WindowBound) -> f64| median(entries.iter().map(|e| of(&e.window)).collect());
-        let ratio = |e: &Entry| (e.score.final_error / (100.0 * e.window.coefficient)).powi(2);
+        let of_windows = |of: fn(&Entry) -> f64| median(entries.iter().map(of).collect());
+        let ratio = |e: &Entry| (e.score.final_error / (100.0 * e.bound)).powi(2);
         Self {
             wind_mps,
             case,
@@ -141,8 +120,8 @@ impl Row {
             coverage_percent: (!covered.is_empty()).then(|| mean(covered.into_iter())),
             bound: Bound {
                 median: known(scored(efficient, median)),
-                coefficient_std_percent: 100.0 * of_windows(|w| w.coefficient),
-                coefficient_std_after_2s_percent: 100.0 * of_windows(|w| w.coefficient_early),
+                coefficient_std_percent: 100.0 * of_windows(|e| e.bound),
+                coefficient_std_after_2s_percent: 100.0 * of_windows(|e| e.bound_early),
                 error_over_bound: mean(entries.iter().map(ratio)).sqrt(),
             },
         }
@@ -158,28 +137,15 @@ fn worst(values: Vec<f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Above the columns of [`line`].
+const HEAD: [&str; 2] = [
+    "                                 |        leakage error %        |      coefficient error %      |  within 5 %   | coefficient's bound",
+    " m/s case  leak        law      |           mean           peak |           mean           peak |       after s | 1s, 2 s 1s, end  ratio",
+];
+
 /// The table for people: medians, worst case in brackets; below each leak the efficient estimator.
 pub(super) fn to_text(title: &str, rows: &[Row]) -> String {
-    let mut out = format!(
-        "{title}\n{:33}| {:^29} | {:^29} | {:^13} | coefficient's bound\n\
-         {:>4} {:>4}  {:<10}  {:<9}| {:>14} {:>14} | {:>14} {:>14} | {:>13} | {:>7} {:>7} {:>6}\n",
-        "",
-        "leakage error %",
-        "coefficient error %",
-        "within 5 %",
-        "m/s",
-        "case",
-        "leak",
-        "law",
-        "mean",
-        "peak",
-        "mean",
-        "peak",
-        "after s",
-        "1s, 2 s",
-        "1s, end",
-        "ratio"
-    );
+    let mut out = format!("{title}\n{}\n", HEAD.join("\n"));
     for leak in rows.chunk_by(|a, b| (a.wind_mps, a.case, a.leak) == (b.wind_mps, b.case, b.leak)) {
         leak.iter().for_each(|row| out += &line(row));
         leak.last().into_iter().filter(|row| row.identifiable).for_each(|row| out += &limit_line(row));
@@ -204,9 +170,9 @@ fn line(row: &Row) -> String {
         pair(c, wc),
         pair(d, wd),
         pair(e, we),
-        short(bound.coefficient_std_after_2s_percent),
-        short(bound.coefficient_std_percent),
-        short(bound.error_over_bound)
+        five_digits(bound.coefficient_std_after_2s_percent),
+        five_digits(bound.coefficient_std_percent),
+        five_digits(bound.error_over_bound)
     )
 }
 
@@ -229,12 +195,12 @@ impl Scored {
     }
 
     fn cells(&self) -> [String; 5] {
-        self.values().map(|value| value.map_or_else(|| "-".into(), short))
+        self.values().map(|value| value.map_or_else(|| "-".into(), five_digits))
     }
 }
 
 /// A number in at most five characters.
-fn short(value: f64) -> String {
+pub(super) fn five_digits(value: f64) -> String {
     match value {
         v if v >= 1000.0 => ">999".into(),
         v if v >= 100.0 => format!("{v:.0}"),

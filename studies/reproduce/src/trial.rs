@@ -73,18 +73,26 @@ impl EstimateHistory {
         mut estimate: impl FnMut(usize, &Sample<f64>) -> (PerLeak<Estimate<f64>>, [f64; 2]),
     ) -> Result<Self, FilterError> {
         let mut history = Self::default();
-        let mut filters = Filters::default();
+        let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
+        let settled = |value: f64| {
+            let mut filter = filter;
+            filter.reset(value);
+            filter
+        };
+        let mut filters = None;
         for (index, truth) in window.iter().enumerate() {
             let sample = sensing.read(&truth.sample);
             let (coefficients, biases_pa) = estimate(index, &sample);
             let read = leak_pressures_pa([sample.pa_pa, sample.pb_pa]);
-            let (pressures, references) = filters.advance(read, truth.leaks_m3s)?;
-            let found = leak_pressures_pa(biases_pa);
+            // Both start settled on their first values.
+            let [of_pressures, of_leaks] =
+                filters.get_or_insert_with(|| [read, truth.leaks_m3s].map(|first| first.map(settled)));
+            let (pressures, found) = (advance(of_pressures, read), leak_pressures_pa(biases_pa));
             let flows = coefficients.zip(pressures.zip(found)).map(|(c, (p, bias))| c.value * (p - bias));
             history.t_s.push(index as f64 / SAMPLE_RATE_HZ);
             history.coefficients.push(coefficients);
             history.flows_m3s.push(flows);
-            history.references_m3s.push(references);
+            history.references_m3s.push(advance(of_leaks, truth.leaks_m3s));
         }
         Ok(history)
     }
@@ -122,38 +130,7 @@ impl EstimateHistory {
     }
 }
 
-/// The paper's filter on the pressures that drive the leaks and on the true leak flows; it starts settled on
-/// the first values.
-#[derive(Default)]
-pub(super) struct Filters(Option<(PerLeakFilter, PerLeakFilter)>);
-
-type PerLeakFilter = PerLeak<Butterworth<f64>>;
-
-impl Filters {
-    /// Pressures, Pa, and leak flows, m³/s, behind the filter.
-    pub fn advance(
-        &mut self,
-        pressures: PerLeak<f64>,
-        leaks: PerLeak<f64>,
-    ) -> Result<(PerLeak<f64>, PerLeak<f64>), FilterError> {
-        let (of_pressures, of_leaks) = match &mut self.0 {
-            Some(filters) => filters,
-            none => none.insert((settled(pressures)?, settled(leaks)?)),
-        };
-        Ok((advance(of_pressures, pressures), advance(of_leaks, leaks)))
-    }
-}
-
-fn settled(start: PerLeak<f64>) -> Result<PerLeakFilter, FilterError> {
-    let filter = Butterworth::new(CUTOFF_HZ, SAMPLE_RATE_HZ)?;
-    Ok(start.map(|start| {
-        let mut filter = filter;
-        filter.reset(start);
-        filter
-    }))
-}
-
-fn advance(filters: &mut PerLeakFilter, values: PerLeak<f64>) -> PerLeak<f64> {
+fn advance(filters: &mut PerLeak<Butterworth<f64>>, values: PerLeak<f64>) -> PerLeak<f64> {
     PerLeak::from_fn(|leak| filters[leak].update(values[leak]))
 }
 

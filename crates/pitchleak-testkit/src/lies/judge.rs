@@ -6,7 +6,7 @@ use pitchleak::live::{EstimateEvent, Event, LineFormat, LiveConfig, LiveLeakage,
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{Reason, ReasonId, ReplayReport, Status};
 use pitchleak::simulate::{
-    Biases, Reading, Row, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
+    Biases, Reading, Sensing, SensorFault, SensorFaults, TraceLayout, TraceWriter, Truth,
 };
 use pitchleak::trace::TraceReader;
 use pitchleak::units::LPM_PER_M3S;
@@ -189,10 +189,10 @@ pub fn recorded<'a>(truths: &'a [Truth], lie: &Lie, accuracy: f64, seed: u64) ->
     let mut shown_rows = 0;
     for (index, truth) in truths.iter().enumerate() {
         let sample: Sample<f64> = sensing.read(&truth.sample);
-        let shown = faults.show(&Reading::at(truth, sample)).filter(|_| index % lie.every == 0);
+        let shown = faults.show(&Reading::at(truth, &sample, None)).filter(|_| index % lie.every == 0);
         if let Some(shown) = shown {
             shown_rows = index + 1;
-            writer.row(&Row::new(truth, shown)).expect("memory takes it");
+            writer.row(&shown).expect("memory takes it");
         }
     }
     (writer.into_inner(), truths.get(..shown_rows).unwrap_or_default())
