@@ -145,7 +145,7 @@ impl Normal {
 }
 
 /// ln of the normal's probability above a point.
-fn ln_tail(point: f64) -> f64 {
+pub(crate) fn ln_tail(point: f64) -> f64 {
     if point < 5.0 {
         return (0.5 * erfc(point / SQRT_2)).ln();
     }

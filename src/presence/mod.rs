@@ -3,7 +3,7 @@
 mod belief;
 mod found;
 
-pub(crate) use belief::Place;
+pub(crate) use belief::{Place, ln_tail};
 pub(crate) use belief::SIZE as LEAK_SIZE;
 pub use found::FoundLeak;
 pub(crate) use found::{Found, Wording, report, told};

@@ -82,16 +82,20 @@ fn finished<'a>(
     error: &impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
     progress: Progress<'_>,
 ) -> Selection<'a> {
+    let mut weighed = Vec::new();
     for _ in 0..MOST_SWAPS {
         all.drop_needless(progress);
         all.drop_needless_changes(progress);
         all.drop_doubtful(progress);
-        if !sets::weigh(&mut all, progress) {
+        if all.fit.active() == weighed || !sets::weigh(&mut all, progress) {
             return all;
         }
+        weighed = all.fit.active().to_vec();
         add_while(&mut all, |_| true, error, progress);
     }
-    sets::weigh(&mut all, progress);
+    if all.fit.active() != weighed {
+        sets::weigh(&mut all, progress);
+    }
     all
 }
 

@@ -11,6 +11,8 @@ use crate::diagnose::thresholds::{
     CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_SWAPS,
 };
 use crate::diagnose::weak_form::Unlisted;
+use crate::presence::ln_tail;
+use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
 
 /// Some named effects gone, and others in their place.
@@ -20,7 +22,8 @@ struct Exchange {
     new: Vec<(usize, EffectConstants<f64>)>,
     /// By how much the sum of squares rises.
     rise: f64,
-    /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise.
+    /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise; of one that is
+    /// fitted, with what leaks below zero cost.
     dearer: f64,
     /// One of the new that is too small for a name: it may be the rounding of a data sheet.
     rounding: Option<usize>,
@@ -170,7 +173,15 @@ fn fitted(fit: &Fit<'_>, one: Exchange, progress: Progress<'_>) -> Option<Exchan
         !fit.problem.is_worth_a_name(*term, size)
     };
     let rounding = one.new.iter().map(|(term, _)| *term).find(is_rounding);
-    is_model.then(|| Exchange { rise: other.left_beyond(fit), rounding, ..one })
+    let dearer = one.dearer + below_zero(&other) - below_zero(fit);
+    is_model.then(|| Exchange { rise: other.left_beyond(fit), dearer, rounding, ..one })
+}
+
+/// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
+fn below_zero(fit: &Fit<'_>) -> f64 {
+    let widening = fit.dispersion(fit.bounded.chi2).sqrt();
+    let leaks = Leak::ALL.into_iter().map(|leak| fit.mean_leak(leak)).filter(|own| own.std > 0.0);
+    leaks.map(|own| -2.0 * ln_tail(-own.value / (own.std * widening))).sum()
 }
 
 fn is_at_bound(fit: &Fit<'_>) -> bool {
