@@ -110,13 +110,17 @@ impl<'a, 'p> Candidates<'a, 'p> {
 
     /// Its ln likelihood.
     fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
-        let hypothesis =
-            Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course);
-        let scored = Scored::new(self.declared, &self.pass.sizes, hypothesis);
+        let scored = self.scored(state, leaks, ln_course);
         let ln_likelihood = scored.ln_likelihood;
         self.best_ln = self.best_ln.max(scored.ln_posterior);
         self.all.push(scored);
         ln_likelihood
+    }
+
+    fn scored(&self, state: State<'a>, leaks: Leaks, ln_course: f64) -> Scored<'a> {
+        let (sizes, segments) = (&self.pass.sizes, self.pass.segments);
+        let hypothesis = Hypothesis::new(self.declared, sizes, segments, state, leaks, ln_course);
+        Scored::new(self.declared, sizes, hypothesis)
     }
 
     /// Other courses of the leaks, beside the best states, as far as they can be within `least_ln` of the best.
@@ -159,7 +163,8 @@ impl<'a, 'p> Candidates<'a, 'p> {
         Some(steady_ln - self.pass.tables.ln_course(LeakCourse::Constant) + gain)
     }
 
-    /// Two leaks each with a course of its own, where those can be as probable as the best.
+    /// Two leaks each with a course of its own, where those can be as probable as the best; one that opens beside one that is steady, as
+    /// beside others it is a sudden one.
     fn add_pairs(
         &mut self,
         state: State<'a>,
@@ -170,13 +175,16 @@ impl<'a, 'p> Candidates<'a, 'p> {
     ) {
         let mut courses = courses.to_vec();
         courses.retain(|(course, _)| {
-            matches!(course, LeakCourse::Growing | LeakCourse::Accelerating | LeakCourse::Sudden(_))
+            use LeakCourse::{Accelerating, Growing, Opening, Sudden};
+            matches!(course, Growing | Accelerating | Opening(_) | Sudden(_))
         });
         courses.push((LeakCourse::Constant, self.pass.tables.ln_course(LeakCourse::Constant)));
         let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
         for (course, ln_one) in &courses {
             for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                if most + ln_one + ln_other <= self.best_ln - least_ln {
+                let is_told = [course, another].iter().all(|own| !matches!(own, LeakCourse::Opening(_)))
+                    || [course, another].contains(&&LeakCourse::Constant);
+                if !is_told || most + ln_one + ln_other <= self.best_ln - least_ln {
                     continue;
                 }
                 let mut leaks = [None; 3];
@@ -201,7 +209,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let (ln_steady, ln_likelihood) = (steady.ln_posterior - steady.ln_sign, steady.ln_likelihood);
             let leaks = together(subset, LeakCourse::Constant);
             let ln_constant = self.ln_constant(subset);
-            let most = self.add(State { wander: *wander, ..state }, leaks, ln_constant);
+            let most = self.scored(State { wander: *wander, ..state }, leaks, ln_constant).ln_likelihood;
             for zeros in tables.zeros.iter().filter(|zeros| zeros.jumps()) {
                 let ln_odds = (zeros.share / state.zeros.share).ln() - ln_borders;
                 if ln_steady + ln_odds + most - ln_likelihood + BEYOND_WANDERING <= self.best_ln - least_ln {

@@ -19,6 +19,8 @@ pub(super) enum LeakCourse {
     Growing,
     /// From start ≥ 0 on, linear and by the square of time.
     Accelerating,
+    /// There from this segment on; before, what seeps.
+    Opening(usize),
     /// Another level from this segment on.
     Sudden(usize),
     /// A random walk at the segments' borders.
@@ -36,6 +38,7 @@ impl LeakCourse {
             Self::Cracking => "cracking",
             Self::Growing => "growing",
             Self::Accelerating => "accelerating",
+            Self::Opening(_) => "opening",
             Self::Sudden(_) => "sudden",
             Self::Wandering => "wandering",
             Self::Creeping => "creeping",
@@ -75,6 +78,9 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
         Some(LeakCourse::Growing) => vec![own(Course::FromBegin, 0.0), own(Course::ToEnd, 1.0)],
         Some(LeakCourse::Accelerating) => {
             vec![level(), own(Course::ToEnd, 1.0), own(Course::Accelerating, 1.0)]
+        }
+        Some(LeakCourse::Opening(border)) => {
+            vec![Term { std: seepage, ..level() }, own(Course::Since(border), 1.0)]
         }
         Some(LeakCourse::Sudden(border)) => {
             vec![own(Course::Before(border), 0.0), own(Course::Since(border), 1.0)]
@@ -218,7 +224,7 @@ impl<'a> Hypothesis<'a> {
     /// The segment from which on all leaks are as at the end: where one wanders, the last.
     pub fn last_change(&self, segments: usize) -> usize {
         let border = |course: &Option<LeakCourse>| match course {
-            Some(LeakCourse::Sudden(border)) => *border,
+            Some(LeakCourse::Opening(border) | LeakCourse::Sudden(border)) => *border,
             Some(LeakCourse::Wandering | LeakCourse::Creeping) => segments.saturating_sub(1),
             _ => 0,
         };

@@ -179,14 +179,15 @@ impl<'a, 's> Pass<'a, 's> {
         let borders = 1..self.segments;
         let ln_borders = (borders.len().max(1) as f64).ln();
         let with_prior = |course: LeakCourse| (course, self.tables.ln_course(course));
-        let sudden = borders.map(|border| {
-            let (course, ln_course) = with_prior(LeakCourse::Sudden(border));
+        let at_once = borders.flat_map(|border| [LeakCourse::Opening(border), LeakCourse::Sudden(border)]);
+        let at_once = at_once.map(|course| {
+            let (course, ln_course) = with_prior(course);
             (course, ln_course - ln_borders)
         });
         let others =
             [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing, LeakCourse::Accelerating]
                 .map(with_prior);
-        others.into_iter().chain(sudden).collect()
+        others.into_iter().chain(at_once).collect()
     }
 
     /// Whether readings come as slowly as a recorder takes them, once a clock is mended: a block has one at the least.

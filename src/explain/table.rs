@@ -204,11 +204,12 @@ pub(super) fn zeros() -> Vec<Entry> {
 /// How a leak goes along the trace, beside being constant.
 pub(super) fn courses() -> Vec<Entry> {
     vec![
-        Entry::new("constant", Kind::Course, 0.72, "is steady"),
+        Entry::new("constant", Kind::Course, 0.68, "is steady"),
         Entry::new("cracking", Kind::Course, share::UNCOMMON, "opens at a pressure"),
         Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
         Entry::new("growing", Kind::Course, 0.04, "grows or shrinks steadily"),
         Entry::new("accelerating", Kind::Course, share::UNCOMMON, "grows faster and faster"),
+        Entry::new("opening", Kind::Course, 0.04, "opened at once, where there was none"),
         Entry::new("sudden", Kind::Course, 0.06, "changed at once"),
         Entry::new("wandering", Kind::Course, 0.03, "comes and goes"),
         Entry::new("creeping", Kind::Course, 0.03, "changes little by little"),

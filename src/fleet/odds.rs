@@ -296,7 +296,8 @@ mod tests {
         let odds = FleetOdds::learn(&rows);
         assert_eq!(odds.cylinders, 100);
         let zeros = explanations().into_iter().filter(|entry| entry.kind == Kind::Zeros);
-        let table: f64 = zeros.filter(|one| one.id.starts_with("flow_zero_")).map(|one| one.share).sum();
+        let table: f64 =
+            zeros.filter(|one| ["flow_zero_a", "flow_zero_b"].contains(&one.id)).map(|one| one.share).sum();
         assert!((share(&odds, "flow_zero") - (20.0 * table + 10.0) / 120.0).abs() < 1e-9, "{odds:?}");
         let growing = odds.shares.iter().find(|one| one.id == "growing").unwrap();
         assert!((growing.share - (20.0 * growing.table + 4.0) / 24.0).abs() < 1e-9);
@@ -311,7 +312,9 @@ mod tests {
         let said: Vec<_> = entries.iter().filter(zeros).map(|entry| (usual(entry), entry.share)).collect();
         let rows: Vec<_> = (0..50).map(|cylinder| row(cylinder, &said)).collect();
         for one in FleetOdds::learn(&rows).shares.iter().filter(|one| one.id.starts_with("flow_zero")) {
-            assert!((one.share - Odds::MOST * one.table).abs() < 1e-9, "{one:?}");
+            // Together they leave room for what is too rare to have been met.
+            let [least, most] = [Odds::MOST, 1.0].map(|share| share * one.table);
+            assert!((least - 1e-9..=most + 1e-9).contains(&one.share), "{one:?}");
         }
     }
 
