@@ -18,7 +18,7 @@ mod share {
     /// Two at once.
     pub const VERY_RARE: f64 = 0.002;
     /// What a leak that opens at once is always taken for, unless the pressures tell it from one.
-    pub const FREAK: f64 = 3e-5;
+    pub const FREAK: f64 = 3e-6;
 }
 
 /// Prior probability of each leak. A guess.

@@ -6,9 +6,6 @@ use super::gram::{AGED, Segment};
 use super::statistic::ContinuityStatistic;
 use crate::Real;
 
-/// The block in which a flow changed is of neither level, and so may its neighbours be: by so many noise makes one mistake it.
-const UNSURE: usize = 1;
-
 impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
     /// The segments so far, oldest first.
     pub fn segments(&self) -> &[Segment<T>] {
@@ -42,7 +39,8 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
         self.waiting.add(block);
         if self.waiting.is_full() {
             match self.waiting.change() {
-                Some(at) => self.end_segment(at - UNSURE, 1 + 2 * UNSURE),
+                // The block in which a flow changed is of neither level.
+                Some(at) => self.end_segment(at, 1),
                 None => self.end_segment(SEGMENT_BLOCKS, 0),
             }
         }
@@ -51,7 +49,7 @@ impl<T: Real, const S: usize> ContinuityStatistic<T, S> {
     /// Takes the blocks that still wait for their segment into one, for a verdict: of a statistic that goes on, close a copy.
     pub fn close(&mut self) {
         if let Some(at) = self.waiting.change() {
-            self.end_segment(at - UNSURE, 1 + 2 * UNSURE);
+            self.end_segment(at, 1);
         }
         self.end_segment(self.waiting.blocks().len(), 0);
     }
