@@ -115,6 +115,8 @@ pub use model::{
     LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope,
     signed_root,
 };
+#[cfg(feature = "serde")]
+pub(crate) use number::Saved;
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;

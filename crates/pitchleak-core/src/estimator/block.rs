@@ -9,14 +9,7 @@ use crate::linalg::symmetric;
 
 /// Sums of the position filter's whitened observations over one block.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct BlockSums<T, const N: usize> {
     /// Σ f fᵀ/S, lower triangle.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
@@ -77,14 +70,7 @@ pub(super) const BALANCES: usize = 2;
 
 /// A balance of unit variance.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Balance<T, const N: usize> {
     pub equation: Equation<T, N>,
     /// Its age at the block's end, s.
@@ -93,14 +79,7 @@ pub(super) struct Balance<T, const N: usize> {
 
 /// What one block tells: the position equation's sums and, where both flows were measured, whitened balances.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Block<T, const N: usize> {
     /// Its length, s.
     pub time_s: T,

@@ -13,14 +13,7 @@ const USUAL_CHANGE: f64 = 0.1 / 240.0;
 ///
 /// Slopes are counted in [`USUAL_CHANGE`] per memory, and have a unit prior as everything else.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Hypothesis<T, const N: usize> {
     pub memory_s: T,
     has_slopes: bool,

@@ -14,14 +14,7 @@ use crate::linalg::{Factors, Joint, Pivots};
 /// prior is the identity. The prior is never forgotten: when excitation stops, the covariance grows back
 /// to the prior and no further (no blow-up).
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Information<T, const N: usize> {
     /// Σ w f fᵀ.
     pub matrix: Joint<T, N>,
@@ -45,14 +38,7 @@ pub(super) struct Prior<'a, T> {
 
 /// What is known of the levels, prior units.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Solution<T, const N: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub mean: [T; N],

@@ -9,8 +9,7 @@ pub(super) const fn leak_column(leak: usize) -> usize {
 
 /// Parameters of [`Rls`](super::Rls) in their fixed order: an estimator of N parameters has the first N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Parameter {
     /// 1/β.
     Compressibility,

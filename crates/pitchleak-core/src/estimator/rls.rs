@@ -43,14 +43,7 @@ const ROWS_AT_ONCE: usize = 2;
 /// Rls::<f64, 5>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
 /// ```
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct Rls<T, const N: usize> {
     cylinder: Cylinder<T>,
     noise: NoiseStd<T>,

@@ -12,14 +12,7 @@ pub(crate) const SLOPES: usize = 3;
 /// common is a strip beside it. A flat triangle would be smaller for larger N by N (N − 1)/2 − 6, but needs an array of
 /// (N + 3)(N + 4)/2, which the language doesn't know how to size.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(crate) struct Joint<T, const N: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     square: [[T; N]; N],

@@ -3,8 +3,7 @@ use core::ops::{Index, IndexMut};
 
 /// Where oil can leak.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Leak {
     /// Past the piston seal, chamber A to chamber B.
     Internal,

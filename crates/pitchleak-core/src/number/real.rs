@@ -24,6 +24,16 @@ pub trait Real:
     fn at_most(self, most: Self) -> Self {
         if self < most { self } else { most }
     }
+    /// Finite and above zero.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash
+    fn is_positive(self) -> bool {
+        self.is_finite() && self > Self::zero()
+    }
+    /// Finite and not below zero.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash
+    fn is_not_negative(self) -> bool {
+        self.is_finite() && self >= Self::zero()
+    }
     /// One over the square root of a positive number, within a few units in the last place. In `f32` by Newton's iteration from the
     /// bits of the number, on every target: a microcontroller's library takes five times as long for a root and a division.
     fn inverse_root(self) -> Self;
@@ -47,6 +57,12 @@ pub trait Real:
     fn libm_tanh(self) -> Self;
 }
 
+/// A number that serde knows, too: what is said of the generic types whose arrays it does not know by itself.
+#[cfg(feature = "serde")]
+pub trait Saved: Real + serde::Serialize + serde::de::DeserializeOwned {}
+#[cfg(feature = "serde")]
+impl<T: Real + serde::Serialize + serde::de::DeserializeOwned> Saved for T {}
+
 /// Nobody else may add a [`Real`]: the last bit of each result depends on it.
 mod sealed {
     pub trait Sealed {}
@@ -55,7 +71,7 @@ mod sealed {
 }
 
 macro_rules! real {
-    ($type:ty, $inverse_root:expr, $exp:ident, $ln:ident, $ln_1p:ident, $powf:ident, $sin:ident, $cos:ident, $tan:ident, $acos:ident, $tanh:ident) => {
+    ($type:ty, $inverse_root:expr, $powf:ident, $($function:ident $libm:ident),*) => {
         impl Real for $type {
             #[inline(always)]
             fn lit(value: f64) -> Self {
@@ -69,36 +85,15 @@ macro_rules! real {
             fn inverse_root(self) -> Self {
                 $inverse_root(self)
             }
-            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
-            fn libm_exp(self) -> Self {
-                libm::$exp(self)
-            }
-            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
-            fn libm_ln(self) -> Self {
-                libm::$ln(self)
-            }
-            #[cfg_attr(target_os = "none", inline(never))] // once in the flash
-            fn libm_ln_1p(self) -> Self {
-                libm::$ln_1p(self)
-            }
             fn libm_powf(self, exponent: Self) -> Self {
                 libm::$powf(self, exponent)
             }
-            fn libm_sin(self) -> Self {
-                libm::$sin(self)
-            }
-            fn libm_cos(self) -> Self {
-                libm::$cos(self)
-            }
-            fn libm_tan(self) -> Self {
-                libm::$tan(self)
-            }
-            fn libm_acos(self) -> Self {
-                libm::$acos(self)
-            }
-            fn libm_tanh(self) -> Self {
-                libm::$tanh(self)
-            }
+            $(
+                #[cfg_attr(target_os = "none", inline(never))] // once in the flash
+                fn $function(self) -> Self {
+                    libm::$libm(self)
+                }
+            )*
         }
     };
 }
@@ -114,8 +109,14 @@ fn newtons_inverse_root(number: f32) -> f32 {
     root
 }
 
-real!(f32, newtons_inverse_root, expf, logf, log1pf, powf, sinf, cosf, tanf, acosf, tanhf);
-real!(f64, |number: f64| 1.0 / number.sqrt(), exp, log, log1p, pow, sin, cos, tan, acos, tanh);
+real!(
+    f32, newtons_inverse_root, powf, libm_exp expf, libm_ln logf, libm_ln_1p log1pf, libm_sin sinf, libm_cos cosf, libm_tan tanf,
+    libm_acos acosf, libm_tanh tanhf
+);
+real!(
+    f64, |number: f64| 1.0 / number.sqrt(), pow, libm_exp exp, libm_ln log, libm_ln_1p log1p, libm_sin sin, libm_cos cos,
+    libm_tan tan, libm_acos acos, libm_tanh tanh
+);
 
 #[cfg(test)]
 mod tests {

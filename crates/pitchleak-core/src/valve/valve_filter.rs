@@ -77,14 +77,7 @@ enum Due {
 
 /// Leaks of a cylinder without flow meters, by the flows of its calibrated valve; in constant time and memory.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct ValveFilter<T> {
     edges: Edges<T>,
     equations: Equations<T>,
