@@ -44,7 +44,7 @@ impl core::error::Error for FilterError {}
 impl<T: Real> Butterworth<T> {
     /// A filter at rest at zero. `cutoff_hz` must lie between zero and half of `sample_rate_hz`.
     pub fn new(cutoff_hz: T, sample_rate_hz: T) -> Result<Self, FilterError> {
-        if !(sample_rate_hz.is_finite() && sample_rate_hz > T::zero()) {
+        if !sample_rate_hz.is_positive() {
             return Err(FilterError::SampleRate);
         }
         let share = cutoff_hz / sample_rate_hz;
@@ -236,7 +236,7 @@ pub fn force_imbalance_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>, lo
 }
 
 /// P_A A_A − P_B A_B, N.
-pub fn hydraulic_force_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>) -> T {
+fn hydraulic_force_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>) -> T {
     sample.pa_pa * cylinder.area_a_m2 - sample.pb_pa * cylinder.area_b_m2
 }
 

@@ -106,14 +106,10 @@ pub use estimator::{
     Estimates, Excitation, ExcitationReport, ExcitationSettings, Innovation, Parameter, Rls, RlsError,
     RlsSettings, Update,
 };
-pub use filter::{
-    Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n,
-    hydraulic_force_n,
-};
+pub use filter::{Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n};
 pub use model::{
-    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, Leak, LeakPressures, Linkage,
-    LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope,
-    signed_root,
+    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, Leak, LeakPressures, Linkage, LinkageError,
+    Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope, signed_root,
 };
 #[cfg(feature = "serde")]
 pub(crate) use number::Saved;

@@ -61,16 +61,6 @@ impl core::fmt::Display for CylinderError {
 
 impl core::error::Error for CylinderError {}
 
-#[cfg_attr(target_os = "none", inline(never))]
-fn positive<T: Real>(value: T) -> bool {
-    value.is_finite() && value > T::zero()
-}
-
-#[cfg_attr(target_os = "none", inline(never))]
-pub(super) fn not_negative<T: Real>(value: T) -> bool {
-    value.is_finite() && value >= T::zero()
-}
-
 impl<T: Real> Cylinder<T> {
     /// The rig of the paper (Section III); its mass is not printed, 20 kg is assumed.
     pub fn paper() -> Self {
@@ -86,13 +76,13 @@ impl<T: Real> Cylinder<T> {
 
     /// Says whether a cylinder like this can exist.
     pub fn check(&self) -> Result<(), CylinderError> {
-        if !positive(self.area_a_m2) || !positive(self.area_b_m2) {
+        if !self.area_a_m2.is_positive() || !self.area_b_m2.is_positive() {
             Err(CylinderError::Area)
-        } else if !positive(self.stroke_m) {
+        } else if !self.stroke_m.is_positive() {
             Err(CylinderError::Stroke)
-        } else if !positive(self.moving_mass_kg) {
+        } else if !self.moving_mass_kg.is_positive() {
             Err(CylinderError::MovingMass)
-        } else if !not_negative(self.dead_volume_a_m3) || !not_negative(self.dead_volume_b_m3) {
+        } else if !self.dead_volume_a_m3.is_not_negative() || !self.dead_volume_b_m3.is_not_negative() {
             Err(CylinderError::DeadVolume)
         } else {
             Ok(())
@@ -120,9 +110,9 @@ impl<T: Real> Fluid<T> {
 
     /// Says whether oil like this can exist.
     pub fn check(&self) -> Result<(), CylinderError> {
-        if !positive(self.bulk_modulus_pa) {
+        if !self.bulk_modulus_pa.is_positive() {
             Err(CylinderError::BulkModulus)
-        } else if !not_negative(self.bulk_modulus_std_pa) {
+        } else if !self.bulk_modulus_std_pa.is_not_negative() {
             Err(CylinderError::BulkModulusSpread)
         } else {
             Ok(())

@@ -85,7 +85,7 @@ impl<V> PerLeak<Option<V>> {
 impl<T: Real> PerLeak<T> {
     /// Whether every value is a number and none is negative, as a leak's coefficient must be.
     pub fn is_physical(&self) -> bool {
-        self.iter().all(|(_, value)| value.is_finite() && *value >= T::zero())
+        self.iter().all(|(_, value)| value.is_not_negative())
     }
 }
 

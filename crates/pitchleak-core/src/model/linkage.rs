@@ -61,7 +61,7 @@ impl<T: Real> Linkage<T> {
     /// Says whether a linkage like this can exist.
     pub fn check(&self) -> Result<(), LinkageError> {
         let lengths = [self.pivot_distance_m, self.retracted_length_m, self.crank_radius_m];
-        let sound = lengths.iter().all(|l| l.is_finite() && *l > T::zero());
+        let sound = lengths.into_iter().all(T::is_positive);
         if sound && self.zero_angle_rad.is_finite() { Ok(()) } else { Err(LinkageError::Geometry) }
     }
 

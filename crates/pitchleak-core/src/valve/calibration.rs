@@ -95,14 +95,12 @@ pub(super) const LEAK_SIZE: f64 = 10.0;
 
 impl<T: Real> ValveCalibration<T> {
     pub(super) fn check(&self) -> Result<(), ValveError> {
-        let positive = |value: T| value.is_finite() && value > T::zero();
-        let not_negative = |value: T| value.is_finite() && value >= T::zero();
         let sizes = [self.rated_flow_m3s, self.rated_drop_pa, self.mean[KAPPA], self.mean[ROUNDING]];
         let spreads =
             [self.hysteresis, self.null_leak, self.gain_drift, self.lap_drift, self.null_leak_drift];
         let numbers = self.mean.iter().chain(&self.covariance).chain([&self.tank_pa]);
-        let is_possible = sizes.into_iter().all(positive)
-            && spreads.into_iter().all(not_negative)
+        let is_possible = sizes.into_iter().all(T::is_positive)
+            && spreads.into_iter().all(T::is_not_negative)
             && numbers.copied().all(T::is_finite);
         if is_possible { Ok(()) } else { Err(ValveError::Calibration) }
     }
@@ -164,8 +162,7 @@ impl<T: Real> ValveCalibration<T> {
 impl<T: Real> ValveNoise<T> {
     pub(super) fn check(&self) -> Result<(), ValveError> {
         let Self { position_m, pressure_pa, spool, supply_pa } = *self;
-        let positive = |value: T| value.is_finite() && value > T::zero();
-        let all = [position_m, pressure_pa, spool, supply_pa].into_iter().all(positive);
+        let all = [position_m, pressure_pa, spool, supply_pa].into_iter().all(T::is_positive);
         if all { Ok(()) } else { Err(ValveError::Noise) }
     }
 }

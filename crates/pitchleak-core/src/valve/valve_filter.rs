@@ -121,7 +121,7 @@ impl<T: Real> ValveFilter<T> {
         fluid.check()?;
         calibration.check()?;
         noise.check()?;
-        if !max_step_s.is_finite() || max_step_s <= T::zero() {
+        if !max_step_s.is_positive() {
             return Err(ValveError::Noise);
         }
         let growth_ps = calibration.growth_ps(fluid);
@@ -205,7 +205,7 @@ impl<T: Real> ValveFilter<T> {
         }
         self.block = Block::new();
         (self.before, self.white, self.spool) = (None, None, None);
-        if gap_s > T::zero() && gap_s.is_finite() {
+        if gap_s.is_positive() {
             self.filter.widen(self.zero_growth_ps * gap_s, along_zero());
             for (unknown, growth_ps) in self.growth_ps.iter().enumerate() {
                 self.filter.widen(*growth_ps * gap_s, along(unknown));
