@@ -5,7 +5,7 @@ use super::evidence::Evidence;
 use super::hypothesis::Hypothesis;
 use super::information::{Posterior, Prior, Solution};
 use super::mixture::Mixture;
-use super::parameter::{LEAKS, Parameter, leak_column};
+use super::prior::{LEAKS, Parameter, leak_column};
 use crate::Real;
 
 /// Hypotheses in which the leaks change.

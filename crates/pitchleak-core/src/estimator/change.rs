@@ -1,5 +1,5 @@
 use super::information::Solution;
-use super::parameter::{LEAKS, leak_column};
+use super::prior::{LEAKS, leak_column};
 use super::update::Innovation;
 use crate::Real;
 use crate::continuity::Equation;

@@ -4,7 +4,7 @@
 use super::block::Block;
 use super::hypothesis::Hypothesis;
 use super::information::{Posterior, Prior};
-use super::parameter::LEAKS;
+use super::prior::LEAKS;
 use crate::Real;
 
 /// Measures how well a hypothesis foretold a block: ln of the block's probability, less what is the same for

@@ -1,5 +1,5 @@
 use super::block::BlockSums;
-use super::parameter::{LEAKS, leak_column};
+use super::prior::{LEAKS, leak_column};
 use crate::Real;
 use crate::continuity::Equation;
 

@@ -3,9 +3,8 @@ use super::block::{BALANCES, Balance, BlockSums};
 use super::change::ChangeDetector;
 use super::information::{Prior, Solution};
 use super::innovations::Innovations;
-use super::parameter::{LEAKS, Parameter};
 use super::position::PositionFilter;
-use super::prior::{OffsetPrior, Zeros, offset_units, prior_spread};
+use super::prior::{LEAKS, OffsetPrior, Parameter, Zeros, offset_units, prior_spread};
 use super::settings::{self, RlsError, RlsSettings};
 use super::update::{Innovation, Update};
 use crate::continuity::{
@@ -180,16 +179,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn rest(&mut self, step: Integrals<T>, measured: Measured, x_m: T) -> Weights<T> {
         self.unfed.add(&step);
-        let only = match measured {
-            Measured::OnlyA => Weights::only_a,
-            Measured::OnlyB => Weights::only_b,
-            Measured::Both | Measured::Neither => {
-                self.anchor(x_m);
-                self.sums.count -= T::one();
-                return self.both;
-            }
-        };
-        only(&self.cylinder, &self.noise, &self.possible_leaks_m3spa())
+        if measured == Measured::Neither {
+            self.anchor(x_m);
+            self.sums.count -= T::one();
+            return self.both;
+        }
+        self.weights_of(measured, &self.noise)
     }
 
     /// Nothing goes over from what came before.
