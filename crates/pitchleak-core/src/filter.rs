@@ -21,25 +21,16 @@ pub struct Butterworth<T> {
 }
 
 /// Error returned by [`Butterworth::new`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {
     /// The sample rate is not positive and finite.
+    #[error("the sample rate must be positive")]
     SampleRate,
     /// The cut-off is not above zero and below half the sample rate.
+    #[error("the cut-off must lie above zero and below half the sample rate")]
     Cutoff,
 }
-
-impl core::fmt::Display for FilterError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::SampleRate => "the sample rate must be positive",
-            Self::Cutoff => "the cut-off must lie above zero and below half the sample rate",
-        })
-    }
-}
-
-impl core::error::Error for FilterError {}
 
 impl<T: Real> Butterworth<T> {
     /// A filter at rest at zero. `cutoff_hz` must lie between zero and half of `sample_rate_hz`.

@@ -29,37 +29,28 @@ pub struct Fluid<T> {
 }
 
 /// Error returned by [`Cylinder::check`] and [`Fluid::check`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CylinderError {
     /// An area is not positive and finite.
+    #[error("piston areas must be positive")]
     Area,
     /// The stroke is not positive and finite.
+    #[error("the stroke must be positive")]
     Stroke,
     /// The moving mass is not positive and finite.
+    #[error("the moving mass must be positive")]
     MovingMass,
     /// A dead volume is negative or not finite.
+    #[error("dead volumes must not be negative")]
     DeadVolume,
     /// The bulk modulus is not positive and finite.
+    #[error("the bulk modulus must be positive")]
     BulkModulus,
     /// The spread of the bulk modulus is negative or not finite.
+    #[error("the spread of the bulk modulus must not be negative")]
     BulkModulusSpread,
 }
-
-impl core::fmt::Display for CylinderError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Area => "piston areas must be positive",
-            Self::Stroke => "the stroke must be positive",
-            Self::MovingMass => "the moving mass must be positive",
-            Self::DeadVolume => "dead volumes must not be negative",
-            Self::BulkModulus => "the bulk modulus must be positive",
-            Self::BulkModulusSpread => "the spread of the bulk modulus must not be negative",
-        })
-    }
-}
-
-impl core::error::Error for CylinderError {}
 
 impl<T: Real> Cylinder<T> {
     /// The rig of the paper (Section III); its mass is not printed, 20 kg is assumed.

@@ -49,42 +49,18 @@ pub struct ValveNoise<T> {
 }
 
 /// Why there is no [`ValveFilter`](super::ValveFilter).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValveError {
     /// The cylinder or its oil cannot be.
-    Cylinder(CylinderError),
+    #[error("{0}")]
+    Cylinder(#[from] CylinderError),
     /// A number of the calibration cannot be.
+    #[error("the valve's calibration is none that `pitchleak calibrate` wrote")]
     Calibration,
     /// A sensor's noise or the longest step is not positive.
+    #[error("noise of the sensors and the longest step must be positive")]
     Noise,
-}
-
-impl core::fmt::Display for ValveError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Cylinder(error) => error.fmt(f),
-            Self::Calibration => {
-                f.write_str("the valve's calibration is none that `pitchleak calibrate` wrote")
-            }
-            Self::Noise => f.write_str("noise of the sensors and the longest step must be positive"),
-        }
-    }
-}
-
-impl core::error::Error for ValveError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Cylinder(error) => Some(error),
-            Self::Calibration | Self::Noise => None,
-        }
-    }
-}
-
-impl From<CylinderError> for ValveError {
-    fn from(error: CylinderError) -> Self {
-        Self::Cylinder(error)
-    }
 }
 
 /// A leak grows by so much in an hour, 1 σ, L/min at 50 bar: no valve tells less (docs/valve.md).
