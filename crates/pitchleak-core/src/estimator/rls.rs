@@ -150,7 +150,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[inline]
     pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
         let () = Self::HAS_A_KNOWN_SIZE;
-        if !self.plausible(sample) {
+        if !self.plausible(&Readings::from(sample)) {
             return Update::Rejected;
         }
         let follows = dt_s > T::zero() && dt_s <= self.longest_s;
@@ -283,20 +283,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Finite, and within ten times what any pitch cylinder meets.
     #[inline]
-    fn plausible(&self, sample: &Sample<T>) -> bool {
-        let (x_limit, pressure_limit, flow_limit) = self.limits();
-        let flow_ok = |q: Option<T>| q.is_none_or(|q| q.abs() <= flow_limit);
-        sample.x_m.abs() <= x_limit
-            && sample.pa_pa.abs() <= pressure_limit
-            && sample.pb_pa.abs() <= pressure_limit
-            && flow_ok(sample.qa_m3s)
-            && flow_ok(sample.qb_m3s)
-    }
-
-    /// Largest position, m, pressure, Pa, and flow, m³/s, that are readings.
-    #[inline]
-    fn limits(&self) -> (T, T, T) {
-        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), self.flow_limit_m3s)
+    fn plausible(&self, &PerChannel { x, pa, pb, qa, qb }: &Readings<T>) -> bool {
+        let (x_limit, pressure_limit) = (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9));
+        let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
+        ok(x, x_limit)
+            && ok(pa, pressure_limit)
+            && ok(pb, pressure_limit)
+            && ok(qa, self.flow_limit_m3s)
+            && ok(qb, self.flow_limit_m3s)
     }
 
     /// Takes in what was read `dt_s` after the readings before, of channels that need not all come at once: between two of its
@@ -335,15 +329,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cold]
     #[cfg_attr(target_os = "none", inline(never))]
     fn update_on_clocks(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
-        let (x_limit, pressure_limit, flow_limit) = self.limits();
-        let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
-        let PerChannel { x, pa, pb, qa, qb } = *readings;
-        let plausible = ok(x, x_limit)
-            && ok(pa, pressure_limit)
-            && ok(pb, pressure_limit)
-            && ok(qa, flow_limit)
-            && ok(qb, flow_limit);
-        if !plausible {
+        if !self.plausible(readings) {
             return Update::Rejected;
         }
         let renewing = self.bank.is_renewing();

@@ -303,16 +303,12 @@ impl<T: Real> ValveFilter<T> {
     /// What the readings so far say.
     pub fn estimates(&self) -> ValveEstimates<T> {
         let unit = T::lit(LEAK_UNIT_M3SPA);
-        let [wide_internal, wide_a, wide_b] = self.watch.widening();
-        let leak = |at: usize, wide: T| {
-            let own = Estimate { value: self.filter.step[at], std: self.filter.variance(at).sqrt() * wide };
-            own.scaled(unit)
-        };
-        let leaks_m3spa = PerLeak {
-            internal: leak(0, wide_internal),
-            external_a: leak(1, wide_a),
-            external_b: leak(2, wide_b),
-        };
+        let wider = self.watch.widening();
+        let leaks_m3spa = PerLeak::from_fn(|leak| {
+            let at = leak as usize;
+            let std = self.filter.variance(at).sqrt() * wider[at];
+            Estimate { value: self.filter.step[at], std }.scaled(unit)
+        });
         let sizes_pa = self.pressures.means().sizes_pa;
         let kappa = Estimate {
             value: self.kappa_mean + self.filter.step[KAPPA],
