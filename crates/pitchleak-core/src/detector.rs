@@ -60,8 +60,7 @@ impl<T: Real> AlarmSettings<T> {
 
 /// A change of one alarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum AlarmState {
     /// The leak is above its threshold beyond doubt.
     Raised,

@@ -21,30 +21,21 @@ pub struct Butterworth<T> {
 }
 
 /// Error returned by [`Butterworth::new`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {
     /// The sample rate is not positive and finite.
+    #[error("the sample rate must be positive")]
     SampleRate,
     /// The cut-off is not above zero and below half the sample rate.
+    #[error("the cut-off must lie above zero and below half the sample rate")]
     Cutoff,
 }
-
-impl core::fmt::Display for FilterError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::SampleRate => "the sample rate must be positive",
-            Self::Cutoff => "the cut-off must lie above zero and below half the sample rate",
-        })
-    }
-}
-
-impl core::error::Error for FilterError {}
 
 impl<T: Real> Butterworth<T> {
     /// A filter at rest at zero. `cutoff_hz` must lie between zero and half of `sample_rate_hz`.
     pub fn new(cutoff_hz: T, sample_rate_hz: T) -> Result<Self, FilterError> {
-        if !(sample_rate_hz.is_finite() && sample_rate_hz > T::zero()) {
+        if !sample_rate_hz.is_positive() {
             return Err(FilterError::SampleRate);
         }
         let share = cutoff_hz / sample_rate_hz;
@@ -236,7 +227,7 @@ pub fn force_imbalance_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>, lo
 }
 
 /// P_A A_A − P_B A_B, N.
-pub fn hydraulic_force_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>) -> T {
+fn hydraulic_force_n<T: Real>(cylinder: &Cylinder<T>, sample: &Sample<T>) -> T {
     sample.pa_pa * cylinder.area_a_m2 - sample.pb_pa * cylinder.area_b_m2
 }
 

@@ -106,15 +106,13 @@ pub use estimator::{
     Estimates, Excitation, ExcitationReport, ExcitationSettings, Innovation, Parameter, Rls, RlsError,
     RlsSettings, Update,
 };
-pub use filter::{
-    Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n,
-    hydraulic_force_n,
-};
+pub use filter::{Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n};
 pub use model::{
-    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, LEAST_ABSOLUTE_PA, Leak, LeakPressures, Linkage,
-    LinkageError, Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope,
-    signed_root,
+    ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, Leak, LeakPressures, Linkage, LinkageError,
+    Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope, signed_root,
 };
+#[cfg(feature = "serde")]
+pub(crate) use number::Saved;
 pub use number::{LPM_PER_M3S, Real};
 pub use paper::{PaperEstimator, PaperGains, PaperLaw, PaperLawRate, Theta, regressors};
 pub use plant::rk4_step;

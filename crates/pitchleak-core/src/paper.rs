@@ -107,11 +107,8 @@ impl<T: Real> PaperLaw<T> {
     pub fn leak_coefficients(&self) -> PerLeak<T> {
         let beta = self.theta[0];
         let per_beta = if beta > T::zero() { T::one() / beta } else { T::zero() };
-        PerLeak {
-            internal: self.theta[1] * per_beta,
-            external_a: self.theta[2] * per_beta,
-            external_b: self.theta[3] * per_beta,
-        }
+        let [_, internal, external_a, external_b, _] = self.theta.map(|theta| theta * per_beta);
+        PerLeak { internal, external_a, external_b }
     }
 }
 

@@ -119,9 +119,11 @@ fn a_missing_flow_rests() {
 
 /// When segments end, s.
 fn ends_s(samples: &[Sample<f64>]) -> Vec<f64> {
-    let mut ends = vec![0.0];
+    let mut end_s = 0.0;
+    let mut ends = vec![end_s];
     for segment in statistic::<12>(samples).segments() {
-        ends.push(ends.last().unwrap() + segment.time_s());
+        end_s += segment.time_s();
+        ends.push(end_s);
     }
     ends
 }

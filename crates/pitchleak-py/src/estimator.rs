@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The running estimator under `pitchleak.Estimator`.
 #[pyclass(frozen, subclass, module = "pitchleak._pitchleak")]
@@ -153,11 +153,7 @@ impl Estimator {
         } else {
             let arrays = readings.iter().filter_map(Readings::array);
             let _held = arrays.map(|array| Lent::new(array.clone())).collect::<PyResult<Vec<_>>>()?;
-            py.detach(|| match self.running.lock() {
-                Ok(mut running) => running.take(given, batch, self),
-                // Only a panic in here could have poisoned it.
-                Err(poisoned) => poisoned.into_inner().take(given, batch, self),
-            })
+            py.detach(|| self.lock_detached().take(given, batch, self))
         };
         done.map_err(|error| trace_error(py, &error))
     }
@@ -168,10 +164,7 @@ impl Estimator {
             let mut running = self.lock(py)?;
             running.stream.epoch_ns = running.stream.epoch_ns.or(table.get().first_ns());
         }
-        source.read(py, &self.rig.0, false, |reader| match self.running.lock() {
-            Ok(mut running) => Ok(running.stream.extend(reader)?),
-            Err(poisoned) => Ok(poisoned.into_inner().stream.extend(reader)?),
-        })
+        source.read(py, &self.rig.0, false, |reader| Ok(self.lock_detached().stream.extend(reader)?))
     }
 
     /// JSON and text of the report as it stands; None before the first sample.
@@ -207,8 +200,13 @@ impl Estimator {
         Self { rig, bare_rig, running: Mutex::new(Running { stream, layout: None }) }
     }
 
-    fn lock(&self, py: Python<'_>) -> PyResult<std::sync::MutexGuard<'_, Running>> {
+    fn lock(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, Running>> {
         self.running.lock_py_attached(py).map_err(value_error)
+    }
+
+    /// Only a panic in whoever had it could have poisoned it.
+    fn lock_detached(&self) -> MutexGuard<'_, Running> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

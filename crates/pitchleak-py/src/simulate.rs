@@ -6,16 +6,16 @@ use crate::signals::{Signals, Stopped, detached};
 use numpy::{IntoPyArray, PyArray1};
 use pitchleak::core::PerLeak;
 use pitchleak::output::make_folder;
-use pitchleak::simulate::{
-    EffectSize, Followed, LeakCourse, Plan, RecordingError, Span, share_of_full_scale,
-};
+use pitchleak::simulate::{EffectSize, Followed, LeakCourse, Plan, RecordingError, share_of_full_scale};
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
 use pitchleak_reproduce::{Progress, ReproduceError, reproduce as engine_reproduce};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// A number in SI, or a quantity with its unit.
 #[derive(FromPyObject)]
@@ -42,8 +42,8 @@ impl Quantity {
         }
     }
 
-    fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(&self, name: &str) -> PyResult<T> {
-        self.text().parse().map_err(|error| value_error(format!("{name}: {error}")))
+    fn parsed<T: FromStr<Err: Display>>(&self, name: &str) -> PyResult<T> {
+        parsed(name, &self.text())
     }
 }
 
@@ -116,18 +116,15 @@ pub fn simulate<'py>(
     Ok((serde_json::to_string(&truth).map_err(value_error)?, recording.warnings(), columns))
 }
 
-fn span(text: &str) -> PyResult<Span> {
-    text.parse().map_err(|error| value_error(format!("shut: {error}")))
+fn parsed<T: FromStr<Err: Display>>(name: &str, text: &str) -> PyResult<T> {
+    text.parse().map_err(|error| value_error(format!("{name}: {error}")))
 }
 
 impl Order {
     fn followed(&self) -> PyResult<Followed> {
         match (&self.wind, &self.position, &self.load) {
             (Some(wind), None, None) => {
-                let wind: Wind = match wind.parse() {
-                    Ok(wind) => wind,
-                    Err(never) => match never {},
-                };
+                let Ok(wind) = wind.parse::<Wind>();
                 Ok(Followed::Wind(wind, self.emulation()))
             }
             (None, Some(position), Some(load)) => {
@@ -162,13 +159,9 @@ impl Order {
             },
             onset_s: self.onset.si("onset", Dimension::Time)?,
             oil_temperature: self.oil_temp.as_ref().map(Quantity::text),
-            shut: self.shut.as_deref().map(span).transpose()?,
+            shut: self.shut.as_deref().map(|shut| parsed("shut", shut)).transpose()?,
             effects: self.effects.iter().map(effect).collect::<PyResult<_>>()?,
-            valve_flaws: self
-                .valve
-                .iter()
-                .map(|flaw| flaw.parse().map_err(|error| value_error(format!("valve: {error}"))))
-                .collect::<PyResult<_>>()?,
+            valve_flaws: self.valve.iter().map(|flaw| parsed("valve", flaw)).collect::<PyResult<_>>()?,
             noise: self.noise.parsed("noise")?,
             bias_share: share_of_full_scale(&self.bias.text())
                 .map_err(|error| value_error(format!("bias: {error}")))?,

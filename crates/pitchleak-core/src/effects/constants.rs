@@ -25,8 +25,7 @@ pub struct EffectConstants<T> {
 
 /// One constant of a [`EffectConstants`], by name: what a fit may vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum EffectConstant {
     /// [`EffectConstants::precharge_pa`]
     Precharge,

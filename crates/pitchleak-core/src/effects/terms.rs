@@ -2,7 +2,10 @@
 //! the truth.
 
 use super::EffectConstants;
-use crate::{ATMOSPHERE_PA, Cylinder, LEAST_ABSOLUTE_PA, Model, Real, Signals, Terms};
+use crate::{ATMOSPHERE_PA, Cylinder, Model, Real, Signals, Terms};
+
+/// Absolute pressure below which no gas law is evaluated, Pa.
+const LEAST_ABSOLUTE_PA: f64 = 1_000.0;
 
 pub(super) fn chamber_a<T: Real>(flow_m3s: T) -> Terms<T> {
     Terms { chamber_a_m3s: flow_m3s, ..Terms::default() }

@@ -118,7 +118,7 @@ impl<T: Real> EmulatorParams<T> {
         }
         if !self.supply.is_physical() {
             Err(PlantError::Supply)
-        } else if !(self.internal_step_s.is_finite() && self.internal_step_s > T::zero()) {
+        } else if !self.internal_step_s.is_positive() {
             Err(PlantError::Step)
         } else {
             Ok(())
@@ -187,7 +187,7 @@ impl<T: Real> Emulator<T> {
 
     /// Changes the oil's temperature, K, which effects of the pitching cylinder may follow.
     pub fn set_temperature(&mut self, temp_k: T) -> Result<(), PlantError> {
-        if !(temp_k.is_finite() && temp_k > T::zero()) {
+        if !temp_k.is_positive() {
             return Err(PlantError::Temperature);
         }
         self.params.pitch.plant.temp_k = temp_k;
@@ -229,7 +229,7 @@ impl<T: Real> Emulator<T> {
     ) -> Result<(), PlantError> {
         let ticks = (step_s / self.params.internal_step_s).ceil().max(T::one());
         let count = ticks.to_u32().filter(|n| *n <= 100_000_000).ok_or(PlantError::Step)?;
-        if !(step_s.is_finite() && step_s > T::zero()) {
+        if !step_s.is_positive() {
             return Err(PlantError::Step);
         }
         let goal = |new: T, old: T| if new.is_finite() { new } else { old };
@@ -337,9 +337,7 @@ pub struct Gains<T> {
 
 impl<T: Real> Gains<T> {
     pub(super) fn is_physical(&self) -> bool {
-        [self.proportional, self.integral_ps, self.derivative_s]
-            .iter()
-            .all(|gain| gain.is_finite() && *gain >= T::zero())
+        [self.proportional, self.integral_ps, self.derivative_s].into_iter().all(T::is_not_negative)
     }
 
     /// The valve command ±1 for an error and its rate; `integral` is the controller's memory.

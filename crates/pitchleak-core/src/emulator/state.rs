@@ -144,43 +144,19 @@ impl<T: Real> State<T> {
     }
 
     pub fn to_array(self) -> [T; STATES] {
-        let CylinderState { x_m, v_mps, oil_a_m3, oil_b_m3 } = self.pitch;
-        let ([load_a, load_b], [pitch_spool, load_spool], [pitch_speed, load_speed]) =
+        let [x, v, oil_a, oil_b] = self.pitch.to_array();
+        let ([load_a, load_b], [u_pitch, u_load], [du_pitch, du_load]) =
             (self.load_oil_m3, self.spools, self.spool_speeds_ps);
-        [
-            x_m,
-            v_mps,
-            oil_a_m3,
-            oil_b_m3,
-            load_a,
-            load_b,
-            pitch_spool,
-            load_spool,
-            pitch_speed,
-            load_speed,
-            self.supply_pa,
-        ]
+        [x, v, oil_a, oil_b, load_a, load_b, u_pitch, u_load, du_pitch, du_load, self.supply_pa]
     }
 
     pub fn from_array(y: [T; STATES]) -> Self {
-        let [
-            x_m,
-            v_mps,
-            oil_a_m3,
-            oil_b_m3,
-            load_a,
-            load_b,
-            pitch_spool,
-            load_spool,
-            pitch_speed,
-            load_speed,
-            supply_pa,
-        ] = y;
+        let [x, v, oil_a, oil_b, load_a, load_b, u_pitch, u_load, du_pitch, du_load, supply_pa] = y;
         Self {
-            pitch: CylinderState { x_m, v_mps, oil_a_m3, oil_b_m3 },
+            pitch: CylinderState::from_array([x, v, oil_a, oil_b]),
             load_oil_m3: [load_a, load_b],
-            spools: [pitch_spool, load_spool],
-            spool_speeds_ps: [pitch_speed, load_speed],
+            spools: [u_pitch, u_load],
+            spool_speeds_ps: [du_pitch, du_load],
             supply_pa,
         }
     }

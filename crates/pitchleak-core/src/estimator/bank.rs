@@ -5,7 +5,7 @@ use super::evidence::Evidence;
 use super::hypothesis::Hypothesis;
 use super::information::{Posterior, Prior, Solution};
 use super::mixture::Mixture;
-use super::parameter::{LEAKS, Parameter, leak_column};
+use super::prior::{LEAKS, Parameter, leak_column};
 use crate::Real;
 
 /// Hypotheses in which the leaks change.
@@ -49,14 +49,7 @@ const RECENT_S: f64 = 20.0;
 /// takes in what has been seen, and each sample hears one hypothesis, first of all a jump that is suspected. As soon as it has foretold
 /// best it is told; else the next sample concludes. The one after replaces what was refuted.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Bank<T, const N: usize> {
     /// That the leaks stay as they are, then the trends.
     hypotheses: [Hypothesis<T, N>; HYPOTHESES],
@@ -73,14 +66,7 @@ pub(super) struct Bank<T, const N: usize> {
 
 /// What waits for more.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 enum Pending<T, const N: usize> {
     Nothing,
     /// It looks as though the leaks had jumped; this is what is known since. The next block tells.
@@ -90,14 +76,7 @@ enum Pending<T, const N: usize> {
 
 /// A renewal, half done.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 struct Renewal<T, const N: usize> {
     /// Variances by which the offsets of chambers A and B have moved.
     drifted: [T; 2],

@@ -2,21 +2,14 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::information::Information;
-use super::parameter::{LEAKS, leak_column};
+use super::prior::{LEAKS, leak_column};
 use crate::Real;
 use crate::continuity::Equation;
 use crate::linalg::symmetric;
 
 /// Sums of the position filter's whitened observations over one block.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct BlockSums<T, const N: usize> {
     /// Σ f fᵀ/S, lower triangle.
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
@@ -77,14 +70,7 @@ pub(super) const BALANCES: usize = 2;
 
 /// A balance of unit variance.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Balance<T, const N: usize> {
     pub equation: Equation<T, N>,
     /// Its age at the block's end, s.
@@ -93,14 +79,7 @@ pub(super) struct Balance<T, const N: usize> {
 
 /// What one block tells: the position equation's sums and, where both flows were measured, whitened balances.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Block<T, const N: usize> {
     /// Its length, s.
     pub time_s: T,
@@ -160,18 +139,6 @@ impl<T: Real, const N: usize> Block<T, N> {
         (self.time_s, self.square, self.count) = (time_s, sums.square, sums.count);
     }
 
-    #[cfg(test)]
-    pub fn new(
-        time_s: T,
-        sums: &BlockSums<T, N>,
-        balances: &[Option<Balance<T, N>>; BALANCES],
-        column_noise: T,
-    ) -> Self {
-        let mut block = Self::empty();
-        block.fill(time_s, sums, balances, column_noise);
-        block
-    }
-
     /// Σ (y − fᵀθ)² at `theta`, and the number of rows.
     pub fn chi_square(&self, theta: &[T; N]) -> (T, T) {
         let Information { matrix, levels, .. } = &self.information;
@@ -190,6 +157,19 @@ impl<T: Real, const N: usize> Block<T, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl<T: Real, const N: usize> Block<T, N> {
+        pub fn new(
+            time_s: T,
+            sums: &BlockSums<T, N>,
+            balances: &[Option<Balance<T, N>>; BALANCES],
+            column_noise: T,
+        ) -> Self {
+            let mut block = Self::empty();
+            block.fill(time_s, sums, balances, column_noise);
+            block
+        }
+    }
 
     const F: [[f64; 4]; 4] =
         [[0.3, -1.2, 2.0, 0.7], [1.0, 0.4, -0.6, 1.5], [-0.8, 2.1, 0.2, -0.3], [0.5, 0.9, 1.1, -1.7]];

@@ -1,5 +1,5 @@
 use super::information::Solution;
-use super::parameter::{LEAKS, leak_column};
+use super::prior::{LEAKS, leak_column};
 use super::update::Innovation;
 use crate::Real;
 use crate::continuity::Equation;
@@ -22,14 +22,7 @@ const SUDDEN_S: f64 = 3.0;
 /// As soon as they are larger than usual the forecast stands still: what was known before has to foretell the
 /// blocks that follow, as hypotheses that adapt quickly would hide the change in their own uncertainty.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct ChangeDetector<T, const N: usize> {
     /// Of use only while `cusum` is above zero.
     forecast: Solution<T, N>,

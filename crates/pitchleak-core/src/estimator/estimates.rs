@@ -1,6 +1,6 @@
 //! What the estimator has found so far, and what the data can tell: per parameter, whether this trace pins it down.
 
-use super::parameter::Parameter;
+use super::prior::Parameter;
 use super::rls::Rls;
 use crate::{Estimate, LPM_PER_M3S, LeakPressures, PerLeak, Real};
 
@@ -99,6 +99,11 @@ pub struct ExcitationReport<T> {
     pub bulk_modulus: Excitation<T>,
 }
 
+const LEAKS: PerLeak<Parameter> = PerLeak {
+    internal: Parameter::Internal,
+    external_a: Parameter::ExternalA,
+    external_b: Parameter::ExternalB,
+};
 const OFFSETS: [Parameter; 2] = [Parameter::OffsetA, Parameter::OffsetB];
 
 impl<T: Real, const N: usize> Rls<T, N> {
@@ -122,13 +127,8 @@ impl<T: Real, const N: usize> Rls<T, N> {
     /// Estimate of a parameter's deviation from its prior mean, SI; zero with no spread where N is too
     /// small to have it.
     fn parameter(&self, parameter: Parameter) -> Estimate<T> {
-        let index = parameter as usize;
-        match (self.solution.mean.get(index), self.scale.get(index)) {
-            (Some(mean), Some(scale)) => {
-                Estimate { value: *mean * *scale, std: self.covariance(parameter, parameter).sqrt() * *scale }
-            }
-            _ => Estimate::default(),
-        }
+        let (mean, scale) = (entry(&self.solution.mean, parameter), entry(&self.scale, parameter));
+        Estimate { value: mean * scale, std: self.covariance(parameter, parameter).sqrt() * scale }
     }
 
     /// Covariance of two parameters' errors, each in units of its prior's standard deviation; not below
@@ -146,11 +146,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// [`Estimates::leaks_m3spa`] alone.
     pub fn leak_coefficients(&self) -> PerLeak<Estimate<T>> {
-        PerLeak {
-            internal: self.parameter(Parameter::Internal),
-            external_a: self.parameter(Parameter::ExternalA),
-            external_b: self.parameter(Parameter::ExternalB),
-        }
+        LEAKS.map(|leak| self.parameter(leak))
     }
 
     fn leak_slopes(&self) -> PerLeak<Estimate<T>> {
@@ -170,14 +166,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Leak coefficients, those below zero as none, m³/(s·Pa).
     pub(super) fn possible_leaks_m3spa(&self) -> PerLeak<T> {
-        let one = |leak: Parameter| {
-            (self.solution.mean[leak as usize] * self.scale[leak as usize]).at_least(T::zero())
-        };
-        PerLeak {
-            internal: one(Parameter::Internal),
-            external_a: one(Parameter::ExternalA),
-            external_b: one(Parameter::ExternalB),
-        }
+        LEAKS.map(|leak| (self.solution.mean[leak as usize] * self.scale[leak as usize]).at_least(T::zero()))
     }
 
     fn flow_offsets_m3s(&self) -> [Estimate<T>; 2] {
@@ -208,11 +197,6 @@ impl<T: Real, const N: usize> Rls<T, N> {
         self.scale[Parameter::Internal as usize]
     }
 
-    /// Prior standard deviation of the compressibility, 1/Pa.
-    pub fn compressibility_prior_std(&self) -> T {
-        self.scale[Parameter::Compressibility as usize]
-    }
-
     /// [`Estimates::pressure_biases_pa`] alone.
     pub fn pressure_biases_pa(&self) -> [Estimate<T>; 2] {
         let (one, none) = (T::one(), T::zero());
@@ -223,7 +207,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn per_offset(&self, [flow_a, flow_b]: [T; 2], [share_a, share_b]: [T; 2]) -> [T; 2] {
         let [[aa, ab], [ba, bb]] = self.offsets.pressure_per_offset;
         let bias_pa = self.zeros.now().pressure.bias_std;
-        let [unit_a, unit_b] = OFFSETS.map(|o| self.scale.get(o as usize).copied().unwrap_or(T::zero()));
+        let [unit_a, unit_b] = OFFSETS.map(|offset| entry(&self.scale, offset));
         [
             flow_a * unit_a + bias_pa * (share_a * aa + share_b * ba),
             flow_b * unit_b + bias_pa * (share_a * ab + share_b * bb),
@@ -234,8 +218,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     fn offset_sum(&self, flows: [T; 2], pressures: [T; 2]) -> Estimate<T> {
         let [per_a, per_b] = self.per_offset(flows, pressures);
         let [a, b] = OFFSETS;
-        let [mean_a, mean_b] =
-            OFFSETS.map(|o| self.solution.mean.get(o as usize).copied().unwrap_or(T::zero()));
+        let [mean_a, mean_b] = OFFSETS.map(|offset| entry(&self.solution.mean, offset));
         let found = per_a * per_a * self.covariance(a, a)
             + T::lit(2.0) * per_a * per_b * self.covariance(a, b)
             + per_b * per_b * self.covariance(b, b);
@@ -268,16 +251,10 @@ impl<T: Real, const N: usize> Rls<T, N> {
         let pressure = pressure_pa - bias.value;
         let [per_a, per_b] = self.per_offset(none, shares);
         let [a, b] = OFFSETS.map(|offset| self.covariance(leak, offset));
-        let scale = self.scale.get(leak as usize).copied().unwrap_or(T::zero());
-        let together = scale * (per_a * a + per_b * b);
+        let together = entry(&self.scale, leak) * (per_a * a + per_b * b);
         let (own, through) = (coefficient.std * pressure, coefficient.value * bias.std);
         let variance = own * own + through * through - T::lit(2.0) * coefficient.value * pressure * together;
         Estimate { value: coefficient.value * pressure, std: variance.at_least(T::zero()).sqrt() }
-    }
-
-    /// Means of |P_L|, P_A, P_B over the memory as read, Pa.
-    fn mean_pressures_pa(&self) -> PerLeak<T> {
-        self.pressures.means().sizes_pa
     }
 
     /// Says for each parameter whether the samples so far identify it: identifiability as accumulated
@@ -288,16 +265,13 @@ impl<T: Real, const N: usize> Rls<T, N> {
             variance_reduction: self.variance_reduction(parameter),
             traded_with: self.traded_with(parameter),
         };
-        let pinned = self.leak_coefficients().zip(self.mean_pressures_pa()).map(|(leak, pressure)| {
+        let pinned = self.leak_coefficients().zip(self.pressures.means().sizes_pa).map(|(leak, pressure)| {
             settings.resolves(&leak.scaled(pressure.at_least(settings.least_pressure_pa)))
         });
-        let learnt = settings.learns(self.compressibility().std, self.compressibility_prior_std());
+        let prior_std = self.scale[Parameter::Compressibility as usize];
+        let learnt = settings.learns(self.compressibility().std, prior_std);
         ExcitationReport {
-            leaks: PerLeak {
-                internal: one(Parameter::Internal, pinned.internal),
-                external_a: one(Parameter::ExternalA, pinned.external_a),
-                external_b: one(Parameter::ExternalB, pinned.external_b),
-            },
+            leaks: PerLeak::from_fn(|leak| one(LEAKS[leak], pinned[leak])),
             bulk_modulus: one(Parameter::Compressibility, learnt),
         }
     }
@@ -323,6 +297,11 @@ impl<T: Real, const N: usize> Rls<T, N> {
         }
         partner
     }
+}
+
+/// A parameter's own; zero where N is too small to have it.
+fn entry<T: Real, const N: usize>(of_each: &[T; N], parameter: Parameter) -> T {
+    of_each.get(parameter as usize).copied().unwrap_or(T::zero())
 }
 
 /// A share of the reading that is wrong, γ/(1 + γ), as a share of the truth, γ.

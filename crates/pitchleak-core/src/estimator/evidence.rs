@@ -4,7 +4,7 @@
 use super::block::Block;
 use super::hypothesis::Hypothesis;
 use super::information::{Posterior, Prior};
-use super::parameter::LEAKS;
+use super::prior::LEAKS;
 use crate::Real;
 
 /// Measures how well a hypothesis foretold a block: ln of the block's probability, less what is the same for
@@ -19,14 +19,7 @@ use crate::Real;
 /// (Kalman's likelihood by the matrix inversion lemma; Bar-Shalom, Li, Kirubarajan 2001, §5.2 and §11.6). The square is
 /// taken relative to a reference θ common to all, so that nothing cancels in f32.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Evidence<T, const N: usize> {
     pub block: Block<T, N>,
     /// Hᵀ(y − H θ) at the reference, of levels …

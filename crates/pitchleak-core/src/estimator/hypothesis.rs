@@ -13,14 +13,7 @@ const USUAL_CHANGE: f64 = 0.1 / 240.0;
 ///
 /// Slopes are counted in [`USUAL_CHANGE`] per memory, and have a unit prior as everything else.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Hypothesis<T, const N: usize> {
     pub memory_s: T,
     has_slopes: bool,
@@ -76,18 +69,19 @@ impl<T: Real, const N: usize> Hypothesis<T, N> {
     pub fn solve(&self, prior: &Prior<'_, T>, posterior: &mut Posterior<T, N>) {
         self.known.solve(prior, self.rate_ps(), posterior);
     }
-
-    #[cfg(test)]
-    pub fn solved(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
-        self.known.solved(prior, self.rate_ps())
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::block::BlockSums;
-    use super::super::parameter::LEAKS;
+    use super::super::prior::LEAKS;
     use super::*;
+
+    impl<T: Real, const N: usize> Hypothesis<T, N> {
+        pub fn solved(&self, prior: &Prior<'_, T>) -> Posterior<T, N> {
+            self.known.solved(prior, self.rate_ps())
+        }
+    }
 
     const OFFSETS: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
     const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &OFFSETS };

@@ -1,7 +1,7 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::parameter::{LEAKS, Parameter, leak_column};
+use super::prior::{LEAKS, Parameter, leak_column};
 use super::update::Innovation;
 use crate::Real;
 use crate::continuity::Equation;
@@ -14,14 +14,7 @@ use crate::linalg::{Factors, Joint, Pivots};
 /// prior is the identity. The prior is never forgotten: when excitation stops, the covariance grows back
 /// to the prior and no further (no blow-up).
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Information<T, const N: usize> {
     /// Σ w f fᵀ.
     pub matrix: Joint<T, N>,
@@ -45,14 +38,7 @@ pub(super) struct Prior<'a, T> {
 
 /// What is known of the levels, prior units.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Solution<T, const N: usize> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]
     pub mean: [T; N],
@@ -313,13 +299,6 @@ impl<T: Real, const N: usize> Information<T, N> {
         factors.factor(&self.matrix, rate_ps > T::zero(), entry, self.column_noise);
         factors.solve(mean, half, prior.mean_0);
     }
-
-    #[cfg(test)]
-    pub fn solved(&self, prior: &Prior<'_, T>, rate_ps: T) -> Posterior<T, N> {
-        let mut posterior = Posterior::room();
-        self.solve(prior, rate_ps, &mut posterior);
-        posterior
-    }
 }
 
 /// Entry of the prior information, `i` >= `j`; none is zero.
@@ -410,6 +389,14 @@ impl<T: Real, const N: usize> Posterior<T, N> {
 mod tests {
     use super::super::block::{Balance, Block, BlockSums};
     use super::*;
+
+    impl<T: Real, const N: usize> Information<T, N> {
+        pub fn solved(&self, prior: &Prior<'_, T>, rate_ps: T) -> Posterior<T, N> {
+            let mut posterior = Posterior::room();
+            self.solve(prior, rate_ps, &mut posterior);
+            posterior
+        }
+    }
 
     const OFFSETS: [[f64; 2]; 2] = [[1.0, 0.0], [0.0, 1.0]];
     const PRIOR: Prior<'static, f64> = Prior { mean_0: 0.0, offsets: &OFFSETS };

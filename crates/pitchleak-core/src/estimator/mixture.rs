@@ -7,14 +7,7 @@ use crate::Real;
 /// What several hypotheses know, weighed, one added after the other: the mean, and the covariance about it, which holds
 /// what they disagree on.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Mixture<T, const N: usize> {
     /// Of the covariance the lower triangle.
     known: Solution<T, N>,

@@ -25,7 +25,6 @@ mod hypothesis;
 mod information;
 mod innovations;
 mod mixture;
-mod parameter;
 mod position;
 mod prior;
 mod rls;
@@ -33,7 +32,7 @@ mod settings;
 mod update;
 
 pub use estimates::{Estimates, Excitation, ExcitationReport, ExcitationSettings};
-pub use parameter::Parameter;
+pub use prior::Parameter;
 pub use rls::Rls;
 pub use settings::{RlsError, RlsSettings};
 pub use update::{Innovation, Update};

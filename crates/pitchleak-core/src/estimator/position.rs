@@ -1,5 +1,5 @@
 use super::block::BlockSums;
-use super::parameter::{LEAKS, leak_column};
+use super::prior::{LEAKS, leak_column};
 use crate::Real;
 use crate::continuity::Equation;
 
@@ -10,14 +10,7 @@ use crate::continuity::Equation;
 /// is kept as x̂ − gᵀθ: x̂ as if θ stood at its prior mean, g the sensitivity to θ (Friedland 1969,
 /// "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14, separate-bias form).
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct PositionFilter<T, const N: usize> {
     position_m: T,
     variance_m2: T,

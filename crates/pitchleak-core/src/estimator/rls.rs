@@ -3,9 +3,8 @@ use super::block::{BALANCES, Balance, BlockSums};
 use super::change::ChangeDetector;
 use super::information::{Prior, Solution};
 use super::innovations::Innovations;
-use super::parameter::{LEAKS, Parameter};
 use super::position::PositionFilter;
-use super::prior::{OffsetPrior, Zeros, offset_units, prior_spread};
+use super::prior::{LEAKS, OffsetPrior, Parameter, Zeros, offset_units, prior_spread};
 use super::settings::{self, RlsError, RlsSettings};
 use super::update::{Innovation, Update};
 use crate::continuity::{
@@ -43,14 +42,7 @@ const ROWS_AT_ONCE: usize = 2;
 /// Rls::<f64, 5>::new(Cylinder::paper(), Fluid::paper(), &Sensors::paper(), RlsSettings::default());
 /// ```
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct Rls<T, const N: usize> {
     cylinder: Cylinder<T>,
     noise: NoiseStd<T>,
@@ -158,7 +150,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[inline]
     pub fn update(&mut self, dt_s: T, sample: &Sample<T>) -> Update<T> {
         let () = Self::HAS_A_KNOWN_SIZE;
-        if !self.plausible(sample) {
+        if !self.plausible(&Readings::from(sample)) {
             return Update::Rejected;
         }
         let follows = dt_s > T::zero() && dt_s <= self.longest_s;
@@ -187,16 +179,12 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cfg_attr(target_os = "none", inline(never))]
     fn rest(&mut self, step: Integrals<T>, measured: Measured, x_m: T) -> Weights<T> {
         self.unfed.add(&step);
-        let only = match measured {
-            Measured::OnlyA => Weights::only_a,
-            Measured::OnlyB => Weights::only_b,
-            Measured::Both | Measured::Neither => {
-                self.anchor(x_m);
-                self.sums.count -= T::one();
-                return self.both;
-            }
-        };
-        only(&self.cylinder, &self.noise, &self.possible_leaks_m3spa())
+        if measured == Measured::Neither {
+            self.anchor(x_m);
+            self.sums.count -= T::one();
+            return self.both;
+        }
+        self.weights_of(measured, &self.noise)
     }
 
     /// Nothing goes over from what came before.
@@ -295,20 +283,14 @@ impl<T: Real, const N: usize> Rls<T, N> {
 
     /// Finite, and within ten times what any pitch cylinder meets.
     #[inline]
-    fn plausible(&self, sample: &Sample<T>) -> bool {
-        let (x_limit, pressure_limit, flow_limit) = self.limits();
-        let flow_ok = |q: Option<T>| q.is_none_or(|q| q.abs() <= flow_limit);
-        sample.x_m.abs() <= x_limit
-            && sample.pa_pa.abs() <= pressure_limit
-            && sample.pb_pa.abs() <= pressure_limit
-            && flow_ok(sample.qa_m3s)
-            && flow_ok(sample.qb_m3s)
-    }
-
-    /// Largest position, m, pressure, Pa, and flow, m³/s, that are readings.
-    #[inline]
-    fn limits(&self) -> (T, T, T) {
-        (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9), self.flow_limit_m3s)
+    fn plausible(&self, &PerChannel { x, pa, pb, qa, qb }: &Readings<T>) -> bool {
+        let (x_limit, pressure_limit) = (T::lit(2.0) * self.cylinder.stroke_m, T::lit(1e9));
+        let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
+        ok(x, x_limit)
+            && ok(pa, pressure_limit)
+            && ok(pb, pressure_limit)
+            && ok(qa, self.flow_limit_m3s)
+            && ok(qb, self.flow_limit_m3s)
     }
 
     /// Takes in what was read `dt_s` after the readings before, of channels that need not all come at once: between two of its
@@ -347,15 +329,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
     #[cold]
     #[cfg_attr(target_os = "none", inline(never))]
     fn update_on_clocks(&mut self, dt_s: T, readings: &Readings<T>) -> Update<T> {
-        let (x_limit, pressure_limit, flow_limit) = self.limits();
-        let ok = |reading: Option<T>, limit: T| reading.is_none_or(|value| value.abs() <= limit);
-        let PerChannel { x, pa, pb, qa, qb } = *readings;
-        let plausible = ok(x, x_limit)
-            && ok(pa, pressure_limit)
-            && ok(pb, pressure_limit)
-            && ok(qa, flow_limit)
-            && ok(qb, flow_limit);
-        if !plausible {
+        if !self.plausible(readings) {
             return Update::Rejected;
         }
         let renewing = self.bank.is_renewing();

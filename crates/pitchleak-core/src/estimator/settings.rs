@@ -20,40 +20,18 @@ impl<T: Real> Default for RlsSettings<T> {
 }
 
 /// Error returned by [`Rls::new`](super::Rls::new): of this an estimator would make nothing but nonsense.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RlsError {
     /// The cylinder or its oil cannot be.
-    Cylinder(CylinderError),
+    #[error("{0}")]
+    Cylinder(#[from] CylinderError),
     /// A sensor's noise, bias or gain error is negative or not a number.
+    #[error("noise, bias and gain error of sensors must not be negative")]
     Sensors,
     /// A time of [`RlsSettings`] is not positive, or the block's is infinite.
+    #[error("forgetting time, block time and longest step must be positive")]
     Settings,
-}
-
-impl core::fmt::Display for RlsError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Cylinder(error) => error.fmt(f),
-            Self::Sensors => f.write_str("noise, bias and gain error of sensors must not be negative"),
-            Self::Settings => f.write_str("forgetting time, block time and longest step must be positive"),
-        }
-    }
-}
-
-impl core::error::Error for RlsError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Cylinder(error) => Some(error),
-            Self::Sensors | Self::Settings => None,
-        }
-    }
-}
-
-impl From<CylinderError> for RlsError {
-    fn from(error: CylinderError) -> Self {
-        Self::Cylinder(error)
-    }
 }
 
 /// Whether an estimator can be made of all this.

@@ -1,7 +1,7 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
-use super::joint::{Joint, SLOPES};
+use super::{Joint, SLOPES};
 use crate::Real;
 
 /// U D Uᵀ of a joint information matrix A, last parameter first: the columns of the slopes, then those of the levels. The last

@@ -29,46 +29,27 @@ pub struct Fluid<T> {
 }
 
 /// Error returned by [`Cylinder::check`] and [`Fluid::check`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CylinderError {
     /// An area is not positive and finite.
+    #[error("piston areas must be positive")]
     Area,
     /// The stroke is not positive and finite.
+    #[error("the stroke must be positive")]
     Stroke,
     /// The moving mass is not positive and finite.
+    #[error("the moving mass must be positive")]
     MovingMass,
     /// A dead volume is negative or not finite.
+    #[error("dead volumes must not be negative")]
     DeadVolume,
     /// The bulk modulus is not positive and finite.
+    #[error("the bulk modulus must be positive")]
     BulkModulus,
     /// The spread of the bulk modulus is negative or not finite.
+    #[error("the spread of the bulk modulus must not be negative")]
     BulkModulusSpread,
-}
-
-impl core::fmt::Display for CylinderError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Area => "piston areas must be positive",
-            Self::Stroke => "the stroke must be positive",
-            Self::MovingMass => "the moving mass must be positive",
-            Self::DeadVolume => "dead volumes must not be negative",
-            Self::BulkModulus => "the bulk modulus must be positive",
-            Self::BulkModulusSpread => "the spread of the bulk modulus must not be negative",
-        })
-    }
-}
-
-impl core::error::Error for CylinderError {}
-
-#[cfg_attr(target_os = "none", inline(never))]
-fn positive<T: Real>(value: T) -> bool {
-    value.is_finite() && value > T::zero()
-}
-
-#[cfg_attr(target_os = "none", inline(never))]
-pub(super) fn not_negative<T: Real>(value: T) -> bool {
-    value.is_finite() && value >= T::zero()
 }
 
 impl<T: Real> Cylinder<T> {
@@ -86,13 +67,13 @@ impl<T: Real> Cylinder<T> {
 
     /// Says whether a cylinder like this can exist.
     pub fn check(&self) -> Result<(), CylinderError> {
-        if !positive(self.area_a_m2) || !positive(self.area_b_m2) {
+        if !self.area_a_m2.is_positive() || !self.area_b_m2.is_positive() {
             Err(CylinderError::Area)
-        } else if !positive(self.stroke_m) {
+        } else if !self.stroke_m.is_positive() {
             Err(CylinderError::Stroke)
-        } else if !positive(self.moving_mass_kg) {
+        } else if !self.moving_mass_kg.is_positive() {
             Err(CylinderError::MovingMass)
-        } else if !not_negative(self.dead_volume_a_m3) || !not_negative(self.dead_volume_b_m3) {
+        } else if !self.dead_volume_a_m3.is_not_negative() || !self.dead_volume_b_m3.is_not_negative() {
             Err(CylinderError::DeadVolume)
         } else {
             Ok(())
@@ -120,9 +101,9 @@ impl<T: Real> Fluid<T> {
 
     /// Says whether oil like this can exist.
     pub fn check(&self) -> Result<(), CylinderError> {
-        if !positive(self.bulk_modulus_pa) {
+        if !self.bulk_modulus_pa.is_positive() {
             Err(CylinderError::BulkModulus)
-        } else if !not_negative(self.bulk_modulus_std_pa) {
+        } else if !self.bulk_modulus_std_pa.is_not_negative() {
             Err(CylinderError::BulkModulusSpread)
         } else {
             Ok(())

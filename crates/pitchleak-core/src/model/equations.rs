@@ -114,9 +114,7 @@ impl<T: Real> Model<T> {
                 - at.force_n,
         }
     }
-}
 
-impl<T: Real> Model<T> {
     /// What one unit of a misreading adds to [`Self::residual`], to first order; `read` says what the sensors show with so much of it. The
     /// residual is quadratic in the signals: the central difference is exact whatever its step, where readings are linear in their error.
     #[inline]

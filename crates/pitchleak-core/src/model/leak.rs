@@ -3,8 +3,7 @@ use core::ops::{Index, IndexMut};
 
 /// Where oil can leak.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Leak {
     /// Past the piston seal, chamber A to chamber B.
     Internal,
@@ -86,7 +85,7 @@ impl<V> PerLeak<Option<V>> {
 impl<T: Real> PerLeak<T> {
     /// Whether every value is a number and none is negative, as a leak's coefficient must be.
     pub fn is_physical(&self) -> bool {
-        self.iter().all(|(_, value)| value.is_finite() && *value >= T::zero())
+        self.iter().all(|(_, value)| value.is_not_negative())
     }
 }
 

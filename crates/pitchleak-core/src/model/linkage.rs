@@ -18,34 +18,25 @@ pub struct Linkage<T> {
 }
 
 /// Error returned by [`Linkage`]'s functions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkageError {
     /// A length is not positive and finite, or the angle is not finite.
+    #[error("lengths of the linkage must be positive")]
     Geometry,
     /// No crank angle between the dead points has this pitch with the piston inside the cylinder.
+    #[error("the linkage cannot reach this pitch angle")]
     Pitch,
     /// The linkage cannot put the piston there.
+    #[error("the linkage cannot reach this piston position")]
     Position,
     /// Crank and cylinder are in line: no force makes a torque.
+    #[error("crank and cylinder are in line: force and torque are unrelated")]
     DeadPoint,
     /// A torque or force is not finite.
+    #[error("torque and force must be numbers")]
     Load,
 }
-
-impl core::fmt::Display for LinkageError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Geometry => "lengths of the linkage must be positive",
-            Self::Pitch => "the linkage cannot reach this pitch angle",
-            Self::Position => "the linkage cannot reach this piston position",
-            Self::DeadPoint => "crank and cylinder are in line: force and torque are unrelated",
-            Self::Load => "torque and force must be numbers",
-        })
-    }
-}
-
-impl core::error::Error for LinkageError {}
 
 impl<T: Real> Linkage<T> {
     /// The mechanism of the paper: L_p = 1.1 m, l_p = 1.0 m, r_p = 0.5 m, φ = 63°.
@@ -61,7 +52,7 @@ impl<T: Real> Linkage<T> {
     /// Says whether a linkage like this can exist.
     pub fn check(&self) -> Result<(), LinkageError> {
         let lengths = [self.pivot_distance_m, self.retracted_length_m, self.crank_radius_m];
-        let sound = lengths.iter().all(|l| l.is_finite() && *l > T::zero());
+        let sound = lengths.into_iter().all(T::is_positive);
         if sound && self.zero_angle_rad.is_finite() { Ok(()) } else { Err(LinkageError::Geometry) }
     }
 

@@ -3,19 +3,15 @@
 mod cylinder;
 mod equations;
 mod estimate;
-mod gas;
 mod leak;
 mod linkage;
 mod orifice;
-mod sample;
 mod sensors;
 
 pub use cylinder::{Cylinder, CylinderError, Fluid};
 pub use equations::{Model, Signals, Terms};
 pub use estimate::{Estimate, LeakPressures};
-pub use gas::{ATMOSPHERE_PA, LEAST_ABSOLUTE_PA};
 pub use leak::{Leak, PerLeak};
 pub use linkage::{Linkage, LinkageError};
 pub use orifice::{metering, metering_slope, signed_root};
-pub use sample::Sample;
-pub use sensors::{SensorSpread, Sensors};
+pub use sensors::{ATMOSPHERE_PA, Sample, SensorSpread, Sensors};

@@ -1,5 +1,54 @@
-use super::cylinder::not_negative;
+//! The sensors: what they read, and how far that may be off.
+
 use crate::{LPM_PER_M3S, Real};
+
+/// Standard atmosphere, Pa: gauge pressures count from here.
+pub const ATMOSPHERE_PA: f64 = 101_325.0;
+
+/// One reading of the sensors. A flow is `None` while its chamber has no meter (or is not fed
+/// through it): then only that chamber's equation rests.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sample<T> {
+    /// Piston position x from the A end, m.
+    pub x_m: T,
+    /// Pressure P_A of the piston-side chamber, Pa gauge.
+    pub pa_pa: T,
+    /// Pressure P_B of the rod-side chamber, Pa gauge.
+    pub pb_pa: T,
+    /// Flow Q_A into the piston-side chamber, m³/s.
+    pub qa_m3s: Option<T>,
+    /// Flow Q_B into the rod-side chamber, m³/s.
+    pub qb_m3s: Option<T>,
+    /// Load force F against extension, N.
+    pub force_n: Option<T>,
+}
+
+impl<T: Real> Sample<T> {
+    /// P_L = P_A − P_B, Pa.
+    #[inline]
+    pub fn load_pressure_pa(&self) -> T {
+        self.pa_pa - self.pb_pa
+    }
+
+    /// x, P_A, P_B, Q_A and Q_B: what the continuity equations need.
+    #[inline]
+    pub fn readings(&self) -> [Option<T>; 5] {
+        [Some(self.x_m), Some(self.pa_pa), Some(self.pb_pa), self.qa_m3s, self.qb_m3s]
+    }
+
+    /// Whether every reading that is there is a finite number.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        let ok = |q: Option<T>| q.is_none_or(|v| v.is_finite());
+        self.x_m.is_finite()
+            && self.pa_pa.is_finite()
+            && self.pb_pa.is_finite()
+            && ok(self.qa_m3s)
+            && ok(self.qb_m3s)
+            && ok(self.force_n)
+    }
+}
 
 /// How far one sensor's reading may be off, 1 σ each, in the sensor's SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -42,20 +91,18 @@ impl<T: Real> SensorSpread<T> {
             drift_std_ph: T::zero(),
         }
     }
-}
 
-impl<T: Real> SensorSpread<T> {
     /// Whether every spread is a number and none is negative.
     #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each sensor
     pub fn is_physical(&self) -> bool {
         let Self { noise_std, bias_std, gain_std, drift_std_ph } = *self;
-        [noise_std, bias_std, gain_std, drift_std_ph].iter().all(|std| not_negative(*std))
+        [noise_std, bias_std, gain_std, drift_std_ph].into_iter().all(T::is_not_negative)
     }
 }
 
 impl<T: Real> Sensors<T> {
     /// Standard deviations of the noise of x (m), P_A, P_B (Pa), Q_A and Q_B (m³/s), in the order of
-    /// [`Sample::readings`](super::Sample::readings).
+    /// [`Sample::readings`].
     pub fn noise_stds(&self) -> [T; 5] {
         let Self { flow_a, flow_b, pressure, position, .. } = self;
         [position, pressure, pressure, flow_a, flow_b].map(|spread| spread.noise_std)

@@ -94,7 +94,7 @@ impl<T: Real> CylinderPlant<T> {
             Err(PlantError::EndStop)
         } else if !(vapour >= T::lit(-crate::ATMOSPHERE_PA) && vapour <= T::zero()) {
             Err(PlantError::VapourPressure)
-        } else if !(self.temp_k.is_finite() && self.temp_k > T::zero()) {
+        } else if !self.temp_k.is_positive() {
             Err(PlantError::Temperature)
         } else {
             Ok(())
@@ -329,7 +329,7 @@ pub(crate) fn number_or_zero<T: Real>(value: T) -> T {
 
 /// Into how many steps of what length a step is divided, for motions of a rate.
 pub(crate) fn substeps<T: Real>(step_s: T, rate_ps: T) -> (u32, T) {
-    if !(step_s.is_finite() && step_s > T::zero()) {
+    if !step_s.is_positive() {
         return (0, T::zero());
     }
     let wanted = (step_s * rate_ps / T::lit(STEP_RATE)).ceil().max(T::one());

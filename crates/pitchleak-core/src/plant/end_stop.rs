@@ -24,12 +24,10 @@ impl<T: Real> EndStop<T> {
     }
 
     pub(super) fn is_physical(&self, stroke_m: T) -> bool {
-        let positive = |v: T| v.is_finite() && v > T::zero();
-        positive(self.gap_m)
+        self.gap_m.is_positive()
             && self.gap_m < stroke_m / T::lit(2.0)
-            && positive(self.stiffness_npm)
-            && self.damping_nspm.is_finite()
-            && self.damping_nspm >= T::zero()
+            && self.stiffness_npm.is_positive()
+            && self.damping_nspm.is_not_negative()
     }
 
     /// Force of the stops against extension, N.

@@ -63,10 +63,9 @@ impl<T: Real> Valve<T> {
             self.area_ratio_b,
             self.laminar_drop_pa,
         ];
-        positive.iter().all(|v| v.is_finite() && *v > T::zero())
+        positive.into_iter().all(T::is_positive)
             && self.underlap.abs() < T::one()
-            && self.clearance_m3spa.is_finite()
-            && self.clearance_m3spa >= T::zero()
+            && self.clearance_m3spa.is_not_negative()
     }
 
     /// Time derivative of spool position and speed for a command (share of the stroke).
@@ -147,7 +146,7 @@ impl<T: Real> Supply<T> {
     pub(crate) fn is_physical(&self) -> bool {
         let positive =
             [self.pump_flow_m3s, self.relief_pressure_pa, self.relief_slope_m3spa, self.compliance_m3pa];
-        positive.iter().all(|v| v.is_finite() && *v > T::zero())
+        positive.into_iter().all(T::is_positive)
     }
 
     /// Flow over the relief valve, m³/s.

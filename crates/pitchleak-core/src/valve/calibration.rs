@@ -49,42 +49,18 @@ pub struct ValveNoise<T> {
 }
 
 /// Why there is no [`ValveFilter`](super::ValveFilter).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValveError {
     /// The cylinder or its oil cannot be.
-    Cylinder(CylinderError),
+    #[error("{0}")]
+    Cylinder(#[from] CylinderError),
     /// A number of the calibration cannot be.
+    #[error("the valve's calibration is none that `pitchleak calibrate` wrote")]
     Calibration,
     /// A sensor's noise or the longest step is not positive.
+    #[error("noise of the sensors and the longest step must be positive")]
     Noise,
-}
-
-impl core::fmt::Display for ValveError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Cylinder(error) => error.fmt(f),
-            Self::Calibration => {
-                f.write_str("the valve's calibration is none that `pitchleak calibrate` wrote")
-            }
-            Self::Noise => f.write_str("noise of the sensors and the longest step must be positive"),
-        }
-    }
-}
-
-impl core::error::Error for ValveError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Cylinder(error) => Some(error),
-            Self::Calibration | Self::Noise => None,
-        }
-    }
-}
-
-impl From<CylinderError> for ValveError {
-    fn from(error: CylinderError) -> Self {
-        Self::Cylinder(error)
-    }
 }
 
 /// A leak grows by so much in an hour, 1 σ, L/min at 50 bar: no valve tells less (docs/valve.md).
@@ -95,14 +71,12 @@ pub(super) const LEAK_SIZE: f64 = 10.0;
 
 impl<T: Real> ValveCalibration<T> {
     pub(super) fn check(&self) -> Result<(), ValveError> {
-        let positive = |value: T| value.is_finite() && value > T::zero();
-        let not_negative = |value: T| value.is_finite() && value >= T::zero();
         let sizes = [self.rated_flow_m3s, self.rated_drop_pa, self.mean[KAPPA], self.mean[ROUNDING]];
         let spreads =
             [self.hysteresis, self.null_leak, self.gain_drift, self.lap_drift, self.null_leak_drift];
         let numbers = self.mean.iter().chain(&self.covariance).chain([&self.tank_pa]);
-        let is_possible = sizes.into_iter().all(positive)
-            && spreads.into_iter().all(not_negative)
+        let is_possible = sizes.into_iter().all(T::is_positive)
+            && spreads.into_iter().all(T::is_not_negative)
             && numbers.copied().all(T::is_finite);
         if is_possible { Ok(()) } else { Err(ValveError::Calibration) }
     }
@@ -164,8 +138,7 @@ impl<T: Real> ValveCalibration<T> {
 impl<T: Real> ValveNoise<T> {
     pub(super) fn check(&self) -> Result<(), ValveError> {
         let Self { position_m, pressure_pa, spool, supply_pa } = *self;
-        let positive = |value: T| value.is_finite() && value > T::zero();
-        let all = [position_m, pressure_pa, spool, supply_pa].into_iter().all(positive);
+        let all = [position_m, pressure_pa, spool, supply_pa].into_iter().all(T::is_positive);
         if all { Ok(()) } else { Err(ValveError::Noise) }
     }
 }

@@ -15,14 +15,7 @@ pub(super) type Row<T> = [T; N + 1];
 
 /// The unknowns beside those of the calibration, and how well they are known.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Filter<T> {
     pub step: [T; N],
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::vector"))]

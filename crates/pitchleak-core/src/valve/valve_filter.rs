@@ -77,14 +77,7 @@ enum Due {
 
 /// Leaks of a cylinder without flow meters, by the flows of its calibrated valve; in constant time and memory.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct ValveFilter<T> {
     edges: Edges<T>,
     equations: Equations<T>,
@@ -128,7 +121,7 @@ impl<T: Real> ValveFilter<T> {
         fluid.check()?;
         calibration.check()?;
         noise.check()?;
-        if !max_step_s.is_finite() || max_step_s <= T::zero() {
+        if !max_step_s.is_positive() {
             return Err(ValveError::Noise);
         }
         let growth_ps = calibration.growth_ps(fluid);
@@ -212,7 +205,7 @@ impl<T: Real> ValveFilter<T> {
         }
         self.block = Block::new();
         (self.before, self.white, self.spool) = (None, None, None);
-        if gap_s > T::zero() && gap_s.is_finite() {
+        if gap_s.is_positive() {
             self.filter.widen(self.zero_growth_ps * gap_s, along_zero());
             for (unknown, growth_ps) in self.growth_ps.iter().enumerate() {
                 self.filter.widen(*growth_ps * gap_s, along(unknown));
@@ -310,16 +303,12 @@ impl<T: Real> ValveFilter<T> {
     /// What the readings so far say.
     pub fn estimates(&self) -> ValveEstimates<T> {
         let unit = T::lit(LEAK_UNIT_M3SPA);
-        let [wide_internal, wide_a, wide_b] = self.watch.widening();
-        let leak = |at: usize, wide: T| {
-            let own = Estimate { value: self.filter.step[at], std: self.filter.variance(at).sqrt() * wide };
-            own.scaled(unit)
-        };
-        let leaks_m3spa = PerLeak {
-            internal: leak(0, wide_internal),
-            external_a: leak(1, wide_a),
-            external_b: leak(2, wide_b),
-        };
+        let wider = self.watch.widening();
+        let leaks_m3spa = PerLeak::from_fn(|leak| {
+            let at = leak as usize;
+            let std = self.filter.variance(at).sqrt() * wider[at];
+            Estimate { value: self.filter.step[at], std }.scaled(unit)
+        });
         let sizes_pa = self.pressures.means().sizes_pa;
         let kappa = Estimate {
             value: self.kappa_mean + self.filter.step[KAPPA],
