@@ -199,8 +199,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
     pub fn add_jumps(&mut self, least_ln: f64) {
         let tables = self.pass.tables;
         let Some(wander) = tables.wanders.last() else { return };
-        let borders = 1..self.pass.segments;
-        let ln_borders = (borders.len().max(1) as f64).ln();
+        let (borders, ln_border) = self.pass.borders();
         self.sort();
         let mut states = best_states(&self.all);
         states.retain(|state| state.wander.0 <= 0.0 && state.zeros.id == "zeros_usual");
@@ -211,12 +210,12 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let ln_constant = self.ln_constant(subset);
             let most = self.scored(State { wander: *wander, ..state }, leaks, ln_constant).ln_likelihood;
             for zeros in tables.zeros.iter().filter(|zeros| zeros.jumps()) {
-                let ln_odds = (zeros.share / state.zeros.share).ln() - ln_borders;
+                let ln_odds = (zeros.share / state.zeros.share).ln() + ln_border;
                 if ln_steady + ln_odds + most - ln_likelihood + BEYOND_WANDERING <= self.best_ln - least_ln {
                     continue;
                 }
                 for border in borders.clone() {
-                    self.add(State { zeros, border, ..state }, leaks, ln_constant - ln_borders);
+                    self.add(State { zeros, border, ..state }, leaks, ln_constant + ln_border);
                 }
             }
         }

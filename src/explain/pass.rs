@@ -13,6 +13,7 @@ use crate::rig::{Odds, Rig};
 use crate::told::Told;
 use pitchleak_core::continuity::EQUATIONS;
 use pitchleak_core::{Leak, PerLeak};
+use std::ops::Range;
 
 /// Recorders of pitch systems take at the most 2000 readings a second. Chosen.
 const LEAST_STEP_S: f64 = 5e-4;
@@ -147,7 +148,7 @@ impl<'a, 's> Pass<'a, 's> {
     pub fn columns(&self) -> Vec<(Column, Course)> {
         let mut columns = vec![(Column::LeftSide, Course::Constant)];
         columns.extend(USUAL.iter().map(|(column, course, _)| (*column, *course)));
-        let entries = self.tables.zeros.iter().chain(self.departures());
+        let entries = self.tables.zeros.iter().filter(|zeros| !zeros.jumps()).chain(self.departures());
         columns.extend(
             entries.flat_map(|entry| entry.free.iter().map(|(column, course, _)| (*column, *course))),
         );
@@ -174,15 +175,21 @@ impl<'a, 's> Pass<'a, 's> {
         columns
     }
 
+    /// Where a leak or a zero may change at once, and ln of each one's share.
+    pub fn borders(&self) -> (Range<usize>, f64) {
+        let borders = 1..self.segments;
+        let ln_border = -(borders.len().max(1) as f64).ln();
+        (borders, ln_border)
+    }
+
     /// Courses of leaks beside being constant, wandering and creeping, with their priors.
     pub fn courses(&self) -> Vec<(LeakCourse, f64)> {
-        let borders = 1..self.segments;
-        let ln_borders = (borders.len().max(1) as f64).ln();
+        let (borders, ln_border) = self.borders();
         let with_prior = |course: LeakCourse| (course, self.tables.ln_course(course));
         let at_once = borders.flat_map(|border| [LeakCourse::Opening(border), LeakCourse::Sudden(border)]);
         let at_once = at_once.map(|course| {
             let (course, ln_course) = with_prior(course);
-            (course, ln_course - ln_borders)
+            (course, ln_course + ln_border)
         });
         let others =
             [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing, LeakCourse::Accelerating]

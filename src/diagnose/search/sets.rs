@@ -92,7 +92,8 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     }
     near.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
     near.truncate(MOST_EXCHANGES);
-    near.into_iter().filter_map(|one| fitted(fit, one, progress)).collect()
+    let own_leaks = below_zero(fit);
+    near.into_iter().filter_map(|one| fitted(fit, own_leaks, one, progress)).collect()
 }
 
 /// All sets of one to `most` of these.
@@ -156,9 +157,9 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
     pairs.filter_map(pair).collect()
 }
 
-/// The exchange once it is fitted. None where the other set is no model: its fit does not settle, leaves more than noise where the named one
+/// The exchange once it is fitted, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle, leaves more than noise where the named one
 /// does not, has an effect at the end of its range, or one that has nothing to do.
-fn fitted(fit: &Fit<'_>, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
+fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
@@ -173,7 +174,7 @@ fn fitted(fit: &Fit<'_>, one: Exchange, progress: Progress<'_>) -> Option<Exchan
         !fit.problem.is_worth_a_name(*term, size)
     };
     let rounding = one.new.iter().map(|(term, _)| *term).find(is_rounding);
-    let dearer = one.dearer + below_zero(&other) - below_zero(fit);
+    let dearer = one.dearer + below_zero(&other) - own_leaks;
     is_model.then(|| Exchange { rise: other.left_beyond(fit), dearer, rounding, ..one })
 }
 

@@ -23,14 +23,7 @@ const ARE_LEAKS: [bool; REGRESSORS] = [false, true, true, true, false];
 
 /// The waiting blocks.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Real",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub(super) struct Waiting<T> {
     blocks: Filled<Block<T>, WAITING>,
     area_m2: [T; 2],

@@ -15,14 +15,7 @@ const DIFFERENCE_SIGMAS: f64 = 3.0;
 
 /// Gram matrices of a stretch of the trace.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct Segment<T> {
     #[cfg_attr(feature = "serde", serde(with = "crate::number::arrays::matrix"))]
     gram: [[T; PACKED]; EQUATIONS],

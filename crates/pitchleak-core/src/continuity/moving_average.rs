@@ -8,14 +8,7 @@ use crate::Real;
 /// w_k = e_k + (S_{k−1}/V_{k−1}) w_{k−1} have the variance V_k = D + S_k + S_{k−1} (1 − S_{k−1}/V_{k−1}) and are independent
 /// (Brockwell, Davis 1991, Time Series: Theory and Methods, §5.2, the innovations algorithm; a first block has V = D + 2 S).
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct MovingAverage<T, const N: usize> {
     /// w, not divided by its standard deviation.
     innovation: Equation<T, N>,

@@ -14,14 +14,7 @@ use crate::{Cylinder, Fluid, PerLeak, Real, Sample, Sensors, signed_root};
 
 /// The statistic, in at most `S` segments.
 #[derive(Clone, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Real",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct ContinuityStatistic<T, const S: usize> {
     clocks: Clocks<T>,
     /// The last row, and its step, s.

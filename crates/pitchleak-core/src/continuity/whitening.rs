@@ -49,14 +49,7 @@ pub const VOLUME_POWERS: usize = 6;
 
 /// The recursion.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(bound(
-        serialize = "T: serde::Serialize + Copy",
-        deserialize = "T: Real + serde::Deserialize<'de>"
-    ))
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
 pub struct Whitener<T> {
     area_m2: [T; 2],
     /// Variances: flows A and B, (m³/s)²; position, m²; κ₀ times a pressure, 1.
