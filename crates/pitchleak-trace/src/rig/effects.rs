@@ -2,8 +2,9 @@
 
 use super::bound::{self, Bound};
 use super::document::{RigError, Section};
+use super::keys::{Done, Keys};
 use crate::units::Dimension;
-use pitchleak_core::effects::{EffectConstant, EffectConstants};
+use pitchleak_core::effects::EffectConstants;
 use pitchleak_core::{Effect, EffectSet};
 use std::collections::BTreeMap;
 
@@ -51,7 +52,7 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
             continue;
         }
         let size = if section.is_table(id) {
-            read_table(effect, &section.section(id)?)?
+            section.section(id)?.read(EffectValue::new(0.0, None), keys(effect))?
         } else {
             EffectValue::new(section.required(id, size(effect))?, None)
         };
@@ -63,21 +64,20 @@ pub(super) fn read(section: &Section<'_>) -> Result<EffectMap, RigError> {
     Ok(effects)
 }
 
-fn read_table(effect: Effect, entry: &Section<'_>) -> Result<EffectValue, RigError> {
-    let shape_ids = effect.constants().iter().map(|parameter| parameter.spec().id);
-    let keys: Vec<&str> = ["value", "std"].into_iter().chain(shape_ids).collect();
-    entry.allow(&keys)?;
-    let value = entry.required("value", size(effect))?;
-    let std = entry.quantity("std", bound::EFFECT_STD)?;
-    let mut size = EffectValue::new(value, std);
-    for parameter in effect.constants() {
-        let spec = EffectConstant::spec(*parameter);
-        let within = Bound::between(Dimension::Share, spec.lower, spec.upper);
-        if let Some(constant) = entry.quantity(spec.id, within)? {
-            size.constants = size.constants.with(*parameter, constant);
-        }
+/// Its size, how sure that is, and its constants by their names.
+pub(super) fn keys(effect: Effect) -> impl Fn(&mut Keys<'_>, &mut EffectValue) -> Done {
+    move |keys, own| {
+        keys.needed("value", size(effect), &mut own.value)?;
+        keys.optional("std", bound::EFFECT_STD, &mut own.std)?;
+        effect.constants().iter().try_for_each(|constant| {
+            let (spec, usual) = (constant.spec(), EffectConstants::default().get(*constant));
+            let within = Bound::between(Dimension::Share, spec.lower, spec.upper);
+            let mut value = own.constants.get(*constant);
+            keys.number(spec.id, within, &mut value, usual)?;
+            own.constants = own.constants.with(*constant, value);
+            Ok(())
+        })
     }
-    Ok(size)
 }
 
 pub(super) fn size(effect: Effect) -> Bound {

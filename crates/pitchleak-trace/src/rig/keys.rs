@@ -2,7 +2,8 @@
 
 use super::bound::{self, Bound};
 use super::document::{RigError, Section};
-use crate::units::Dimension;
+use crate::units::{self, Dimension, FEW_DIGITS, rounded};
+use std::fmt::Display;
 
 /// A key that can't be read is an error; to write and to name one is none.
 pub(super) type Done = Result<(), RigError>;
@@ -18,33 +19,38 @@ pub(super) enum Keys<'s> {
 }
 
 impl Keys<'_> {
-    /// A quantity that may be left out, SI.
-    pub(super) fn optional(&mut self, key: &'static str, bound: Bound, value: &mut Option<f64>) -> Done {
+    /// One of the list: how it is read, and how it is written where it says anything.
+    pub(super) fn entry<T>(
+        &mut self,
+        key: &'static str,
+        value: &mut T,
+        read: impl FnOnce(&Section<'_>) -> Result<T, RigError>,
+        text: impl FnOnce(&mut T) -> Option<String>,
+    ) -> Done {
         match self {
             Self::Name(names) => names.push(key),
-            Self::Read(section) => *value = section.quantity(key, bound)?,
-            Self::Write(lines) => {
-                lines.extend(value.map(|value| (key.to_owned(), written(value, bound))));
-            }
+            Self::Read(section) => *value = read(section)?,
+            Self::Write(lines) => lines.extend(text(value).map(|text| (key.to_owned(), text))),
         }
         Ok(())
+    }
+
+    /// A quantity that may be left out, SI.
+    pub(super) fn optional(&mut self, key: &'static str, bound: Bound, value: &mut Option<f64>) -> Done {
+        let text = |value: &mut Option<f64>| value.map(|value| written(value, bound));
+        self.entry(key, value, |section| section.quantity(key, bound), text)
     }
 
     /// One that is `default` where it is left out.
     pub(super) fn number(&mut self, key: &'static str, bound: Bound, value: &mut f64, default: f64) -> Done {
-        let mut given = Some(*value);
-        self.optional(key, bound, &mut given)?;
-        *value = given.unwrap_or(default);
-        Ok(())
+        let read = |section: &Section<'_>| Ok(section.quantity(key, bound)?.unwrap_or(default));
+        self.entry(key, value, read, |value| Some(written(*value, bound)))
     }
 
     /// One that must be there.
     pub(super) fn needed(&mut self, key: &'static str, bound: Bound, value: &mut f64) -> Done {
-        match self {
-            Self::Read(section) => *value = section.required(key, bound)?,
-            _ => self.number(key, bound, value, 0.0)?,
-        }
-        Ok(())
+        let read = |section: &Section<'_>| section.required(key, bound);
+        self.entry(key, value, read, |value| Some(written(*value, bound)))
     }
 
     /// A share, from none to all of something, that is `default` where it is left out.
@@ -61,14 +67,8 @@ impl Keys<'_> {
         allowed: &str,
         value: &mut Option<T>,
     ) -> Done {
-        match self {
-            Self::Name(names) => names.push(key),
-            Self::Read(section) => *value = section.named(key, by_name, allowed)?,
-            Self::Write(lines) => {
-                lines.extend(value.as_ref().map(|value| (key.to_owned(), toml_text(&name(value)))));
-            }
-        }
-        Ok(())
+        let text = |value: &mut Option<T>| value.as_ref().map(|value| toml_text(&name(value)));
+        self.entry(key, value, |section| section.named(key, by_name, allowed), text)
     }
 
     /// A table with keys of its own.
@@ -90,23 +90,18 @@ impl Keys<'_> {
     }
 
     /// The data sheet of a sensor, in a line; `value` stays where there is none.
-    pub(super) fn sheet<T>(
+    pub(super) fn sheet<T: Copy>(
         &mut self,
         key: &'static str,
         value: &mut T,
         list: impl Fn(&mut Keys<'_>, &mut T) -> Done,
     ) -> Done {
-        match self {
-            Self::Name(names) => names.push(key),
-            Self::Read(section) if section.has(key) => section.section(key)?.read_into(value, list)?,
-            Self::Read(_) => {}
-            Self::Write(lines) => {
-                let inner =
-                    lines_of(value, list).into_iter().map(|(name, value)| format!("{name} = {value}"));
-                lines.push((key.to_owned(), format!("{{ {} }}", inner.collect::<Vec<_>>().join(", "))));
-            }
-        }
-        Ok(())
+        let usual = *value;
+        let read = |section: &Section<'_>| match section.has(key) {
+            true => section.section(key)?.read(usual, &list),
+            false => Ok(usual),
+        };
+        self.entry(key, value, read, |value| Some(inline(lines_of(value, &list))))
     }
 }
 
@@ -142,6 +137,12 @@ pub(super) fn lines_of<T>(
     if let Keys::Write(lines) = keys { lines } else { Vec::new() }
 }
 
+/// Keys and values as a table in one line.
+pub(super) fn inline(lines: impl IntoIterator<Item = (impl Display, impl Display)>) -> String {
+    let entries: Vec<String> = lines.into_iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    format!("{{ {} }}", entries.join(", "))
+}
+
 /// A number that reads back to the same, or to the nearest that the reader takes: a bare share, or a quantity as text.
 fn written(value: f64, bound: Bound) -> String {
     let (value, dimension) = (bound.nearest(value), bound.dimension);
@@ -149,8 +150,20 @@ fn written(value: f64, bound: Bound) -> String {
 }
 
 /// A quantity that reads back to the same number.
-pub(super) fn quantity(value: f64, dimension: Dimension) -> String {
+fn quantity(value: f64, dimension: Dimension) -> String {
     toml_text(format!("{value} {}", dimension.si()).trim_end())
+}
+
+/// A quantity as text, within what the reader takes: in the unit that people read it in where few digits say the same number
+/// there.
+pub(super) fn for_people(value: f64, bound: Bound) -> String {
+    let (si, dimension) = (bound.nearest(value), bound.dimension);
+    let text = dimension.difference_for_people().and_then(|unit| {
+        let text = format!("{} {}", rounded(unit.from_si(si), FEW_DIGITS), unit.text);
+        let read = units::parse(&text, dimension).ok()?;
+        (read.to_bits() == si.to_bits()).then(|| toml_text(&text))
+    });
+    text.unwrap_or_else(|| quantity(si, dimension))
 }
 
 pub(super) fn toml_text(text: &str) -> String {

@@ -150,7 +150,7 @@ impl Rig {
             alarms: root.section("alarms")?.read(AlarmSettings::default(), |keys, alarms| {
                 settings::alarm_keys(keys, alarms, &instruments)
             })?,
-            decision: DecisionSettings::read(&root.section("decision")?)?,
+            decision: root.section("decision")?.read(DecisionSettings::default(), DecisionSettings::keys)?,
             columns: settings::read_columns(&root.section("columns")?)?,
             csv: root.section("csv")?.read(CsvSettings::default(), CsvSettings::keys)?,
             effects: effects::read(&root.section("effects")?)?,

@@ -3,7 +3,7 @@
 use super::bound;
 use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
-use super::keys::{Done, Keys};
+use super::keys::{Done, Keys, for_people, inline, toml_text};
 use super::odds::Odds;
 use crate::header::{self, HeaderUnit};
 use crate::signal::Signal;
@@ -153,11 +153,17 @@ impl Default for DecisionSettings {
 }
 
 impl DecisionSettings {
-    pub(super) fn read(section: &Section<'_>) -> Result<Self, RigError> {
-        section.allow(&["alpha", "odds"])?;
-        let alpha = section.quantity("alpha", bound::ALPHA)?;
-        let odds = Odds::read(&section.section("odds")?)?;
-        Ok(Self { alpha: alpha.unwrap_or(Self::default().alpha), odds })
+    pub(super) fn keys(keys: &mut Keys<'_>, own: &mut Self) -> Done {
+        keys.number("alpha", bound::ALPHA, &mut own.alpha, Self::default().alpha)?;
+        keys.entry(
+            "odds",
+            &mut own.odds,
+            |section| Odds::read(&section.section("odds")?),
+            |odds| {
+                let shares = odds.iter().map(|(id, share)| (id, format!("{share:?}")));
+                (!odds.is_empty()).then(|| inline(shares))
+            },
+        )
     }
 }
 
@@ -266,40 +272,58 @@ pub(super) fn read_columns(section: &Section<'_>) -> Result<ColumnMap, RigError>
     section.allow(&Signal::ALL.map(Signal::name))?;
     let mut columns = ColumnMap::new();
     for signal in section.keys().filter_map(Signal::by_name) {
-        if !section.is_table(signal.name()) {
-            columns.insert(signal, read_header(section, signal)?);
-            continue;
-        }
-        let entry = section.section(signal.name())?;
-        match signal.dimension() {
-            Some(_) => entry.allow(&["name", "unit", "scale", "offset"])?,
-            None if signal == Signal::Shut => entry.allow(&["name"])?,
-            None => entry.allow(&["name", "unit", "scale", "offset", "format", "zone"])?,
-        }
-        let name =
-            entry.text("name")?.ok_or_else(|| entry.missing("name", "the column's name in the header"))?;
-        let unit = read_unit(&entry, signal)?;
-        let scale = entry.quantity("scale", bound::offset(Dimension::Share))?.unwrap_or(1.0);
-        if !bound::SCALE.holds(scale.abs()) {
-            let value = scale.to_string();
-            return Err(entry.impossible(
-                "scale",
-                &value,
-                "a number that keeps the readings apart, from 1e-12 on",
-            ));
-        }
-        let offset = match signal.dimension() {
-            Some(dimension) => entry.quantity("offset", bound::offset(dimension))?,
-            None => None,
+        let column = match section.is_table(signal.name()) {
+            true => {
+                section.section(signal.name())?.read(ForeignColumn::new("", None), column_keys(signal))?
+            }
+            false => read_header(section, signal)?,
         };
-        let offset = offset.unwrap_or(0.0);
-        let format = entry.named("format", TimeKind::by_name, TimeKind::ALLOWED)?;
-        let zone = entry.named("zone", Zone::by_name, ZONES)?;
-        let name = name.to_owned();
-        columns.insert(signal, ForeignColumn { name, unit, scale, offset, format, zone });
+        columns.insert(signal, column);
     }
     each_its_own(section, &columns)?;
     Ok(columns)
+}
+
+/// Scale and offset are written where they do anything; only a timestamp has a format and a zone.
+pub(super) fn column_keys(signal: Signal) -> impl Fn(&mut Keys<'_>, &mut ForeignColumn) -> Done {
+    move |keys, own| {
+        let name = |section: &Section<'_>| {
+            let name = section.text("name")?.map(str::to_owned);
+            name.ok_or_else(|| section.missing("name", "the column's name in the header"))
+        };
+        keys.entry("name", &mut own.name, name, |name| Some(toml_text(name)))?;
+        if signal == Signal::Shut {
+            return Ok(());
+        }
+        let unit = |unit: &mut Option<Unit>| unit.map(|unit| toml_text(unit.text));
+        keys.entry("unit", &mut own.unit, |section| read_unit(section, signal), unit)?;
+        keys.entry("scale", &mut own.scale, read_scale, |scale| {
+            let scale = bound::SCALE.nearest(scale.abs()).copysign(*scale);
+            ((scale - 1.0).abs() > 0.0).then(|| format!("{scale:?}"))
+        })?;
+        let within = signal.dimension().map(bound::offset);
+        let offset = |section: &Section<'_>| {
+            let offset = within.map(|within| section.quantity("offset", within)).transpose()?;
+            Ok(offset.flatten().unwrap_or(0.0))
+        };
+        keys.entry("offset", &mut own.offset, offset, |offset| {
+            within.filter(|_| offset.abs() > 0.0).map(|within| for_people(*offset, within))
+        })?;
+        if signal != Signal::Timestamp {
+            return Ok(());
+        }
+        keys.word("format", TimeKind::by_name, TimeKind::to_string, TimeKind::ALLOWED, &mut own.format)?;
+        keys.word("zone", Zone::by_name, Zone::to_string, ZONES, &mut own.zone)
+    }
+}
+
+fn read_scale(section: &Section<'_>) -> Result<f64, RigError> {
+    let scale = section.quantity("scale", bound::offset(Dimension::Share))?.unwrap_or(1.0);
+    if bound::SCALE.holds(scale.abs()) {
+        return Ok(scale);
+    }
+    let allowed = "a number that keeps the readings apart, from 1e-12 on";
+    Err(section.impossible("scale", &scale.to_string(), allowed))
 }
 
 /// Two signals of one kind are two columns; but the command of a valve may stand for its spool.

@@ -1,28 +1,14 @@
-use super::bound::{self, Bound};
-use super::keys::{Keys, lines_of, quantity, toml_text};
-use super::settings::alarm_keys;
+use super::keys::{Keys, inline, lines_of};
+use super::settings::{alarm_keys, column_keys};
 use super::{
     CsvSettings, DecisionSettings, EstimatorSettings, ForeignColumn, Instruments, Rig, ValveSheet,
     cylinder_keys, effects, fluid_keys,
 };
 use crate::signal::Signal;
-use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use pitchleak_core::EffectSet;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use toml_edit::{DocumentMut, Item, TableLike};
-
-/// A quantity as text, within what the reader takes: in the unit that people read it in where few digits say the same number
-/// there.
-fn for_people(value: f64, bound: Bound) -> String {
-    let (si, dimension) = (bound.nearest(value), bound.dimension);
-    let text = dimension.difference_for_people().and_then(|unit| {
-        let text = format!("{} {}", rounded(unit.from_si(si), FEW_DIGITS), unit.text);
-        let read = units::parse(&text, dimension).ok()?;
-        (read.to_bits() == si.to_bits()).then(|| toml_text(&text))
-    });
-    text.unwrap_or_else(|| quantity(si, dimension))
-}
 
 impl Rig {
     /// The rig file `text` with this rig's numbers: what differs is written anew, and all else stays as somebody wrote it,
@@ -59,7 +45,9 @@ impl Rig {
         put(&mut out, "estimator", lines_of(&mut rig.estimator, EstimatorSettings::keys));
         let alarms = |keys: &mut Keys<'_>, alarms: &mut _| alarm_keys(keys, alarms, &self.instruments);
         put(&mut out, "alarms", lines_of(&mut rig.alarms, alarms));
-        self.write_decision(&mut out);
+        if rig.decision != DecisionSettings::default() {
+            put(&mut out, "decision", lines_of(&mut rig.decision, DecisionSettings::keys));
+        }
         self.write_columns(&mut out);
         self.write_csv(&mut out);
         self.write_effects(&mut out);
@@ -67,18 +55,6 @@ impl Rig {
             put(&mut out, "valve", lines_of(valve, ValveSheet::keys));
         }
         out
-    }
-
-    fn write_decision(&self, out: &mut String) {
-        if self.decision != DecisionSettings::default() {
-            let alpha = bound::ALPHA.nearest(self.decision.alpha);
-            let _ = write!(out, "\n[decision]\nalpha = {alpha:?}\n");
-            let odds: Vec<String> =
-                self.decision.odds.iter().map(|(id, share)| format!("{id} = {share:?}")).collect();
-            if !odds.is_empty() {
-                let _ = writeln!(out, "odds = {{ {} }}", odds.join(", "));
-            }
-        }
     }
 
     fn write_columns(&self, out: &mut String) {
@@ -103,24 +79,13 @@ impl Rig {
         let mut room = EffectSet::default();
         for (effect, size) in &self.effects {
             let value = effects::size(*effect).nearest(size.value);
-            let constants = effect.constants().iter().map(|constant| {
-                let spec = constant.spec();
-                (
-                    spec.id,
-                    Bound::between(Dimension::Share, spec.lower, spec.upper)
-                        .nearest(size.constants.get(*constant)),
-                )
-            });
-            if room.set(*effect, value, Default::default()).is_err() {
-                let _ = writeln!(out, "# {effect}: no room for more");
-                continue;
-            }
-            let std = size.std.map(|std| ("std", bound::EFFECT_STD.nearest(std)));
-            let _ = write!(out, "{effect} = {{ value = {value:?}");
-            for (key, value) in std.into_iter().chain(constants) {
-                let _ = write!(out, ", {key} = {value:?}");
-            }
-            out.push_str(" }\n");
+            let _ = match room.set(*effect, value, Default::default()) {
+                Ok(()) => {
+                    let lines = lines_of(&mut size.clone(), effects::keys(*effect));
+                    writeln!(out, "{effect} = {}", inline(lines))
+                }
+                Err(_) => writeln!(out, "# {effect}: no room for more"),
+            };
         }
     }
 }
@@ -129,24 +94,7 @@ impl ForeignColumn {
     /// The entry of `[columns]`, e.g. `{ name = "Head pressure", unit = "bar" }`; scale and offset where they do
     /// anything.
     pub fn to_toml(&self, signal: Signal) -> String {
-        let mut out = format!("{{ name = {}", toml_text(&self.name));
-        if let Some(unit) = self.unit {
-            let _ = write!(out, ", unit = {}", toml_text(unit.text));
-        }
-        let scale = bound::SCALE.nearest(self.scale.abs()).copysign(self.scale);
-        if (scale - 1.0).abs() > 0.0 {
-            let _ = write!(out, ", scale = {scale:?}");
-        }
-        if let Some(dimension) = signal.dimension().filter(|_| self.offset.abs() > 0.0) {
-            let _ = write!(out, ", offset = {}", for_people(self.offset, bound::offset(dimension)));
-        }
-        if let Some(format) = &self.format {
-            let _ = write!(out, ", format = {}", toml_text(&format.to_string()));
-        }
-        if let Some(zone) = &self.zone {
-            let _ = write!(out, ", zone = {}", toml_text(&zone.to_string()));
-        }
-        out + " }"
+        inline(lines_of(&mut self.clone(), column_keys(signal)))
     }
 }
 
