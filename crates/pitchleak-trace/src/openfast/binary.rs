@@ -37,32 +37,39 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Run, Problem> {
     let description = latin1(cursor.take(description_length, "description")?).trim().to_owned();
     let mut channels = named_channels(&mut cursor, count, name_length)?;
     let packed_time = match id {
-        WITH_TIME => Some(cursor.array(samples, "time", i32::from_le_bytes)?),
+        WITH_TIME => Some(cursor.array(samples, "time", |bytes| i32::from_le_bytes(bytes).into())?),
         _ => None,
     };
-    match scaling {
-        Some(scaling) => compressed(&mut cursor, &mut channels, scaling, samples)?,
-        None => uncompressed(&mut cursor, &mut channels, samples)?,
+    let columns = match scaling {
+        Some(_) => columns(&mut cursor, count, samples, |bytes| i16::from_le_bytes(bytes).into())?,
+        None => columns(&mut cursor, count, samples, f64::from_le_bytes)?,
+    };
+    channels.iter_mut().zip(columns).for_each(|(channel, values)| channel.values = values);
+    if let Some([scales, offsets]) = scaling {
+        for (Channel { name, values, .. }, (scale, offset)) in
+            channels.iter_mut().zip(scales.into_iter().zip(offsets))
+        {
+            unpack(values, scale.into(), offset.into(), name)?;
+        }
     }
     // Only now is `samples` known to be backed by that many rows.
     let time_s = match packed_time {
-        Some(packed) => unpacked(packed.into_iter().map(f64::from), time_first, time_second, "Time")?,
+        Some(mut time_s) => {
+            unpack(&mut time_s, time_first, time_second, "Time")?;
+            time_s
+        }
         None => (0..samples).map(|k| time_first + time_second * k as f64).collect(),
     };
     Ok(Run { description, time_s, channels })
 }
 
 /// Numbers of which the file has scale and offset.
-fn unpacked(
-    packed: impl Iterator<Item = f64>,
-    scale: f64,
-    offset: f64,
-    channel: &str,
-) -> Result<Vec<f64>, Problem> {
+fn unpack(values: &mut [f64], scale: f64, offset: f64, channel: &str) -> Result<(), Problem> {
     if scale == 0.0 || !scale.is_finite() || !offset.is_finite() {
         return Err(Problem::Scale { channel: channel.to_owned() });
     }
-    Ok(packed.map(|packed| (packed - offset) / scale).collect())
+    values.iter_mut().for_each(|value| *value = (*value - offset) / scale);
+    Ok(())
 }
 
 /// The names, then the units, of time and of every channel.
@@ -78,30 +85,16 @@ fn named_channels(cursor: &mut Cursor, count: usize, length: usize) -> Result<Ve
         .collect())
 }
 
-fn uncompressed(cursor: &mut Cursor, channels: &mut [Channel], samples: usize) -> Result<(), Problem> {
-    let count = channels.len();
-    let data = cursor.array(samples.saturating_mul(count), "samples", f64::from_le_bytes)?;
-    for (column, channel) in channels.iter_mut().enumerate() {
-        channel.values = data.iter().skip(column).step_by(count).copied().collect();
-    }
-    Ok(())
-}
-
-fn compressed(
+/// The samples of each channel; in the file those of one time stand together.
+fn columns<const N: usize>(
     cursor: &mut Cursor,
-    channels: &mut [Channel],
-    [scales, offsets]: [Vec<f32>; 2],
+    count: usize,
     samples: usize,
-) -> Result<(), Problem> {
-    let count = channels.len();
-    let data = cursor.array(samples.saturating_mul(count), "samples", i16::from_le_bytes)?;
-    for (column, (channel, (scale, offset))) in
-        channels.iter_mut().zip(scales.into_iter().zip(offsets)).enumerate()
-    {
-        let packed = data.iter().skip(column).step_by(count).copied().map(f64::from);
-        channel.values = unpacked(packed, scale.into(), offset.into(), &channel.name)?;
-    }
-    Ok(())
+    from_le: fn([u8; N]) -> f64,
+) -> Result<Vec<Vec<f64>>, Problem> {
+    let data = cursor.array(samples.saturating_mul(count), "samples", from_le)?;
+    let column = |column| data.iter().skip(column).step_by(count).copied().collect();
+    Ok((0..count).map(column).collect())
 }
 
 fn positive(part: &'static str, value: i64) -> Result<usize, Problem> {

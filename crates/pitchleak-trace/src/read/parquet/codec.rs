@@ -59,10 +59,15 @@ impl Codec {
             Self::Plain => return Ok([before, packed].concat().into()),
             // So is a page of missing cells alone.
             _ if room == 0 => Vec::new(),
-            Self::Snappy => snappy(packed, room)?,
+            Self::Snappy => {
+                if snap::raw::decompress_len(packed).map_err(|error| damaged(&error))? != room {
+                    return Err(damaged(&"a page is not as large as it says"));
+                }
+                block(room, |bytes| snap::raw::Decoder::new().decompress(packed, bytes))?
+            }
             Self::Gzip => stream(MultiGzDecoder::new(packed), room)?,
             Self::Zstd => zstd(packed, room)?,
-            Self::Lz4Raw => lz4_block(packed, room)?,
+            Self::Lz4Raw => block(room, |bytes| lz4_flex::block::decompress_into(packed, bytes))?,
         };
         if values.len() != room {
             return Err(damaged(&"a page is not as large as it says"));
@@ -78,13 +83,14 @@ fn stream(from: impl Read, room: usize) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn snappy(packed: &[u8], room: usize) -> Result<Vec<u8>> {
-    if snap::raw::decompress_len(packed).map_err(|error| damaged(&error))? != room {
-        return Err(damaged(&"a page is not as large as it says"));
-    }
+/// What `decode` writes of a block into so much room.
+fn block<E: Display>(
+    room: usize,
+    decode: impl FnOnce(&mut [u8]) -> std::result::Result<usize, E>,
+) -> Result<Vec<u8>> {
     // Zeros of the system, which take no memory until they are written.
     let mut bytes = vec![0; room];
-    let length = snap::raw::Decoder::new().decompress(packed, &mut bytes).map_err(|error| damaged(&error))?;
+    let length = decode(&mut bytes).map_err(|error| damaged(&error))?;
     bytes.truncate(length);
     Ok(bytes)
 }
@@ -97,13 +103,6 @@ fn zstd(mut frames: &[u8], room: usize) -> Result<Vec<u8>> {
         let left = (room - bytes.len()) as u64;
         frame.take(left + 1).read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
     }
-    Ok(bytes)
-}
-
-fn lz4_block(packed: &[u8], room: usize) -> Result<Vec<u8>> {
-    let mut bytes = vec![0; room];
-    let length = lz4_flex::block::decompress_into(packed, &mut bytes).map_err(|error| damaged(&error))?;
-    bytes.truncate(length);
     Ok(bytes)
 }
 
