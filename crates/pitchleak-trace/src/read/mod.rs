@@ -40,7 +40,7 @@ use crate::signal::Signal;
 use crate::times::Clock;
 use join::Joined;
 use own_clocks::OwnClocks;
-use row::{ChangedFlows, Next, Row, RowSource};
+use row::{Next, Row, RowSource};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -51,6 +51,8 @@ pub struct TraceReader<'a> {
     name: String,
     rows: Box<dyn RowSource + Send + 'a>,
     row: Row,
+    /// Other flows than were read.
+    change: Option<FlowChange<'a>>,
     validator: RowValidator,
     done: bool,
     /// Stamp from which the seconds of columns in memory count.
@@ -152,7 +154,8 @@ impl<'a> TraceReader<'a> {
     fn over(name: &str, rows: Box<dyn RowSource + Send + 'a>, rig: &Rig) -> Self {
         let rows = Box::new(OwnClocks::of(rows));
         let validator = RowValidator::new(rig, rows.layout());
-        Self { name: name.to_owned(), rows, row: Row::empty(), validator, done: false, first_ns: None }
+        let (name, row) = (name.to_owned(), Row::empty());
+        Self { name, rows, row, change: None, validator, done: false, first_ns: None }
     }
 
     /// Says from which time stamp the seconds of columns in memory count, ns since 1970.
@@ -178,7 +181,7 @@ impl<'a> TraceReader<'a> {
     /// The same trace with other flows; one that is missing has to stay so.
     #[must_use]
     pub fn with_flows(self, change: FlowChange<'a>) -> Self {
-        Self { rows: Box::new(ChangedFlows { rows: self.rows, change }), ..self }
+        Self { change: Some(change), ..self }
     }
 
     /// Says what becomes of bad rows.
@@ -245,7 +248,12 @@ impl<'a> TraceReader<'a> {
     ) -> Result<bool, TraceError> {
         while !self.done {
             let taken = match self.rows.next_row(&mut self.row).map_err(|fault| self.error(fault))? {
-                Next::Row => self.validator.take(&self.row, self.rows.layout(), record),
+                Next::Row => {
+                    if let Some(change) = &mut self.change {
+                        self.row.change_flows(change);
+                    }
+                    self.validator.take(&self.row, self.rows.layout(), record)
+                }
                 Next::Bad(bad) => self.validator.skip(bad).map(|()| false),
                 Next::CutOff(why) => {
                     self.done = true;

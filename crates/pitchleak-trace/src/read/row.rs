@@ -150,6 +150,18 @@ impl Row {
         }
     }
 
+    /// Takes other flows: of the cylinder as it would be.
+    #[cold]
+    pub(super) fn change_flows(&mut self, change: &mut FlowChange<'_>) {
+        let of = |a, b| [self.get(a), self.get(b)];
+        let pressures_pa = of(Signal::PressureA, Signal::PressureB);
+        let flows_m3s = of(Signal::FlowA, Signal::FlowB);
+        // A flow that was not read stays so: no number is made of none.
+        let [qa, qb] = change(self.get(Signal::Time), pressures_pa, flows_m3s);
+        self.set(Signal::FlowA, qa);
+        self.set(Signal::FlowB, qb);
+    }
+
     /// Takes what it lacks from another row.
     pub(super) fn fill(&mut self, other: &Self) {
         for (cell, other) in self.cells.iter_mut().zip(other.cells) {
@@ -175,37 +187,3 @@ fn blame(columns: &[Column], time: f64) -> Fault {
 
 /// Readings of flow, m³/s, from the time, s, the pressures, Pa, and the flows that were read, those of A first.
 pub type FlowChange<'a> = Box<dyn FnMut(f64, [f64; 2], [f64; 2]) -> [f64; 2] + Send + 'a>;
-
-/// Rows with flows other than were read: of the cylinder as it would be.
-pub(super) struct ChangedFlows<'a> {
-    pub(super) rows: Box<dyn RowSource + Send + 'a>,
-    pub(super) change: FlowChange<'a>,
-}
-
-impl RowSource for ChangedFlows<'_> {
-    fn layout(&self) -> &Layout {
-        self.rows.layout()
-    }
-
-    fn epoch_ns(&self) -> Option<i64> {
-        self.rows.epoch_ns()
-    }
-
-    fn count_from(&mut self, rows: u64) {
-        self.rows.count_from(rows);
-    }
-
-    fn next_row(&mut self, row: &mut Row) -> Result<Next, TraceFault> {
-        let next = self.rows.next_row(row)?;
-        if let Next::Row = next {
-            let of = |a, b| [row.get(a), row.get(b)];
-            let pressures_pa = of(Signal::PressureA, Signal::PressureB);
-            let flows_m3s = of(Signal::FlowA, Signal::FlowB);
-            let [qa, qb] = (self.change)(row.get(Signal::Time), pressures_pa, flows_m3s);
-            // A flow that was not read stays so: no number is made of none.
-            row.set(Signal::FlowA, qa);
-            row.set(Signal::FlowB, qb);
-        }
-        Ok(next)
-    }
-}
