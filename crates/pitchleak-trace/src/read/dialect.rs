@@ -5,7 +5,7 @@ use super::columns::{Column, Layout, REQUIRED};
 use super::error::TraceFault;
 use super::format::{Stream, mistaken};
 use super::number::{decimal, number};
-use super::proposal::{Proposal, partly, proposals};
+use super::proposal::{Proposal, proposals};
 use super::records::{Encoding, Records, stopped_early};
 use super::shapes::{self, Source};
 use super::stamps::{Epoch, time_format};
@@ -74,9 +74,7 @@ impl Dialect {
             Some(decimal) => decimal,
             None => decimal(&numbers(&table, &layout))?,
         };
-        if let Some(index) = layout.columns.iter().position(Column::is_timestamp) {
-            layout.time = time_format(&table.column(index), &layout, &foreign, rig)?;
-        }
+        layout.time = time_format(&table.rows, &layout, &foreign, rig)?;
         check_steps(&table, &layout, decimal)?;
         layout.reading = reading(&table, &layout, &foreign, decimal, encoding);
         Ok(Self { delimiter: table.delimiter, decimal, layout, last_header_line })
@@ -98,7 +96,7 @@ fn hinted(mut fault: TraceFault, table: &TextTable, rig: &Rig) -> TraceFault {
         Signal::Timestamp => signal == "time",
         other => REQUIRED.iter().any(|(required, words)| *required == other && words == signal),
     };
-    *hint = match proposals(table, &partly(table, rig), rig).iter().find(is_missing) {
+    *hint = match proposals(table, rig).iter().find(is_missing) {
         Some(Proposal { signal, column, .. }) => format!(
             "; if `{}` is it, say {} = {} under [columns] of the rig file (`pitchleak columns` proposes all)",
             shorten(&column.name, 40),

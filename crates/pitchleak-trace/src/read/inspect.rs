@@ -1,12 +1,11 @@
 //! How a file would be read, for a person to look at before it is.
 
-use super::bind::Bound;
 use super::columns::{Content, absent};
 use super::dialect::Dialect;
 use super::error::{TraceError, TraceFault};
 use super::format;
 use super::number::decimal;
-use super::proposal::{Proposal, Why, partly, proposals};
+use super::proposal::{BY_NAME, contents, proposals};
 use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::{Decimal, ForeignColumn, Rig};
@@ -111,20 +110,17 @@ impl FileReading {
             units_line: table.units.as_ref().map(|row| row.line),
         });
         let foreign = table.bound.iter().flat_map(|bound| &bound.foreign);
-        let named = foreign.map(|(signal, column)| ProposedLine::of(*signal, column, Why::Name)).collect();
-        let found = match &table.bound {
-            Ok(Bound { layout, .. }) => layout.columns.iter().map(|column| column.content).collect(),
-            Err(_) => partly(&table, rig),
-        };
+        let named = foreign.map(|(signal, column)| ProposedLine::of(*signal, column, BY_NAME)).collect();
+        let found = contents(&table, rig);
         let columns = table.headers.iter().zip(found.iter()).enumerate().map(|(index, (header, content))| {
             let first =
                 table.column(index).into_iter().take(Self::SHOWN).map(|cell| shorten(cell, 40)).collect();
             read_column(header, *content, first)
         });
         let columns = columns.collect();
-        let proposals = proposals(&table, &found, rig);
-        let line = |one: &Proposal| ProposedLine::of(one.signal, &one.column, one.why);
-        let proposals = proposals.iter().map(line).collect();
+        let proposals = proposals(&table, rig);
+        let proposals =
+            proposals.iter().map(|one| ProposedLine::of(one.signal, &one.column, one.why)).collect();
         let misspelt = absent(&table.headers, &rig.columns).map(misspelt).collect();
         let (mut time_format, mut problem) = (None, None);
         if text.is_none() {
@@ -162,8 +158,8 @@ fn read_column(header: &str, content: Option<Content>, first: Vec<String>) -> Co
 }
 
 impl ProposedLine {
-    fn of(signal: Signal, column: &ForeignColumn, why: Why) -> Self {
-        Self { line: format!("{} = {}", signal.name(), column.to_toml(signal)), why: why.text() }
+    fn of(signal: Signal, column: &ForeignColumn, why: &'static str) -> Self {
+        Self { line: format!("{} = {}", signal.name(), column.to_toml(signal)), why }
     }
 }
 

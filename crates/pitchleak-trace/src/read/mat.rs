@@ -5,14 +5,16 @@
 mod hdf5;
 mod vector;
 
+use super::bind::Bound;
 use super::error::{Counted, TraceFault};
 use super::format::{MOST_HELD, Rows, Stream};
-use super::stamps::{self, sample};
-use super::table::TableRows;
-use super::table_text::TextTable;
+use super::stamps::{Epoch, ROWS, cell_text, first_rows, time_format};
+use super::table::{Cells, TableRows};
+use super::table_text::{TextRow, TextTable};
 use crate::header::shorten;
 use crate::rig::Rig;
 use flate2::read::ZlibDecoder;
+use std::borrow::Cow;
 use std::io::{self, Read};
 use std::sync::Arc;
 
@@ -35,16 +37,30 @@ type Variables = Vec<(String, Values)>;
 pub(super) fn open(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let Vectors { names, values, short, others } = vectors(stream)?;
     let TextTable { bound, rows, .. } = TextTable::of_columns(names, sample(&values), rig);
-    let bound = bound.map_err(|fault| with_others(fault, &others, &short))?;
-    let mut layout = bound.layout;
+    let Bound { mut layout, foreign } = bound.map_err(|fault| with_others(fault, &others, &short))?;
     layout.counted = Counted::Rows;
-    let mut once = Some(stamps::cells(&mut layout, &bound.foreign, rig, &rows, values)?);
+    layout.time = time_format(&rows, &layout, &foreign, rig)?;
+    let mut epoch = Epoch::new(layout.time.clone());
+    let mut cells = Vec::new();
+    for (index, (column, mut values)) in layout.columns.iter().zip(values).enumerate() {
+        let Some(content) = column.content else { continue };
+        if column.is_timestamp() {
+            values.iter_mut().for_each(|value| *value = epoch.seconds_of(*value));
+        }
+        cells.push(Cells::of(content, Cow::Owned(values), index));
+    }
+    let mut once = Some(cells);
     Ok(Box::new(TableRows::over(Arc::new(layout), Box::new(move || Ok(once.take())))))
 }
 
 pub(super) fn look(stream: Stream, rig: &Rig) -> Result<TextTable, TraceFault> {
     let Vectors { names, values, .. } = vectors(stream)?;
     Ok(TextTable::of_columns(names, sample(&values), rig))
+}
+
+fn sample(values: &[Vec<f64>]) -> Vec<TextRow> {
+    let text = |values: &Vec<f64>| values.iter().take(ROWS).map(cell_text).collect();
+    first_rows(&values.iter().map(text).collect::<Vec<_>>())
 }
 
 /// The vectors of a file that are as long as its longest, and what else is in it.

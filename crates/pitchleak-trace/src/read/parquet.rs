@@ -5,12 +5,13 @@ mod footer;
 mod pages;
 mod thrift;
 
+use super::bind::Bound;
 use super::columns::{Content, standard};
 use super::error::{Counted, TraceFault};
 use super::format::{Rows, Stream, mistaken};
-use super::stamps::{Epoch, cell_text, seconds_between, time_format};
+use super::stamps::{Epoch, ROWS, cell_text, first_rows, seconds_between, time_format};
 use super::table::{Cells, TableRows};
-use super::table_text::{TextRow, TextTable, column};
+use super::table_text::{TextRow, TextTable};
 use crate::header::shorten;
 use crate::rig::Rig;
 use crate::times::TimeFormat;
@@ -28,8 +29,6 @@ use std::sync::{Arc, Once, OnceLock};
 
 /// Rows read at a time: their columns stay in the cache.
 const BATCH: usize = 4096;
-/// So many rows say how times are written.
-const SAMPLE: usize = 100;
 
 /// A column that is read.
 struct Read {
@@ -67,8 +66,7 @@ fn table(file: &Columns, rig: &Rig) -> Result<TextTable, TraceFault> {
 fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
     let file = columns_of(stream)?;
     let TextTable { bound, rows, .. } = table(&file, rig)?;
-    let bound = bound?;
-    let mut layout = bound.layout;
+    let Bound { mut layout, foreign } = bound?;
     layout.counted = Counted::Rows;
     let mut read = Vec::new();
     for (index, (leaf, column)) in file.leaves.iter().zip(&layout.columns).enumerate() {
@@ -76,10 +74,10 @@ fn open_unguarded(stream: Stream, rig: &Rig) -> Result<Rows, TraceFault> {
         check_kind(leaf, column.is_timestamp())?;
         read.push(Read { index, content, is_stamp: column.is_timestamp() });
     }
-    let untyped = |read: &&Read| read.is_stamp && !matches!(file.leaves[read.index].kind, Kind::Stamp(_));
-    layout.time = match read.iter().find(untyped) {
-        Some(stamps) => time_format(&column(&rows, stamps.index), &layout, &bound.foreign, rig)?,
-        None => TimeFormat::default(),
+    let is_untyped = |read: &Read| read.is_stamp && !matches!(file.leaves[read.index].kind, Kind::Stamp(_));
+    layout.time = match read.iter().any(is_untyped) {
+        true => time_format(&rows, &layout, &foreign, rig)?,
+        false => TimeFormat::default(),
     };
     let layout = Arc::new(layout);
     let epoch_ns = Arc::default();
@@ -138,21 +136,11 @@ fn is_plain(name: &str, rig: &Rig) -> bool {
 /// The first rows as text, as those of a file of text are looked at; without the columns whose cells nobody asks, because
 /// a page of each would be read twice.
 fn sample(file: &Columns, rig: &Rig) -> Result<Vec<TextRow>, TraceFault> {
-    let mut rows: Vec<TextRow> = Vec::new();
     if file.groups() == 0 {
-        return Ok(rows);
+        return Ok(Vec::new());
     }
-    for (index, leaf) in file.leaves.iter().enumerate() {
-        for (row, cell) in first_cells(file, index, leaf, rig)?.into_iter().enumerate() {
-            if rows.len() == row {
-                rows.push(TextRow { line: row as u64, cells: vec![String::new(); file.leaves.len()] });
-            }
-            if let Some(to) = rows.get_mut(row).and_then(|row| row.cells.get_mut(index)) {
-                *to = cell;
-            }
-        }
-    }
-    Ok(rows)
+    let cells = file.leaves.iter().enumerate().map(|(index, leaf)| first_cells(file, index, leaf, rig));
+    Ok(first_rows(&cells.collect::<Result<Vec<_>, _>>()?))
 }
 
 fn first_cells(file: &Columns, index: usize, leaf: &Leaf, rig: &Rig) -> Result<Vec<String>, TraceFault> {
@@ -162,11 +150,11 @@ fn first_cells(file: &Columns, index: usize, leaf: &Leaf, rig: &Rig) -> Result<V
         Kind::Number | Kind::Decimal(_) if is_plain(leaf.name.trim(), rig) => Ok(Vec::new()),
         Kind::Stamp(_) | Kind::Int96 => Ok(vec!["2000-01-01T00:00:00".to_owned()]),
         Kind::Text => {
-            let texts = texts(&mut reader()?, leaf, SAMPLE)?;
+            let texts = texts(&mut reader()?, leaf, ROWS)?;
             Ok(texts.iter().map(|text| String::from_utf8_lossy(text.data()).into_owned()).collect())
         }
         Kind::Number | Kind::Decimal(_) => {
-            let values = numbers(&mut reader()?, leaf, SAMPLE)?;
+            let values = numbers(&mut reader()?, leaf, ROWS)?;
             Ok(values.iter().map(cell_text).collect())
         }
     }

@@ -10,38 +10,32 @@ use crate::times;
 use crate::units::{Dimension, Unit};
 
 /// A column that may hold a signal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Proposal {
-    /// The signal.
-    pub signal: Signal,
+pub(super) struct Proposal {
+    pub(super) signal: Signal,
     /// How `[columns]` would name it.
-    pub column: ForeignColumn,
-    /// What speaks for it.
-    pub why: Why,
+    pub(super) column: ForeignColumn,
+    /// What speaks for it, in words.
+    pub(super) why: &'static str,
 }
 
-/// What speaks for a proposal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Why {
-    /// Name and unit of the header.
-    Name,
-    /// The name; the unit is one in which its values are possible on this rig.
-    NameAndValues,
-    /// Its unit alone, and its place among the columns.
-    Unit,
-    /// Its values alone, and its place among the columns.
-    Values,
-}
+/// What speaks for a proposal: name and unit of the header, …
+pub(super) const BY_NAME: &str = "by its name";
+/// … the name, and the unit is one in which its values are possible on this rig, …
+const BY_NAME_AND_VALUES: &str = "by its name; the unit by its values: check it";
+/// … its unit alone, and its place among the columns, …
+const BY_UNIT: &str = "by its unit and place: check it";
+/// … or its values alone, and its place.
+const BY_VALUES: &str = "by its values and place: check it";
 
-impl Why {
-    /// In words, behind a proposal.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::Name => "by its name",
-            Self::NameAndValues => "by its name; the unit by its values: check it",
-            Self::Unit => "by its unit and place: check it",
-            Self::Values => "by its values and place: check it",
-        }
+impl Proposal {
+    /// Of a column whose unit the file says.
+    fn with_unit(signal: Signal, column: &Unread<'_>, unit: HeaderUnit, why: &'static str) -> Self {
+        Self { signal, column: ForeignColumn::with_unit(column.header, unit), why }
+    }
+
+    /// Of one whose unit is not said, or that has none.
+    fn of(signal: Signal, column: &Unread<'_>, unit: Option<Unit>, why: &'static str) -> Self {
+        Self { signal, column: ForeignColumn::new(column.header, unit), why }
     }
 }
 
@@ -140,13 +134,17 @@ pub(super) fn propose(
     proposals
 }
 
-/// What the headers say one by one, where they do not make a trace together.
-pub(super) fn partly(table: &TextTable, rig: &Rig) -> Vec<Option<Content>> {
-    table.headers.iter().map(|header| content_of(header.trim(), &rig.columns)).collect()
+/// What is read of each column; where the headers do not make a trace together, what they say one by one.
+pub(super) fn contents(table: &TextTable, rig: &Rig) -> Vec<Option<Content>> {
+    match &table.bound {
+        Ok(bound) => bound.layout.columns.iter().map(|column| column.content).collect(),
+        Err(_) => table.headers.iter().map(|header| content_of(header.trim(), &rig.columns)).collect(),
+    }
 }
 
 /// What the columns that are not read may be.
-pub(super) fn proposals(table: &TextTable, found: &[Option<Content>], rig: &Rig) -> Vec<Proposal> {
+pub(super) fn proposals(table: &TextTable, rig: &Rig) -> Vec<Proposal> {
+    let found = contents(table, rig);
     let has = |signal: Signal| found.iter().flatten().any(|content| content.signal == signal);
     let has_time = has(Signal::Time) || has(Signal::Timestamp);
     let is_given = |signal: &Signal| has(*signal) || has_time && signal.is_time();
@@ -157,7 +155,7 @@ pub(super) fn proposals(table: &TextTable, found: &[Option<Content>], rig: &Rig)
     };
     let unread: Vec<Unread<'_>> = (0..)
         .zip(&table.headers)
-        .zip(found)
+        .zip(&found)
         .filter(|(_, content)| content.is_none())
         .map(|((index, header), _)| Unread { header, unit: unit(index), cells: table.column(index) })
         .collect();
@@ -174,11 +172,7 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     let words = words(column.header);
     if let Some(signal) = of_the_valve(&words) {
         let found = column.unit(Dimension::Spool)?;
-        return Some(Proposal {
-            signal,
-            column: ForeignColumn::with_unit(column.header, found),
-            why: Why::Name,
-        });
+        return Some(Proposal::with_unit(signal, column, found, BY_NAME));
     }
     if !may_be_a_reading(&words) {
         return None;
@@ -197,20 +191,15 @@ fn by_name(column: &Unread<'_>, decimal: Decimal, rig: &Rig) -> Option<Proposal>
     };
     let dimension = signal.dimension()?;
     if let Some(found) = column.unit(dimension) {
-        return Some(Proposal {
-            signal,
-            column: ForeignColumn::with_unit(column.header, found),
-            why: Why::Name,
-        });
+        return Some(Proposal::with_unit(signal, column, found, BY_NAME));
     }
     if signal == Signal::Time && times::guess(&column.cells).is_ok() {
-        let foreign = ForeignColumn::new(column.header, None);
-        return Some(Proposal { signal: Signal::Timestamp, column: foreign, why: Why::Name });
+        return Some(Proposal::of(Signal::Timestamp, column, None, BY_NAME));
     }
     let values = values(column, decimal);
     // What is called time may be the time of another channel, or of day: this one must at least go on.
     let unit = possible_unit(signal, &values, rig).filter(|_| signal != Signal::Time || rises(&values))?;
-    Some(Proposal { signal, column: ForeignColumn::new(column.header, Some(unit)), why: Why::NameAndValues })
+    Some(Proposal::of(signal, column, Some(unit), BY_NAME_AND_VALUES))
 }
 
 /// The signals that a trace needs, in their usual order.
@@ -219,7 +208,7 @@ fn by_unit(column: &Unread<'_>, open: impl Fn(&Signal) -> bool) -> Option<Propos
     let in_order = [Position, PressureA, PressureB, FlowA, FlowB, Force];
     in_order.into_iter().filter(open).find_map(|signal| {
         let found = column.unit(signal.dimension()?)?;
-        Some(Proposal { signal, column: ForeignColumn::with_unit(column.header, found), why: Why::Unit })
+        Some(Proposal::with_unit(signal, column, found, BY_UNIT))
     })
 }
 
@@ -243,8 +232,7 @@ fn by_values(
     };
     tried.iter().filter(|signal| open(signal)).find_map(|signal| {
         let unit = possible_unit(*signal, &values, rig)?;
-        let column = ForeignColumn::new(column.header, Some(unit));
-        Some(Proposal { signal: *signal, column, why: Why::Values })
+        Some(Proposal::of(*signal, column, Some(unit), BY_VALUES))
     })
 }
 
@@ -420,10 +408,10 @@ mod tests {
         assert_eq!(
             found,
             [
-                (Signal::Position, "AI0", Some("cm"), Why::Unit),
-                (Signal::PressureA, "AI1", Some("MPa"), Why::Unit),
-                (Signal::PressureB, "AI2 [psi]", Some("psi"), Why::Unit),
-                (Signal::FlowA, "AI4", Some("L/min"), Why::Unit),
+                (Signal::Position, "AI0", Some("cm"), BY_UNIT),
+                (Signal::PressureA, "AI1", Some("MPa"), BY_UNIT),
+                (Signal::PressureB, "AI2 [psi]", Some("psi"), BY_UNIT),
+                (Signal::FlowA, "AI4", Some("L/min"), BY_UNIT),
             ]
         );
     }

@@ -2,13 +2,11 @@
 
 use super::columns::{Column, Layout};
 use super::error::{BadReason, TraceFault};
-use super::table::Cells;
 use super::table_text::{TextRow, column};
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::{self, TimeFault, TimeFormat, TimeKind};
-use std::borrow::Cow;
 
 /// The first time stamp of a trace, from which its seconds count.
 #[derive(Default)]
@@ -64,56 +62,32 @@ pub fn seconds_between(from_ns: i128, to_ns: i128) -> f64 {
 }
 
 /// So many rows say how times are written.
-const ROWS: usize = 100;
+pub(super) const ROWS: usize = 100;
 
 /// A number as text; none is an empty cell.
 pub(super) fn cell_text(value: &f64) -> String {
     if value.is_nan() { String::new() } else { value.to_string() }
 }
 
-/// The first rows as text, as those of a file of text are looked at.
-pub(super) fn sample(columns: &[Vec<f64>]) -> Vec<TextRow> {
-    let rows = columns.iter().map(Vec::len).max().unwrap_or(0).min(ROWS);
-    let text = |row: usize, column: &Vec<f64>| column.get(row).map(cell_text).unwrap_or_default();
-    let row = |row: usize| TextRow {
-        line: row as u64,
-        cells: columns.iter().map(|column| text(row, column)).collect(),
-    };
-    (0..rows).map(row).collect()
+/// The first cells of each column as rows, as those of a file of text are looked at.
+pub(super) fn first_rows(columns: &[Vec<String>]) -> Vec<TextRow> {
+    let rows = columns.iter().map(Vec::len).max().unwrap_or(0);
+    let cells = |row: usize| columns.iter().map(move |cells| cells.get(row).cloned().unwrap_or_default());
+    (0..rows).map(|row| TextRow { line: row as u64, cells: cells(row).collect() }).collect()
 }
 
-/// The columns that are read, with their first `rows` as text; a column of time stamps, if there is one, becomes seconds, and its format the layout's.
-pub(super) fn cells(
-    layout: &mut Layout,
-    foreign: &ColumnMap,
-    rig: &Rig,
-    rows: &[TextRow],
-    columns: Vec<Vec<f64>>,
-) -> Result<Vec<Cells<'static>>, TraceFault> {
-    layout.time = match layout.columns.iter().position(Column::is_timestamp) {
-        Some(index) => time_format(&column(rows, index), layout, foreign, rig)?,
-        None => TimeFormat::default(),
-    };
-    let mut epoch = Epoch::new(layout.time.clone());
-    let mut cells = Vec::new();
-    for (index, (column, values)) in layout.columns.iter().zip(columns).enumerate() {
-        let Some(content) = column.content else { continue };
-        let values = match column.is_timestamp() {
-            true => values.into_iter().map(|value| epoch.seconds_of(value)).collect(),
-            false => values,
-        };
-        cells.push(Cells::of(content, Cow::Owned(values), index));
-    }
-    Ok(cells)
-}
-
-/// As the rig file or the command line says it, else as the cells themselves do.
+/// How the time stamps below these first rows are written: as the rig file or the command line says it, else as the cells
+/// themselves do.
 pub(super) fn time_format(
-    cells: &[&str],
+    rows: &[TextRow],
     layout: &Layout,
     foreign: &ColumnMap,
     rig: &Rig,
 ) -> Result<TimeFormat, TraceFault> {
+    let Some(index) = layout.columns.iter().position(Column::is_timestamp) else {
+        return Ok(TimeFormat::default());
+    };
+    let cells = &column(rows, index)[..];
     let entry = rig.columns.get(&Signal::Timestamp).or_else(|| foreign.get(&Signal::Timestamp));
     let zone = entry.and_then(|entry| entry.zone.clone());
     let zone = zone.or_else(|| rig.csv.time.as_ref().and_then(|time| time.zone.clone()));
