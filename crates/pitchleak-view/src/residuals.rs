@@ -2,7 +2,9 @@
 //! against each variable.
 
 use crate::figure::{FigureError, Ink, Line, Panel, svg};
-use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation, EquationResidual};
+use pitchleak::diagnose::{
+    BinnedResidual, Diagnosis, Equation, EquationResidual, HoldLeak, LeakEstimate, LeakEstimates,
+};
 use pitchleak::report::with_interval;
 use pitchleak::units::{LPM_PER_M3S, effect_unit};
 
@@ -173,6 +175,46 @@ pub(crate) fn in_a_row(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         last = Some(t);
     }
     row
+}
+
+/// Each equation's error on held-out samples, before and after, in people's unit.
+pub(crate) fn rms_errors(diagnosis: &Diagnosis) -> impl Iterator<Item = (Equation, [f64; 2], &'static str)> {
+    Equation::ALL.into_iter().filter_map(|equation| {
+        let [before, after] = [&diagnosis.before, &diagnosis.after].map(|fit| fit.quality.rmse[equation]);
+        let (factor, unit) = people_unit(equation);
+        Some((equation, [before? * factor, after? * factor], unit))
+    })
+}
+
+/// Each equation's residual before and, where effects were found, after.
+pub(crate) fn before_and_after(
+    diagnosis: &Diagnosis,
+) -> impl Iterator<Item = (Equation, &'static str, &EquationResidual)> {
+    let sides = [("before", &diagnosis.before.residuals), ("after", &diagnosis.after.residuals)];
+    let shown = if diagnosis.effects.is_empty() { 1 } else { 2 };
+    let of = move |equation| {
+        let shown = sides.into_iter().take(shown);
+        shown.filter_map(move |(side, residuals)| Some((equation, side, residuals[equation].as_ref()?)))
+    };
+    Equation::ALL.into_iter().flat_map(of)
+}
+
+/// Chambers that were held under pressure, and what leaves them.
+pub(crate) fn holds(diagnosis: &Diagnosis) -> impl Iterator<Item = (&'static str, HoldLeak)> {
+    let holds = diagnosis.holds.unwrap_or_default();
+    [("A", holds.chamber_a), ("B", holds.chamber_b)]
+        .into_iter()
+        .filter_map(|(name, hold)| Some((name, hold?)))
+}
+
+/// Leaks and bulk modulus of a fit.
+pub(crate) fn estimates(leaks: &LeakEstimates) -> [LeakEstimate; 4] {
+    [
+        leaks.internal_leak_coefficient,
+        leaks.external_leak_a_coefficient,
+        leaks.external_leak_b_coefficient,
+        leaks.bulk_modulus,
+    ]
 }
 
 /// Name of an equation in text and figures.

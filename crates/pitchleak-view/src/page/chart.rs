@@ -1,6 +1,7 @@
 //! Charts of a page: what is drawn, as numbers for the page's script and as a table for those who read or print it.
 
 use crate::envelope::{Range, extremes};
+use crate::text::significant;
 use maud::{Markup, html};
 use pitchleak::times::Clock;
 use serde::Serialize;
@@ -259,9 +260,7 @@ fn cells(line: &Line, start: usize, count: usize) -> Vec<Option<f64>> {
 
 /// Four significant digits.
 fn number_of(value: Option<f64>) -> String {
-    let Some(value) = value else { return "–".to_owned() };
-    let decimals = (3.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 5.0) as usize;
-    format!("{value:.decimals$}")
+    value.map_or_else(|| "–".to_owned(), |value| significant(value, 4, 5))
 }
 
 #[cfg(test)]

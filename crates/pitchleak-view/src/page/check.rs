@@ -2,7 +2,7 @@
 
 use super::machine::{channels, made, prose, rig, rough, short, table};
 use super::{Card, Head, History, Page, Section, Tone};
-use crate::text::{data_line, misfit};
+use crate::text::{ESTIMATES, data_line, misfit};
 use maud::{Markup, html};
 use pitchleak::check::{CheckReport, Reach, Reading};
 use pitchleak::report::capital;
@@ -50,14 +50,13 @@ fn finding(report: &CheckReport) -> Finding {
 }
 
 /// All that the trace may tell: by name, with factor and unit for people.
-fn all(report: &CheckReport) -> impl Iterator<Item = (String, &Reach, f64, &'static str)> {
-    let leaks =
-        report.leaks.iter().map(|(leak, reach)| (format!("{} leak", leak.label()), reach, 1.0, "L/min"));
-    let bulk = ("bulk modulus of the oil".to_owned(), &report.bulk_modulus, 1e-9, "GPa");
-    leaks.collect::<Vec<_>>().into_iter().chain([bulk])
+fn all(report: &CheckReport) -> impl Iterator<Item = (&'static str, &Reach, f64, &'static str)> {
+    let leaks = report.leaks.iter().map(|(_, reach)| (reach, 1.0, "L/min"));
+    let all = leaks.chain([(&report.bulk_modulus, 1e-9, "GPa")]);
+    ESTIMATES.into_iter().zip(all).map(|(name, (reach, factor, unit))| (name, reach, factor, unit))
 }
 
-fn open(report: &CheckReport) -> impl Iterator<Item = (String, &Reach)> {
+fn open(report: &CheckReport) -> impl Iterator<Item = (&'static str, &Reach)> {
     all(report).filter(|(_, reach, ..)| !reach.identifiable).map(|(name, reach, ..)| (name, reach))
 }
 
@@ -136,7 +135,7 @@ fn not_told(report: &CheckReport) -> Markup {
             p { "Nothing is open: all three leaks and the bulk modulus of the oil can be identified." }
         } @else {
             ul { @for (name, reach) in open(report) {
-                li { strong { (capital(&name)) } ": " (reach.reason.as_deref().unwrap_or("too little excitation")) "." }
+                li { strong { (capital(name)) } ": " (reach.reason.as_deref().unwrap_or("too little excitation")) "." }
             } }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::Tone;
 use super::history::ink;
-use super::machine::{prose, short};
+use super::machine::{prose, short, table};
 use crate::envelope::{Envelopes, Row, Spot, extremes};
 use crate::text;
 use jiff::Timestamp;
@@ -125,15 +125,11 @@ fn behind(cylinder: &FleetCylinder) -> String {
 fn traces(cylinder: &FleetCylinder, report: &FleetReport<'_>, shown: usize) -> Markup {
     let rows = cylinder.rows.iter().rev().filter_map(|place| report.rows.get(*place));
     let more = cylinder.rows.len() - shown;
+    let leaks = Leak::ALL.map(|leak| format!("#{}, L/min", leak.label()));
     html! {
-        div .wide { table {
-            thead { tr {
-                th scope="col" { "begins" } th scope="col" { "verdict" }
-                @for leak in Leak::ALL { th .number scope="col" { (leak.label()) ", L/min" } }
-                th .number scope="col" { "minutes" } th scope="col" { "trace" }
-            } }
-            tbody { @for row in rows.take(shown) { (line(row)) } }
-        } }
+        (table(&["begins", "verdict", &leaks[0], &leaks[1], &leaks[2], "#minutes", "trace"], html! {
+            @for row in rows.take(shown) { (line(row)) }
+        }))
         @if more > 0 { p { "… and " (more) " more: the table that " code { "--out" } " writes has all." } }
     }
 }

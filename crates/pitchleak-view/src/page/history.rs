@@ -28,6 +28,18 @@ const LEAKS: usize = 9;
 const REFERENCES: usize = 12;
 const QUANTITIES: usize = 15;
 
+/// A line of a chart: its name, colour and column.
+type Signal = (&'static str, Ink, usize);
+
+/// The charts of the signals: title, unit, and lines.
+const SIGNALS: [(&str, &str, &[Signal]); 5] = [
+    ("Piston position", "mm", &[("x", Ink::Blue, POSITION)]),
+    ("Chamber pressures", "bar", &[("P_A", Ink::Blue, PRESSURE_A), ("P_B", Ink::Vermilion, PRESSURE_B)]),
+    ("Flows into the chambers", "L/min", &[("Q_A", Ink::Blue, FLOW_A), ("Q_B", Ink::Vermilion, FLOW_B)]),
+    ("Load force against extension", "kN", &[("force", Ink::Blue, FORCE)]),
+    ("Oil temperature", "°C", &[("temperature", Ink::Blue, TEMPERATURE)]),
+];
+
 /// Signals, estimates and residuals of a replay as a screen can show them, however long the trace.
 #[derive(Clone, Debug, Default)]
 pub struct History {
@@ -120,21 +132,12 @@ impl Drawn {
 
     /// Every signal as it was read.
     pub fn signals(&self, charts: &mut Charts) -> Markup {
-        let mut chart = |title: &str, unit, lines: Vec<Line>| {
-            charts.place(Chart { title: title.to_owned(), unit, lines, ..Chart::default() })
-        };
         html! {
-            (chart("Piston position", "mm", vec![self.line("x", Ink::Blue, POSITION)]))
-            (chart("Chamber pressures", "bar", vec![
-                self.line("P_A", Ink::Blue, PRESSURE_A),
-                self.line("P_B", Ink::Vermilion, PRESSURE_B),
-            ]))
-            (chart("Flows into the chambers", "L/min", vec![
-                self.line("Q_A", Ink::Blue, FLOW_A),
-                self.line("Q_B", Ink::Vermilion, FLOW_B),
-            ]))
-            (chart("Load force against extension", "kN", vec![self.line("force", Ink::Blue, FORCE)]))
-            (chart("Oil temperature", "°C", vec![self.line("temperature", Ink::Blue, TEMPERATURE)]))
+            @for (title, unit, lines) in SIGNALS {
+                @let line = |(name, ink, column): &Signal| self.line(*name, *ink, *column);
+                @let lines = lines.iter().map(line).collect();
+                (charts.place(Chart { title: title.to_owned(), unit, lines, ..Chart::default() }))
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! The machine and what was read of it, as tables.
 
-use crate::text::{data_line, rig_line};
+use crate::text::{data_line, rig_line, significant};
 use maud::{Markup, html};
 use pitchleak::channels::ChannelFault;
 use pitchleak::core::Leak;
@@ -167,13 +167,11 @@ pub fn made(of: &TraceSummary, schema: &str) -> Markup {
 
 /// Two significant digits: how well something is known.
 pub fn rough(value: f64) -> String {
-    let decimals = (1.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 7.0) as usize;
-    format!("{value:.decimals$}")
+    significant(value, 2, 7)
 }
 
 /// Four significant digits at the most, without zeros at the end.
 pub fn short(value: f64) -> String {
-    let decimals = (3.0 - value.abs().max(1e-4).log10().floor()).clamp(0.0, 7.0) as usize;
-    let text = format!("{value:.decimals$}");
+    let text = significant(value, 4, 7);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }

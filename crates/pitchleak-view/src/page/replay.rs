@@ -6,7 +6,7 @@ use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, table, trace};
 use super::{Card, Head, History, Page, Section};
 use crate::bar::{Bar, scale};
-use crate::text::{data_line, gpa, hold_line, known, missing_rig, per_bar, unknown, valve_line};
+use crate::text::{ESTIMATES, data_line, gpa, hold_line, known, missing_rig, per_bar, unknown, valve_line};
 use maud::{Markup, html};
 use pitchleak::core::{AlarmState, Leak, PerLeak};
 use pitchleak::report::{
@@ -77,13 +77,9 @@ fn what(reason: &Reason) -> Markup {
 /// What could not be identified, and why.
 fn open(report: &ReplayReport) -> Markup {
     let estimates = &report.estimates;
-    let leaks = estimates
-        .leaks()
-        .iter()
-        .map(|(leak, entry)| (format!("{} leak", leak.label()), *entry))
-        .collect::<Vec<_>>();
-    let entries = leaks.into_iter().chain([("bulk modulus of the oil".to_owned(), &estimates.bulk_modulus)]);
-    let open: Vec<_> = entries.filter(|(_, entry)| !entry.identifiable).collect();
+    let leaks = estimates.leaks();
+    let entries = Leak::ALL.into_iter().map(|leak| leaks[leak]).chain([&estimates.bulk_modulus]);
+    let open: Vec<_> = ESTIMATES.into_iter().zip(entries).filter(|(_, entry)| !entry.identifiable).collect();
     html! {
         @if report.verdict.status == Status::Doubtful {
             p { "Anything, before what stands under “What to do” is settled: until then no figure on this page is to be believed." }

@@ -1,15 +1,16 @@
 //! A diagnosis as lines of text: the verdict, the effects, the error before and after, the residual, the leaks.
 
-use super::Text;
 use super::replay::per_bar;
+use super::{Text, significant};
 use crate::Palette;
 use crate::bar::level;
 use crate::envelope::extremes;
-use crate::residuals::{name, people, people_unit, quantity, symbol};
+use crate::residuals::{
+    before_and_after, estimates, holds, name, people, people_unit, quantity, rms_errors, symbol,
+};
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
-    BinnedResidual, Diagnosis, Equation, EquationResidual, FoundEffect, LeakEstimate, LeakEstimates, Samples,
-    Verdict,
+    BinnedResidual, Diagnosis, EquationResidual, FoundEffect, LeakEstimate, Samples, Verdict,
 };
 use pitchleak::units::LPM_PER_M3S as LPM;
 use pitchleak::wiring::Wiring;
@@ -27,7 +28,32 @@ const MOST_NAMED: usize = 3;
 impl Text for Diagnosis {
     /// A few lines for people; a terminal gets no more.
     fn to_text(&self, _: &Palette) -> String {
-        DiagnosisText { diagnosis: self }.text()
+        let mut out = String::new();
+        match &self.wiring {
+            Some(wiring) => write_wiring(&mut out, wiring),
+            None => out = format!("{}\n", sentence(self.verdict)),
+        }
+        self.effects.iter().for_each(|effect| write_effect(&mut out, effect));
+        if let Some(next) = &self.next_measurement {
+            let [one, other] = next.between;
+            let _ = writeln!(out, "\nMeasure next, to tell {one} from {other}: {}", next.measurement);
+        }
+        if self.verdict != Verdict::InsufficientExcitation {
+            write_errors(&mut out, self);
+            write_residuals(&mut out, self);
+            write_bins(&mut out, self);
+            write_leaks(&mut out, self);
+            write_leak_changes(&mut out, self);
+            write_holds(&mut out, self);
+        }
+        let Samples { read, fitted } = self.samples;
+        if (fitted as f64) < PIECES_SHARE * read as f64 {
+            let _ = writeln!(out, "note: fitted {fitted} of {read} samples: pieces, evenly over the traces");
+        }
+        for note in &self.notes {
+            let _ = writeln!(out, "note: {note}");
+        }
+        out
     }
 }
 
@@ -46,151 +72,93 @@ pub fn sentence(verdict: Verdict) -> &'static str {
     }
 }
 
-struct DiagnosisText<'a> {
-    diagnosis: &'a Diagnosis,
+fn write_errors(out: &mut String, diagnosis: &Diagnosis) {
+    out.push_str("\nerror on held-out samples   before      after\n");
+    for (equation, [before, after], unit) in rms_errors(diagnosis) {
+        let _ = writeln!(out, "  {:<22} {before:>10.4} {after:>10.4} {unit}", name(equation));
+    }
 }
 
-impl DiagnosisText<'_> {
-    fn text(&self) -> String {
-        let mut out = String::new();
-        match &self.diagnosis.wiring {
-            Some(wiring) => write_wiring(&mut out, wiring),
-            None => out = format!("{}\n", sentence(self.diagnosis.verdict)),
-        }
-        self.diagnosis.effects.iter().for_each(|effect| write_effect(&mut out, effect));
-        if let Some(next) = &self.diagnosis.next_measurement {
-            let [one, other] = next.between;
-            let _ = writeln!(out, "\nMeasure next, to tell {one} from {other}: {}", next.measurement);
-        }
-        if self.diagnosis.verdict != Verdict::InsufficientExcitation {
-            self.write_errors(&mut out);
-            self.write_residuals(&mut out);
-            self.write_bins(&mut out);
-            self.write_leaks(&mut out);
-            self.write_leak_changes(&mut out);
-            self.write_holds(&mut out);
-        }
-        let Samples { read, fitted } = self.diagnosis.samples;
-        if (fitted as f64) < PIECES_SHARE * read as f64 {
-            let _ = writeln!(out, "note: fitted {fitted} of {read} samples: pieces, evenly over the traces");
-        }
-        for note in &self.diagnosis.notes {
-            let _ = writeln!(out, "note: {note}");
-        }
-        out
+fn write_holds(out: &mut String, diagnosis: &Diagnosis) {
+    let flow = |value: f64, std: f64| {
+        format!("{:.3} ± {:.3}", value * LPM, Estimate { value, std }.half_width95() * LPM)
+    };
+    for (chamber, held) in holds(diagnosis) {
+        let [before, after] = held.apart_sigma();
+        let _ = writeln!(
+            out,
+            "\nat rest under {:.0} bar ({} holds of 1 s) {} L/min leave chamber {chamber}; what moves predicts {} before \
+             ({before:.1} sigma apart), {} after ({after:.1} sigma apart)",
+            held.mean_pressure_pa / 1e5,
+            held.count,
+            flow(held.leak_m3s, held.std_m3s),
+            flow(held.predicted_before_m3s, held.predicted_before_std_m3s),
+            flow(held.predicted_after_m3s, held.predicted_after_std_m3s)
+        );
     }
+}
 
-    fn write_errors(&self, out: &mut String) {
-        out.push_str("\nerror on held-out samples   before      after\n");
-        for (equation, before) in self.diagnosis.before.quality.rmse.iter() {
-            let (factor, unit) = people_unit(equation);
-            if let (Some(before), Some(after)) = (before, self.diagnosis.after.quality.rmse[equation]) {
-                let (name, before, after) = (name(equation), before * factor, after * factor);
-                let _ = writeln!(out, "  {name:<22} {before:>10.4} {after:>10.4} {unit}");
-            }
-        }
+fn write_leaks(out: &mut String, diagnosis: &Diagnosis) {
+    let _ = writeln!(out, "\n{:<24} {:>24} {:>22}", "leak, L/min/bar, 95 %", "before", "after");
+    let text = |leak: LeakEstimate| {
+        per_bar(leak.value, Some(leak.std)) + if leak.physical { "" } else { " (impossible)" }
+    };
+    let [before, after] = [&diagnosis.before, &diagnosis.after].map(|fit| estimates(&fit.leaks));
+    for (leak, (before, after)) in Leak::ALL.into_iter().zip(before.into_iter().zip(after)) {
+        let _ = writeln!(out, "  {:<22} {:>24} {:>22}", leak.label(), text(before), text(after));
     }
+}
 
-    fn write_holds(&self, out: &mut String) {
-        let Some(holds) = self.diagnosis.holds else { return };
-        for (name, held) in [("A", holds.chamber_a), ("B", holds.chamber_b)] {
-            let Some(held) = held else { continue };
-            let flow = |value: f64, std: f64| {
-                format!("{:.3} ± {:.3}", value * LPM, Estimate { value, std }.half_width95() * LPM)
-            };
-            let [before, after] = held.apart_sigma();
-            let _ = writeln!(
-                out,
-                "\nat rest under {:.0} bar ({} holds of 1 s) {} L/min leave chamber {name}; what moves predicts {} before \
-                 ({before:.1} sigma apart), {} after ({after:.1} sigma apart)",
-                held.mean_pressure_pa / 1e5,
-                held.count,
-                flow(held.leak_m3s, held.std_m3s),
-                flow(held.predicted_before_m3s, held.predicted_before_std_m3s),
-                flow(held.predicted_after_m3s, held.predicted_after_std_m3s)
-            );
-        }
+/// Where leaks change, in order of time.
+fn write_leak_changes(out: &mut String, diagnosis: &Diagnosis) {
+    let changes = &diagnosis.leak_changes;
+    if changes.is_empty() {
+        return;
     }
-
-    fn write_leaks(&self, out: &mut String) {
-        let _ = writeln!(out, "\n{:<24} {:>24} {:>22}", "leak, L/min/bar, 95 %", "before", "after");
-        let rows = |leaks: &LeakEstimates| {
-            [
-                leaks.internal_leak_coefficient,
-                leaks.external_leak_a_coefficient,
-                leaks.external_leak_b_coefficient,
-            ]
-        };
-        let names = ["internal", "external A", "external B"];
-        for ((name, before), after) in
-            names.iter().zip(rows(&self.diagnosis.before.leaks)).zip(rows(&self.diagnosis.after.leaks))
-        {
-            let text = |leak: LeakEstimate| {
-                let mark = if leak.physical { "" } else { " (impossible)" };
-                per_bar(leak.value, Some(leak.std)) + mark
-            };
-            let _ = writeln!(out, "  {name:<22} {:>24} {:>22}", text(before), text(after));
-        }
+    out.push_str("\nleaks that change, L/min/bar            before                  after\n");
+    for change in changes.iter().take(MOST_CHANGES) {
+        let text = |level: &Estimate<f64>| per_bar(level.value, Some(level.std));
+        let leak = Leak::ALL.into_iter().find(|leak| leak.id() == change.fault).map_or("", Leak::label);
+        let at = format!("{leak} at {:.1} s", change.time_s);
+        let trace = if change.trace == 0 { String::new() } else { format!(", trace {}", change.trace + 1) };
+        let (before, after) = (text(&change.before), text(&change.after));
+        let _ = writeln!(out, "  {:<22} {before:>24} {after:>22}", at + &trace);
     }
-
-    /// Where leaks change, in order of time.
-    fn write_leak_changes(&self, out: &mut String) {
-        let changes = &self.diagnosis.leak_changes;
-        if changes.is_empty() {
-            return;
-        }
-        out.push_str("\nleaks that change, L/min/bar            before                  after\n");
-        for change in changes.iter().take(MOST_CHANGES) {
-            let text = |level: &Estimate<f64>| per_bar(level.value, Some(level.std));
-            let leak = Leak::ALL.into_iter().find(|leak| leak.id() == change.fault).map_or("", Leak::label);
-            let at = format!("{leak} at {:.1} s", change.time_s);
-            let trace =
-                if change.trace == 0 { String::new() } else { format!(", trace {}", change.trace + 1) };
-            let (before, after) = (text(&change.before), text(&change.after));
-            let _ = writeln!(out, "  {:<22} {before:>24} {after:>22}", at + &trace);
-        }
-        if let Some(more) = changes.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
-            let _ = writeln!(out, "  and {more} more");
-        }
+    if let Some(more) = changes.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
+        let _ = writeln!(out, "  and {more} more");
     }
+}
 
-    /// Size against the sensors' noise, whiteness, normality, and what the residual goes with.
-    fn write_residuals(&self, out: &mut String) {
-        out.push_str("\nresidual                     of noise    white p   normal p   goes with\n");
-        let sides =
-            [("before", &self.diagnosis.before.residuals), ("after", &self.diagnosis.after.residuals)];
-        let shown = if self.diagnosis.effects.is_empty() { &sides[..1] } else { &sides[..] };
-        for equation in Equation::ALL {
-            for (side, residuals) in shown {
-                let Some(residual) = &residuals[equation] else { continue };
-                let p = |p: Option<f64>| p.map_or_else(|| "-".into(), probability);
-                let _ = writeln!(
-                    out,
-                    "  {:<12} {side:<10} {:>10.2} {:>10} {:>10}   {}",
-                    name(equation),
-                    residual.noise_ratio,
-                    p(residual.whiteness_p),
-                    p(residual.normality_p),
-                    companions(residual)
-                );
-            }
-        }
+/// Size against the sensors' noise, whiteness, normality, and what the residual goes with.
+fn write_residuals(out: &mut String, diagnosis: &Diagnosis) {
+    out.push_str("\nresidual                     of noise    white p   normal p   goes with\n");
+    for (equation, side, residual) in before_and_after(diagnosis) {
+        let p = |p: Option<f64>| p.map_or_else(|| "-".into(), probability);
+        let _ = writeln!(
+            out,
+            "  {:<12} {side:<10} {:>10.2} {:>10} {:>10}   {}",
+            name(equation),
+            residual.noise_ratio,
+            p(residual.whiteness_p),
+            p(residual.normality_p),
+            companions(residual)
+        );
     }
+}
 
-    /// The residual against the variables that it follows most, for each equation that is not explained.
-    fn write_bins(&self, out: &mut String) {
-        for (equation, residual) in self.diagnosis.after.residuals.iter() {
-            let Some(residual) = residual else { continue };
-            if residual.noise_ratio <= 1.0 && residual.beyond_chance().is_empty() {
-                continue;
-            }
-            let bins = self.diagnosis.after.binned_residuals.iter();
-            let mut bins: Vec<&BinnedResidual> =
-                bins.filter(|one| one.equation == equation && one.varies()).collect();
-            bins.sort_by(|a, b| b.strength().total_cmp(&a.strength()));
-            for one in bins.into_iter().take(MOST_NAMED) {
-                let _ = writeln!(out, "{}", line(one));
-            }
+/// The residual against the variables that it follows most, for each equation that is not explained.
+fn write_bins(out: &mut String, diagnosis: &Diagnosis) {
+    for (equation, residual) in diagnosis.after.residuals.iter() {
+        let Some(residual) = residual else { continue };
+        if residual.noise_ratio <= 1.0 && residual.beyond_chance().is_empty() {
+            continue;
+        }
+        let bins = diagnosis.after.binned_residuals.iter();
+        let mut bins: Vec<&BinnedResidual> =
+            bins.filter(|one| one.equation == equation && one.varies()).collect();
+        bins.sort_by(|a, b| b.strength().total_cmp(&a.strength()));
+        for one in bins.into_iter().take(MOST_NAMED) {
+            let _ = writeln!(out, "{}", line(one));
         }
     }
 }
@@ -227,8 +195,7 @@ fn probability(p: f64) -> String {
 
 /// Three significant digits.
 fn short(value: f64) -> String {
-    let decimals = (2.0 - value.abs().max(1e-3).log10().floor()).clamp(0.0, 4.0) as usize;
-    format!("{value:.decimals$}")
+    significant(value, 3, 4)
 }
 
 /// Wiring comes before any verdict: what the channels say is wrong.

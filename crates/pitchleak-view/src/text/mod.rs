@@ -77,3 +77,13 @@ impl Palette {
         (self.caution, self.reset)
     }
 }
+
+/// What every trace is to tell: the leaks in their order, and the oil.
+pub(crate) const ESTIMATES: [&str; 4] =
+    ["internal leak", "external A leak", "external B leak", "bulk modulus of the oil"];
+
+/// A number with so many significant digits, and no more than so many decimals.
+pub(crate) fn significant(value: f64, digits: i32, most_decimals: i32) -> String {
+    let decimals = (f64::from(digits - 1) - value.abs().log10().floor()).clamp(0.0, most_decimals.into());
+    format!("{value:.*}", decimals as usize)
+}

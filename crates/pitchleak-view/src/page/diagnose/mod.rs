@@ -5,10 +5,10 @@ mod residuals;
 use super::chart::Charts;
 use super::machine::{channels, facts, prose, rig, short, table};
 use super::{Card, Head, Page, Section, Tone};
-use crate::residuals::{name, people_unit, quantity};
+use crate::residuals::{estimates, holds, name, quantity, rms_errors};
+use crate::text::ESTIMATES;
 use maud::{Markup, html};
-use pitchleak::core::Leak;
-use pitchleak::diagnose::{Diagnosis, FoundEffect, HoldLeak, LeakEstimate, LeakEstimates, Verdict};
+use pitchleak::diagnose::{Diagnosis, FoundEffect, HoldLeak, LeakEstimate, Verdict};
 use pitchleak::report::{capital, with_interval};
 use pitchleak::rig::Rig;
 use pitchleak::units::LPM_PER_M3S;
@@ -120,9 +120,8 @@ fn to_do(diagnosis: &Diagnosis) -> Markup {
 }
 
 fn open(diagnosis: &Diagnosis) -> Markup {
-    let after = &diagnosis.after.leaks;
-    let unknown: Vec<_> =
-        entries(after).into_iter().filter(|(_, entry)| !entry.identifiable).map(|(name, _)| name).collect();
+    let after = ESTIMATES.into_iter().zip(estimates(&diagnosis.after.leaks));
+    let unknown: Vec<_> = after.filter(|(_, entry)| !entry.identifiable).map(|(name, _)| name).collect();
     let doubtful: Vec<_> = diagnosis.effects.iter().filter(|effect| !effect.confident).collect();
     html! {
         @if unknown.is_empty() && doubtful.is_empty() {
@@ -147,16 +146,13 @@ fn errors(diagnosis: &Diagnosis) -> Markup {
                 @if found { th .number scope="col" { "after" } th .number scope="col" { "less by" } }
             } }
             tbody {
-                @for (equation, before) in diagnosis.before.quality.rmse.iter() {
-                    @let (factor, unit) = people_unit(equation);
-                    @if let (Some(before), Some(after)) = (before, diagnosis.after.quality.rmse[equation]) {
-                        tr {
-                            th scope="row" { (name(equation)) ", " (unit) }
-                            td .number { (short(before * factor)) }
-                            @if found {
-                                td .number { (short(after * factor)) }
-                                td .number { (percent(1.0 - after / before)) }
-                            }
+                @for (equation, [before, after], unit) in rms_errors(diagnosis) {
+                    tr {
+                        th scope="row" { (name(equation)) ", " (unit) }
+                        td .number { (short(before)) }
+                        @if found {
+                            td .number { (short(after)) }
+                            td .number { (percent(1.0 - after / before)) }
                         }
                     }
                 }
@@ -259,7 +255,7 @@ fn chance(p: f64) -> String {
 
 /// Leaks before and after, in motion and at rest.
 fn leaks(diagnosis: &Diagnosis) -> Markup {
-    let both = entries(&diagnosis.before.leaks).into_iter().zip(entries(&diagnosis.after.leaks));
+    let [before, after] = [&diagnosis.before, &diagnosis.after].map(|fit| estimates(&fit.leaks));
     let text = |entry: LeakEstimate| {
         if entry.unit == "Pa" {
             format!("{} GPa", with_interval(entry.value * 1e-9, Some(entry.std * 1e-9)))
@@ -274,7 +270,7 @@ fn leaks(diagnosis: &Diagnosis) -> Markup {
     };
     html! {
         (table(&["", "#before, 95 %", "#after, 95 %"], html! {
-            @for ((name, before), (_, after)) in both {
+            @for (name, (before, after)) in ESTIMATES.into_iter().zip(before.into_iter().zip(after)) {
                 tr {
                     th scope="row" { (capital(name)) }
                     td .number { (text(before)) (mark(before)) }
@@ -282,23 +278,12 @@ fn leaks(diagnosis: &Diagnosis) -> Markup {
                 }
             }
         }))
-        @if let Some(holds) = diagnosis.holds {
+        @if diagnosis.holds.is_some() {
             h3 { "At rest against in motion" }
             p .note { "Flow that leaves a chamber while the piston stands, measured, beside what the model fitted to motion foretells." }
-            @for (leak, hold) in [(Leak::ExternalA, holds.chamber_a), (Leak::ExternalB, holds.chamber_b)] {
-                @if let Some(hold) = hold { (held(if leak == Leak::ExternalA { "A" } else { "B" }, &hold)) }
-            }
+            @for (chamber, hold) in holds(diagnosis) { (held(chamber, &hold)) }
         }
     }
-}
-
-fn entries(leaks: &LeakEstimates) -> [(&'static str, LeakEstimate); 4] {
-    [
-        ("internal leak", leaks.internal_leak_coefficient),
-        ("external A leak", leaks.external_leak_a_coefficient),
-        ("external B leak", leaks.external_leak_b_coefficient),
-        ("bulk modulus of the oil", leaks.bulk_modulus),
-    ]
 }
 
 fn held(chamber: &str, hold: &HoldLeak) -> Markup {

@@ -3,7 +3,7 @@
 use super::super::chart::{Chart, Charts, Ink, Line};
 use super::super::machine::table;
 use crate::envelope::{Envelopes, Range, Spot};
-use crate::residuals::{drawn_bins, in_a_row, name, people, people_unit, symbol};
+use crate::residuals::{before_and_after, drawn_bins, in_a_row, name, people, people_unit, symbol};
 use maud::{Markup, html};
 use pitchleak::diagnose::{BinnedResidual, Diagnosis, Equation};
 use pitchleak::report::capital;
@@ -119,25 +119,19 @@ fn binned(label: &str, ink: Ink, bins: &BinnedResidual) -> Line {
 
 /// Size and nature of the residual.
 fn quality(diagnosis: &Diagnosis) -> Markup {
-    let sides = [("before", &diagnosis.before.residuals), ("after", &diagnosis.after.residuals)];
-    let shown = if diagnosis.effects.is_empty() { 1 } else { 2 };
     let p = |p: Option<f64>| {
         p.map_or_else(|| "–".to_owned(), |p| if p < 1e-3 { "< 0.001".to_owned() } else { format!("{p:.3}") })
     };
     html! {
         (table(&["equation", "", "#of the sensors' noise", "#white, p", "#normal, p", "goes with"], html! {
-            @for equation in Equation::ALL {
-                @for (side, residuals) in sides.iter().take(shown) {
-                    @if let Some(residual) = &residuals[equation] {
-                        tr {
-                            th scope="row" { (capital(name(equation))) }
-                            td { (side) }
-                            td .number { (format!("{:.2}", residual.noise_ratio)) " times" }
-                            td .number { (p(residual.whiteness_p)) }
-                            td .number { (p(residual.normality_p)) }
-                            td { (crate::text::companions(residual)) }
-                        }
-                    }
+            @for (equation, side, residual) in before_and_after(diagnosis) {
+                tr {
+                    th scope="row" { (capital(name(equation))) }
+                    td { (side) }
+                    td .number { (format!("{:.2}", residual.noise_ratio)) " times" }
+                    td .number { (p(residual.whiteness_p)) }
+                    td .number { (p(residual.normality_p)) }
+                    td { (crate::text::companions(residual)) }
                 }
             }
         }))
