@@ -295,7 +295,7 @@ impl Encoding {
         match self {
             Self::Utf8 => bytes,
             Self::Utf16 { big_endian } => {
-                let mut utf16 = Utf16 { source: bytes, big_endian, odd: None, high: None };
+                let mut utf16 = Utf16 { source: bytes, big_endian, left: Vec::new() };
                 Box::new(Written::by(move |text| utf16.decode(text)))
             }
         }
@@ -313,10 +313,8 @@ pub(super) fn text(cell: &[u8]) -> Cow<'_, str> {
 struct Utf16 {
     source: Box<dyn Read + Send>,
     big_endian: bool,
-    /// First byte of a unit that is not whole yet.
-    odd: Option<u8>,
-    /// First unit of a pair that is not whole yet.
-    high: Option<u16>,
+    /// Bytes of a character that is not whole yet.
+    left: Vec<u8>,
 }
 
 impl Utf16 {
@@ -327,26 +325,17 @@ impl Utf16 {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => return Ok(true),
             read => read?,
         };
-        for byte in chunk.iter().take(read) {
-            match self.odd.take() {
-                None => self.odd = Some(*byte),
-                Some(first) => self.push(first, *byte, text),
-            }
-        }
-        Ok(read > 0)
-    }
-
-    fn push(&mut self, first: u8, second: u8, text: &mut Vec<u8>) {
-        let bytes = [first, second];
-        let unit = if self.big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) };
-        if self.high.is_none() && (0xd800..0xdc00).contains(&unit) {
-            self.high = Some(unit);
-            return;
-        }
-        for c in char::decode_utf16(self.high.take().into_iter().chain([unit])) {
+        self.left.extend(chunk.get(..read).unwrap_or_default());
+        let unit = if self.big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+        let mut units: Vec<u16> = self.left.as_chunks().0.iter().map(|bytes| unit(*bytes)).collect();
+        // The first of a pair waits for the second.
+        units.pop_if(|last| (0xd800..0xdc00).contains(last));
+        for c in char::decode_utf16(units.iter().copied()) {
             let c = c.unwrap_or(char::REPLACEMENT_CHARACTER);
             text.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes());
         }
+        self.left.drain(..2 * units.len());
+        Ok(read > 0)
     }
 }
 
