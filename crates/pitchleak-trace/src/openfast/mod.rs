@@ -142,13 +142,8 @@ pub fn read(path: &Path) -> Result<Run, Error> {
 /// # Errors
 /// The first [`Problem`] found. Memory stays within a small multiple of `bytes`.
 pub fn parse(bytes: &[u8]) -> Result<Run, Problem> {
-    if is_binary(bytes) { binary::parse(bytes) } else { parse_text(bytes) }
-}
-
-/// Whether these bytes begin like a binary output file: a two-byte id whose high byte is zero, as
-/// no text begins.
-pub(crate) fn is_binary(bytes: &[u8]) -> bool {
-    matches!(bytes, [_, 0, ..])
+    // A binary file begins with an id of two bytes whose high byte is zero, as no text begins.
+    if matches!(bytes, [_, 0, ..]) { binary::parse(bytes) } else { parse_text(bytes) }
 }
 
 /// Text of one byte per character: units may hold 0xB7, the middle dot of Latin-1.

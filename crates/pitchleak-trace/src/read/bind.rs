@@ -1,7 +1,7 @@
 //! Headers as columns of a trace: by the names of the contract, those of `[columns]`, and foreign ones that name signal and
 //! unit.
 
-use super::columns::{Content, Layout, REQUIRED, mapped, standard};
+use super::columns::{Content, Layout, REQUIRED, doubled, mapped, standard};
 use super::error::TraceFault;
 use super::table_text::{TextRow, bare_unit, column};
 use crate::header::{self, HeaderUnit, shorten};
@@ -37,11 +37,7 @@ pub(super) fn bind(
             continue;
         }
         if let Some(first) = foreign.insert(signal, found) {
-            return Err(TraceFault::DoubledColumn {
-                signal: signal.name(),
-                first: shorten(&first.name, 40),
-                second: shorten(header, 40),
-            });
+            return Err(doubled(signal, &first.name, header));
         }
     }
     let mut map = rig.columns.clone();

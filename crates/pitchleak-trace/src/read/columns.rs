@@ -39,7 +39,7 @@ impl Column {
 }
 
 /// The columns of a trace in the order of the file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub(super) columns: Vec<Column>,
     /// Mapped columns of optional signals that the header does not have.
@@ -68,9 +68,8 @@ impl Layout {
             absent: absent(headers, map)
                 .map(|(_, name, near)| near.map_or(name.clone(), |near| format!("{name} (`{near}` is near)")))
                 .collect(),
-            counted: Counted::Lines,
             time: declared_time(map),
-            reading: None,
+            ..Self::default()
         };
         layout.check_units()?;
         layout.check(map, required)?;
@@ -79,13 +78,7 @@ impl Layout {
 
     /// Of the parts of one recording.
     pub(super) fn joined<'l>(parts: impl Iterator<Item = &'l Self>) -> Self {
-        let mut whole = Self {
-            columns: Vec::new(),
-            absent: Vec::new(),
-            counted: Counted::Lines,
-            time: TimeFormat::default(),
-            reading: None,
-        };
+        let mut whole = Self::default();
         for part in parts {
             // Each file has a time of its own.
             let known = whole.gives(Signal::Time);
@@ -191,11 +184,7 @@ impl Layout {
         for signal in Signal::ALL {
             let mut columns = self.columns.iter().filter(|column| column.signal() == Some(signal));
             if let (Some(first), Some(second)) = (columns.next(), columns.next()) {
-                return Err(TraceFault::DoubledColumn {
-                    signal: signal.name(),
-                    first: shorten(&first.header, 40),
-                    second: shorten(&second.header, 40),
-                });
+                return Err(doubled(signal, &first.header, &second.header));
             }
         }
         Ok(())
@@ -249,6 +238,12 @@ impl Layout {
             hint: String::new(),
         }
     }
+}
+
+/// Two columns, by their headers, of one signal.
+pub(super) fn doubled(signal: Signal, first: &str, second: &str) -> TraceFault {
+    let [first, second] = [first, second].map(|header| shorten(header, 40));
+    TraceFault::DoubledColumn { signal: signal.name(), first, second }
 }
 
 /// What every trace must have, in words.
