@@ -18,21 +18,14 @@ pub enum Ink {
 }
 
 impl Ink {
-    fn colour(self) -> RGBColor {
-        match self {
-            Self::Measured => RGBColor(165, 165, 165),
-            Self::Ours => RGBColor(0, 114, 178),
-            Self::Paper => RGBColor(213, 94, 0),
-            Self::Limit => RGBColor(60, 60, 60),
-        }
-    }
-
-    fn width(self) -> u32 {
-        match self {
-            Self::Measured => 5,
-            Self::Ours | Self::Paper => 2,
-            Self::Limit => 1,
-        }
+    fn style(self) -> ShapeStyle {
+        let (colour, width) = match self {
+            Self::Measured => (RGBColor(165, 165, 165), 5),
+            Self::Ours => (RGBColor(0, 114, 178), 2),
+            Self::Paper => (RGBColor(213, 94, 0), 2),
+            Self::Limit => (RGBColor(60, 60, 60), 1),
+        };
+        colour.stroke_width(width)
     }
 }
 
@@ -148,7 +141,7 @@ fn draw(panel: &Panel, cell: &Cell) -> Result<(), FigureError> {
 }
 
 fn draw_line(chart: &mut Chart, line: &Line, low: f64, high: f64) -> Result<(), FigureError> {
-    let style = line.ink.colour().stroke_width(line.ink.width());
+    let style = line.ink.style();
     let mut label = line.label;
     let stride = line.points.len().div_ceil(MOST_POINTS).max(1);
     for piece in line.points.split(|p| !p.0.is_finite() || !p.1.is_finite()) {

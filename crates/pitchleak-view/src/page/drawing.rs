@@ -1,11 +1,11 @@
 //! The cylinder as a drawing: chambers, piston, ports and meters, each leak an arrow of its size, each sensor in its state.
 
+use crate::text::thresholds_lpm;
 use maud::{Markup, html};
 use pitchleak::core::{Leak, PerLeak};
 use pitchleak::report::{ReplayReport, Status, interval};
 use pitchleak::rig::Rig;
 use pitchleak::signal::Signal;
-use pitchleak::units::LPM_PER_M3S;
 
 /// Colours and strokes, for a page that defines `--text`, `--faint`, `--line`, `--card`, `--leak` and `--caution`.
 pub const STYLE: &str = include_str!("assets/drawing.css");
@@ -82,10 +82,11 @@ const SENSORS: [(Signal, [u16; 2], &str, &str); 5] = [
 impl Drawing {
     /// The leaks at the end of a replay, and the sensors that its verdict or its explanations speak against.
     pub fn of(report: &ReplayReport, rig: &Rig) -> Self {
+        let levels = thresholds_lpm(rig);
         let flow = |leak: Leak| {
             let state = Known::of(leak, report);
             let leakage = &report.leakage[leak];
-            let share = leakage.mean_lpm / (rig.alarms.threshold_m3s[leak] * LPM_PER_M3S);
+            let share = leakage.mean_lpm / levels[leak];
             let text = if state == Known::Unknown { "not known".to_owned() } else { interval(leakage) };
             Flow { state, share, text }
         };

@@ -1,6 +1,6 @@
 //! The machine and what was read of it, as tables.
 
-use crate::text::{data_line, rig_line, significant};
+use crate::text::{data_line, rig_line, significant, thresholds_lpm};
 use maud::{Markup, html};
 use pitchleak::channels::ChannelFault;
 use pitchleak::core::Leak;
@@ -88,12 +88,12 @@ fn sensor(name: &str, instrument: &Instrument, factor: f64, unit: &str) -> Marku
 
 /// Alarm thresholds.
 pub fn alarms(rig: &Rig) -> String {
-    let [first, others @ ..] = Leak::ALL.map(|leak| rig.alarms.threshold_m3s[leak] * LPM_PER_M3S);
+    let levels = thresholds_lpm(rig);
+    let [first, others @ ..] = Leak::ALL.map(|leak| levels[leak]);
     if others.iter().all(|other| (other - first).abs() < 1e-9) {
         return format!("{} L/min", short(first));
     }
-    let level =
-        |leak: Leak| format!("{} {}", leak.label(), short(rig.alarms.threshold_m3s[leak] * LPM_PER_M3S));
+    let level = |leak: Leak| format!("{} {}", leak.label(), short(levels[leak]));
     format!("{} L/min", Leak::ALL.map(level).join(", "))
 }
 

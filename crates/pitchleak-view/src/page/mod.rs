@@ -169,14 +169,6 @@ impl Page {
             }
         }
     }
-
-    /// Writes the page to `path`, whole or not at all, and never over one of `inputs`.
-    ///
-    /// # Errors
-    /// [`PageError`].
-    pub fn write(&self, path: impl AsRef<Path>, inputs: &Inputs) -> Result<(), PageError> {
-        PageFile::create(path, inputs)?.finish(self)
-    }
 }
 
 /// Why a page is not written.

@@ -6,7 +6,9 @@ use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, table, trace};
 use super::{Card, Head, History, Page, Section};
 use crate::bar::{Bar, scale};
-use crate::text::{ESTIMATES, data_line, gpa, hold_line, known, missing_rig, per_bar, unknown, valve_line};
+use crate::text::{
+    ESTIMATES, data_line, gpa, hold_line, known, missing_rig, per_bar, thresholds_lpm, unknown, valve_line,
+};
 use maud::{Markup, html};
 use pitchleak::core::{AlarmState, Leak, PerLeak};
 use pitchleak::report::{
@@ -14,7 +16,7 @@ use pitchleak::report::{
     with_interval,
 };
 use pitchleak::rig::Rig;
-use pitchleak::units::{LPM_PER_M3S, duration};
+use pitchleak::units::duration;
 
 impl Page {
     /// The report of a replay of `rig`, with what was gathered on the way.
@@ -153,9 +155,10 @@ fn probability_bar(share: f64) -> Markup {
 
 /// The leaks as bars on a common scale.
 fn brief(report: &ReplayReport, rig: &Rig) -> Markup {
+    let levels = thresholds_lpm(rig);
     let bars = PerLeak::from_fn(|leak| {
         let known = report.estimates.leaks()[leak].identifiable;
-        known.then(|| Bar::of(&report.leakage[leak], rig.alarms.threshold_m3s[leak] * LPM_PER_M3S))
+        known.then(|| Bar::of(&report.leakage[leak], levels[leak]))
     });
     let ends = scale(bars.iter().filter_map(|(_, bar)| bar.as_ref())).unwrap_or_default();
     html! {
@@ -197,8 +200,7 @@ fn bar(&Bar { interval: [low, high], value: (value, _), limit }: &Bar, [from, to
 
 fn leaks(report: &ReplayReport, rig: &Rig, drawn: &Drawn, charts: &mut Charts) -> Markup {
     let mut limits: Vec<Limit> = Vec::new();
-    for (leak, flow) in rig.alarms.threshold_m3s.iter() {
-        let value = flow * LPM_PER_M3S;
+    for (leak, &value) in thresholds_lpm(rig).iter() {
         match limits.iter_mut().find(|limit| (limit.value - value).abs() < 1e-9) {
             Some(limit) => limit.label = "alarm level".to_owned(),
             None => limits.push(Limit { value, label: format!("alarm level, {}", leak.label()) }),

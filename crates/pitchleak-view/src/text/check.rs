@@ -1,8 +1,8 @@
 //! A check as lines of text: what each signal did, what fails, what the trace tells.
 
-use super::Text;
 use super::replay::{data_line, hold_line, misfit, rig_line};
 use super::valve::valve_line;
+use super::{Text, thresholds_lpm};
 use crate::Palette;
 use crate::bar::{Bar, INTERVAL, LIMIT, ZERO, course, scale};
 use crate::envelope::{Envelopes, Spot};
@@ -11,7 +11,7 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::rig::Rig;
 use pitchleak::signal::Signal;
 use pitchleak::trace::Record;
-use pitchleak::units::{Dimension, LPM_PER_M3S, readable};
+use pitchleak::units::{Dimension, readable};
 use std::fmt::Write;
 
 impl Text for CheckReport {
@@ -157,10 +157,7 @@ pub struct CheckSketch {
 impl CheckSketch {
     /// Of a check by `rig` that has not begun.
     pub fn new(rig: &Rig) -> Self {
-        Self {
-            signals: Envelopes::of_at_most(STRETCHES),
-            threshold_lpm: rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S),
-        }
+        Self { signals: Envelopes::of_at_most(STRETCHES), threshold_lpm: thresholds_lpm(rig) }
     }
 
     /// Takes in a record.

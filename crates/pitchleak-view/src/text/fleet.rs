@@ -57,11 +57,20 @@ impl FleetText<'_> {
     fn write_worst(&self, text: &mut String) {
         // A cylinder without any verdict stands below, by its traces.
         let worst: Vec<_> = self.report.worst().filter(|cylinder| cylinder.status.is_some()).collect();
-        let bars = Bars::of(&worst[..worst.len().min(LINES)]).filter(|_| self.draws);
-        let legend = bars.as_ref().map_or_else(String::new, |bars| bars.legend(self.palette));
+        let bars: Vec<Bar> = worst.iter().take(LINES).filter_map(|cylinder| bar(cylinder)).collect();
+        let ends = scale(&bars).filter(|_| self.draws);
+        let (faint, reset) = self.palette.faint();
+        let legend = ends.map_or_else(String::new, |ends| {
+            let marks = format!("{VALUE} largest leak  {INTERVAL} 95 %  {LIMIT} alarm level");
+            format!("{faint}{:<10}{:<CELLS$}  {marks}{reset}\n", "", scale_text(ends))
+        });
         write_lines(text, &legend, &worst, |cylinder| {
-            let bar = bars.as_ref().map_or_else(String::new, |bars| bars.text(cylinder));
-            self.line(cylinder, &bar)
+            // Blank where the cylinder has no leak to act on.
+            let drawn = ends.map_or_else(String::new, |ends| {
+                let bar = bar(cylinder).map_or_else(String::new, |bar| bar.text(ends, CELLS));
+                format!("{bar:<CELLS$}  ")
+            });
+            self.line(cylinder, &drawn)
         });
     }
 
@@ -146,36 +155,7 @@ pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> Strin
 /// Cells of a bar or a course.
 const CELLS: usize = 20;
 
-/// What a terminal shows beside some lines: the worst leak of each against its alarm level, on one scale.
-struct Bars {
-    ends: [f64; 2],
-}
-
-impl Bars {
-    /// None where no line tells of a leak.
-    fn of(cylinders: &[&FleetCylinder]) -> Option<Self> {
-        let bars: Vec<Bar> = cylinders.iter().filter_map(|cylinder| bar(cylinder)).collect();
-        scale(&bars).map(|ends| Self { ends })
-    }
-
-    /// What the bars show.
-    fn legend(&self, palette: &Palette) -> String {
-        let (faint, reset) = palette.faint();
-        let scale = scale_text(self.ends);
-        format!(
-            "{faint}{:<10}{scale:<CELLS$}  {VALUE} largest leak  {INTERVAL} 95 %  {LIMIT} alarm level{reset}\n",
-            ""
-        )
-    }
-
-    /// Blank where the cylinder has no leak to act on.
-    fn text(&self, cylinder: &FleetCylinder) -> String {
-        let text = bar(cylinder).map_or_else(String::new, |bar| bar.text(self.ends, CELLS));
-        format!("{text:<CELLS$}  ")
-    }
-}
-
-/// Of the largest leak to act on.
+/// What a terminal shows beside a line: the largest leak to act on, against its alarm level.
 fn bar(cylinder: &FleetCylinder) -> Option<Bar> {
     let leaks = cylinder.faults.iter().filter_map(|leak| cylinder.leaks[*leak].flow);
     let worst = leaks.max_by(|a, b| a.mean_lpm.total_cmp(&b.mean_lpm))?;

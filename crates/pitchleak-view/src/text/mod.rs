@@ -18,7 +18,10 @@ pub(crate) use replay::{gpa, hold_line, known, misfit, missing_rig, per_bar, rig
 pub use replay_terminal::ReplaySketch;
 pub(crate) use valve::valve_line;
 
+use pitchleak::core::PerLeak;
 use pitchleak::report::Status;
+use pitchleak::rig::Rig;
+use pitchleak::units::LPM_PER_M3S;
 
 /// A result that people read.
 pub trait Text {
@@ -81,6 +84,11 @@ impl Palette {
 /// What every trace is to tell: the leaks in their order, and the oil.
 pub(crate) const ESTIMATES: [&str; 4] =
     ["internal leak", "external A leak", "external B leak", "bulk modulus of the oil"];
+
+/// The alarm level of each leak, L/min.
+pub(crate) fn thresholds_lpm(rig: &Rig) -> PerLeak<f64> {
+    rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S)
+}
 
 /// A number with so many significant digits, and no more than so many decimals.
 pub(crate) fn significant(value: f64, digits: i32, most_decimals: i32) -> String {

@@ -1,5 +1,6 @@
 //! What a terminal can show beside the text: each leak's interval against its alarm level, and its course.
 
+use super::thresholds_lpm;
 use crate::Palette;
 use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
@@ -100,11 +101,7 @@ pub struct ReplaySketch {
 impl ReplaySketch {
     /// Of a replay by `rig` that has not begun.
     pub fn new(rig: &Rig) -> Self {
-        Self {
-            flows_lpm: Envelopes::of_at_most(STRETCHES),
-            threshold_lpm: rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S),
-            ends_s: None,
-        }
+        Self { flows_lpm: Envelopes::of_at_most(STRETCHES), threshold_lpm: thresholds_lpm(rig), ends_s: None }
     }
 
     /// Takes in a record, and the replay that has taken it in before; `renewed` where its estimates are new.
