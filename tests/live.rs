@@ -232,7 +232,7 @@ fn what_was_wrong_once_does_not_keep_a_stream_in_doubt_for_ever() {
         }
     };
     let scatters = |t_s: f64, sample: &mut Sample<f64>| {
-        let by_m3s = if wrong(t_s) { 4e-5 * (40.0 * t_s).sin() } else { 0.0 };
+        let by_m3s = if wrong(t_s) { 7e-5 * (40.0 * t_s).sin() } else { 0.0 };
         sample.qa_m3s = sample.qa_m3s.map(|flow| flow + by_m3s);
     };
     for (rows, said) in [

@@ -10,6 +10,8 @@ use pitchleak::trace::TraceReader;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_testkit::lies::judge::{self, Judgement, Said, judge, recorded};
 use pitchleak_testkit::lies::{Family, LEAKING, Lie, leak_name, rig, truths};
+use pitchleak_testkit::trace_text::{file, row};
+use pitchleak_testkit::{Motion, noisy, seeded};
 use rayon::prelude::*;
 use std::io::Cursor;
 
@@ -157,4 +159,32 @@ fn odds_of_the_rig_file_move_the_posterior_by_as_much() {
     let (usual, given) = (of(Odds::default()), of(Odds::new([("flow_zeros", 0.5)])));
     // The table has 20 % against 80 %.
     assert!((given / usual / 4.0 - 1.0).abs() < 0.05, "{usual} {given}");
+}
+
+/// What nothing explains may be as much of a leak: a flow that swings by what no explanation knows hides a small leak, and leaves a
+/// large one sure.
+#[test]
+fn what_nothing_explains_is_weighed_by_its_size() {
+    let rig = rig(1e-3);
+    let judged = |internal: f64, swing_m3s: f64| {
+        let motion = Motion::wind_like(PerLeak { internal, ..PerLeak::default() });
+        let mut random = seeded(5);
+        let read = |k: u32| {
+            let t_s = 0.01 * f64::from(k);
+            let mut sample = noisy(&motion.sample(t_s), &rig.sensors(), &mut random);
+            sample.qa_m3s = sample.qa_m3s.map(|flow| flow + swing_m3s * (4.0 * t_s).sin());
+            row(t_s, motion.position_m.slope(t_s), &sample)
+        };
+        let rows: Vec<_> = (0..6000).map(read).collect();
+        let text = Box::new(Cursor::new(file(&rows).into_bytes()));
+        let mut reader = TraceReader::from_stream("trace", text, &rig).unwrap();
+        replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap()
+    };
+    let small = judged(0.0, 2e-5).verdict;
+    assert_eq!(small.status, Status::NotSure, "{}", small.text);
+    let large = judged(4e-11, 3e-5).verdict;
+    assert_eq!((large.status, large.faults), (Status::Leak, vec![Leak::Internal]), "{}", large.text);
+    assert!(large.text.contains("What remains unexplained is 5."), "{}", large.text);
+    let larger_swing = judged(5e-11, 5e-5).verdict;
+    assert_eq!(larger_swing.status, Status::Doubtful, "{}", larger_swing.text);
 }

@@ -21,8 +21,8 @@ use std::collections::BTreeSet;
 pub const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
 const WANDER_DOUBT: f64 = 0.3;
-/// A noise scale of so many times the readings' own scatter contradicts the model: below, what remains widens the intervals
-/// by enough (docs/bench/judge.md).
+/// A noise scale of so many times the readings' own scatter contradicts the model, where the leaks are open besides: what
+/// remains widens their intervals.
 pub const MISFIT_DOUBT: f64 = 3.0;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
@@ -217,12 +217,14 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     };
     let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - alpha).collect();
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
-    let status = if wiring > WIRING_DOUBT || misfit > MISFIT_DOUBT {
+    let status = if wiring > WIRING_DOUBT {
         Status::Doubtful
     } else if !faults.is_empty() {
         Status::Leak
     } else if ruled_out.len() == Leak::ALL.len() {
         Status::Sound
+    } else if misfit > MISFIT_DOUBT {
+        Status::Doubtful
     } else {
         Status::NotSure
     };

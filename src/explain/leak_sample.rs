@@ -4,7 +4,7 @@ use super::candidates::Scored;
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, fit};
-use super::hypothesis::{Hypothesis, State};
+use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::Pass;
 use super::sizes::{Found, over_declared};
@@ -13,6 +13,9 @@ use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// Explanations so much less probable than the best have a sample of few points: e⁻⁴ is two in a hundred; numerical.
 const LITTLE_LN: f64 = 4.0;
+
+/// A missing effect may be so many times as much of a leak as what is left of it: what looks like a leak is fitted away. A guess.
+const HIDDEN: f64 = 2.0;
 
 /// A weighed explanation.
 #[derive(Clone, Debug)]
@@ -118,6 +121,22 @@ impl<'a> Fitted<'_, 'a> {
         [0, 1].map(|c| (self.fit.scales[c] / self.weighing.loudness[c]).sqrt())
     }
 
+    /// A leak whose rows would be as large as what the readings show beside the explanation and their own scatter, m³/s. What
+    /// effect that is nobody knows, so the leaks found may be off by as much.
+    fn unexplained_m3s(&self, leak: usize) -> f64 {
+        let Weighing { equations, loudness } = self.weighing;
+        let Some(place) = equations.place(LEAK_COLUMNS[leak], Course::Constant) else { return 0.0 };
+        let (mut left, mut of_leak) = (0.0, 0.0);
+        for (c, loudness) in loudness.into_iter().enumerate() {
+            let rows = equations.rows[c];
+            // Three standard deviations of a mean of squares.
+            let chance = 1.0 + 3.0 * (2.0 / rows.max(1.0)).sqrt();
+            left += rows * (self.fit.scales[c] - chance * loudness).max(0.0);
+            of_leak += equations.gram(c).row(place)[place];
+        }
+        if of_leak > 0.0 { HIDDEN * (left / of_leak).sqrt() * self.pass.full_scale_m3s } else { 0.0 }
+    }
+
     /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of pressure sensors.
     fn leaks_m3s(&self, points: &[[f64; MOST]]) -> Vec<[f64; 3]> {
         let mut out = vec![[0.0; 3]; points.len()];
@@ -138,7 +157,7 @@ impl<'a> Fitted<'_, 'a> {
             // The mean size of a pressure of changing sign follows a zero by an unknown share.
             let spread =
                 if leak == 0 { f64::hypot(sheet, zero) } else { sheet }.hypot(scale.std / scale.value);
-            let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]];
+            let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]].hypot(self.unexplained_m3s(leak));
             for (out, (point, normals)) in out.iter_mut().zip(points.iter().zip(NORMALS.iter())) {
                 let doubt = doubt_m3s * normals[3 + leak];
                 let pressure = lately * (1.0 + zero + spread * normals[leak]);

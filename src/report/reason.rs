@@ -235,7 +235,7 @@ const SENSORS_TELL: &str = "check whether the sensors are as good as declared an
                             diagnose` looks for an effect that the model lacks";
 
 fn model_does_not_fit(decision: &Decision) -> Option<Reason> {
-    (decision.misfit > MISFIT_DOUBT).then(|| {
+    (decision.misfit > MISFIT_DOUBT && !decision.status.is_sure()).then(|| {
         let text = format!(
             "no explanation known fits this trace: what remains is {:.1} times what the readings scatter",
             decision.misfit

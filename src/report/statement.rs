@@ -107,8 +107,9 @@ fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
 
 /// What no explanation fits, where it is too little to contradict a verdict whose intervals it widens.
 fn remains(findings: &Findings<'_>) -> Option<String> {
-    let misfit = findings.decision?.misfit;
-    (misfit > MISFIT_TOLD && misfit <= MISFIT_DOUBT).then(|| {
+    let decision = findings.decision?;
+    let misfit = decision.misfit;
+    (misfit > MISFIT_TOLD && (misfit <= MISFIT_DOUBT || decision.status.is_sure())).then(|| {
         format!("What remains unexplained is {misfit:.1} times what the readings scatter: the intervals allow for it.")
     })
 }
