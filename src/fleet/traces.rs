@@ -60,26 +60,23 @@ impl FleetTrace {
     /// Where a pattern names nothing, the table of rigs or the one rig file can't be used, or the table leaves a trace out.
     pub fn find(patterns: &[String], rigs: &FleetRig) -> Result<Vec<Self>, FleetError> {
         let paths = expand(patterns)?;
-        let table = if let FleetRig::Table(file) = rigs { Some(RigTable::load(file)?) } else { None };
-        let mut shelf = Shelf::default();
+        let table = if let FleetRig::Table(file) = rigs { Some(rig_table(file)?) } else { None };
+        let (mut shelf, paper) = (Shelf::default(), Arc::new(Rig::paper()));
         if let FleetRig::One(file) = rigs {
-            shelf.rigs.insert(file.clone(), Ok(Arc::new(Rig::load(file)?)));
+            shelf.0.insert(file.clone(), Ok(Arc::new(Rig::load(file)?)));
         }
         let trace = |(path, other_names): (PathBuf, Vec<PathBuf>)| {
             let mut identity = TraceIdentity::of(&path);
             let rig_file = match (rigs, &table) {
                 (FleetRig::One(file), _) => Some(file.clone()),
-                (_, None) => shelf.beside(&path),
+                (_, None) => Some(path.with_file_name("rig.toml")).filter(|file| file.is_file()),
                 (_, Some(table)) => {
-                    let Some(row) = table.row_of(&path) else { return Err(path) };
+                    let Some(row) = row_of(table, &path) else { return Err(path) };
                     identity.cylinder = row.cylinder.clone().unwrap_or(identity.cylinder);
                     Some(row.rig.clone())
                 }
             };
-            let rig = match &rig_file {
-                Some(file) => shelf.load(file),
-                None => Ok(shelf.paper()),
-            };
+            let rig = rig_file.as_deref().map_or_else(|| Ok(paper.clone()), |file| shelf.load(file));
             Ok(Self { path, other_names, copies: Vec::new(), identity, rig_file, rig })
         };
         let found: Vec<Result<Self, PathBuf>> = paths.into_iter().map(trace).collect();
@@ -157,25 +154,12 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>, FleetError> {
 
 /// Rig files, each read once.
 #[derive(Default)]
-struct Shelf {
-    paper: Option<Arc<Rig>>,
-    rigs: HashMap<PathBuf, Result<Arc<Rig>, Arc<str>>>,
-    beside: HashMap<PathBuf, Option<PathBuf>>,
-}
+struct Shelf(HashMap<PathBuf, Result<Arc<Rig>, Arc<str>>>);
 
 impl Shelf {
-    fn paper(&mut self) -> Arc<Rig> {
-        self.paper.get_or_insert_with(|| Arc::new(Rig::paper())).clone()
-    }
-
     fn load(&mut self, file: &Path) -> Result<Arc<Rig>, Arc<str>> {
         let load = || Rig::load(file).map(Arc::new).map_err(|error| error.to_string().into());
-        self.rigs.entry(file.to_owned()).or_insert_with(load).clone()
-    }
-
-    fn beside(&mut self, trace: &Path) -> Option<PathBuf> {
-        let file = trace.with_file_name("rig.toml");
-        self.beside.entry(file).or_insert_with_key(|file| file.is_file().then(|| file.clone())).clone()
+        self.0.entry(file.to_owned()).or_insert_with(load).clone()
     }
 }
 
@@ -253,32 +237,25 @@ fn hash(path: &Path, most: u64) -> Option<u64> {
     }
 }
 
-/// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
-/// Paths count from the table's folder; the first row that fits a trace is taken.
-struct RigTable {
-    rows: Vec<RigRow>,
-}
-
-/// What the table says of a trace.
+/// What a table of rigs says of a trace.
 struct RigRow {
     pattern: Pattern,
     rig: PathBuf,
     cylinder: Option<String>,
 }
 
-impl RigTable {
-    /// Reads a table; of one that can't be read the error names the row.
-    fn load(path: &Path) -> Result<Self, FleetError> {
-        let what = path.display().to_string();
-        read(path).map(|rows| Self { rows }).map_err(|why| FleetError::Content { what, why })
-    }
+/// The first row that fits a trace.
+fn row_of<'t>(table: &'t [RigRow], trace: &Path) -> Option<&'t RigRow> {
+    let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
+    let trace = std::path::absolute(trace).unwrap_or_else(|_| trace.to_owned());
+    let trace = trace.to_string_lossy();
+    table.iter().find(|row| row.pattern.matches_with(&trace, options))
+}
 
-    fn row_of(&self, trace: &Path) -> Option<&RigRow> {
-        let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
-        let trace = std::path::absolute(trace).unwrap_or_else(|_| trace.to_owned());
-        let trace = trace.to_string_lossy();
-        self.rows.iter().find(|row| row.pattern.matches_with(&trace, options))
-    }
+/// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
+/// Paths count from the table's folder; of one that can't be read the error names the row.
+fn rig_table(path: &Path) -> Result<Vec<RigRow>, FleetError> {
+    read(path).map_err(|why| FleetError::Content { what: path.display().to_string(), why })
 }
 
 fn read(path: &Path) -> Result<Vec<RigRow>, String> {
