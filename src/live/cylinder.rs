@@ -21,10 +21,10 @@ pub(super) struct Cylinder {
     /// Time of the last estimate said, s.
     told_s: Option<f64>,
     order: Order,
-    history: History,
+    pub history: History,
     weighing: Weighing,
     #[serde(skip)]
-    notices: Notices,
+    pub notices: Notices,
     /// Something came since the last [`Snapshot`](super::Snapshot).
     #[serde(skip)]
     pub changed: bool,
@@ -146,7 +146,7 @@ impl Cylinder {
 
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
-        if self.stream.time_s() != self.told_s || !self.weighing.is_of_now(&self.stream) {
+        if [self.told_s, self.weighing.at_s] != [self.stream.time_s(); 2] {
             // Kept apart: a run that goes on from here says what one run says.
             let decision = self.stream.decision();
             events.extend(self.estimate(name, decision.as_ref()).map(|told| Event::Estimate(Box::new(told))));
@@ -165,15 +165,6 @@ impl Cylinder {
     pub(super) fn tell_counted(&mut self, name: &str, events: &mut Vec<Event>) {
         let rest = self.notices.rest(name, self.times_s());
         events.extend(rest.into_iter().map(|notice| Event::Notice(self.explained(notice))));
-    }
-
-    /// How many lines of each kind were left out.
-    pub(super) fn left_out(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.notices.totals()
-    }
-
-    pub(super) fn history(&self) -> &History {
-        &self.history
     }
 
     /// Of the last line, and of the last good one.
@@ -203,7 +194,7 @@ impl Cylinder {
             return;
         }
         self.weighing.renew(&self.stream);
-        let Some(estimate) = self.estimate(name, self.weighing.decision()) else { return };
+        let Some(estimate) = self.estimate(name, self.weighing.decision.as_ref()) else { return };
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
@@ -230,7 +221,7 @@ impl Cylinder {
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
         self.weighing.renew_now(&self.stream);
-        let report = self.stream.report_as(name, self.weighing.decision());
+        let report = self.stream.report_as(name, self.weighing.decision.as_ref());
         let Some(ReplayReport { leakage, alarms, verdict, .. }) = report else { return };
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
@@ -285,6 +276,7 @@ const BOUNDS_S: (f64, f64) = (1.0, 60.0);
 /// long as nothing happens.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Weighing {
+    /// As it stands.
     decision: Option<Decision>,
     /// Times of it, and of the first sample or the last alarm, s.
     at_s: Option<f64>,
@@ -292,11 +284,6 @@ struct Weighing {
 }
 
 impl Weighing {
-    /// The decision as it stands.
-    fn decision(&self) -> Option<&Decision> {
-        self.decision.as_ref()
-    }
-
     /// Decides anew where that is due.
     fn renew(&mut self, stream: &Stream) {
         let Some(t_s) = stream.time_s() else { return };
@@ -313,11 +300,6 @@ impl Weighing {
         let Some(t_s) = stream.time_s() else { return };
         self.since_s = Some(t_s);
         self.weigh(stream, t_s);
-    }
-
-    /// Whether the decision is of the last sample.
-    fn is_of_now(&self, stream: &Stream) -> bool {
-        self.at_s == stream.time_s()
     }
 
     fn weigh(&mut self, stream: &Stream, t_s: f64) {
