@@ -1,5 +1,6 @@
 //! Standard output and standard error.
 
+use crate::failure::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::report::TraceSummary;
 use pitchleak_view::Palette;
@@ -9,10 +10,9 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Writes `text` to standard output.
-pub fn print(text: &str) -> io::Result<()> {
+pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    out.write_all(harmless(text).as_bytes())?;
-    out.flush()
+    out.write_all(harmless(text).as_bytes()).and_then(|()| out.flush()).map_err(Failure::Output)
 }
 
 /// One line on standard error, if that is still open.

@@ -90,7 +90,8 @@ fn serve(
     let mut events = Vec::new();
     let (mut saved, mut changed) = (Instant::now(), false);
     loop {
-        let wait = (changed && checkpoint.is_some()).then(|| CHECKPOINT.saturating_sub(saved.elapsed()));
+        let is_unsaved = changed && checkpoint.is_some();
+        let wait = if is_unsaved { CHECKPOINT.saturating_sub(saved.elapsed()) } else { Duration::MAX };
         match next(inputs, wait) {
             Some(Input::Lines(lines)) => lines.iter().for_each(|line| watch.take(line, &mut events)),
             Some(Input::TooLong) => {
@@ -120,13 +121,10 @@ fn serve(
 }
 
 /// What wakes the watch next; none where nothing does within `wait`.
-fn next(inputs: &Receiver<Input>, wait: Option<Duration>) -> Option<Input> {
-    match wait {
-        None => Some(inputs.recv().unwrap_or(Input::End)),
-        Some(wait) => match inputs.recv_timeout(wait) {
-            Err(RecvTimeoutError::Timeout) => None,
-            input => Some(input.unwrap_or(Input::End)),
-        },
+fn next(inputs: &Receiver<Input>, wait: Duration) -> Option<Input> {
+    match inputs.recv_timeout(wait) {
+        Err(RecvTimeoutError::Timeout) => None,
+        input => Some(input.unwrap_or(Input::End)),
     }
 }
 
@@ -137,10 +135,9 @@ fn print(events: &[Event], format: OutputFormat) -> Result<(), Failure> {
     }
     let mut text = String::new();
     for event in events {
-        text.push_str(&event.line(format)?);
-        text.push('\n');
+        text += &(event.line(format)? + "\n");
     }
-    output::print(&text).map_err(Failure::Output)
+    output::print(&text)
 }
 
 /// Standard input in a thread of its own, and signals, so that either wakes the watch.
