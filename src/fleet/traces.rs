@@ -25,8 +25,11 @@ pub struct FleetTrace {
     /// The rig file; none for the built-in rig.
     pub rig_file: Option<PathBuf>,
     /// The rig, or why its file can't be used.
-    pub rig: Result<Arc<Rig>, Arc<str>>,
+    pub rig: LoadedRig,
 }
+
+/// A rig, or why its file can't be used.
+type LoadedRig = Result<Arc<Rig>, Arc<str>>;
 
 /// Where the rigs of a fleet come from.
 #[derive(Clone, Debug, Default)]
@@ -61,9 +64,10 @@ impl FleetTrace {
     pub fn find(patterns: &[String], rigs: &FleetRig) -> Result<Vec<Self>, FleetError> {
         let paths = expand(patterns)?;
         let table = if let FleetRig::Table(file) = rigs { Some(rig_table(file)?) } else { None };
-        let (mut shelf, paper) = (Shelf::default(), Arc::new(Rig::paper()));
+        // Each file is read once.
+        let mut known: HashMap<Option<PathBuf>, LoadedRig> = HashMap::new();
         if let FleetRig::One(file) = rigs {
-            shelf.0.insert(file.clone(), Ok(Arc::new(Rig::load(file)?)));
+            known.insert(Some(file.clone()), Ok(Arc::new(Rig::load(file)?)));
         }
         let trace = |(path, other_names): (PathBuf, Vec<PathBuf>)| {
             let mut identity = TraceIdentity::of(&path);
@@ -76,7 +80,11 @@ impl FleetTrace {
                     Some(row.rig.clone())
                 }
             };
-            let rig = rig_file.as_deref().map_or_else(|| Ok(paper.clone()), |file| shelf.load(file));
+            let load = |file: &Option<PathBuf>| {
+                let rig = file.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load);
+                rig.map(Arc::new).map_err(|error| error.to_string().into())
+            };
+            let rig = known.entry(rig_file.clone()).or_insert_with_key(load).clone();
             Ok(Self { path, other_names, copies: Vec::new(), identity, rig_file, rig })
         };
         let found: Vec<Result<Self, PathBuf>> = paths.into_iter().map(trace).collect();
@@ -152,17 +160,6 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>, FleetError> {
     files.collect::<Result<_, _>>().map_err(|error| wrong(error.to_string()))
 }
 
-/// Rig files, each read once.
-#[derive(Default)]
-struct Shelf(HashMap<PathBuf, Result<Arc<Rig>, Arc<str>>>);
-
-impl Shelf {
-    fn load(&mut self, file: &Path) -> Result<Arc<Rig>, Arc<str>> {
-        let load = || Rig::load(file).map(Arc::new).map_err(|error| error.to_string().into());
-        self.0.entry(file.to_owned()).or_insert_with(load).clone()
-    }
-}
-
 /// Within so many bytes the noise of two recordings of one size makes them differ.
 const HEAD_BYTES: usize = 64 << 10;
 
@@ -210,7 +207,7 @@ fn alike(group: &[usize], key: impl Fn(&usize) -> Option<u64>) -> Vec<Vec<usize>
 }
 
 /// Whether a trace is judged alike by both, wherever their files stand.
-fn same_rig(a: &Result<Arc<Rig>, Arc<str>>, b: &Result<Arc<Rig>, Arc<str>>) -> bool {
+fn same_rig(a: &LoadedRig, b: &LoadedRig) -> bool {
     let nameless = |rig: &Rig| Rig { name: String::new(), ..rig.clone() };
     match (a, b) {
         (Ok(a), Ok(b)) => Arc::ptr_eq(a, b) || nameless(a) == nameless(b),

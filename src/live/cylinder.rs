@@ -117,7 +117,7 @@ impl Cylinder {
 
     fn take_next(&mut self, config: &LiveConfig, t_s: f64, line: &Line<'_>, events: &mut Vec<Event>) {
         let before_s = self.stream.time_s();
-        let number = line.number.unwrap_or(self.order.count());
+        let number = line.number.unwrap_or(self.order.count);
         let taken = self.stream.take_line(line.layout, number, line.cells);
         if matches!(taken, Ok(Taken::Good { .. })) {
             self.order.took(t_s);
@@ -155,10 +155,21 @@ impl Cylinder {
         self.tell_counted(name, events);
     }
 
+    /// Of a hold test's report; none of another.
     fn hold(&self, name: &str, report: Option<ReplayReport>) -> Option<Event> {
         let t_s = self.stream.time_s()?;
-        let report = report.filter(|report| HoldTest::tells(report, self.stream.rig()))?;
-        HoldEvent::new(name, t_s, self.time_ns(t_s), report).map(|hold| Event::Hold(Box::new(hold)))
+        let report = report.filter(|report| HoldTest::tells(report, self.rig()))?;
+        Some(Event::Hold(Box::new(HoldEvent {
+            cylinder: name.to_owned(),
+            t_s,
+            status: report.verdict.status,
+            faults: report.verdict.faults,
+            leakage: report.leakage.map(LiveLeakage::from),
+            hold: report.hold?,
+            text: report.verdict.text,
+            reasons: report.verdict.reasons,
+            time_ns: self.time_ns(t_s),
+        })))
     }
 
     /// What was counted and not said.

@@ -2,7 +2,7 @@
 
 use super::history::{LeakSummary, Span};
 use crate::hold::HoldSummary;
-use crate::report::{LeakTrend, Leakage, Reason, ReplayReport, Status};
+use crate::report::{LeakTrend, Leakage, Reason, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -178,23 +178,6 @@ impl NoticeEvent {
     /// Of a cylinder, said at once; no sample goes with it.
     pub(super) fn once(cylinder: String, kind: &str, text: String) -> Self {
         Self { cylinder, t_s: None, kind: kind.to_owned(), count: 1, text }
-    }
-}
-
-impl HoldEvent {
-    /// Of a hold test's report; none of another.
-    pub(super) fn new(cylinder: &str, t_s: f64, time_ns: Option<i64>, report: ReplayReport) -> Option<Self> {
-        Some(Self {
-            cylinder: cylinder.to_owned(),
-            t_s,
-            status: report.verdict.status,
-            faults: report.verdict.faults,
-            leakage: report.leakage.map(LiveLeakage::from),
-            hold: report.hold?,
-            text: report.verdict.text,
-            reasons: report.verdict.reasons,
-            time_ns,
-        })
     }
 }
 

@@ -39,8 +39,7 @@ impl Columns {
         let mut rig = rig(self.rig.as_ref(), std::slice::from_ref(&self.file))?;
         self.text_format.settle(&mut rig);
         let reading = FileReading::of(&self.file, &rig)?;
-        let text = if self.json { reading.to_json()? + "\n" } else { reading.to_text() };
-        output::print(&text)?;
+        output::print_as(self.json, || reading.to_json(), || reading.to_text())?;
         Ok(Outcome::Done)
     }
 }

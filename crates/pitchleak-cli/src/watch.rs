@@ -1,4 +1,5 @@
 use crate::failure::{Failure, at_the_end};
+use crate::input::one_of;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::Rig;
@@ -21,7 +22,7 @@ pub struct Arguments {
     config: Option<PathBuf>,
 
     /// Format of the lines: ndjson, csv or influx [default: told by the first line]
-    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(format, "ndjson, csv, influx"))]
     format: Option<LineFormat>,
 
     /// Print influx line protocol instead of JSON
@@ -45,9 +46,8 @@ const LONGEST_LINE: usize = 64 * 1024;
 /// Blocks of input that wait for the estimators at most.
 const WAITING: usize = 8;
 
-fn format(name: &str) -> Result<LineFormat, String> {
-    let known = LineFormat::NAMES.into_iter().find(|(known, _)| *known == name);
-    known.map(|(_, format)| format).ok_or_else(|| "one of: ndjson, csv, influx".to_owned())
+fn format(name: &str) -> Option<LineFormat> {
+    LineFormat::NAMES.into_iter().find_map(|(known, format)| (known == name).then_some(format))
 }
 
 /// What wakes the watch.

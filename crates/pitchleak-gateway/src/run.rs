@@ -183,8 +183,8 @@ fn serve(service: &mut Service, inputs: &Receiver<Input>, reloader: &mut Reloade
 /// The last checkpoint, then what the broker should have.
 fn end(mut service: Service, inputs: Receiver<Input>, ended: &Receiver<()>) {
     let until = Instant::now() + LAST_CHECKPOINT;
-    while Instant::now() < until && (service.is_saving() || service.has_changed()) {
-        if !service.is_saving() {
+    while Instant::now() < until && (service.waiting.saving || service.waiting.changed) {
+        if !service.waiting.saving {
             service.save();
         }
         // What else comes stays with the broker.
