@@ -30,7 +30,13 @@ pub fn of_cylinder(base: &str, cylinder: &str, kind: &str) -> String {
 
 /// Whether MQTT allows it as a filter.
 pub fn is_filter(filter: &str) -> bool {
-    filter.len() <= 65_535 && !filter.contains('\0') && rumqttc::mqttbytes::valid_filter(filter)
+    let levels: Vec<_> = filter.split('/').collect();
+    let allowed = |(at, level): (usize, &&str)| match *level {
+        "+" => true,
+        "#" => at + 1 == levels.len(),
+        level => !level.contains(['+', '#', '\0']),
+    };
+    !filter.is_empty() && filter.len() <= 65_535 && levels.iter().enumerate().all(allowed)
 }
 
 #[cfg(test)]
