@@ -4,7 +4,6 @@ use super::channel::{Channel, Extreme, Run};
 use super::{CHANNELS, ChannelFault, ChannelFaultKind, ChannelMonitor};
 use crate::rig::Rig;
 use crate::signal::Signal;
-use std::fmt::Write;
 
 /// Fewer readings say nothing of a channel.
 const LEAST_READINGS: u64 = 100;
@@ -79,11 +78,11 @@ impl Judged {
     }
 
     fn fault(&self, kind: ChannelFaultKind, (from_s, to_s): (f64, f64), text: String) -> ChannelFault {
-        ChannelFault { channel: self.signal, kind, from_s, to_s, text, suggestion: suggestion(kind) }
+        let (_, suggestion) = kind.entry();
+        ChannelFault { channel: self.signal, kind, from_s, to_s, text, suggestion }
     }
 
     fn reading(&self, value: f64) -> String {
-        let mut text = String::new();
         let (factor, unit) = match self.signal {
             Signal::Position => (1e3, "mm"),
             Signal::PressureA | Signal::PressureB => (1e-5, "bar"),
@@ -91,27 +90,10 @@ impl Judged {
             _ => (1.0, "N"),
         };
         let shown = value * factor + 0.0;
-        let _ = if shown.abs() < 0.1 && shown != 0.0 {
-            write!(text, "{shown:.2e} {unit}")
+        if shown.abs() < 0.1 && shown != 0.0 {
+            format!("{shown:.2e} {unit}")
         } else {
-            write!(text, "{} {unit}", (shown * 1e3).round() / 1e3)
-        };
-        text
-    }
-}
-
-fn suggestion(kind: ChannelFaultKind) -> &'static str {
-    match kind {
-        ChannelFaultKind::Dead => "check the sensor, its supply and its cable, and which column is read",
-        ChannelFaultKind::Stuck => {
-            "check the sensor and its cable; leave its cells empty while it does not measure"
-        }
-        ChannelFaultKind::Clipped => "check the range of the sensor, its amplifier and the logger's input",
-        ChannelFaultKind::Held => {
-            "record at the rate at which the channel is renewed, or leave the cells between empty"
-        }
-        ChannelFaultKind::Coarse => {
-            "record with more digits, or declare an accuracy that includes the resolution"
+            format!("{} {unit}", (shown * 1e3).round() / 1e3)
         }
     }
 }

@@ -10,38 +10,57 @@ use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::trace::Record;
 use channel::Channel;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// What is wrong with a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChannelFaultKind {
     /// One reading through the whole trace, though the cylinder moves.
-    #[serde(rename = "channel_dead")]
     Dead,
     /// One reading for a part of the trace, though the channel jitters elsewhere.
-    #[serde(rename = "channel_stuck")]
     Stuck,
     /// The readings pile up at their largest or smallest.
-    #[serde(rename = "channel_clipped")]
     Clipped,
     /// Each reading is repeated: the channel is renewed slower than it is sampled.
-    #[serde(rename = "channel_held")]
     Held,
     /// The smallest step between readings is larger than the declared noise.
-    #[serde(rename = "channel_coarse")]
     Coarse,
 }
 
 impl ChannelFaultKind {
     /// Its id, as among the reasons of a verdict.
     pub fn id(self) -> &'static str {
+        self.entry().0
+    }
+
+    /// Its id, and what to check.
+    fn entry(self) -> (&'static str, &'static str) {
         match self {
-            Self::Dead => "channel_dead",
-            Self::Stuck => "channel_stuck",
-            Self::Clipped => "channel_clipped",
-            Self::Held => "channel_held",
-            Self::Coarse => "channel_coarse",
+            Self::Dead => {
+                ("channel_dead", "check the sensor, its supply and its cable, and which column is read")
+            }
+            Self::Stuck => (
+                "channel_stuck",
+                "check the sensor and its cable; leave its cells empty while it does not measure",
+            ),
+            Self::Clipped => {
+                ("channel_clipped", "check the range of the sensor, its amplifier and the logger's input")
+            }
+            Self::Held => (
+                "channel_held",
+                "record at the rate at which the channel is renewed, or leave the cells between empty",
+            ),
+            Self::Coarse => (
+                "channel_coarse",
+                "record with more digits, or declare an accuracy that includes the resolution",
+            ),
         }
+    }
+}
+
+impl Serialize for ChannelFaultKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
     }
 }
 
@@ -73,18 +92,12 @@ const CHANNELS: [Signal; 6] =
     [Signal::Position, Signal::PressureA, Signal::PressureB, Signal::FlowA, Signal::FlowB, Signal::Force];
 
 /// Watches every channel of a trace.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct ChannelMonitor {
     channels: [Channel; CHANNELS.len()],
     first_s: f64,
     last_s: f64,
     rows: u64,
-}
-
-impl Default for ChannelMonitor {
-    fn default() -> Self {
-        Self { channels: [Channel::default(); CHANNELS.len()], first_s: 0.0, last_s: 0.0, rows: 0 }
-    }
 }
 
 impl ChannelMonitor {

@@ -2,7 +2,7 @@
 //! differs is told long before it reaches a threshold.
 
 use super::standing::Answer;
-use super::trend::{Fit, Scatter};
+use super::trend::Scattered;
 use super::{FleetCylinder, FleetRow, count};
 use crate::report::with_interval;
 use nalgebra::SVector;
@@ -113,28 +113,18 @@ struct Difference {
 
 /// Of each cylinder from the mean of the others. None where no cylinder has a second trace.
 fn differences(flows: &[Vec<Estimate<f64>>]) -> Vec<Difference> {
-    let freedom = flows.iter().map(|own| own.len() - 1).sum();
-    let Some(scatter) = Scatter::with_freedom(freedom).filter(|_| flows.len() > 1) else { return Vec::new() };
-    let means = |scatter: f64| -> Option<Vec<Fit<1>>> {
-        let mean = |own: &Vec<Estimate<f64>>| {
-            Fit::of(&own.iter().map(|flow| (SVector::from([1.0]), *flow)).collect::<Vec<_>>(), scatter)
-        };
-        flows.iter().map(mean).collect()
-    };
-    let sum = |fits: &[Fit<1>], of: fn(&Fit<1>) -> f64| fits.iter().map(of).sum::<f64>();
-    let Some(apart) = means(0.0) else { return Vec::new() };
-    let variance = scatter.variance(sum(&apart, |fit| fit.residual), sum(&apart, |fit| fit.free_weight));
-    let Some(means) = means(variance) else { return Vec::new() };
-    let inflation = scatter.inflation(sum(&means, |fit| fit.residual));
-    let siblings = means.len() - 1;
-    let (all, variances) = (sum(&means, |fit| fit.unknowns[0]), sum(&means, |fit| fit.covariance[0]));
-    let difference = |fit: &Fit<1>| {
-        let (mean, own) = (fit.unknowns[0], fit.covariance[0]);
+    let mean = |own: &Vec<Estimate<f64>>| own.iter().map(|flow| (SVector::from([1.0]), *flow)).collect();
+    let groups: Vec<_> = flows.iter().map(mean).collect();
+    let Some(scattered) = Scattered::of(&groups).filter(|_| flows.len() > 1) else { return Vec::new() };
+    let siblings = flows.len() - 1;
+    let means = || scattered.fits.iter().map(|fit| (fit.unknowns[0], fit.covariance[0]));
+    let (all, variances) = (means().map(|of| of.0).sum::<f64>(), means().map(|of| of.1).sum::<f64>());
+    let difference = |(mean, own): (f64, f64)| {
         let more = mean - (all - mean) / siblings as f64;
-        let std = ((own + (variances - own) / (siblings as f64).powi(2)) * inflation).sqrt();
-        Difference { siblings, more, std: std * scatter.width(), chance: scatter.chance(more / std) }
+        let std = ((own + (variances - own) / (siblings as f64).powi(2)) * scattered.inflation).sqrt();
+        Difference { siblings, more, std: std * scattered.width(), chance: scattered.chance(more / std) }
     };
-    means.iter().map(difference).collect()
+    means().map(difference).collect()
 }
 
 #[cfg(test)]

@@ -190,8 +190,7 @@ impl<'r> Told<'r> {
     fn count(&self, choices: &[Choice], shares: &[f64], weight: f64, met: &mut [f64]) {
         let joint: Vec<f64> = shares.iter().zip(&self.likelihoods).map(|(share, of)| share * of).collect();
         for (at, choice) in choices.iter().enumerate() {
-            let of_kind = choices.iter().zip(&joint).filter(|(other, _)| other.kind == choice.kind);
-            let whole: f64 = of_kind.map(|(_, joint)| joint).sum();
+            let whole = in_kind(choice.kind, choices, &joint);
             if whole > 0.0 {
                 met[at] += weight * self.masses[at] * joint[at] / whole;
             }
@@ -226,13 +225,15 @@ fn chosen(explanation: &str, entries: &[Entry]) -> Vec<(Kind, Option<&'static st
     all
 }
 
+/// Sum over the choices of one kind.
+fn in_kind(kind: Kind, choices: &[Choice], values: &[f64]) -> f64 {
+    choices.iter().zip(values).filter(|(choice, _)| choice.kind == kind).map(|(_, value)| value).sum()
+}
+
 /// The most probable shares after so many were met.
 fn updated(choices: &[Choice], met: &[f64]) -> Vec<f64> {
-    let of_kind = |kind: Kind| -> f64 {
-        choices.iter().zip(met).filter(|(choice, _)| choice.kind == kind).map(|(_, met)| met).sum()
-    };
-    let share = |(choice, met): (&Choice, &f64)| {
-        (TABLE_WORTH * choice.table + met) / (TABLE_WORTH + of_kind(choice.kind))
+    let share = |(choice, own): (&Choice, &f64)| {
+        (TABLE_WORTH * choice.table + own) / (TABLE_WORTH + in_kind(choice.kind, choices, met))
     };
     choices.iter().zip(met).map(share).collect()
 }

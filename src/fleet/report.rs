@@ -1,6 +1,6 @@
 //! What was found of a fleet.
 
-use super::{Beside, CylinderTrend, FleetCylinder, FleetOdds, FleetRow, LongTrend};
+use super::{Beside, CylinderLeak, CylinderTrend, FleetCylinder, FleetOdds, FleetRow, LongTrend};
 use crate::report::Status;
 use pitchleak_core::Leak;
 use serde::Serialize;
@@ -106,25 +106,27 @@ impl<'a> FleetReport<'a> {
 
     /// The leaks that differ from those of the cylinder's siblings and do not stand, the surest first.
     pub fn differing(&self) -> Vec<(&FleetCylinder, Leak, &Beside)> {
-        let mut differing = Vec::new();
-        for cylinder in &self.by_cylinder {
-            let known = cylinder.leaks.iter();
-            differing.extend(known.filter_map(|(leak, of)| Some((cylinder, leak, of.differing()?))));
-        }
+        let mut differing = self.leaks(CylinderLeak::differing);
         differing.sort_by(|(_, _, a), (_, _, b)| a.p_value.total_cmp(&b.p_value));
         differing
     }
 
     /// The leaks that grow from trace to trace beyond doubt, the fastest first, with their cylinders.
     pub fn growing(&self) -> Vec<(&str, Leak, &LongTrend)> {
-        let mut growing = Vec::new();
-        for CylinderTrend { cylinder, leaks } in &self.trends {
-            let known = leaks.iter().filter_map(|(leak, long)| Some((leak, long.as_ref()?)));
-            let grows = known.filter(|(_, long)| long.grows());
-            growing.extend(grows.map(|(leak, long)| (cylinder.as_str(), leak, long)));
-        }
+        let mut growing = self.leaks(|of| of.trend.as_ref().filter(|long| long.grows()));
         growing.sort_by(|(_, _, a), (_, _, b)| b.trend.slope_lpm_per_h.total_cmp(&a.trend.slope_lpm_per_h));
-        growing
+        growing.into_iter().map(|(one, leak, long)| (one.cylinder.as_str(), leak, long)).collect()
+    }
+
+    /// What is told of some leaks, with their cylinders.
+    fn leaks<'r, T>(
+        &'r self,
+        told: impl Fn(&'r CylinderLeak) -> Option<&'r T>,
+    ) -> Vec<(&'r FleetCylinder, Leak, &'r T)> {
+        let of_one = |cylinder: &'r FleetCylinder| {
+            Leak::ALL.map(|leak| Some((cylinder, leak, told(&cylinder.leaks[leak])?)))
+        };
+        self.by_cylinder.iter().flat_map(of_one).flatten().collect()
     }
 }
 

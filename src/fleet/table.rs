@@ -13,6 +13,7 @@ use std::path::Path;
 /// Columns of one length, each with its header.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FleetTable {
+    rows: usize,
     columns: Vec<(String, FleetColumn)>,
 }
 
@@ -71,7 +72,7 @@ impl FleetTable {
             ("warnings".to_owned(), texts(&|row| Some(row.warnings.join("; ")))),
             ("error".to_owned(), texts(&|row| row.error.clone())),
         ]);
-        Self { columns }
+        Self { rows: rows.len(), columns }
     }
 
     /// With one more column at its end; `values` are as many as the rows.
@@ -88,21 +89,11 @@ impl FleetTable {
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.columns.first().map_or(0, |(_, column)| column.len())
+        self.rows
     }
 }
 
 impl FleetColumn {
-    fn len(&self) -> usize {
-        match self {
-            Self::Texts(values) => values.len(),
-            Self::Times(values) => values.len(),
-            Self::Numbers(values) => values.len(),
-            Self::Counts(values) => values.len(),
-            Self::Flags(values) => values.len(),
-        }
-    }
-
     /// A cell as text; numbers read back to the same.
     pub(super) fn cell(&self, row: usize) -> String {
         fn text<T: ToString>(values: &[Option<T>], row: usize) -> String {

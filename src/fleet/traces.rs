@@ -25,8 +25,11 @@ pub struct FleetTrace {
     /// The rig file; none for the built-in rig.
     pub rig_file: Option<PathBuf>,
     /// The rig, or why its file can't be used.
-    pub rig: Result<Arc<Rig>, Arc<str>>,
+    pub rig: LoadedRig,
 }
+
+/// A rig, or why its file can't be used.
+type LoadedRig = Result<Arc<Rig>, Arc<str>>;
 
 /// Where the rigs of a fleet come from.
 #[derive(Clone, Debug, Default)]
@@ -60,26 +63,28 @@ impl FleetTrace {
     /// Where a pattern names nothing, the table of rigs or the one rig file can't be used, or the table leaves a trace out.
     pub fn find(patterns: &[String], rigs: &FleetRig) -> Result<Vec<Self>, FleetError> {
         let paths = expand(patterns)?;
-        let table = if let FleetRig::Table(file) = rigs { Some(RigTable::load(file)?) } else { None };
-        let mut shelf = Shelf::default();
+        let table = if let FleetRig::Table(file) = rigs { Some(rig_table(file)?) } else { None };
+        // Each file is read once.
+        let mut known: HashMap<Option<PathBuf>, LoadedRig> = HashMap::new();
         if let FleetRig::One(file) = rigs {
-            shelf.rigs.insert(file.clone(), Ok(Arc::new(Rig::load(file)?)));
+            known.insert(Some(file.clone()), Ok(Arc::new(Rig::load(file)?)));
         }
         let trace = |(path, other_names): (PathBuf, Vec<PathBuf>)| {
             let mut identity = TraceIdentity::of(&path);
             let rig_file = match (rigs, &table) {
                 (FleetRig::One(file), _) => Some(file.clone()),
-                (_, None) => shelf.beside(&path),
+                (_, None) => Some(path.with_file_name("rig.toml")).filter(|file| file.is_file()),
                 (_, Some(table)) => {
-                    let Some(row) = table.row_of(&path) else { return Err(path) };
+                    let Some(row) = row_of(table, &path) else { return Err(path) };
                     identity.cylinder = row.cylinder.clone().unwrap_or(identity.cylinder);
                     Some(row.rig.clone())
                 }
             };
-            let rig = match &rig_file {
-                Some(file) => shelf.load(file),
-                None => Ok(shelf.paper()),
+            let load = |file: &Option<PathBuf>| {
+                let rig = file.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load);
+                rig.map(Arc::new).map_err(|error| error.to_string().into())
             };
+            let rig = known.entry(rig_file.clone()).or_insert_with_key(load).clone();
             Ok(Self { path, other_names, copies: Vec::new(), identity, rig_file, rig })
         };
         let found: Vec<Result<Self, PathBuf>> = paths.into_iter().map(trace).collect();
@@ -155,30 +160,6 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>, FleetError> {
     files.collect::<Result<_, _>>().map_err(|error| wrong(error.to_string()))
 }
 
-/// Rig files, each read once.
-#[derive(Default)]
-struct Shelf {
-    paper: Option<Arc<Rig>>,
-    rigs: HashMap<PathBuf, Result<Arc<Rig>, Arc<str>>>,
-    beside: HashMap<PathBuf, Option<PathBuf>>,
-}
-
-impl Shelf {
-    fn paper(&mut self) -> Arc<Rig> {
-        self.paper.get_or_insert_with(|| Arc::new(Rig::paper())).clone()
-    }
-
-    fn load(&mut self, file: &Path) -> Result<Arc<Rig>, Arc<str>> {
-        let load = || Rig::load(file).map(Arc::new).map_err(|error| error.to_string().into());
-        self.rigs.entry(file.to_owned()).or_insert_with(load).clone()
-    }
-
-    fn beside(&mut self, trace: &Path) -> Option<PathBuf> {
-        let file = trace.with_file_name("rig.toml");
-        self.beside.entry(file).or_insert_with_key(|file| file.is_file().then(|| file.clone())).clone()
-    }
-}
-
 /// Within so many bytes the noise of two recordings of one size makes them differ.
 const HEAD_BYTES: usize = 64 << 10;
 
@@ -226,7 +207,7 @@ fn alike(group: &[usize], key: impl Fn(&usize) -> Option<u64>) -> Vec<Vec<usize>
 }
 
 /// Whether a trace is judged alike by both, wherever their files stand.
-fn same_rig(a: &Result<Arc<Rig>, Arc<str>>, b: &Result<Arc<Rig>, Arc<str>>) -> bool {
+fn same_rig(a: &LoadedRig, b: &LoadedRig) -> bool {
     let nameless = |rig: &Rig| Rig { name: String::new(), ..rig.clone() };
     match (a, b) {
         (Ok(a), Ok(b)) => Arc::ptr_eq(a, b) || nameless(a) == nameless(b),
@@ -253,32 +234,25 @@ fn hash(path: &Path, most: u64) -> Option<u64> {
     }
 }
 
-/// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
-/// Paths count from the table's folder; the first row that fits a trace is taken.
-struct RigTable {
-    rows: Vec<RigRow>,
-}
-
-/// What the table says of a trace.
+/// What a table of rigs says of a trace.
 struct RigRow {
     pattern: Pattern,
     rig: PathBuf,
     cylinder: Option<String>,
 }
 
-impl RigTable {
-    /// Reads a table; of one that can't be read the error names the row.
-    fn load(path: &Path) -> Result<Self, FleetError> {
-        let what = path.display().to_string();
-        read(path).map(|rows| Self { rows }).map_err(|why| FleetError::Content { what, why })
-    }
+/// The first row that fits a trace.
+fn row_of<'t>(table: &'t [RigRow], trace: &Path) -> Option<&'t RigRow> {
+    let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
+    let trace = std::path::absolute(trace).unwrap_or_else(|_| trace.to_owned());
+    let trace = trace.to_string_lossy();
+    table.iter().find(|row| row.pattern.matches_with(&trace, options))
+}
 
-    fn row_of(&self, trace: &Path) -> Option<&RigRow> {
-        let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
-        let trace = std::path::absolute(trace).unwrap_or_else(|_| trace.to_owned());
-        let trace = trace.to_string_lossy();
-        self.rows.iter().find(|row| row.pattern.matches_with(&trace, options))
-    }
+/// A CSV file with the columns `trace` (a path or a pattern), `rig` (a rig file) and, optionally, `cylinder` (its name).
+/// Paths count from the table's folder; of one that can't be read the error names the row.
+fn rig_table(path: &Path) -> Result<Vec<RigRow>, FleetError> {
+    read(path).map_err(|why| FleetError::Content { what: path.display().to_string(), why })
 }
 
 fn read(path: &Path) -> Result<Vec<RigRow>, String> {

@@ -123,16 +123,19 @@ struct Line {
     scatter: f64,
 }
 
-/// A least-squares fit of flows, each a sum of `N` unknowns times known numbers.
+/// A flow, and the numbers by which it is the sum of `N` unknowns.
+type Term<const N: usize> = (SVector<f64, N>, Estimate<f64>);
+
+/// A least-squares fit of flows.
 pub(super) struct Fit<const N: usize> {
     /// The unknowns.
     pub unknowns: SVector<f64, N>,
     /// Their covariance, were each flow's variance the one that it was weighted by.
     pub covariance: SMatrix<f64, N, N>,
     /// Weighted sum of the squares of what the flows differ from the fit.
-    pub residual: f64,
+    residual: f64,
     /// Weights times what is not leverage.
-    pub free_weight: f64,
+    free_weight: f64,
 }
 
 impl<const N: usize> Fit<N> {
@@ -140,7 +143,7 @@ impl<const N: usize> Fit<N> {
     const MOST_INFLATION: f64 = 1e9;
 
     /// Weighted by the inverse of each flow's own variance plus `scatter`.
-    pub fn of(flows: &[(SVector<f64, N>, Estimate<f64>)], scatter: f64) -> Option<Self> {
+    fn of(flows: &[Term<N>], scatter: f64) -> Option<Self> {
         let weighed = || flows.iter().map(|(x, y)| (x, y.value, (y.std.powi(2) + scatter).recip()));
         let normal: SMatrix<f64, N, N> = weighed().map(|(x, _, w)| w * x * x.transpose()).sum();
         let right: SVector<f64, N> = weighed().map(|(x, y, w)| w * y * x).sum();
@@ -160,44 +163,45 @@ impl Line {
     /// Regression with a scatter between traces beside their own errors; 1.96 of its standard deviations are the half of
     /// the 95 % interval.
     fn through(points: &[(f64, Estimate<f64>)]) -> Option<Self> {
-        let scatter = Scatter::with_freedom(points.len().checked_sub(2)?)?;
-        let points: Vec<_> = points.iter().map(|(t, y)| (SVector::from([1.0, *t]), *y)).collect();
-        let own = Fit::of(&points, 0.0)?;
-        let variance = scatter.variance(own.residual, own.free_weight);
-        let Fit { unknowns, covariance, residual, .. } = Fit::of(&points, variance)?;
-        let inflation = scatter.inflation(residual).sqrt() * scatter.width();
+        let points = points.iter().map(|(t, y)| (SVector::from([1.0, *t]), *y)).collect();
+        let scattered = Scattered::of(&[points])?;
+        let [Fit { unknowns, covariance, .. }] = &scattered.fits[..] else { return None };
+        let inflation = scattered.inflation.sqrt() * scattered.width();
         let std = covariance.diagonal().map(|variance| variance.sqrt() * inflation);
         let [level, slope] = [0, 1].map(|at| Estimate { value: unknowns[at], std: std[at] });
-        Some(Self { level, slope, scatter: variance.sqrt() })
+        Some(Self { level, slope, scatter: scattered.variance.sqrt() })
     }
 }
 
-/// A weighted fit with a scatter between traces beside their own errors.
+/// Weighted fits of groups of flows with one scatter between traces beside the flows' own errors.
 ///
 /// The scatter's variance is by moments (DerSimonian & Laird 1986, "Meta-analysis in clinical trials"), the intervals by
 /// Student's t and the weighted residual, never below 1 (Knapp & Hartung 2003, "Improved tests for a random effects
 /// meta-regression with a single covariate").
-pub(super) struct Scatter {
-    freedom: f64,
+pub(super) struct Scattered<const N: usize> {
+    /// Of each group.
+    pub fits: Vec<Fit<N>>,
+    /// Factor of their variances, by the weighted residual.
+    pub inflation: f64,
+    /// Between traces.
+    variance: f64,
     student: StudentsT,
 }
 
-impl Scatter {
-    /// Of a fit with so many values more than unknowns. None without one: then nobody knows what traces scatter.
-    pub fn with_freedom(freedom: usize) -> Option<Self> {
-        let freedom = freedom as f64;
-        Some(Self { freedom, student: StudentsT::new(0.0, 1.0, freedom).ok()? })
-    }
-
-    /// Variance between traces, from a fit weighted by the values' own variances: its weighted sum of squares, and its
-    /// weight times what is not leverage.
-    pub fn variance(&self, residual: f64, free_weight: f64) -> f64 {
-        ((residual - self.freedom) / free_weight).max(0.0)
-    }
-
-    /// Factor of the variances of a fit with this weighted sum of squares.
-    pub fn inflation(&self, residual: f64) -> f64 {
-        (residual / self.freedom).max(1.0)
+impl<const N: usize> Scattered<N> {
+    /// None where no flow is left beside the unknowns: then nobody knows what traces scatter.
+    pub fn of(groups: &[Vec<Term<N>>]) -> Option<Self> {
+        let freedom = groups.iter().map(|group| group.len().checked_sub(N)).sum::<Option<usize>>()? as f64;
+        let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
+        let fits =
+            |scatter: f64| groups.iter().map(|group| Fit::of(group, scatter)).collect::<Option<Vec<_>>>();
+        let sum = |fits: &[Fit<N>], of: fn(&Fit<N>) -> f64| fits.iter().map(of).sum::<f64>();
+        let own = fits(0.0)?;
+        let excess = sum(&own, |fit| fit.residual) - freedom;
+        let variance = (excess / sum(&own, |fit| fit.free_weight)).max(0.0);
+        let fits = fits(variance)?;
+        let inflation = (sum(&fits, |fit| fit.residual) / freedom).max(1.0);
+        Some(Self { fits, inflation, variance, student })
     }
 
     /// Factor of standard deviations such that 1.96 of them are the half of the 95 % interval.

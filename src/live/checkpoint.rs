@@ -103,9 +103,9 @@ impl Snapshot {
 /// Why there is no checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// There is no folder for it.
+    /// There is no folder for it, or the disk does not take it.
     #[error(transparent)]
-    Folder(#[from] OutputError),
+    Write(#[from] OutputError),
     /// Another process keeps its state there: both would spoil it.
     #[error("{folder}: another process keeps its state there")]
     Taken {
@@ -115,14 +115,6 @@ pub enum CheckpointError {
     /// The system does not let us read it.
     #[error("cannot read {file}: {source}")]
     Read {
-        /// Which.
-        file: String,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The disk does not take it.
-    #[error("cannot write {file}: {source}")]
-    Write {
         /// Which.
         file: String,
         /// What the system says.
@@ -139,15 +131,12 @@ impl Checkpoint {
         let folder = folder.as_ref();
         output::make_folder(folder)?;
         let path = folder.join(LOCK);
-        let write = |source| CheckpointError::Write { file: path.display().to_string(), source };
+        let write = |source| not_written(&path, source);
         let lock = File::options().create(true).truncate(false).write(true).open(&path).map_err(write)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(CheckpointError::Taken { folder: folder.display().to_string() });
-            }
-            Err(TryLockError::Error(source)) => return Err(write(source)),
-        }
+        lock.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => CheckpointError::Taken { folder: folder.display().to_string() },
+            TryLockError::Error(source) => write(source),
+        })?;
         let folder = folder.join(CYLINDERS);
         output::make_folder(&folder)?;
         Ok(Self { folder, _lock: lock, files: Mutex::default() })
@@ -168,9 +157,7 @@ impl Checkpoint {
             bytes += self.put(&mut files, name, cylinder)?;
         }
         let synced = File::open(&self.folder).and_then(|folder| folder.sync_all());
-        synced
-            .map_err(|source| CheckpointError::Write { file: self.folder.display().to_string(), source })?;
-        Ok(bytes)
+        synced.map(|()| bytes).map_err(|source| not_written(&self.folder, source))
     }
 
     fn files(&self) -> MutexGuard<'_, BTreeMap<String, Written>> {
@@ -209,7 +196,7 @@ impl Checkpoint {
             let written = file.write_all(&bytes).and_then(|()| file.sync_data());
             written.inspect_err(|_| _ = file.set_len(end as u64)).map(|()| bytes.len())
         });
-        written.map_err(|source| self.not_written(name, source))
+        written.map_err(|source| not_written(&self.file(name, STATE), source))
     }
 
     /// A new file, all on the disk.
@@ -224,7 +211,7 @@ impl Checkpoint {
         written.map_err(|source| {
             // Room for what else the disk has to take.
             let _ = fs::remove_file(self.file(name, NEW));
-            self.not_written(name, source)
+            not_written(&self.file(name, STATE), source)
         })
     }
 
@@ -237,10 +224,6 @@ impl Checkpoint {
             let _ = fs::hard_link(self.file(name, STATE), before);
         }
         fs::rename(self.file(name, NEW), self.file(name, ending))
-    }
-
-    fn not_written(&self, name: &str, source: io::Error) -> CheckpointError {
-        CheckpointError::Write { file: self.file(name, STATE).display().to_string(), source }
     }
 
     fn file(&self, name: &str, ending: &str) -> PathBuf {
@@ -330,6 +313,10 @@ impl Checkpoint {
             let _ = if is_aside { fs::remove_file(before) } else { fs::rename(before, aside) };
         }
     }
+}
+
+fn not_written(path: &Path, source: io::Error) -> CheckpointError {
+    OutputError::Write { path: path.to_owned(), source }.into()
 }
 
 /// Of the cylinder whose state a file holds.

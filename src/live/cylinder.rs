@@ -21,10 +21,10 @@ pub(super) struct Cylinder {
     /// Time of the last estimate said, s.
     told_s: Option<f64>,
     order: Order,
-    history: History,
+    pub history: History,
     weighing: Weighing,
     #[serde(skip)]
-    notices: Notices,
+    pub notices: Notices,
     /// Something came since the last [`Snapshot`](super::Snapshot).
     #[serde(skip)]
     pub changed: bool,
@@ -117,7 +117,7 @@ impl Cylinder {
 
     fn take_next(&mut self, config: &LiveConfig, t_s: f64, line: &Line<'_>, events: &mut Vec<Event>) {
         let before_s = self.stream.time_s();
-        let number = line.number.unwrap_or(self.order.count());
+        let number = line.number.unwrap_or(self.order.count);
         let taken = self.stream.take_line(line.layout, number, line.cells);
         if matches!(taken, Ok(Taken::Good { .. })) {
             self.order.took(t_s);
@@ -146,7 +146,7 @@ impl Cylinder {
 
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
-        if self.stream.time_s() != self.told_s || !self.weighing.is_of_now(&self.stream) {
+        if [self.told_s, self.weighing.at_s] != [self.stream.time_s(); 2] {
             // Kept apart: a run that goes on from here says what one run says.
             let decision = self.stream.decision();
             events.extend(self.estimate(name, decision.as_ref()).map(|told| Event::Estimate(Box::new(told))));
@@ -155,25 +155,27 @@ impl Cylinder {
         self.tell_counted(name, events);
     }
 
+    /// Of a hold test's report; none of another.
     fn hold(&self, name: &str, report: Option<ReplayReport>) -> Option<Event> {
         let t_s = self.stream.time_s()?;
-        let report = report.filter(|report| HoldTest::tells(report, self.stream.rig()))?;
-        HoldEvent::new(name, t_s, self.time_ns(t_s), report).map(|hold| Event::Hold(Box::new(hold)))
+        let report = report.filter(|report| HoldTest::tells(report, self.rig()))?;
+        Some(Event::Hold(Box::new(HoldEvent {
+            cylinder: name.to_owned(),
+            t_s,
+            status: report.verdict.status,
+            faults: report.verdict.faults,
+            leakage: report.leakage.map(LiveLeakage::from),
+            hold: report.hold?,
+            text: report.verdict.text,
+            reasons: report.verdict.reasons,
+            time_ns: self.time_ns(t_s),
+        })))
     }
 
     /// What was counted and not said.
     pub(super) fn tell_counted(&mut self, name: &str, events: &mut Vec<Event>) {
         let rest = self.notices.rest(name, self.times_s());
         events.extend(rest.into_iter().map(|notice| Event::Notice(self.explained(notice))));
-    }
-
-    /// How many lines of each kind were left out.
-    pub(super) fn left_out(&self) -> impl Iterator<Item = (&str, u64)> {
-        self.notices.totals()
-    }
-
-    pub(super) fn history(&self) -> &History {
-        &self.history
     }
 
     /// Of the last line, and of the last good one.
@@ -203,7 +205,7 @@ impl Cylinder {
             return;
         }
         self.weighing.renew(&self.stream);
-        let Some(estimate) = self.estimate(name, self.weighing.decision()) else { return };
+        let Some(estimate) = self.estimate(name, self.weighing.decision.as_ref()) else { return };
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
@@ -230,7 +232,7 @@ impl Cylinder {
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
         self.weighing.renew_now(&self.stream);
-        let report = self.stream.report_as(name, self.weighing.decision());
+        let report = self.stream.report_as(name, self.weighing.decision.as_ref());
         let Some(ReplayReport { leakage, alarms, verdict, .. }) = report else { return };
         for alarm in alarms {
             let time_ns = self.time_ns(alarm.time_s);
@@ -285,6 +287,7 @@ const BOUNDS_S: (f64, f64) = (1.0, 60.0);
 /// long as nothing happens.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Weighing {
+    /// As it stands.
     decision: Option<Decision>,
     /// Times of it, and of the first sample or the last alarm, s.
     at_s: Option<f64>,
@@ -292,11 +295,6 @@ struct Weighing {
 }
 
 impl Weighing {
-    /// The decision as it stands.
-    fn decision(&self) -> Option<&Decision> {
-        self.decision.as_ref()
-    }
-
     /// Decides anew where that is due.
     fn renew(&mut self, stream: &Stream) {
         let Some(t_s) = stream.time_s() else { return };
@@ -313,11 +311,6 @@ impl Weighing {
         let Some(t_s) = stream.time_s() else { return };
         self.since_s = Some(t_s);
         self.weigh(stream, t_s);
-    }
-
-    /// Whether the decision is of the last sample.
-    fn is_of_now(&self, stream: &Stream) -> bool {
-        self.at_s == stream.time_s()
     }
 
     fn weigh(&mut self, stream: &Stream, t_s: f64) {

@@ -2,11 +2,10 @@
 
 use super::history::{LeakSummary, Span};
 use crate::hold::HoldSummary;
-use crate::report::{LeakTrend, Leakage, Reason, ReplayReport, Status};
+use crate::report::{LeakTrend, Leakage, Reason, Status};
 use pitchleak_core::{AlarmState, Leak, PerLeak};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 /// How events are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -182,23 +181,6 @@ impl NoticeEvent {
     }
 }
 
-impl HoldEvent {
-    /// Of a hold test's report; none of another.
-    pub(super) fn new(cylinder: &str, t_s: f64, time_ns: Option<i64>, report: ReplayReport) -> Option<Self> {
-        Some(Self {
-            cylinder: cylinder.to_owned(),
-            t_s,
-            status: report.verdict.status,
-            faults: report.verdict.faults,
-            leakage: report.leakage.map(LiveLeakage::from),
-            hold: report.hold?,
-            text: report.verdict.text,
-            reasons: report.verdict.reasons,
-            time_ns,
-        })
-    }
-}
-
 impl Event {
     /// The event as a line, without its end.
     ///
@@ -231,50 +213,47 @@ impl Event {
     fn influx_fields(&self) -> String {
         let quoted =
             |text: &str| text.replace(char::is_control, " ").replace('\\', "\\\\").replace('"', "\\\"");
-        let mut fields = String::new();
-        // Writing to a string does not fail.
-        let _ = match self {
+        let each_leak = |fields: &dyn Fn(Leak) -> String| Leak::ALL.map(fields).concat();
+        match self {
             Self::Estimate(event) => {
-                let _ = write!(fields, "t_s={},status=\"{}\"", event.t_s, event.status.id());
-                if let Some(reason) = event.reasons.first() {
-                    let _ = write!(fields, ",reason=\"{}\"", reason.id.name());
-                }
-                Leak::ALL.into_iter().try_for_each(|leak| {
-                    fields.push_str(&event.leakage[leak].influx(leak));
-                    if let Some(trend) = event.trend[leak] {
-                        write!(fields, ",{}_slope_lpm_per_h={}", leak.id(), trend.slope_lpm_per_h)?;
-                    }
-                    write!(fields, ",{}_alarm={}", leak.id(), event.faults.contains(&leak))
-                })
+                let reason = event.reasons.first().map(|reason| format!(",reason=\"{}\"", reason.id.name()));
+                let leaks = each_leak(&|leak| {
+                    let (name, mean, alarm) = (leak.id(), event.leakage[leak], event.faults.contains(&leak));
+                    let slope = event.trend[leak]
+                        .map(|trend| format!(",{name}_slope_lpm_per_h={}", trend.slope_lpm_per_h));
+                    format!("{}{},{name}_alarm={alarm}", mean.influx(leak), slope.unwrap_or_default())
+                });
+                let (t_s, status, reason) = (event.t_s, event.status.id(), reason.unwrap_or_default());
+                format!("t_s={t_s},status=\"{status}\"{reason}{leaks}")
             }
             Self::Alarm(event) => {
                 let raised = event.state == AlarmState::Raised;
                 let (id, status, mean) = (quoted(&event.id), event.status.id(), event.leakage.mean_lpm);
                 let t_s = event.t_s;
-                write!(fields, "id=\"{id}\",t_s={t_s},raised={raised},status=\"{status}\",mean_lpm={mean}")
+                format!("id=\"{id}\",t_s={t_s},raised={raised},status=\"{status}\",mean_lpm={mean}")
             }
-            Self::Notice(event) => write!(fields, "count={}u,text=\"{}\"", event.count, quoted(&event.text)),
+            Self::Notice(event) => format!("count={}u,text=\"{}\"", event.count, quoted(&event.text)),
             Self::Summary(event) => {
-                let _ = write!(fields, "estimates={}u", event.estimates);
-                Leak::ALL.into_iter().try_for_each(|leak| {
+                let leaks = each_leak(&|leak| {
                     let (name, leakage) = (leak.id(), event.leakage[leak]);
                     let LeakSummary { mean_lpm, max_lpm, .. } = leakage;
-                    write!(fields, ",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}")?;
-                    leakage
-                        .trend_lpm_per_day
-                        .map_or(Ok(()), |trend| write!(fields, ",{name}_slope_lpm_per_day={}", trend.slope))
-                })
+                    let slope = leakage.trend_lpm_per_day;
+                    let slope = slope.map(|trend| format!(",{name}_slope_lpm_per_day={}", trend.slope));
+                    let slope = slope.unwrap_or_default();
+                    format!(",{name}_mean_lpm={mean_lpm},{name}_max_lpm={max_lpm}{slope}")
+                });
+                format!("estimates={}u{leaks}", event.estimates)
             }
             Self::Hold(event) => {
-                let _ = write!(fields, "t_s={},status=\"{}\"", event.t_s, event.status.id());
-                let _ = write!(fields, ",usable_s={},text=\"{}\"", event.hold.usable_s, quoted(&event.text));
-                Leak::ALL.into_iter().try_for_each(|leak| {
-                    fields.push_str(&event.leakage[leak].influx(leak));
-                    write!(fields, ",{}_found={}", leak.id(), event.faults.contains(&leak))
-                })
+                let HoldEvent { t_s, status, hold, faults, .. } = &**event;
+                let leaks = each_leak(&|leak| {
+                    let mean = event.leakage[leak].influx(leak);
+                    format!("{mean},{}_found={}", leak.id(), faults.contains(&leak))
+                });
+                let (status, usable_s, text) = (status.id(), hold.usable_s, quoted(&event.text));
+                format!("t_s={t_s},status=\"{status}\",usable_s={usable_s},text=\"{text}\"{leaks}")
             }
-        };
-        fields
+        }
     }
 }
 

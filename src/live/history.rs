@@ -2,7 +2,7 @@
 
 use super::event::{EstimateEvent, LiveLeakage, SummaryEvent};
 use crate::units::S_PER_DAY;
-use pitchleak_core::{Estimate, Leak, PerLeak};
+use pitchleak_core::{Leak, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// Days that are kept for the trend.
@@ -141,9 +141,8 @@ impl History {
         let slope = mean(&|day| (day.index - day0) * (day.mean_lpm[leak] - flow0)) * count as f64 / spread;
         let off = |day: &DayMean| day.mean_lpm[leak] - flow0 - slope * (day.index - day0);
         let variance = mean(&|day| off(day).powi(2)) * count as f64 / (count - 2) as f64;
-        let found = Estimate { value: slope, std: (variance / spread).sqrt() };
-        let finite = found.value.is_finite() && found.std.is_finite();
-        finite.then_some(DayTrend { slope: found.value, std: found.std, days: count })
+        let std = (variance / spread).sqrt();
+        (slope.is_finite() && std.is_finite()).then_some(DayTrend { slope, std, days: count })
     }
 }
 

@@ -20,7 +20,7 @@ const BAD: usize = 64;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Order {
     /// Samples that had their turn.
-    count: u64,
+    pub count: u64,
     /// Of the last one taken.
     last_s: Option<f64>,
     /// After it: times of samples that had their turn and were bad.
@@ -30,11 +30,6 @@ pub(super) struct Order {
 }
 
 impl Order {
-    /// Samples that had their turn.
-    pub(super) fn count(&self) -> u64 {
-        self.count
-    }
-
     /// Whether counts and times can be those of samples.
     pub(super) fn is_possible(&self) -> bool {
         self.bad_s.len() <= BAD

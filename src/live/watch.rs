@@ -2,7 +2,6 @@ use super::config::LiveConfig;
 use super::cylinder::{Cylinder, Line};
 use super::event::{Event, NoticeEvent, Notices};
 use super::format::{Batch, Fields, LineFormat, Parser, parse_batch};
-use super::history::History;
 use super::{checkpoint, record};
 use crate::Rig;
 use crate::header::shorten;
@@ -70,15 +69,14 @@ impl Watch {
     /// Mean flow of each leak of a cylinder on each of the last 90 days that are over, L/min: the day's begin, s since 1970
     /// or as the samples count, and the leaks.
     pub fn days(&self, cylinder: &str) -> Vec<(f64, PerLeak<f64>)> {
-        let history = self.cylinders.get(cylinder).map(Cylinder::history);
-        let days = history.into_iter().flat_map(History::days);
+        let days = self.cylinders.get(cylinder).into_iter().flat_map(|cylinder| cylinder.history.days());
         days.map(|(day, mean_lpm)| (day * S_PER_DAY, mean_lpm)).collect()
     }
 
     /// How many samples, lines and messages were left out, by kind, each counted at once.
     pub fn left_out(&self) -> BTreeMap<String, u64> {
         let mut all = self.left_out_before.clone();
-        let each = self.cylinders.values().flat_map(Cylinder::left_out);
+        let each = self.cylinders.values().flat_map(|cylinder| cylinder.notices.totals());
         each.chain(self.notices.totals()).for_each(|(kind, count)| add(&mut all, kind, count));
         all
     }
@@ -97,7 +95,7 @@ impl Watch {
                 continue;
             }
             cylinder.tell_counted(&name, events);
-            cylinder.left_out().for_each(|(kind, count)| add(&mut self.left_out_before, kind, count));
+            cylinder.notices.totals().for_each(|(kind, count)| add(&mut self.left_out_before, kind, count));
             let (text, place) = match rig {
                 Some(_) => ("its rig is another: it begins anew", &mut self.replaced),
                 None => ("it is watched no more", &mut self.gone),

@@ -51,6 +51,14 @@ enum Coding {
 }
 
 impl Coding {
+    #[inline]
+    fn out(&mut self) -> &mut dyn Write {
+        match self {
+            Self::Plain(out) => out,
+            Self::Gzip(out) => out,
+        }
+    }
+
     /// Its bytes, all on the disk.
     fn sealed(self) -> io::Result<Sink> {
         let out = match self {
@@ -118,17 +126,11 @@ impl OutputFile {
 impl Write for OutputFile {
     #[inline]
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match &mut self.coding {
-            Coding::Plain(out) => out.write(bytes),
-            Coding::Gzip(out) => out.write(bytes),
-        }
+        self.coding.out().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match &mut self.coding {
-            Coding::Plain(out) => out.flush(),
-            Coding::Gzip(out) => out.flush(),
-        }
+        self.coding.out().flush()
     }
 }
 
@@ -142,6 +144,13 @@ impl Sink {
         // Renaming would pass over a file's protection, and wait until the end to find a folder.
         let opened = OpenOptions::new().write(true).open(&target)?;
         if old.is_file() { Replacement::of(target).map(Self::Replacement) } else { Ok(Self::Device(opened)) }
+    }
+
+    fn out(&mut self) -> &mut dyn Write {
+        match self {
+            Self::Replacement(file) => file,
+            Self::Device(file) => file,
+        }
     }
 
     fn seal(&mut self) -> io::Result<()> {
@@ -163,11 +172,7 @@ impl Write for Sink {
     /// Again where a signal came within it: not every writer above does that.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         loop {
-            let written = match self {
-                Self::Replacement(file) => file.write(bytes),
-                Self::Device(file) => file.write(bytes),
-            };
-            match written {
+            match self.out().write(bytes) {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 done => return done,
             }
@@ -175,10 +180,7 @@ impl Write for Sink {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Replacement(file) => file.flush(),
-            Self::Device(file) => file.flush(),
-        }
+        self.out().flush()
     }
 }
 

@@ -8,7 +8,7 @@ use super::{LEAK_UNIT_M3SPA, LeakLikelihood};
 use crate::explain::{LEAK_SHARE, Orthant, POINTS, positive_orthant};
 use crate::units::LPM_PER_M3S;
 use nalgebra::{DMatrix, DVector, Matrix3};
-use pitchleak_core::{Estimate, Leak, PerLeak};
+use pitchleak_core::{Estimate, PerLeak};
 use statrs::function::erf::erfc;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -63,7 +63,7 @@ pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
     let information = middle.map_or_else(Matrix3::zeros, |middle| middle.information);
     Beliefs {
         leaks: PerLeak::from_fn(|leak| {
-            let own = index(leak);
+            let own = leak as usize;
             let alone = 1.0 / (information[(own, own)] + SIZE.powi(-2)).sqrt();
             let smallest = alone * detected_sigmas(alone, sure);
             Belief { smallest: smallest * LEAK_UNIT_M3SPA, ..spread(&weighed, own) }
@@ -71,15 +71,6 @@ pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
         any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
         kappa,
         negative: possible - any_sign,
-    }
-}
-
-/// Place of a leak among the unknowns.
-fn index(leak: Leak) -> usize {
-    match leak {
-        Leak::Internal => 0,
-        Leak::ExternalA => 1,
-        Leak::ExternalB => 2,
     }
 }
 
@@ -230,5 +221,5 @@ fn detected_sigmas(std: f64, sure: f64) -> f64 {
 
 /// Standard deviation of the half normal size that a leak has before any reading, m³/(s·Pa).
 pub(crate) fn prior_std() -> f64 {
-    LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 * (1.0 - 2.0 / std::f64::consts::PI).sqrt()
+    LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 * (1.0 - 2.0 / PI).sqrt()
 }

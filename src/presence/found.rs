@@ -112,7 +112,7 @@ impl Found {
         let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         let Sorted { found, excluded, open } = self.sorted(&threshold_lpm, 1.0 - rig.decision.alpha);
         if !contradictions.is_empty() {
-            let apparent = self.apparent(&found);
+            let apparent = self.apparent(&found).unwrap_or_default();
             return told(Status::Doubtful, found, contradictions, &apparent);
         }
         let mut sentences: Vec<String> = Vec::new();
@@ -208,14 +208,11 @@ impl Found {
     }
 
     /// Leaks that are in doubt.
-    fn apparent(&self, leaks: &[Leak]) -> String {
+    fn apparent(&self, leaks: &[Leak]) -> Option<String> {
         let each = |leak: &Leak| format!("{} of {} L/min", leak.label(), self.flow(*leak));
         let named: Vec<_> = leaks.iter().map(each).collect();
-        if named.is_empty() {
-            String::new()
-        } else {
-            format!("Until then these apparent leaks stay in doubt: {}.", named.join(", "))
-        }
+        (!named.is_empty())
+            .then(|| format!("Until then these apparent leaks stay in doubt: {}.", named.join(", ")))
     }
 
     fn leakage(&self, leak: Leak) -> Leakage {

@@ -57,9 +57,7 @@ impl ReasonId {
             Self::NoUncertainty => "no_uncertainty",
         }
     }
-}
 
-impl ReasonId {
     /// Whether it has to be mended before anything is said of leaks.
     pub(super) fn precedes_a_verdict(self) -> bool {
         matches!(self, Self::SampledTooSeldom | Self::NoRigFile)
@@ -138,8 +136,7 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         let text = "this trace is too short to tell about leaks, or nothing explains it at all";
         return vec![Reason::new(ReasonId::NotIdentifiable, text, RECORD)];
     };
-    let open: Vec<Leak> =
-        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && !findings.is_below(*leak)).collect();
+    let (_, open) = findings.below_and_open(faults);
     let (away, open): (Vec<_>, Vec<_>) = open.into_iter().partition(|leak| findings.is_away(*leak));
     let away = (!away.is_empty()).then(|| {
         let text = format!("{} leaks come and go, and the last seconds show none", join(&away, "and"));

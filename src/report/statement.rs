@@ -18,22 +18,26 @@ pub fn advice(leak: Leak) -> &'static str {
 /// happened before.
 pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], reasons: &[Reason]) -> String {
     let mut sentences = Vec::new();
+    let (below, open) = findings.below_and_open(faults);
     if status.is_sure() {
         sentences.extend(faults.iter().map(|leak| fault(findings, *leak)));
         sentences.extend(law(findings));
-        sentences.extend(excluded(findings));
-        sentences.extend(unknown(findings));
+        sentences.extend(excluded(findings, &below));
+        // A sure verdict says nothing of these.
+        sentences.extend(
+            (!open.is_empty()).then(|| format!("This trace cannot tell about {} leaks.", join(&open, "and"))),
+        );
         sentences.extend(notes(findings));
         sentences.extend(remains(findings));
     } else {
         sentences.extend(reasons.iter().take(1).flat_map(why));
         sentences.extend(apparent(findings, faults));
         if status == Status::NotSure {
-            sentences.extend(excluded(findings));
+            sentences.extend(excluded(findings, &below));
             sentences.extend(remains(findings));
         }
     }
-    sentences.extend(before(findings));
+    sentences.extend(before(findings, faults));
     // Without any rig file the line of the rig says so.
     if findings.assumed.sensors && !findings.assumed.rig {
         sentences.push("The rig file has no [sensors]: meters as the paper's are supposed.".to_owned());
@@ -81,20 +85,9 @@ fn law(findings: &Findings<'_>) -> Option<String> {
 const LAW_SURE: f64 = 0.9;
 
 /// Leaks whose upper bound is below the threshold.
-fn excluded(findings: &Findings<'_>) -> Option<String> {
-    let faults = findings.faults();
-    let below: Vec<_> =
-        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && findings.is_below(*leak)).collect();
+fn excluded(findings: &Findings<'_>, below: &[Leak]) -> Option<String> {
     let limit = below.iter().map(|leak| findings.threshold_lpm[*leak]).fold(0.0, f64::max);
-    (!below.is_empty()).then(|| format!("No {} leak above {limit:.2} L/min.", join(&below, "or")))
-}
-
-/// Leaks of which a sure verdict says nothing.
-fn unknown(findings: &Findings<'_>) -> Option<String> {
-    let faults = findings.faults();
-    let open: Vec<_> =
-        Leak::ALL.into_iter().filter(|leak| !faults.contains(leak) && !findings.is_below(*leak)).collect();
-    (!open.is_empty()).then(|| format!("This trace cannot tell about {} leaks.", join(&open, "and")))
+    (!below.is_empty()).then(|| format!("No {} leak above {limit:.2} L/min.", join(below, "or")))
 }
 
 /// What of sensors and rig is not as declared, which the verdict has taken into account.
@@ -131,12 +124,11 @@ fn apparent(findings: &Findings<'_>, faults: &[Leak]) -> Option<String> {
     }
 }
 
-/// Episodes that ended, and sudden changes.
-fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
-    let faults = findings.faults();
+/// Episodes that ended, faults of channels before the last stretch of a stream, and sudden changes.
+fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
     // Beside sensors that are off alarms were raised and cleared for those.
     let told = findings.decision.is_none_or(|decision| decision.as_declared);
-    let ended = Leak::ALL.into_iter().filter(move |leak| told && !faults.contains(leak)).filter_map(|leak| {
+    let ended = Leak::ALL.into_iter().filter(|leak| told && !faults.contains(leak)).filter_map(|leak| {
         let own: Vec<_> = findings.episodes.iter().filter(|episode| episode.fault == leak).collect();
         let last = own.last()?;
         let often = if own.len() > 1 { format!(", the last of {} times", own.len()) } else { String::new() };
@@ -157,12 +149,8 @@ fn before(findings: &Findings<'_>) -> impl Iterator<Item = String> {
             }
         }
     });
-    ended.collect::<Vec<_>>().into_iter().chain(no_longer_weighed(findings)).chain(changed)
-}
-
-/// Faults of channels before the last stretch of a stream.
-fn no_longer_weighed(findings: &Findings<'_>) -> impl Iterator<Item = String> {
-    findings.earlier_channels.iter().map(|fault| format!("Earlier: {}.", fault.text))
+    let channels = findings.earlier_channels.iter().map(|fault| format!("Earlier: {}.", fault.text));
+    ended.chain(channels).chain(changed).collect()
 }
 
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {

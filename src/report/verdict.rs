@@ -130,6 +130,12 @@ impl Findings<'_> {
         self.decision.is_some_and(|decision| decision.ruled_out.contains(&leak)) && !self.is_away(leak)
     }
 
+    /// The other leaks than `faults`: those that are below their thresholds, and those of which the trace says too little.
+    pub(super) fn below_and_open(&self, faults: &[Leak]) -> (Vec<Leak>, Vec<Leak>) {
+        let others = Leak::ALL.into_iter().filter(|leak| !faults.contains(leak));
+        others.partition(|leak| self.is_below(*leak))
+    }
+
     /// Whether a leak comes and goes, as likely as not, and is away while its alarm stands.
     pub(super) fn is_away(&self, leak: Leak) -> bool {
         let Some(decision) = self.decision.filter(|_| self.active[leak]) else { return false };

@@ -62,14 +62,16 @@ impl ForceSums {
         both
     }
 
-    /// The balance with P_A and P_B divided by `factors`; `None` of too few blocks, or without a load force that changes.
-    pub fn scaled(&self, rig: &Rig, [by_a, by_b]: [f64; 2]) -> Option<Scaled> {
-        let Cylinder { area_a_m2, area_b_m2, .. } = rig.cylinder;
-        let ([[load, of_a, of_b], ..], weights) = (self.left(), [area_a_m2 / by_a, -area_b_m2 / by_b]);
-        let left = Left::of(self.left(), self.means(), weights, zero_std_n(rig));
-        let slope = (weights[0] * of_a + weights[1] * of_b) / load;
-        let blocks = f64::from(self.blocks);
-        (self.blocks >= LEAST_BLOCKS && load > 0.0).then_some(Scaled { left, slope, blocks })
+    /// What they say of the pressures; none of too few blocks, or without a load force that changes.
+    pub fn balance(&self, rig: &Rig) -> Option<ForceBalance> {
+        let left = self.left();
+        (self.blocks >= LEAST_BLOCKS && left[0][0] > 0.0).then(|| ForceBalance {
+            left,
+            means: self.means(),
+            zero_std_n: zero_std_n(rig),
+            blocks: f64::from(self.blocks),
+            area_m2: [rig.cylinder.area_a_m2, rig.cylinder.area_b_m2],
+        })
     }
 
     /// Means of F, P_A and P_B.
@@ -195,22 +197,17 @@ pub struct ForceBalance {
     means: [f64; TERMS - FREE],
     /// By how far the sensors' zeros may be off together, 1 σ, N.
     zero_std_n: f64,
-    /// Independent blocks.
-    worth: f64,
+    blocks: f64,
     area_m2: [f64; 2],
 }
 
 impl ForceBalance {
-    /// By these sums; none of too few blocks, or without a load force that changes.
-    pub(super) fn of(sums: &ForceSums, rig: &Rig) -> Option<Self> {
-        let left = sums.left();
-        (sums.blocks >= LEAST_BLOCKS && left[0][0] > 0.0).then(|| Self {
-            left,
-            means: sums.means(),
-            zero_std_n: zero_std_n(rig),
-            worth: INDEPENDENT * f64::from(sums.blocks),
-            area_m2: [rig.cylinder.area_a_m2, rig.cylinder.area_b_m2],
-        })
+    /// With P_A and P_B divided by these factors.
+    pub(crate) fn scaled(&self, [by_a, by_b]: [f64; 2]) -> Scaled {
+        let ([a, b], [[load, of_a, of_b], ..]) = (self.area_m2, self.left);
+        let weights = [a / by_a, -b / by_b];
+        let slope = (weights[0] * of_a + weights[1] * of_b) / load;
+        Scaled { left: self.left_by(weights), slope, blocks: self.blocks }
     }
 
     /// ln of how much likelier the force is where P_A and P_B are `by` times those read, or exchanged, than as they are.
@@ -221,6 +218,10 @@ impl ForceBalance {
     }
 
     fn ln_likelihood(&self, weights: [f64; 2]) -> f64 {
-        Left::of(self.left, self.means, weights, self.zero_std_n).ln_likelihood(self.worth)
+        self.left_by(weights).ln_likelihood(INDEPENDENT * self.blocks)
+    }
+
+    fn left_by(&self, weights: [f64; 2]) -> Left {
+        Left::of(self.left, self.means, weights, self.zero_std_n)
     }
 }

@@ -82,7 +82,7 @@ impl Beside {
             both.into_iter().flatten().reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
         });
         Told {
-            force: ForceBalance::of(&now.force.with(&before.force), rig),
+            force: now.force.with(&before.force).balance(rig),
             extremes,
             signs: now.signs.with(&before.signs).found(),
         }

@@ -91,11 +91,10 @@ impl Side {
         if own.flow_m3s.abs() > SIGMAS * own.std {
             self.moving[usize::from(own.flow_m3s < 0.0)] += 1;
         }
-        for (by_shape, shape) in self.left[0].iter_mut().zip(shapes) {
-            each_leak(by_shape, sheet, |leak| flow - (own.flow_m3s + leak * shape));
-        }
-        for (by_shape, shape) in self.left[1].iter_mut().zip(shapes) {
-            each_leak(by_shape, sheet, |leak| flow - (own.flow_m3s + leak * shape).abs());
+        let [of_flow, of_size] = &mut self.left;
+        for ((of_flow, of_size), shape) in of_flow.iter_mut().zip(of_size).zip(shapes) {
+            each_leak(of_flow, sheet, |leak| flow - (own.flow_m3s + leak * shape));
+            each_leak(of_size, sheet, |leak| flow - (own.flow_m3s + leak * shape).abs());
         }
     }
 

@@ -209,7 +209,8 @@ impl Refused {
     fn force_with(&self, of: Of, factor: f64) -> Option<Scaled> {
         let by = |signal| if of.sensors().contains(&signal) { factor } else { 1.0 };
         let factors = [Signal::PressureA, Signal::PressureB].map(by);
-        factors.iter().any(|factor| *factor > 1.0).then(|| self.force.scaled(&self.rig, factors))?
+        let balance = self.force.balance(&self.rig).filter(|_| factors.iter().any(|factor| *factor > 1.0))?;
+        Some(balance.scaled(factors))
     }
 
     /// Where the load force balances the pressures with some factors, the others go.

@@ -6,7 +6,6 @@ use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use pitchleak::explain::explanations;
-use std::io::Write;
 
 /// Write the completions of a shell to standard output
 #[derive(Args)]
@@ -26,10 +25,6 @@ pub struct ManualPage {
     #[arg(value_name = "COMMAND")]
     command: Option<String>,
 }
-
-/// Lists what a verdict weighs beside leaks: sensors, rig and wiring, each with its prior share
-#[derive(Args)]
-pub struct Explanations {}
 
 impl Completions {
     pub fn run(&self) -> Result<Outcome, Failure> {
@@ -57,14 +52,13 @@ impl ManualPage {
     }
 }
 
-impl Explanations {
-    pub fn run(&self) -> Result<Outcome, Failure> {
-        let mut out = std::io::stdout().lock();
-        writeln!(out, "{:<10} {:<26} {:>7}  what", "kind", "id", "share")?;
-        for entry in explanations() {
-            let (kind, percent) = (entry.kind.name(), 100.0 * entry.share);
-            writeln!(out, "{kind:<10} {:<26} {percent:>5.2} %  {}", entry.id, entry.text)?;
-        }
-        Ok(Outcome::Done)
+/// A line for each, kind by kind.
+pub fn list_explanations() -> Result<Outcome, Failure> {
+    let mut text = format!("{:<10} {:<26} {:>7}  what\n", "kind", "id", "share");
+    for entry in explanations() {
+        let (kind, percent) = (entry.kind.name(), 100.0 * entry.share);
+        text += &format!("{kind:<10} {:<26} {percent:>5.2} %  {}\n", entry.id, entry.text);
     }
+    output::print(&text)?;
+    Ok(Outcome::Done)
 }

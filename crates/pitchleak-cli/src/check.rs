@@ -49,8 +49,8 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
     }
     bar.finish_and_clear();
     output::tell(&report.trace);
-    let json = arguments.json.then(|| report.to_json()).transpose()?;
-    trace.print(json, || match &sketch {
+    let to_json = || report.to_json();
+    trace.print(arguments.json, to_json, || match &sketch {
         Some(sketch) => sketch.to_text(&report, &output::palette()),
         None => report.to_text(&output::palette()),
     })?;

@@ -39,8 +39,7 @@ impl Columns {
         let mut rig = rig(self.rig.as_ref(), std::slice::from_ref(&self.file))?;
         self.text_format.settle(&mut rig);
         let reading = FileReading::of(&self.file, &rig)?;
-        let text = if self.json { reading.to_json()? + "\n" } else { reading.to_text() };
-        output::print(&text)?;
+        output::print_as(self.json, || reading.to_json(), || reading.to_text())?;
         Ok(Outcome::Done)
     }
 }
@@ -78,16 +77,11 @@ impl Init {
         let (mut lines, mut given) = (Vec::new(), Vec::new());
         for path in &self.files {
             let reading = FileReading::of(path, &rig)?;
-            let taken = |line: &ProposedLine, lines: &[ProposedLine]| {
-                lines.iter().any(|known| key(known) == key(line))
-            };
-            let named: Vec<String> = reading.named.iter().map(|line| key(line).to_owned()).collect();
+            let is_among = |name: &str, lines: &[ProposedLine]| lines.iter().any(|line| key(line) == name);
             let signals = reading.columns.iter().filter_map(|column| column.signal);
-            given.extend(
-                signals.filter(|name| !named.iter().any(|key| key == name)).filter_map(Signal::by_name),
-            );
+            given.extend(signals.filter(|name| !is_among(name, &reading.named)).filter_map(Signal::by_name));
             for line in reading.named.into_iter().chain(reading.proposals) {
-                if !taken(&line, &lines) {
+                if !is_among(key(&line), &lines) {
                     lines.push(line);
                 }
             }

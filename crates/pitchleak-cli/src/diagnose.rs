@@ -103,12 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             pitchleak::output::write(folder.join(name), figure, &inputs)?;
         }
     }
-    let text = if arguments.json {
-        serde_json::to_string_pretty(&diagnosis)? + "\n"
-    } else {
-        format!("rig {}\n{}", rig.name, diagnosis.to_text(&Palette::PLAIN))
-    };
-    output::print(&text)?;
+    let to_text = || format!("rig {}\n{}", rig.name, diagnosis.to_text(&Palette::PLAIN));
+    output::print_as(arguments.json, || serde_json::to_string_pretty(&diagnosis), to_text)?;
     Ok(Outcome::Done)
 }
 

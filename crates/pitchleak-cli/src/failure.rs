@@ -1,54 +1,23 @@
 //! Why a command ends early: a failure, or a signal.
 
 use crate::output;
-use pitchleak::diagnose::FittedAndJudged;
-use pitchleak::fleet::FleetError;
-use pitchleak::live::{CheckpointError, ConfigError};
-use pitchleak::output::{OutputError, abandon};
-use pitchleak::prove::ProveError;
-use pitchleak::replay::{EstimateFileError, ReplayError};
-use pitchleak::rig::RigError;
-use pitchleak::simulate::{PlanError, RecordingError};
-use pitchleak::trace::TraceError;
-use pitchleak::valve::CalibrationError;
-use pitchleak_reproduce::ReproduceError;
-use pitchleak_view::figure::FigureError;
-use pitchleak_view::page::PageError;
+use pitchleak::output::abandon;
+use pitchleak::simulate::RecordingError;
+use std::error::Error;
+use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
 /// Why a command ended early; one line for people each.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 pub enum Failure {
-    /// The rig file.
-    #[error(transparent)]
-    Rig(#[from] RigError),
+    /// What the engine says of traces, rig files, options and output files.
+    Engine(Box<dyn Error + Send + Sync>),
     /// The command line.
-    #[error("{0}")]
     Arguments(String),
-    /// The trace.
-    #[error(transparent)]
-    Trace(#[from] TraceError),
-    /// The traces' roles.
-    #[error(transparent)]
-    Roles(#[from] FittedAndJudged),
-    /// The replay of a trace.
-    #[error(transparent)]
-    Replay(#[from] ReplayError),
-    /// A leak that cannot be put into a trace.
-    #[error(transparent)]
-    Prove(#[from] ProveError),
-    /// A valve that cannot be calibrated.
-    #[error(transparent)]
-    Calibrate(#[from] CalibrationError),
     /// A trace that is read more than once.
-    #[error("standard input is read once, and this takes files: give a file")]
     ReadOnce,
-    /// The traces of a fleet.
-    #[error(transparent)]
-    Fleet(#[from] FleetError),
     /// Some of many traces; the others were.
-    #[error("{errors} of {traces} traces could not be judged")]
     NotJudged {
         /// Those that were not.
         errors: usize,
@@ -56,7 +25,6 @@ pub enum Failure {
         traces: usize,
     },
     /// A file that is of one trace.
-    #[error("{flag} is of one trace: {traces} are given")]
     OneTraceOnly {
         /// The flag that names the file.
         flag: &'static str,
@@ -64,50 +32,45 @@ pub enum Failure {
         traces: usize,
     },
     /// `init` writes over nothing.
-    #[error("{path} is there already, and stays: name another by --out, or take it away", path = .0.display())]
     RigIsThere(PathBuf),
     /// A manual page of no command.
-    #[error("no command `{0}`; pitchleak --help names them")]
     NoCommand(String),
     /// Ctrl-C, or the signal to end.
-    #[error("interrupted: no file is left half-written")]
     Interrupted,
     /// Standard input.
-    #[error("cannot read standard input: {0}")]
     Input(io::Error),
-    /// The configuration of a watch.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The state of a watch.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
     /// Standard output.
-    #[error("cannot write to standard output: {0}")]
-    Output(#[from] io::Error),
-    /// The file of estimates.
-    #[error(transparent)]
-    Estimates(#[from] EstimateFileError),
-    /// The page of a report.
-    #[error(transparent)]
-    Page(#[from] PageError),
-    /// A figure.
-    #[error(transparent)]
-    Figure(#[from] FigureError),
-    /// A rig file or a figure.
-    #[error(transparent)]
-    Save(#[from] OutputError),
-    /// The report as JSON.
-    #[error("cannot write JSON: {0}")]
-    Json(#[from] serde_json::Error),
-    /// What is to be simulated.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The simulation or its trace.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The paper's experiment.
-    #[error(transparent)]
-    Reproduce(#[from] ReproduceError),
+    Output(io::Error),
+}
+
+/// So it is no `Error` itself.
+impl<E: Error + Send + Sync + 'static> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Engine(Box::new(error))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Engine(error) if error.is::<serde_json::Error>() => write!(f, "cannot write JSON: {error}"),
+            Self::Engine(error) => error.fmt(f),
+            Self::Arguments(answer) => f.write_str(answer),
+            Self::ReadOnce => f.write_str("standard input is read once, and this takes files: give a file"),
+            Self::NotJudged { errors, traces } => {
+                write!(f, "{errors} of {traces} traces could not be judged")
+            }
+            Self::OneTraceOnly { flag, traces } => write!(f, "{flag} is of one trace: {traces} are given"),
+            Self::RigIsThere(path) => {
+                let path = path.display();
+                write!(f, "{path} is there already, and stays: name another by --out, or take it away")
+            }
+            Self::NoCommand(name) => write!(f, "no command `{name}`; pitchleak --help names them"),
+            Self::Interrupted => f.write_str("interrupted: no file is left half-written"),
+            Self::Input(source) => write!(f, "cannot read standard input: {source}"),
+            Self::Output(source) => write!(f, "cannot write to standard output: {source}"),
+        }
+    }
 }
 
 impl Failure {
@@ -119,10 +82,14 @@ impl Failure {
     /// Whether the reader of standard output is gone.
     pub fn is_broken_pipe(&self) -> bool {
         let cause = match self {
-            Self::Output(cause) | Self::Recording(RecordingError::StandardOutput(cause)) => cause,
-            _ => return false,
+            Self::Output(cause) => Some(cause),
+            Self::Engine(error) => match error.downcast_ref() {
+                Some(RecordingError::StandardOutput(cause)) => Some(cause),
+                _ => None,
+            },
+            _ => None,
         };
-        cause.kind() == io::ErrorKind::BrokenPipe
+        cause.is_some_and(|cause| cause.kind() == io::ErrorKind::BrokenPipe)
     }
 }
 

@@ -94,13 +94,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if let Some(page) = page {
         page.finish(&Page::of_fleet(&report))?;
     }
-    output::print(&if arguments.json {
-        report.to_json()? + "\n"
-    } else if output::draws() {
-        fleet_terminal(&report, &output::palette())
-    } else {
-        report.to_text(&output::palette())
-    })?;
+    output::print_as(
+        arguments.json,
+        || report.to_json(),
+        || match output::draws() {
+            true => fleet_terminal(&report, &output::palette()),
+            false => report.to_text(&output::palette()),
+        },
+    )?;
     let fault = arguments.fail_on_fault && report.by_cylinder.iter().any(|one| !one.faults.is_empty());
     match report.counts.error {
         0 if fault => Ok(Outcome::FaultFound),

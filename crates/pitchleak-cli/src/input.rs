@@ -124,10 +124,13 @@ impl Trace {
     }
 
     /// Prints a report: as a line of JSON, else as text, with an empty line behind it where others follow.
-    pub fn print(&self, json: Option<String>, text: impl FnOnce() -> String) -> Result<(), Failure> {
-        let end = if self.follows { "\n" } else { "" };
-        output::print(&json.map_or_else(|| text() + end, |json| json + "\n"))?;
-        Ok(())
+    pub fn print(
+        &self,
+        json: bool,
+        to_json: impl FnOnce() -> Result<String, serde_json::Error>,
+        to_text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        output::print_as(json, to_json, || to_text() + if self.follows { "\n" } else { "" })
     }
 }
 
@@ -146,29 +149,25 @@ fn progress(bytes: u64) -> ProgressBar {
 #[command(next_help_heading = "Where a file leaves it open")]
 pub struct TextFormat {
     /// What stands between cells: comma, semicolon, tab or bar
-    #[arg(long, value_name = "NAME", value_parser = delimiter)]
+    #[arg(long, value_name = "NAME", value_parser = one_of(Delimiter::by_name, Delimiter::NAMES.map(|(name, _)| name).join(", ")))]
     delimiter: Option<Delimiter>,
 
     /// What stands before decimals: point or comma
-    #[arg(long, value_name = "NAME", value_parser = decimal)]
+    #[arg(long, value_name = "NAME", value_parser = one_of(Decimal::by_name, "point, comma"))]
     decimal: Option<Decimal>,
 
     /// How times are written: iso, dmy, mdy, ymd, hms, epoch s|ms|us|ns, excel, or a pattern (%d.%m.%Y %H:%M:%S%.f)
-    #[arg(long, value_name = "FORMAT", value_parser = time)]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(TimeKind::by_name, TimeKind::ALLOWED))]
     time_format: Option<TimeKind>,
 }
 
-fn delimiter(name: &str) -> Result<Delimiter, String> {
-    let names = Delimiter::NAMES.map(|(name, _)| name).join(", ");
-    Delimiter::by_name(name).ok_or_else(|| format!("one of: {names}"))
-}
-
-fn decimal(name: &str) -> Result<Decimal, String> {
-    Decimal::by_name(name).ok_or_else(|| "one of: point, comma".to_owned())
-}
-
-fn time(name: &str) -> Result<TimeKind, String> {
-    TimeKind::by_name(name).ok_or_else(|| format!("one of: {}", TimeKind::ALLOWED))
+/// Reads an option that is one of `names`.
+pub fn one_of<T>(
+    by_name: fn(&str) -> Option<T>,
+    names: impl Into<String>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    let names = names.into();
+    move |name| by_name(name).ok_or_else(|| format!("one of: {names}"))
 }
 
 impl TextFormat {

@@ -50,7 +50,8 @@ enum Command {
     Columns(columns::Columns),
     Init(columns::Init),
     Fleet(fleet::Arguments),
-    Explanations(about::Explanations),
+    /// Lists what a verdict weighs beside leaks: sensors, rig and wiring, each with its prior share
+    Explanations,
     Watch(watch::Arguments),
     Simulate(Box<simulate::Arguments>),
     Reproduce(reproduce::Arguments),
@@ -107,7 +108,7 @@ fn tell(answer: &clap::Error) -> Result<Outcome, Failure> {
     if answer.use_stderr() {
         return Err(Failure::Arguments(in_one_line(&answer.to_string())));
     }
-    answer.print()?;
+    answer.print().map_err(Failure::Output)?;
     Ok(Outcome::Done)
 }
 
@@ -147,7 +148,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Columns(arguments) => arguments.run(),
         Command::Init(arguments) => arguments.run(),
         Command::Fleet(arguments) => fleet::run(arguments),
-        Command::Explanations(arguments) => arguments.run(),
+        Command::Explanations => about::list_explanations(),
         Command::Watch(arguments) => watch::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments),
         Command::Reproduce(arguments) => reproduce::run(arguments),

@@ -1,5 +1,6 @@
 //! Standard output and standard error.
 
+use crate::failure::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
 use pitchleak::report::TraceSummary;
 use pitchleak_view::Palette;
@@ -9,10 +10,18 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Writes `text` to standard output.
-pub fn print(text: &str) -> io::Result<()> {
+pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    out.write_all(harmless(text).as_bytes())?;
-    out.flush()
+    out.write_all(harmless(text).as_bytes()).and_then(|()| out.flush()).map_err(Failure::Output)
+}
+
+/// Prints a result: as JSON where that is asked for, else as text.
+pub fn print_as(
+    json: bool,
+    to_json: impl FnOnce() -> Result<String, serde_json::Error>,
+    to_text: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    print(&if json { to_json()? + "\n" } else { to_text() })
 }
 
 /// One line on standard error, if that is still open.
@@ -61,9 +70,13 @@ pub fn spinner(template: &str) -> ProgressBar {
 
 /// Colours only on a terminal, and only where nobody forbids them (no-color.org).
 pub fn palette() -> Palette {
-    let forbidden = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty())
-        || std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    if io::stdout().is_terminal() && !forbidden { Palette::ANSI } else { Palette::PLAIN }
+    let forbidden = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    if is_terminal() && !forbidden { Palette::ANSI } else { Palette::PLAIN }
+}
+
+/// Whether standard output is a terminal that knows more than lines.
+fn is_terminal() -> bool {
+    io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
 /// Whether standard output is a terminal that shows more than letters: by the locale, and on Windows by its own terminal.
@@ -74,8 +87,7 @@ pub fn draws() -> bool {
     };
     let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().filter_map(std::env::var_os);
     let knows = locale.into_iter().find(|value| !value.is_empty()).is_some_and(says_utf8);
-    let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
-    io::stdout().is_terminal() && !dumb && (knows || std::env::var_os("WT_SESSION").is_some())
+    is_terminal() && (knows || std::env::var_os("WT_SESSION").is_some())
 }
 
 /// The text with what would steer a terminal made visible: names of files and columns are anybody's. Line ends and our

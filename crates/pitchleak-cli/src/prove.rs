@@ -71,7 +71,6 @@ fn run_one(arguments: &Arguments, trace: &Trace) -> Result<Outcome, Failure> {
         page.finish(&Page::of_proof(&proof, &trace.rig))?;
     }
     output::tell(&proof.trace);
-    let json = arguments.json.then(|| proof.to_json()).transpose()?;
-    trace.print(json, || proof.to_text(&output::palette()))?;
+    trace.print(arguments.json, || proof.to_json(), || proof.to_text(&output::palette()))?;
     Ok(Outcome::Done)
 }

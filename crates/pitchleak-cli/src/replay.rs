@@ -1,5 +1,5 @@
 use crate::failure::Failure;
-use crate::input::{Input, Trace};
+use crate::input::{Input, Trace, one_of};
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::replay::{EstimateFile, Replay, replay};
@@ -18,7 +18,7 @@ pub struct Arguments {
     input: Input,
 
     /// Estimator [default: as in the rig file, else rls]
-    #[arg(long, value_name = "NAME", value_parser = estimator)]
+    #[arg(long, value_name = "NAME", value_parser = one_of(EstimatorKind::by_name, EstimatorKind::NAMES.join(", ")))]
     estimator: Option<EstimatorKind>,
 
     /// Write the estimates over time of one trace, a row per sample: .csv, .csv.gz or .parquet
@@ -49,11 +49,6 @@ Examples:
   pitchleak replay monday/*.csv --json | jq -r '[.trace.path, .verdict.status] | @tsv'
   pitchleak replay trace.csv --rig turbine7.toml --json | jq .verdict
   zcat log.csv.gz | pitchleak replay - --rig turbine7.toml --fail-on-fault";
-
-fn estimator(name: &str) -> Result<EstimatorKind, String> {
-    let names = || format!("one of: {}", EstimatorKind::NAMES.join(", "));
-    EstimatorKind::by_name(name).ok_or_else(names)
-}
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.input.check_single("--out", arguments.out.is_some())?;
@@ -89,8 +84,8 @@ fn run_one(arguments: &Arguments, mut trace: Trace) -> Result<Outcome, Failure> 
     }
     bar.finish_and_clear();
     output::tell(&report.trace);
-    let json = arguments.json.then(|| report.to_json()).transpose()?;
-    trace.print(json, || match &sketch {
+    let to_json = || report.to_json();
+    trace.print(arguments.json, to_json, || match &sketch {
         Some(sketch) => sketch.to_text(&report, &output::palette()),
         None => report.to_text(&output::palette()),
     })?;

@@ -53,6 +53,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         page.finish(&pitchleak_reproduce::page(&reproduction)?)?;
     }
     let report = &reproduction.report;
-    output::print(&if arguments.json { report.to_json()? + "\n" } else { report.to_text() })?;
+    output::print_as(arguments.json, || report.to_json(), || report.to_text())?;
     Ok(Outcome::Done)
 }

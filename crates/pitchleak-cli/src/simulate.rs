@@ -47,7 +47,7 @@ pub struct Arguments {
     leak_external_b: LeakCourse,
 
     /// Time into the trace at which leaks without times of their own open [default: before it begins]
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = in_unit_of(Dimension::Time))]
     onset: Option<f64>,
 
     /// Oil temperature: "45 °C", "20 °C -> 60 °C @ 0 s..600 s", or a CSV file with t_s and temp_c. Leaks have
@@ -87,15 +87,15 @@ pub struct Arguments {
     seed: u64,
 
     /// Length of the trace [default: 60 s, or what the wind or reference has]
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = in_unit_of(Dimension::Time))]
     duration: Option<f64>,
 
     /// Where in the wind or reference the trace begins [default: 10 s after its beginning]
-    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(long, value_name = "TIME", value_parser = in_unit_of(Dimension::Time))]
     start: Option<f64>,
 
     /// Samples per second, or a frequency ("1 kHz")
-    #[arg(long, value_name = "RATE", value_parser = frequency, default_value = "100")]
+    #[arg(long, value_name = "RATE", value_parser = in_unit_of(Dimension::Frequency), default_value = "100")]
     sample_rate: f64,
 
     /// Loads of the turbine are divided by this (the paper: 1000)
@@ -131,9 +131,12 @@ Examples:
   pitchleak simulate --position '100 mm' --load '4 kN' --shut '2 s..' --leak-internal '0.01 L/min' --noise rig --duration '12 s' --out hold.csv
   pitchleak simulate --position '100 mm' --load load.csv --duration '30 s' --out - | pitchleak replay -";
 
-fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
-    let value = units::parse(text, dimension).map_err(|error| error.to_string())?;
-    if value < 0.0 { Err("must not be negative".into()) } else { Ok(value) }
+/// Reads a quantity that is not negative.
+fn in_unit_of(dimension: Dimension) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match units::parse(text, dimension) {
+        Ok(value) if value < 0.0 => Err("must not be negative".to_owned()),
+        parsed => parsed.map_err(|error| error.to_string()),
+    }
 }
 
 fn leak(text: &str) -> Result<LeakCourse, String> {
@@ -142,14 +145,6 @@ fn leak(text: &str) -> Result<LeakCourse, String> {
         return Err("a leak needs its unit, e.g. \"0.5 L/min\"".to_owned());
     }
     text.parse::<LeakCourse>().map_err(|error| error.to_string())
-}
-
-fn time(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Time)
-}
-
-fn frequency(text: &str) -> Result<f64, String> {
-    quantity(text, Dimension::Frequency)
 }
 
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {

@@ -1,4 +1,5 @@
 use crate::failure::{Failure, at_the_end};
+use crate::input::one_of;
 use crate::{Outcome, output};
 use clap::Args;
 use pitchleak::Rig;
@@ -21,7 +22,7 @@ pub struct Arguments {
     config: Option<PathBuf>,
 
     /// Format of the lines: ndjson, csv or influx [default: told by the first line]
-    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(format, "ndjson, csv, influx"))]
     format: Option<LineFormat>,
 
     /// Print influx line protocol instead of JSON
@@ -45,9 +46,8 @@ const LONGEST_LINE: usize = 64 * 1024;
 /// Blocks of input that wait for the estimators at most.
 const WAITING: usize = 8;
 
-fn format(name: &str) -> Result<LineFormat, String> {
-    let known = LineFormat::NAMES.into_iter().find(|(known, _)| *known == name);
-    known.map(|(_, format)| format).ok_or_else(|| "one of: ndjson, csv, influx".to_owned())
+fn format(name: &str) -> Option<LineFormat> {
+    LineFormat::NAMES.into_iter().find_map(|(known, format)| (known == name).then_some(format))
 }
 
 /// What wakes the watch.
@@ -90,7 +90,8 @@ fn serve(
     let mut events = Vec::new();
     let (mut saved, mut changed) = (Instant::now(), false);
     loop {
-        let wait = (changed && checkpoint.is_some()).then(|| CHECKPOINT.saturating_sub(saved.elapsed()));
+        let is_unsaved = changed && checkpoint.is_some();
+        let wait = if is_unsaved { CHECKPOINT.saturating_sub(saved.elapsed()) } else { Duration::MAX };
         match next(inputs, wait) {
             Some(Input::Lines(lines)) => lines.iter().for_each(|line| watch.take(line, &mut events)),
             Some(Input::TooLong) => {
@@ -120,13 +121,10 @@ fn serve(
 }
 
 /// What wakes the watch next; none where nothing does within `wait`.
-fn next(inputs: &Receiver<Input>, wait: Option<Duration>) -> Option<Input> {
-    match wait {
-        None => Some(inputs.recv().unwrap_or(Input::End)),
-        Some(wait) => match inputs.recv_timeout(wait) {
-            Err(RecvTimeoutError::Timeout) => None,
-            input => Some(input.unwrap_or(Input::End)),
-        },
+fn next(inputs: &Receiver<Input>, wait: Duration) -> Option<Input> {
+    match inputs.recv_timeout(wait) {
+        Err(RecvTimeoutError::Timeout) => None,
+        input => Some(input.unwrap_or(Input::End)),
     }
 }
 
@@ -137,10 +135,9 @@ fn print(events: &[Event], format: OutputFormat) -> Result<(), Failure> {
     }
     let mut text = String::new();
     for event in events {
-        text.push_str(&event.line(format)?);
-        text.push('\n');
+        text += &(event.line(format)? + "\n");
     }
-    output::print(&text).map_err(Failure::Output)
+    output::print(&text)
 }
 
 /// Standard input in a thread of its own, and signals, so that either wakes the watch.

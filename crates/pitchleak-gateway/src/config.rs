@@ -9,8 +9,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// All that the service runs by, files read.
-#[derive(Clone, Debug, PartialEq)]
+/// All that the service runs by, files read. It has secrets: nothing here is `Debug`.
+#[derive(Clone, PartialEq)]
 pub struct Config {
     pub watch: LiveConfig,
     /// Folder of checkpoints and summaries.
@@ -32,7 +32,7 @@ pub struct Config {
 }
 
 /// How to reach the broker.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct BrokerConfig {
     pub host: String,
     pub port: u16,
@@ -46,7 +46,7 @@ pub struct BrokerConfig {
 }
 
 /// How the connection is hidden from others.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Tls {
     /// The authority's certificate, PEM; none: the system's authorities.
     pub authority: Option<Vec<u8>>,
@@ -55,7 +55,7 @@ pub struct Tls {
 }
 
 /// Where samples come from.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Samples {
     /// Topic filter; the levels of `+` and `#` name the cylinder.
@@ -211,9 +211,8 @@ impl BrokerDocument {
             return Err(bad("broker: host and client_id must not be empty, nor in_flight 0"));
         }
         if tls.is_none() && login.is_some() {
-            files
-                .warnings
-                .push("broker: the password goes over the network as it is: set tls = true".to_owned());
+            let open = "broker: the password goes over the network as it is: set tls = true";
+            files.warnings.push(open.to_owned());
         }
         Ok(BrokerConfig {
             host: self.host,
@@ -245,18 +244,6 @@ pub struct Login {
     pub password: String,
 }
 
-impl std::fmt::Debug for Identity {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Identity")
-    }
-}
-
-impl std::fmt::Debug for Login {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Login").field("user", &self.user).finish_non_exhaustive()
-    }
-}
-
 /// Reads the files that a configuration names.
 struct Files<'a> {
     /// The configuration: paths are from its folder.
@@ -278,20 +265,17 @@ impl Files<'_> {
 
     /// Certificates in PEM.
     fn certificate(&self, file: &Path) -> Result<Vec<u8>, Failure> {
-        self.pem(&self.path(file)?, "CERTIFICATE-----")
+        pem(&self.path(file)?, "CERTIFICATE-----")
     }
 
     /// A private key in PEM.
     fn key(&mut self, file: &Path) -> Result<Vec<u8>, Failure> {
-        let path = self.path(file)?;
-        self.warn_if_open(&path);
-        self.pem(&path, "PRIVATE KEY-----")
+        pem(&self.secret(file)?, "PRIVATE KEY-----")
     }
 
     /// Its one line.
     fn password(&mut self, file: &Path) -> Result<String, Failure> {
-        let path = self.path(file)?;
-        self.warn_if_open(&path);
+        let path = self.secret(file)?;
         let text = String::from_utf8(read(&path)?).map_err(|_| Failure::content(&path, "not UTF-8"))?;
         match text.lines().next() {
             Some(line) if !line.is_empty() => Ok(line.to_owned()),
@@ -299,26 +283,25 @@ impl Files<'_> {
         }
     }
 
-    fn pem(&self, path: &Path, what: &str) -> Result<Vec<u8>, Failure> {
-        let bytes = read(path)?;
-        if String::from_utf8_lossy(&bytes).contains(what) {
-            return Ok(bytes);
-        }
-        let what = what.trim_end_matches('-').to_lowercase();
-        Err(Failure::content(path, format!("no {what} in PEM")))
-    }
-
-    /// A secret is one's own.
-    fn warn_if_open(&mut self, path: &Path) {
-        let mode = std::fs::metadata(path).map_or(0, |about| about.permissions().mode());
+    /// Where a secret lies, which is one's own: else that is said.
+    fn secret(&mut self, file: &Path) -> Result<PathBuf, Failure> {
+        let path = self.path(file)?;
+        let mode = std::fs::metadata(&path).map_or(0, |about| about.permissions().mode());
         if mode & 0o077 != 0 {
-            let mode = mode & 0o777;
-            self.warnings.push(format!(
-                "{}: others can read this secret (mode {mode:03o}): chmod 600",
-                path.display()
-            ));
+            let (name, mode) = (path.display(), mode & 0o777);
+            self.warnings.push(format!("{name}: others can read this secret (mode {mode:03o}): chmod 600"));
         }
+        Ok(path)
     }
+}
+
+fn pem(path: &Path, what: &str) -> Result<Vec<u8>, Failure> {
+    let bytes = read(path)?;
+    if String::from_utf8_lossy(&bytes).contains(what) {
+        return Ok(bytes);
+    }
+    let what = what.trim_end_matches('-').to_lowercase();
+    Err(Failure::content(path, format!("no {what} in PEM")))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {

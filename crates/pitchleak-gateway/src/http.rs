@@ -2,6 +2,7 @@
 
 use crate::Failure;
 use crate::metrics::Metrics;
+use crate::run::network_thread;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use http_body_util::Full;
@@ -54,18 +55,14 @@ pub fn start(address: SocketAddr, metrics: Arc<Metrics>, every: Duration) -> Res
     let listener = std::net::TcpListener::bind(address).map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     let bound = listener.local_addr().map_err(failed)?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
     let page = page();
     let told = Arc::new(Told { metrics, every, policy: policy(&page), page });
-    let run = move || {
-        runtime.block_on(async {
-            if let Ok(listener) = TcpListener::from_std(listener) {
-                listen(&listener, &told).await;
-            }
-        });
+    let run = async move || {
+        if let Ok(listener) = TcpListener::from_std(listener) {
+            listen(&listener, &told).await;
+        }
     };
-    let spawned = std::thread::Builder::new().name("http".to_owned()).spawn(run);
-    spawned.map_err(failed)?;
+    network_thread("http", run)?;
     Ok(bound)
 }
 

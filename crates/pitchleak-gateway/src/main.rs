@@ -82,8 +82,10 @@ pub(crate) enum Failure {
     Tls(String),
     #[error("cannot write to standard output: {0}")]
     Output(io::Error),
-    #[error("cannot {what}: {source}")]
-    System { what: &'static str, source: io::Error },
+    #[error("cannot start the thread `{name}`: {source}")]
+    Thread { name: &'static str, source: io::Error },
+    #[error("cannot wait for signals: {0}")]
+    Signals(io::Error),
 }
 
 impl Failure {

@@ -4,7 +4,8 @@ use crate::Failure;
 use crate::broker::{Delivery, Inbound, Keeping, Message, Ticket};
 use crate::config::{BrokerConfig, Tls};
 use crate::outbox::{Next, Outbox};
-use crate::run::Input;
+use crate::run::{Input, network_thread};
+use rumqttc::tokio_rustls::rustls::crypto::ring::default_provider;
 use rumqttc::tokio_rustls::rustls::pki_types::pem::PemObject;
 use rumqttc::tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rumqttc::tokio_rustls::rustls::{ClientConfig, RootCertStore};
@@ -46,32 +47,33 @@ pub fn connect(
     outbox: Arc<Outbox>,
     inbox: SyncSender<Input>,
 ) -> Result<Receiver<()>, Failure> {
-    let options = options(config, gone, reach(config)?);
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|source| Failure::System { what: "start the network thread", source })?;
+    let options = options(config, gone)?;
     let (end, ended) = sync_channel(1);
-    let run = move || {
-        runtime.block_on(async {
-            let (client, connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
-            let shared = Arc::new(Shared::default());
-            tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
-            tokio::spawn(send(client, outbox, Arc::clone(&shared), inbox.clone()));
-            listen(connection, &shared, &inbox).await;
-        });
+    let run = async move || {
+        let (client, connection) = AsyncClient::builder(options).capacity(REQUESTS).build();
+        let shared = Arc::new(Shared::default());
+        tokio::spawn(subscribe(client.clone(), filters, Arc::clone(&shared)));
+        tokio::spawn(send(client, outbox, Arc::clone(&shared), inbox.clone()));
+        listen(connection, &shared, &inbox).await;
         let _ = end.send(());
     };
-    let spawned = std::thread::Builder::new().name("mqtt".to_owned()).spawn(run);
-    spawned.map_err(|source| Failure::System { what: "start the network thread", source })?;
+    network_thread("mqtt", run)?;
     Ok(ended)
 }
 
-/// Of the connection that lasts.
-fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> MqttOptions {
-    let mut network = reach.network_options();
+/// The way to the broker, and what is agreed with it.
+fn options(config: &BrokerConfig, gone: Message) -> Result<MqttOptions, Failure> {
+    let mut options = MqttOptions::new(&config.client_id, (config.host.as_str(), config.port));
+    if let Some(login) = &config.login {
+        options.set_credentials(&login.user, login.password.clone());
+    }
+    if let Some(tls) = &config.tls {
+        let client = client(tls).map_err(|error| Failure::Tls(error.to_string()))?;
+        options.set_transport(Transport::tls_with_config(TlsConfiguration::Rustls(Arc::new(client))));
+    }
+    let mut network = options.network_options();
     network.set_tcp_nodelay(true);
-    reach
+    options
         .set_network_options(network)
         .set_keep_alive(config.keep_alive_s)
         .set_session_mode(SessionMode::Persistent)
@@ -84,45 +86,26 @@ fn options(config: &BrokerConfig, gone: Message, mut reach: MqttOptions) -> Mqtt
         .set_read_batch_size(READS)
         .set_max_packet_size(Some(LARGEST_PACKET))
         .set_last_will(LastWill::new(gone.topic, gone.payload, QoS::AtLeastOnce, true, None));
-    reach
-}
-
-/// The way to the broker.
-fn reach(config: &BrokerConfig) -> Result<MqttOptions, Failure> {
-    let mut options = MqttOptions::new(&config.client_id, (config.host.as_str(), config.port));
-    if let Some(login) = &config.login {
-        options.set_credentials(&login.user, login.password.clone());
-    }
-    if let Some(tls) = &config.tls {
-        let tls = TlsConfiguration::Rustls(Arc::new(client(tls)?));
-        options.set_transport(Transport::tls_with_config(tls));
-    }
     Ok(options)
 }
 
 /// Whom it trusts, and who it says it is.
-fn client(tls: &Tls) -> Result<ClientConfig, Failure> {
-    let failed = |error: &dyn std::fmt::Display| Failure::Tls(error.to_string());
+fn client(tls: &Tls) -> Result<ClientConfig, Box<dyn std::error::Error>> {
     let mut roots = RootCertStore::empty();
     match &tls.authority {
         Some(pem) => {
             for certificate in CertificateDer::pem_slice_iter(pem) {
-                let certificate = certificate.map_err(|error| failed(&error))?;
-                roots.add(certificate).map_err(|error| failed(&error))?;
+                roots.add(certificate?)?;
             }
         }
         None => _ = roots.add_parsable_certificates(rustls_native_certs::load_native_certs().certs),
     }
-    let builder = ClientConfig::builder_with_provider(Arc::new(
-        rumqttc::tokio_rustls::rustls::crypto::ring::default_provider(),
-    ));
-    let builder = builder.with_safe_default_protocol_versions().map_err(|error| failed(&error))?;
-    let builder = builder.with_root_certificates(roots);
+    let builder = ClientConfig::builder_with_provider(Arc::new(default_provider()));
+    let builder = builder.with_safe_default_protocol_versions()?.with_root_certificates(roots);
     let Some(identity) = &tls.identity else { return Ok(builder.with_no_client_auth()) };
-    let chain = CertificateDer::pem_slice_iter(&identity.certificate).collect::<Result<Vec<_>, _>>();
-    let key = PrivateKeyDer::from_pem_slice(&identity.key).map_err(|error| failed(&error))?;
-    let with = chain.map(|chain| builder.with_client_auth_cert(chain, key));
-    with.map_err(|error| failed(&error))?.map_err(|error| failed(&error))
+    let key = PrivateKeyDer::from_pem_slice(&identity.key)?;
+    let chain = CertificateDer::pem_slice_iter(&identity.certificate).collect::<Result<_, _>>()?;
+    Ok(builder.with_client_auth_cert(chain, key)?)
 }
 
 /// Between the tasks of the network thread.

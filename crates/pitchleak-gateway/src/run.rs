@@ -98,8 +98,7 @@ fn warn(log: &Log, warnings: &[String]) {
 }
 
 fn listen_for_signals(inbox: SyncSender<Input>) -> Result<(), Failure> {
-    let failed = |source| Failure::System { what: "wait for signals", source };
-    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM]).map_err(failed)?;
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM]).map_err(Failure::Signals)?;
     let run = move || {
         for signal in signals.forever() {
             let input = if signal == SIGHUP { Input::Reload } else { Input::Stop };
@@ -108,8 +107,26 @@ fn listen_for_signals(inbox: SyncSender<Input>) -> Result<(), Failure> {
             }
         }
     };
-    let spawned = std::thread::Builder::new().name("signals".to_owned()).spawn(run);
-    spawned.map(drop).map_err(failed)
+    thread("signals", run).map(drop)
+}
+
+/// Starts a thread of this name.
+pub fn thread(
+    name: &'static str,
+    run: impl FnOnce() + Send + 'static,
+) -> Result<std::thread::JoinHandle<()>, Failure> {
+    let spawned = std::thread::Builder::new().name(name.to_owned()).spawn(run);
+    spawned.map_err(|source| Failure::Thread { name, source })
+}
+
+/// Runs a task, and those that it starts, in a thread of this name that waits for the network alone.
+pub fn network_thread<T: Future<Output = ()>>(
+    name: &'static str,
+    task: impl FnOnce() -> T + Send + 'static,
+) -> Result<(), Failure> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.map_err(|source| Failure::Thread { name, source })?;
+    thread(name, move || runtime.block_on(task())).map(drop)
 }
 
 /// Those of a run before; one that is damaged is put aside.
@@ -166,8 +183,8 @@ fn serve(service: &mut Service, inputs: &Receiver<Input>, reloader: &mut Reloade
 /// The last checkpoint, then what the broker should have.
 fn end(mut service: Service, inputs: Receiver<Input>, ended: &Receiver<()>) {
     let until = Instant::now() + LAST_CHECKPOINT;
-    while Instant::now() < until && (service.is_saving() || service.has_changed()) {
-        if !service.is_saving() {
+    while Instant::now() < until && (service.waiting.saving || service.waiting.changed) {
+        if !service.waiting.saving {
             service.save();
         }
         // What else comes stays with the broker.
@@ -217,7 +234,6 @@ pub fn in_words(config: &Config) -> String {
 struct Reloader {
     path: PathBuf,
     running: Config,
-    every: Option<Duration>,
     looked: Instant,
     /// What was found at the last look and is not what the service runs by: whoever writes it may not have finished.
     found: Option<Config>,
@@ -225,8 +241,7 @@ struct Reloader {
 
 impl Reloader {
     fn new(path: &Path, running: Config) -> Self {
-        let (path, every) = (path.to_owned(), running.reload_every);
-        Self { path, running, every, looked: Instant::now(), found: None }
+        Self { path: path.to_owned(), running, looked: Instant::now(), found: None }
     }
 
     /// Reads the file. One that cannot be used changes nothing.
@@ -243,7 +258,7 @@ impl Reloader {
 
     /// Once in a while, where the configuration asks for it: goes on by what has changed and stays so.
     fn look(&mut self, service: &mut Service, now: Instant) {
-        if self.every.is_none_or(|every| now.duration_since(self.looked) < every) {
+        if self.running.reload_every.is_none_or(|every| now.duration_since(self.looked) < every) {
             return;
         }
         self.looked = now;
@@ -261,7 +276,6 @@ impl Reloader {
             service.log.say(Level::Warning, "reload_later", &text);
         }
         warn(&service.log, &config.warnings);
-        self.every = config.reload_every;
         self.running = config.clone();
         service.reload(Box::new(config));
     }

@@ -2,14 +2,13 @@
 
 use crate::Failure;
 use crate::broker::Ticket;
-use crate::run::Input;
+use crate::run::{Input, thread};
 use jiff::Timestamp;
 use pitchleak::core::Leak;
-use pitchleak::live::{Checkpoint, Snapshot, SummaryEvent};
+use pitchleak::live::{Checkpoint, LeakSummary, Snapshot, SummaryEvent};
 use pitchleak::output::{self, Inputs};
 use rustix::process::{getpriority_process, setpriority_process};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::os::unix::fs::FileExt;
@@ -58,9 +57,7 @@ pub fn start(disk: Disk, inbox: SyncSender<Input>) -> Result<(SyncSender<Job>, J
         give_way();
         work(&disk, &queue, &inbox);
     };
-    let spawned = std::thread::Builder::new().name("saver".to_owned()).spawn(run);
-    let thread = spawned.map_err(|source| Failure::System { what: "start the saver", source })?;
-    Ok((jobs, thread))
+    Ok((jobs, thread("saver", run)?))
 }
 
 /// Where samples come meanwhile on the same core, they go first. On Linux a priority is the thread's own.
@@ -183,21 +180,12 @@ fn rows(text: &mut String, from: &str, summary: &SummaryEvent) {
     let cylinder = summary.cylinder.replace('"', "\"\"");
     let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     for leak in Leak::ALL {
-        let name = leak.id();
-        let leakage = summary.leakage[leak];
-        let (slope, std) = (
-            leakage.trend_lpm_per_day.map(|trend| trend.slope),
-            leakage.trend_lpm_per_day.map(|trend| trend.std),
-        );
-        let _ = writeln!(
-            text,
-            "{from},{span},\"{cylinder}\",{name},{},{},{},{},{},{}",
-            leakage.mean_lpm,
-            number(leakage.std_lpm),
-            leakage.max_lpm,
-            leakage.alarm_share,
-            number(slope),
-            number(std)
+        let (name, of) = (leak.id(), summary.leakage[leak]);
+        let LeakSummary { mean_lpm, max_lpm, alarm_share, trend_lpm_per_day: trend, .. } = of;
+        let std_lpm = number(of.std_lpm);
+        let (slope, std) = (number(trend.map(|trend| trend.slope)), number(trend.map(|trend| trend.std)));
+        *text += &format!(
+            "{from},{span},\"{cylinder}\",{name},{mean_lpm},{std_lpm},{max_lpm},{alarm_share},{slope},{std}\n"
         );
     }
 }

@@ -50,9 +50,9 @@ pub struct Waiting {
     /// Hours and days, for the disk.
     summaries: Vec<SummaryEvent>,
     /// A checkpoint is being written.
-    saving: bool,
-    /// Something came since the last one.
-    changed: bool,
+    pub saving: bool,
+    /// Something came since the last one was asked for.
+    pub changed: bool,
     /// A configuration, for the checkpoint that is being written.
     config: Option<Box<Config>>,
     counted: Option<Instant>,
@@ -237,11 +237,6 @@ impl Service {
         let _ = self.jobs.send(job);
     }
 
-    /// Whether a checkpoint is being written.
-    pub fn is_saving(&self) -> bool {
-        self.waiting.saving
-    }
-
     fn saved(&mut self, saved: Saved) {
         self.waiting.saving = false;
         let Saved { result, took, job } = saved;
@@ -333,11 +328,6 @@ impl Service {
             };
             self.outbox.put(Message { topic, payload, keeping });
         }
-    }
-
-    /// Whether samples came since the last checkpoint was asked for.
-    pub fn has_changed(&self) -> bool {
-        self.waiting.changed
     }
 }
 
