@@ -21,8 +21,8 @@ use std::collections::BTreeSet;
 pub const WIRING_DOUBT: f64 = 0.5;
 /// Zeros that wander with such a mass hide a leak that comes and goes. A guess.
 const WANDER_DOUBT: f64 = 0.3;
-/// A noise scale of so many times the readings' own scatter contradicts the model, where the leaks are open besides: what
-/// remains widens their intervals.
+/// A noise scale of so many times the readings' own scatter contradicts what is said of sensors and rig. Where they are as
+/// declared it widens the leaks' intervals, and is a doubt where those are open.
 pub const MISFIT_DOUBT: f64 = 3.0;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
@@ -217,13 +217,17 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     };
     let faults: Vec<Leak> = Leak::ALL.into_iter().filter(|leak| probability[*leak] >= 1.0 - alpha).collect();
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
-    let status = if wiring > WIRING_DOUBT {
+    let as_declared =
+        weighed.first().is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id)));
+    let misfits = misfit > MISFIT_DOUBT;
+    // Where what is said of sensors and rig leaves as much, it is not so, and no leak beside it is.
+    let status = if wiring > WIRING_DOUBT || misfits && !as_declared {
         Status::Doubtful
     } else if !faults.is_empty() {
         Status::Leak
     } else if ruled_out.len() == Leak::ALL.len() {
         Status::Sound
-    } else if misfit > MISFIT_DOUBT {
+    } else if misfits {
         Status::Doubtful
     } else {
         Status::NotSure
@@ -238,9 +242,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         changed_ago_s: weighed.first().and_then(|best| best.changed_ago_s),
         pressures_pa: weighed.first().map_or_else(PerLeak::default, |best| best.pressures_pa),
         explanations: listed(weighed, rig),
-        as_declared: weighed
-            .first()
-            .is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id))),
+        as_declared,
         notes: notes(weighed, rig),
         misfit,
         wander,

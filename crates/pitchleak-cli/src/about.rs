@@ -6,6 +6,7 @@ use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use pitchleak::explain::explanations;
+use pitchleak::units::readable;
 
 /// Write the completions of a shell to standard output
 #[derive(Args)]
@@ -54,10 +55,10 @@ impl ManualPage {
 
 /// A line for each, kind by kind.
 pub fn list_explanations() -> Result<Outcome, Failure> {
-    let mut text = format!("{:<10} {:<26} {:>7}  what\n", "kind", "id", "share");
+    let mut text = format!("{:<10} {:<26} {:>9}  what\n", "kind", "id", "share");
     for entry in explanations() {
-        let (kind, percent) = (entry.kind.name(), 100.0 * entry.share);
-        text += &format!("{kind:<10} {:<26} {percent:>5.2} %  {}\n", entry.id, entry.text);
+        let (kind, percent) = (entry.kind.name(), readable(100.0 * entry.share, 3));
+        text += &format!("{kind:<10} {:<26} {percent:>7} %  {}\n", entry.id, entry.text);
     }
     output::print(&text)?;
     Ok(Outcome::Done)

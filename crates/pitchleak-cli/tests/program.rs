@@ -363,3 +363,14 @@ fn a_reader_that_leaves_early_is_no_error() {
     assert!(output.stderr.is_empty(), "{}", stderr(&output));
     assert_eq!(output.status.code(), Some(0));
 }
+
+/// However rare an explanation is, its share is not none.
+#[test]
+fn shares_of_explanations_are_told_with_digits_that_count() {
+    let told = Command::new(env!("CARGO_BIN_EXE_pitchleak")).arg("explanations").output().unwrap();
+    let told = String::from_utf8(told.stdout).unwrap();
+    let shares =
+        told.lines().skip(1).map(|line| line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap());
+    assert!(shares.clone().count() > 50);
+    assert!(shares.clone().all(|share| share > 0.0), "{told}");
+}
