@@ -23,7 +23,7 @@ pub const WIRING_DOUBT: f64 = 0.5;
 const WANDER_DOUBT: f64 = 0.3;
 /// A noise scale of so many times the readings' own scatter contradicts what is said of sensors and rig. Where they are as
 /// declared it widens the leaks' intervals, and is a doubt where those are open.
-pub const MISFIT_DOUBT: f64 = 3.0;
+const MISFIT_DOUBT: f64 = 3.0;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
@@ -142,6 +142,11 @@ pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told:
 }
 
 impl Decision {
+    /// Whether too much remains under every explanation for the leaks to be told.
+    pub fn fits_nothing(&self) -> bool {
+        self.misfit > MISFIT_DOUBT && !self.status.is_sure()
+    }
+
     /// Probability of the explanations one of whose parts `is` so, as far as they are listed.
     pub(crate) fn probability_where(&self, is: impl Fn(&str) -> bool) -> f64 {
         let so = self.explanations.iter().filter(|one| one.id.split('+').any(&is));

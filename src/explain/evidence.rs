@@ -104,7 +104,7 @@ impl Products {
     /// power are left of the column's.
     /// `scale` is that of the columns' noise.
     fn kept(&self, c: usize, rows: f64, scale: f64) -> Vec<f64> {
-        let most = (1.0 - 3.0 * (2.0 / rows.max(1.0)).sqrt()).max(0.1);
+        let most = (1.0 - 3.0 * mean_square_std(rows)).max(0.1);
         let share = |i: usize| {
             let place = i * self.size + i;
             let (noise, power) = (scale * self.noise[c][place], self.gram[c][place].max(0.0));
@@ -184,6 +184,11 @@ pub(super) fn chi_square(equations: &NormalEquations, free: &[Free], scales: [f6
         sum.iter_mut().zip(&one).for_each(|(sum, one)| *sum += one);
     }
     solve(&mut sum, size, &mut vec![0.0; free.len()]).1
+}
+
+/// Standard deviation of the mean of squares of so many unit normals.
+pub(super) fn mean_square_std(rows: f64) -> f64 {
+    (2.0 / rows.max(1.0)).sqrt()
 }
 
 /// ln of the prior density of a noise scale s², up to a constant: −½ν (ln s² + 1/s² − 1).

@@ -3,7 +3,7 @@
 use super::candidates::Scored;
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, fit};
+use super::evidence::{Fit, fit, mean_square_std};
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::Pass;
@@ -129,8 +129,7 @@ impl<'a> Fitted<'_, 'a> {
         let (mut left, mut of_leak) = (0.0, 0.0);
         for (c, loudness) in loudness.into_iter().enumerate() {
             let rows = equations.rows[c];
-            // Three standard deviations of a mean of squares.
-            let chance = 1.0 + 3.0 * (2.0 / rows.max(1.0)).sqrt();
+            let chance = 1.0 + 3.0 * mean_square_std(rows);
             left += rows * (self.fit.scales[c] - chance * loudness).max(0.0);
             of_leak += equations.gram(c).row(place)[place];
         }

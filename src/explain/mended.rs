@@ -10,7 +10,7 @@
 //! for neither side more than the noise itself differs.
 
 use super::equations::NormalEquations;
-use super::evidence::ln_scale_prior;
+use super::evidence::{ln_scale_prior, mean_square_std};
 use super::leak_sample::Weighing;
 use super::readings::Mistake;
 use pitchleak_core::continuity::EQUATIONS;
@@ -196,5 +196,5 @@ fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
 
 /// A noise scale over what it truly is.
 fn most_by_chance(rows: f64) -> f64 {
-    1.0 + CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt()
+    1.0 + CHANCE_SIGMAS * mean_square_std(rows)
 }

@@ -26,7 +26,7 @@ mod still;
 mod table;
 
 pub use columns::{Column, Course};
-pub use decision::{Belief, Decision, Explained, MISFIT_DOUBT, MISFIT_TOLD, Note, WIRING_DOUBT, explain};
+pub use decision::{Belief, Decision, Explained, MISFIT_TOLD, Note, WIRING_DOUBT, explain};
 pub(crate) use odds::Prior;
 pub(crate) use orthant::{Orthant, POINTS, positive_orthant};
 pub(crate) use posterior::NEAR;

@@ -5,6 +5,7 @@
 //! pressure that varies no more than its noise does is its mean, segment by segment: then it tells a leak from nothing that is
 //! constant as well, and from nothing else.
 
+use super::evidence::mean_square_std;
 use super::raw_products::SegmentProducts;
 use pitchleak_core::continuity::{COLUMNS, RawSum, column as place_of};
 
@@ -94,7 +95,7 @@ fn is_still(segments: &[SegmentProducts], quantity: &Quantity) -> bool {
             }
         }
     }
-    rows > 0.0 && power < noise * (1.0 + SIGMAS * (2.0 / rows).sqrt())
+    rows > 0.0 && power < noise * (1.0 + SIGMAS * mean_square_std(rows))
 }
 
 const PRESSURES: [RawSum; 2] = [RawSum::PressureA, RawSum::PressureB];

@@ -3,7 +3,7 @@
 use super::Findings;
 use super::statement::{interval, join};
 use crate::channels::ChannelFaultKind;
-use crate::explain::{Decision, Explained, MISFIT_DOUBT, WIRING_DOUBT};
+use crate::explain::{Decision, Explained, WIRING_DOUBT};
 use crate::signal::Signal;
 use crate::units::readable;
 use crate::wiring::remedy;
@@ -112,7 +112,7 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
         return Some(reason.against(&found.sensors));
     }
     // What leaves as much as that is no explanation.
-    let is_likely = |decision: &&Decision| decision.wiring > WIRING_DOUBT && decision.misfit <= MISFIT_DOUBT;
+    let is_likely = |decision: &&Decision| decision.wiring > WIRING_DOUBT && !decision.fits_nothing();
     let decision = findings.decision.filter(is_likely)?;
     let best = decision.explanations.iter().find(|one| one.wiring)?;
     let percent = 100.0 * decision.wiring;
@@ -232,7 +232,7 @@ const SENSORS_TELL: &str = "check whether the sensors are as good as declared an
                             diagnose` looks for an effect that the model lacks";
 
 fn model_does_not_fit(decision: &Decision) -> Option<Reason> {
-    (decision.misfit > MISFIT_DOUBT && !decision.status.is_sure()).then(|| {
+    decision.fits_nothing().then(|| {
         let text = format!(
             "no explanation known fits this trace: what remains is {:.1} times what the readings scatter",
             decision.misfit

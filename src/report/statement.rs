@@ -1,7 +1,7 @@
 //! The verdict as sentences.
 
 use super::{Findings, Leakage, Reason, Status};
-use crate::explain::{MISFIT_DOUBT, MISFIT_TOLD};
+use crate::explain::MISFIT_TOLD;
 use crate::units::duration;
 use pitchleak_core::{Estimate, Leak};
 
@@ -102,7 +102,7 @@ fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
 fn remains(findings: &Findings<'_>) -> Option<String> {
     let decision = findings.decision?;
     let misfit = decision.misfit;
-    (misfit > MISFIT_TOLD && (misfit <= MISFIT_DOUBT || decision.status.is_sure())).then(|| {
+    (misfit > MISFIT_TOLD && !decision.fits_nothing()).then(|| {
         format!("What remains unexplained is {misfit:.1} times what the readings scatter: the intervals allow for it.")
     })
 }

@@ -97,9 +97,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     output::print_as(
         arguments.json,
         || report.to_json(),
-        || match output::draws() {
-            true => fleet_terminal(&report, &output::palette()),
-            false => report.to_text(&output::palette()),
+        || {
+            let palette = output::palette();
+            if output::draws() { fleet_terminal(&report, &palette) } else { report.to_text(&palette) }
         },
     )?;
     let fault = arguments.fail_on_fault && report.by_cylinder.iter().any(|one| !one.faults.is_empty());
