@@ -166,8 +166,6 @@ pub(crate) const IN_THE_RUNNING: f64 = 0.4;
 pub(crate) const AGREED_SIGMA: f64 = 3.0;
 /// A lag is not named below this share of the time between two samples. Chosen: integrals between samples are no better than that.
 pub(crate) const LEAST_LAG_SHARE: f64 = 0.01;
-/// An area is not named below this share of the declared one, but a rival of what is. Sourced: data sheets give areas in three digits.
-pub(crate) const ROUNDING_SHARE: f64 = 0.005;
 /// Candidates whose fit is this close cannot be told apart. Derived: three standard deviations.
 pub(crate) const CONFUSABLE_CHI2: f64 = 9.0;
 /// A candidate's score is linear about the effect in whose place it would stand, and may err by this share: within it, it is fitted there.

@@ -177,12 +177,6 @@ pub(crate) fn judge(
             "a product of signals that the table does not list fits better than any known effect".to_owned(),
         );
     }
-    let rounding =
-        effects.iter().filter_map(|one| Some((fit.problem.terms[one.term].effect()?, one.below_rounding?)));
-    complaints.extend(rounding.map(|(named, number)| {
-        let [named, number] = [named, number].map(|effect| effect.spec().id);
-        format!("{number} within the rounding of its data sheet explains more than {named}")
-    }));
     let [before, after] = [before, after].map(|model| &model.quality.rmse);
     let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);
     if !effects.is_empty() && Equation::ALL.into_iter().all(|equation| !fell[equation]) {

@@ -6,7 +6,7 @@ use super::dead_band::{Beside, median_of_three, within_band};
 use super::play::{Followed, Sides};
 use super::series::Series;
 use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
-use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals};
+use pitchleak_core::{Cylinder, Effect, EffectSet, Sensors, Signals, Terms};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
 #[derive(Default)]
@@ -30,19 +30,20 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// Of a trace whose sensors have these `effects`, which are undone, and whose leaks at each time are `leaks_at`.
+    /// Of a trace of this cylinder whose sensors have these `effects`, which are undone; `residual` is that of the model at a time.
     pub(crate) fn of(
         series: &Series,
-        (model, leaks_at): (&Model<f64>, impl Fn(f64) -> PerLeak<f64>),
+        cylinder: &Cylinder<f64>,
+        residual: impl Fn(f64, &Signals<f64>) -> Terms<f64>,
         effects: &EffectSet<f64>,
         sensors: &Sensors<f64>,
     ) -> Self {
-        let model = Model { cylinder: effects.built(&model.cylinder), ..*model };
+        let cylinder = &effects.built(cylinder);
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
-            let [qa, qb] = within_bands(series, &model, sensors);
-            let raw = raw_speed(series, (&model, leaks_at), effects, [&qa.side, &qb.side]);
-            let (v_mps, std_mps, rms_mps) = from_flow(series, &raw, &model, sensors);
+            let [qa, qb] = within_bands(series, cylinder, sensors);
+            let raw = raw_speed(series, residual, effects, [&qa.side, &qb.side]);
+            let (v_mps, std_mps, rms_mps) = from_flow(series, &raw, cylinder, sensors);
             Self { v_mps, std_mps, rms_mps, qa, qb, ..Self::default() }
         } else {
             Self::from_position(series, effects, sensors)
@@ -103,12 +104,12 @@ impl Motion {
 fn from_flow(
     series: &Series,
     raw: &[f64],
-    model: &Model<f64>,
+    cylinder: &Cylinder<f64>,
     sensors: &Sensors<f64>,
 ) -> (Vec<f64>, f64, f64) {
     let rms = root_mean_square(raw);
-    let std = (sensors.flow_a.noise_std / model.cylinder.area_a_m2)
-        .min(sensors.flow_b.noise_std / model.cylinder.area_b_m2);
+    let std =
+        (sensors.flow_a.noise_std / cylinder.area_a_m2).min(sensors.flow_b.noise_std / cylinder.area_b_m2);
     let (half, step) = (half_window(std, rms, 2.0), series.step_s());
     let half = half.min(longest_half(step));
     (smooth(raw, half), std / ((2 * half + 1) as f64).sqrt(), rms)
@@ -116,8 +117,8 @@ fn from_flow(
 
 /// Where in dead bands of their meters the flows A and B would lie: what the other meter shows says how they go on meanwhile, or
 /// the position where that shows nothing either.
-fn within_bands(series: &Series, model: &Model<f64>, sensors: &Sensors<f64>) -> [Sides; 2] {
-    let (step, cylinder) = (series.step_s(), &model.cylinder);
+fn within_bands(series: &Series, cylinder: &Cylinder<f64>, sensors: &Sensors<f64>) -> [Sides; 2] {
+    let step = series.step_s();
     let half = longest_half(step).max(1);
     let speed = slope(&series.t_s, &series.x_m, half);
     let speed_std = slope_std(sensors.position.noise_std, half, step);
@@ -148,49 +149,47 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
     ((std / (SPEED_NOISE_SHARE * rms)).powf(power) / 2.0).min(1e6) as usize
 }
 
-/// Speed from eq. (1), both chambers averaged where both have a meter. `unread`: where in their dead bands the flows lie.
+/// The speed at which nothing is left of eq. (1), both chambers averaged where both have a meter. `unread`: where in their dead bands the
+/// flows lie.
 fn raw_speed(
     series: &Series,
-    (model, leaks_at): (&Model<f64>, impl Fn(f64) -> PerLeak<f64>),
+    residual: impl Fn(f64, &Signals<f64>) -> Terms<f64>,
     effects: &EffectSet<f64>,
     [qa_unread, qb_unread]: [&[f64]; 2],
 ) -> Vec<f64> {
-    let (cylinder, bulk) = (&model.cylinder, model.fluid.bulk_modulus_pa);
     let rate = |values: &[f64], at: usize| {
         let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
         let span = series.t_s[to] - series.t_s[from];
         if span > 0.0 { (values[to] - values[from]) / span } else { 0.0 }
     };
-    (0..series.len())
-        .map(|at| {
-            let reading = Signals {
-                x_m: series.x_m[at],
-                pa_pa: series.pa_pa[at],
-                pb_pa: series.pb_pa[at],
-                dpa_pas: rate(&series.pa_pa, at),
-                dpb_pas: rate(&series.pb_pa, at),
-                qa_m3s: series.qa_m3s[at],
-                qb_m3s: series.qb_m3s[at],
-                dqa_m3s2: rate(&series.qa_m3s, at),
-                dqb_m3s2: rate(&series.qb_m3s, at),
-                qa_unread: qa_unread[at],
-                qb_unread: qb_unread[at],
-                ..Signals::default()
-            };
-            let seen = effects.correct(&reading);
-            let leaks = leaks_at(series.t_s[at]);
-            let past = leaks.internal * (seen.pa_pa - seen.pb_pa);
-            let stored_a = cylinder.volume_a_m3(seen.x_m) / bulk * seen.dpa_pas;
-            let stored_b = cylinder.volume_b_m3(seen.x_m) / bulk * seen.dpb_pas;
-            let a = (seen.qa_m3s - past - leaks.external_a * seen.pa_pa - stored_a) / cylinder.area_a_m2;
-            let b = -(seen.qb_m3s + past - leaks.external_b * seen.pb_pa - stored_b) / cylinder.area_b_m2;
-            match (a.is_finite(), b.is_finite()) {
-                (true, true) => (a + b) / 2.0,
-                (true, false) => a,
-                _ => b,
-            }
-        })
-        .collect()
+    let speed = |at: usize| {
+        let reading = Signals {
+            x_m: series.x_m[at],
+            pa_pa: series.pa_pa[at],
+            pb_pa: series.pb_pa[at],
+            dpa_pas: rate(&series.pa_pa, at),
+            dpb_pas: rate(&series.pb_pa, at),
+            qa_m3s: series.qa_m3s[at],
+            qb_m3s: series.qb_m3s[at],
+            dqa_m3s2: rate(&series.qa_m3s, at),
+            dqb_m3s2: rate(&series.qb_m3s, at),
+            qa_unread: qa_unread[at],
+            qb_unread: qb_unread[at],
+            temp_k: series.temp_k[at],
+            t_s: series.t_s[at],
+            ..Signals::default()
+        };
+        let seen = effects.correct(&reading);
+        // A chamber's residual is linear in the speed.
+        let left = |v_mps: f64| residual(series.t_s[at], &Signals { v_mps, ..seen });
+        let balanced = left(0.0).zip(left(1.0), |still, moving| still / (still - moving));
+        match (balanced.chamber_a_m3s, balanced.chamber_b_m3s) {
+            (a, b) if a.is_finite() && b.is_finite() => (a + b) / 2.0,
+            (a, _) if a.is_finite() => a,
+            (_, b) => b,
+        }
+    };
+    (0..series.len()).map(speed).collect()
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {

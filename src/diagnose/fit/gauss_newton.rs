@@ -99,20 +99,24 @@ impl<'a> Fit<'a> {
         Self::linearised(self.problem, &structure, (at, error), next, progress)
     }
 
-    /// By how much more it leaves than another fit of the same traces: squares of what is left over, each fit's at the noise that its own
-    /// model gives the rows that count for both, and what the priors pay. So an equation times a constant is the same equation.
+    /// Twice the ln of the odds against it beside another fit of the same traces, on the rows that count for both: what it leaves at the noise
+    /// that its own model gives them, how wide that noise is, and what the priors pay.
     pub(crate) fn left_beyond(&self, other: &Self) -> f64 {
         let counts = self.regression.counted.iter().zip(&other.regression.counted);
         let counts: Vec<bool> = counts.map(|(own, others)| *own && *others).collect();
-        self.squares_left(&counts) + self.paid() - other.squares_left(&counts) - other.paid()
+        self.misfit(&counts) + self.paid() - other.misfit(&counts) - other.paid()
     }
 
-    /// Of the entries that count.
-    fn squares_left(&self, counts: &[bool]) -> f64 {
+    /// Minus twice the ln of the likelihood of what the meters and the load cell read at the other readings, over the entries that count. So an
+    /// equation times a constant is the same equation, and a model that hands on more of the readings' noise has to leave less.
+    fn misfit(&self, counts: &[bool]) -> f64 {
         let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);
-        let left = regression::residual(self.rows(), &self.free);
-        let white = Whitening::of(&covariances, &self.assumed_error).whiten(&left);
-        white.iter().zip(counts).filter(|(_, counts)| **counts).map(|(value, _)| value * value).sum()
+        let whitening = Whitening::of(&covariances, &self.assumed_error);
+        let white = whitening.whiten(&regression::residual(self.rows(), &self.free));
+        let widths = whitening.widths().zip(self.weak_form.left_gains());
+        let of_entry = |(value, (width, gain)): (&f64, (f64, f64))| value * value + 2.0 * (width / gain).ln();
+        let all = white.iter().zip(widths).zip(counts);
+        all.filter(|(_, counts)| **counts).map(|(entry, _)| of_entry(entry)).sum()
     }
 
     /// What the priors add to the sum of squares.

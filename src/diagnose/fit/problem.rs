@@ -2,10 +2,10 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
-use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, ROUNDING_SHARE, SHOWN_SIGMA};
+use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, SHOWN_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
-use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind};
-use pitchleak_core::{Cylinder, Effect, Model, PerLeak, Sensors, Signals};
+use pitchleak_core::effects::{EffectConstant, EffectConstants};
+use pitchleak_core::{Cylinder, Effect, Sensors, Signals};
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -123,31 +123,17 @@ impl<'a> Problem<'a> {
         let lag_s = effect.is_lag().then_some(self.least_lag_s);
         noise_m3s.map(|std| SHOWN_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
     }
-
-    /// Whether so much of an effect is worth its name, not only a doubt about another's.
-    pub(crate) fn is_worth_a_name(&self, term: usize, value: f64) -> bool {
-        self.terms[term].effect().is_none_or(|effect| value.abs() >= self.rounding(effect))
-    }
-
-    /// By so much a declared number may be off because its data sheet rounds it.
-    fn rounding(&self, effect: Effect) -> f64 {
-        let mut cylinder = *self.declared_cylinder();
-        let is_number = effect.spec().kind == EffectKind::Cylinder;
-        let declared = is_number.then(|| effect.adds_to(&mut cylinder)).flatten();
-        declared.map_or(0.0, |number| ROUNDING_SHARE * *number)
-    }
 }
 
 /// Friction turns within the speed that these traces can resolve, and a valve opens at the mean load pressure.
 fn usual_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
-    let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: PerLeak::default() };
-    let least = |motion: &Motion| (motion.least_sure_mps() / 3.0, motion.rms_mps);
-    let speeds: Vec<(f64, f64)> = traces
-        .iter()
-        .map(|series| {
-            least(&Motion::of(series, (&model, |_| PerLeak::default()), &declared.effects, &declared.sensors))
-        })
-        .collect();
+    let start = Linearisation::declared(declared);
+    let speeds = |series: &Series| {
+        let residual = |_, seen: &Signals<f64>| start.residual(seen);
+        let motion = Motion::of(series, &declared.cylinder, residual, &declared.effects, &declared.sensors);
+        (motion.least_sure_mps() / 3.0, motion.rms_mps)
+    };
+    let speeds: Vec<(f64, f64)> = traces.iter().map(speeds).collect();
     let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
     let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);
     EffectConstants {

@@ -38,8 +38,6 @@ pub(crate) struct Selected {
     pub(crate) unlisted_rival: Option<Unlisted>,
     /// A product of signals that the table does not list would have fitted better.
     pub(crate) is_below_unlisted: bool,
-    /// A number of the cylinder that explains more in its place, and is too small for a name.
-    pub(crate) below_rounding: Option<Effect>,
 }
 
 impl Selected {
@@ -53,7 +51,6 @@ impl Selected {
             probability: 0.0,
             unlisted_rival: None,
             is_below_unlisted: false,
-            below_rounding: None,
         }
     }
 }
@@ -195,10 +192,7 @@ fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
     let chi2_drop = trial.score.chi2_drop;
     let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
     let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= LEAST_MENDED_SHARE;
-    is_significant
-        && mends_enough
-        && trial.is_worth_a_name(fit)
-        && fit.helps_held_out(trial.score.term, trial.constants)
+    is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
 }
 
 /// The pairs whose product explains more than chance would.

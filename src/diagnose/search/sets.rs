@@ -25,8 +25,6 @@ struct Exchange {
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise; of one that is
     /// fitted, with what leaks below zero cost.
     dearer: f64,
-    /// One of the new that is too small for a name: it may be the rounding of a data sheet.
-    rounding: Option<usize>,
 }
 
 impl Exchange {
@@ -43,7 +41,7 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let mut exchanges = nearest(all, progress);
     for _ in 0..MOST_SWAPS {
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
-        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && one.rounding.is_none();
+        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0;
         let better = exchanges.iter().filter(is_better);
         let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
         let Some(best) = best else { break };
@@ -123,7 +121,6 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
         new: vec![(term, constants)],
         rise: lost - chi2_drop,
         dearer: needed(fit, constants) - spared,
-        rounding: None,
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
 }
@@ -150,7 +147,6 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
             rise: lost - both.chi2_drop,
             dearer: needed[a] + needed[b] - spared,
-            rounding: None,
         })
     };
     let pairs = (0..terms.len()).flat_map(|a| (a + 1..terms.len()).map(move |b| (a, b)));
@@ -169,13 +165,8 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_complete = !other.is_incomplete() || fit.is_incomplete();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
     let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
-    let is_rounding = |term: &usize| {
-        let size = other.estimate(*term).map_or(0.0, |own| own.value);
-        !fit.problem.is_worth_a_name(*term, size)
-    };
-    let rounding = one.new.iter().map(|(term, _)| *term).find(is_rounding);
     let dearer = one.dearer + below_zero(&other) - own_leaks;
-    is_model.then(|| Exchange { rise: other.left_beyond(fit), dearer, rounding, ..one })
+    is_model.then(|| Exchange { rise: other.left_beyond(fit), dearer, ..one })
 }
 
 /// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
@@ -200,9 +191,6 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
         let odds_against = against.clone().map(|other| odds(other.worse(dispersion))).sum::<f64>();
         one.probability = 1.0 / (1.0 + odds_against + worse.map_or(0.0, odds));
         one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
-        let better = |other: &Exchange| (other.worse(dispersion) < 0.0).then_some(other.rounding).flatten();
-        one.below_rounding =
-            against.clone().find_map(better).and_then(|term| fit.problem.terms[term].effect());
         let rival = |other: &Exchange| Rival {
             effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
             probability: one.probability * odds(other.worse(dispersion)),

@@ -143,11 +143,6 @@ impl Trial {
     pub(super) fn beyond(&self, dispersion: f64) -> f64 {
         self.score.chi2_drop / dispersion - self.critical_sigma.powi(2)
     }
-
-    /// Whether there is enough of it for a name.
-    pub(super) fn is_worth_a_name(&self, fit: &Fit<'_>) -> bool {
-        fit.problem.is_worth_a_name(self.score.term, self.score.value)
-    }
 }
 
 impl Candidates<'_, '_> {

@@ -52,7 +52,7 @@ impl Linearisation {
     }
 
     /// The leaks at a time of a trace, changes included.
-    pub(crate) fn leaks_at(&self, trace: usize, t_s: f64) -> PerLeak<f64> {
+    fn leaks_at(&self, trace: usize, t_s: f64) -> PerLeak<f64> {
         let mut leaks = self.model.leaks_m3spa;
         for (change, value) in &self.changes {
             leaks[change.leak] += value * change.at(trace, t_s);
@@ -68,8 +68,17 @@ impl Linearisation {
 
     /// The residual of the three equations at corrected readings.
     pub(crate) fn residual(&self, at: &Signals<f64>) -> Terms<f64> {
-        let known = self.effects.terms(at, &self.model, |kind| kind != EffectKind::Sensor);
-        self.model.residual(at).plus(-1.0, known)
+        self.residual_with(&self.model, at)
+    }
+
+    /// The same at a time of a trace, with the leaks of that time.
+    pub(crate) fn residual_at(&self, trace: usize, t_s: f64, at: &Signals<f64>) -> Terms<f64> {
+        self.residual_with(&Model { leaks_m3spa: self.leaks_at(trace, t_s), ..self.model }, at)
+    }
+
+    fn residual_with(&self, model: &Model<f64>, at: &Signals<f64>) -> Terms<f64> {
+        let known = self.effects.terms(at, model, |kind| kind != EffectKind::Sensor);
+        model.residual(at).plus(-1.0, known)
     }
 
     /// The residual of the equations at readings as the sensors show them: the chambers by the position's own speed,

@@ -23,8 +23,8 @@ use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
-use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::{Sensors, Signals};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -94,6 +94,14 @@ impl<'a> WeakForm<'a> {
     /// The noise of these rows, had the equations this error.
     pub(crate) fn noise(&self, equation_error: PerEquation<f64>) -> NoiseModel<'_> {
         self.noise_with(&self.sensitivities, equation_error)
+    }
+
+    /// By how much each entry grows with what its meter or the load cell reads.
+    pub(crate) fn left_gains(&self) -> impl Iterator<Item = f64> {
+        self.rows
+            .entries
+            .iter()
+            .map(|entry| self.sensitivities[entry.row][entry.equation].left_gain(entry.equation))
     }
 
     /// The covariances of these rows, had the equations this error.
@@ -189,7 +197,8 @@ fn add_unresolved(
 
 fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
     let of = |(trace, series): (usize, &Series)| {
-        Motion::of(series, (&at.model, |t_s| at.leaks_at(trace, t_s)), &at.effects, sensors)
+        let residual = |t_s: f64, seen: &Signals<f64>| at.residual_at(trace, t_s, seen);
+        Motion::of(series, &at.model.cylinder, residual, &at.effects, sensors)
     };
     traces.iter().enumerate().map(of).collect()
 }

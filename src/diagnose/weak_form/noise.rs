@@ -249,6 +249,11 @@ impl Whitening {
         Self { factor }
     }
 
+    /// The diagonal of L: how wide the noise of each entry is beside those before it.
+    pub(crate) fn widths(&self) -> impl Iterator<Item = f64> {
+        self.factor.iter().map(|line| line[0])
+    }
+
     /// L⁻¹ v.
     pub(crate) fn whiten(&self, v: &[f64]) -> Vec<f64> {
         let mut out: Vec<f64> = Vec::with_capacity(v.len());

@@ -307,7 +307,7 @@ mod tests {
         }
         let at = Linearisation::declared(&declared);
         let motion =
-            Motion::of(&series, (&at.model, |_| at.model.leaks_m3spa), &at.effects, &declared.sensors);
+            Motion::of(&series, &cylinder, |_, seen| at.residual(seen), &at.effects, &declared.sensors);
         let integrand = Integrand::new(&at, &[Term::Internal], &[EffectConstants::default()]);
         Rows::build(&[series], &[motion], &integrand, 0.1)
     }

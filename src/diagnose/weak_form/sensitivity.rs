@@ -29,6 +29,16 @@ impl Sensitivity {
         Self { noise_factor: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
     }
 
+    /// How the reading enters that an equation has by itself.
+    pub(super) fn left_gain(&self, equation: Equation) -> f64 {
+        let own = match equation {
+            Equation::ChamberA => Channel::FlowA,
+            Equation::ChamberB => Channel::FlowB,
+            Equation::Force => Channel::Force,
+        };
+        self.gains[own as usize][0].abs()
+    }
+
     /// Whether samples don't see all of the speed that forces feel.
     pub(super) fn is_speed_unresolved(&self) -> bool {
         self.noise_factor[Channel::FeltSpeed as usize] > 1.0

@@ -101,7 +101,7 @@ impl EffectConstant {
                 let (low, high) = span(|at| at.x_m);
                 (0.05 * (high - low), 0.7 * (high - low))
             }
-            Self::StribeckSpeed => (0.02 * fastest_mps(), 0.7 * fastest_mps()),
+            Self::StribeckSpeed => (0.02 * fastest_mps(), 1.5 * fastest_mps()),
             Self::SlipSpeed => (finest, 0.3 * fastest_mps()),
             Self::Precharge => (0.0, span(|at| at.pa_pa.max(at.pb_pa)).1),
             Self::CrackingPressure => {
