@@ -57,6 +57,15 @@ pub(crate) struct Fit<'a> {
     pub(super) colour: PerEquation<OnceLock<Option<f64>>>,
 }
 
+/// By how much more one fit leaves than another. So an equation times a constant is the same equation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Beyond {
+    /// Squares of what is left over, each fit's at the noise that its own model gives, and what the priors pay.
+    pub(crate) chi2: f64,
+    /// Twice the ln of how wide that noise is, in what the meters and the load cell read.
+    pub(crate) width: f64,
+}
+
 impl<'a> Fit<'a> {
     /// Best fit of the declared model.
     pub(crate) fn declared(problem: &'a Problem<'a>, progress: Progress<'_>) -> Self {
@@ -86,7 +95,7 @@ impl<'a> Fit<'a> {
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
-    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: see [`left_beyond`](Self::left_beyond).
+    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: see [`beyond`](Self::beyond).
     pub(crate) fn in_place_of(
         &self,
         old: &[usize],
@@ -99,24 +108,25 @@ impl<'a> Fit<'a> {
         Self::linearised(self.problem, &structure, (at, error), next, progress)
     }
 
-    /// Twice the ln of the odds against it beside another fit of the same traces, on the rows that count for both: what it leaves at the noise
-    /// that its own model gives them, how wide that noise is, and what the priors pay.
-    pub(crate) fn left_beyond(&self, other: &Self) -> f64 {
+    /// How it does beside another fit of the same traces, on the rows that count for both.
+    pub(crate) fn beyond(&self, other: &Self) -> Beyond {
         let counts = self.regression.counted.iter().zip(&other.regression.counted);
         let counts: Vec<bool> = counts.map(|(own, others)| *own && *others).collect();
-        self.misfit(&counts) + self.paid() - other.misfit(&counts) - other.paid()
+        let (own, others) = (self.left(&counts), other.left(&counts));
+        Beyond { chi2: own.chi2 + self.paid() - others.chi2 - other.paid(), width: own.width - others.width }
     }
 
-    /// Minus twice the ln of the likelihood of what the meters and the load cell read at the other readings, over the entries that count. So an
-    /// equation times a constant is the same equation, and a model that hands on more of the readings' noise has to leave less.
-    fn misfit(&self, counts: &[bool]) -> f64 {
+    /// What it leaves of the entries that count.
+    fn left(&self, counts: &[bool]) -> Beyond {
         let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);
         let whitening = Whitening::of(&covariances, &self.assumed_error);
         let white = whitening.whiten(&regression::residual(self.rows(), &self.free));
         let widths = whitening.widths().zip(self.weak_form.left_gains());
-        let of_entry = |(value, (width, gain)): (&f64, (f64, f64))| value * value + 2.0 * (width / gain).ln();
-        let all = white.iter().zip(widths).zip(counts);
-        all.filter(|(_, counts)| **counts).map(|(entry, _)| of_entry(entry)).sum()
+        let counted = white.iter().zip(widths).zip(counts).filter(|(_, counts)| **counts);
+        counted.fold(Beyond::default(), |sum, ((value, (width, gain)), _)| Beyond {
+            chi2: sum.chi2 + value * value,
+            width: sum.width + 2.0 * (width / gain).ln(),
+        })
     }
 
     /// What the priors add to the sum of squares.

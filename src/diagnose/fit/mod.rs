@@ -10,8 +10,8 @@ mod score;
 mod widening;
 
 pub(crate) use emptied::Emptied;
-pub(crate) use gauss_newton::Fit;
 pub use gauss_newton::Progress;
+pub(crate) use gauss_newton::{Beyond, Fit};
 pub(crate) use leak_levels::LeakProducts;
 pub(crate) use predict::MeanFlow;
 pub(crate) use problem::Problem;

@@ -5,7 +5,7 @@
 
 use super::candidates::{Candidates, critical_sigma, open, strongest_unlisted};
 use super::selection::{self, Rival, Selected, Selection};
-use crate::diagnose::fit::{Fit, Progress, Solution};
+use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
     CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_SWAPS,
@@ -15,6 +15,9 @@ use crate::presence::ln_tail;
 use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
 
+/// The ln of larger odds is certainty, and its exponential might be no number.
+const MOST_LN_ODDS: f64 = 300.0;
+
 /// Some named effects gone, and others in their place.
 #[derive(Clone, Debug)]
 struct Exchange {
@@ -22,15 +25,29 @@ struct Exchange {
     new: Vec<(usize, EffectConstants<f64>)>,
     /// By how much the sum of squares rises.
     rise: f64,
+    /// By how much the noise that its model gives the rows is wider; of one that is fitted.
+    wider: f64,
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise; of one that is
     /// fitted, with what leaks below zero cost.
     dearer: f64,
 }
 
 impl Exchange {
-    /// By how much the set is the worse one: twice the ln of the odds against it.
+    /// By how much the set is the worse one: twice the ln of the odds against it, where the true readings are as likely anywhere on what the
+    /// model allows.
     fn worse(&self, dispersion: f64) -> f64 {
         self.rise / dispersion + self.dearer
+    }
+
+    /// The same where the true position and pressures are as likely anywhere, and what the meters read follows from them. What is true lies
+    /// between both, as the machine's motion is slow and the noise is not: what only one of them tells is not known.
+    fn worse_by_width(&self, dispersion: f64) -> f64 {
+        self.worse(dispersion) + self.wider
+    }
+
+    /// Whether either says that it comes near.
+    fn is_near(&self, dispersion: f64) -> bool {
+        self.worse(dispersion).min(self.worse_by_width(dispersion)) < CONFUSABLE_CHI2
     }
 }
 
@@ -120,6 +137,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
         gone: gone.to_vec(),
         new: vec![(term, constants)],
         rise: lost - chi2_drop,
+        wider: 0.0,
         dearer: needed(fit, constants) - spared,
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
@@ -146,6 +164,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
             gone: gone.to_vec(),
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
             rise: lost - both.chi2_drop,
+            wider: 0.0,
             dearer: needed[a] + needed[b] - spared,
         })
     };
@@ -166,7 +185,10 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
     let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
     let dearer = one.dearer + below_zero(&other) - own_leaks;
-    is_model.then(|| Exchange { rise: other.left_beyond(fit), dearer, ..one })
+    is_model.then(|| {
+        let Beyond { chi2, width } = other.beyond(fit);
+        Exchange { rise: chi2, wider: width, dearer, ..one }
+    })
 }
 
 /// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
@@ -184,18 +206,26 @@ fn is_at_bound(fit: &Fit<'_>) -> bool {
 fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
     let fit = &all.fit;
     let dispersion = fit.dispersion(fit.free.chi2);
-    let odds = |worse: f64| (-worse / 2.0).exp();
+    let measures: [fn(&Exchange, f64) -> f64; 2] = [Exchange::worse, Exchange::worse_by_width];
+    let odds = |worse: f64| (-worse / 2.0).min(MOST_LN_ODDS).exp();
     for one in &mut all.effects {
         let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
         let (unlisted, worse) = unlisted(fit, one.term).unzip();
-        let odds_against = against.clone().map(|other| odds(other.worse(dispersion))).sum::<f64>();
-        one.probability = 1.0 / (1.0 + odds_against + worse.map_or(0.0, odds));
+        let own = measures.map(|worse_of| {
+            let odds_against = against.clone().map(|other| odds(worse_of(other, dispersion))).sum::<f64>();
+            1.0 / (1.0 + odds_against + worse.map_or(0.0, odds))
+        });
+        one.probability = f64::midpoint(own[0], own[1]);
         one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
-        let rival = |other: &Exchange| Rival {
-            effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
-            probability: one.probability * odds(other.worse(dispersion)),
+        let rival = |other: &Exchange| {
+            let shares =
+                measures.iter().zip(own).map(|(worse_of, own)| own * odds(worse_of(other, dispersion)));
+            Rival {
+                effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
+                probability: shares.sum::<f64>() / 2.0,
+            }
         };
-        one.rivals = against.filter(|other| other.worse(dispersion) < CONFUSABLE_CHI2).map(rival).collect();
+        one.rivals = against.filter(|other| other.is_near(dispersion)).map(rival).collect();
     }
 }
 
