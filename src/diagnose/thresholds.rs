@@ -225,9 +225,11 @@ pub(crate) const DOUBTED_ODDS: f64 = 0.5;
 /// Bins of equal count in which the residual is averaged against a variable. Chosen: six see a slope, a bend and a step, and hold
 /// [`FEWEST_ROWS`] each in 20 s.
 pub(crate) const SHAPE_BINS: usize = 6;
-/// An effect that mends less than this share of what all of its equations mend together may be an error of theirs. Chosen: laws that
-/// are wrong by 5 % leave that much.
-pub(crate) const LEAST_SHARE_BESIDE: f64 = 3e-3;
+/// An effect that mends less than this share of what another of the same equation does may be that one's error. Chosen: a law that
+/// is wrong by 3 % leaves that much.
+pub(crate) const LEAST_SHARE_BESIDE: f64 = 1e-3;
+/// More effects at once than that are rather one that no table has. Chosen: a hose is three, and two faults at once are rare.
+pub(crate) const MOST_BELIEVED: usize = 4;
 /// A leak this many standard deviations below zero takes confidence from the effects of its chamber. Chosen: two.
 pub(crate) const DOUBTED_LEAK_SIGMA: f64 = 2.0;
 /// A leak this many standard deviations below zero is evidence against the model. Chosen: three.

@@ -7,7 +7,7 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{EquationResidual, Interaction, ModelFit};
 use crate::diagnose::search::Selection;
-use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, PORTMANTEAU_LAGS, SHAPE_BINS};
+use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, MOST_BELIEVED, PORTMANTEAU_LAGS, SHAPE_BINS};
 use crate::diagnose::weak_form::{RESIDUAL_TESTS, Unlisted};
 use crate::diagnose::{search, statistics};
 
@@ -176,6 +176,11 @@ pub(crate) fn judge(
         complaints.push(
             "a product of signals that the table does not list fits better than any known effect".to_owned(),
         );
+    }
+    if effects.len() > MOST_BELIEVED {
+        let count = effects.len();
+        complaints
+            .push(format!("{count} effects at once are rare: one that no table has may be behind them"));
     }
     let [before, after] = [before, after].map(|model| &model.quality.rmse);
     let fell = PerEquation::from_fn(|equation| after[equation] < before[equation]);

@@ -152,7 +152,7 @@ fn weak_rival(fit: &Fit<'_>, one: &Selected, judgement: &Judgement) -> Option<Do
     ))
 }
 
-/// It is as small as the error that the laws of what acts in its equations may have. While something else is there that
+/// It is as small as the error that another named effect, of the same equation, may have in its law. While something else is there that
 /// no effect explains, that error is of unknown size: only the strongest effect of an equation is believed.
 fn small_beside_other(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) -> Option<Doubt> {
     let fit = &selection.fit;
@@ -162,12 +162,11 @@ fn small_beside_other(selection: &Selection<'_>, one: &Selected, judgement: &Jud
         Equation::ALL.into_iter().any(|equation| acts[equation] && also[equation])
     };
     let own = search::loss(fit, &[one.term]);
-    let all: Vec<usize> = selection.effects.iter().filter(shares_equation).map(|other| other.term).collect();
-    let others = all.iter().filter(|other| **other != one.term);
-    let of_others = others.map(|other| (*other, search::loss(fit, &[*other])));
+    let others = selection.effects.iter().filter(|other| other.term != one.term);
+    let of_others = others.filter(shares_equation).map(|other| (other, search::loss(fit, &[other.term])));
     let (large, mended) = of_others.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let id = fit.problem.terms[large].effect()?.spec().id;
-    if own < LEAST_SHARE_BESIDE * search::loss(fit, &all) {
+    let id = fit.problem.terms[large.term].effect()?.spec().id;
+    if own < LEAST_SHARE_BESIDE * mended {
         let text =
             format!("it is so small beside {id} that a small error in the law of that would pass for it");
         return Some(doubt(DoubtId::SmallBesideOther, text));
