@@ -4,6 +4,7 @@
 use pitchleak::diagnose::{Diagnosis, Verdict};
 use pitchleak_testkit::confidence::plant::Rest;
 use pitchleak_testkit::confidence::{Case, all_named, ask_all, deviations, first_is_true, line, questions};
+use pitchleak_testkit::subsets;
 
 /// Every `stride`th from `first`.
 fn asked(cases: Vec<Case>, first: usize, stride: usize) -> Vec<(Case, Diagnosis)> {
@@ -115,6 +116,19 @@ fn what_an_error_of_a_large_effect_leaves_is_no_sure_small_one() {
         let is_true = |id: &str| case.truth.iter().any(|(own, _)| *own == id);
         let wrong = answer.effects.iter().any(|effect| effect.confident && !is_true(effect.id));
         assert!(!wrong && first_is_true(&case, &answer), "{}", line(&case, &answer));
+    }
+}
+
+/// One dry friction is not surely another where the motion hardly tells them apart, nor a meter's zero a turbulent leak beside a play that hides it,
+/// nor are wrong areas a friction that a line's resistance hides.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
+fn what_another_set_of_effects_may_be_is_not_surely_the_first() {
+    let cases = [12, 103, 138, 199].map(|number| subsets::Case::draw(0x0c0f_fee1, number, 2));
+    let answers = subsets::ask_all(&cases);
+    assert_eq!(answers.len(), cases.len());
+    for (case, answer) in &answers {
+        assert!(!answer.has_a_sure_wrong_name(), "{}: {}", case.words(), answer.line());
     }
 }
 

@@ -139,6 +139,11 @@ impl Answer {
         self.diagnosis.effects.iter().any(|effect| !self.is_there(effect))
     }
 
+    /// Something is named that is not there, and no doubt stands beside it.
+    pub fn has_a_sure_wrong_name(&self) -> bool {
+        self.diagnosis.effects.iter().any(|effect| effect.confident && !self.is_there(effect))
+    }
+
     fn first_is_right(&self) -> bool {
         self.diagnosis.effects.first().is_some_and(|effect| self.is_there(effect))
     }

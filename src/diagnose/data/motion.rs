@@ -231,3 +231,29 @@ fn slope(t: &[f64], x: &[f64], half: usize) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, torn_seal};
+    use pitchleak_core::Model;
+    use pitchleak_core::effects::EffectConstants;
+
+    /// What an effect takes past the piston is no motion, once the model has it.
+    #[test]
+    fn speed_from_flows_knows_the_effects_that_were_found() {
+        let (series, declared) = (torn_seal(30), declared());
+        let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: LEAKS };
+        let off = |effects: &EffectSet<f64>| {
+            let residual =
+                |_, at: &Signals<f64>| model.residual(at).plus(-1.0, effects.terms(at, &model, |_| true));
+            let speed = Motion::of(&series, &model.cylinder, residual, effects, &declared.sensors);
+            let (way, steps) = (speed.way_m(&series.t_s), series.len() - 1);
+            (way[steps] - way[0] - (series.x_m[steps] - series.x_m[0])).abs()
+        };
+        let mut known = EffectSet::default();
+        known.set(TURBULENT.0, TURBULENT.1, EffectConstants::default()).expect("is physical");
+        let (without, with) = (off(&EffectSet::default()), off(&known));
+        assert!(with < 1e-3 && without > 10.0 * with, "{without} m without, {with} m with it");
+    }
+}

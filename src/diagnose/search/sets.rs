@@ -237,3 +237,33 @@ fn unlisted(fit: &Fit<'_>, term: usize) -> Option<(Unlisted, f64)> {
     let dearer = needed(fit, fit.problem.usual_constants) - needed(fit, fit.constants(term));
     Some((law, rise / fit.dispersion(fit.free.chi2) + dearer))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fit::Problem;
+    use crate::diagnose::testing::{TURBULENT, declared, torn_seal};
+    use crate::diagnose::weak_form::Term;
+    use pitchleak_core::Effect;
+
+    #[test]
+    fn what_only_one_belief_tells_is_not_sure() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let [named, other] = [TURBULENT.0, Effect::FlowMeterGainA]
+            .map(|effect| problem.place(Term::Effect(effect)).expect("is a term"));
+        let fit = Fit::declared(&problem, &|| ()).with(named, problem.usual_constants, &|| ());
+        let mut all = Selection { fit, effects: vec![Selected::new(named, 1.0)] };
+        let mut held = |rise: f64, wider: f64| {
+            let new = vec![(other, problem.usual_constants)];
+            hold_against(&mut all, &[Exchange { gone: vec![named], new, rise, wider, dearer: 0.0 }]);
+            (all.effects[0].probability, all.effects[0].rivals.len())
+        };
+        let (sure, rivals) = held(60.0, 10.0);
+        assert!(sure > 0.99 && rivals == 0, "{sure}, {rivals} rivals");
+        for (rise, wider) in [(60.0, -120.0), (-60.0, 120.0), (1e4, -1e6)] {
+            let (half, rivals) = held(rise, wider);
+            assert!((half - 0.5).abs() < 0.01 && rivals == 1, "{half}, {rivals} rivals");
+        }
+    }
+}

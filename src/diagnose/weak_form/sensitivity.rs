@@ -29,14 +29,15 @@ impl Sensitivity {
         Self { noise_factor: [x, pa, pb, qa, qb, force, qa.max(qb)], ..self }
     }
 
-    /// How the reading enters that an equation has by itself.
+    /// By how much an equation grows with the reading that it has by itself; one where that has no noise to tell it.
     pub(super) fn left_gain(&self, equation: Equation) -> f64 {
         let own = match equation {
             Equation::ChamberA => Channel::FlowA,
             Equation::ChamberB => Channel::FlowB,
             Equation::Force => Channel::Force,
         };
-        self.gains[own as usize][0].abs()
+        let gain = self.gains[own as usize][0].abs();
+        if gain > 0.0 { gain } else { 1.0 }
     }
 
     /// Whether samples don't see all of the speed that forces feel.
