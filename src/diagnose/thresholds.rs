@@ -168,6 +168,8 @@ pub(crate) const AGREED_SIGMA: f64 = 3.0;
 pub(crate) const LEAST_LAG_SHARE: f64 = 0.01;
 /// Candidates whose fit is this close cannot be told apart. Derived: three standard deviations.
 pub(crate) const CONFUSABLE_CHI2: f64 = 9.0;
+/// The ln of larger odds is certainty. Derived: far beyond any evidence that is told, far below what has no exponential.
+pub(crate) const MOST_LN_ODDS: f64 = 300.0;
 /// A candidate's score is linear about the effect in whose place it would stand, and may err by this share: within it, it is fitted there.
 /// Derived: the square of an effect of a fifth, which is beyond any gain or area in use.
 pub(crate) const CURVED_SHARE: f64 = 0.04;

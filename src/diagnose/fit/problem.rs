@@ -31,7 +31,8 @@ pub(crate) struct Problem<'a> {
 impl<'a> Problem<'a> {
     pub(crate) fn new(traces: &'a [Series], declared: &Declared, checks: &[SensorCheck]) -> Self {
         let terms = all_terms();
-        let usual_constants = usual_constants(traces, declared);
+        let start = Linearisation::declared(declared);
+        let usual_constants = usual_constants(traces, &start.motions(traces, &declared.sensors));
         Self {
             traces,
             declared: declared.sensors,
@@ -42,7 +43,7 @@ impl<'a> Problem<'a> {
             least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
             given_constants: EffectConstants { slip_speed_mps: turning_speed(declared), ..usual_constants },
             usual_constants,
-            start: Linearisation::declared(declared),
+            start,
         }
     }
 
@@ -126,16 +127,9 @@ impl<'a> Problem<'a> {
 }
 
 /// Friction turns within the speed that these traces can resolve, and a valve opens at the mean load pressure.
-fn usual_constants(traces: &[Series], declared: &Declared) -> EffectConstants<f64> {
-    let start = Linearisation::declared(declared);
-    let speeds = |series: &Series| {
-        let residual = |_, seen: &Signals<f64>| start.residual(seen);
-        let motion = Motion::of(series, &declared.cylinder, residual, &declared.effects, &declared.sensors);
-        (motion.least_sure_mps() / 3.0, motion.rms_mps)
-    };
-    let speeds: Vec<(f64, f64)> = traces.iter().map(speeds).collect();
-    let slip = speeds.iter().map(|s| s.0).fold(0.0, f64::max);
-    let usual = speeds.iter().map(|s| s.1).fold(0.0, f64::max);
+fn usual_constants(traces: &[Series], motions: &[Motion]) -> EffectConstants<f64> {
+    let slip = motions.iter().map(|motion| motion.least_sure_mps() / 3.0).fold(0.0, f64::max);
+    let usual = motions.iter().map(|motion| motion.rms_mps).fold(0.0, f64::max);
     EffectConstants {
         slip_speed_mps: within(EffectConstant::SlipSpeed, slip),
         stribeck_speed_mps: within(EffectConstant::StribeckSpeed, usual / 2.0),

@@ -8,25 +8,20 @@ use super::selection::{self, Rival, Selected, Selection};
 use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_SWAPS,
+    CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_LN_ODDS, MOST_SWAPS,
 };
 use crate::diagnose::weak_form::Unlisted;
 use crate::presence::ln_tail;
 use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
 
-/// The ln of larger odds is certainty, and its exponential might be no number.
-const MOST_LN_ODDS: f64 = 300.0;
-
 /// Some named effects gone, and others in their place.
 #[derive(Clone, Debug)]
 struct Exchange {
     gone: Vec<usize>,
     new: Vec<(usize, EffectConstants<f64>)>,
-    /// By how much the sum of squares rises.
-    rise: f64,
-    /// By how much the noise that its model gives the rows is wider; of one that is fitted.
-    wider: f64,
+    /// How much more it leaves; the width of the noise is known of one that is fitted.
+    left: Beyond,
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise; of one that is
     /// fitted, with what leaks below zero cost.
     dearer: f64,
@@ -36,18 +31,14 @@ impl Exchange {
     /// By how much the set is the worse one: twice the ln of the odds against it, where the true readings are as likely anywhere on what the
     /// model allows.
     fn worse(&self, dispersion: f64) -> f64 {
-        self.rise / dispersion + self.dearer
+        self.left.chi2 / dispersion + self.dearer
     }
 
-    /// The same where the true position and pressures are as likely anywhere, and what the meters read follows from them. What is true lies
-    /// between both, as the machine's motion is slow and the noise is not: what only one of them tells is not known.
-    fn worse_by_width(&self, dispersion: f64) -> f64 {
-        self.worse(dispersion) + self.wider
-    }
-
-    /// Whether either says that it comes near.
-    fn is_near(&self, dispersion: f64) -> bool {
-        self.worse(dispersion).min(self.worse_by_width(dispersion)) < CONFUSABLE_CHI2
+    /// That, and the same where the true position and pressures are as likely anywhere and what the meters read follows from them. What is true
+    /// lies between both, as the machine's motion is slow and the noise is not: what only one of them tells is not known.
+    fn worse_by_either(&self, dispersion: f64) -> [f64; 2] {
+        let worse = self.worse(dispersion);
+        [worse, worse + self.left.width]
     }
 }
 
@@ -136,8 +127,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
     let exchange = |(term, constants, chi2_drop)| Exchange {
         gone: gone.to_vec(),
         new: vec![(term, constants)],
-        rise: lost - chi2_drop,
-        wider: 0.0,
+        left: Beyond { chi2: lost - chi2_drop, ..Beyond::default() },
         dearer: needed(fit, constants) - spared,
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
@@ -163,8 +153,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
         (is_for_both && allowed).then(|| Exchange {
             gone: gone.to_vec(),
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
-            rise: lost - both.chi2_drop,
-            wider: 0.0,
+            left: Beyond { chi2: lost - both.chi2_drop, ..Beyond::default() },
             dearer: needed[a] + needed[b] - spared,
         })
     };
@@ -172,8 +161,8 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
     pairs.filter_map(pair).collect()
 }
 
-/// The exchange once it is fitted, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle, leaves more than noise where the named one
-/// does not, has an effect at the end of its range, or one that has nothing to do.
+/// The exchange once it is fitted, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle,
+/// leaves more than noise where the named one does not, has an effect at the end of its range, or one that has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
     let dispersion = other.dispersion(other.free.chi2);
@@ -185,10 +174,7 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
     let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
     let dearer = one.dearer + below_zero(&other) - own_leaks;
-    is_model.then(|| {
-        let Beyond { chi2, width } = other.beyond(fit);
-        Exchange { rise: chi2, wider: width, dearer, ..one }
-    })
+    is_model.then(|| Exchange { left: other.beyond(fit), dearer, ..one })
 }
 
 /// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
@@ -206,26 +192,28 @@ fn is_at_bound(fit: &Fit<'_>) -> bool {
 fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
     let fit = &all.fit;
     let dispersion = fit.dispersion(fit.free.chi2);
-    let measures: [fn(&Exchange, f64) -> f64; 2] = [Exchange::worse, Exchange::worse_by_width];
     let odds = |worse: f64| (-worse / 2.0).min(MOST_LN_ODDS).exp();
     for one in &mut all.effects {
         let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
         let (unlisted, worse) = unlisted(fit, one.term).unzip();
-        let own = measures.map(|worse_of| {
-            let odds_against = against.clone().map(|other| odds(worse_of(other, dispersion))).sum::<f64>();
+        let odds_of = |other: &Exchange| other.worse_by_either(dispersion).map(odds);
+        let own = [0, 1].map(|belief| {
+            let odds_against: f64 = against.clone().map(|other| odds_of(other)[belief]).sum();
             1.0 / (1.0 + odds_against + worse.map_or(0.0, odds))
         });
         one.probability = f64::midpoint(own[0], own[1]);
         one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
         let rival = |other: &Exchange| {
-            let shares =
-                measures.iter().zip(own).map(|(worse_of, own)| own * odds(worse_of(other, dispersion)));
+            let [one, two] = odds_of(other);
             Rival {
                 effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
-                probability: shares.sum::<f64>() / 2.0,
+                probability: f64::midpoint(own[0] * one, own[1] * two),
             }
         };
-        one.rivals = against.filter(|other| other.is_near(dispersion)).map(rival).collect();
+        let is_near = |other: &&Exchange| {
+            other.worse_by_either(dispersion).iter().any(|worse| *worse < CONFUSABLE_CHI2)
+        };
+        one.rivals = against.filter(is_near).map(rival).collect();
     }
 }
 
@@ -254,15 +242,15 @@ mod tests {
             .map(|effect| problem.place(Term::Effect(effect)).expect("is a term"));
         let fit = Fit::declared(&problem, &|| ()).with(named, problem.usual_constants, &|| ());
         let mut all = Selection { fit, effects: vec![Selected::new(named, 1.0)] };
-        let mut held = |rise: f64, wider: f64| {
-            let new = vec![(other, problem.usual_constants)];
-            hold_against(&mut all, &[Exchange { gone: vec![named], new, rise, wider, dearer: 0.0 }]);
+        let mut held = |chi2: f64, width: f64| {
+            let (new, left) = (vec![(other, problem.usual_constants)], Beyond { chi2, width });
+            hold_against(&mut all, &[Exchange { gone: vec![named], new, left, dearer: 0.0 }]);
             (all.effects[0].probability, all.effects[0].rivals.len())
         };
         let (sure, rivals) = held(60.0, 10.0);
         assert!(sure > 0.99 && rivals == 0, "{sure}, {rivals} rivals");
-        for (rise, wider) in [(60.0, -120.0), (-60.0, 120.0), (1e4, -1e6)] {
-            let (half, rivals) = held(rise, wider);
+        for (chi2, width) in [(60.0, -120.0), (-60.0, 120.0), (1e4, -1e6)] {
+            let (half, rivals) = held(chi2, width);
             assert!((half - 0.5).abs() < 0.01 && rivals == 1, "{half}, {rivals} rivals");
         }
     }

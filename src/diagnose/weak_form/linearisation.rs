@@ -2,11 +2,11 @@
 
 use super::leak_change::LeakChange;
 use super::terms::Term;
-use crate::diagnose::data::Declared;
+use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{DERIVATIVE_STEP, LEAST_COMPRESSIBILITY, OIL_SIGMA};
 use pitchleak_core::effects::{EffectConstants, EffectKind};
-use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Signals, Terms};
+use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals, Terms};
 
 /// The values around which the regression is linear.
 #[derive(Clone, Debug)]
@@ -71,9 +71,14 @@ impl Linearisation {
         self.residual_with(&self.model, at)
     }
 
-    /// The same at a time of a trace, with the leaks of that time.
-    pub(crate) fn residual_at(&self, trace: usize, t_s: f64, at: &Signals<f64>) -> Terms<f64> {
-        self.residual_with(&Model { leaks_m3spa: self.leaks_at(trace, t_s), ..self.model }, at)
+    /// The motion of traces in which nothing of this is left of the chambers' equations, with the leaks of each time.
+    pub(crate) fn motions(&self, traces: &[Series], sensors: &Sensors<f64>) -> Vec<Motion> {
+        let of = |(trace, series): (usize, &Series)| {
+            let model_at = |t_s: f64| Model { leaks_m3spa: self.leaks_at(trace, t_s), ..self.model };
+            let residual = |t_s: f64, seen: &Signals<f64>| self.residual_with(&model_at(t_s), seen);
+            Motion::of(series, &self.model.cylinder, residual, &self.effects, sensors)
+        };
+        traces.iter().enumerate().map(of).collect()
     }
 
     fn residual_with(&self, model: &Model<f64>, at: &Signals<f64>) -> Terms<f64> {

@@ -23,8 +23,8 @@ use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
-use pitchleak_core::{Sensors, Signals};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::OnceLock;
@@ -56,7 +56,7 @@ impl<'a> WeakForm<'a> {
         columns: Columns<'_>,
         equation_error: PerEquation<f64>,
     ) -> Self {
-        let motions = motions(traces, sensors, &at);
+        let motions = at.motions(traces, sensors);
         let rows = Rows::build(traces, &motions, &Integrand::of(&at, columns), BLOCK_S);
         let mut rows = rows.at_places(columns.places, columns.terms.len());
         rows.add_leak_changes(columns.terms);
@@ -166,7 +166,7 @@ pub(crate) fn residual_rows(
     at: &Linearisation,
     block_s: f64,
 ) -> Rows {
-    Rows::build(traces, &motions(traces, sensors, at), &Integrand::new(at, &[], &[]), block_s)
+    Rows::build(traces, &at.motions(traces, sensors), &Integrand::new(at, &[], &[]), block_s)
 }
 
 /// More noise where a trace moves faster than its samples tell, and where a sensor is somewhere in its play or dead band.
@@ -193,12 +193,4 @@ fn add_unresolved(
         *own = PerEquation::from_fn(|equation| own[equation].with_noise_factors(times));
         row.has_unseen_force = own.force.is_speed_unresolved() || has_unseen_force;
     }
-}
-
-fn motions(traces: &[Series], sensors: &Sensors<f64>, at: &Linearisation) -> Vec<Motion> {
-    let of = |(trace, series): (usize, &Series)| {
-        let residual = |t_s: f64, seen: &Signals<f64>| at.residual_at(trace, t_s, seen);
-        Motion::of(series, &at.model.cylinder, residual, &at.effects, sensors)
-    };
-    traces.iter().enumerate().map(of).collect()
 }

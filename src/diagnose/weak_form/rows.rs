@@ -306,10 +306,10 @@ mod tests {
             series.push(t, &sample, None);
         }
         let at = Linearisation::declared(&declared);
-        let motion =
-            Motion::of(&series, &cylinder, |_, seen| at.residual(seen), &at.effects, &declared.sensors);
+        let series = [series];
+        let motions = at.motions(&series, &declared.sensors);
         let integrand = Integrand::new(&at, &[Term::Internal], &[EffectConstants::default()]);
-        Rows::build(&[series], &[motion], &integrand, 0.1)
+        Rows::build(&series, &motions, &integrand, 0.1)
     }
 
     #[test]

@@ -88,7 +88,7 @@ impl EffectConstant {
 
     /// The values that a trace can tell apart: `span` gives the least and the largest value of a quantity in it, `finest` is the
     /// smallest value of this constant that it resolves. None where it tells nothing. The shares are chosen: a bell, a bend or a
-    /// threshold shows only well within what the trace covers.
+    /// threshold shows only well within what the trace covers, a Stribeck speed up to half beyond it, as its bend begins at rest.
     pub fn range(
         self,
         finest: f64,
