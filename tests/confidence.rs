@@ -132,6 +132,17 @@ fn what_another_set_of_effects_may_be_is_not_surely_the_first() {
     }
 }
 
+/// Near its end stop a chamber is small, its oil rings faster than is sampled and evaporates at times: nothing is missing there.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
+fn what_moves_faster_than_is_sampled_is_no_missing_effect() {
+    let cases = [50, 100, 180].map(|number| subsets::Case::draw(0x50f2, number, 0));
+    for (case, answer) in subsets::ask_all(&cases) {
+        let Diagnosis { verdict, notes, .. } = &answer.diagnosis;
+        assert_eq!(*verdict, Verdict::NoMissingEffect, "{}: {notes:?}", case.words());
+    }
+}
+
 /// A pressure sensor whose scale bends may pass for one with a gain and an offset, and a leak that grows faster than its pressure for one
 /// that opens at a pressure: where the traces do not tell, no name is sure.
 #[test]

@@ -140,6 +140,24 @@ fn honest_traces_stay_sure() {
     });
 }
 
+/// How much better than their data sheets sensors are says nothing of their gains and lags.
+#[test]
+fn sensors_much_better_than_their_sheets_are_believed() {
+    let history = History::of(&Wind::BuiltIn(WindCase::Mps21)).expect("is built in");
+    let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
+    let leaks = PerLeak { internal: "0.2 L/min".parse().expect("a course"), ..PerLeak::default() };
+    let scenario = Scenario { leaks, duration_s: 80.0, ..Scenario::new(rig(1e-2), reference) };
+    for start_s in [10.0, 130.0, 250.0] {
+        let scenario = Scenario { start_s, ..scenario.clone() };
+        let truths = scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs");
+        for (times, seed) in [(10.0, 1), (33.0, 2)] {
+            let (trace, _) = recorded(&truths, &lie(&[]), 1e-2 / times, seed);
+            let verdict = judge::replayed(trace, 1e-2).unwrap_or_else(|e| panic!("{e}")).verdict;
+            assert_eq!((verdict.status, verdict.faults), (Status::Leak, vec![Leak::Internal]), "{times}");
+        }
+    }
+}
+
 /// A plant whose meters' zeros are off in one of two recordings says so: among sizes that the trace leaves open, the zero
 /// gains as much as its prior odds do.
 #[test]

@@ -90,7 +90,7 @@ pub(crate) const SHOWN_SIGMA: f64 = 3.0;
 
 /// Length of a block, s. Chosen: short against the machine's motion, long against a sample.
 pub(crate) const BLOCK_S: f64 = 0.1;
-/// Steps longer than this many [`LEAST_STEP_S`] are integrated at two points, and what moves within them is looked for. Chosen: samples
+/// Steps longer than this many [`LEAST_STEP_S`] are integrated at two points. Chosen: samples
 /// of 100 Hz are fast, those of 50 Hz are not.
 pub(crate) const LONG_STEP: f64 = 1.5;
 /// Steps are even that differ by less than this share. Chosen: the jitter of a recorder's clock.

@@ -121,7 +121,7 @@ fn wiring(findings: &Findings<'_>) -> Option<Reason> {
 }
 
 /// What the trace says too little of.
-pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
+pub(super) fn gaps(findings: &Findings<'_>) -> Vec<Reason> {
     if !findings.knows_noise {
         let text = "the paper's law knows no uncertainty: its figures may be right or not";
         return vec![Reason::new(ReasonId::NoUncertainty, text, "replay with `--estimator rls`")];
@@ -136,7 +136,8 @@ pub(super) fn gaps(findings: &Findings<'_>, faults: &[Leak]) -> Vec<Reason> {
         let text = "this trace is too short to tell about leaks, or nothing explains it at all";
         return vec![Reason::new(ReasonId::NotIdentifiable, text, RECORD)];
     };
-    let (_, open) = findings.below_and_open(faults);
+    // An alarm that stands is no decision.
+    let (_, open) = findings.below_and_open(&decision.faults);
     let (away, open): (Vec<_>, Vec<_>) = open.into_iter().partition(|leak| findings.is_away(*leak));
     let away = (!away.is_empty()).then(|| {
         let text = format!("{} leaks come and go, and the last seconds show none", join(&away, "and"));

@@ -273,6 +273,17 @@ fn apparent_leaks_are_told_one_by_one() {
 }
 
 #[test]
+fn an_alarm_that_the_posterior_leaves_open_is_a_gap() {
+    let mut found = found(INTERNAL);
+    let decision = found.decision.as_mut().unwrap();
+    (decision.status, decision.faults) = (Status::NotSure, vec![]);
+    decision.probability.internal = 0.4;
+    assert_eq!(found.judged(), (Status::NotSure, vec!["undecided"]));
+    let text = found.verdict().text;
+    assert!(text.starts_with("Internal leak above 0.10 L/min with 40 %: "), "{text}");
+}
+
+#[test]
 fn what_no_explanation_fits_is_a_doubt() {
     let mut strange = found(INTERNAL);
     let decision = strange.decision.as_mut().unwrap();

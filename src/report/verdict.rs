@@ -161,7 +161,7 @@ impl Verdict {
     pub fn of(findings: &Findings<'_>) -> Self {
         let faults = findings.faults();
         let contradictions = contradictions(findings);
-        let gaps = gaps(findings, &faults);
+        let gaps = gaps(findings);
         let (status, reasons) = match findings.decision {
             _ if !contradictions.is_empty() => (Status::Doubtful, contradictions),
             _ if gaps.iter().any(|gap| gap.id.precedes_a_verdict()) => (Status::NotSure, gaps),

@@ -5,8 +5,7 @@
 use super::declared::Declared;
 use super::series::Series;
 use crate::diagnose::thresholds::{
-    FASTEST_MOTION_HZ, LEAST_STEP_S, LONG_STEP, MEDIAN_EFFICIENCY, MOTION_LEFT, NOISIER_SIGMA, RIPPLE,
-    RIPPLE_COLOUR, UNRESOLVED_SIGMA,
+    FASTEST_MOTION_HZ, MEDIAN_EFFICIENCY, MOTION_LEFT, NOISIER_SIGMA, RIPPLE, RIPPLE_COLOUR, UNRESOLVED_SIGMA,
 };
 use pitchleak_core::Sensors;
 use std::ops::Range;
@@ -217,8 +216,8 @@ const NORMAL_MEDIAN: f64 = 0.674_489_750_196_082;
 
 /// The fast part of each reading along a trace, held against the noise of its sensor.
 pub(crate) struct Unresolved {
-    /// Squares of differences in variances of the noise: position, pressures, flows, force. Empty where samples are fast enough.
-    squares: Option<[Vec<f64>; 6]>,
+    /// Squares of differences in variances of the noise: position, pressures, flows, force.
+    squares: [Vec<f64>; 6],
     order: usize,
 }
 
@@ -230,17 +229,14 @@ impl Unresolved {
             let unit = of_white * noise_std.max(f64::MIN_POSITIVE);
             fast.into_iter().map(|d| (d / unit).powi(2)).collect()
         };
-        let is_slow = series.step_s() > LONG_STEP * LEAST_STEP_S;
-        let squares = is_slow.then(|| {
-            [
-                squares(&series.x_m, sensors.position.noise_std),
-                squares(&series.pa_pa, sensors.pressure.noise_std),
-                squares(&series.pb_pa, sensors.pressure.noise_std),
-                squares(&series.qa_m3s, sensors.flow_a.noise_std),
-                squares(&series.qb_m3s, sensors.flow_b.noise_std),
-                squares(&series.force_n, sensors.force.noise_std),
-            ]
-        });
+        let squares = [
+            squares(&series.x_m, sensors.position.noise_std),
+            squares(&series.pa_pa, sensors.pressure.noise_std),
+            squares(&series.pb_pa, sensors.pressure.noise_std),
+            squares(&series.qa_m3s, sensors.flow_a.noise_std),
+            squares(&series.qb_m3s, sensors.flow_b.noise_std),
+            squares(&series.force_n, sensors.force.noise_std),
+        ];
         Self { squares, order }
     }
 
@@ -254,7 +250,7 @@ impl Unresolved {
             let (sum, count) = near.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
             if sum > UNRESOLVED_SIGMA.powi(2) * count { (sum / count).sqrt() } else { 1.0 }
         };
-        self.squares.as_ref().map_or([1.0; 6], |squares| squares.each_ref().map(of))
+        self.squares.each_ref().map(of)
     }
 }
 
@@ -308,10 +304,10 @@ mod unresolved_tests {
     use crate::diagnose::testing::{declared, sound};
     use pitchleak_core::Sample;
 
-    /// Samples of 20 Hz, one of which jumps.
-    fn slow(jolt_pa: f64) -> Series {
+    /// Every so many of the samples of 100 Hz, one of which jumps.
+    fn every(step: usize, jolt_pa: f64) -> Series {
         let (full, mut series) = (sound(60), Series::default());
-        for at in (0..full.len()).step_by(5) {
+        for at in (0..full.len()).step_by(step) {
             let sample = Sample {
                 x_m: full.x_m[at],
                 pa_pa: full.pa_pa[at] + if at == 1500 { jolt_pa } else { 0.0 },
@@ -329,13 +325,17 @@ mod unresolved_tests {
     fn a_jolt_is_loud_where_it_is_and_noise_is_not() {
         let sensors = declared().sensors;
         let jolt = 30.0 * sensors.pressure.noise_std;
-        let (quiet, jolted) = (Unresolved::of(&slow(0.0), &sensors), Unresolved::of(&slow(jolt), &sensors));
-        let is_one = |times: &[f64; 6]| times.iter().all(|one| (one - 1.0).abs() < 1e-12);
-        let loud = (0..1190).step_by(2).filter(|at| !is_one(&quiet.noise_factor(*at..at + 4))).count();
-        assert!(loud < 5, "{loud} of 595 by chance");
-        let there = jolted.noise_factor(298..302);
-        assert!(there[1] > 5.0 && there[2] < 2.0, "{there:?}");
-        let beside = (jolted.noise_factor(320..324)[1], quiet.noise_factor(320..324)[1]);
-        assert!((beside.0 - beside.1).abs() < 1e-12, "{beside:?}");
+        for step in [1, 5] {
+            let [quiet, jolted] = [0.0, jolt].map(|jolt| Unresolved::of(&every(step, jolt), &sensors));
+            let is_one = |times: &[f64; 6]| times.iter().all(|one| (one - 1.0).abs() < 1e-12);
+            let rows = 5950 / step / 2;
+            let loud = (0..rows).filter(|row| !is_one(&quiet.noise_factor(2 * row..2 * row + 4))).count();
+            assert!(loud < rows / 100, "{loud} of {rows} by chance");
+            let at = 1500 / step;
+            let there = jolted.noise_factor(at - 2..at + 2);
+            assert!(there[1] > 5.0 && there[2] < 2.0, "{there:?}");
+            let beside = [&jolted, &quiet].map(|one| one.noise_factor(at + 20..at + 24)[1]);
+            assert!((beside[0] - beside[1]).abs() < 1e-12, "{beside:?}");
+        }
     }
 }

@@ -182,8 +182,11 @@ impl Term {
         match self {
             Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => STORAGE.to_vec(),
             Self::Unlisted(Unlisted::DirectionLeak) => left_side(LeftSide::Speed).to_vec(),
-            Self::Unlisted(Unlisted::BentPressureA) => vec![(Channel::PressureA, 0), (Channel::PressureA, 1)],
-            Self::Unlisted(Unlisted::BentPressureB) => vec![(Channel::PressureB, 0), (Channel::PressureB, 1)],
+            Self::Unlisted(Unlisted::BentMeterA) => left_side(LeftSide::FlowA).to_vec(),
+            Self::Unlisted(Unlisted::BentMeterB) => left_side(LeftSide::FlowB).to_vec(),
+            Self::Unlisted(Unlisted::BentPressureA) => left_side(LeftSide::PressureA).to_vec(),
+            Self::Unlisted(Unlisted::BentPressureB) => left_side(LeftSide::PressureB).to_vec(),
+            Self::Unlisted(Unlisted::SquareFriction) => FELT.to_vec(),
             Self::Effect(effect) => {
                 let EffectSpec { carries, shares_noise_of, kind, .. } = effect.spec();
                 match *kind {
