@@ -14,10 +14,8 @@ use super::equations::NormalEquations;
 
 /// Degrees of freedom of the noise scales' prior: the declared noise is worth so many blocks. A guess.
 const NU: f64 = 4.0;
-/// Steps towards the scales' best values at the most: each only changes the noise by what the fit before left over; numerical.
-const MOST_STEPS: usize = 8;
-/// Scales are settled once a step moves neither by more than this share of what chance does; numerical.
-const SETTLED: f64 = 0.1;
+/// Steps towards the scales' best values: each only changes the noise by what the fit before left over.
+const STEPS: usize = 2;
 /// Least variance, in the declared noise's: sensors without noise are quantised all the same.
 const LEAST_SCALE: f64 = 0.02;
 /// Least square of a pivot, where noise products taken off leave less than the prior alone.
@@ -136,29 +134,32 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let products = Products::of(equations, free);
     let size = products.size;
     let mut scales = [1.0; 2];
-    let mut one = vec![0.0; size * size];
+    let mut loudest = [f64::INFINITY; 2];
+    let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
     let mut factor = vec![0.0; size * size];
     let mut means = vec![0.0; free.len()];
     let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
-    for _ in 0..MOST_STEPS {
-        factor.fill(0.0);
+    for step in 0..=STEPS {
         for c in 0..2 {
-            products.clean(c, n[c], scales[c], equations.loudest[c], &mut one);
-            factor.iter_mut().zip(&one).for_each(|(sum, one)| *sum += one);
+            products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
+        }
+        for (out, (one, other)) in factor.iter_mut().zip(each[0].iter().zip(&each[1])) {
+            *out = one + other;
         }
         (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
-        let better = [0, 1].map(|c| {
-            // What is left is the noise of the left side and of the columns, which are no louder than the readings scatter.
-            let of_columns = residual(&products.noise[c], size, &means);
-            let share = (equations.loudest[c] / scales[c]).min(1.0);
-            let left = residual(&products.gram[c], size, &means).max(0.0);
-            ((NU + left) / (NU + (n[c] + share * of_columns).max(LEAST_SCALE * n[c]))).max(LEAST_SCALE)
-        });
-        let moves = |c: usize| (better[c] / scales[c] - 1.0).abs() > SETTLED * mean_square_std(n[c]);
-        if !moves(0) && !moves(1) {
-            break;
+        if step < STEPS {
+            for c in 0..2 {
+                let mut left = residual(&each[c], size, &means);
+                // More than there is was taken off: the misfit is no noise of the columns.
+                if left < 0.0 {
+                    loudest[c] = equations.loudest[c];
+                    products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
+                    left = residual(&each[c], size, &means);
+                }
+                let residual = scales[c] * left.max(0.0);
+                scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
+            }
         }
-        scales = better;
     }
     let ln_scales: f64 = (0..2).map(|c| ln_scale_prior(scales[c]) - 0.5 * n[c] * scales[c].ln()).sum();
     let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);

@@ -17,6 +17,8 @@ use pitchleak_core::PerLeak;
 const LEAST_LN: f64 = 9.0;
 /// As much in the first look, which asks for the best and for means alone; numerical.
 const FIRST_LOOK_LN: f64 = 3.0;
+/// Leaks below this share of their threshold say nothing of the pressure sensors; a guess.
+const LEAST_LEAK: f64 = 0.5;
 /// A noise scale of so many times the readings' own scatter, squared, may be chance; above, an effect is missing, which is
 /// alike in about ten blocks: a push of the pitch. Guesses.
 const CHANCE_MISFIT2: f64 = 1.15;
@@ -54,8 +56,8 @@ pub(super) fn weigh<'a>(
     let pass = Pass::new(statistic, &products, rig, tables, PerLeak::default());
     let (first, inflation) = look(&Pass { told: *told, ..pass });
     let mean_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
-    // Leaks that are no faults say nothing of the pressure sensors.
-    let is_sound = mean_m3s.zip(rig.alarms.threshold_m3s).iter().all(|(_, (mean, fault))| mean < fault);
+    let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
+    let is_sound = mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least);
     let found_m3s = if is_sound { PerLeak::default() } else { mean_m3s };
     let products = products.worth(inflation);
     let last = Pass { doubts_m3s, told: *told, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
