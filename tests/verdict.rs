@@ -5,7 +5,7 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
 use pitchleak::rig::Odds;
-use pitchleak::simulate::{Scenario, Truth};
+use pitchleak::simulate::{LeakCourse, Scenario, Truth};
 use pitchleak::trace::TraceReader;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_testkit::lies::judge::{self, Judgement, Said, judge, recorded};
@@ -114,10 +114,14 @@ fn a_leak_that_grew_and_stays_is_a_leak_and_no_zero() {
 
 /// What happened where the external leak of A took this course.
 fn grown(wind: WindCase, course: &str, duration_s: f64) -> Vec<Truth> {
-    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let leaks = PerLeak { external_a: course.parse().expect("a course"), ..PerLeak::default() };
+    windy(wind, leaks, 0.0, duration_s)
+}
+
+fn windy(wind: WindCase, leaks: PerLeak<LeakCourse>, start_s: f64, duration_s: f64) -> Vec<Truth> {
+    let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
-    let scenario = Scenario { leaks, start_s: 0.0, duration_s, ..Scenario::new(rig(1e-2), reference) };
+    let scenario = Scenario { leaks, start_s, duration_s, ..Scenario::new(rig(1e-2), reference) };
     scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs")
 }
 
@@ -143,13 +147,9 @@ fn honest_traces_stay_sure() {
 /// How much better than their data sheets sensors are says nothing of their gains and lags.
 #[test]
 fn sensors_much_better_than_their_sheets_are_believed() {
-    let history = History::of(&Wind::BuiltIn(WindCase::Mps21)).expect("is built in");
-    let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
-    let leaks = PerLeak { internal: "0.2 L/min".parse().expect("a course"), ..PerLeak::default() };
-    let scenario = Scenario { leaks, duration_s: 80.0, ..Scenario::new(rig(1e-2), reference) };
     for start_s in [10.0, 130.0, 250.0] {
-        let scenario = Scenario { start_s, ..scenario.clone() };
-        let truths = scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs");
+        let leaks = PerLeak { internal: "0.2 L/min".parse().expect("a course"), ..PerLeak::default() };
+        let truths = windy(WindCase::Mps21, leaks, start_s, 80.0);
         for (times, seed) in [(10.0, 1), (33.0, 2)] {
             let (trace, _) = recorded(&truths, &lie(&[]), 1e-2 / times, seed);
             let verdict = judge::replayed(trace, 1e-2).unwrap_or_else(|e| panic!("{e}")).verdict;

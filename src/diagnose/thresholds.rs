@@ -90,8 +90,8 @@ pub(crate) const SHOWN_SIGMA: f64 = 3.0;
 
 /// Length of a block, s. Chosen: short against the machine's motion, long against a sample.
 pub(crate) const BLOCK_S: f64 = 0.1;
-/// Steps longer than this many [`LEAST_STEP_S`] are integrated at two points. Chosen: samples
-/// of 100 Hz are fast, those of 50 Hz are not.
+/// Steps longer than this many [`LEAST_STEP_S`] are integrated at two points. Chosen: samples of 100 Hz are fast, those of 50 Hz
+/// are not.
 pub(crate) const LONG_STEP: f64 = 1.5;
 /// Steps are even that differ by less than this share. Chosen: the jitter of a recorder's clock.
 pub(crate) const EVEN_SHARE: f64 = 0.1;

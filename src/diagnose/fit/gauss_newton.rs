@@ -176,8 +176,8 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let columns = Columns { terms: &problem.terms, constants: &structure.constants, places };
-        let weak_form =
-            WeakForm::new(problem.traces, &problem.sensors, (at, noise_at), columns, assumed_error);
+        let traces = (problem.traces, &problem.unresolved[..]);
+        let weak_form = WeakForm::new(traces, &problem.sensors, (at, noise_at), columns, assumed_error);
         Self::solving(weak_form, columns, problem, structure.clone(), assumed_error)
     }
 

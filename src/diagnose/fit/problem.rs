@@ -1,7 +1,7 @@
 //! What a diagnosis fits, and all that stays the same while it tries one effect after the other.
 
 use super::regression::Prior;
-use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, effective, white};
+use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, Unresolved, effective, white};
 use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, SHOWN_SIGMA};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
@@ -10,6 +10,8 @@ use pitchleak_core::{Cylinder, Effect, Sensors, Signals};
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
     pub(crate) traces: &'a [Series],
+    /// Their fast parts, in the noise of `sensors`.
+    pub(super) unresolved: Vec<Unresolved>,
     /// As the data sheets have them.
     pub(super) declared: Sensors<f64>,
     /// With the noise that the sensors really carry.
@@ -33,10 +35,12 @@ impl<'a> Problem<'a> {
         let terms = all_terms();
         let start = Linearisation::declared(declared);
         let usual_constants = usual_constants(traces, &start.motions(traces, &declared.sensors));
+        let sensors = effective(&declared.sensors, checks);
         Self {
             traces,
+            unresolved: traces.iter().map(|series| Unresolved::of(series, &sensors)).collect(),
             declared: declared.sensors,
-            sensors: effective(&declared.sensors, checks),
+            sensors,
             white: white(&declared.sensors, checks),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,

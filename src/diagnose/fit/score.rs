@@ -207,8 +207,8 @@ mod tests {
         let places: Vec<usize> = (0..problem.terms.len()).collect();
         let columns = Columns { terms: &problem.terms, constants: &constants, places: &places };
         let start = problem.start.clone();
-        let form =
-            WeakForm::new(&traces, &problem.sensors, (start.clone(), start), columns, PerEquation::default());
+        let (of, at) = ((&traces[..], &problem.unresolved[..]), (start.clone(), start));
+        let form = WeakForm::new(of, &problem.sensors, at, columns, PerEquation::default());
         test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));
     }
 

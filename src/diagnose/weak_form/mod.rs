@@ -48,9 +48,9 @@ pub(crate) struct WeakForm<'a> {
 }
 
 impl<'a> WeakForm<'a> {
-    /// With the noise that the sensors bring at `noise_at`, and `equation_error` as in [`NoiseModel`].
+    /// Of traces with their fast parts, with the noise that the sensors bring at `noise_at`, and `equation_error` as in [`NoiseModel`].
     pub(crate) fn new(
-        traces: &'a [Series],
+        (traces, unresolved): (&'a [Series], &[Unresolved]),
         sensors: &'a Sensors<f64>,
         (at, noise_at): (Linearisation, Linearisation),
         columns: Columns<'_>,
@@ -61,7 +61,7 @@ impl<'a> WeakForm<'a> {
         let mut rows = rows.at_places(columns.places, columns.terms.len());
         rows.add_leak_changes(columns.terms);
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
-        add_unresolved(&mut sensitivities, &mut rows, (traces, &motions), (sensors, &noise_at));
+        add_unresolved(&mut sensitivities, &mut rows, (traces, unresolved, &motions), (sensors, &noise_at));
         let (of_rows, of_noise) = (&rows, &sensitivities);
         let noise =
             NoiseModel { at: &noise_at, sensors, equation_error, rows: of_rows, sensitivities: of_noise };
@@ -173,10 +173,9 @@ pub(crate) fn residual_rows(
 fn add_unresolved(
     sensitivities: &mut [PerEquation<Sensitivity>],
     rows: &mut Rows,
-    (traces, motions): (&[Series], &[Motion]),
+    (traces, unresolved, motions): (&[Series], &[Unresolved], &[Motion]),
     (sensors, at): (&Sensors<f64>, &Linearisation),
 ) {
-    let unresolved: Vec<Unresolved> = traces.iter().map(|series| Unresolved::of(series, sensors)).collect();
     for (own, row) in sensitivities.iter_mut().zip(&mut rows.rows) {
         let samples = row.samples_in(&traces[row.trace()].t_s);
         let mut times = unresolved[row.trace()].noise_factor(samples.clone());
