@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, Free, chi_square, fit};
+use super::evidence::{Fit, Free, at_scales, fit};
 use super::hypothesis::{
     CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
 };
@@ -14,8 +14,6 @@ use super::readings::Mistake;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 use std::collections::HashMap;
 
-/// By how much the likelihood of a course may exceed that of leaks that wander, in ln; numerical.
-const BEYOND_WANDERING: f64 = 2.0;
 /// States of sensors and rig, best first, beside which pairs of leaks have courses of their own; numerical.
 const STATES_WITH_PAIRS: usize = 3;
 /// States of sensors and rig beside which other courses of leaks are tried; numerical.
@@ -51,6 +49,16 @@ pub(super) struct Scored<'a> {
     pub wiring: usize,
 }
 
+/// What is known of steady leaks beside a state, by which their other courses are asked or not.
+struct Steady {
+    scales: [f64; 2],
+    /// By these scales.
+    chi_square: f64,
+    ln_likelihood: f64,
+    /// ln of its prior and Occam's factor.
+    ln_weight: f64,
+}
+
 /// Explanations as they are found.
 pub(super) struct Candidates<'a, 'p> {
     pass: &'p Pass<'a, 'p>,
@@ -59,12 +67,14 @@ pub(super) struct Candidates<'a, 'p> {
     all: Vec<Scored<'a>>,
     /// The largest ln posterior of them.
     best_ln: f64,
+    /// What is less probable than the best by more, in ln, need not be found.
+    least_ln: f64,
 }
 
 impl<'a, 'p> Candidates<'a, 'p> {
     /// Constant leaks with every state of the sensors; zeros that wander only beside the two likeliest zeros.
-    pub fn with_constant_leaks(pass: &'p Pass<'a, 'p>, declared: &'p NormalEquations) -> Self {
-        let mut own = Self { pass, declared, all: Vec::new(), best_ln: f64::NEG_INFINITY };
+    pub fn with_constant_leaks(pass: &'p Pass<'a, 'p>, declared: &'p NormalEquations, least_ln: f64) -> Self {
+        let mut own = Self { pass, declared, all: Vec::new(), best_ln: f64::NEG_INFINITY, least_ln };
         let knows_zeros = pass.sizes.zeros.iter().all(|zero| *zero > 0.0);
         for (rank, zeros) in pass.tables.zeros.iter().enumerate() {
             // Who declares zeros knows them: they fail, but are not slightly off.
@@ -84,13 +94,59 @@ impl<'a, 'p> Candidates<'a, 'p> {
     }
 
     fn add_constant_leaks(&mut self, state: State<'a>) {
-        for subset in subsets() {
-            // A pressure's gain acts through the leak past the piston.
-            if state.departure.is_through_seal() && !subset[0] {
-                continue;
+        let own: Vec<Subset> = subsets().filter(|subset| is_asked(state, *subset)).collect();
+        self.add_subsets(&own, self.least(), |own, subset| own.with_steady(state, subset));
+    }
+
+    /// These sets of leaks, from none to all, unless no leak can make one as probable as `least`.
+    fn add_subsets(&mut self, own: &[Subset], least: f64, scored: impl Fn(&Self, Subset) -> Scored<'a>) {
+        let [none, between @ .., all] = own else { return };
+        let none = scored(self, *none);
+        let all = scored(self, *all);
+        // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
+        let most = none.ln_posterior - none.ln_sign - none.ln_likelihood + all.ln_likelihood;
+        let hopeless = none.ln_posterior.is_finite() && most < least;
+        self.keep(none);
+        self.keep(all);
+        if !hopeless {
+            for subset in between {
+                let one = scored(self, *subset);
+                self.keep(one);
             }
-            self.add(state, together(subset, LeakCourse::Constant), self.ln_constant(subset));
         }
+    }
+
+    /// ln posterior below which none matters.
+    fn least(&self) -> f64 {
+        self.best_ln - self.least_ln
+    }
+
+    fn keep(&mut self, scored: Scored<'a>) {
+        self.best_ln = self.best_ln.max(scored.ln_posterior);
+        self.all.push(scored);
+    }
+
+    fn with_steady(&self, state: State<'a>, subset: Subset) -> Scored<'a> {
+        let leaks = together(subset, LeakCourse::Constant);
+        self.scored(self.hypothesis(state, leaks, self.ln_constant(subset)))
+    }
+
+    fn steady(&mut self, state: State<'a>, subset: Subset) -> Option<Steady> {
+        if !is_asked(state, subset) {
+            return None;
+        }
+        if find(&self.all, state, subset).is_none() {
+            let one = self.with_steady(state, subset);
+            self.keep(one);
+        }
+        let Scored { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, .. } =
+            find(&self.all, state, subset)?;
+        Some(Steady {
+            scales: *scales,
+            chi_square: at_scales(self.declared, &hypothesis.free, *scales).0,
+            ln_likelihood: *ln_likelihood,
+            ln_weight: ln_posterior - ln_sign - ln_likelihood,
+        })
     }
 
     /// Best first.
@@ -108,70 +164,68 @@ impl<'a, 'p> Candidates<'a, 'p> {
         if subset == [false; 3] { 0.0 } else { self.pass.tables.ln_course(LeakCourse::Constant) }
     }
 
-    /// Its ln likelihood.
-    fn add(&mut self, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
-        let scored = self.scored(state, leaks, ln_course);
-        let ln_likelihood = scored.ln_likelihood;
-        self.best_ln = self.best_ln.max(scored.ln_posterior);
-        self.all.push(scored);
+    fn scored(&self, hypothesis: Hypothesis<'a>) -> Scored<'a> {
+        Scored::new(self.declared, &self.pass.sizes, hypothesis)
+    }
+
+    fn hypothesis(&self, state: State<'a>, leaks: Leaks, ln_course: f64) -> Hypothesis<'a> {
+        Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course)
+    }
+
+    /// An explanation, unless by the noise of one with steady leaks it does not matter; its ln likelihood.
+    fn ask(&mut self, steady: &Steady, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
+        let hypothesis = self.hypothesis(state, leaks, ln_course);
+        let (chi_square, ln_determinant) = at_scales(self.declared, &hypothesis.free, steady.scales);
+        let ln_likelihood = steady.ln_likelihood + self.ln_gain(steady.chi_square - chi_square);
+        if hypothesis.ln_prior + ln_likelihood - 0.5 * ln_determinant > self.least() {
+            let scored = self.scored(hypothesis);
+            self.keep(scored);
+        }
         ln_likelihood
     }
 
-    fn scored(&self, state: State<'a>, leaks: Leaks, ln_course: f64) -> Scored<'a> {
-        let (sizes, segments) = (&self.pass.sizes, self.pass.segments);
-        let hypothesis = Hypothesis::new(self.declared, sizes, segments, state, leaks, ln_course);
-        Scored::new(self.declared, sizes, hypothesis)
+    /// ln by which χ² that falls by so much raises the likelihood, once the noise scale has followed: −½ n ln(1 − Δ/n).
+    fn ln_gain(&self, fall: f64) -> f64 {
+        let rows = self.declared.rows.into_iter().filter(|rows| *rows > 0.0).fold(f64::INFINITY, f64::min);
+        if fall < rows { -0.5 * rows * (1.0 - fall / rows).ln() } else { f64::INFINITY }
     }
 
-    /// Other courses of the leaks, beside the best states, as far as they can be within `least_ln` of the best.
-    pub fn add_courses(&mut self, least_ln: f64) {
+    /// Other courses of the leaks, beside the best states, as far as they can matter.
+    pub fn add_courses(&mut self) {
         self.sort();
+        let tables = self.pass.tables;
         let courses = self.pass.courses();
         for (rank, state) in best_states(&self.all).into_iter().enumerate() {
             for subset in subsets().skip(1) {
-                let Some(most) = self.add_free_courses(state, subset) else { continue };
+                let Some(steady) = self.steady(state, subset) else { continue };
                 let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
                 for (course, ln_course) in &courses {
-                    let is_asked = match course {
-                        LeakCourse::Orifice => true,
-                        LeakCourse::Cracking => can_crack,
-                        _ => most + ln_course > self.best_ln - least_ln,
-                    };
-                    if is_asked {
-                        self.add(state, together(subset, *course), *ln_course);
+                    if can_crack || *course != LeakCourse::Cracking {
+                        self.ask(&steady, state, together(subset, *course), *ln_course);
                     }
                 }
+                // Leaks that wander or creep may do all that pairs do.
+                let free = [LeakCourse::Wandering, LeakCourse::Creeping].map(|course| {
+                    self.ask(&steady, state, together(subset, course), tables.ln_course(course))
+                });
                 let are_two = subset.iter().filter(|leak| **leak).count() == 2;
                 if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && are_two {
-                    self.add_pairs(state, subset, &courses, most, least_ln);
+                    let most = steady.ln_weight + free[0].max(free[1]);
+                    self.add_pairs(&steady, state, subset, &courses, most - self.ln_constant(subset));
                 }
             }
         }
-    }
-
-    /// Leaks that wander or creep may do all that the others do: returns what a course without its prior may reach at the most.
-    /// Where even that raises the likelihood by too little, it need not be asked.
-    fn add_free_courses(&mut self, state: State<'a>, subset: Subset) -> Option<f64> {
-        let steady = find(&self.all, state, subset)?;
-        let (steady_ln, steady_likelihood) = (steady.ln_posterior - steady.ln_sign, steady.ln_likelihood);
-        let mut most_likely = steady_likelihood;
-        for course in [LeakCourse::Wandering, LeakCourse::Creeping] {
-            let ln_course = self.pass.tables.ln_course(course);
-            most_likely = most_likely.max(self.add(state, together(subset, course), ln_course));
-        }
-        let gain = most_likely - steady_likelihood + BEYOND_WANDERING;
-        Some(steady_ln - self.pass.tables.ln_course(LeakCourse::Constant) + gain)
     }
 
     /// Two leaks each with a course of its own, where those can be as probable as the best; one that opens beside one that is steady, as
     /// beside others it is a sudden one.
     fn add_pairs(
         &mut self,
+        steady: &Steady,
         state: State<'a>,
         subset: Subset,
         courses: &[(LeakCourse, f64)],
         most: f64,
-        least_ln: f64,
     ) {
         let mut courses = courses.to_vec();
         courses.retain(|(course, _)| {
@@ -184,45 +238,35 @@ impl<'a, 'p> Candidates<'a, 'p> {
             for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
                 let is_told = [course, another].iter().all(|own| !matches!(own, LeakCourse::Opening(_)))
                     || [course, another].contains(&&LeakCourse::Constant);
-                if !is_told || most + ln_one + ln_other <= self.best_ln - least_ln {
-                    continue;
+                if is_told && most + ln_one + ln_other > self.least() {
+                    let mut leaks = [None; 3];
+                    (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
+                    self.ask(steady, state, leaks, ln_one + ln_other);
                 }
-                let mut leaks = [None; 3];
-                (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));
-                self.add(state, leaks, ln_one + ln_other);
             }
         }
     }
 
-    /// Zeros that jump, beside constant leaks and the best states of the rest. Zeros that wander may do all that they do: where even that
-    /// raises the likelihood by too little, none is asked.
-    pub fn add_jumps(&mut self, least_ln: f64) {
-        let tables = self.pass.tables;
-        let Some(wander) = tables.wanders.last() else { return };
+    /// Zeros that jump, beside constant leaks and the best states of the rest.
+    pub fn add_jumps(&mut self) {
         let (borders, ln_border) = self.pass.borders();
         self.sort();
         let mut states = best_states(&self.all);
         states.retain(|state| state.wander.0 <= 0.0 && state.zeros.id == "zeros_usual");
         for (state, subset) in states.into_iter().flat_map(|state| subsets().map(move |own| (state, own))) {
-            let Some(steady) = find(&self.all, state, subset) else { continue };
-            let (ln_steady, ln_likelihood) = (steady.ln_posterior - steady.ln_sign, steady.ln_likelihood);
+            let Some(steady) = self.steady(state, subset) else { continue };
             let leaks = together(subset, LeakCourse::Constant);
-            let ln_constant = self.ln_constant(subset);
-            let most = self.scored(State { wander: *wander, ..state }, leaks, ln_constant).ln_likelihood;
-            for zeros in tables.zeros.iter().filter(|zeros| zeros.jumps()) {
-                let ln_odds = (zeros.share / state.zeros.share).ln() + ln_border;
-                if ln_steady + ln_odds + most - ln_likelihood + BEYOND_WANDERING <= self.best_ln - least_ln {
-                    continue;
-                }
+            let ln_course = self.ln_constant(subset) + ln_border;
+            for zeros in self.pass.tables.zeros.iter().filter(|zeros| zeros.jumps()) {
                 for border in borders.clone() {
-                    self.add(State { zeros, border, ..state }, leaks, ln_constant + ln_border);
+                    self.ask(&steady, State { zeros, border, ..state }, leaks, ln_course);
                 }
             }
         }
     }
 
     /// Mistakes of wiring, beside slightly wrong zeros and constant leaks; their equations.
-    pub fn add_mistakes(&mut self, least_ln: f64) -> Vec<Mended> {
+    pub fn add_mistakes(&mut self) -> Vec<Mended> {
         let tables = self.pass.tables;
         let (Some(zeros), Some(departure), Some(wander)) =
             (tables.zeros.get(1), tables.departures.first(), tables.wanders.first())
@@ -230,7 +274,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             return Vec::new();
         };
         let state = State { zeros, departure, wander: *wander, border: 0 };
-        let least = self.best_ln - least_ln;
+        let least = self.least();
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
         let mut bound = Bound::of(best, self.declared);
@@ -258,27 +302,18 @@ impl<'a, 'p> Candidates<'a, 'p> {
     /// A mistake with each set of leaks, unless no leak can make it as probable as `least`.
     fn add_mistake(&mut self, mended: &Mended, mistaken: Mistaken<'a>, least: f64) {
         let Mistaken { entry, state, ln_prior, wiring } = mistaken;
-        let is_part = |subset: &Subset| subset.iter().any(|leak| *leak) && !subset.iter().all(|leak| *leak);
-        let mut none_ln = f64::NEG_INFINITY;
-        for subset in [[false; 3], [true; 3]].into_iter().chain(subsets().filter(is_part)) {
+        let own: Vec<Subset> = subsets().collect();
+        self.add_subsets(&own, least, |own, subset| {
+            let ln_prior = own.ln_constant(subset) + ln_prior;
+            let (sizes, segments) = (&own.pass.sizes, own.pass.segments);
             let leaks = together(subset, LeakCourse::Constant);
-            let ln_prior = self.ln_constant(subset) + ln_prior;
-            let (sizes, segments) = (&self.pass.sizes, self.pass.segments);
             let mut hypothesis = Hypothesis::new(&mended.equations, sizes, segments, state, leaks, ln_prior);
             hypothesis.wiring = Some(entry);
             let mut scored = Scored::new(&mended.equations, sizes, hypothesis);
             scored.wiring = wiring;
             scored.ln_posterior += mended.ln_chance(scored.scales);
-            // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
-            if subset == [false; 3] {
-                none_ln = scored.ln_posterior - scored.ln_sign - scored.ln_likelihood;
-            }
-            let hopeless = subset == [true; 3] && none_ln + scored.ln_likelihood < least;
-            self.all.push(scored);
-            if hopeless {
-                break;
-            }
-        }
+            scored
+        });
     }
 }
 
@@ -300,7 +335,7 @@ impl<'e> Bound<'e> {
     fn of(best: Option<&Scored<'_>>, declared: &'e NormalEquations) -> Option<Self> {
         let best = best.filter(|best| best.ln_posterior.is_finite())?;
         let (free, scales) = (best.hypothesis.free.clone(), best.scales);
-        let chi_square = chi_square(declared, &free, scales);
+        let (chi_square, _) = at_scales(declared, &free, scales);
         let (ln_posterior, gained) = (best.ln_posterior, HashMap::new());
         Some(Self { declared, free, scales, ln_posterior, chi_square, gained })
     }
@@ -327,7 +362,7 @@ impl<'e> Bound<'e> {
             free.retain(|known| known.column != place);
             free.push(Free { column: place, std: ANY_GAIN });
         }
-        0.5 * (self.chi_square - chi_square(self.declared, &free, self.scales))
+        0.5 * (self.chi_square - at_scales(self.declared, &free, self.scales).0)
     }
 }
 
@@ -402,6 +437,11 @@ fn steady_columns() -> Vec<(Column, Course)> {
         .chain(usual.filter(|(_, course)| *course == Course::Constant))
         .chain(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)))
         .collect()
+}
+
+/// A pressure's gain acts through the leak past the piston.
+fn is_asked(state: State<'_>, subset: Subset) -> bool {
+    subset[0] || !state.departure.is_through_seal()
 }
 
 /// These leaks on one course.

@@ -174,8 +174,8 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     }
 }
 
-/// χ² where the noise has these scales, and the columns that of the readings' scatter.
-pub(super) fn chi_square(equations: &NormalEquations, free: &[Free], scales: [f64; 2]) -> f64 {
+/// χ² and ln |M| where the noise has these scales, and the columns that of the readings' scatter.
+pub(super) fn at_scales(equations: &NormalEquations, free: &[Free], scales: [f64; 2]) -> (f64, f64) {
     let products = Products::of(equations, free);
     let size = products.size;
     let (mut sum, mut one) = (vec![0.0; size * size], vec![0.0; size * size]);
@@ -183,7 +183,8 @@ pub(super) fn chi_square(equations: &NormalEquations, free: &[Free], scales: [f6
         products.clean(c, equations.rows[c], scale, equations.loudest[c], &mut one);
         sum.iter_mut().zip(&one).for_each(|(sum, one)| *sum += one);
     }
-    solve(&mut sum, size, &mut vec![0.0; free.len()]).1
+    let (ln_determinant, chi_square) = solve(&mut sum, size, &mut vec![0.0; free.len()]);
+    (chi_square, ln_determinant)
 }
 
 /// Standard deviation of the mean of squares of so many unit normals.

@@ -93,10 +93,10 @@ fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
 
 /// All explanations, as far as they are within `least_ln` of the best.
 fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64) -> Posterior<'a> {
-    let mut candidates = Candidates::with_constant_leaks(pass, declared);
-    candidates.add_courses(LEAST_LN);
-    candidates.add_jumps(LEAST_LN);
-    let mended = candidates.add_mistakes(LEAST_LN);
+    let mut candidates = Candidates::with_constant_leaks(pass, declared, least_ln);
+    candidates.add_courses();
+    candidates.add_jumps();
+    let mended = candidates.add_mistakes();
     let Louder { flows, position, .. } = pass.over_sheet.louder();
     let as_declared = Weighing { equations: declared, loudness: [flows * flows, position * position] };
     let weighings: Vec<Weighing<'_>> =
