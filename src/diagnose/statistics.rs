@@ -1,7 +1,19 @@
 //! The laws by which numbers are judged: whether they are white noise, and how large chance makes them.
 
-use super::thresholds::PORTMANTEAU_LAGS;
+use super::equation::Equation;
+use super::thresholds::{FALSE_RATE, FEWEST_NUMBERS, PORTMANTEAU_LAGS};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// Tests that the residual of a sound rig passes: of the size and the whiteness of each equation, and of products that no effect makes.
+const TESTS: usize = 2 * Equation::ALL.len() + 1;
+
+/// A sound rig fails any one of them this rarely.
+pub(crate) const LEAST_P: f64 = FALSE_RATE / TESTS as f64;
+
+/// The mean square of so many numbers of a sound rig, one without chance, is off by no more than that.
+pub(crate) fn chance_of_variance(count: f64) -> f64 {
+    bonferroni_sigma(FALSE_RATE, TESTS) * (2.0 / count).sqrt()
+}
 
 /// The chance of a [`portmanteau_chi2`] as large as this among white numbers.
 pub(crate) fn colour_p(chi2: f64) -> f64 {
@@ -14,7 +26,7 @@ pub(crate) fn colour_p(chi2: f64) -> f64 {
 /// would pass for colour ten times as often as the law says. What is not a number is left out.
 pub(crate) fn portmanteau_chi2(innovations: &[f64], dispersion: f64) -> Option<f64> {
     let n = known(innovations).count();
-    if n < 4 * PORTMANTEAU_LAGS {
+    if n < FEWEST_NUMBERS + PORTMANTEAU_LAGS {
         return None;
     }
     let power = known(innovations).map(|v| v * v).sum::<f64>() / n as f64;
@@ -44,6 +56,17 @@ pub(crate) fn chi2_p(value: f64, freedom: f64) -> f64 {
 pub(crate) fn bonferroni_sigma(rate: f64, count: usize) -> f64 {
     let share = rate / count.max(1) as f64 / 2.0;
     Normal::standard().inverse_cdf(1.0 - share)
+}
+
+/// Half the width of the interval that holds the truth with 95 % probability, in standard deviations.
+pub(crate) fn ci95_sigma() -> f64 {
+    bonferroni_sigma(1.0 - 0.95, 1)
+}
+
+/// The sum of squares of `freedom` numbers that one of `count` tests passes by chance with probability `rate`.
+pub(crate) fn bonferroni_chi2(rate: f64, count: usize, freedom: f64) -> f64 {
+    let share = rate / count.max(1) as f64;
+    ChiSquared::new(freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - share))
 }
 
 #[cfg(test)]
@@ -89,5 +112,11 @@ mod tests {
     #[test]
     fn thirty_tests_at_one_in_a_thousand_need_four_sigma() {
         assert!((bonferroni_sigma(1e-3, 30) - 4.15).abs() < 0.05);
+    }
+
+    #[test]
+    fn six_squares_of_two_million_parts_stay_below_fifty_five_but_once_in_a_thousand() {
+        assert!((bonferroni_chi2(1e-3, 2_000_000, 6.0) - 55.0).abs() < 0.5);
+        assert!((chi2_p(bonferroni_chi2(1e-3, 30, 6.0), 6.0) / (1e-3 / 30.0) - 1.0).abs() < 1e-3);
     }
 }

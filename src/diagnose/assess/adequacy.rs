@@ -7,7 +7,8 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{EquationResidual, Interaction, ModelFit};
 use crate::diagnose::search::Selection;
-use crate::diagnose::thresholds::{FEWEST_ROWS, LEAST_P, MOST_BELIEVED, PORTMANTEAU_LAGS, SHAPE_BINS};
+use crate::diagnose::statistics::LEAST_P;
+use crate::diagnose::thresholds::{BINS, FEWEST_NUMBERS, MOST_EFFECTS, PORTMANTEAU_LAGS};
 use crate::diagnose::weak_form::{RESIDUAL_TESTS, Unlisted};
 use crate::diagnose::{search, statistics};
 
@@ -114,11 +115,11 @@ fn binned_chi2(white: &[f64], values: &[f64]) -> Option<(f64, f64)> {
     let mut pairs: Vec<(f64, f64)> =
         values.iter().zip(white).filter(|(value, _)| value.is_finite()).map(|(v, w)| (*v, *w)).collect();
     let varies = pairs.iter().any(|pair| pair.0.to_bits() != pairs[0].0.to_bits());
-    if !varies || pairs.len() < SHAPE_BINS * FEWEST_ROWS {
+    if !varies || pairs.len() < BINS * FEWEST_NUMBERS {
         return None;
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let bins = pairs.chunks(pairs.len().div_ceil(SHAPE_BINS));
+    let bins = pairs.chunks(pairs.len().div_ceil(BINS));
     let of_bin = |bin: &[(f64, f64)]| bin.iter().map(|pair| pair.1).sum::<f64>().powi(2) / bin.len() as f64;
     let freedom = bins.len() as f64;
     Some((bins.map(of_bin).sum(), freedom))
@@ -177,7 +178,7 @@ pub(crate) fn judge(
             "a product of signals that the table does not list fits better than any known effect".to_owned(),
         );
     }
-    if effects.len() > MOST_BELIEVED {
+    if effects.len() >= MOST_EFFECTS {
         let count = effects.len();
         complaints
             .push(format!("{count} effects at once are rare: one that no table has may be behind them"));

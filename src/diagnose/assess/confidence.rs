@@ -7,9 +7,9 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{Doubt, DoubtId};
 use crate::diagnose::search::{self, Rival, Selected, Selection};
+use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    ACTS_SHARE, AGREED_SIGMA, CONFUSABLE_CHI2, CURVED_SHARE, DOUBTED_LEAK_SIGMA, DOUBTED_ODDS,
-    LEAST_SHARE_BESIDE, UNMENDED_SHARE,
+    CURVED_SHARE, DOUBTED_ODDS, NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA, SMALL_SHARE, UNMENDED_SHARE,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Leak;
@@ -91,7 +91,7 @@ fn sensor_fault(failures: &[String]) -> Option<Doubt> {
 fn acts_in(fit: &Fit<'_>, term: usize) -> PerEquation<bool> {
     let squares = fit.squares(term);
     let all: f64 = squares.iter().map(|(_, square)| square).sum();
-    PerEquation::from_fn(|equation| squares[equation] > ACTS_SHARE * all)
+    PerEquation::from_fn(|equation| squares[equation] > SMALL_SHARE * all)
 }
 
 /// Others fit as well in its place.
@@ -166,7 +166,7 @@ fn small_beside_other(selection: &Selection<'_>, one: &Selected, judgement: &Jud
     let of_others = others.filter(shares_equation).map(|other| (other, search::loss(fit, &[other.term])));
     let (large, mended) = of_others.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let id = fit.problem.terms[large.term].effect()?.spec().id;
-    if own < LEAST_SHARE_BESIDE * mended {
+    if own < NEGLIGIBLE_SHARE * mended {
         let text =
             format!("it is so small beside {id} that a small error in the law of that would pass for it");
         return Some(doubt(DoubtId::SmallBesideOther, text));
@@ -219,10 +219,10 @@ fn may_be_none(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let own = fit.estimate(one.term)?;
     let spread = own.std.hypot(unnamed_shift(fit, one.term));
     let text = "beside an effect too weak for a name, which these traces do not rule out, it could be none";
-    (own.value.abs() < AGREED_SIGMA * spread).then(|| doubt(DoubtId::MayBeNone, text))
+    (own.value.abs() < SIGNIFICANT_SIGMA * spread).then(|| doubt(DoubtId::MayBeNone, text))
 }
 
-/// With it a leak comes out below zero.
+/// With it a leak comes out below zero, all of its 95 % interval.
 fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let acts = acts_in(fit, one.term);
     let impossible = |(leak, equations): (Leak, &[Equation])| {
@@ -230,7 +230,7 @@ fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
         let sigma = course.map(|at| -at.value / at.std).fold(f64::NEG_INFINITY, f64::max);
         let is_near = equations.iter().any(|equation| acts[*equation]);
         let text = || format!("with it the {} leak is {sigma:.1} sigma below zero", leak.label());
-        (sigma > DOUBTED_LEAK_SIGMA && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
+        (sigma > statistics::ci95_sigma() && is_near).then(|| doubt(DoubtId::NegativeLeak, text()))
     };
     let (a, b) = (Equation::ChamberA, Equation::ChamberB);
     [(Leak::Internal, &[a, b][..]), (Leak::ExternalA, &[a][..]), (Leak::ExternalB, &[b][..])]
@@ -247,7 +247,7 @@ pub(crate) fn unnamed_shift(fit: &Fit<'_>, term: usize) -> f64 {
     let is_possible = |candidate: &usize| {
         let beside = fit.score(&fit.free, *candidate);
         let in_its_place = || fit.score(&without, *candidate);
-        beside.is_some_and(|score| score.chi2_drop > CONFUSABLE_CHI2 * dispersion)
+        beside.is_some_and(|score| score.chi2_drop > SIGNIFICANT_SIGMA.powi(2) * dispersion)
             && in_its_place().is_none_or(|score| score.chi2_drop < near)
     };
     let possible = search::open(fit).into_iter().filter(is_possible);

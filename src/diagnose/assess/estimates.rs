@@ -7,9 +7,9 @@ use crate::diagnose::outcome::{
     Calibration, Doubt, FoundEffect, FoundLeakChange, LeakEstimate, LeakEstimates, Size,
 };
 use crate::diagnose::search::{self, Selected, Selection};
+use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    CI95_SIGMA, DETECTABLE_SIGMA, FEWEST_ROWS, IDENTIFIED_M3S, LEARNT_SHARE, NEGATIVE_SIGMA,
-    RATIO_KNOWN_SHARE,
+    EVIDENT_SIGMA, FEWEST_NUMBERS, IDENTIFIED_M3S, MOST_OF, SIGNIFICANT_SIGMA,
 };
 use crate::diagnose::weak_form::{Row, Term};
 use pitchleak_core::effects::EffectKind;
@@ -32,7 +32,8 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
         let Estimate { value, std } = fit.mean_leak(leak);
         let std = std * widening;
         let mean = estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S);
-        let is_possible = course(fit, leak).iter().all(|at| at.value >= -NEGATIVE_SIGMA * at.std * widening);
+        let is_possible =
+            course(fit, leak).iter().all(|at| at.value >= -SIGNIFICANT_SIGMA * at.std * widening);
         LeakEstimate { physical: mean.physical && is_possible, ..mean }
     };
     let Estimate { value: compressibility, std } = estimate(fit, Term::InverseBulk);
@@ -44,12 +45,7 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
         internal_leak_coefficient: leak(Leak::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
         external_leak_a_coefficient: leak(Leak::ExternalA, mean(&|row| row.mean.pa_pa)),
         external_leak_b_coefficient: leak(Leak::ExternalB, mean(&|row| row.mean.pb_pa)),
-        bulk_modulus: estimated(
-            bulk,
-            std * widening * bulk * bulk,
-            "Pa",
-            std * widening < LEARNT_SHARE * prior,
-        ),
+        bulk_modulus: estimated(bulk, std * widening * bulk * bulk, "Pa", std * widening < MOST_OF * prior),
     }
 }
 
@@ -93,9 +89,9 @@ pub(super) fn change_notes(fit: &Fit<'_>) -> Vec<String> {
 }
 
 fn estimated(value: f64, std: f64, unit: &'static str, identifiable: bool) -> LeakEstimate {
-    let half = CI95_SIGMA * std;
+    let half = statistics::ci95_sigma() * std;
     let ci95 = [value - half, value + half];
-    LeakEstimate { value, std, ci95, unit, identifiable, physical: value >= -NEGATIVE_SIGMA * std }
+    LeakEstimate { value, std, ci95, unit, identifiable, physical: value >= -SIGNIFICANT_SIGMA * std }
 }
 
 /// Sentences about leaks that physics forbids.
@@ -127,7 +123,7 @@ pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
     let id = fit.problem.terms[one.term].effect()?.spec().id;
     let (own, std) = (fit.estimate(one.term)?, std_with_oil(fit, one.term)?);
     let percent = |std: f64| 100.0 * std / own.value;
-    (own.std < RATIO_KNOWN_SHARE * std && own.value > 0.0).then(|| {
+    (own.std < MOST_OF * std && own.value > 0.0).then(|| {
         format!(
             "{id}: only its ratio to the bulk modulus is well known (to {:.1} %); the volume itself no better than the oil ({:.0} %)",
             percent(own.std),
@@ -204,7 +200,7 @@ pub(crate) fn calibration(fit: &Fit<'_>) -> Vec<Calibration> {
 /// Whether position or pressure do more than their noise.
 pub(crate) fn is_excited(fit: &Fit<'_>) -> bool {
     let rows = &fit.rows().rows;
-    if rows.len() < FEWEST_ROWS || fit.regression.count() < FEWEST_ROWS {
+    if rows.len() < FEWEST_NUMBERS || fit.regression.count() < FEWEST_NUMBERS {
         return false;
     }
     let spread = |value: &dyn Fn(&Row) -> f64| {
@@ -212,7 +208,7 @@ pub(crate) fn is_excited(fit: &Fit<'_>) -> bool {
         (rows.iter().map(|row| (value(row) - mean).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
     };
     let samples = rows.iter().map(|row| row.samples).min().unwrap_or(1) as f64;
-    let noise = |std: f64| DETECTABLE_SIGMA * std / samples.sqrt();
+    let noise = |std: f64| EVIDENT_SIGMA * std / samples.sqrt();
     spread(&|row| row.mean.x_m) > noise(fit.problem.sensors.position.noise_std)
         || spread(&|row| row.mean.pa_pa) > noise(fit.problem.sensors.pressure.noise_std)
         || spread(&|row| row.mean.pb_pa) > noise(fit.problem.sensors.pressure.noise_std)
@@ -228,7 +224,7 @@ pub(crate) fn detection_limits(fit: &Fit<'_>) -> BTreeMap<&'static str, Size> {
         else {
             continue;
         };
-        let value = DETECTABLE_SIGMA * score.std * widening;
+        let value = EVIDENT_SIGMA * score.std * widening;
         sizes.insert(effect.spec().id, Size { value, unit: effect.spec().unit });
     }
     sizes

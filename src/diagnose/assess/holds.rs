@@ -7,12 +7,14 @@ use crate::diagnose::fit::{Fit, MeanFlow, Problem, Progress};
 use crate::diagnose::outcome::{HoldLeak, Holds};
 use crate::diagnose::search::Selection;
 use crate::diagnose::thresholds::{
-    FEWEST_HOLDS, HOLD_PIECES, HOLD_S, LEAST_HELD_PA, STILL_SHARE_OF_STROKE, STILL_SHARE_OF_TRAVEL,
-    STILL_SIGMA,
+    BLOCK_S, EVIDENT_SIGMA, LEAST_HELD_PA, SAMPLES_PER_BLOCK, STILL_SHARE_OF_TRAVEL,
 };
 use crate::diagnose::weak_form::Term;
 use pitchleak_core::{Estimate, Signals};
 use std::ops::Range;
+
+/// A hold lasts so many blocks, s.
+const HOLD_S: f64 = SAMPLES_PER_BLOCK as f64 * BLOCK_S;
 
 /// Between holds that are cut out, s.
 const APART_S: f64 = 1e3;
@@ -48,7 +50,7 @@ pub(crate) fn check(
 fn rests(series: &Series, declared: &Declared) -> Vec<Range<usize>> {
     let step_s = series.step_s();
     let length = (HOLD_S / step_s.max(1e-9)).round() as usize;
-    let piece = length / HOLD_PIECES;
+    let piece = length / SAMPLES_PER_BLOCK;
     if piece == 0 {
         return vec![];
     }
@@ -64,10 +66,8 @@ fn rests(series: &Series, declared: &Declared) -> Vec<Range<usize>> {
     let windows: Vec<(Range<usize>, f64)> =
         windows.map(|window| (window.clone(), travel_m(&window))).collect();
     let farthest_m = windows.iter().map(|(_, travel)| *travel).fold(0.0, f64::max);
-    let noise_m = STILL_SIGMA * declared.sensors.position.noise_std / (piece as f64).sqrt();
-    let still_m = (STILL_SHARE_OF_TRAVEL * farthest_m)
-        .max(STILL_SHARE_OF_STROKE * declared.cylinder.stroke_m)
-        .max(noise_m);
+    let noise_m = EVIDENT_SIGMA * declared.sensors.position.noise_std / (piece as f64).sqrt();
+    let still_m = (STILL_SHARE_OF_TRAVEL * farthest_m).max(noise_m);
     windows.into_iter().filter(|(_, travel)| *travel <= still_m).map(|(window, _)| window).collect()
 }
 
@@ -124,7 +124,7 @@ impl Held {
         own.retain(|one| {
             one.chamber == chamber && pressure_and_flow(&one.row.mean, chamber).0 >= LEAST_HELD_PA
         });
-        if own.len() < FEWEST_HOLDS {
+        if own.len() < 2 {
             return None;
         }
         let n = own.len() as f64;

@@ -7,7 +7,7 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{BinnedResidual, Correlation, EquationResidual, ModelFit, Quality};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{DRAWN_BINS, FEWEST_FOR_MOMENTS};
+use crate::diagnose::thresholds::{BINS, FEWEST_NUMBERS};
 use crate::diagnose::weak_form::{Entry, Row, Rows, VARIABLES};
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ pub(super) fn whitened_residual(fit: &Fit<'_>, equation: Equation) -> Option<Equ
         count: white.len(),
         noise_ratio: fit.noise_ratio()[equation],
         whiteness_p: fit.whiteness_p(equation),
-        normality_p: (white.len() >= FEWEST_FOR_MOMENTS)
+        normality_p: (white.len() >= FEWEST_NUMBERS)
             .then(|| jarque_bera_p(white.len(), skewness, excess_kurtosis)),
         skewness,
         excess_kurtosis,
@@ -127,7 +127,7 @@ impl HeldOut {
 
     /// The residual against each variable, in bins of equal count.
     pub(crate) fn binned(&self) -> Vec<BinnedResidual> {
-        let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * DRAWN_BINS;
+        let has_enough = |equation: &Equation| self.of_equation(*equation).count() >= 2 * BINS;
         let pairs = Equation::ALL.into_iter().filter(has_enough);
         let pairs = pairs.flat_map(|equation| VARIABLES.iter().map(move |variable| (equation, variable)));
         pairs
@@ -148,7 +148,7 @@ fn binned(equation: Equation, against: &'static str, mut pairs: Vec<(f64, f64)>)
     let (xx, yy) = (mean(&|p| (p.0 - mx).powi(2)), mean(&|p| (p.1 - my).powi(2)));
     let xy = mean(&|p| (p.0 - mx) * (p.1 - my));
     let scale = (xx * yy).sqrt();
-    let bins = pairs.chunks(pairs.len().div_ceil(DRAWN_BINS)).map(Bin::of);
+    let bins = pairs.chunks(pairs.len().div_ceil(BINS)).map(Bin::of);
     let (mut at, mut mean, mut std_error) = (vec![], vec![], vec![]);
     for bin in bins {
         at.push(bin.at);

@@ -2,7 +2,7 @@
 //! edge; how it goes on in between another sensor shows, or nothing does.
 
 use super::play::{ANYWHERE, Sides};
-use crate::diagnose::thresholds::SHOWN_SIGMA;
+use crate::diagnose::thresholds::SIGNIFICANT_SIGMA;
 use std::ops::Range;
 
 /// A flow that goes as the one in question does, but for leaks and storage, which are small or slow.
@@ -16,7 +16,7 @@ pub(super) struct Beside {
 /// left, and what another flow `beside` departs from its own straight way meanwhile. Zero while the reading shows something. Flows are without
 /// single outliers.
 pub(super) fn within_band(t_s: &[f64], flow_m3s: &[f64], noise_std: f64, beside: &[Beside]) -> Sides {
-    let is_silent = |flow: f64, std: f64| flow.abs() < SHOWN_SIGMA * std;
+    let is_silent = |flow: f64, std: f64| flow.abs() < SIGNIFICANT_SIGMA * std;
     let rests = rests(flow_m3s, |flow| is_silent(flow, noise_std));
     let anywhere = |flow: &f64| if is_silent(*flow, noise_std) { ANYWHERE } else { 0.0 };
     let mut own =
@@ -142,7 +142,7 @@ mod tests {
         read[1000] = f64::NAN;
         let beside = Beside { flow_m3s: flow.clone(), std_m3s: NOISE_M3S };
         let own = within_band(&t, &read, NOISE_M3S, &[beside]);
-        let least = SHOWN_SIGMA * NOISE_M3S;
+        let least = SIGNIFICANT_SIGMA * NOISE_M3S;
         for (read, (side, std)) in read.iter().zip(own.side.iter().zip(&own.side_std)) {
             let is_known = read.is_nan() || read.abs() >= least;
             assert_eq!(is_known, *std == 0.0, "{read} {std}");

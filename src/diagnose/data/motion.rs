@@ -5,7 +5,7 @@ use super::channel::Channel;
 use super::dead_band::{Beside, median_of_three, within_band};
 use super::play::{Followed, Sides};
 use super::series::Series;
-use crate::diagnose::thresholds::{LEAST_SURE_SHARE, LEAST_SURE_SIGMA, LONGEST_WINDOW_S, SPEED_NOISE_SHARE};
+use crate::diagnose::thresholds::{BLOCK_S, SIGNIFICANT_SIGMA, SMALL_SHARE};
 use pitchleak_core::{Cylinder, Effect, EffectSet, Sensors, Signals, Terms};
 
 /// Speed along a trace, smoothed just enough for the sensors' noise.
@@ -96,7 +96,7 @@ impl Motion {
 
     /// Below this speed the direction of motion is not known.
     pub(crate) fn least_sure_mps(&self) -> f64 {
-        (LEAST_SURE_SIGMA * self.std_mps).max(LEAST_SURE_SHARE * self.rms_mps)
+        SIGNIFICANT_SIGMA * self.std_mps
     }
 }
 
@@ -138,7 +138,7 @@ fn within_bands(series: &Series, cylinder: &Cylinder<f64>, sensors: &Sensors<f64
 }
 
 fn longest_half(step_s: f64) -> usize {
-    if step_s > 0.0 { (LONGEST_WINDOW_S / step_s / 2.0) as usize } else { 0 }
+    if step_s > 0.0 { (BLOCK_S / step_s / 2.0) as usize } else { 0 }
 }
 
 /// Samples on each side over which noise `std` averages down to the wanted share of `rms`.
@@ -146,7 +146,7 @@ fn half_window(std: f64, rms: f64, power: f64) -> usize {
     if rms <= 0.0 {
         return usize::MAX / 4;
     }
-    ((std / (SPEED_NOISE_SHARE * rms)).powf(power) / 2.0).min(1e6) as usize
+    ((std / (SMALL_SHARE * rms)).powf(power) / 2.0).min(1e6) as usize
 }
 
 /// The speed at which nothing is left of eq. (1), both chambers averaged where both have a meter. `unread`: where in their dead bands the

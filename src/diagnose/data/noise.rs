@@ -4,10 +4,12 @@
 
 use super::declared::Declared;
 use super::series::Series;
+use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    FASTEST_MOTION_HZ, MEDIAN_EFFICIENCY, MOTION_LEFT, NOISIER_SIGMA, RIPPLE, RIPPLE_COLOUR, UNRESOLVED_SIGMA,
+    FALSE_RATE, FASTEST_MOTION_HZ, NEGLIGIBLE_SHARE, RIPPLE, SIGNIFICANT_SIGMA,
 };
 use pitchleak_core::Sensors;
+use statrs::distribution::{Continuous, Normal};
 use std::ops::Range;
 
 /// How the noise of one kind of sensor compares with its data sheet.
@@ -19,25 +21,34 @@ pub(crate) struct SensorCheck {
     shared_std: f64,
 }
 
+/// Noise beyond the declared one by so many standard deviations of its estimate is the sensor's own: one of six of a sound rig shows so
+/// much by chance once in a thousand rigs.
+fn noisier_sigma() -> f64 {
+    statistics::bonferroni_sigma(FALSE_RATE, SIGNALS)
+}
+
+/// Position, pressures, flows and force.
+const SIGNALS: usize = 6;
+
 impl SensorCheck {
     pub(crate) fn is_noisier(&self) -> bool {
-        self.found.std > (1.0 + NOISIER_SIGMA * self.found.scatter) * self.declared_std
+        self.found.std > (1.0 + noisier_sigma() * self.found.scatter) * self.declared_std
     }
 
     /// Whether it is white and less than declared: more can't hide, as motion only adds to it. None at all is a coarse reading.
     fn is_quieter(&self) -> bool {
-        let is_white = self.found.std > 0.0 && self.found.colour < RIPPLE_COLOUR;
-        is_white && self.found.std < (1.0 - NOISIER_SIGMA * self.found.scatter) * self.declared_std
+        let is_white = self.found.std > 0.0 && self.found.colour < RIPPLE;
+        is_white && self.found.std < (1.0 - noisier_sigma() * self.found.scatter) * self.declared_std
     }
 
     pub(crate) fn is_ripple(&self) -> bool {
-        self.found.std > RIPPLE * self.declared_std && self.found.colour > RIPPLE_COLOUR
+        self.found.std > (1.0 + RIPPLE) * self.declared_std && self.found.colour > RIPPLE
     }
 
     /// Whether it is one without the motion that other sensors show too.
     pub(crate) fn is_ripple_of_its_own(&self) -> bool {
         let own = self.found.std.powi(2) - self.shared_std.powi(2);
-        self.is_ripple() && own > (RIPPLE * self.declared_std).powi(2)
+        self.is_ripple() && own > ((1.0 + RIPPLE) * self.declared_std).powi(2)
     }
 }
 
@@ -45,7 +56,7 @@ impl SensorCheck {
 pub(crate) fn check_sensors(traces: &[Series], declared: &Declared) -> Vec<SensorCheck> {
     let declared = &declared.sensors;
     type Column = fn(&Series) -> &[f64];
-    let signals: [(&'static str, f64, Column); 6] = [
+    let signals: [(&'static str, f64, Column); SIGNALS] = [
         ("position", declared.position.noise_std, |s| &s.x_m),
         ("pressure a", declared.pressure.noise_std, |s| &s.pa_pa),
         ("pressure b", declared.pressure.noise_std, |s| &s.pb_pa),
@@ -117,7 +128,7 @@ pub(crate) struct FastNoise {
 pub(super) fn difference_order(step_s: f64) -> usize {
     let turn = 2.0 * (std::f64::consts::PI * FASTEST_MOTION_HZ * step_s).sin();
     let is_blind =
-        |order: &usize| turn.powi(*order as i32) / binomials(2 * order)[*order].sqrt() < MOTION_LEFT;
+        |order: &usize| turn.powi(*order as i32) / binomials(2 * order)[*order].sqrt() < NEGLIGIBLE_SHARE;
     (3..6).find(is_blind).unwrap_or(6)
 }
 
@@ -180,7 +191,9 @@ impl FastPart {
         let colour =
             lags.map(|lag| (self.product(self, lag, [f64::INFINITY; 2]) / power).abs()).fold(0.0, f64::max);
         let independent = sizes.len() as f64 / correlated(self.order);
-        let scatter = (0.5 / MEDIAN_EFFICIENCY / independent).sqrt();
+        // Of the median of independent numbers (Rousseeuw and Croux 1993).
+        let density = 2.0 * Normal::standard().pdf(NORMAL_MEDIAN);
+        let scatter = 0.5 / (density * NORMAL_MEDIAN * independent.sqrt());
         FastNoise { std: median / NORMAL_MEDIAN / self.gain, scatter, colour }
     }
 
@@ -201,12 +214,12 @@ impl FastPart {
         let excess = other.noise.std.powi(2) - declared_std.powi(2);
         let lags = 0..=self.order;
         let both_ways = lags.flat_map(|lag| [(self, other, lag), (other, self, lag)]);
-        let most = |part: &Self| UNRESOLVED_SIGMA * part.noise.std * part.gain;
+        let most = |part: &Self| SIGNIFICANT_SIGMA * part.noise.std * part.gain;
         let sums = both_ways
             .map(|(first, second, lag)| first.product(second, lag, [most(first), most(second)]).abs());
         let covariance = sums.fold(0.0, f64::max) / (count * self.gain * other.gain);
         let by_chance = self.noise.std * other.noise.std * (correlated(self.order) / count).sqrt();
-        let is_shared = excess > 0.0 && covariance > NOISIER_SIGMA * by_chance;
+        let is_shared = excess > 0.0 && covariance > noisier_sigma() * by_chance;
         if is_shared { covariance / excess.sqrt() } else { 0.0 }
     }
 }
@@ -217,7 +230,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_750_196_082;
 /// The fast part of each reading along a trace, held against the noise of its sensor.
 pub(crate) struct Unresolved {
     /// Squares of differences in variances of the noise: position, pressures, flows, force.
-    squares: [Vec<f64>; 6],
+    squares: [Vec<f64>; SIGNALS],
     order: usize,
 }
 
@@ -241,14 +254,14 @@ impl Unresolved {
     }
 
     /// Standard deviation of what is read in some samples, in those of the sensors' noise: one where noise explains it.
-    pub(crate) fn noise_factor(&self, samples: Range<usize>) -> [f64; 6] {
+    pub(crate) fn noise_factor(&self, samples: Range<usize>) -> [f64; SIGNALS] {
         let of = |squares: &Vec<f64>| {
             // Differences count where their middle lies.
             let place = |sample: usize| sample.saturating_sub(self.order / 2).min(squares.len());
             let near =
                 squares[place(samples.start)..place(samples.end)].iter().filter(|square| square.is_finite());
             let (sum, count) = near.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
-            if sum > UNRESOLVED_SIGMA.powi(2) * count { (sum / count).sqrt() } else { 1.0 }
+            if sum > SIGNIFICANT_SIGMA.powi(2) * count { (sum / count).sqrt() } else { 1.0 }
         };
         self.squares.each_ref().map(of)
     }

@@ -4,8 +4,7 @@
 //! at each turn.
 
 use crate::diagnose::thresholds::{
-    AT_END, BLOCK_S, EVIDENT_CHI2, LONGEST_STILL_S, NEXT_PLAY, OF_STRAIGHT_WAY, PLAY_REFINEMENTS,
-    TURNED_SIGMA,
+    BLOCK_S, EVIDENT_SIGMA, HALVINGS, NEXT_PLAY, OF_STRAIGHT_WAY, ROUNDING, SIGNIFICANT_SIGMA,
 };
 use pitchleak_core::effects::Play;
 use std::ops::Range;
@@ -38,7 +37,7 @@ impl Sides {
 
     /// Of a reading that is smoothed, with what noise is left.
     pub(super) fn of(t_s: &[f64], smooth: &[f64], noise_std: f64) -> Self {
-        let play = TURNED_SIGMA * noise_std;
+        let play = SIGNIFICANT_SIGMA * noise_std;
         let before = moved(t_s.iter().zip(smooth), play);
         let mut after = moved(t_s.iter().zip(smooth).rev(), play);
         after.reverse();
@@ -85,8 +84,8 @@ fn between(t_s: f64, before: Moved, after: Moved) -> (f64, f64) {
         }
         // Nothing moved before, or nothing will.
         (a, b) if a * b == 0.0 => (OF_STRAIGHT_WAY * (a + b), ANYWHERE),
-        // It may have gone and come back.
-        (a, _) if still_s > LONGEST_STILL_S => (OF_STRAIGHT_WAY * a, ANYWHERE),
+        // Noise alone hides slow motion for half a block; for longer it may have gone and come back.
+        (a, _) if still_s > BLOCK_S / 2.0 => (OF_STRAIGHT_WAY * a, ANYWHERE),
         (a, _) => (a, 0.0),
     }
 }
@@ -123,7 +122,7 @@ impl<'a> Followed<'a> {
             let (mut play, mut is_known) = (Play::new(*first), false);
             for at in stretch.clone() {
                 let side = play.side(play_m, self.way_m[at]);
-                is_known |= side.abs() > AT_END;
+                is_known |= side.abs() > 1.0 - ROUNDING;
                 (own.side[at], own.side_std[at]) = (side, if is_known { 0.0 } else { ANYWHERE });
             }
         }
@@ -147,13 +146,14 @@ impl<'a> Followed<'a> {
             play_m *= NEXT_PLAY;
         }
         let none = gone.iter().map(|gone| gone * gone).sum::<f64>();
-        let evident = none - EVIDENT_CHI2 * 2.0 * self.noise_std_m.powi(2) / self.samples_per_block as f64;
+        let evident =
+            none - EVIDENT_SIGMA.powi(2) * 2.0 * self.noise_std_m.powi(2) / self.samples_per_block as f64;
         let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 < evident)?;
         let refine = |(best, share): ((f64, f64), f64), _| {
             let beside = [best.1 * share, best.1 / share].map(|play_m| (left(play_m), play_m));
             (beside.into_iter().fold(best, |best, one| if one.0 < best.0 { one } else { best }), share.sqrt())
         };
-        Some((0..PLAY_REFINEMENTS).fold((best, NEXT_PLAY.sqrt()), refine).0.1)
+        Some((0..HALVINGS).fold((best, NEXT_PLAY.sqrt()), refine).0.1)
     }
 
     /// Differences of the means of neighbouring blocks.

@@ -1,6 +1,7 @@
 //! A trace as columns, cut into stretches without a gap.
 
 use crate::channels::ChannelMonitor;
+use crate::diagnose::thresholds::LONG_STEP;
 use crate::rig::ColumnMap;
 use crate::trace::{Record, TraceError, TraceReader};
 use pitchleak_core::Sample;
@@ -77,7 +78,7 @@ impl Series {
     /// The samples as records.
     pub(super) fn records(&self) -> impl Iterator<Item = Record> + '_ {
         let read = |value: f64| value.is_finite().then_some(value);
-        let longest = 1.5 * self.step_s();
+        let longest = LONG_STEP * self.step_s();
         (0..self.len()).map(move |at| {
             let dt_s = if at == 0 { 0.0 } else { self.t_s[at] - self.t_s[at - 1] };
             let sample = Sample {
@@ -169,7 +170,7 @@ impl Series {
 
     /// Index ranges without a gap: neighbours are at most 1.5 usual steps apart.
     pub(crate) fn stretches(&self) -> Vec<std::ops::Range<usize>> {
-        let longest = 1.5 * self.step_s();
+        let longest = LONG_STEP * self.step_s();
         let mut start = 0;
         let mut found = Vec::new();
         for (at, pair) in self.t_s.windows(2).enumerate() {

@@ -6,11 +6,14 @@
 
 use super::series::Series;
 use crate::Rig;
-use crate::diagnose::thresholds::{LEAST_STEP_S, MOST_SAMPLES, PIECE_SAMPLES};
+use crate::diagnose::thresholds::{LEAST_STEP_S, MOST_SAMPLES, PIECES};
 use crate::output::{Identity, identity};
 use crate::trace::{Record, TraceError, TraceReader};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Samples in a piece of a trace too long to be fitted whole: of what is held, each piece of the jackknife has one at least.
+const PIECE_SAMPLES: usize = MOST_SAMPLES / (2 * PIECES);
 
 /// Pieces of the traces of one rig, evenly over them. Once there are too many samples every other piece goes, and
 /// from then on every other one is left out.

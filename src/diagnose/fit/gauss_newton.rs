@@ -6,7 +6,7 @@ use super::problem::Problem;
 use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
 use crate::diagnose::equation::{Equation, PerEquation};
-use crate::diagnose::thresholds::{FOLDS, HELD, MOST_ROUNDS, SETTLED_NOISE, SETTLED_SIGMA};
+use crate::diagnose::thresholds::{MOST_ROUNDS, ROUNDING, SMALL_SHARE};
 use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm, Whitening};
 use pitchleak_core::Estimate;
 use pitchleak_core::effects::EffectConstants;
@@ -265,7 +265,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn has_converged(&self) -> bool {
         let (assumed, found) = (self.noise_ratios(self.assumed_error), self.noise_ratio());
         let is_as_assumed =
-            |equation: Equation| (found[equation] / assumed[equation] - 1.0).abs() <= SETTLED_NOISE;
+            |equation: Equation| (found[equation] / assumed[equation] - 1.0).abs() <= SMALL_SHARE;
         self.stands_still() && Equation::ALL.into_iter().all(is_as_assumed)
     }
 
@@ -274,7 +274,7 @@ impl<'a> Fit<'a> {
         let (at, solved) = (&self.weak_form.at, self.solved());
         let is_still = |(term, std): (&usize, &f64)| {
             let term = self.problem.terms[*term];
-            (solved.known(term) - at.known(term)).abs() <= SETTLED_SIGMA * std
+            (solved.known(term) - at.known(term)).abs() <= SMALL_SHARE * std
         };
         self.bounded.terms.iter().zip(&self.bounded.std).all(is_still)
     }
@@ -395,7 +395,7 @@ impl<'a> Fit<'a> {
         let mut priors = self.problem.increments(&self.weak_form.at);
         for term in terms {
             let mean = -self.weak_form.at.value(self.problem.terms[*term]);
-            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: HELD * own.std });
+            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: ROUNDING.sqrt() * own.std });
         }
         self.regression.solve(&self.structure.active, &priors)
     }
@@ -420,7 +420,7 @@ impl<'a> Fit<'a> {
         let after = regression.held_out(&with, &priors);
         let better = before.iter().zip(&after).filter(|(b, a)| a < b).count();
         let sum: f64 = before.iter().zip(&after).map(|(b, a)| b - a).sum();
-        sum > 0.0 && 2 * better > FOLDS
+        sum > 0.0 && 2 * better > before.len()
     }
 }
 
@@ -436,7 +436,7 @@ fn beyond_range(problem: &Problem<'_>, at: &Linearisation, free: &Solution) -> O
 /// Holds 1/β at a value.
 fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation, held: Option<f64>) {
     if let (Some(held), Some(own)) = (held, problem.place(Term::InverseBulk)) {
-        priors[own] = Some(Prior { mean: held - at.value(Term::InverseBulk), std: HELD * held });
+        priors[own] = Some(Prior { mean: held - at.value(Term::InverseBulk), std: ROUNDING.sqrt() * held });
     }
 }
 
@@ -460,7 +460,7 @@ mod tests {
             let (before, after) = (plain.estimate(*term), again.estimate(*term));
             let (before, after) = before.zip(after).expect("is fitted");
             assert!(
-                (before.value - after.value).abs() < 3.0 * SETTLED_SIGMA * before.std,
+                (before.value - after.value).abs() < 3.0 * SMALL_SHARE * before.std,
                 "{before:?} {after:?}"
             );
         }

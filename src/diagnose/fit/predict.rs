@@ -8,7 +8,7 @@ use super::regression::{self, Solution, residual};
 use crate::diagnose::data::Series;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{BLOCK_S, CHANCE_SIGMA, FOLDS, SHARE_BISECTIONS};
+use crate::diagnose::thresholds::{BLOCK_S, HALVINGS};
 use crate::diagnose::weak_form::{NoiseModel, Row, Rows, Term, WeakForm, Whitening, residual_rows};
 use pitchleak_core::effects::EffectKind;
 use pitchleak_core::{Estimate, Signals};
@@ -32,14 +32,13 @@ impl Fit<'_> {
         self.regression.innovations(self.rows(), &self.bounded, equation)
     }
 
-    /// The residual of each entry when its fold is not fitted, in the equation's unit.
+    /// The residual of each entry when its piece is not fitted, in the equation's unit.
     pub(crate) fn held_out_residual(&self) -> Vec<f64> {
-        let priors = self.held_priors();
         let mut residual = vec![0.0; self.rows().y.len()];
-        for fold in 0..FOLDS {
-            let solution = self.regression.solve_without(fold, self.active(), &priors);
-            for (i, value) in regression::residual(self.rows(), &solution).into_iter().enumerate() {
-                if self.regression.fold_of(i) == fold {
+        let fits = self.regression.leave_one_out(self.active(), &self.held_priors());
+        for (piece, solution) in fits.iter().enumerate() {
+            for (i, value) in regression::residual(self.rows(), solution).into_iter().enumerate() {
+                if self.regression.piece_of(i) == piece {
                     residual[i] = value;
                 }
             }
@@ -143,7 +142,7 @@ impl Fit<'_> {
         if !is_quieter(&white) {
             return white;
         }
-        for _ in 0..SHARE_BISECTIONS {
+        for _ in 0..HALVINGS {
             let middle = (low + high) / 2.0;
             let louder = self.whitened_at(middle, equation);
             if level(&louder) > 1.0 {
@@ -178,7 +177,7 @@ fn level(white: &[f64]) -> f64 {
 /// Whether numbers are smaller than chance makes white ones of variance one.
 fn is_quieter(white: &[f64]) -> bool {
     let count = statistics::known(white).count().max(1) as f64;
-    level(white) < 1.0 - CHANCE_SIGMA * (2.0 / count).sqrt()
+    level(white) < 1.0 - statistics::chance_of_variance(count)
 }
 
 #[cfg(test)]
@@ -186,8 +185,8 @@ mod tests {
     use super::*;
     use crate::diagnose::data::check_sensors;
     use crate::diagnose::fit::Problem;
+    use crate::diagnose::statistics::LEAST_P;
     use crate::diagnose::testing::{declared, sound, torn_seal};
-    use crate::diagnose::thresholds::LEAST_P;
 
     /// Of chamber A where both meters seem to have four times their noise: as the fit whitens it, and at its own noise.
     fn p(traces: &[crate::diagnose::Series]) -> [f64; 2] {

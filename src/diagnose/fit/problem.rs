@@ -2,7 +2,7 @@
 
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, Unresolved, effective, white};
-use crate::diagnose::thresholds::{LEAST_LAG_SHARE, LEAST_SURE_SIGMA, SHOWN_SIGMA};
+use crate::diagnose::thresholds::{SIGNIFICANT_SIGMA, SMALL_SHARE};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Cylinder, Effect, Sensors, Signals};
@@ -44,7 +44,7 @@ impl<'a> Problem<'a> {
             white: white(&declared.sensors, checks),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
             terms,
-            least_lag_s: LEAST_LAG_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
+            least_lag_s: SMALL_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
             given_constants: EffectConstants { slip_speed_mps: turning_speed(declared), ..usual_constants },
             usual_constants,
             start,
@@ -126,7 +126,7 @@ impl<'a> Problem<'a> {
         let mut noise = Signals { qa_m3s: flow_a.noise_std, qb_m3s: flow_b.noise_std, ..Signals::default() };
         let noise_m3s = effect.deaf(&mut noise).copied();
         let lag_s = effect.is_lag().then_some(self.least_lag_s);
-        noise_m3s.map(|std| SHOWN_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
+        noise_m3s.map(|std| SIGNIFICANT_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
     }
 }
 
@@ -161,7 +161,7 @@ fn mean_load_pressure(traces: &[Series]) -> Option<f64> {
 fn turning_speed(declared: &Declared) -> f64 {
     let (sensors, cylinder) = (&declared.sensors, &declared.cylinder);
     let swept_m3s = sensors.flow_a.noise_std.hypot(sensors.flow_b.noise_std);
-    let speed_mps = LEAST_SURE_SIGMA * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
+    let speed_mps = SIGNIFICANT_SIGMA * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
     within(EffectConstant::SlipSpeed, speed_mps)
 }
 

@@ -1,11 +1,10 @@
 //! Generalised least squares on the whitened rows. All fits, tests and held-out errors come from one
-//! Gram matrix per fold, so that trying a candidate costs a small solve, not a pass over the data. With it the variance component of an
+//! Gram matrix per piece, so that trying a candidate costs a small solve, not a pass over the data. With it the variance component of an
 //! incomplete model: how far its equations are wrong.
 
 use crate::diagnose::equation::{Equation, PerEquation};
-use crate::diagnose::thresholds::{
-    BISECTIONS, CHANCE_SIGMA, COLLINEAR_RIDGE, FOLDS, MOST_NOISE_SHARE, PIECES,
-};
+use crate::diagnose::statistics;
+use crate::diagnose::thresholds::{COLLINEAR_RIDGE, HALVINGS, MOST_OF, PIECES};
 use crate::diagnose::weak_form::{Covariances, NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
@@ -194,24 +193,14 @@ impl Regression {
         !self.columns[term].is_empty()
     }
 
-    /// Which fold an entry belongs to.
-    pub(crate) fn fold_of(&self, entry: usize) -> usize {
-        self.piece_of[entry] % FOLDS
-    }
-
-    fn fold(&self, fold: usize) -> DMatrix<f64> {
-        let zero = DMatrix::zeros(self.width(), self.width());
-        self.grams.iter().skip(fold).step_by(FOLDS).fold(zero, |sum, gram| sum + gram)
+    /// Which piece an entry belongs to.
+    pub(crate) fn piece_of(&self, entry: usize) -> usize {
+        self.piece_of[entry]
     }
 
     /// Fits `terms` to all the data.
     pub(crate) fn solve(&self, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
         self.solve_gram(&self.total, terms, priors)
-    }
-
-    /// Fits `terms` to all but one fold.
-    pub(crate) fn solve_without(&self, fold: usize, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
-        self.solve_gram(&(&self.total - self.fold(fold)), terms, priors)
     }
 
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
@@ -258,7 +247,7 @@ impl Regression {
     /// Variance of a unit column's size, which the Gram matrix alone gives as `quiet`: of what is new in the column only the
     /// part that is no noise tells its size.
     fn scatter(&self, quiet: f64, term: usize) -> f64 {
-        let noise = (self.noise_share[term] * quiet.max(0.0)).min(MOST_NOISE_SHARE);
+        let noise = (self.noise_share[term] * quiet.max(0.0)).min(MOST_OF);
         quiet.max(0.0) / (1.0 - noise).powi(2)
     }
 
@@ -273,11 +262,10 @@ impl Regression {
         pairs.map(|((i, a), (j, b))| a * b * solution.inverse[(*i, *j)]).sum()
     }
 
-    /// Whitened sum of squares of each fold under the fit to the other folds.
-    pub(crate) fn held_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> [f64; FOLDS] {
-        std::array::from_fn(|fold| {
-            let solution = self.solve_without(fold, terms, priors);
-            let gram = self.fold(fold);
+    /// Whitened sum of squares of each piece under the fit to the other pieces.
+    pub(crate) fn held_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<f64> {
+        let fits = self.leave_one_out(terms, priors);
+        let of_piece = |(solution, gram): (&Solution, &DMatrix<f64>)| {
             let y = self.columns.len();
             let mut sum = gram[(y, y)];
             for (a, va) in solution.terms.iter().zip(solution.scaled.iter()) {
@@ -287,7 +275,8 @@ impl Regression {
                 }
             }
             sum
-        })
+        };
+        fits.iter().zip(&self.grams).map(of_piece).collect()
     }
 
     /// Whitened residuals of one equation, in order of time.
@@ -373,7 +362,7 @@ pub(super) fn equation_error(
     };
     let sensors_only = levels(&weak_form.covariances(PerEquation::default()), PerEquation::default());
     let mut high = PerEquation::from_fn(|equation| {
-        let by_chance = CHANCE_SIGMA * (2.0 / counts[equation]).sqrt();
+        let by_chance = statistics::chance_of_variance(counts[equation]);
         if sensors_only[equation] <= 1.0 + by_chance {
             return 0.0;
         }
@@ -388,7 +377,7 @@ pub(super) fn equation_error(
     }
     let covariances = weak_form.covariances(high);
     let mut low = PerEquation::<f64>::default();
-    for _ in 0..BISECTIONS {
+    for _ in 0..HALVINGS {
         let middle = low.zip(high, |low, high| (low + high) / 2.0);
         let level = levels(&covariances, middle);
         for equation in Equation::ALL {

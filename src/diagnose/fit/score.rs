@@ -1,7 +1,7 @@
 //! What one more term would bring, without a fit: the score test.
 
 use super::regression::{Regression, Solution, normalised};
-use crate::diagnose::thresholds::{LEAST_NEW_SHARE, MOST_NOISE_SHARE};
+use crate::diagnose::thresholds::{MOST_OF, ROUNDING};
 use nalgebra::{DMatrix, DVector};
 
 /// What a further term would bring.
@@ -63,14 +63,14 @@ impl Beside<'_> {
     }
 
     fn is_new(&self, at: usize) -> bool {
-        self.products[(at, at)] >= LEAST_NEW_SHARE
+        self.products[(at, at)] >= ROUNDING
     }
 
     /// What two of them bring; none where they are one column, or what is new in them is mostly noise.
     pub(crate) fn pair(&self, a: usize, b: usize) -> Option<PairScore> {
         let (own, other, cross) = (self.products[(a, a)], self.products[(b, b)], self.products[(a, b)]);
         let determinant = own * other - cross * cross;
-        if !(self.is_new(a) && self.is_new(b) && determinant >= LEAST_NEW_SHARE * own * other) {
+        if !(self.is_new(a) && self.is_new(b) && determinant >= ROUNDING * own * other) {
             return None;
         }
         let (pull, pull_other) = (self.pulls[a], self.pulls[b]);
@@ -82,7 +82,7 @@ impl Beside<'_> {
         let noise = &self.noise;
         let noise = sizes[0] * (sizes[0] * noise[(a, a)] + 2.0 * sizes[1] * noise[(a, b)])
             + sizes[1] * sizes[1] * noise[(b, b)];
-        if noise > MOST_NOISE_SHARE * (chi2_drop + noise) {
+        if noise > MOST_OF * (chi2_drop + noise) {
             return None;
         }
         let scales = [a, b].map(|at| self.regression.scale[self.terms[at]]);
@@ -159,7 +159,7 @@ impl Regression {
         );
         let explained = &solution.inverse * &cross;
         let partial_variance = 1.0 - cross.dot(&explained);
-        (partial_variance >= LEAST_NEW_SHARE).then_some(PartialColumn {
+        (partial_variance >= ROUNDING).then_some(PartialColumn {
             unit,
             scale,
             cross,
@@ -177,7 +177,7 @@ impl Regression {
         scale: f64,
     ) -> Option<Score> {
         let partial_variance = own - cross.dot(&(&solution.inverse * cross));
-        if partial_variance < LEAST_NEW_SHARE {
+        if partial_variance < ROUNDING {
             return None;
         }
         let pull = with_y - cross.dot(&solution.scaled);

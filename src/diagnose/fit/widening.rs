@@ -2,7 +2,7 @@
 
 use super::gauss_newton::Fit;
 use super::regression::normalised;
-use crate::diagnose::thresholds::CONSTANT_STEP;
+use crate::diagnose::thresholds::NEGLIGIBLE_SHARE;
 use nalgebra::{DMatrix, DVector};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 
@@ -53,7 +53,7 @@ impl Fit<'_> {
         let constants = self.constants(term);
         let (low, high) = one.range;
         let at = constants.get(one.parameter).clamp(low, high);
-        let step = CONSTANT_STEP * (high - low);
+        let step = NEGLIGIBLE_SHARE * (high - low);
         let (below, above) = ((at - step).max(low), (at + step).min(high));
         let column = |at: f64| {
             let constants: EffectConstants<f64> = constants.with(one.parameter, at);

@@ -2,7 +2,7 @@
 
 use crate::diagnose::equation::Equation;
 use crate::diagnose::statistics::bonferroni_sigma;
-use crate::diagnose::thresholds::CHANCE_RATE;
+use crate::diagnose::thresholds::FALSE_RATE;
 use crate::diagnose::weak_form::RESIDUAL_TESTS;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -69,7 +69,7 @@ impl EquationResidual {
 
     /// Those that chance would hardly bring among all tests of this kind.
     pub fn beyond_chance(&self) -> Vec<(&'static str, Correlation)> {
-        self.goes_with(bonferroni_sigma(CHANCE_RATE, RESIDUAL_TESTS))
+        self.goes_with(bonferroni_sigma(FALSE_RATE, RESIDUAL_TESTS))
     }
 }
 

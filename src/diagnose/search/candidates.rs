@@ -2,7 +2,7 @@
 
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_EFFECT_RATE};
+use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_RATE};
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::effects::EffectConstants;
 
@@ -19,7 +19,7 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
     let problem = fit.problem;
     let count = problem.terms.iter().filter(|term| term.effect().is_some()).count();
     let trials = if problem.is_usual(constants) { 1 } else { CONSTANTS_TRIALS };
-    statistics::bonferroni_sigma(FALSE_EFFECT_RATE, count * trials)
+    statistics::bonferroni_sigma(FALSE_RATE, count * trials)
 }
 
 /// The product of signals that the table does not list and that would bring most to a model, and by how much the sum of squares would fall.

@@ -3,7 +3,8 @@
 
 use super::candidates::critical_sigma;
 use crate::diagnose::fit::{Emptied, Fit, LeakProducts, Problem, Progress};
-use crate::diagnose::thresholds::{CHANGE_CHI2, COLLINEAR_RIDGE, MOST_CHANGE_PLACES, MOST_CHANGE_ROUNDS};
+use crate::diagnose::statistics;
+use crate::diagnose::thresholds::{COLLINEAR_RIDGE, FALSE_RATE, MOST_CHANGE_PLACES, MOST_ROUNDS};
 use crate::diagnose::weak_form::{ChangeKind, LeakChange};
 use nalgebra::{Cholesky, Matrix6};
 use pitchleak_core::Leak;
@@ -19,7 +20,7 @@ pub(crate) fn problem<'a>(plain: impl Fn() -> Problem<'a>, progress: Progress<'_
 /// found first.
 fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'_>) -> Vec<LeakChange> {
     let mut changes = Vec::new();
-    for _ in 0..MOST_CHANGE_ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let with = problem(&changes);
         let fit = Fit::declared(&with, progress);
         let more: Vec<LeakChange> = if fit.is_incomplete() { new_ones(&fit, &changes) } else { Vec::new() };
@@ -99,12 +100,14 @@ fn borders(products: &[LeakProducts]) -> Vec<usize> {
     fine
 }
 
-/// The inner borders of the best partition among these places.
+/// The inner borders of the best partition among these places. Each part has to explain more than chance would of any of them, with leaks
+/// that grow.
 fn partition(sums: &[LeakProducts], places: &[usize]) -> Vec<usize> {
+    let parts = places.len() * places.len() / 2;
+    let by_chance = statistics::bonferroni_chi2(FALSE_RATE, parts, 2.0 * Leak::ALL.len() as f64);
     let mut best = vec![(0.0_f64, 0_usize)];
     for (end, until) in places.iter().enumerate().skip(1) {
-        let with =
-            |begin: usize| best[begin].0 + explained(&sums[*until], &sums[places[begin]]) - CHANGE_CHI2;
+        let with = |begin: usize| best[begin].0 + explained(&sums[*until], &sums[places[begin]]) - by_chance;
         let found = (0..end).map(|begin| (with(begin), begin)).max_by(|a, b| a.0.total_cmp(&b.0));
         best.push(found.unwrap_or_default());
     }

@@ -13,7 +13,7 @@ pub use trials::{Candidate, Collinearity};
 
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::{Fit, Problem, Progress};
-use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_STEPS, MOST_SWAPS};
+use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_ROUNDS};
 
 /// The effects that are missing from a declared model whose leaks stay, or from one whose leaks change: whichever says more with less.
 /// Leaks are asked whether they change once a few effects leave more than noise.
@@ -63,7 +63,7 @@ fn add_while(
     progress: Progress<'_>,
 ) {
     let mut last = error(&all.fit);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MOST_ROUNDS {
         if !goes_on(all) || !all.add_next(progress) {
             break;
         }
@@ -83,7 +83,7 @@ fn finished<'a>(
     progress: Progress<'_>,
 ) -> Selection<'a> {
     let mut weighed = Vec::new();
-    for _ in 0..MOST_SWAPS {
+    for _ in 0..MOST_ROUNDS {
         all.drop_needless(progress);
         all.drop_needless_changes(progress);
         all.drop_doubtful(progress);

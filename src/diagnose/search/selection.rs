@@ -8,9 +8,7 @@ use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::outcome::Interaction;
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{
-    AGREED_SIGMA, CONFUSABLE_CHI2, FALSE_PRODUCT_RATE, LEAST_CLIMB, LEAST_MENDED_SHARE, MOST_EFFECTS,
-};
+use crate::diagnose::thresholds::{FALSE_RATE, MOST_EFFECTS, SIGNIFICANT_SIGMA, SMALL_SHARE};
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Effect;
 
@@ -112,7 +110,7 @@ pub(super) fn with_better_constants<'a>(
     let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop))?;
     let (best, found) = trials::best_score(&mut candidates, &vacated.free, first);
     let is_usual = fit.constants(term) == fit.problem.usual(term);
-    let needed = if is_usual { CONFUSABLE_CHI2 } else { LEAST_CLIMB };
+    let needed = if is_usual { SIGNIFICANT_SIGMA.powi(2) } else { 0.0 };
     let is_better = best.chi2_drop > present + needed * vacated.dispersion(fit.free.chi2);
     is_better.then(|| vacated.with(term, found, progress))
 }
@@ -142,7 +140,8 @@ impl Selection<'_> {
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
-        let is_below_unlisted = unlisted_chi2_drop(fit, &fit.free) > chi2_drop + CONFUSABLE_CHI2 * dispersion;
+        let is_below_unlisted =
+            unlisted_chi2_drop(fit, &fit.free) > chi2_drop + SIGNIFICANT_SIGMA.powi(2) * dispersion;
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
         self.fit = with(fit, &trial, progress);
         true
@@ -181,7 +180,7 @@ impl Selection<'_> {
                 |one: &Selected| self.fit.estimate(one.term).map_or(0.0, |own| own.value.abs() / own.std);
             let ratios = self.effects.iter().map(ratio).enumerate();
             let weakest = ratios.min_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((at, _)) = weakest.filter(|(_, ratio)| *ratio < AGREED_SIGMA) else { return };
+            let Some((at, _)) = weakest.filter(|(_, ratio)| *ratio < SIGNIFICANT_SIGMA) else { return };
             self.drop_at(at, progress);
         }
     }
@@ -191,7 +190,7 @@ impl Selection<'_> {
 fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
     let chi2_drop = trial.score.chi2_drop;
     let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
-    let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= LEAST_MENDED_SHARE;
+    let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= SMALL_SHARE;
     is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
 }
 
@@ -201,7 +200,7 @@ pub(crate) fn interactions(fit: &Fit<'_>, selected: &[Selected]) -> Vec<Interact
         .flat_map(|a| (a + 1..selected.len()).map(move |b| (a, b)))
         .map(|(a, b)| (selected[a].term, selected[b].term))
         .collect();
-    let needed = statistics::bonferroni_sigma(FALSE_PRODUCT_RATE, pairs.len());
+    let needed = statistics::bonferroni_sigma(FALSE_RATE, pairs.len());
     let dispersion = fit.dispersion(fit.free.chi2);
     let test = |(a, b): &(usize, usize)| {
         let (one, other) = (fit.problem.terms[*a].effect()?, fit.problem.terms[*b].effect()?);

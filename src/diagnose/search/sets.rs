@@ -7,9 +7,7 @@ use super::candidates::{Candidates, critical_sigma, open, strongest_unlisted};
 use super::selection::{self, Rival, Selected, Selection};
 use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
-use crate::diagnose::thresholds::{
-    CONFUSABLE_CHI2, CURVED_SHARE, MOST_EXCHANGED, MOST_EXCHANGES, MOST_LN_ODDS, MOST_SWAPS,
-};
+use crate::diagnose::thresholds::{CURVED_SHARE, MOST_EXCHANGES, MOST_ROUNDS, SIGNIFICANT_SIGMA};
 use crate::diagnose::weak_form::Unlisted;
 use crate::presence::ln_tail;
 use pitchleak_core::Leak;
@@ -47,7 +45,7 @@ impl Exchange {
 pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
     let mut has_changed = false;
     let mut exchanges = nearest(all, progress);
-    for _ in 0..MOST_SWAPS {
+    for _ in 0..MOST_ROUNDS {
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
         let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0;
         let better = exchanges.iter().filter(is_better);
@@ -88,10 +86,10 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     let named: Vec<usize> = all.effects.iter().map(|one| one.term).collect();
     let mut candidates = Candidates::of(fit);
     let mut near = vec![];
-    for gone in subsets(&named, MOST_EXCHANGED) {
+    for gone in subsets(&named) {
         let without = fit.solve_without(&gone);
         let lost = without.chi2 - fit.free.chi2;
-        let margin = CONFUSABLE_CHI2 + CURVED_SHARE * lost / dispersion;
+        let margin = SIGNIFICANT_SIGMA.powi(2) + CURVED_SHARE * lost / dispersion;
         let singles = of_one(&mut candidates, &without, &gone);
         let pairs = of_two(fit, &without, &gone);
         near.extend(singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin));
@@ -102,11 +100,10 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     near.into_iter().filter_map(|one| fitted(fit, own_leaks, one, progress)).collect()
 }
 
-/// All sets of one to `most` of these.
-fn subsets(of: &[usize], most: usize) -> Vec<Vec<usize>> {
-    let all = (1..1_usize << of.len()).filter(|bits| bits.count_ones() as usize <= most);
+/// All sets of these but the empty one.
+fn subsets(of: &[usize]) -> Vec<Vec<usize>> {
     let chosen = |bits: usize| of.iter().enumerate().filter(move |(at, _)| bits >> at & 1 == 1);
-    all.map(|bits| chosen(bits).map(|(_, term)| *term).collect()).collect()
+    (1..1_usize << of.len()).map(|bits| chosen(bits).map(|(_, term)| *term).collect()).collect()
 }
 
 fn needed(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
@@ -188,32 +185,36 @@ fn is_at_bound(fit: &Fit<'_>) -> bool {
     fit.active().iter().any(|term| fit.is_at_bound(*term))
 }
 
+/// Probability of one of several explanations, all that there are, each the worse one by so much.
+fn share(worse: f64, all: &[f64]) -> f64 {
+    1.0 / all.iter().map(|other| ((worse - other) / 2.0).exp()).sum::<f64>()
+}
+
 /// Gives each named effect its rivals and its probability among all that could stand in its place.
 fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
     let fit = &all.fit;
     let dispersion = fit.dispersion(fit.free.chi2);
-    let odds = |worse: f64| (-worse / 2.0).min(MOST_LN_ODDS).exp();
+    let is_near = |worse: f64| worse < SIGNIFICANT_SIGMA.powi(2);
     for one in &mut all.effects {
         let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
         let (unlisted, worse) = unlisted(fit, one.term).unzip();
-        let odds_of = |other: &Exchange| other.worse_by_either(dispersion).map(odds);
-        let own = [0, 1].map(|belief| {
-            let odds_against: f64 = against.clone().map(|other| odds_of(other)[belief]).sum();
-            1.0 / (1.0 + odds_against + worse.map_or(0.0, odds))
+        let everything = [0, 1].map(|belief| {
+            let others = against.clone().map(|other| other.worse_by_either(dispersion)[belief]);
+            others.chain(worse).chain([0.0]).collect::<Vec<f64>>()
         });
-        one.probability = f64::midpoint(own[0], own[1]);
-        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse < CONFUSABLE_CHI2));
+        let of =
+            |worse: [f64; 2]| f64::midpoint(share(worse[0], &everything[0]), share(worse[1], &everything[1]));
         let rival = |other: &Exchange| {
-            let [one, two] = odds_of(other);
-            Rival {
-                effects: other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect()).collect(),
-                probability: f64::midpoint(own[0] * one, own[1] * two),
-            }
+            let effects = other.new.iter().filter_map(|(term, _)| fit.problem.terms[*term].effect());
+            Rival { effects: effects.collect(), probability: of(other.worse_by_either(dispersion)) }
         };
-        let is_near = |other: &&Exchange| {
-            other.worse_by_either(dispersion).iter().any(|worse| *worse < CONFUSABLE_CHI2)
-        };
-        one.rivals = against.filter(is_near).map(rival).collect();
+        one.probability = of([0.0; 2]);
+        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(is_near));
+        one.rivals = against
+            .clone()
+            .filter(|other| other.worse_by_either(dispersion).into_iter().any(is_near))
+            .map(rival)
+            .collect();
     }
 }
 

@@ -4,12 +4,12 @@
 use super::candidates::{self, Candidates, critical_sigma, open};
 use crate::diagnose::data::{Declared, Series, check_sensors, thinned};
 use crate::diagnose::fit::{Fit, PartialColumn, Problem, Score, Solution, UnknownConstant};
-use crate::diagnose::thresholds::{
-    FIRST_STEP, IN_THE_RUNNING, LAST_STEP, LEAST_CLIMB, MOST_CLIMBS, OTHERS_SHARE, SEARCH_STARTS,
-    WORTH_SEARCHING,
-};
+use crate::diagnose::thresholds::{HALVINGS, IN_THE_RUNNING, SEARCH_STARTS, SIGNIFICANT_SIGMA};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Effect, Signals};
+
+/// Half of one of the parts of a range that the search starts in: so far it is from the middle to the ends.
+const HALF_PART: f64 = 0.5 / SEARCH_STARTS as f64;
 
 /// A constant and the values of it that these traces can tell apart.
 #[derive(Clone, Copy, Debug)]
@@ -56,14 +56,16 @@ fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
 /// The constants with which the search for a candidate's begins: the present ones and a few places of each range.
 fn starts(fit: &Fit<'_>, term: usize) -> Vec<EffectConstants<f64>> {
     let (ranges, usual) = (free(fit, term), fit.problem.usual(term));
-    let middle = ranges.iter().fold(fit.constants(term), |constants, other| {
-        constants.with(other.parameter, other.at(OTHERS_SHARE))
-    });
-    let places = ranges.iter().flat_map(|range| SEARCH_STARTS.map(|share| (range, share)));
+    // The others stand low meanwhile: bells and bends are narrow.
+    let low = ranges
+        .iter()
+        .fold(fit.constants(term), |constants, other| constants.with(other.parameter, other.at(HALF_PART)));
+    let shares = (0..SEARCH_STARTS).map(|part| (2 * part + 1) as f64 * HALF_PART);
+    let places = ranges.iter().flat_map(|range| shares.clone().map(move |share| (range, share)));
     (fit.constants(term) != usual)
         .then_some(usual)
         .into_iter()
-        .chain(places.map(|(range, share)| middle.with(range.parameter, range.at(share))))
+        .chain(places.map(|(range, share)| low.with(range.parameter, range.at(share))))
         .collect()
 }
 
@@ -95,7 +97,7 @@ pub(super) fn best_score(
     first: (Score, EffectConstants<f64>),
 ) -> (Score, EffectConstants<f64>) {
     let dispersion = candidates.fit.dispersion(model.chi2 - first.0.chi2_drop);
-    if first.0.chi2_drop / dispersion < WORTH_SEARCHING {
+    if first.0.chi2_drop / dispersion < SIGNIFICANT_SIGMA.powi(2) {
         return first;
     }
     let ranges = free(candidates.fit, first.0.term);
@@ -111,11 +113,8 @@ fn climb(
 ) -> (Score, EffectConstants<f64>) {
     let term = start.0.term;
     let mut best = start;
-    let mut share = FIRST_STEP;
-    for _ in 0..MOST_CLIMBS {
-        if share < LAST_STEP || ranges.is_empty() {
-            break;
-        }
+    let (mut share, mut halvings) = (HALF_PART, 0);
+    while halvings < HALVINGS {
         let steps = ranges.iter().flat_map(|range| [(range, share), (range, -share)]);
         let tried = steps.filter_map(|(range, share)| {
             let value = best.1.get(range.parameter) + share * (range.high - range.low);
@@ -123,8 +122,8 @@ fn climb(
             Some((candidates.score(model, term, constants)?, constants))
         });
         match tried.max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop)) {
-            Some(better) if better.0.chi2_drop > best.0.chi2_drop + LEAST_CLIMB => best = better,
-            _ => share /= 2.0,
+            Some(better) if better.0.chi2_drop > best.0.chi2_drop => best = better,
+            _ => (share, halvings) = (share / 2.0, halvings + 1),
         }
     }
     best

@@ -4,7 +4,7 @@ use super::leak_change::LeakChange;
 use super::terms::Term;
 use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{DERIVATIVE_STEP, LEAST_COMPRESSIBILITY, OIL_SIGMA};
+use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA};
 use pitchleak_core::effects::{EffectConstants, EffectKind};
 use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals, Terms};
 
@@ -39,14 +39,12 @@ impl Linearisation {
     pub(crate) fn declared(declared: &Declared) -> Self {
         let fluid = declared.fluid;
         let compressibility = 1.0 / fluid.bulk_modulus_pa;
-        let share = OIL_SIGMA * fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
+        let share = SIGNIFICANT_SIGMA * fluid.bulk_modulus_std_pa / fluid.bulk_modulus_pa;
         Self {
             model: Model { cylinder: declared.cylinder, fluid, leaks_m3spa: PerLeak::default() },
             effects: declared.effects,
-            compressibility: (
-                compressibility * (1.0 - share).max(LEAST_COMPRESSIBILITY),
-                compressibility * (1.0 + share),
-            ),
+            // What is softer or stiffer is no oil but an effect.
+            compressibility: (compressibility / (1.0 + share), compressibility * (1.0 + share)),
             changes: Vec::new(),
         }
     }
@@ -127,7 +125,7 @@ impl Linearisation {
         if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) {
             return own;
         }
-        let step = DERIVATIVE_STEP * term.usual_size();
+        let step = NEGLIGIBLE_SHARE * term.usual_size();
         let above = term.read(step, at).filter(|above| !is_same(above, at));
         let Some((above, below)) = above.zip(term.read(-step, at)) else { return own };
         let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);

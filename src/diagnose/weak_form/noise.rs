@@ -11,7 +11,7 @@ use super::rows::{Entry, Row, Rows};
 use super::sensitivity::Sensitivity;
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::{Equation, PerEquation};
-use crate::diagnose::thresholds::{IGNORED, LEAST_PIVOT};
+use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, ROUNDING};
 use pitchleak_core::Sensors;
 
 /// Sums of products of the weights of samples in two rows: by test functions (0), differences (1) and curvatures (2).
@@ -157,7 +157,7 @@ struct Line {
 impl Line {
     fn covariance(&self, distance: usize, equation_error: &PerEquation<f64>) -> f64 {
         let value = self.sensors[distance] + self.error[distance] * equation_error[self.equation];
-        if distance == 0 && !self.counts { value * IGNORED } else { value }
+        if distance == 0 && !self.counts { value / ROUNDING } else { value }
     }
 }
 
@@ -240,7 +240,7 @@ impl Whitening {
                     .sum();
                 let rest = covariance - done;
                 line[d] = match d {
-                    0 => rest.max(LEAST_PIVOT * covariance).sqrt(),
+                    0 => rest.max(NEGLIGIBLE_SHARE * covariance).sqrt(),
                     _ => rest / factor[i - d][0],
                 };
             }

@@ -9,7 +9,7 @@ use super::integrals::{ActiveTerm, Integrals, Integrand, Step, TestFunctions};
 use super::linearisation::Linearisation;
 use crate::diagnose::data::{Motion, Series};
 use crate::diagnose::equation::{Equation, PerEquation};
-use crate::diagnose::thresholds::SLIVER;
+use crate::diagnose::thresholds::ROUNDING;
 use pitchleak_core::Signals;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -197,7 +197,7 @@ impl Rows {
             has_leak_change: false,
         });
         for equation in Equation::ALL {
-            if weighted.missing_s[equation] > SLIVER * block_s {
+            if weighted.missing_s[equation] > ROUNDING * block_s {
                 continue;
             }
             self.entries.push(Entry { row, equation });
@@ -220,7 +220,7 @@ impl Rows {
     pub(crate) fn counts(&self, entry: &Entry) -> bool {
         let row = &self.rows[entry.row];
         match entry.equation {
-            Equation::Force => row.unsure_share <= SLIVER && !row.has_unseen_force,
+            Equation::Force => row.unsure_share <= ROUNDING && !row.has_unseen_force,
             _ => !row.has_leak_change,
         }
     }
