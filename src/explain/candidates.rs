@@ -14,10 +14,8 @@ use super::readings::Mistake;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 use std::collections::HashMap;
 
-/// States of sensors and rig, best first, beside which pairs of leaks have courses of their own; numerical.
-const STATES_WITH_PAIRS: usize = 3;
-/// States of sensors and rig beside which other courses of leaks are tried; numerical.
-const STATES_WITH_COURSES: usize = 5;
+/// States of sensors and rig, best first, beside which other courses of leaks are tried; numerical.
+const STATES_WITH_COURSES: usize = 3;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
 /// ln of what columns gain at the noise of the explanation without them, from which on they speak for a mistake: more they
@@ -195,7 +193,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         self.sort();
         let tables = self.pass.tables;
         let courses = self.pass.courses();
-        for (rank, state) in best_states(&self.all).into_iter().enumerate() {
+        for state in best_states(&self.all) {
             for subset in subsets().skip(1) {
                 let Some(steady) = self.steady(state, subset) else { continue };
                 let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
@@ -209,7 +207,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
                     self.ask(&steady, state, together(subset, course), tables.ln_course(course))
                 });
                 let are_two = subset.iter().filter(|leak| **leak).count() == 2;
-                if rank < STATES_WITH_PAIRS && state.wander.0 <= 0.0 && are_two {
+                if state.wander.0 <= 0.0 && are_two {
                     let most = steady.ln_weight + free[0].max(free[1]);
                     self.add_pairs(&steady, state, subset, &courses, most - self.ln_constant(subset));
                 }

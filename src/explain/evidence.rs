@@ -20,6 +20,8 @@ const STEPS: usize = 2;
 const LEAST_SCALE: f64 = 0.02;
 /// Least square of a pivot, where noise products taken off leave less than the prior alone.
 const LEAST_PIVOT: f64 = 0.2;
+/// A mean square so many standard deviations from what it should be is so by chance. Chosen: the usual three.
+const CHANCE_SIGMAS: f64 = 3.0;
 /// χ² further below zero than this is no sum of squares: more noise was taken off than there is.
 const LEAST_CHI_SQUARE: f64 = -50.0;
 
@@ -104,7 +106,7 @@ impl Products {
     /// power are left of the column's.
     /// `scale` is that of the columns' noise.
     fn kept(&self, c: usize, rows: f64, scale: f64) -> Vec<f64> {
-        let most = (1.0 - 3.0 * mean_square_std(rows)).max(0.1);
+        let most = (1.0 - chance_of_mean_square(rows)).max(0.1);
         let share = |i: usize| {
             let place = i * self.size + i;
             let (noise, power) = (scale * self.noise[c][place], self.gram[c][place].max(0.0));
@@ -187,9 +189,9 @@ pub(super) fn at_scales(equations: &NormalEquations, free: &[Free], scales: [f64
     (chi_square, ln_determinant)
 }
 
-/// Standard deviation of the mean of squares of so many unit normals.
-pub(super) fn mean_square_std(rows: f64) -> f64 {
-    (2.0 / rows.max(1.0)).sqrt()
+/// By how much the mean of squares of so many unit normals may be off by chance: a mean square's standard deviation is √(2/n).
+pub(super) fn chance_of_mean_square(rows: f64) -> f64 {
+    CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt()
 }
 
 /// ln of the prior density of a noise scale s², up to a constant: −½ν (ln s² + 1/s² − 1).

@@ -13,8 +13,6 @@ use super::hypothesis::{Hypothesis, LEAK_COLUMNS};
 use super::raw_products::{RawProducts, SegmentProducts};
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 
-/// Segments of which a scatter says something.
-const LEAST_SEGMENTS: usize = 4;
 /// Rows of a segment that counts.
 const LEAST_ROWS: f64 = 4.0;
 
@@ -65,7 +63,7 @@ pub(super) fn inflation(
 
 /// Q over what chance makes of it: its mean and a standard deviation.
 fn excess(scores: &[(f64, f64)], scale: f64) -> Option<f64> {
-    let freedom = scores.len().checked_sub(1).filter(|_| scores.len() >= LEAST_SEGMENTS)? as f64;
+    let freedom = scores.len().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
     let (score, information) =
         scores.iter().fold((0.0, 0.0), |sum, (score, information)| (sum.0 + score, sum.1 + information));
     let squares: f64 = scores.iter().map(|(score, information)| score * score / information).sum();

@@ -3,7 +3,7 @@
 use super::candidates::Scored;
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, fit, mean_square_std};
+use super::evidence::{Fit, chance_of_mean_square, fit};
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::Pass;
@@ -11,8 +11,9 @@ use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
-/// Explanations so much less probable than the best have a sample of few points: e⁻⁴ is two in a hundred; numerical.
-const LITTLE_LN: f64 = 4.0;
+/// Explanations so much less probable than the best have a sample of few points, and are left out of a first look: e⁻⁴ is two in a
+/// hundred; numerical.
+pub(super) const LITTLE_LN: f64 = 4.0;
 
 /// A missing effect may be so many times as much of a leak as what is left of it: what looks like a leak is fitted away. A guess.
 const HIDDEN: f64 = 2.0;
@@ -129,7 +130,7 @@ impl<'a> Fitted<'_, 'a> {
         let (mut left, mut of_leak) = (0.0, 0.0);
         for (c, loudness) in loudness.into_iter().enumerate() {
             let rows = equations.rows[c];
-            let chance = 1.0 + 3.0 * mean_square_std(rows);
+            let chance = 1.0 + chance_of_mean_square(rows);
             left += rows * (self.fit.scales[c] - chance * loudness).max(0.0);
             of_leak += equations.gram(c).row(place)[place];
         }

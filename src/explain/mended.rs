@@ -10,7 +10,7 @@
 //! for neither side more than the noise itself differs.
 
 use super::equations::NormalEquations;
-use super::evidence::{ln_scale_prior, mean_square_std};
+use super::evidence::{chance_of_mean_square, ln_scale_prior};
 use super::leak_sample::Weighing;
 use super::readings::Mistake;
 use pitchleak_core::continuity::EQUATIONS;
@@ -19,9 +19,6 @@ use pitchleak_core::continuity::EQUATIONS;
 /// flow and position together is known: with v ~ N(0, V²) of any scale V, a unit f of both flows costs ln f by the flows'
 /// density and gives it back by V, which is f times smaller.
 const BALANCE: usize = 0;
-
-/// Noise whose mean square is so many standard deviations above its own is chance, and no misfit that a mistake explains. Chosen.
-const CHANCE_SIGMAS: f64 = 2.0;
 
 /// Rows are measured by the noise that they have once mended, as the declared ones are by theirs.
 pub(super) struct Mended {
@@ -196,5 +193,5 @@ fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
 
 /// A noise scale over what it truly is.
 fn most_by_chance(rows: f64) -> f64 {
-    1.0 + CHANCE_SIGMAS * mean_square_std(rows)
+    1.0 + chance_of_mean_square(rows)
 }

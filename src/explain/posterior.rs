@@ -4,7 +4,7 @@ use super::candidates::{Candidates, Scored};
 use super::equations::NormalEquations;
 use super::evidence::fit;
 use super::independence::inflation;
-use super::leak_sample::{Weighed, Weighing, cut};
+use super::leak_sample::{LITTLE_LN, Weighed, Weighing, cut};
 use super::mended::Mended;
 use super::pass::{Pass, Tables};
 use super::raw_products::{RawProducts, Statistic};
@@ -15,10 +15,6 @@ use pitchleak_core::PerLeak;
 
 /// Explanations so much less probable than the best (e⁻⁹) are left out; numerical.
 const LEAST_LN: f64 = 9.0;
-/// As much in the first look, which asks for the best and for means alone; numerical.
-const FIRST_LOOK_LN: f64 = 3.0;
-/// Leaks below this share of their threshold say nothing of the pressure sensors; a guess.
-const LEAST_LEAK: f64 = 0.5;
 /// A noise scale of so many times the readings' own scatter, squared, may be chance; above, an effect is missing, which is
 /// alike in about ten blocks: a push of the pitch. Guesses.
 const CHANCE_MISFIT2: f64 = 1.15;
@@ -55,10 +51,7 @@ pub(super) fn weigh<'a>(
     let products = RawProducts::of(statistic, rig);
     let pass = Pass::new(statistic, &products, rig, tables, PerLeak::default());
     let (first, inflation) = look(&Pass { told: *told, ..pass });
-    let mean_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
-    let least_m3s = rig.alarms.threshold_m3s.map(|threshold| LEAST_LEAK * threshold);
-    let is_sound = mean_m3s.zip(least_m3s).iter().all(|(_, (mean, least))| mean < least);
-    let found_m3s = if is_sound { PerLeak::default() } else { mean_m3s };
+    let found_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
     let products = products.worth(inflation);
     let last = Pass { doubts_m3s, told: *told, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
     let declared = last.equations(last.products, None, &last.columns());
@@ -75,7 +68,7 @@ fn mean_level(weighed: &[Weighed<'_>], leak: usize) -> f64 {
 fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
     let columns = pass.columns();
     let declared = pass.equations(pass.products, None, &columns);
-    let Posterior { weighed, .. } = weigh_all(pass, &declared, FIRST_LOOK_LN);
+    let Posterior { weighed, .. } = weigh_all(pass, &declared, LITTLE_LN);
     let inflation = weighed.first().map_or([1.0; 2], |best| {
         let coloured = if best.hypothesis.wiring.is_some() {
             [1.0; 2]

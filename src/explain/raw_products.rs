@@ -16,8 +16,8 @@ pub type Statistic = ContinuityStatistic<f64, SEGMENTS>;
 const END_READINGS: f64 = 7.0;
 
 const LEAST_TIME_S: f64 = 1e-9;
-/// Readings scatter by so much of their sheet's noise at the least.
-const LEAST_SCATTER: f64 = 0.01;
+/// Readings that scatter by less of their sheet's noise are computed: they count as noise of that size, and tell no unit.
+pub(super) const LEAST_SCATTER: f64 = 0.01;
 
 /// Of a whole trace.
 pub(super) struct RawProducts {

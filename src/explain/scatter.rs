@@ -5,6 +5,7 @@
 //! A mistake by a factor f divides its channels' r by f. So it takes all other sensors to be as their sheets say before one
 //! of them is believed to be in another unit.
 
+use super::raw_products::LEAST_SCATTER;
 use super::readings::Mistake;
 use crate::rig::Rig;
 use pitchleak_core::continuity::CHANNELS;
@@ -17,8 +18,6 @@ const WIDE: f64 = 1.0;
 /// The same of readings that scatter more: what is measured is a bound on the noise from above, with hum, drift and the
 /// motion between seldom readings in it. A guess.
 const WIDER: f64 = 3.0;
-/// Readings that scatter less, in that of their sheet, are computed, and their noise tells no unit.
-const LEAST_RATIO: f64 = 0.01;
 
 /// Scatter of each channel's readings over its sheet's noise; none where either is not known.
 #[derive(Clone, Copy)]
@@ -58,7 +57,7 @@ impl OverSheet {
     /// None where a channel is computed.
     fn ln_ratios(&self) -> Option<[f64; CHANNELS]> {
         let scatters =
-            |ratio: &Option<f64>| ratio.is_some_and(|ratio| ratio.is_finite() && ratio > LEAST_RATIO);
+            |ratio: &Option<f64>| ratio.is_some_and(|ratio| ratio.is_finite() && ratio > LEAST_SCATTER);
         self.0.iter().all(scatters).then(|| self.0.map(|ratio| ratio.unwrap_or(1.0).ln()))
     }
 }

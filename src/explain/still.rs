@@ -5,12 +5,9 @@
 //! pressure that varies no more than its noise does is its mean, segment by segment: then it tells a leak from nothing that is
 //! constant as well, and from nothing else.
 
-use super::evidence::mean_square_std;
+use super::evidence::chance_of_mean_square;
 use super::raw_products::SegmentProducts;
 use pitchleak_core::continuity::{COLUMNS, RawSum, column as place_of};
-
-/// A power is more than its noise's where it is so many standard deviations above it. Chosen.
-const SIGMAS: f64 = 3.0;
 
 /// A quantity that may stand still: combinations of the pressures' integrals, and what stands still with it.
 struct Quantity {
@@ -95,7 +92,7 @@ fn is_still(segments: &[SegmentProducts], quantity: &Quantity) -> bool {
             }
         }
     }
-    rows > 0.0 && power < noise * (1.0 + SIGMAS * mean_square_std(rows))
+    rows > 0.0 && power < noise * (1.0 + chance_of_mean_square(rows))
 }
 
 const PRESSURES: [RawSum; 2] = [RawSum::PressureA, RawSum::PressureB];
