@@ -193,6 +193,18 @@ fn what_the_model_lacks_is_said() {
     let frozen: String = (0..500).map(|k| format!("{:.2},100,60,40,1\n", f64::from(k) / 100.0)).collect();
     let verdict = judged(&format!("t_s,x_mm,pa_bar,pb_bar,shut\n{frozen}")).verdict;
     assert_eq!((verdict.status, verdict.reasons[0].id.name()), (Status::Doubtful, "channel_stuck"));
+
+    let flickering = trace(HeldCylinder::default(), 10.0, 4).text;
+    let header = flickering.lines().next().expect("has a header");
+    let place = header.split(',').position(|name| name.starts_with("pa_")).expect("has P_A");
+    let stuck = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells[place] = if line == header { cells[place] } else { "60" };
+        cells.join(",") + "\n"
+    };
+    let verdict = judged(&flickering.lines().map(stuck).collect::<String>()).verdict;
+    assert_eq!((verdict.status, verdict.reasons[0].id.name()), (Status::Doubtful, "channel_stuck"));
+    assert!(verdict.text.contains("P_A does not change"), "{}", verdict.text);
 }
 
 #[test]

@@ -5,8 +5,9 @@ use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
 use pitchleak::rig::Odds;
-use pitchleak::simulate::{LeakCourse, Scenario, Truth};
+use pitchleak::simulate::{LeakCourse, LeakSize, Scenario, Truth};
 use pitchleak::trace::TraceReader;
+use pitchleak::units::LPM_PER_M3S;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_testkit::lies::judge::{self, Judgement, Said, judge, recorded};
 use pitchleak_testkit::lies::{Family, LEAKING, Lie, leak_name, rig, truths};
@@ -123,6 +124,37 @@ fn windy(wind: WindCase, leaks: PerLeak<LeakCourse>, start_s: f64, duration_s: f
     let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
     let scenario = Scenario { leaks, start_s, duration_s, ..Scenario::new(rig(1e-2), reference) };
     scenario.collect(scenario.leak_coefficients().expect("within reach")).expect("runs")
+}
+
+/// That two leaks at once are rare is no finding of a trace, so it rules none out: meters' zeros that explain the trace as well leave
+/// the leaks open.
+#[test]
+fn two_external_leaks_are_never_called_sound() {
+    let size = |lpm: f64| LeakCourse::from(LeakSize::MeanFlow(lpm / LPM_PER_M3S));
+    let leaks = PerLeak { internal: size(0.0), external_a: size(0.2), external_b: size(0.2) };
+    [WindCase::Mps13, WindCase::Mps21].par_iter().for_each(|wind| {
+        let truths = windy(*wind, leaks, 20.0, 60.0);
+        for seed in 1..=12 {
+            let (report, _) = replayed(&truths, &lie(&[]), 1e-2, seed);
+            assert_ne!(report.verdict.status, Status::Sound, "{wind:?} {seed}: {}", report.verdict.text);
+        }
+    });
+}
+
+/// A pressure sensor's gain is undone in the leak's flow, too: the pressure that drives it is not as read.
+#[test]
+fn a_leak_beside_a_pressures_gain_has_its_true_size() {
+    let internal = LeakCourse::from(LeakSize::MeanFlow(0.5 / LPM_PER_M3S));
+    let leaks = PerLeak { internal, ..PerLeak::default() };
+    let truths = windy(WindCase::Mps21, leaks, 20.0, 120.0);
+    for fault in [&["pa gain 10 %"][..], &["pa gain -10 %"]] {
+        for seed in 1..=3 {
+            let (report, shown) = replayed(&truths, &lie(fault), 1e-2, seed);
+            let text = report.verdict.text.clone();
+            let judged = judge(&report.into(), Some(Leak::Internal), shown);
+            assert_ne!(judged, Judgement::ConfidentlyWrong, "{fault:?} {seed}: {text}");
+        }
+    }
 }
 
 /// Right columns, honest sensors: sure, and right.

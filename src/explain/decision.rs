@@ -265,17 +265,22 @@ struct Marginal {
 struct Flow {
     m3s: f64,
     weight: f64,
+    /// Its weights where this leak had been as probable as none before the trace: this one alone, and each.
+    even_weights: [f64; 2],
     is_leak: bool,
 }
 
 impl Marginal {
     fn of(weighed: &[Weighed<'_>], leak: Leak) -> Self {
         let of_one = |one: &Weighed<'_>| {
-            let is_leak = one.hypothesis.leaks[leak as usize].is_some();
+            let leaks = &one.hypothesis.leaks;
+            let even = |there: &Option<_>| if there.is_some() { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
+            let even_odds = [even(&leaks[leak as usize]), leaks.iter().map(even).product()];
             let flow = |(flows, weight): (&[f64; 3], &f64)| Flow {
                 m3s: flows[leak as usize],
                 weight: weight * one.probability,
-                is_leak,
+                even_weights: even_odds.map(|odds| weight * one.probability * odds),
+                is_leak: leaks[leak as usize].is_some(),
             };
             one.leaks_m3s.iter().zip(&one.weights).map(flow).collect::<Vec<_>>()
         };
@@ -292,10 +297,14 @@ impl Marginal {
         self.sum(|flow| if flow.m3s > threshold_m3s { flow.weight } else { 0.0 }).min(1.0)
     }
 
-    /// The same where a leak had been as probable as none before the trace: that leaks are rare is no finding of this trace.
+    /// The same where this leak, alone or with the others, had been as probable as none before the trace, the larger: that leaks are
+    /// rare, and two of them rarer, is no finding of this trace.
     fn above_at_even_odds(&self, threshold_m3s: f64) -> f64 {
-        let even = |flow: &Flow| flow.weight * if flow.is_leak { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
-        self.sum(|flow| if flow.m3s > threshold_m3s { even(flow) } else { 0.0 }) / self.sum(even)
+        let above = |which: usize| {
+            let weight = |flow: &Flow| flow.even_weights[which];
+            self.sum(|flow| if flow.m3s > threshold_m3s { weight(flow) } else { 0.0 }) / self.sum(weight)
+        };
+        above(0).max(above(1))
     }
 
     fn quantile(&self, probability: f64) -> f64 {

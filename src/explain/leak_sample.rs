@@ -152,15 +152,17 @@ impl<'a> Fitted<'_, 'a> {
             let pressure_pa = pressures_pa[Leak::ALL[leak]].max(1.0);
             let lately = pressure_pa / all_pa[Leak::ALL[leak]].max(1.0);
             let sheet = USUAL_PRESSURE * self.pass.rig.instruments.pressure.full_scale / pressure_pa;
-            let zero = self.pressure_zero_pa(leak) / pressure_pa;
+            let off = self.pressure_off_pa(leak, pressures_pa) / pressure_pa;
             let scale = self.scale(Leak::ALL[leak]);
-            // The mean size of a pressure of changing sign follows a zero by an unknown share.
-            let spread =
-                if leak == 0 { f64::hypot(sheet, zero) } else { sheet }.hypot(scale.std / scale.value);
+            // The mean size of a pressure of changing sign follows its mean for certain, and else by an unknown share.
+            let signed =
+                if leak == 0 { pressures_pa.external_a - pressures_pa.external_b } else { pressure_pa };
+            let follows = (signed / pressure_pa).clamp(-1.0, 1.0);
+            let spread = sheet.hypot((1.0 - follows.abs()) * off).hypot(scale.std / scale.value);
             let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]].hypot(self.unexplained_m3s(leak));
             for (out, (point, normals)) in out.iter_mut().zip(points.iter().zip(NORMALS.iter())) {
                 let doubt = doubt_m3s * normals[3 + leak];
-                let pressure = lately * (1.0 + zero + spread * normals[leak]);
+                let pressure = lately * (1.0 + follows * off + spread * normals[leak]);
                 out[leak] =
                     (flow(point) * scale.value * pressure * self.pass.full_scale_m3s + doubt).max(0.0);
             }
@@ -180,17 +182,20 @@ impl<'a> Fitted<'_, 'a> {
         own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| over_declared(*share))
     }
 
-    /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero of a pressure sensor.
-    fn pressure_zero_pa(&self, leak: usize) -> f64 {
+    /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero or a gain of a pressure sensor.
+    fn pressure_off_pa(&self, leak: usize, mean_pa: PerLeak<f64>) -> f64 {
         let signs = match leak {
             0 => [-1.0, 1.0],
             1 => [-1.0, 0.0],
             _ => [0.0, -1.0],
         };
         let full_scale = self.pass.rig.instruments.pressure.full_scale;
-        let zero = |column: Column| self.place(column).map_or(0.0, |at| self.fit.means[at] * full_scale);
-        let [zero_a, zero_b] = [Column::PressureZeroA, Column::PressureZeroB].map(zero);
-        signs[0] * zero_a + signs[1] * zero_b
+        let share = |column: Column| self.place(column).map_or(0.0, |at| self.fit.means[at]);
+        let off_a =
+            share(Column::PressureZeroA) * full_scale + share(Column::PressureGainA) * mean_pa.external_a;
+        let off_b =
+            share(Column::PressureZeroB) * full_scale + share(Column::PressureGainB) * mean_pa.external_b;
+        signs[0] * off_a + signs[1] * off_b
     }
 
     /// The segment from which on all leaks are as at the end.

@@ -1,7 +1,7 @@
 //! What a hold test found, and its report.
 
 use super::fit::{Fit, fit, usable};
-use super::recorder::{EndedBy, Held, Recorder};
+use super::recorder::{EndedBy, Held, Reading, Recorder};
 use crate::presence::{self, FoundLeak};
 use crate::report::{ReplayReport, Status, TraceSummary};
 use crate::rig::Rig;
@@ -27,8 +27,8 @@ pub struct HoldSummary {
 pub struct HoldTest {
     pub(super) summary: HoldSummary,
     pub(super) fit: Option<Fit>,
-    /// Position and both pressures never change by a digit.
-    pub(super) is_frozen: bool,
+    /// P_A and P_B never change by a digit.
+    pub(super) frozen: [bool; 2],
 }
 
 impl Recorder {
@@ -54,7 +54,7 @@ impl HoldTest {
             holds: holds.len(),
             leaks: fit.as_ref().map(|fit| fit.found.leaks()),
         };
-        Some(Self { summary, is_frozen: is_frozen(&usable), fit })
+        Some(Self { summary, frozen: frozen(&usable), fit })
     }
 
     /// How much of it was usable, and what it could find.
@@ -78,12 +78,17 @@ impl HoldTest {
 /// So many equal readings are no chance.
 const FROZEN_READINGS: usize = 50;
 
-/// Whether a recorder seems to stand still: real sensors flicker in their last digit.
+/// Whether each pressure sensor, or its recorder, seems to stand still: real ones flicker in their last digit. A position of many digits
+/// need not, as the piston stands.
 #[allow(clippy::float_cmp)]
-fn is_frozen(holds: &[&Held]) -> bool {
-    let same = |held: &&Held| {
-        let [first, rest @ ..] = held.readings.as_slice() else { return true };
-        rest.iter().all(|r| r.x_m == first.x_m && r.pa_pa == first.pa_pa && r.pb_pa == first.pb_pa)
-    };
-    holds.iter().map(|held| held.readings.len()).sum::<usize>() >= FROZEN_READINGS && holds.iter().all(same)
+fn frozen(holds: &[&Held]) -> [bool; 2] {
+    let is_long = holds.iter().map(|held| held.readings.len()).sum::<usize>() >= FROZEN_READINGS;
+    let pressures: [fn(&Reading) -> f64; 2] = [|r| r.pa_pa, |r| r.pb_pa];
+    pressures.map(|pressure| {
+        let same = |held: &&Held| {
+            let [first, rest @ ..] = held.readings.as_slice() else { return true };
+            rest.iter().all(|r| pressure(r) == pressure(first))
+        };
+        is_long && holds.iter().all(same)
+    })
 }

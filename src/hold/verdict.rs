@@ -48,18 +48,25 @@ impl HoldTest {
     }
 
     fn contradictions(&self, fit: &Fit, rig: &Rig) -> Vec<Reason> {
-        let frozen = || {
-            Reason::new(
-                ReasonId::Channel(ChannelFaultKind::Stuck),
-                "position and pressures do not change by a single digit while the ports are shut",
-                "check that the recorder runs: sensors flicker in their last digit",
-            )
-        };
-        let mut reasons: Vec<Reason> = self.is_frozen.then(frozen).into_iter().collect();
+        let mut reasons: Vec<Reason> = self.stuck().into_iter().collect();
         reasons.extend(fit.misfit());
         reasons.extend(fit.negative());
         reasons.extend(fit.found.other_oil(rig, "hold"));
         reasons
+    }
+
+    fn stuck(&self) -> Option<Reason> {
+        let who = match self.frozen {
+            [true, true] => "both pressures do",
+            [true, false] => "P_A does",
+            [false, true] => "P_B does",
+            [false, false] => return None,
+        };
+        Some(Reason::new(
+            ReasonId::Channel(ChannelFaultKind::Stuck),
+            format!("{who} not change by a single digit while the ports are shut"),
+            "check that the recorder runs, and the sensor: sensors flicker in their last digit",
+        ))
     }
 
     /// How much of the hold counts.

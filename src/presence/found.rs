@@ -137,9 +137,10 @@ impl Found {
     /// Says so where `teller` asks for another oil than the rig file's.
     pub fn other_oil(&self, rig: &Rig, teller: &str) -> Option<Reason> {
         let (declared_pa, std_pa) = (rig.fluid.bulk_modulus_pa, rig.fluid.bulk_modulus_std_pa);
-        let kappa = self.beliefs.kappa.value;
-        let off_pa = (kappa - 1.0).abs() * declared_pa;
-        (off_pa > BULK_MODULUS_SIGMAS * std_pa && std_pa > 0.0).then(|| {
+        let Estimate { value: kappa, std } = self.beliefs.kappa;
+        let chance = std.hypot(std_pa / declared_pa);
+        let is_off = (kappa - 1.0).abs() > BULK_MODULUS_SIGMAS * chance;
+        (is_off && std_pa > 0.0).then(|| {
             Reason::new(
                 ReasonId::BulkModulusImpossible,
                 format!(

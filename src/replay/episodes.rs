@@ -42,7 +42,7 @@ impl Episodes {
             let begun = Open { from_s: t_s, time_s: 0.0, leaked_lpm_s: 0.0, peak_lpm: flow_lpm };
             let open = open.get_or_insert(begun);
             open.time_s += elapsed_s;
-            open.leaked_lpm_s += flow_lpm * elapsed_s;
+            open.leaked_lpm_s += flow_lpm.max(0.0) * elapsed_s;
             open.peak_lpm = open.peak_lpm.max(flow_lpm);
         }
     }
@@ -65,6 +65,17 @@ impl Episodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_leak_lets_oil_in() {
+        let mut episodes = Episodes::default();
+        let active = PerLeak { internal: true, ..PerLeak::default() };
+        for (t_s, lpm) in [(1.0, 0.4), (2.0, -4.0)] {
+            let flows_m3s = PerLeak { internal: lpm / LPM_PER_M3S, ..PerLeak::default() };
+            episodes.add(t_s, 1.0, flows_m3s, &active);
+        }
+        assert!((episodes.list()[0].mean_lpm - 0.2).abs() < 1e-12);
+    }
 
     #[test]
     fn a_leak_that_comes_and_goes_for_years_takes_no_more_memory() {

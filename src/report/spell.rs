@@ -85,7 +85,7 @@ pub struct Episode {
     pub from_s: f64,
     /// When it was cleared, s; none where it stands at the end.
     pub to_s: Option<f64>,
-    /// Mean of the estimates meanwhile, L/min.
+    /// Mean of the estimates meanwhile, none below zero, L/min.
     pub mean_lpm: f64,
     /// Largest of them, L/min.
     pub peak_lpm: f64,
