@@ -302,6 +302,9 @@ fn bulk_modulus(kappa: &Estimate<f64>, rig: &Rig) -> EstimateEntry {
         ci95: Some([declared_pa / high, stiffest]),
         ..EstimateEntry::new(estimate, EstimateEntry::BULK_MODULUS_UNIT)
     };
+    if low <= 0.0 {
+        return entry.not_identifiable("the pressures hardly change by more than their noise");
+    }
     if std < UNKNOWN * rig.fluid.bulk_modulus_std_pa / declared_pa {
         return entry;
     }
