@@ -129,7 +129,7 @@ fn windy(wind: WindCase, leaks: PerLeak<LeakCourse>, start_s: f64, duration_s: f
 /// That two leaks at once are rare is no finding of a trace, so it rules none out: meters' zeros that explain the trace as well leave
 /// the leaks open.
 #[test]
-fn two_external_leaks_are_never_called_sound() {
+fn two_external_leaks_are_not_ruled_out_for_being_rare() {
     let size = |lpm: f64| LeakCourse::from(LeakSize::MeanFlow(lpm / LPM_PER_M3S));
     let leaks = PerLeak { internal: size(0.0), external_a: size(0.2), external_b: size(0.2) };
     [WindCase::Mps13, WindCase::Mps21].par_iter().for_each(|wind| {

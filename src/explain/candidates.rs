@@ -129,16 +129,20 @@ impl<'a, 'p> Candidates<'a, 'p> {
         self.scored(self.hypothesis(state, leaks, self.ln_constant(subset)))
     }
 
+    /// Steady leaks beside a state, asked for now where they did not matter before; none where the state has no such leaks.
     fn steady(&mut self, state: State<'a>, subset: Subset) -> Option<Steady> {
         if !is_asked(state, subset) {
             return None;
         }
-        if find(&self.all, state, subset).is_none() {
+        let leaks = together(subset, LeakCourse::Constant);
+        let is_it = |one: &Scored<'_>| one.hypothesis.leaks == leaks && one.hypothesis.state == state;
+        let known = self.all.iter().position(is_it);
+        let at = known.unwrap_or(self.all.len());
+        if known.is_none() {
             let one = self.with_steady(state, subset);
             self.keep(one);
         }
-        let Scored { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, .. } =
-            find(&self.all, state, subset)?;
+        let Scored { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, .. } = self.all.get(at)?;
         Some(Steady {
             scales: *scales,
             chi_square: at_scales(self.declared, &hypothesis.free, *scales).0,
@@ -170,7 +174,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         Hypothesis::new(self.declared, &self.pass.sizes, self.pass.segments, state, leaks, ln_course)
     }
 
-    /// An explanation, unless by the noise of one with steady leaks it does not matter; its ln likelihood.
+    /// Keeps an explanation, unless by the noise of one with steady leaks it does not matter; its ln likelihood by that noise.
     fn ask(&mut self, steady: &Steady, state: State<'a>, leaks: Leaks, ln_course: f64) -> f64 {
         let hypothesis = self.hypothesis(state, leaks, ln_course);
         let (chi_square, ln_determinant) = at_scales(self.declared, &hypothesis.free, steady.scales);
@@ -445,12 +449,6 @@ fn is_asked(state: State<'_>, subset: Subset) -> bool {
 /// These leaks on one course.
 fn together(subset: Subset, course: LeakCourse) -> Leaks {
     subset.map(|there| there.then_some(course))
-}
-
-/// These leaks, steady, in this state.
-fn find<'b, 'a>(all: &'b [Scored<'a>], state: State<'a>, subset: Subset) -> Option<&'b Scored<'a>> {
-    let steady = together(subset, LeakCourse::Constant);
-    all.iter().find(|scored| scored.hypothesis.leaks == steady && scored.hypothesis.state == state)
 }
 
 /// The states of best evidence, each once, of explanations best first, and as-declared with usual and slight zeros.

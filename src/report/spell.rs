@@ -15,7 +15,7 @@ pub struct Spell {
     pub times: usize,
     /// How long an alarm stood, all of them together, s.
     pub stood_s: f64,
-    /// Mean of the estimates while one stood, L/min.
+    /// Mean of the estimates while one stood, none below zero, L/min.
     pub mean_lpm: f64,
     /// Largest of them, L/min.
     pub peak_lpm: f64,
