@@ -113,21 +113,6 @@ fn a_sound_cylinder_has_no_leak_and_its_valve_is_said_to_be_open() {
     }
 }
 
-/// Where pressures hardly change but by their noise, no oil is told, and none contradicts the rig file.
-#[test]
-fn in_calm_wind_no_oil_is_told() {
-    for wind in [0.05, 0.1, 0.2] {
-        let sound =
-            |seed| ValveCylinder { wind, dry_n: 0.0, ..ValveCylinder::drawn(first_seed() + 900 + seed) };
-        for report in reports(4, 60.0, sound) {
-            let reasons: Vec<_> = report.verdict.reasons.iter().map(|reason| reason.id.name()).collect();
-            assert!(!reasons.contains(&"bulk_modulus_impossible"), "{wind}: {}", report.verdict.text);
-            let oil = &report.estimates.bulk_modulus;
-            assert!(oil.value > 0.0 || !oil.identifiable, "{wind}: {oil:?}");
-        }
-    }
-}
-
 #[test]
 fn an_external_leak_is_told_beyond_what_the_valves_clearance_may_be() {
     // 1 σ at 50 bar.

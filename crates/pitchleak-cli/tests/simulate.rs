@@ -196,3 +196,41 @@ fn bad_usage_is_one_clear_message() {
     assert!(other.status.code() == Some(2) && message.contains(".csv.gz"), "{message}");
     assert_eq!(pitchleak(&["reproduce", "--seeds", "0"]).status.code(), Some(2));
 }
+
+/// Without flow meters, where pressures hardly change but by their noise, no oil is told, and none contradicts the rig file.
+#[test]
+fn in_calm_wind_a_valve_tells_no_oil() {
+    let folder = TempDir::new().unwrap();
+    let rig = folder.path().join("rig.toml");
+    let text = r#"
+        [cylinder]
+        area_a = "12.6 cm^2"
+        area_b = "9.4 cm^2"
+        stroke = "200 mm"
+        moving_mass = "20 kg"
+        dead_volume_a = "50 mL"
+        dead_volume_b = "50 mL"
+        [fluid]
+        bulk_modulus = "0.8 GPa"
+        bulk_modulus_std = "0.2 GPa"
+        [sensors]
+        pressure = { full_scale = "160 bar", accuracy = "0.3 %" }
+        position = { full_scale = "200 mm", accuracy = "0.3 %" }
+        spool = { accuracy = "0.3 %" }
+        [valve]
+        rated_flow = "4 L/min"
+        rated_drop = "35 bar"
+        supply = "100 bar"
+    "#;
+    std::fs::write(&rig, text).unwrap();
+    let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
+    for seed in ["1", "2", "3"] {
+        let arguments = ["--rig", &rig, "--wind", "5", "--noise", "rig", "--seed", seed];
+        let output = simulate(&trace, &arguments);
+        assert!(output.status.success(), "{output:?}");
+        let report = pitchleak(&["replay", &trace.display().to_string(), "--rig", &rig, "--json"]);
+        let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+        assert_ne!(report["verdict"]["status"], "doubtful", "{}", report["verdict"]["text"]);
+        assert_eq!(report["estimates"]["bulk_modulus"]["identifiable"], false, "{seed}");
+    }
+}
