@@ -270,16 +270,15 @@ impl<'a, 'p> Candidates<'a, 'p> {
     /// Mistakes of wiring, beside slightly wrong zeros and constant leaks; their equations.
     pub fn add_mistakes(&mut self) -> Vec<Mended> {
         let tables = self.pass.tables;
-        let (Some(zeros), Some(departure), Some(wander)) =
-            (tables.zeros.get(1), tables.departures.first(), tables.wanders.first())
-        else {
-            return Vec::new();
-        };
-        let state = State { zeros, departure, wander: *wander, border: 0 };
+        let Some(state) = self.pass.slightly_off() else { return Vec::new() };
         let least = self.least();
         let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
         let scales = best.map_or([1.0; 2], |best| best.scales);
-        let mut bound = Bound::of(best, self.declared);
+        let plain = |one: &&Scored<'_>| one.hypothesis.state.departure == state.departure;
+        let best_plain =
+            self.all.iter().filter(plain).max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
+        let mut bounds: Vec<Bound<'_>> =
+            [best, best_plain].into_iter().filter_map(|best| Bound::of(best, self.declared)).collect();
         let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
@@ -292,7 +291,8 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let ln_prior = ln_share + mended.ln_measure;
             let begin = self.all.len();
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
-            let most = bound.as_mut().map_or(f64::INFINITY, |bound| bound.ln_most(mistake, ln_share));
+            let each = bounds.iter_mut().map(|bound| bound.ln_most(mistake, ln_share));
+            let most = each.reduce(f64::max).unwrap_or(f64::INFINITY);
             self.all[begin..]
                 .iter_mut()
                 .for_each(|own| own.ln_posterior = own.ln_posterior.min(most + own.ln_sign));
@@ -391,7 +391,7 @@ impl<'a> Scored<'a> {
 }
 
 /// What the parameters that cannot be negative, and are, cost at the least.
-fn ln_sign(fit: &Fit, positive: &[usize]) -> f64 {
+pub(super) fn ln_sign(fit: &Fit, positive: &[usize]) -> f64 {
     let means: Vec<f64> = positive.iter().map(|&i| fit.means[i]).collect();
     if means.iter().all(|mean| *mean >= 0.0) { 0.0 } else { ln_most(&means, &fit.covariance(positive)) }
 }
@@ -433,7 +433,7 @@ fn is_impossible(
 }
 
 /// All that is free beside a mistake of wiring.
-fn steady_columns() -> Vec<(Column, Course)> {
+pub(super) fn steady_columns() -> Vec<(Column, Course)> {
     let usual = USUAL.iter().map(|(column, course, _)| (*column, *course));
     std::iter::once((Column::LeftSide, Course::Constant))
         .chain(usual.filter(|(_, course)| *course == Course::Constant))
@@ -447,7 +447,7 @@ fn is_asked(state: State<'_>, subset: Subset) -> bool {
 }
 
 /// These leaks on one course.
-fn together(subset: Subset, course: LeakCourse) -> Leaks {
+pub(super) fn together(subset: Subset, course: LeakCourse) -> Leaks {
     subset.map(|there| there.then_some(course))
 }
 

@@ -2,10 +2,11 @@
 
 use super::hypothesis::{LeakCourse, State};
 use super::leak_sample::Weighed;
-use super::pass::Tables;
-use super::posterior::{Posterior, weigh};
-use super::raw_products::Statistic;
+use super::pass::{Pass, Tables};
+use super::posterior::{Posterior, has_enough, weigh};
+use super::raw_products::{RawProducts, Statistic};
 use super::readings::{Mistake, Of};
+use super::scales::with_scales;
 use super::sizes::{mended, sentence};
 use super::table::{Entry, LEAK_SHARE, explanations};
 use crate::report::Status;
@@ -129,10 +130,16 @@ pub struct Decision {
 /// Explains a trace; `None` where there is too little of it. Leaks are uncertain by `doubts_m3s` beside what the trace
 /// leaves open.
 pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told: &Told) -> Option<Decision> {
-    let tables = Tables::new(&rig.decision.odds);
     let mut statistic = Box::new(statistic.clone());
     statistic.close();
-    let Posterior { weighed, residuals } = weigh(&statistic, rig, &tables, doubts_m3s, told)?;
+    if !has_enough(&statistic) {
+        return None;
+    }
+    let products = RawProducts::of(&statistic, rig);
+    let tables = Tables::new(&rig.decision.odds);
+    let mistakes = with_scales(&Pass::new(&statistic, &products, rig, &tables, PerLeak::default(), told));
+    let tables = Tables { mistakes, ..tables };
+    let Posterior { weighed, residuals } = weigh(&statistic, products, rig, &tables, doubts_m3s, told)?;
     let decision = Decision { residuals, ..decide(&weighed, rig) };
     let decision = decision.with_sizes(&tables, told);
     Some(match told.lost_sign() {

@@ -86,34 +86,52 @@ impl Noise {
 
     /// Of readings in another unit; `scale` is that of the best explanation as declared.
     fn measure_unit(&self, rows: f64, scale: f64) -> Measure {
-        let ln_louder = 0.5 * rows * self.louder().ln();
         let scattered = self.own_scatter / self.other;
         Measure {
             rows,
             scattered,
             left: scattered,
-            declared: Some((ln_by_chance(rows, scale, self.scatter / self.other), ln_louder.abs())),
-            ln_noise: ln_louder,
+            declared: Some(self.declared_by_chance(rows, scale)),
+            ln_noise: 0.5 * rows * self.louder().ln(),
             ..Measure::default()
         }
     }
 
-    /// Of any other mistake: it turns noise into other noise, which by chance may be smaller. A clock scales no reading.
-    /// Readings better than their sheet may be so once mended, too.
-    fn measure(&self, rows: f64, scale: f64, is_clock: bool) -> Measure {
+    /// Of another clock: it scales no reading, but over how long its noise is summed.
+    fn measure_clock(&self, rows: f64, scale: f64) -> Measure {
         let unit = self.louder();
-        let sheet = if is_clock { self.own } else { self.other };
         let scattered = self.own_scatter / (self.other * unit);
-        let as_usual = (self.own_scatter / sheet).clamp((self.scatter / self.other).min(1.0), 1.0);
+        Measure {
+            rows,
+            unit,
+            unit_of_sheet: unit * self.other / self.own,
+            scattered,
+            left: scattered,
+            declared: Some(self.declared_by_chance(rows, scale)),
+            ln_noise: 0.0,
+        }
+    }
+
+    /// ln of what the best explanation as declared gained or lost by chance, and the most that is taken back.
+    fn declared_by_chance(&self, rows: f64, scale: f64) -> (f64, f64) {
+        (ln_by_chance(rows, scale, self.scatter / self.other), (0.5 * rows * self.louder().ln()).abs())
+    }
+
+    /// Of any other mistake: it turns noise into other noise, which by chance may be smaller. Readings better than their sheet
+    /// may be so once mended, too.
+    fn measure(&self, rows: f64, scale: f64) -> Measure {
+        let unit = self.louder();
+        let scattered = self.own_scatter / (self.other * unit);
+        let as_usual = (self.own_scatter / self.other).clamp((self.scatter / self.other).min(1.0), 1.0);
         let chance = most_by_chance(rows);
         Measure {
             rows,
             unit,
-            unit_of_sheet: unit * self.other / sheet,
+            unit_of_sheet: unit,
             scattered,
             left: (scale * self.other / self.scatter).min(chance) * scattered,
             declared: None,
-            ln_noise: ln_scale_prior(self.own_scatter / sheet / as_usual)
+            ln_noise: ln_scale_prior(self.own_scatter / self.other / as_usual)
                 - ln_scale_prior((self.scatter / self.other).max(1.0)),
         }
     }
@@ -144,13 +162,13 @@ impl Mended {
         scales: [f64; EQUATIONS],
         scatters: bool,
     ) -> Self {
-        let is_unit = scatters && matches!(mistake, Mistake::Factor(..));
-        let is_clock = matches!(mistake, Mistake::Clock(_));
         let noises = [0, 1].map(|equation| Noise::of(&mended, declared, equation));
         let measure = |equation: usize| {
             let (rows, scale) = (mended.rows[equation], scales[equation]);
-            noises[equation].as_ref().map_or_else(Measure::default, |noise| {
-                if is_unit { noise.measure_unit(rows, scale) } else { noise.measure(rows, scale, is_clock) }
+            noises[equation].as_ref().map_or_else(Measure::default, |noise| match mistake {
+                Mistake::Factor(..) if scatters => noise.measure_unit(rows, scale),
+                Mistake::Clock(_) => noise.measure_clock(rows, scale),
+                _ => noise.measure(rows, scale),
             })
         };
         let measures = [0, 1].map(measure);

@@ -1,6 +1,7 @@
 //! Mistakes of wiring, sign, unit and geometry: the part of the table that no small error is.
 
 use super::readings::{Mistake, Of};
+use super::scales;
 use super::table::{Entry, Kind};
 use crate::units::{Dimension, Unit};
 
@@ -74,7 +75,8 @@ pub(super) fn mistakes() -> Vec<Entry> {
     let others: Vec<Row> = ODD.into_iter().chain(units).chain(clocks).chain(areas).collect();
     let share = OTHERS / others.len() as f64;
     let exchanges = EXCHANGES.into_iter().map(|row| (row, EXCHANGED));
-    exchanges.chain(others.into_iter().map(|row| (row, share))).map(entry).collect()
+    let exact = exchanges.chain(others.into_iter().map(|row| (row, share))).map(entry);
+    exact.chain(scales::entries(share)).collect()
 }
 
 fn entry(((id, mistake, text), share): (Row, f64)) -> Entry {

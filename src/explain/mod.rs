@@ -19,6 +19,7 @@ mod pass;
 mod posterior;
 mod raw_products;
 mod readings;
+mod scales;
 pub(crate) mod scatter;
 mod sensors;
 mod sizes;

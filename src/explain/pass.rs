@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
-use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes};
+use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State};
 use super::mistakes;
 use super::odds::Prior;
 use super::raw_products::{RawProducts, SegmentProducts, Statistic};
@@ -71,6 +71,7 @@ impl<'a, 's> Pass<'a, 's> {
         rig: &'s Rig,
         tables: &'a Tables,
         found_m3s: PerLeak<f64>,
+        told: &Told,
     ) -> Self {
         let flows = [rig.instruments.flow_a, rig.instruments.flow_b];
         let full_scale_m3s = flows[0].full_scale.max(flows[1].full_scale);
@@ -80,7 +81,7 @@ impl<'a, 's> Pass<'a, 's> {
             rig,
             tables,
             found_m3s,
-            told: Told::default(),
+            told: *told,
             doubts_m3s: PerLeak::default(),
             sizes: Sizes {
                 seepage: rig.alarms.threshold_m3s.map(|fault| table::USUAL_SEEPAGE * fault / full_scale_m3s),
@@ -173,6 +174,17 @@ impl<'a, 's> Pass<'a, 's> {
         let mut seen = std::collections::HashSet::new();
         columns.retain(|key| seen.insert(*key));
         columns
+    }
+
+    /// Zeros slightly off beside sensors and rig as declared: what mistakes are weighed beside.
+    pub fn slightly_off(&self) -> Option<State<'a>> {
+        let Tables { zeros, departures, wanders, .. } = self.tables;
+        Some(State {
+            zeros: zeros.get(1)?,
+            departure: departures.first()?,
+            wander: *wanders.first()?,
+            border: 0,
+        })
     }
 
     /// Where a leak or a zero may change at once, and ln of each one's share.

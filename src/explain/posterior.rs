@@ -35,25 +35,26 @@ pub(super) struct Posterior<'a> {
     pub residuals: [Option<f64>; 2],
 }
 
-/// Weighs the whole table; `None` where there is too little to weigh.
+/// Whether there is enough to weigh.
+pub(super) fn has_enough(statistic: &Statistic) -> bool {
+    let rows = |c: usize| statistic.segments().iter().map(|s| s.rows(c)).sum::<f64>();
+    rows(0).max(rows(1)) >= LEAST_ROWS
+}
+
+/// Weighs the whole table; `None` where nothing explains the readings.
 pub(super) fn weigh<'a>(
     statistic: &Statistic,
+    products: RawProducts,
     rig: &Rig,
     tables: &'a Tables,
     doubts_m3s: PerLeak<f64>,
     told: &Told,
 ) -> Option<Posterior<'a>> {
-    let rows: f64 =
-        (0..2).map(|c| statistic.segments().iter().map(|s| s.rows(c)).sum::<f64>()).fold(0.0, f64::max);
-    if rows < LEAST_ROWS {
-        return None;
-    }
-    let products = RawProducts::of(statistic, rig);
-    let pass = Pass::new(statistic, &products, rig, tables, PerLeak::default());
-    let (first, inflation) = look(&Pass { told: *told, ..pass });
+    let pass = Pass::new(statistic, &products, rig, tables, PerLeak::default(), told);
+    let (first, inflation) = look(&pass);
     let found_m3s = PerLeak::from_fn(|leak| mean_level(&first, leak as usize));
     let products = products.worth(inflation);
-    let last = Pass { doubts_m3s, told: *told, ..Pass::new(statistic, &products, rig, tables, found_m3s) };
+    let last = Pass { doubts_m3s, ..Pass::new(statistic, &products, rig, tables, found_m3s, told) };
     let declared = last.equations(last.products, None, &last.columns());
     let posterior = weigh_all(&last, &declared, LEAST_LN);
     (!posterior.weighed.is_empty()).then_some(posterior)

@@ -131,7 +131,7 @@ impl Entry {
         self
     }
 
-    fn alike(mut self, alike: &'static [&'static str]) -> Self {
+    pub(super) fn alike(mut self, alike: &'static [&'static str]) -> Self {
         self.alike = alike;
         self
     }

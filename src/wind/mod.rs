@@ -82,11 +82,24 @@ pub struct Emulation {
 }
 
 /// Why a history cannot be brought onto a rig.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum EmulationError {
-    /// The mechanism does not reach the rig's positions, or has no lever arm on the way.
+    /// The mechanism has no lever arm on the way.
     #[error(transparent)]
     Linkage(#[from] LinkageError),
+    /// The mechanism does not reach the rig's positions.
+    #[error(
+        "a stroke of {} mm times the position scale of {} is more than the pitch mechanism of the turbine reaches: take a \
+         smaller position scale",
+        1e3 * stroke_m,
+        position_scale
+    )]
+    Stroke {
+        /// The rig's stroke, m.
+        stroke_m: f64,
+        /// By which positions of the turbine are divided.
+        position_scale: f64,
+    },
     /// A scale factor, the inertia or the guard is out of range.
     #[error("{0} must be positive and finite")]
     Setting(&'static str),
@@ -124,7 +137,9 @@ impl Emulation {
     pub fn reference(&self, history: &History, stroke_m: f64) -> Result<Reference, EmulationError> {
         self.check()?;
         let lowest = self.linkage.pitch_rad(self.guard_m * self.position_scale)?;
-        let highest = self.linkage.pitch_rad((stroke_m - self.guard_m) * self.position_scale)?;
+        let position_scale = self.position_scale;
+        let highest = (self.linkage.pitch_rad((stroke_m - self.guard_m) * position_scale))
+            .map_err(|_| EmulationError::Stroke { stroke_m, position_scale })?;
         let reach = lowest..=highest;
         let acceleration = second_derivative(&history.pitch_rad, history.step_s());
         let mut position_m = Vec::with_capacity(history.t_s.len());

@@ -24,6 +24,8 @@ pub enum Failure {
         /// All.
         traces: usize,
     },
+    /// Lines came, and none was a sample.
+    NoSample(u64),
     /// A file that is of one trace.
     OneTraceOnly {
         /// The flag that names the file.
@@ -60,6 +62,7 @@ impl fmt::Display for Failure {
             Self::NotJudged { errors, traces } => {
                 write!(f, "{errors} of {traces} traces could not be judged")
             }
+            Self::NoSample(lines) => write!(f, "none of {lines} lines is a sample: the notices say why"),
             Self::OneTraceOnly { flag, traces } => write!(f, "{flag} is of one trace: {traces} are given"),
             Self::RigIsThere(path) => {
                 let path = path.display();

@@ -78,7 +78,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if let Some(checkpoint) = &checkpoint {
         checkpoint.save(&Snapshot::of(&mut watch))?;
     }
-    outcome.map(|()| Outcome::Done)
+    outcome?;
+    let left_out: u64 = watch.left_out().values().sum();
+    if watch.cylinders() == 0 && left_out > 0 { Err(Failure::NoSample(left_out)) } else { Ok(Outcome::Done) }
 }
 
 fn serve(

@@ -9,7 +9,7 @@ const ROWS: &str = "t_s,x_mm,pa_bar,pb_bar,qa_lpm,qb_lpm\n0.00,100,50,40,1,-1\n0
 const HALF: &str = "[cylinder]\narea_a = \"12.6 cm^2\"\n";
 
 /// Arguments, apart by `|`, and what the line says.
-const MISTAKES: [(&str, &str); 50] = [
+const MISTAKES: [(&str, &str); 51] = [
     ("repaly|a.csv", "a similar subcommand exists: 'replay'"),
     ("replay", "usage: pitchleak replay <TRACE>..."),
     ("replay|none.csv", "none.csv: No such file"),
@@ -46,6 +46,7 @@ const MISTAKES: [(&str, &str); 50] = [
     ("simulate|--wind|13|--duration|0 s|--out|x.csv", "must lie between"),
     ("simulate|--wind|13|--sample-rate|0|--out|x.csv", "must lie between"),
     ("simulate|--wind|13|--seed|abc|--out|x.csv", "'--seed <N>'"),
+    ("simulate|--wind|13|--position-scale|10|--out|x.csv", "take a smaller position scale"),
     ("simulate|--position|500 mm|--load|1 kN|--out|x.csv", "beyond the cylinder's stroke (0 to 200 mm)"),
     ("simulate|--position|100 mm|--wind|13|--out|x.csv", "cannot be used with '--wind"),
     ("simulate|--position|100 mm|--out|x.csv", "--load <F|FILE>"),

@@ -390,3 +390,20 @@ fn the_command_of_telegraf_speaks_its_protocol() {
     assert!(estimates[0].ends_with(" 1700000001000000000"), "{}", estimates[0]);
     assert!(output.contains("pitchleak_alarm,cylinder=T7\\ B2,fault=internal id=\"T7 B2:internal:raised:17"));
 }
+
+#[test]
+fn lines_of_which_none_is_a_sample_are_no_success() {
+    for lines in ["hello\nworld\n", "{\"a\": 1}\n", "t_s,speed\n0,1\n"] {
+        let mut child = watch(&[], None)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        child.stdin.take().unwrap().write_all(lines.as_bytes()).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{lines}");
+        assert!(said.starts_with("error: none of ") && said.lines().count() == 1, "{lines}: {said}");
+    }
+}

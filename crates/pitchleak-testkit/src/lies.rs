@@ -186,8 +186,8 @@ pub const LIES: &[Lie] = &[
     mistake("pa clipped", &["pa clipped 40 bar"], "channel_clipped", "pa reads"),
     mistake("qa held", &["qa held 500 ms"], "channel_held", "qa repeats"),
     mistake("x held", &["x held 500 ms"], "channel_held", "x repeats"),
-    mistake("qa 20 % gain", &["qa gain 20 %"], "explanation", "flow_gain_a"),
-    mistake("qb 20 % gain", &["qb gain 20 %"], "explanation", "flow_gain_b"),
+    mistake("qa 20 % gain", &["qa gain 20 %"], "wiring", "qa divided by"),
+    mistake("qb 20 % gain", &["qb gain 20 %"], "wiring", "qb divided by"),
     mistake("pa 10 bar zero", &["pa offset 10 bar"], "explanation", "pressure_zero"),
     mistake("pb 10 bar zero", &["pb offset 10 bar"], "explanation", "pressure_zero"),
 ];

@@ -96,6 +96,7 @@ const EXPLANATIONS: [(&str, &str); 5] = [
         "wiring",
         "exchanged_flows exchanged_pressures exchanged_chambers exchanged_turned_flows sign_qa sign_qb sign_flows \
          lost_sign_qa lost_sign_qb lost_sign_flows other_end absolute_pressures absolute_pa absolute_pb \
-         areas_exchanged unit_flows unit_qa unit_qb unit_pressures unit_pa unit_pb unit_x unit_t unit_area_a unit_area_b",
+         areas_exchanged unit_flows unit_qa unit_qb unit_pressures unit_pa unit_pb unit_x unit_t unit_area_a unit_area_b \
+         scale_qa scale_qb scale_flows scale_x scale_t",
     ),
 ];
