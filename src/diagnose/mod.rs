@@ -54,6 +54,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let excited = assess::is_excited(&plain);
     let miswired = data::miswired(&train, &declared);
     let beyond_effects = miswired.as_ref().is_some_and(|found| found.is_beyond_effects);
+    let tested = data::miswired(&test, &declared).filter(|found| found.is_beyond_effects);
     let changing = OnceCell::new();
     let selection = if excited && !beyond_effects {
         let with_changes = || {
@@ -71,7 +72,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let judgement = assess::judge(&selection, assess::failures(&checks, &faults), [&before, &after]);
     let found = assess::found(&selection, &judgement);
     let verdict = match assess::verdict(&judgement, &found, &after.leaks) {
-        _ if beyond_effects => Verdict::Unexplained,
+        _ if beyond_effects || tested.is_some() => Verdict::Unexplained,
         _ if !excited => Verdict::InsufficientExcitation,
         verdict => verdict,
     };
@@ -86,7 +87,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
         calibration: assess::calibration(fit),
         not_detectable_below: if excited { assess::detection_limits(fit) } else { BTreeMap::new() },
         verdict,
-        wiring: wiring.map(|found| found.wiring),
+        wiring: wiring.map(|found| found.wiring).or(tested.map(data::Miswired::of_test)),
         notes: assess::notes(
             &selection,
             judgement.complaints,

@@ -58,15 +58,12 @@ pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
     let moment = |power: i32| weighed.iter().map(|one| one.weight * one.kappa.powi(power)).sum::<f64>();
     let (mean, square) = (moment(1), moment(2));
     let kappa = Estimate { value: mean, std: (square - mean * mean).max(0.0).sqrt() };
-    let off = |place: &&Place| (place.kappa - mean).abs();
-    let middle = places.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|place| place.likelihood);
-    let information = middle.map_or_else(Matrix3::zeros, |middle| middle.information);
+    let information = beside_oil(places, kappa);
     Beliefs {
         leaks: PerLeak::from_fn(|leak| {
             let own = leak as usize;
-            let alone = 1.0 / (information[(own, own)] + SIZE.powi(-2)).sqrt();
-            let smallest = alone * detected_sigmas(alone, sure);
-            Belief { smallest: smallest * LEAK_UNIT_M3SPA, ..spread(&weighed, own) }
+            let smallest = smallest(&information, own, sure) * LEAK_UNIT_M3SPA;
+            Belief { smallest, ..spread(&weighed, own) }
         }),
         any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
         kappa,
@@ -211,12 +208,59 @@ fn spread(sets: &[Weighed], own: usize) -> Belief {
     }
 }
 
-/// How many of its standard deviations a single leak must have to be believed with the probability `sure`: its odds are
-/// those before times the evidence s/(1 − s) · 2σ/τ · e^(z²/2), of which the tail below zero is left out.
-fn detected_sigmas(std: f64, sure: f64) -> f64 {
-    let wanted = (sure / (1.0 - sure) * (1.0 - LEAK_SHARE) / LEAK_SHARE).ln();
-    let occam = (2.0 * std / SIZE).ln();
-    (2.0 * (wanted - occam)).max(1.0).sqrt()
+/// Information on the leaks where κ is known no better than this: C moves with it by dC/dκ.
+fn beside_oil(places: &[Place], kappa: Estimate<f64>) -> Matrix3<f64> {
+    let off = |at: &usize| (places[*at].kappa - kappa.value).abs();
+    let Some(middle) = (0..places.len()).min_by(|a, b| off(a).total_cmp(&off(b))) else {
+        return Matrix3::zeros();
+    };
+    let information = places[middle].likelihood.information;
+    let (below, above) = (&places[middle.saturating_sub(1)], &places[(middle + 1).min(places.len() - 1)]);
+    let step = above.kappa - below.kappa;
+    if step <= 0.0 {
+        return information;
+    }
+    // (I⁻¹ + v vᵀ)⁻¹ of what κ makes of C, v: Sherman and Morrison (1950).
+    let moved = (above.likelihood.leaks - below.likelihood.leaks) * (kappa.std / step);
+    let told = information * moved;
+    information - told * told.transpose() / (1.0 + moved.dot(&told))
+}
+
+/// The smallest single leak that would be believed with the probability `sure`: its set against each of the sets without it that
+/// take over some of what it does, and let no oil in for that.
+fn smallest(information: &Matrix3<f64>, own: usize, sure: f64) -> f64 {
+    let others: Vec<usize> = (0..3).filter(|leak| *leak != own).collect();
+    let rivals = [vec![], vec![others[0]], vec![others[1]], others];
+    let single = ln_volume(information, &[own]);
+    let wanted = |rival: &Vec<usize>| {
+        let ln_odds = (sure / (1.0 - sure)).ln() + ln_volume(information, rival) - single;
+        let left = left_by(information, own, rival)?;
+        Some((2.0 * ln_odds).max(0.0) / left.max(f64::MIN_POSITIVE))
+    };
+    rivals.iter().filter_map(wanted).fold(0.0, f64::max).sqrt()
+}
+
+/// ln of the share of a set of leaks and of Occam's factor of their sizes.
+fn ln_volume(information: &Matrix3<f64>, set: &[usize]) -> f64 {
+    let count = set.len() as f64;
+    let ln_det = part(information, set, set).determinant().ln();
+    count * (LEAK_SHARE / (1.0 - LEAK_SHARE) * 2.0 / SIZE).ln() - 0.5 * ln_det
+}
+
+/// Information on a leak that those of a set do not take over; none where they would have to be negative.
+fn left_by(information: &Matrix3<f64>, own: usize, set: &[usize]) -> Option<f64> {
+    let across = part(information, set, &[own]);
+    let taken = part(information, set, set).cholesky()?.solve(&across);
+    let is_possible = taken.iter().all(|share| *share >= 0.0);
+    is_possible.then(|| information[(own, own)] - across.dot(&taken))
+}
+
+/// Rows and columns of the information, with what is believed before of each size.
+fn part(information: &Matrix3<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+        let (i, j) = (rows[i], columns[j]);
+        information[(i, j)] + if i == j { SIZE.powi(-2) } else { 0.0 }
+    })
 }
 
 /// Standard deviation of the half normal size that a leak has before any reading, m³/(s·Pa).

@@ -128,6 +128,19 @@ fn a_mistake_of_wiring_is_named_before_any_effect() {
     );
 }
 
+/// A fit is not judged by traces whose columns are exchanged.
+#[test]
+fn a_mistake_of_wiring_in_the_traces_it_is_judged_on_is_told() {
+    let folder = folder(0.0);
+    let exchanged = HEADER.replace("qa_m3s,qb_m3s", "qb_m3s,qa_m3s");
+    assert_ne!(exchanged, HEADER);
+    fs::write(folder.path().join("test.csv"), trace(0.0).replace(HEADER, &exchanged)).unwrap();
+    let found = json(&pitchleak(&folder, &["diagnose", "trace.csv", "--test", "test.csv", "--json"]));
+    assert_eq!(found["verdict"], "unexplained");
+    let told = found["wiring"]["suggestion"].as_str().unwrap();
+    assert!(told.contains("only judged on") && told.contains("qa and qb exchanged"), "{told}");
+}
+
 #[test]
 fn bad_input_is_one_clear_line() {
     let folder = folder(0.0);

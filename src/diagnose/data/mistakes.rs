@@ -3,7 +3,7 @@
 use super::declared::Declared;
 use super::series::Series;
 use crate::channels::{ChannelFault, ChannelFaultKind};
-use crate::explain::{Mistake, Statistic, explain};
+use crate::explain::{Statistic, explain};
 use crate::signal::Signal;
 use crate::told::Beside;
 use crate::wiring::Wiring;
@@ -38,8 +38,16 @@ fn is_no_flow(series: &Series, fault: &ChannelFault) -> bool {
 /// A mistake that explains the traces.
 pub(crate) struct Miswired {
     pub(crate) wiring: Wiring,
-    /// No effect could do the same: not so for a pressure's zero, which sensors have too.
+    /// No effect could do the same: not so for a pressure's zero or a meter's gain, which sensors have too.
     pub(crate) is_beyond_effects: bool,
+}
+
+impl Miswired {
+    /// Told of traces that are only judged on.
+    pub(crate) fn of_test(self) -> Wiring {
+        let suggestion = format!("of the traces that are only judged on: {}", self.wiring.suggestion);
+        Wiring { suggestion, ..self.wiring }
+    }
 }
 
 /// The mistake that explains all of the traces together. None is looked for beside effects that the rig file declares:
@@ -57,13 +65,16 @@ pub(crate) fn miswired(traces: &[Series], declared: &Declared) -> Option<Miswire
     }
     let decision = explain(&statistic, &rig, PerLeak::default(), &evidence.told(&rig))?;
     let columns = traces.first().map(|series| series.columns.clone()).unwrap_or_default();
-    let is_absolute = |mistake: Mistake| matches!(mistake, Mistake::Absolute(_));
-    let first = decision.explanations.iter().find_map(|one| one.mistake);
+    let first = decision.explanations.iter().find(|one| one.mistake.is_some())?;
     Some(Miswired {
         wiring: Wiring::of(&decision, &columns, &rig)?,
-        is_beyond_effects: !first.is_some_and(is_absolute),
+        is_beyond_effects: !first.id.split('+').any(|part| OF_SENSORS.contains(&part)),
     })
 }
+
+/// Mistakes that are an effect of one sensor: its zero, its gain.
+const OF_SENSORS: [&str; 7] =
+    ["absolute_pressures", "absolute_pa", "absolute_pb", "scale_qa", "scale_qb", "scale_flows", "scale_x"];
 
 #[cfg(test)]
 mod tests {

@@ -13,7 +13,7 @@ mod traces;
 pub(crate) use channel::Channel;
 pub use declared::Declared;
 pub(crate) use declared::thinned;
-pub(crate) use mistakes::{channel_faults, miswired};
+pub(crate) use mistakes::{Miswired, channel_faults, miswired};
 pub(crate) use motion::Motion;
 pub(crate) use noise::{SensorCheck, Unresolved, check_sensors, effective, white};
 pub use series::Series;
