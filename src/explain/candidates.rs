@@ -21,8 +21,8 @@ const MOST_GAIN: f64 = 0.15;
 /// ln of what columns gain at the noise of the explanation without them, from which on they speak for a mistake: more they
 /// would gain by less noise. Chosen.
 const MUCH: f64 = 30.0;
-/// Standard deviation of a gain that may be any.
-const ANY_GAIN: f64 = 100.0;
+/// Standard deviation of a share that may be any.
+const ANY: f64 = 100.0;
 /// Compressibility beyond the declared one, as its share: no oil is four times as stiff as its sheet says, and with six times its
 /// compressibility it is foam. Chosen.
 const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -0.75..=5.0;
@@ -272,13 +272,18 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let tables = self.pass.tables;
         let Some(state) = self.pass.slightly_off() else { return Vec::new() };
         let least = self.least();
-        let best = self.all.iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
-        let scales = best.map_or([1.0; 2], |best| best.scales);
-        let plain = |one: &&Scored<'_>| one.hypothesis.state.departure == state.departure;
-        let best_plain =
-            self.all.iter().filter(plain).max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
+        let best_of = |is: &dyn Fn(&Scored<'a>) -> bool| {
+            let all = self.all.iter().enumerate().filter(|(_, one)| is(one));
+            all.max_by(|a, b| a.1.ln_posterior.total_cmp(&b.1.ln_posterior)).map(|(at, _)| at)
+        };
+        // A departure may have taken up already what a mistake's columns gain.
+        let mut best =
+            vec![best_of(&|_| true), best_of(&|one| one.hypothesis.state.departure == state.departure)];
+        best.dedup();
+        let best: Vec<&Scored<'_>> = best.into_iter().flatten().map(|at| &self.all[at]).collect();
+        let scales = best.first().map_or([1.0; 2], |best| best.scales);
         let mut bounds: Vec<Bound<'_>> =
-            [best, best_plain].into_iter().filter_map(|best| Bound::of(best, self.declared)).collect();
+            best.into_iter().filter_map(|best| Bound::of(best, self.declared)).collect();
         let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
@@ -323,7 +328,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
 /// is not off is noise, of which no data sheet is so exact.
 struct Bound<'e> {
     declared: &'e NormalEquations,
-    /// Of the likeliest explanation of the readings as declared.
+    /// Of the likeliest explanation of the readings as declared, or the likeliest without a departure.
     free: Vec<Free>,
     scales: [f64; 2],
     ln_posterior: f64,
@@ -334,8 +339,10 @@ struct Bound<'e> {
 
 impl<'e> Bound<'e> {
     /// None where the readings as declared have no explanation.
-    fn of(best: Option<&Scored<'_>>, declared: &'e NormalEquations) -> Option<Self> {
-        let best = best.filter(|best| best.ln_posterior.is_finite())?;
+    fn of(best: &Scored<'_>, declared: &'e NormalEquations) -> Option<Self> {
+        if !best.ln_posterior.is_finite() {
+            return None;
+        }
         let (free, scales) = (best.hypothesis.free.clone(), best.scales);
         let (chi_square, _) = at_scales(declared, &free, scales);
         let (ln_posterior, gained) = (best.ln_posterior, HashMap::new());
@@ -361,11 +368,20 @@ impl<'e> Bound<'e> {
     fn gain(&self, columns: &[Column]) -> f64 {
         let mut free = self.free.clone();
         for place in columns.iter().filter_map(|column| self.declared.place(*column, Course::Constant)) {
-            free.retain(|known| known.column != place);
-            free.push(Free { column: place, std: ANY_GAIN });
+            set_free(&mut free, place);
         }
         0.5 * (self.chi_square - at_scales(self.declared, &free, self.scales).0)
     }
+}
+
+/// Lets a column be any share of itself, in its own place where it was free before; gives that.
+pub(super) fn set_free(free: &mut Vec<Free>, column: usize) -> usize {
+    let at = free.iter().position(|known| known.column == column).unwrap_or_else(|| {
+        free.push(Free { column, std: ANY });
+        free.len() - 1
+    });
+    free[at].std = ANY;
+    at
 }
 
 /// A mistake of wiring as it is weighed.

@@ -5,10 +5,10 @@
 //! that are always free cover [`USUAL_GAIN`] of it, so the one factor that fits has that share of the range: Occam's factor of
 //! a uniform prior (MacKay 2003, Information Theory, Inference, and Learning Algorithms, §28.1).
 
-use super::candidates::{ln_sign, steady_columns, together};
+use super::candidates::{ln_sign, set_free, steady_columns, together};
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Free, fit};
+use super::evidence::fit;
 use super::hypothesis::{Hypothesis, LeakCourse, subsets};
 use super::mended::Mended;
 use super::pass::Pass;
@@ -23,11 +23,9 @@ const MOST: f64 = 10.0;
 /// Nearer to 1, ln, it is a gain, of which the table's largest is half as large. Chosen.
 const LEAST_LN: f64 = 0.1;
 /// How often it is looked for again in readings mended by it, where its own noise does no harm; numerical.
-const REFINED: usize = 3;
+const REFINED: usize = 2;
 /// Half a unit of the last of so many digits is less than a gain that is always free.
 const DIGITS: usize = 3;
-/// Standard deviation of a share that may be any.
-const ANY: f64 = 100.0;
 
 /// An entry, whose scale it is, and how it is told.
 const SCALES: [(&str, Scaled, &str); 5] = [
@@ -104,25 +102,25 @@ pub(super) fn with_scales(pass: &Pass<'_, '_>) -> Vec<Entry> {
     let scatters = pass.over_sheet.all_scatter();
     let occam = USUAL_GAIN * TAU.sqrt() / (2.0 * MOST.ln());
     let mut mistakes = pass.tables.mistakes.clone();
-    for (id, scaled, _) in SCALES {
-        for entry in mistakes.iter_mut().filter(|entry| entry.id == id) {
-            entry.share *= occam;
-            let mut factor = scaled.factor_by(pass, &declared);
-            for _ in 0..REFINED {
-                entry.mistake = factor.filter(is_scale).map(|factor| scaled.mistake(rounded(factor, DIGITS)));
-                let left = entry.mistake.and_then(|mistake| {
-                    let equations = pass.equations(&whole, Some(entry), &columns);
-                    let mended = Mended::new(equations, &declared, mistake, [1.0; EQUATIONS], scatters);
-                    scaled.factor_by(pass, &mended.equations)
-                });
-                factor = factor.zip(left).map(|(factor, left)| factor * left);
-            }
+    for entry in &mut mistakes {
+        let Some((_, scaled, _)) = SCALES.into_iter().find(|(id, ..)| *id == entry.id) else { continue };
+        let mistake = |factor: f64| is_scale(factor).then(|| scaled.mistake(rounded(factor, DIGITS)));
+        entry.share *= occam;
+        let mut factor = scaled.factor_by(pass, &declared);
+        entry.mistake = factor.and_then(mistake);
+        for _ in 0..REFINED {
+            let Some(found) = entry.mistake else { break };
+            let equations = pass.equations(&whole, Some(entry), &columns);
+            let mended = Mended::new(equations, &declared, found, [1.0; EQUATIONS], scatters);
+            let left = scaled.factor_by(pass, &mended.equations);
+            factor = factor.zip(left).map(|(factor, left)| factor * left);
+            entry.mistake = factor.and_then(mistake);
         }
     }
     mistakes
 }
 
-fn is_scale(factor: &f64) -> bool {
+fn is_scale(factor: f64) -> bool {
     factor.is_finite() && (LEAST_LN..MOST.ln()).contains(&factor.ln().abs())
 }
 
@@ -133,10 +131,7 @@ fn share(pass: &Pass<'_, '_>, equations: &NormalEquations, column: Column) -> Op
     let fits = subsets().map(|subset| {
         let leaks = together(subset, LeakCourse::Constant);
         let mut own = Hypothesis::new(equations, &pass.sizes, pass.segments, state, leaks, 0.0);
-        let known = own.free.iter().position(|free| free.column == place);
-        let at = known.unwrap_or(own.free.len());
-        own.free.resize(own.free.len().max(at + 1), Free { column: place, std: ANY });
-        own.free[at].std = ANY;
+        let at = set_free(&mut own.free, place);
         let fit = fit(equations, &own.free);
         (fit.ln_evidence + own.ln_prior + ln_sign(&fit, &own.positive), fit.means[at])
     });

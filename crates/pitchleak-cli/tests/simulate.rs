@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use pitchleak_testkit::rig::with_valve;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
@@ -202,26 +203,8 @@ fn bad_usage_is_one_clear_message() {
 fn in_calm_wind_a_valve_tells_no_oil() {
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("rig.toml");
-    let text = r#"
-        [cylinder]
-        area_a = "12.6 cm^2"
-        area_b = "9.4 cm^2"
-        stroke = "200 mm"
-        moving_mass = "20 kg"
-        dead_volume_a = "50 mL"
-        dead_volume_b = "50 mL"
-        [fluid]
-        bulk_modulus = "0.8 GPa"
-        bulk_modulus_std = "0.2 GPa"
-        [sensors]
-        pressure = { full_scale = "160 bar", accuracy = "0.3 %" }
-        position = { full_scale = "200 mm", accuracy = "0.3 %" }
-        spool = { accuracy = "0.3 %" }
-        [valve]
-        rated_flow = "4 L/min"
-        rated_drop = "35 bar"
-        supply = "100 bar"
-    "#;
+    // The paper's mass, and a tank without pressure.
+    let text = with_valve("supply = \"100 bar\"").replace("60 kg", "20 kg").replace("tank = \"2 bar\"\n", "");
     std::fs::write(&rig, text).unwrap();
     let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
     for seed in ["1", "2", "3"] {
