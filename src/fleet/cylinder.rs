@@ -248,6 +248,7 @@ mod tests {
             let ci95 = Some([mean_lpm - 0.01, mean_lpm + 0.01]);
             FleetLeak {
                 mean_lpm,
+                comes_and_goes: false,
                 std_lpm: Some(0.0051),
                 ci95,
                 threshold_lpm: 0.1,

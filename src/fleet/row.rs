@@ -4,7 +4,7 @@ use super::{FleetTrace, TraceIdentity};
 use crate::Rig;
 use crate::explain::Explained;
 use crate::replay::{ReplayError, replay};
-use crate::report::{LeakTrend, ReplayReport, Status};
+use crate::report::{LeakTrend, ReplayReport, Status, with_interval};
 use crate::trace::TraceReader;
 use crate::units::LPM_PER_M3S;
 use jiff::Timestamp;
@@ -70,12 +70,15 @@ pub struct FleetExplanation {
 /// One leak of a cylinder.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FleetLeak {
-    /// Mean size of its flow, L/min.
+    /// Mean size of its flow, L/min; of a leak that comes and goes, while it was last there.
     pub mean_lpm: f64,
-    /// Standard deviation of its error, L/min; none where the estimator gives none.
+    /// Standard deviation of its error, L/min; none where the estimator gives none, and of a leak that comes and goes.
     pub std_lpm: Option<f64>,
     /// The interval that holds the flow with 95 % probability, L/min.
     pub ci95: Option<[f64; 2]>,
+    /// It is a leak to act on, and away at the trace's end.
+    #[serde(default)]
+    pub comes_and_goes: bool,
     /// The alarm's threshold, L/min.
     pub threshold_lpm: f64,
     /// Whether the trace pins it down.
@@ -168,14 +171,24 @@ impl FleetExplanation {
 impl FleetLeak {
     fn of(report: &ReplayReport, rig: &Rig, leak: Leak) -> Self {
         let flow = report.leakage[leak];
+        let last = report.episodes.iter().rev().find(|episode| episode.fault == leak);
+        let away = last.filter(|last| last.to_s.is_some() && report.verdict.faults.contains(&leak));
+        let std_lpm = flow.std_lpm.filter(|_| away.is_none());
         Self {
-            mean_lpm: flow.mean_lpm,
-            std_lpm: flow.std_lpm,
-            ci95: flow.std_lpm.map(|std| Estimate { value: flow.mean_lpm, std }.ci95()),
+            mean_lpm: away.map_or(flow.mean_lpm, |last| last.mean_lpm),
+            std_lpm,
+            ci95: std_lpm.map(|_| flow.ci95()),
+            comes_and_goes: away.is_some(),
             threshold_lpm: rig.alarms.threshold_m3s[leak] * LPM_PER_M3S,
             identifiable: report.estimates.leaks()[leak].identifiable,
             trend: report.trend[leak],
         }
+    }
+
+    /// Its flow with its interval, for people.
+    pub fn flow_text(&self) -> String {
+        let flow = with_interval(self.mean_lpm, self.std_lpm);
+        if self.comes_and_goes { format!("comes and goes, {flow}") } else { flow }
     }
 }
 

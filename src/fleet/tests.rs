@@ -3,7 +3,7 @@ use crate::Rig;
 use crate::output::Inputs;
 use crate::replay::{ReplayError, replay};
 use crate::trace::TraceReader;
-use pitchleak_core::PerLeak;
+use pitchleak_core::{Leak, PerLeak};
 use pitchleak_testkit::Motion;
 use pitchleak_testkit::rig::PAPER;
 use pitchleak_testkit::trace_text::file;
@@ -56,6 +56,29 @@ fn a_row_says_what_a_replay_says() {
     assert_eq!(names, ["B1", "B1", "B2", "B2"]);
     let counts = FleetReport::of(&rows).counts;
     assert_eq!(counts, Counts { leak: 2, sound: 1, error: 1, ..Counts::default() });
+}
+
+/// What a day tells of such a leak is neither its flow at the trace's end nor the mean with the time that it was away.
+#[test]
+fn a_leak_that_comes_and_goes_is_as_large_as_while_it_was_there() {
+    let farm = farm();
+    let path = farm.path().join("T7/B1/2026-05-01.csv");
+    let rows_with = |internal| {
+        let motion = Motion::sines(PerLeak { internal, external_a: 0.0, external_b: 0.0 });
+        motion.rows(9000)
+    };
+    let (leaking, sound) = (rows_with(1.2e-11), rows_with(0.0));
+    let is_there = |k: usize| (k / 1000) % 3 == 1;
+    let mixed = (0..sound.len()).map(|k| if is_there(k) { leaking[k].clone() } else { sound[k].clone() });
+    fs::write(&path, file(&mixed.collect::<Vec<_>>())).unwrap();
+    let rows = rows(&FleetTrace::find(&pattern(&farm, "T7/B1/*.csv"), &FleetRig::Beside).unwrap());
+    let [mixed, always] = &rows[..] else { panic!("{rows:?}") };
+    let [there, steady] = [mixed, always].map(|row| row.leaks.unwrap().internal);
+    assert_eq!((mixed.status, &mixed.faults[..]), (Some(crate::report::Status::Leak), &[Leak::Internal][..]));
+    assert!(there.comes_and_goes && !steady.comes_and_goes);
+    assert!((there.mean_lpm - steady.mean_lpm).abs() < 0.15 * steady.mean_lpm, "{there:?} {steady:?}");
+    assert_eq!((there.std_lpm, there.ci95), (None, None));
+    assert!(there.flow_text().starts_with("comes and goes, 1."));
 }
 
 #[test]

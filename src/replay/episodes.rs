@@ -29,10 +29,16 @@ impl Open {
 }
 
 impl Episodes {
-    /// Takes the leak flows, m³/s, as estimated at `t_s`, `elapsed_s` of watched time after those before, and which alarms
-    /// stand.
-    pub fn add(&mut self, t_s: f64, elapsed_s: f64, flows_m3s: PerLeak<f64>, active: &PerLeak<bool>) {
-        for (fault, flow_m3s) in flows_m3s {
+    /// Takes the leak flows as estimated at `t_s`, `elapsed_s` of watched time after those before, each with the one below
+    /// which the leak is gone (an alarm stands until that is sure), m³/s, and which alarms stand.
+    pub fn add(
+        &mut self,
+        t_s: f64,
+        elapsed_s: f64,
+        flows_m3s: PerLeak<(f64, f64)>,
+        active: &PerLeak<bool>,
+    ) {
+        for (fault, (flow_m3s, gone_m3s)) in flows_m3s {
             let open = &mut self.open[fault];
             if !active[fault] {
                 self.ended.extend(open.take().map(|open| open.episode(fault, Some(t_s))));
@@ -41,8 +47,10 @@ impl Episodes {
             let flow_lpm = flow_m3s * LPM_PER_M3S;
             let begun = Open { from_s: t_s, time_s: 0.0, leaked_lpm_s: 0.0, peak_lpm: flow_lpm };
             let open = open.get_or_insert(begun);
-            open.time_s += elapsed_s;
-            open.leaked_lpm_s += flow_lpm.max(0.0) * elapsed_s;
+            if flow_m3s >= gone_m3s {
+                open.time_s += elapsed_s;
+                open.leaked_lpm_s += flow_lpm * elapsed_s;
+            }
             open.peak_lpm = open.peak_lpm.max(flow_lpm);
         }
     }
@@ -67,14 +75,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_leak_lets_oil_in() {
+    fn what_was_estimated_until_the_alarm_was_cleared_makes_no_leak_smaller() {
         let mut episodes = Episodes::default();
         let active = PerLeak { internal: true, ..PerLeak::default() };
-        for (t_s, lpm) in [(1.0, 0.4), (2.0, -4.0)] {
-            let flows_m3s = PerLeak { internal: lpm / LPM_PER_M3S, ..PerLeak::default() };
-            episodes.add(t_s, 1.0, flows_m3s, &active);
+        for (t_s, lpm) in [(1.0, 0.4), (2.0, 0.2), (3.0, 0.04), (4.0, -4.0)] {
+            let flow = (lpm / LPM_PER_M3S, 0.05 / LPM_PER_M3S);
+            episodes.add(t_s, 1.0, PerLeak { internal: flow, ..PerLeak::default() }, &active);
         }
-        assert!((episodes.list()[0].mean_lpm - 0.2).abs() < 1e-12);
+        assert!((episodes.list()[0].mean_lpm - 0.3).abs() < 1e-12);
     }
 
     #[test]

@@ -254,7 +254,10 @@ impl Replay {
         for (fault, change) in self.detector.update(elapsed_s, &flows) {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
-        self.episodes.add(t_s, elapsed_s, flows.map(|flow| flow.value), &self.detector.active());
+        let alarms = &self.rig.alarms;
+        let gone_m3s = alarms.threshold_m3s.map(|threshold| alarms.clear_share * threshold);
+        let there = flows.map(|flow| flow.value).zip(gone_m3s);
+        self.episodes.add(t_s, elapsed_s, there, &self.detector.active());
     }
 
     /// Leak flows as they are held against their alarms, m³/s: means over the estimator's memory; of the paper's law, which

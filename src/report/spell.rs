@@ -15,7 +15,7 @@ pub struct Spell {
     pub times: usize,
     /// How long an alarm stood, all of them together, s.
     pub stood_s: f64,
-    /// Mean of the estimates while one stood, none below zero, L/min.
+    /// Mean of the estimates while one stood and the leak was not below the level at which it clears, L/min.
     pub mean_lpm: f64,
     /// Largest of them, L/min.
     pub peak_lpm: f64,
@@ -85,7 +85,7 @@ pub struct Episode {
     pub from_s: f64,
     /// When it was cleared, s; none where it stands at the end.
     pub to_s: Option<f64>,
-    /// Mean of the estimates meanwhile, none below zero, L/min.
+    /// Mean of the estimates meanwhile that are not below the level at which it clears, L/min.
     pub mean_lpm: f64,
     /// Largest of them, L/min.
     pub peak_lpm: f64,

@@ -35,11 +35,13 @@ class FleetLeak:
     """One leak of one cylinder in one trace."""
 
     mean_lpm: float | None
-    """Mean size of its flow, L/min."""
+    """Mean size of its flow, L/min; of a leak that comes and goes, while it was last there."""
     std_lpm: float | None
-    """Standard deviation of its error, L/min; None where the estimator gives none."""
+    """Standard deviation of its error, L/min; None where the estimator gives none, and of a leak that comes and goes."""
     ci95: tuple[float | None, ...] | None
     """The interval that holds the flow with 95 % probability, L/min."""
+    comes_and_goes: bool
+    """Whether it is a leak to act on that is away at the trace's end."""
     threshold_lpm: float
     """The alarm's threshold, L/min."""
     identifiable: bool

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use maud::{Markup, html};
 use pitchleak::core::Leak;
 use pitchleak::fleet::{Counts, FleetCylinder, FleetLeak, FleetReport, FleetRow, count};
-use pitchleak::report::{capital, with_interval};
+use pitchleak::report::capital;
 use pitchleak::units::S_PER_DAY;
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -142,7 +142,7 @@ fn line(row: &FleetRow) -> Markup {
             td class=(tone.class()) { (row.word()) }
             @for leak in Leak::ALL {
                 td .number { @match row.leaks.map(|leaks| leaks[leak]) {
-                    Some(leak) if leak.identifiable => (interval(&leak)),
+                    Some(leak) if leak.identifiable => (leak.flow_text()),
                     _ => "–",
                 } }
             }
@@ -161,10 +161,6 @@ fn said(row: &FleetRow) -> Markup {
         None if reasons.is_empty() => html! { bdi { (row.path) } },
         None => html! { bdi { (row.path) } ": " (reasons) },
     }
-}
-
-fn interval(leak: &FleetLeak) -> String {
-    with_interval(leak.mean_lpm, leak.std_lpm)
 }
 
 /// Size of a course of leaks, small enough to stand in a row.

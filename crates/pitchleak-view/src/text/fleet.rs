@@ -6,7 +6,7 @@ use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
 use pitchleak::core::Leak;
 use pitchleak::fleet::{Counts, CylinderLeak, FleetCylinder, FleetReport, Point, count};
-use pitchleak::report::{Status, with_interval};
+use pitchleak::report::Status;
 use std::fmt::Write;
 
 /// Lines of a kind in the text.
@@ -139,7 +139,7 @@ pub(crate) fn found(cylinder: &FleetCylinder, report: &FleetReport<'_>) -> Strin
         let flow = of.flow?;
         let since =
             of.since_text().filter(|_| !at_once).map_or_else(String::new, |since| format!(" {since}"));
-        Some(format!("{} {} L/min{since}", leak.label(), with_interval(flow.mean_lpm, flow.std_lpm)))
+        Some(format!("{} {} L/min{since}", leak.label(), flow.flow_text()))
     };
     let is_leak = cylinder.status == Some(Status::Leak);
     let mut found: Vec<String> =

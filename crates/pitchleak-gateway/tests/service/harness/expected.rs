@@ -1,4 +1,4 @@
-use super::{Listener, data};
+use super::{Listener, Sender, data, wait_until};
 use pitchleak::Rig;
 use pitchleak::live::{Batch, BatchFormat, Checkpoint, Event, LiveConfig, Watch};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,12 +51,32 @@ fn rig() -> Rig {
 
 /// Of the alarms that were heard.
 pub fn ids(listener: &Listener) -> BTreeSet<String> {
-    let alarms = listener.heard("/alarm").into_iter();
-    alarms
-        .map(|alarm| {
-            serde_json::from_str::<serde_json::Value>(&alarm).unwrap()["id"].as_str().unwrap().to_owned()
-        })
-        .collect()
+    heard(listener).into_iter().collect()
+}
+
+fn heard(listener: &Listener) -> Vec<String> {
+    let id = |alarm: &String| {
+        let alarm: serde_json::Value = serde_json::from_str(alarm).unwrap();
+        alarm["id"].as_str().unwrap().to_owned()
+    };
+    listener.heard("/alarm").iter().map(id).collect()
+}
+
+/// How often each alarm was heard, once all has come that the broker had before.
+pub fn copies(sender: &mut Sender, listener: &Listener) -> BTreeMap<String, u64> {
+    let before = listener.heard("/marker").len();
+    sender.send("pitchleak/marker", b"");
+    wait_until("the marker comes", || listener.heard("/marker").len() > before);
+    let mut copies = BTreeMap::new();
+    heard(listener).into_iter().for_each(|id| *copies.entry(id).or_default() += 1);
+    copies
+}
+
+/// Alarms that a gateway would know, if it started now, that the broker has.
+pub fn sent_by_disk(folder: &Path) -> Vec<String> {
+    let Ok(text) = std::fs::read_to_string(folder.join("alarms.json")) else { return Vec::new() };
+    let alarms: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&text).unwrap();
+    alarms.into_iter().filter(|(_, alarm)| alarm["sent"] == true).map(|(id, _)| id).collect()
 }
 
 /// Of so many cylinders.

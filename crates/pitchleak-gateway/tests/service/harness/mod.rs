@@ -6,7 +6,7 @@ mod gateway;
 mod mosquitto;
 
 pub use client::{Listener, Sender};
-pub use expected::{States, ids, names, state, undisturbed};
+pub use expected::{States, copies, ids, names, sent_by_disk, state, undisturbed};
 pub use gateway::{Gateway, write_secret};
 pub use mosquitto::{Mosquitto, free_port};
 
