@@ -306,14 +306,43 @@ fn an_effect_that_other_samples_do_not_have_is_not_believed() {
 
 /// In this wind, through these sensors.
 fn in_wind(wind: WindCase, effects: EffectSet<f64>, duration_s: f64, sensors: &Rig, seed: u64) -> Series {
+    leaking_in_wind(wind, PerLeak::default(), effects, duration_s, sensors, seed)
+}
+
+fn leaking_in_wind(
+    wind: WindCase,
+    leaks: PerLeak<f64>,
+    effects: EffectSet<f64>,
+    duration_s: f64,
+    sensors: &Rig,
+    seed: u64,
+) -> Series {
     let history = History::of(&Wind::BuiltIn(wind)).expect("is built in");
     let reference = Emulation::paper().reference(&history, 0.2).expect("fits the rig");
     let scenario = Scenario { effects, start_s: 0.0, duration_s, ..Scenario::new(Rig::paper(), reference) };
     let mut sensing = Sensing::new(sensors.sensors(), Biases::default(), seed);
     let mut series = Series::default();
     let push = |truth: &Truth| series.push(truth.t_s, &sensing.read(&truth.sample), None);
-    scenario.run(PerLeak::default(), push).expect("the plant runs");
+    scenario.run(leaks, push).expect("the plant runs");
     series
+}
+
+/// One effect does nearly as well, as the winds reach other places.
+#[test]
+fn leaks_that_differ_a_little_from_trace_to_trace_are_no_worn_spot() {
+    let mut sensors = Rig::paper();
+    sensors.instruments = sensors.instruments.with_accuracy(3e-3);
+    let seen = |wind, lpm_bar: f64, seed| {
+        let leaks = PerLeak { internal: lpm_bar / LPM_PER_BAR, ..PerLeak::default() };
+        leaking_in_wind(wind, leaks, EffectSet::default(), 60.0, &sensors, seed)
+    };
+    for seed in 1..=3 {
+        let traces = [seen(WindCase::Mps21, 0.0098, seed), seen(WindCase::Mps13, 0.0083, 10 + seed)];
+        let answer = diagnose(&traces, &[], &Declared::of(&sensors), &|| ());
+        assert_eq!((first(&answer), answer.verdict), ("", Verdict::NoMissingEffect), "{:?}", answer.notes);
+        let of: Vec<_> = answer.leak_changes.iter().map(|change| (change.fault, change.trace)).collect();
+        assert_eq!(of, [("internal", 1)]);
+    }
 }
 
 /// Sensors ten times as good as declared, a meter of which reads 3 % too much: what the declared noise would do to the fit

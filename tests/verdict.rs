@@ -1,6 +1,7 @@
 //! The verdict on traces whose sensors lie: is each kind of reason given where it should be, and none where nothing is
 //! wrong?
 
+use pitchleak::Rig;
 use pitchleak::core::{Leak, PerLeak};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::{ReplayReport, Status};
@@ -226,9 +227,7 @@ fn what_nothing_explains_is_weighed_by_its_size() {
             row(t_s, motion.position_m.slope(t_s), &sample)
         };
         let rows: Vec<_> = (0..6000).map(read).collect();
-        let text = Box::new(Cursor::new(file(&rows).into_bytes()));
-        let mut reader = TraceReader::from_stream("trace", text, &rig).unwrap();
-        replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap()
+        report_on(&rows, &rig)
     };
     let small = judged(0.0, 2e-5).verdict;
     assert_eq!(small.status, Status::NotSure, "{}", small.text);
@@ -237,4 +236,33 @@ fn what_nothing_explains_is_weighed_by_its_size() {
     assert!(large.text.contains("What remains unexplained is 5."), "{}", large.text);
     let larger_swing = judged(5e-11, 5e-5).verdict;
     assert_eq!(larger_swing.status, Status::Doubtful, "{}", larger_swing.text);
+}
+
+fn report_on(rows: &[String], rig: &Rig) -> ReplayReport {
+    let text = Box::new(Cursor::new(file(rows).into_bytes()));
+    let mut reader = TraceReader::from_stream("trace", text, rig).unwrap();
+    replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap()
+}
+
+/// One pressure of quiet sensors passes a filter of 50 ms, which the table does not have: what comes nearest takes a dead volume of
+/// litres and leaks to the outside.
+#[test]
+fn sizes_that_nothing_has_explain_nothing() {
+    let internal = LeakCourse::from(LeakSize::MeanFlow(0.3 / LPM_PER_M3S));
+    let leaks = PerLeak { internal, ..PerLeak::default() };
+    let (truths, rig) = (windy(WindCase::Mps5, leaks, 0.0, 60.0), rig(1e-3));
+    for seed in 10..14 {
+        let mut random = seeded(seed);
+        let mut filtered: Option<f64> = None;
+        let rows = truths.iter().map(|truth| {
+            let mut sample = noisy(&truth.sample, &rig.sensors(), &mut random);
+            let last = filtered.unwrap_or(sample.pb_pa);
+            sample.pb_pa = last + (sample.pb_pa - last) / 6.0;
+            filtered = Some(sample.pb_pa);
+            row(truth.t_s, truth.signals.v_mps, &sample)
+        });
+        let verdict = report_on(&rows.collect::<Vec<_>>(), &rig).verdict;
+        let names_outside = verdict.faults.iter().any(|leak| *leak != Leak::Internal);
+        assert!(verdict.status != Status::Leak || !names_outside, "{seed}: {}", verdict.text);
+    }
 }

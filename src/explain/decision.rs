@@ -25,6 +25,9 @@ const WANDER_DOUBT: f64 = 0.3;
 /// A noise scale of so many times the readings' own scatter contradicts what is said of sensors and rig. Where they are as
 /// declared it widens the leaks' intervals, and is a doubt where those are open.
 const MISFIT_DOUBT: f64 = 3.0;
+/// What takes sizes of so many standard deviations of what sensors and rigs are off by is no explanation, but the nearest that the
+/// table has. Derived: one of two million is so large.
+const MOST_STRAIN: f64 = 5.0;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
@@ -118,6 +121,9 @@ pub struct Decision {
     pub notes: Vec<Note>,
     /// Noise scale over the readings' own scatter.
     pub misfit: f64,
+    /// The sizes that it takes are beyond those of sensors and rigs, as likely as not.
+    #[serde(default)]
+    pub strained: bool,
     /// Probability that zeros wander.
     pub wander: f64,
     /// Probability of a mistake of wiring, sign or unit.
@@ -151,7 +157,7 @@ pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told:
 impl Decision {
     /// Whether too much remains under every explanation for the leaks to be told.
     pub fn fits_nothing(&self) -> bool {
-        self.misfit > MISFIT_DOUBT && !self.status.is_sure()
+        (self.misfit > MISFIT_DOUBT || self.strained) && !self.status.is_sure()
     }
 
     /// Probability of the explanations one of whose parts `is` so, as far as they are listed.
@@ -231,7 +237,8 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
     let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
     let as_declared =
         weighed.first().is_some_and(|best| found(best).iter().flatten().all(|entry| is_usual(entry.id)));
-    let misfits = misfit > MISFIT_DOUBT;
+    let strained = mass(&|one| one.strain > MOST_STRAIN) > 0.5;
+    let misfits = misfit > MISFIT_DOUBT || strained;
     // Where what is said of sensors and rig leaves as much, it is not so, and no leak beside it is.
     let status = if wiring > WIRING_DOUBT || misfits && !as_declared {
         Status::Doubtful
@@ -257,6 +264,7 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         as_declared,
         notes: notes(weighed, rig),
         misfit,
+        strained,
         wander,
         wiring,
         residuals: [None; 2],

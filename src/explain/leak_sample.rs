@@ -32,6 +32,8 @@ pub(super) struct Weighed<'a> {
     pub pressures_pa: PerLeak<f64>,
     /// What is not as declared, in its columns' units.
     pub found: Vec<Found>,
+    /// The largest of these in the standard deviations of what sensors and rigs are off by.
+    pub strain: f64,
     /// Mean of C P of each leak, m³/s.
     pub levels_m3s: [f64; 3],
     /// Flow of each leak at the trace's end, m³/s, and weights of sum 1.
@@ -83,6 +85,7 @@ impl<'a> Fitted<'_, 'a> {
             changed_ago_s: changed.map(|segment| products.total_s - segment.begin_s),
             pressures_pa: products.mean_pressures_pa(border),
             found: self.found(),
+            strain: self.strain(),
             levels_m3s: self.levels_m3s(&orthant),
             leaks_m3s: self.leaks_m3s(&orthant.points),
             weights: orthant.weights,
@@ -90,16 +93,24 @@ impl<'a> Fitted<'_, 'a> {
         }
     }
 
-    /// The columns that its state sets free, as far as they are steady.
-    fn found(&self) -> Vec<Found> {
+    /// The columns that its state sets free, as far as they are steady, with their places among the free parameters.
+    fn set_free(&self) -> impl Iterator<Item = (Column, usize)> {
         let State { zeros, departure, .. } = self.hypothesis.state;
         let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
-        let size = |column: Column| {
-            let at = self.place(column)?;
+        columns.filter_map(|(column, ..)| Some((*column, self.place(*column)?)))
+    }
+
+    fn found(&self) -> Vec<Found> {
+        let size = |at: usize| {
             let variance = self.fit.covariance(&[at])[0][0];
-            Some((column, Estimate { value: self.fit.means[at], std: variance.max(0.0).sqrt() }))
+            Estimate { value: self.fit.means[at], std: variance.max(0.0).sqrt() }
         };
-        columns.filter_map(|(column, ..)| size(*column)).collect()
+        self.set_free().map(|(column, at)| (column, size(at))).collect()
+    }
+
+    fn strain(&self) -> f64 {
+        let strain = |at: usize| self.fit.means[at].abs() / self.hypothesis.free[at].std;
+        self.set_free().map(|(_, at)| strain(at)).fold(0.0, f64::max)
     }
 
     /// Where a steady column stands among the free parameters.

@@ -12,10 +12,14 @@ use pitchleak_core::{Estimate, PerLeak};
 use statrs::function::erf::erfc;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Size of a leak that a cylinder may have, half normal, at 50 bar, L/min. A guess: that of docs/explanations.md for a meter of 20 L/min.
+/// Size of a leak that a cylinder may have, half normal, at the pressure that drives it, L/min. A guess: that of docs/explanations.md
+/// for a meter of 20 L/min.
 const LEAK_SIZE_LPM: f64 = 1.0;
-/// In [`LEAK_UNIT_M3SPA`].
-pub(crate) const SIZE: f64 = LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 / LEAK_UNIT_M3SPA;
+
+/// The coefficient of such a leak at a mean pressure, Pa, in [`LEAK_UNIT_M3SPA`].
+pub(crate) const fn size(pressure_pa: f64) -> f64 {
+    LEAK_SIZE_LPM / LPM_PER_M3S / pressure_pa / LEAK_UNIT_M3SPA
+}
 
 /// What is believed of one leak; coefficients in m³/(s·Pa), where there is such a leak.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -28,6 +32,8 @@ pub(crate) struct Belief {
     pub interval: [f64; 2],
     /// The smallest that would be found in this hold.
     pub smallest: f64,
+    /// Standard deviation before any reading.
+    pub prior_std: f64,
 }
 
 /// What is believed of all leaks, and of the oil.
@@ -43,12 +49,13 @@ pub(crate) struct Beliefs {
     pub negative: f64,
 }
 
-/// Weighs the leaks by their likelihood at some places of κ, which are equally far apart; `sure` is the probability from which a leak
-/// counts as found.
-pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
+/// Weighs leaks of these sizes by their likelihood at some places of κ, which are equally far apart; `sure` is the probability from
+/// which a leak counts as found.
+pub(crate) fn weigh(places: &[Place], sizes: [f64; 3], sure: f64) -> Beliefs {
     let sets: Vec<Vec<usize>> =
         (0..8).map(|members| (0..3).filter(|leak| members >> leak & 1 == 1).collect()).collect();
-    let mut weighed: Vec<Weighed> = sets.iter().flat_map(|members| over_kappa(members, places)).collect();
+    let mut weighed: Vec<Weighed> =
+        sets.iter().flat_map(|members| over_kappa(members, places, &sizes)).collect();
     let possible = weighed.iter().map(|one| one.squares).fold(f64::INFINITY, f64::min);
     let any_sign = places.iter().map(|place| place.likelihood.squares).fold(f64::INFINITY, f64::min);
     let largest = weighed.iter().map(|one| one.weight).fold(f64::NEG_INFINITY, f64::max);
@@ -58,12 +65,13 @@ pub(crate) fn weigh(places: &[Place], sure: f64) -> Beliefs {
     let moment = |power: i32| weighed.iter().map(|one| one.weight * one.kappa.powi(power)).sum::<f64>();
     let (mean, square) = (moment(1), moment(2));
     let kappa = Estimate { value: mean, std: (square - mean * mean).max(0.0).sqrt() };
-    let information = beside_oil(places, kappa);
+    let told = Told { information: beside_oil(places, kappa), sizes };
     Beliefs {
         leaks: PerLeak::from_fn(|leak| {
             let own = leak as usize;
-            let smallest = smallest(&information, own, sure) * LEAK_UNIT_M3SPA;
-            Belief { smallest, ..spread(&weighed, own) }
+            let smallest = told.smallest(own, sure) * LEAK_UNIT_M3SPA;
+            let prior_std = sizes[own] * LEAK_UNIT_M3SPA * (1.0 - 2.0 / PI).sqrt();
+            Belief { smallest, prior_std, ..spread(&weighed, own) }
         }),
         any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
         kappa,
@@ -105,13 +113,14 @@ struct Normal {
 }
 
 impl Normal {
-    fn new(members: &[usize], place: &Place) -> Option<Self> {
+    fn new(members: &[usize], place: &Place, sizes: &[f64; 3]) -> Option<Self> {
         let Place { likelihood, ln_prior, .. } = place;
         let count = members.len();
         let ln_share = count as f64 * LEAK_SHARE.ln() + (3 - count) as f64 * (1.0 - LEAK_SHARE).ln();
         let pull = likelihood.information * likelihood.leaks;
         let precision = DMatrix::from_fn(count, count, |i, j| {
-            likelihood.information[(members[i], members[j])] + if i == j { SIZE.powi(-2) } else { 0.0 }
+            likelihood.information[(members[i], members[j])]
+                + if i == j { sizes[members[i]].powi(-2) } else { 0.0 }
         });
         let right = DVector::from_fn(count, |i, _| pull[members[i]]);
         let factor = precision.cholesky()?;
@@ -119,7 +128,7 @@ impl Normal {
         // Half normal sizes of density 2/(τ √(2π)) at none, times a normal integral over the orthant.
         let ln_det = 2.0 * factor.l().diagonal().map(f64::ln).sum();
         let squares = likelihood.squares + likelihood.leaks.dot(&pull) - mean.dot(&right);
-        let ln_size = count as f64 * (2.0 / SIZE).ln();
+        let ln_size: f64 = members.iter().map(|member| (2.0 / sizes[*member]).ln()).sum();
         let ln_weight = ln_share + ln_prior - 0.5 * squares + ln_size - 0.5 * ln_det;
         Some(Self { mean, covariance: factor.inverse(), squares, ln_weight })
     }
@@ -141,10 +150,10 @@ pub(crate) fn ln_tail(point: f64) -> f64 {
 }
 
 /// A set of leaks at the places of κ that count for it.
-fn over_kappa(members: &[usize], places: &[Place]) -> Vec<Weighed> {
+fn over_kappa(members: &[usize], places: &[Place], sizes: &[f64; 3]) -> Vec<Weighed> {
     let about: Vec<f64> = places
         .iter()
-        .map(|place| Normal::new(members, place).map_or(f64::NEG_INFINITY, |normal| normal.ln_about()))
+        .map(|place| Normal::new(members, place, sizes).map_or(f64::NEG_INFINITY, |normal| normal.ln_about()))
         .collect();
     let largest = about.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let counts = |ln: &f64| *ln > largest + LEAST_LN_WEIGHT;
@@ -153,7 +162,7 @@ fn over_kappa(members: &[usize], places: &[Place]) -> Vec<Weighed> {
     let step = ((last - first) / (TAKEN - 1)).max(1);
     let taken = places[first..=last].iter().step_by(step);
     let weighed = taken.filter_map(|place| {
-        let normal = Normal::new(members, place)?;
+        let normal = Normal::new(members, place, sizes)?;
         let rows: Vec<Vec<f64>> =
             normal.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
         let orthant = (!members.is_empty()).then(|| positive_orthant(normal.mean.as_slice(), &rows, POINTS));
@@ -226,44 +235,47 @@ fn beside_oil(places: &[Place], kappa: Estimate<f64>) -> Matrix3<f64> {
     information - told * told.transpose() / (1.0 + moved.dot(&told))
 }
 
-/// The smallest single leak that would be believed with the probability `sure`: its set against each of the sets without it that
-/// take over some of what it does, and let no oil in for that.
-fn smallest(information: &Matrix3<f64>, own: usize, sure: f64) -> f64 {
-    let others: Vec<usize> = (0..3).filter(|leak| *leak != own).collect();
-    let rivals = [vec![], vec![others[0]], vec![others[1]], others];
-    let single = ln_volume(information, &[own]);
-    let wanted = |rival: &Vec<usize>| {
-        let ln_odds = (sure / (1.0 - sure)).ln() + ln_volume(information, rival) - single;
-        let left = left_by(information, own, rival)?;
-        Some((2.0 * ln_odds).max(0.0) / left.max(f64::MIN_POSITIVE))
-    };
-    rivals.iter().filter_map(wanted).fold(0.0, f64::max).sqrt()
+/// What a trace tells of leaks of these sizes.
+struct Told {
+    information: Matrix3<f64>,
+    sizes: [f64; 3],
 }
 
-/// ln of the share of a set of leaks and of Occam's factor of their sizes.
-fn ln_volume(information: &Matrix3<f64>, set: &[usize]) -> f64 {
-    let count = set.len() as f64;
-    let ln_det = part(information, set, set).determinant().ln();
-    count * (LEAK_SHARE / (1.0 - LEAK_SHARE) * 2.0 / SIZE).ln() - 0.5 * ln_det
-}
+impl Told {
+    /// The smallest single leak that would be believed with the probability `sure`: its set against each of the sets without it that
+    /// take over some of what it does, and let no oil in for that.
+    fn smallest(&self, own: usize, sure: f64) -> f64 {
+        let others: Vec<usize> = (0..3).filter(|leak| *leak != own).collect();
+        let rivals = [vec![], vec![others[0]], vec![others[1]], others];
+        let single = self.ln_volume(&[own]);
+        let wanted = |rival: &Vec<usize>| {
+            let ln_odds = (sure / (1.0 - sure)).ln() + self.ln_volume(rival) - single;
+            let left = self.left_by(own, rival)?;
+            Some((2.0 * ln_odds).max(0.0) / left.max(f64::MIN_POSITIVE))
+        };
+        rivals.iter().filter_map(wanted).fold(0.0, f64::max).sqrt()
+    }
 
-/// Information on a leak that those of a set do not take over; none where they would have to be negative.
-fn left_by(information: &Matrix3<f64>, own: usize, set: &[usize]) -> Option<f64> {
-    let across = part(information, set, &[own]);
-    let taken = part(information, set, set).cholesky()?.solve(&across);
-    let is_possible = taken.iter().all(|share| *share >= 0.0);
-    is_possible.then(|| information[(own, own)] - across.dot(&taken))
-}
+    /// ln of the share of a set of leaks and of Occam's factor of their sizes.
+    fn ln_volume(&self, set: &[usize]) -> f64 {
+        let share = LEAK_SHARE / (1.0 - LEAK_SHARE);
+        let ln_det = self.part(set, set).determinant().ln();
+        set.iter().map(|leak| (share * 2.0 / self.sizes[*leak]).ln()).sum::<f64>() - 0.5 * ln_det
+    }
 
-/// Rows and columns of the information, with what is believed before of each size.
-fn part(information: &Matrix3<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
-        let (i, j) = (rows[i], columns[j]);
-        information[(i, j)] + if i == j { SIZE.powi(-2) } else { 0.0 }
-    })
-}
+    /// Information on a leak that those of a set do not take over; none where they would have to be negative.
+    fn left_by(&self, own: usize, set: &[usize]) -> Option<f64> {
+        let across = self.part(set, &[own]);
+        let taken = self.part(set, set).cholesky()?.solve(&across);
+        let is_possible = taken.iter().all(|share| *share >= 0.0);
+        is_possible.then(|| self.information[(own, own)] - across.dot(&taken))
+    }
 
-/// Standard deviation of the half normal size that a leak has before any reading, m³/(s·Pa).
-pub(crate) fn prior_std() -> f64 {
-    LEAK_SIZE_LPM / LPM_PER_M3S / 50e5 * (1.0 - 2.0 / PI).sqrt()
+    /// Rows and columns of the information, with what is believed before of each size.
+    fn part(&self, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+            let (i, j) = (rows[i], columns[j]);
+            self.information[(i, j)] + if i == j { self.sizes[i].powi(-2) } else { 0.0 }
+        })
+    }
 }

@@ -1,7 +1,7 @@
 //! What was found of the leaks, in words and as a report.
 
 use super::Pressures;
-use super::belief::{Belief, Beliefs, Place, prior_std, weigh};
+use super::belief::{Belief, Beliefs, Place, size, weigh};
 use crate::hold::HoldSummary;
 use crate::report::{
     EstimateEntry, Estimates, Leakage, Reason, ReasonId, ReplayReport, Status, TraceSummary, Verdict, advice,
@@ -71,16 +71,20 @@ const BULK_MODULUS_SIGMAS: f64 = 3.0;
 impl Belief {
     /// Whether hardly more is known of a leak than before any reading.
     fn is_untold(&self) -> bool {
-        self.std >= UNKNOWN * prior_std()
+        self.std >= UNKNOWN * self.prior_std
     }
 }
 
 impl Found {
     /// By the likelihood at some places of κ.
     pub fn new(places: &[Place], pressures: &Pressures, rig: &Rig) -> Self {
+        let pressures_pa = pressures.sizes_pa();
+        // P_L swings about zero, and what leaks past the piston is no larger for that.
+        let PerLeak { external_a: a_pa, external_b: b_pa, .. } = pressures_pa;
+        let sizes = [0.5 * (a_pa + b_pa), a_pa, b_pa].map(|pressure_pa| size(pressure_pa.max(LEAST_LOAD_PA)));
         Self {
-            beliefs: weigh(places, 1.0 - rig.decision.alpha),
-            pressures_pa: pressures.sizes_pa(),
+            beliefs: weigh(places, sizes, 1.0 - rig.decision.alpha),
+            pressures_pa,
             load_pressure_pa: pressures.load_pa(),
             floor_m3spa: PerLeak::default(),
         }

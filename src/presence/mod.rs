@@ -3,8 +3,7 @@
 mod belief;
 mod found;
 
-pub(crate) use belief::SIZE as LEAK_SIZE;
-pub(crate) use belief::{Place, ln_tail};
+pub(crate) use belief::{Place, ln_tail, size};
 pub use found::FoundLeak;
 pub(crate) use found::{Found, Wording, report, told};
 /// Unit of the leak coefficients.

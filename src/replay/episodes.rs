@@ -31,13 +31,7 @@ impl Open {
 impl Episodes {
     /// Takes the leak flows as estimated at `t_s`, `elapsed_s` of watched time after those before, each with the one below
     /// which the leak is gone (an alarm stands until that is sure), m³/s, and which alarms stand.
-    pub fn add(
-        &mut self,
-        t_s: f64,
-        elapsed_s: f64,
-        flows_m3s: PerLeak<(f64, f64)>,
-        active: &PerLeak<bool>,
-    ) {
+    pub fn add(&mut self, t_s: f64, elapsed_s: f64, flows_m3s: PerLeak<(f64, f64)>, active: &PerLeak<bool>) {
         for (fault, (flow_m3s, gone_m3s)) in flows_m3s {
             let open = &mut self.open[fault];
             if !active[fault] {

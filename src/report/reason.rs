@@ -234,10 +234,14 @@ const SENSORS_TELL: &str = "check whether the sensors are as good as declared an
 
 fn model_does_not_fit(decision: &Decision) -> Option<Reason> {
     decision.fits_nothing().then(|| {
-        let text = format!(
-            "no explanation known fits this trace: what remains is {:.1} times what the readings scatter",
-            decision.misfit
-        );
+        let text = if decision.strained {
+            "no explanation known fits this trace: the nearest takes sizes that no sensor and no rig is off by".to_owned()
+        } else {
+            format!(
+                "no explanation known fits this trace: what remains is {:.1} times what the readings scatter",
+                decision.misfit
+            )
+        };
         Reason::new(ReasonId::ModelDoesNotFit, text, SENSORS_TELL)
     })
 }

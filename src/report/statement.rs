@@ -42,7 +42,9 @@ pub(super) fn text(findings: &Findings<'_>, status: Status, faults: &[Leak], rea
     if findings.assumed.sensors && !findings.assumed.rig {
         sentences.push("The rig file has no [sensors]: meters as the paper's are supposed.".to_owned());
     }
-    sentences.extend(Leak::ALL.into_iter().filter_map(|leak| grows(findings, leak, status)));
+    // Of a leak that the trace cannot tell about a sure verdict says no more.
+    let told = Leak::ALL.into_iter().filter(|leak| !(status.is_sure() && open.contains(leak)));
+    sentences.extend(told.filter_map(|leak| grows(findings, leak, status)));
     sentences.join(" ")
 }
 
@@ -57,8 +59,9 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
     match episode {
         Some(last) if last.to_s.is_some() => {
             let count = findings.episodes.iter().filter(|episode| episode.fault == leak).count();
+            let often = if count > 1 { format!(", {count} times") } else { String::new() };
             format!(
-                "{label} leak that comes and goes, {count} times, last {:.2} L/min on average until {}: {}.",
+                "{label} leak that comes and goes{often}, last {:.2} L/min on average until {}: {}.",
                 last.mean_lpm,
                 findings.trace.time(last.to_s.unwrap_or(last.from_s), 1),
                 advice(leak)
@@ -156,9 +159,10 @@ fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
-    // What may be none does not fall.
+    // What may be none does not fall, and what is below its threshold has not grown beyond that within the trace.
     let [low, _] = findings.leakage[leak].ci95();
-    if value < 0.0 && low <= 0.0 {
+    let grown_lpm = value * findings.trace.duration_s / 3600.0;
+    if value < 0.0 && low <= 0.0 || findings.is_below(leak) && grown_lpm > findings.threshold_lpm[leak] {
         return None;
     }
     let slope = with_interval(value.abs(), Some(std));

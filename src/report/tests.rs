@@ -94,6 +94,7 @@ fn decision(active: PerLeak<bool>) -> Decision {
         as_declared: true,
         notes: Vec::new(),
         misfit: 1.0,
+        strained: false,
         wander: 0.0,
         wiring: 0.0,
         residuals: [None; 2],
@@ -409,6 +410,25 @@ fn a_leak_that_grows_says_when_it_matters() {
     falling.leakage.internal =
         Leakage { mean_lpm: 1e-3, std_lpm: Some(1e-3), net_mean_lpm: None, since: None };
     assert!(!falling.verdict().text.contains("falls"), "what may be none does not fall");
+}
+
+#[test]
+fn no_leak_grows_of_which_the_same_verdict_says_otherwise() {
+    let flow = Estimate { value: 0.01, std: 1e-3 };
+    let told = |mut found: Found, leak: Leak, slope_lpm_ps: f64| {
+        let slope = Estimate { value: slope_lpm_ps, std: 0.1 * slope_lpm_ps };
+        found.trends[leak] = LeakTrend::new(flow, slope, 0.1);
+        found.verdict().text.contains("grows")
+    };
+    // 0.6 L/min in the trace's minute, of a leak that is below 0.1.
+    assert!(told(sound(), Leak::Internal, 1e-3) && !told(sound(), Leak::Internal, 1e-2));
+    let open = || {
+        let mut found = found(INTERNAL);
+        found.decision.as_mut().unwrap().ruled_out = vec![Leak::ExternalA];
+        found
+    };
+    assert!(open().verdict().text.contains("cannot tell about external B"));
+    assert!(told(open(), Leak::ExternalA, 1e-3) && !told(open(), Leak::ExternalB, 1e-3));
 }
 
 #[test]

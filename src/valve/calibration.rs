@@ -184,7 +184,7 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::Nothing`], [`CalibrationError::LeakChanged`].
     pub fn finish(mut self) -> Result<Calibration, CalibrationError> {
-        let taken = self.meter.taken().ok_or(CalibrationError::Nothing)?;
+        let taken = self.meter.taken().filter(|taken| taken.is_settled).ok_or(CalibrationError::Nothing)?;
         if let Some(at_s) = taken.changed_at_s {
             return Err(CalibrationError::LeakChanged(at_s));
         }

@@ -7,24 +7,22 @@
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
 use super::parts::{Normal, Part};
-use super::unknowns::{Belief, HYSTERESIS, KAPPA, LAPS, ROUNDING, Unknowns};
+use super::unknowns::{Belief, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
 use super::unread;
 use super::whitening::Whitening;
 
-const MOST_ROUNDS: usize = 20;
-/// … and where a pressure is not measured: it and the chamber's own leak are known by their product, and half steps settle after the first.
-const MOST_ROUNDS_UNREAD: usize = 40;
-const ROUNDS_WHOLE: usize = 6;
-/// Rounds in which κ is held, and in which the laps move by no more than this, a share of the stroke: the edges' corners are far
-/// from linear.
-const ROUNDS_HELD: usize = 4;
-const ROUNDS_SLOW: usize = 3;
-const SLOW: f64 = 0.01;
+const MOST_ROUNDS: usize = 40;
+/// The first step moves no unknown beyond what is known of it to explain the readings; so many times less holds it back from round to
+/// round.
+const EASED: f64 = 30.0;
+/// After so many rounds steps are half as long: where an edge is sharp, or a pressure and its chamber's own leak are known by their
+/// product, whole ones go to and fro.
+const ROUNDS_WHOLE: usize = 8;
 /// Rounds after which the spool is followed with the hysteresis found, within these multiples of the declared one.
 const ROUNDS_FOLLOWED: [usize; 3] = [5, 8, 11];
 const PLAY_RANGE: [f64; 2] = [0.3, 2.0];
 /// The search is over where no unknown moves by more than this share of its standard deviation.
-const SETTLED: f64 = 0.02;
+const SETTLED: f64 = 0.5;
 /// κ stays within these multiples of the rig file's on its way, and an edge is never sharper than this share of the stroke.
 const KAPPA_RANGE: [f64; 2] = [0.2, 5.0];
 const SHARPEST: f64 = 1e-3;
@@ -56,7 +54,7 @@ pub(super) struct Fit {
     /// Around which all is linear.
     pub at: Unknowns,
     pub parts: Vec<Part>,
-    /// Whether the search came to an end.
+    /// Whether the search came to an end; else the place is the likeliest that it passed.
     pub is_settled: bool,
 }
 
@@ -144,50 +142,48 @@ impl Smoothed {
     }
 }
 
-/// Fits all runs together after what was believed before, beginning at `unknowns`; `is_cold` where those are the data sheet's. None
+/// Fits all runs together after what was believed before, beginning at `unknowns`. None
 /// where no finite number comes out.
 pub(super) fn fit(
     runs: &[Run],
     before: &Belief,
     mut unknowns: Unknowns,
-    is_cold: bool,
     half_width: f64,
     known: &Known,
 ) -> Option<Fit> {
     let mut runs: Vec<Smoothed> =
         runs.iter().map(|run| Smoothed::begin(run, half_width, &unknowns, known)).collect();
-    let is_unread = runs.iter().any(|run| run.unread.is_some());
-    let most_rounds = if is_unread { MOST_ROUNDS_UNREAD } else { MOST_ROUNDS };
-    let mut is_settled = false;
-    for round in 0..most_rounds {
-        if ROUNDS_FOLLOWED.contains(&round) && half_width > 0.0 {
-            let found =
-                unknowns[HYSTERESIS].abs().clamp(PLAY_RANGE[0] * half_width, PLAY_RANGE[1] * half_width);
-            runs.iter_mut().for_each(|run| run.follow(found));
+    let told: f64 = runs.iter().map(|run| run.known.told * run.nodes.len() as f64).sum();
+    let (mut is_settled, mut damping) = (false, None);
+    let mut likeliest: Option<Place> = None;
+    for round in 0..MOST_ROUNDS {
+        if half_width > 0.0 && ROUNDS_FOLLOWED.contains(&round) {
+            let [least, most] = PLAY_RANGE.map(|share| share * half_width);
+            runs.iter_mut().for_each(|run| run.follow(unknowns[HYSTERESIS].abs().clamp(least, most)));
         }
-        let held = is_cold && round < ROUNDS_HELD;
+        let whites: Vec<Whitening> = runs.iter().map(|run| run.whitened(&unknowns)).collect::<Option<_>>()?;
         let mut normal = Normal::prior(before, &unknowns);
-        let mut whites = Vec::with_capacity(runs.len());
-        for run in &runs {
-            let white = run.whitened(&unknowns)?;
-            normal.add_steps(white.steps());
-            whites.push(white);
-        }
-        let step = normal.solve(held.then_some(KAPPA))?;
-        let share = match round {
-            0..ROUNDS_SLOW if is_cold => slow(&step),
-            ROUNDS_WHOLE.. if is_unread => 0.5,
-            _ => 1.0,
-        };
-        for (run, white) in runs.iter_mut().zip(&whites) {
-            run.smooth(white, &(step * share))?;
-        }
-        let next = bounded(unknowns + step * share);
-        is_settled = !held && normal.square(&((next - unknowns) / share)) < SETTLED * SETTLED;
-        unknowns = next;
+        whites.iter().for_each(|white| normal.add_steps(white.steps()));
+        let moved =
+            |damping: f64| Some(bounded(unknowns + normal.solve(&before.information, damping)?) - unknowns);
+        is_settled = normal.square(&moved(0.0)?) < SETTLED * SETTLED;
         if is_settled {
             break;
         }
+        let square = squares(&whites) + before.square(&unknowns);
+        if likeliest.as_ref().is_none_or(|place| square < place.square) {
+            likeliest = Some(Place::of(&runs, unknowns, square));
+        }
+        let held = damping.unwrap_or((square - told).max(0.0));
+        damping = Some(held / EASED);
+        let step = moved(held)? * if round < ROUNDS_WHOLE { 1.0 } else { 0.5 };
+        for (run, white) in runs.iter_mut().zip(&whites) {
+            run.smooth(white, &step)?;
+        }
+        unknowns += step;
+    }
+    if let Some(place) = likeliest.filter(|_| !is_settled) {
+        unknowns = place.go_back(&mut runs);
     }
     let mut parts = Vec::new();
     for run in &runs {
@@ -196,9 +192,28 @@ pub(super) fn fit(
     Some(Fit { at: unknowns, parts, is_settled })
 }
 
-fn slow(step: &Unknowns) -> f64 {
-    let most = step.fixed_rows::<4>(LAPS).amax();
-    if most > SLOW { SLOW / most } else { 1.0 }
+/// Where the search passed.
+struct Place {
+    unknowns: Unknowns,
+    nodes: Vec<Vec<Node>>,
+    /// Of the residuals and of what was believed before.
+    square: f64,
+}
+
+impl Place {
+    fn of(runs: &[Smoothed], unknowns: Unknowns, square: f64) -> Self {
+        Self { unknowns, nodes: runs.iter().map(|run| run.nodes.clone()).collect(), square }
+    }
+
+    fn go_back(self, runs: &mut [Smoothed]) -> Unknowns {
+        runs.iter_mut().zip(self.nodes).for_each(|(run, nodes)| run.nodes = nodes);
+        self.unknowns
+    }
+}
+
+/// Of the residuals, in those of the noise.
+fn squares(whites: &[Whitening]) -> f64 {
+    whites.iter().flat_map(Whitening::steps).map(|step| step.residual.norm_squared()).sum()
 }
 
 fn bounded(mut unknowns: Unknowns) -> Unknowns {

@@ -62,7 +62,7 @@ pub(super) struct Taken {
     /// Leaks changed in it, somewhere: what it says of the valve is not believed.
     is_mixed: bool,
     /// Whether the search for it came to an end.
-    is_settled: bool,
+    pub is_settled: bool,
     /// How often they changed.
     pub changes: usize,
     /// Whether noise explains what was before the last change, too.
@@ -149,9 +149,9 @@ impl ValveMeter {
         }
     }
 
-    /// Whether what it says of leaks is worth anything: without one of the pressures a calibrated valve's, where the search settled.
+    /// Whether what it says of leaks is worth anything: where the search settled, without one of the pressures a calibrated valve's.
     pub(super) fn can_tell(&self, taken: &Taken) -> bool {
-        self.unread.is_none() || self.since.is_some() && taken.is_settled
+        taken.is_settled && (self.unread.is_none() || self.since.is_some())
     }
 
     /// The leak at the chamber whose pressure is not measured, which nothing tells of.
@@ -231,32 +231,25 @@ impl ValveMeter {
         if self.count < LEAST_WINDOW {
             return None;
         }
-        let (start, is_cold) = self.at.map_or((self.before.mean, true), |at| (at, false));
+        let start = self.at.unwrap_or(self.before.mean);
         self.runs.retain(|run| run.readings.len() >= LEAST_READINGS);
-        let mut taken = self.settled(&self.runs, &self.before, start, is_cold, MOST_CHANGES)?;
+        let mut taken = self.settled(&self.runs, &self.before, start, MOST_CHANGES)?;
         self.at = Some(taken.at);
         let Some(last) = &self.last else { return Some(taken) };
         let begin_s = self.runs.first()?.readings.first()?.t_s;
         let limit = CHANGED * taken.summary.noise.max(1.0);
         if taken.changes == 0 && moved(&self.before, &taken.summary.belief).is_some_and(|far| far > limit) {
             let before = self.before.with_new_leaks()?;
-            taken = self.settled(&self.runs, &before, taken.at, false, 0)?;
+            taken = self.settled(&self.runs, &before, taken.at, 0)?;
             (taken.changed_at_s, taken.changes, taken.is_mixed) = (Some(begin_s), 1, true);
         }
         Some(taken.after(last, begin_s))
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
-    fn settled(
-        &self,
-        runs: &[Run],
-        before: &Belief,
-        start: Unknowns,
-        is_cold: bool,
-        changes: usize,
-    ) -> Option<Taken> {
+    fn settled(&self, runs: &[Run], before: &Belief, start: Unknowns, changes: usize) -> Option<Taken> {
         let known = Known::of(&self.rig, &self.sheet);
-        let fit = fit(runs, before, start, is_cold, self.sheet.hysteresis, &known)?;
+        let fit = fit(runs, before, start, self.sheet.hysteresis, &known)?;
         let summary = summary(&fit.parts, before, &fit.at)?;
         let constant = Taken {
             summary,
@@ -280,9 +273,9 @@ impl ValveMeter {
             runs.iter().filter_map(|run| run.between(from_s, to_s)).collect::<Vec<_>>()
         };
         let early = part(f64::NEG_INFINITY, until_s);
-        let valve = self.settled(&early, before, before.mean, true, changes - 1);
+        let valve = self.settled(&early, before, before.mean, changes - 1);
         let known = valve.as_ref().map_or(before, |taken| &taken.summary.belief).with_new_leaks()?;
-        let now = self.settled(&part(from_s, f64::INFINITY), &known, known.mean, true, changes - 1)?;
+        let now = self.settled(&part(from_s, f64::INFINITY), &known, known.mean, changes - 1)?;
         let was_explained =
             valve.as_ref().is_none_or(|taken| taken.was_explained && taken.summary.is_explained());
         Some(Taken {
@@ -293,15 +286,18 @@ impl ValveMeter {
         })
     }
 
-    /// What the window says becomes what was believed before.
+    /// What the window says becomes what was believed before, where the search for it came to an end.
     fn next_window(&mut self) {
         if let Some(taken) = self.window() {
-            let known = if taken.is_mixed { self.before.with_new_leaks() } else { None };
+            let tells = taken.is_settled && !taken.is_mixed;
+            let known = if tells { None } else { self.before.with_new_leaks() };
             let known = known.unwrap_or_else(|| taken.summary.belief.clone());
             let later = known.later(&self.rig, &self.sheet, self.seconds());
             self.before = later.unwrap_or(known);
-            self.at = self.at.filter(|_| !taken.is_mixed);
-            self.last = Some(taken);
+            self.at = self.at.filter(|_| tells);
+            if taken.is_settled || !taken.is_explained() {
+                self.last = Some(taken);
+            }
         }
     }
 }

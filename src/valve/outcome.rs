@@ -125,7 +125,7 @@ impl ValveTest {
 
     /// Flows of the leaks, whatever their sign, m³/s; none where too little was read.
     pub(super) fn flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
-        let fit = &self.taken.as_ref()?.summary;
+        let fit = &self.taken.as_ref().filter(|taken| taken.is_settled)?.summary;
         let (mean, covariance) = leaks(fit, self.untold)?;
         let at = |i: usize| Estimate { value: mean[i], std: covariance[(i, i)].sqrt() };
         let pressures_pa = fit.pressures.sizes_pa();

@@ -50,15 +50,14 @@ impl Normal {
         self.right -= columns.transpose() * step.residual;
     }
 
-    /// The step; an unknown that is held stays.
-    pub fn solve(&self, held: Option<usize>) -> Option<Unknowns> {
-        let (mut information, mut right) = (self.information, self.right);
-        if let Some(held) = held {
-            information.row_mut(held).fill(0.0);
-            information.column_mut(held).fill(0.0);
-            (information[(held, held)], right[held]) = (1.0, 0.0);
+    /// The step; the unknowns that are not leaks, in which the equations are not linear, are held back by so many times what was
+    /// known of each (Levenberg 1944, Marquardt 1963).
+    pub fn solve(&self, known: &Information, damping: f64) -> Option<Unknowns> {
+        let mut information = self.information;
+        for unknown in (0..UNKNOWNS).filter(|unknown| !(LEAKS..LEAKS + 3).contains(unknown)) {
+            information[(unknown, unknown)] += damping * known[(unknown, unknown)];
         }
-        let step = information.cholesky()?.solve(&right);
+        let step = information.cholesky()?.solve(&self.right);
         step.iter().all(|number| number.is_finite()).then_some(step)
     }
 

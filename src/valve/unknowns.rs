@@ -1,6 +1,6 @@
 //! What is not known of a cylinder and its valve, and what the rig file says of it.
 
-use crate::presence::LEAK_SIZE;
+use crate::presence::size;
 use crate::rig::{Rig, ValveSheet};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 pub(super) use pitchleak_core::VALVE_UNKNOWNS as UNKNOWNS;
@@ -23,6 +23,8 @@ const LAG_STD_MS: f64 = 2.0;
 const DROOP_STD_BAR: f64 = 2.0;
 /// Zeros of a pressure sensor that nobody declared, a share of its accuracy: 1 σ.
 const ZERO_SHARE: f64 = 1.0 / 3.0;
+/// Pressure of a chamber in which it is not measured, Pa: a guess.
+const UNREAD_PA: f64 = 50e5;
 /// Of what is known for certain: rounding.
 pub(super) const CERTAIN: f64 = 1e-6;
 
@@ -62,7 +64,7 @@ impl Belief {
 
     /// Where the pressure at a leak is not measured: the two are told as their product, and a leak is no larger than leaks are.
     pub fn without_pressure_at(mut self, leak: usize) -> Option<Self> {
-        self.leak_std[leak] = LEAK_SIZE;
+        self.leak_std[leak] = size(UNREAD_PA);
         self.with_new_leaks()
     }
 
@@ -100,6 +102,12 @@ impl Belief {
     pub fn leaks(&self) -> Option<(Vector3<f64>, Matrix3<f64>)> {
         let covariance = self.covariance()?.fixed_view::<3, 3>(LEAKS, LEAKS).into_owned();
         Some((self.mean.fixed_rows::<3>(LEAKS).into_owned(), covariance))
+    }
+
+    /// How far unknowns are from what is believed: squares in those of its spread.
+    pub fn square(&self, unknowns: &Unknowns) -> f64 {
+        let off = unknowns - self.mean;
+        off.dot(&(self.information * off))
     }
 
     pub fn covariance(&self) -> Option<Information> {

@@ -15,7 +15,9 @@ const NEGATIVE_SIGMAS: f64 = 5.0;
 impl ValveTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
         let (Some(found), Some(taken)) = (&self.found, &self.taken) else {
-            return told(Status::NotSure, Vec::new(), vec![self.cannot_tell()], "");
+            let misfit = self.taken.as_ref().and_then(misfit);
+            let status = if misfit.is_some() { Status::Doubtful } else { Status::NotSure };
+            return told(status, Vec::new(), vec![misfit.unwrap_or_else(|| self.cannot_tell())], "");
         };
         let wording = Wording {
             teller: "The valve's flows",
@@ -38,6 +40,10 @@ impl ValveTest {
             Some(name) => (
                 format!("{name} is not measured, and this trace does not tell it well enough to find leaks"),
                 "measure both chamber pressures, or record longer, with the piston moving both ways",
+            ),
+            None if self.taken.is_some() => (
+                "what is not known of the valve has no likeliest values in this trace, by which leaks could be told".to_owned(),
+                "record longer, with the piston moving both ways; a hold test needs no valve",
             ),
             None => (
                 "this trace is too short to tell leaks from the valve's own gains and laps".to_owned(),
@@ -128,21 +134,7 @@ impl ValveTest {
 const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
 
 fn contradictions(taken: &Taken, found: &Found, rig: &Rig) -> Vec<Reason> {
-    let fit = &taken.summary;
-    let mut reasons = Vec::new();
-    if !taken.is_explained() {
-        let what = match taken.changes {
-            0 => format!(
-                "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
-                fit.unlike()
-            ),
-            1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
-            times => format!(
-                "no valve as in [valve] explains this trace: its leaks would have changed {times} times"
-            ),
-        };
-        reasons.push(Reason::new(ReasonId::ModelDoesNotFit, what, LOOK_FOR));
-    }
+    let mut reasons: Vec<_> = misfit(taken).into_iter().collect();
     if found.beliefs.negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
         reasons.push(Reason::new(
             ReasonId::NegativeLeak,
@@ -153,4 +145,22 @@ fn contradictions(taken: &Taken, found: &Found, rig: &Rig) -> Vec<Reason> {
     // In calm wind the pressures change by their noise alone, which no flow answers: oil that seems too stiff is no contradiction.
     reasons.extend(found.other_oil(rig, "trace").filter(|_| found.beliefs.kappa.value > 1.0));
     reasons
+}
+
+/// Where no valve as declared with leaks as leaks are explains the readings.
+fn misfit(taken: &Taken) -> Option<Reason> {
+    if taken.is_explained() {
+        return None;
+    }
+    let what = match taken.changes {
+        0 => format!(
+            "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
+            taken.summary.unlike()
+        ),
+        1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
+        times => {
+            format!("no valve as in [valve] explains this trace: its leaks would have changed {times} times")
+        }
+    };
+    Some(Reason::new(ReasonId::ModelDoesNotFit, what, LOOK_FOR))
 }

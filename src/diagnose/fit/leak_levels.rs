@@ -74,6 +74,11 @@ impl Fit<'_> {
         self.problem.leak_changes().filter(|(place, _)| self.active().contains(place))
     }
 
+    /// How many traces there are.
+    pub(crate) fn traces(&self) -> usize {
+        self.rows().rows.last().map_or(0, |row| row.trace() + 1)
+    }
+
     /// Whether a leak changes along the traces.
     pub(crate) fn has_leak_changes(&self) -> bool {
         self.leak_changes().next().is_some()

@@ -17,9 +17,10 @@ pub(crate) fn problem<'a>(plain: impl Fn() -> Problem<'a>, progress: Progress<'_
 }
 
 /// The changes that the declared model needs. While it is incomplete the noise that it is held against is large, so that the largest are
-/// found first.
+/// found first. From trace to trace leaks may be others without more than noise being left.
 fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'_>) -> Vec<LeakChange> {
-    let mut changes = Vec::new();
+    let from_trace_to_trace = between_traces(&Fit::declared(&problem(&[]), progress));
+    let mut changes = needed(&problem, from_trace_to_trace, progress);
     for _ in 0..MOST_ROUNDS {
         let with = problem(&changes);
         let fit = Fit::declared(&with, progress);
@@ -28,13 +29,36 @@ fn find<'a>(problem: impl Fn(&[LeakChange]) -> Problem<'a>, progress: Progress<'
             break;
         }
         changes.extend(more);
-        let with = problem(&changes);
-        let fit = Fit::declared(&with, progress);
-        let gone = needless(&fit);
-        let kept = fit.leak_changes().filter(|(place, _)| !gone.contains(place));
-        changes = kept.map(|(_, change)| change).collect();
+        changes = needed(&problem, changes, progress);
     }
     changes
+}
+
+/// Those that are more than chance.
+fn needed<'a>(
+    problem: &impl Fn(&[LeakChange]) -> Problem<'a>,
+    changes: Vec<LeakChange>,
+    progress: Progress<'_>,
+) -> Vec<LeakChange> {
+    if changes.is_empty() {
+        return changes;
+    }
+    let with = problem(&changes);
+    let fit = Fit::declared(&with, progress);
+    let gone = needless(&fit);
+    let kept = fit.leak_changes().filter(|(place, _)| !gone.contains(place));
+    kept.map(|(_, change)| change).collect()
+}
+
+/// Steps of every leak where a trace follows another.
+fn between_traces(fit: &Fit<'_>) -> Vec<LeakChange> {
+    let rows = &fit.rows().rows;
+    let begins = (1..rows.len()).filter(|row| rows[*row].trace() != rows[row - 1].trace());
+    let steps = begins.map(|row| {
+        let (trace, from_s) = (rows[row].trace(), rows[row].t_s);
+        Leak::ALL.map(|leak| LeakChange { leak, kind: ChangeKind::Step, row, trace, from_s })
+    });
+    steps.flatten().collect()
 }
 
 fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {

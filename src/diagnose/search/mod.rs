@@ -16,7 +16,7 @@ use crate::diagnose::fit::{Fit, Problem, Progress};
 use crate::diagnose::thresholds::{FEW_EFFECTS, MOST_ROUNDS};
 
 /// The effects that are missing from a declared model whose leaks stay, or from one whose leaks change: whichever says more with less.
-/// Leaks are asked whether they change once a few effects leave more than noise.
+/// Leaks are asked whether they change once a few effects leave more than noise, and where there are several traces.
 pub(crate) fn best<'a>(
     declared: Fit<'a>,
     with_changes: impl FnOnce() -> Option<&'a Problem<'a>>,
@@ -30,12 +30,18 @@ pub(crate) fn best<'a>(
         &error,
         progress,
     );
-    if !staying.fit.is_incomplete() {
+    let is_whole = !staying.fit.is_incomplete();
+    if is_whole && (staying.effects.is_empty() || staying.fit.traces() == 1) {
         return finished(staying, &error, progress);
     }
     let changing = with_changes().map(|problem| search(Fit::declared(problem, progress), &error, progress));
     // While something else is missing, what leaks seem to do is that one's doing.
-    let changing = match changing.filter(|all| !all.fit.is_incomplete()) {
+    let changing = changing.filter(|all| !all.fit.is_incomplete());
+    if is_whole {
+        let chosen = changing.filter(|other| other.is_commoner_than(&staying));
+        return chosen.unwrap_or_else(|| finished(staying, &error, progress));
+    }
+    let changing = match changing {
         Some(whole) if whole.effects.is_empty() => return whole,
         changing => changing,
     };

@@ -127,6 +127,13 @@ impl Selection<'_> {
         misfit.iter().sum::<f64>() + needed * (self.effects.len() + changes) as f64
     }
 
+    /// Whether it explains as well what another does with more effects: from one trace to the next leaks are others oftener than an effect
+    /// of where the piston was, or of time, is missing.
+    pub(super) fn is_commoner_than(&self, other: &Self) -> bool {
+        let lead = other.fit.free.chi2 - self.fit.free.chi2;
+        self.effects.len() < other.effects.len() && lead > -SIGNIFICANT_SIGMA.powi(2)
+    }
+
     /// Adds the next effect; false when nothing further is significant.
     pub(super) fn add_next(&mut self, progress: Progress<'_>) -> bool {
         let fit = &self.fit;
