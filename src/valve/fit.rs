@@ -1,8 +1,9 @@
 //! Maximum likelihood of the unknowns over the readings of a window.
 //!
 //! Readings stand on both sides of the equations. So signals and unknowns are found in turn: the equations are made linear at the
-//! likeliest signals, which begin as running means, and κ stays where it is for the first rounds: else the noise of the pressures
-//! is taken for compression (Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
+//! likeliest signals, which begin as running means (Gauss and Helmert's method; Deming 1943, "Statistical Adjustment of Data", ch. IV).
+//! What is known before holds all but the leaks back at first: else the noise of the pressures is taken for compression, and a leak for
+//! edges as no valve has them.
 
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
@@ -142,8 +143,7 @@ impl Smoothed {
     }
 }
 
-/// Fits all runs together after what was believed before, beginning at `unknowns`. None
-/// where no finite number comes out.
+/// Fits all runs together after what was believed before, beginning at `unknowns`. None where no finite number comes out.
 pub(super) fn fit(
     runs: &[Run],
     before: &Belief,

@@ -42,7 +42,8 @@ pub(crate) fn best<'a>(
         return chosen.unwrap_or_else(|| finished(staying, &error, progress));
     }
     let changing = match changing {
-        Some(whole) if whole.effects.is_empty() => return whole,
+        // More effects than these few would cost more.
+        Some(whole) if whole.effects.is_empty() || whole.size() <= FEW_EFFECTS => return whole,
         changing => changing,
     };
     add_while(&mut staying, |_| true, &error, progress);

@@ -122,9 +122,13 @@ impl Selection<'_> {
         let fit = &self.fit;
         let ratios = fit.noise_ratio();
         let misfit = Equation::ALL.map(|one| 2.0 * ratios[one].ln() * fit.innovations(one).len() as f64);
-        let changes = fit.leak_changes().count();
         let needed = critical_sigma(fit, fit.problem.usual_constants).powi(2);
-        misfit.iter().sum::<f64>() + needed * (self.effects.len() + changes) as f64
+        misfit.iter().sum::<f64>() + needed * self.size() as f64
+    }
+
+    /// Effects, and changes of leaks.
+    pub(super) fn size(&self) -> usize {
+        self.effects.len() + self.fit.leak_changes().count()
     }
 
     /// Whether it explains as well what another does with more effects: from one trace to the next leaks are others oftener than an effect
