@@ -240,8 +240,8 @@ fn what_nothing_explains_is_weighed_by_its_size() {
 
 fn report_on(rows: &[String], rig: &Rig) -> ReplayReport {
     let text = Box::new(Cursor::new(file(rows).into_bytes()));
-    let mut reader = TraceReader::from_stream("trace", text, rig).unwrap();
-    replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(())).unwrap()
+    let mut reader = TraceReader::from_stream("trace", text, rig).expect("a trace");
+    replay(&mut reader, rig, |_, _, _| Ok::<_, ReplayError>(())).expect("a report")
 }
 
 /// One pressure of quiet sensors passes a filter of 50 ms, which the table does not have: what comes nearest takes a dead volume of
