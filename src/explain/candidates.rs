@@ -219,8 +219,8 @@ impl<'a, 'p> Candidates<'a, 'p> {
         }
     }
 
-    /// Two leaks each with a course of its own, where those can be as probable as the best; one that opens beside one that is steady, as
-    /// beside others it is a sudden one.
+    /// Two leaks each with a course of its own, where those can be as probable as the best; one that opens, wanders or creeps beside one
+    /// that is steady: beside others it is a sudden one, or they do so together.
     fn add_pairs(
         &mut self,
         steady: &Steady,
@@ -229,17 +229,16 @@ impl<'a, 'p> Candidates<'a, 'p> {
         courses: &[(LeakCourse, f64)],
         most: f64,
     ) {
+        use LeakCourse::{Accelerating, Constant, Creeping, Growing, Opening, Sudden, Wandering};
         let mut courses = courses.to_vec();
-        courses.retain(|(course, _)| {
-            use LeakCourse::{Accelerating, Growing, Opening, Sudden};
-            matches!(course, Growing | Accelerating | Opening(_) | Sudden(_))
-        });
-        courses.push((LeakCourse::Constant, self.pass.tables.ln_course(LeakCourse::Constant)));
+        courses.retain(|(course, _)| matches!(course, Growing | Accelerating | Opening(_) | Sudden(_)));
+        courses.extend([Constant, Wandering, Creeping].map(|own| (own, self.pass.tables.ln_course(own))));
         let places: Vec<usize> = (0..3).filter(|leak| subset[*leak]).collect();
         for (course, ln_one) in &courses {
             for (another, ln_other) in courses.iter().filter(|(another, _)| another != course) {
-                let is_told = [course, another].iter().all(|own| !matches!(own, LeakCourse::Opening(_)))
-                    || [course, another].contains(&&LeakCourse::Constant);
+                let is_one_of_many = |own: &LeakCourse| matches!(own, Opening(_) | Wandering | Creeping);
+                let is_told = !is_one_of_many(course) && !is_one_of_many(another)
+                    || [course, another].contains(&&Constant);
                 if is_told && most + ln_one + ln_other > self.least() {
                     let mut leaks = [None; 3];
                     (leaks[places[0]], leaks[places[1]]) = (Some(*course), Some(*another));

@@ -37,7 +37,7 @@ class FleetLeak:
     mean_lpm: float | None
     """Mean size of its flow, L/min; of a leak that comes and goes, while it was last there."""
     std_lpm: float | None
-    """Standard deviation of its error, L/min; None where the estimator gives none, and of a leak that comes and goes."""
+    """Standard deviation of its error, L/min; None of one that comes and goes, and where the estimator gives none."""
     ci95: tuple[float | None, ...] | None
     """The interval that holds the flow with 95 % probability, L/min."""
     comes_and_goes: bool
