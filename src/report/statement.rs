@@ -159,10 +159,11 @@ fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
-    // What may be none does not fall, and what is below its threshold has not grown beyond that within the trace.
+    // What may be none does not fall, and what is below its threshold has not grown beyond that within minutes.
     let [low, _] = findings.leakage[leak].ci95();
     let grown_lpm = value * findings.trace.duration_s / 3600.0;
-    if value < 0.0 && low <= 0.0 || findings.is_below(leak) && grown_lpm > findings.threshold_lpm[leak] {
+    let outgrown = !findings.trace.is_long() && grown_lpm > findings.threshold_lpm[leak];
+    if value < 0.0 && low <= 0.0 || outgrown && findings.is_below(leak) {
         return None;
     }
     let slope = with_interval(value.abs(), Some(std));
