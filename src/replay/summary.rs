@@ -106,11 +106,7 @@ impl Replay {
         let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         Findings {
             active: self.detector.active(),
-            // Beside sensors that are off the estimator's flows change by those.
-            trends: match decision {
-                Some(decision) if !decision.as_declared => PerLeak::default(),
-                _ => self.trend(found, &leakage, &threshold_lpm),
-            },
+            trends: self.trend(found, &leakage, &threshold_lpm),
             leakage,
             episodes: self.episodes.list(),
             threshold_lpm,

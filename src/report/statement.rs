@@ -159,11 +159,9 @@ fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
-    // What may be none does not fall, and what is below its threshold has not grown beyond that within minutes.
+    // What may be none does not fall.
     let [low, _] = findings.leakage[leak].ci95();
-    let grown_lpm = value * findings.trace.duration_s / 3600.0;
-    let outgrown = !findings.trace.is_long() && grown_lpm > findings.threshold_lpm[leak];
-    if value < 0.0 && low <= 0.0 || outgrown && findings.is_below(leak) {
+    if value < 0.0 && low <= 0.0 || findings.is_below(leak) && is_contradicted(findings, leak, value) {
         return None;
     }
     let slope = with_interval(value.abs(), Some(std));
@@ -189,6 +187,14 @@ fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> 
         oil.unwrap_or_default(),
         reaches.unwrap_or_default()
     ))
+}
+
+/// Whether a leak that is below its threshold can't have grown like this: it would be above it within a trace of minutes, or sensors are
+/// off, by which the estimator's flows change.
+fn is_contradicted(findings: &Findings<'_>, leak: Leak, lpm_per_h: f64) -> bool {
+    let grown_lpm = lpm_per_h * findings.trace.duration_s / 3600.0;
+    let outgrown = !findings.trace.is_long() && grown_lpm > findings.threshold_lpm[leak];
+    outgrown || findings.decision.is_some_and(|decision| !decision.as_declared)
 }
 
 fn sentence(text: &str) -> String {
