@@ -1,7 +1,7 @@
 //! A valve's calibration: what traces of this rig say of its edges, kept in a file for later traces.
 
 use super::equations::Known;
-use super::meter::ValveMeter;
+use super::meter::{Taken, ValveMeter};
 use super::unknowns::{
     Belief, CERTAIN, CLEARANCES, GAINS, Information, LAPS, LEAK_STD, LEAKS, UNKNOWNS, Unknowns,
 };
@@ -184,7 +184,9 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::Nothing`], [`CalibrationError::LeakChanged`].
     pub fn finish(mut self) -> Result<Calibration, CalibrationError> {
-        let taken = self.meter.taken().filter(|taken| taken.is_settled).ok_or(CalibrationError::Nothing)?;
+        // What goes to and fro about values that noise explains is known by as much as its spread says.
+        let is_known = |taken: &Taken| taken.is_settled || taken.is_explained();
+        let taken = self.meter.taken().filter(is_known).ok_or(CalibrationError::Nothing)?;
         if let Some(at_s) = taken.changed_at_s {
             return Err(CalibrationError::LeakChanged(at_s));
         }
