@@ -4,7 +4,7 @@ use super::{FleetTrace, TraceIdentity};
 use crate::Rig;
 use crate::explain::Explained;
 use crate::replay::{ReplayError, replay};
-use crate::report::{LeakTrend, ReplayReport, Status, with_interval};
+use crate::report::{Episode, LeakTrend, ReplayReport, Status, with_interval};
 use crate::trace::TraceReader;
 use crate::units::LPM_PER_M3S;
 use jiff::Timestamp;
@@ -171,7 +171,7 @@ impl FleetExplanation {
 impl FleetLeak {
     fn of(report: &ReplayReport, rig: &Rig, leak: Leak) -> Self {
         let flow = report.leakage[leak];
-        let last = report.episodes.iter().rev().find(|episode| episode.fault == leak);
+        let last = Episode::last_of(&report.episodes, leak);
         let away = last.filter(|last| last.to_s.is_some() && report.verdict.faults.contains(&leak));
         let std_lpm = flow.std_lpm.filter(|_| away.is_none());
         Self {

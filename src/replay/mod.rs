@@ -255,7 +255,7 @@ impl Replay {
             self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
         }
         let alarms = &self.rig.alarms;
-        let gone_m3s = alarms.threshold_m3s.map(|threshold| alarms.clear_share * threshold);
+        let gone_m3s = alarms.threshold_m3s.map(|threshold| alarms.clearing_m3s(threshold));
         let there = flows.map(|flow| flow.value).zip(gone_m3s);
         self.episodes.add(t_s, elapsed_s, there, &self.detector.active());
     }

@@ -91,6 +91,13 @@ pub struct Episode {
     pub peak_lpm: f64,
 }
 
+impl Episode {
+    /// The last of a leak.
+    pub(crate) fn last_of(episodes: &[Self], leak: Leak) -> Option<&Self> {
+        episodes.iter().rev().find(|episode| episode.fault == leak)
+    }
+}
+
 /// A leak that stayed away for so many times its longest pause no longer comes and goes.
 const STAYED_AWAY: f64 = 3.0;
 

@@ -1,6 +1,6 @@
 //! The verdict as sentences.
 
-use super::{Findings, Leakage, Reason, Status};
+use super::{Episode, Findings, Leakage, Reason, Status};
 use crate::explain::MISFIT_TOLD;
 use crate::units::duration;
 use pitchleak_core::{Estimate, Leak};
@@ -55,8 +55,7 @@ pub(crate) fn why(reason: &Reason) -> impl Iterator<Item = String> {
 
 fn fault(findings: &Findings<'_>, leak: Leak) -> String {
     let label = capital(leak.label());
-    let episode = findings.episodes.iter().rev().find(|episode| episode.fault == leak);
-    match episode {
+    match Episode::last_of(&findings.episodes, leak) {
         Some(last) if last.to_s.is_some() => {
             let count = findings.episodes.iter().filter(|episode| episode.fault == leak).count();
             let often = if count > 1 { format!(", {count} times") } else { String::new() };

@@ -154,20 +154,20 @@ pub(super) fn fit(
     let mut runs: Vec<Smoothed> =
         runs.iter().map(|run| Smoothed::begin(run, half_width, &unknowns, known)).collect();
     let told: f64 = runs.iter().map(|run| run.known.told * run.nodes.len() as f64).sum();
-    let (mut is_settled, mut damping) = (false, None);
+    let (mut settled, mut damping) = (None, None);
     let mut likeliest: Option<Place> = None;
     for round in 0..MOST_ROUNDS {
         if half_width > 0.0 && ROUNDS_FOLLOWED.contains(&round) {
             let [least, most] = PLAY_RANGE.map(|share| share * half_width);
             runs.iter_mut().for_each(|run| run.follow(unknowns[HYSTERESIS].abs().clamp(least, most)));
         }
-        let whites: Vec<Whitening> = runs.iter().map(|run| run.whitened(&unknowns)).collect::<Option<_>>()?;
+        let whites = whitened(&runs, &unknowns)?;
         let mut normal = Normal::prior(before, &unknowns);
         whites.iter().for_each(|white| normal.add_steps(white.steps()));
         let moved =
             |damping: f64| Some(bounded(unknowns + normal.solve(&before.information, damping)?) - unknowns);
-        is_settled = normal.square(&moved(0.0)?) < SETTLED * SETTLED;
-        if is_settled {
+        if normal.square(&moved(0.0)?) < SETTLED * SETTLED {
+            settled = Some(whites);
             break;
         }
         let square = squares(&whites) + before.square(&unknowns);
@@ -182,13 +182,15 @@ pub(super) fn fit(
         }
         unknowns += step;
     }
-    if let Some(place) = likeliest.filter(|_| !is_settled) {
-        unknowns = place.go_back(&mut runs);
-    }
-    let mut parts = Vec::new();
-    for run in &runs {
-        parts.extend(run.parts(&run.whitened(&unknowns)?));
-    }
+    let is_settled = settled.is_some();
+    let whites = match settled {
+        Some(whites) => whites,
+        None => {
+            unknowns = likeliest?.go_back(&mut runs);
+            whitened(&runs, &unknowns)?
+        }
+    };
+    let parts = runs.iter().zip(&whites).flat_map(|(run, white)| run.parts(white)).collect();
     Some(Fit { at: unknowns, parts, is_settled })
 }
 
@@ -209,6 +211,10 @@ impl Place {
         runs.iter_mut().zip(self.nodes).for_each(|(run, nodes)| run.nodes = nodes);
         self.unknowns
     }
+}
+
+fn whitened(runs: &[Smoothed], unknowns: &Unknowns) -> Option<Vec<Whitening>> {
+    runs.iter().map(|run| run.whitened(unknowns)).collect()
 }
 
 /// Of the residuals, in those of the noise.

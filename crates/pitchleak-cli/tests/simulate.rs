@@ -20,6 +20,13 @@ fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
+/// What a replay says of a trace.
+fn replayed(trace: &Path, settings: &[&str]) -> serde_json::Value {
+    let path = trace.display().to_string();
+    let report = pitchleak(&[&["replay", &path, "--json"], settings].concat());
+    serde_json::from_slice(&report.stdout).unwrap()
+}
+
 #[test]
 fn a_simulated_leak_is_found_again() {
     let folder = TempDir::new().unwrap();
@@ -33,8 +40,7 @@ fn a_simulated_leak_is_found_again() {
     assert_eq!(truth["samples"], 2000);
     assert!((truth["leaks"]["external_a"]["mean_flow_lpm"].as_f64().unwrap() - 0.8).abs() < 0.01);
 
-    let report = pitchleak(&["replay", &trace.display().to_string(), "--json"]);
-    let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+    let report = replayed(&trace, &[]);
     assert_eq!(report["verdict"]["faults"], serde_json::json!(["external_a"]));
     let found = report["leakage"]["external_a"]["mean_lpm"].as_f64().unwrap();
     assert!((found - 0.8).abs() < 0.03, "{found} L/min");
@@ -51,8 +57,7 @@ fn a_simulated_hold_is_judged_without_meters() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 
     let path = trace.display().to_string();
-    let report = pitchleak(&["replay", &path, "--json"]);
-    let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+    let report = replayed(&trace, &[]);
     assert_eq!((&report["verdict"]["status"], &report["hold"]["holds"]), (&"leak".into(), &1.into()));
     assert_eq!(report["verdict"]["faults"], serde_json::json!(["external_b"]));
     assert_eq!(report["hold"]["ended_by"], "pressure");
@@ -211,8 +216,7 @@ fn in_calm_wind_a_valve_tells_no_oil() {
         let arguments = ["--rig", &rig, "--wind", "5", "--noise", "rig", "--seed", seed];
         let output = simulate(&trace, &arguments);
         assert!(output.status.success(), "{output:?}");
-        let report = pitchleak(&["replay", &trace.display().to_string(), "--rig", &rig, "--json"]);
-        let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+        let report = replayed(&trace, &["--rig", &rig]);
         assert_ne!(report["verdict"]["status"], "doubtful", "{}", report["verdict"]["text"]);
         assert_eq!(report["estimates"]["bulk_modulus"]["identifiable"], false, "{seed}");
     }
@@ -234,8 +238,7 @@ fn in_calm_wind_a_valve_hides_no_leak() {
             let flaws = ["--duration", "60 s", "--valve", "clearance=0.02 L/min"];
             let output = simulate(&trace, &[&arguments[..], &flaws].concat());
             assert!(output.status.success(), "{output:?}");
-            let report = pitchleak(&["replay", &trace.display().to_string(), "--rig", &rig, "--json"]);
-            let report: serde_json::Value = serde_json::from_slice(&report.stdout).unwrap();
+            let report = replayed(&trace, &["--rig", &rig]);
             let (verdict, kind) = (&report["verdict"], leak.replace('-', "_"));
             let case = format!("{leak} {seed}: {}", verdict["text"]);
             match verdict["status"].as_str() {

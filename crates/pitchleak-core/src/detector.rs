@@ -50,6 +50,11 @@ impl<T: Real> Default for AlarmSettings<T> {
 }
 
 impl<T: Real> AlarmSettings<T> {
+    /// The level below which an alarm at `threshold_m3s` clears, m³/s.
+    pub fn clearing_m3s(&self, threshold_m3s: T) -> T {
+        self.clear_share * threshold_m3s
+    }
+
     /// Whether a flow, m³/s, is above `threshold_m3s` for certain: what an alarm has to be for the hold time.
     pub fn is_evidence(&self, threshold_m3s: T, flow: &Estimate<T>) -> bool {
         let half_width = |alpha| confidence_half_width(flow.std, threshold_m3s, alpha);
@@ -118,7 +123,7 @@ impl<T: Real> Channel<T> {
     ) -> Option<AlarmState> {
         let evidence = if self.active {
             let sure = confidence_half_width(flow.std, threshold_m3s, settings.false_alarm_probability);
-            flow.value + sure < settings.clear_share * threshold_m3s
+            flow.value + sure < settings.clearing_m3s(threshold_m3s)
         } else {
             settings.is_evidence(threshold_m3s, flow)
         };

@@ -54,11 +54,15 @@ fn needed<'a>(
 fn between_traces(fit: &Fit<'_>) -> Vec<LeakChange> {
     let rows = &fit.rows().rows;
     let begins = (1..rows.len()).filter(|row| rows[*row].trace() != rows[row - 1].trace());
-    let steps = begins.map(|row| {
-        let (trace, from_s) = (rows[row].trace(), rows[row].t_s);
-        Leak::ALL.map(|leak| LeakChange { leak, kind: ChangeKind::Step, row, trace, from_s })
-    });
-    steps.flatten().collect()
+    begins.flat_map(|row| of_each_leak(fit, row, ChangeKind::Step)).collect()
+}
+
+/// This change at a row, of every leak.
+fn of_each_leak(fit: &Fit<'_>, row: usize, kind: ChangeKind) -> impl Iterator<Item = LeakChange> {
+    let at = fit.rows().rows.get(row).map(|own| (own.trace(), own.t_s));
+    at.into_iter().flat_map(move |(trace, from_s)| {
+        Leak::ALL.into_iter().map(move |leak| LeakChange { leak, kind, row, trace, from_s })
+    })
 }
 
 fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
@@ -66,12 +70,7 @@ fn new_ones(fit: &Fit<'_>, known: &[LeakChange]) -> Vec<LeakChange> {
     let steps = borders.iter().map(|row| (*row, ChangeKind::Step));
     let growths = std::iter::once(0).chain(borders.iter().copied()).map(|row| (row, ChangeKind::Growth));
     let all = steps.chain(growths);
-    let rows = &fit.rows().rows;
-    let all = all.filter_map(|(row, kind)| {
-        let (trace, from_s) = rows.get(row).map(|own| (own.trace(), own.t_s))?;
-        Some(Leak::ALL.map(|leak| LeakChange { leak, kind, row, trace, from_s }))
-    });
-    let all = all.flatten();
+    let all = all.flat_map(|(row, kind)| of_each_leak(fit, row, kind));
     all.filter(|change| !known.iter().any(|other| other.overlaps(change))).collect()
 }
 
