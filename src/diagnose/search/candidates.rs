@@ -22,14 +22,17 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
     statistics::bonferroni_sigma(FALSE_RATE, count * trials)
 }
 
-/// The product of signals that the table does not list and that would bring most to a model, and by how much the sum of squares would fall.
+/// Places of the products of signals that the table does not list, and by how much each would make a model's sum of squares fall.
+pub(super) fn unlisted<'f>(fit: &'f Fit<'_>, model: &'f Solution) -> impl Iterator<Item = (usize, f64)> + 'f {
+    let places =
+        (0..fit.problem.terms.len()).filter(|place| matches!(fit.problem.terms[*place], Term::Unlisted(_)));
+    places.filter_map(|place| Some((place, fit.score(model, place)?.chi2_drop)))
+}
+
+/// The strongest of them.
 pub(crate) fn strongest_unlisted(fit: &Fit<'_>, model: &Solution) -> Option<(Unlisted, f64)> {
-    let terms = fit.problem.terms.iter().enumerate();
-    let scored = terms.filter_map(|(place, term)| {
-        let Term::Unlisted(product) = term else { return None };
-        Some((*product, fit.score(model, place)?.chi2_drop))
-    });
-    scored.max_by(|a, b| a.1.total_cmp(&b.1))
+    let (place, chi2_drop) = unlisted(fit, model).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((fit.problem.terms[place].unlisted()?, chi2_drop))
 }
 
 /// By how much it would fall.

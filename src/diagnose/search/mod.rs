@@ -138,6 +138,21 @@ mod tests {
     }
 
     #[test]
+    fn a_leak_whose_gap_the_pressure_widens_makes_no_meters_zero_sure() {
+        let sure_of_zero = |flow_m3s: fn(f64) -> f64| {
+            let traces =
+                [seen(60, |sample| sample.qa_m3s = sample.qa_m3s.map(|q| q + flow_m3s(sample.pa_pa)))];
+            let problem = Problem::new(&traces, &declared(), &[]);
+            let all = search(Fit::declared(&problem, &|| ()), |_| PerEquation::default(), &|| ());
+            assert_eq!(names(&all), [Effect::FlowMeterOffsetA]);
+            all.effects[0].unlisted_rival.is_none()
+        };
+        assert!(sure_of_zero(|_| 5e-6) && sure_of_zero(|_| -5e-6));
+        assert!(!sure_of_zero(|pa_pa| 5e-6 * (pa_pa / 5e6).powi(2)));
+        assert!(!sure_of_zero(|pa_pa| 5e-6 * (pa_pa / 5e6).powi(3)));
+    }
+
+    #[test]
     fn one_effect_that_stands_for_two_gives_way_to_them() {
         let traces = [seen(60, |sample| {
             sample.pb_pa -= 2e4;

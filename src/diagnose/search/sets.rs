@@ -3,7 +3,7 @@
 //!
 //! One Gram matrix says what every such set would leave, as far as it is linear about what is named. The nearest are fitted.
 
-use super::candidates::{Candidates, critical_sigma, open, strongest_unlisted};
+use super::candidates::{self, Candidates, critical_sigma, open};
 use super::selection::{self, Rival, Selected, Selection};
 use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
@@ -55,7 +55,7 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
         has_changed = true;
         exchanges = nearest(all, progress);
     }
-    hold_against(all, &exchanges);
+    hold_against(all, &exchanges, progress);
     let fit = &all.fit;
     all.effects.sort_by(|a, b| selection::loss(fit, &[b.term]).total_cmp(&selection::loss(fit, &[a.term])));
     has_changed
@@ -181,6 +181,13 @@ fn below_zero(fit: &Fit<'_>) -> f64 {
     leaks.map(|own| -2.0 * ln_tail(-own.value / (own.std * widening))).sum()
 }
 
+/// Whether no leak is below zero by more than chance.
+fn lets_no_oil_in(fit: &Fit<'_>) -> bool {
+    let widening = fit.dispersion(fit.bounded.chi2).sqrt();
+    let mut leaks = Leak::ALL.into_iter().map(|leak| fit.mean_leak(leak));
+    leaks.all(|own| own.value >= -SIGNIFICANT_SIGMA * own.std * widening)
+}
+
 fn is_at_bound(fit: &Fit<'_>) -> bool {
     fit.active().iter().any(|term| fit.is_at_bound(*term))
 }
@@ -191,16 +198,16 @@ fn share(worse: f64, all: &[f64]) -> f64 {
 }
 
 /// Gives each named effect its rivals and its probability among all that could stand in its place.
-fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
+fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange], progress: Progress<'_>) {
     let fit = &all.fit;
     let dispersion = fit.dispersion(fit.free.chi2);
     let is_near = |worse: f64| worse < SIGNIFICANT_SIGMA.powi(2);
     for one in &mut all.effects {
         let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
-        let (unlisted, worse) = unlisted(fit, one.term).unzip();
+        let (unlisted, worse) = unlisted(fit, one.term, progress).unzip();
         let everything = [0, 1].map(|belief| {
-            let others = against.clone().map(|other| other.worse_by_either(dispersion)[belief]);
-            others.chain(worse).chain([0.0]).collect::<Vec<f64>>()
+            let others = against.clone().map(|other| other.worse_by_either(dispersion));
+            others.chain(worse).map(|worse| worse[belief]).chain([0.0]).collect::<Vec<f64>>()
         });
         let of =
             |worse: [f64; 2]| f64::midpoint(share(worse[0], &everything[0]), share(worse[1], &everything[1]));
@@ -209,7 +216,7 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
             Rival { effects: effects.collect(), probability: of(other.worse_by_either(dispersion)) }
         };
         one.probability = of([0.0; 2]);
-        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(is_near));
+        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse.into_iter().any(is_near)));
         one.rivals = against
             .clone()
             .filter(|other| other.worse_by_either(dispersion).into_iter().any(is_near))
@@ -218,13 +225,26 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange]) {
     }
 }
 
-/// The strongest law that the table does not list in an effect's place, and by how much it is the worse one.
-fn unlisted(fit: &Fit<'_>, term: usize) -> Option<(Unlisted, f64)> {
+/// The likeliest law that the table does not list in an effect's place, and by how much it is the worse one.
+fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<(Unlisted, [f64; 2])> {
+    let dispersion = fit.dispersion(fit.free.chi2);
     let without = fit.solve_without(&[term]);
-    let (law, chi2_drop) = strongest_unlisted(fit, &without)?;
-    let rise = without.chi2 - fit.free.chi2 - chi2_drop;
-    let dearer = needed(fit, fit.problem.usual_constants) - needed(fit, fit.constants(term));
-    Some((law, rise / fit.dispersion(fit.free.chi2) + dearer))
+    let lost = without.chi2 - fit.free.chi2;
+    let usual = fit.problem.usual_constants;
+    let dearer = needed(fit, usual) - needed(fit, fit.constants(term));
+    let law = |(place, chi2_drop): (usize, f64)| {
+        let left = Beyond { chi2: lost - chi2_drop, ..Beyond::default() };
+        Exchange { gone: vec![term], new: vec![(place, usual)], left, dearer }
+    };
+    let mut laws: Vec<Exchange> = candidates::unlisted(fit, &without).map(law).collect();
+    laws.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
+    let is_possible = |law: &Exchange| {
+        let is_near = law.worse(dispersion) < SIGNIFICANT_SIGMA.powi(2);
+        !is_near || lets_no_oil_in(&fit.in_place_of(&law.gone, &law.new, progress))
+    };
+    let likeliest = laws.into_iter().find(is_possible)?;
+    let law = fit.problem.terms[likeliest.new[0].0].unlisted()?;
+    Some((law, likeliest.worse_by_either(dispersion)))
 }
 
 #[cfg(test)]
@@ -245,7 +265,7 @@ mod tests {
         let mut all = Selection { fit, effects: vec![Selected::new(named, 1.0)] };
         let mut held = |chi2: f64, width: f64| {
             let (new, left) = (vec![(other, problem.usual_constants)], Beyond { chi2, width });
-            hold_against(&mut all, &[Exchange { gone: vec![named], new, left, dearer: 0.0 }]);
+            hold_against(&mut all, &[Exchange { gone: vec![named], new, left, dearer: 0.0 }], &|| ());
             (all.effects[0].probability, all.effects[0].rivals.len())
         };
         let (sure, rivals) = held(60.0, 10.0);

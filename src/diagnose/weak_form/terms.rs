@@ -230,10 +230,17 @@ impl Term {
         if let Self::Effect(effect) = self { Some(effect) } else { None }
     }
 
+    /// The product of signals that the table does not list, where the term is one.
+    pub(crate) fn unlisted(self) -> Option<Unlisted> {
+        if let Self::Unlisted(product) = self { Some(product) } else { None }
+    }
+
     /// Values that physics allows.
     pub(crate) fn bounds(self) -> (f64, f64) {
         match self {
             Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
+            // The other way it is a leak that grows by less than the pressure, which the table has.
+            Self::Unlisted(Unlisted::CubicLeakA | Unlisted::CubicLeakB) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -250,6 +257,10 @@ pub(crate) enum Unlisted {
     SteepLeak,
     /// Leak past the piston in proportion to P_L |P_L|.
     SquareLeak,
+    /// Leak out of chamber A in proportion to P_A³: a gap that the pressure widens; beside C P it does for whatever grows by more than P.
+    CubicLeakA,
+    /// Leak out of chamber B in proportion to P_B³.
+    CubicLeakB,
     /// Leak past the piston in proportion to the spool's opening |ẋ|/√P times P_L.
     SpoolLeak,
     /// Flow of meter A in proportion to |Q_A|.
@@ -267,11 +278,13 @@ pub(crate) enum Unlisted {
 }
 
 impl Unlisted {
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::SpeedLeak,
         Self::DirectionLeak,
         Self::SteepLeak,
         Self::SquareLeak,
+        Self::CubicLeakA,
+        Self::CubicLeakB,
         Self::SpoolLeak,
         Self::BentMeterA,
         Self::BentMeterB,
@@ -291,6 +304,8 @@ impl Unlisted {
             Self::DirectionLeak => "a leak past the piston that turns with speed times load pressure",
             Self::SteepLeak => "a leak past the piston that grows with the power 1.5 of the load pressure",
             Self::SquareLeak => "a leak past the piston that grows with the square of the load pressure",
+            Self::CubicLeakA => "a leak out of chamber A that grows with the cube of its pressure",
+            Self::CubicLeakB => "a leak out of chamber B that grows with the cube of its pressure",
             Self::SpoolLeak => "a leak past the piston that follows the valve's opening",
             Self::BentMeterA => "a meter A whose scale differs between both ways",
             Self::BentMeterB => "a meter B whose scale differs between both ways",
@@ -309,6 +324,8 @@ impl Unlisted {
             Self::DirectionLeak => past(at.v_mps * load),
             Self::SteepLeak => past(load * load.abs().sqrt()),
             Self::SquareLeak => past(load * load.abs()),
+            Self::CubicLeakA => Terms { chamber_a_m3s: at.pa_pa.powi(3), ..Terms::default() },
+            Self::CubicLeakB => Terms { chamber_b_m3s: at.pb_pa.powi(3), ..Terms::default() },
             Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
             Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
             Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
