@@ -61,8 +61,9 @@ pub(crate) const FASTEST_MOTION_HZ: f64 = 2.0;
 /// deviations of the autocorrelation of third differences of 600 samples of white noise (Bartlett 1946).
 pub(crate) const RIPPLE: f64 = 0.25;
 /// Of a reading that stands, what its sensor's side is on average, of the straight way from the last motion to the next. Sourced: measured
-/// on pressures in wind of 5 to 30 m/s under plays of 0.3 and 2 bar, 0.5 to 0.9 where it turns, 0 to 0.9 where it goes on as before.
-pub(crate) const OF_STRAIGHT_WAY: f64 = 0.5;
+/// on pressures in wind of 13 to 30 m/s under plays of 0.3 to 3 standard deviations of noise, 0.55 to 0.84 where it turns; where it goes on as
+/// before nothing at 1.5 of what noise smoothing leaves, 0.1 at 5, 0.3 at 14.
+pub(crate) const OF_STRAIGHT_WAY: f64 = 0.75;
 /// Ratio of two plays that are tried one after the other. Chosen for cost.
 pub(crate) const NEXT_PLAY: f64 = 1.2;
 

@@ -50,11 +50,17 @@ impl Motion {
         };
         let half = longest_half(series.step_s()) / 2;
         let noise_std = sensors.pressure.noise_std / ((2 * half + 1) as f64).sqrt();
-        let sides = |values: &[f64]| Sides::of(&series.t_s, &smooth(values, half), noise_std);
+        let mut plays = Signals::<f64>::default();
+        for one in effects.iter() {
+            one.effect.hanging(&mut plays).into_iter().for_each(|play| *play = one.value);
+        }
+        let sides = |values: &[f64], known: f64| {
+            Sides::of(&series.t_s, &smooth(values, half), noise_std, known.max(0.0))
+        };
         let way_m = own.way_m(&series.t_s);
         let stretches = (series.stretches(), series.step_s());
         let x = Followed::new(stretches, (&series.x_m, &way_m), sensors.position.noise_std).sides();
-        let (pa, pb) = (sides(&series.pa_pa), sides(&series.pb_pa));
+        let (pa, pb) = (sides(&series.pa_pa, plays.pa_pa), sides(&series.pb_pa, plays.pb_pa));
         Self { pa, pb, x, ..own }
     }
 

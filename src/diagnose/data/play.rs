@@ -35,15 +35,17 @@ impl Sides {
         Self { side: vec![0.0; count], side_std: vec![0.0; count] }
     }
 
-    /// Of a reading that is smoothed, with what noise is left.
-    pub(super) fn of(t_s: &[f64], smooth: &[f64], noise_std: f64) -> Self {
+    /// Of a reading that is smoothed, with what noise is left, behind a play of this size as far as it is known.
+    pub(super) fn of(t_s: &[f64], smooth: &[f64], noise_std: f64, known: f64) -> Self {
         let play = SIGNIFICANT_SIGMA * noise_std;
         let before = moved(t_s.iter().zip(smooth), play);
         let mut after = moved(t_s.iter().zip(smooth).rev(), play);
         after.reverse();
         after.iter_mut().for_each(|one| one.way = -one.way);
         let pairs = t_s.iter().zip(before.iter().zip(&after));
-        let (side, side_std) = pairs.map(|(t, (before, after))| between(*t, *before, *after)).unzip();
+        // What a smaller play hides, noise hides, too.
+        let held = OF_STRAIGHT_WAY * known / (known + EVIDENT_SIGMA * play);
+        let (side, side_std) = pairs.map(|(t, (before, after))| between(*t, *before, *after, held)).unzip();
         Self { side, side_std }
     }
 
@@ -74,8 +76,8 @@ fn moved<'a>(samples: impl Iterator<Item = (&'a f64, &'a f64)>, play: f64) -> Ve
         .collect()
 }
 
-/// The side at a time between two motions, and its standard deviation.
-fn between(t_s: f64, before: Moved, after: Moved) -> (f64, f64) {
+/// The side at a time between two motions, and its standard deviation; `held` is what is left of it where the reading stands and goes on as before.
+fn between(t_s: f64, before: Moved, after: Moved, held: f64) -> (f64, f64) {
     let still_s = after.t_s - before.t_s;
     match (before.way, after.way) {
         (a, b) if a * b < 0.0 => {
@@ -83,9 +85,9 @@ fn between(t_s: f64, before: Moved, after: Moved) -> (f64, f64) {
             (OF_STRAIGHT_WAY * (a + (b - a) * share), ANYWHERE)
         }
         // Nothing moved before, or nothing will.
-        (a, b) if a * b == 0.0 => (OF_STRAIGHT_WAY * (a + b), ANYWHERE),
+        (a, b) if a * b == 0.0 => (held * (a + b), ANYWHERE),
         // Noise alone hides slow motion for half a block; for longer it may have gone and come back.
-        (a, _) if still_s > BLOCK_S / 2.0 => (OF_STRAIGHT_WAY * a, ANYWHERE),
+        (a, _) if still_s > BLOCK_S / 2.0 => (held * a, ANYWHERE),
         (a, _) => (a, 0.0),
     }
 }
@@ -186,12 +188,16 @@ mod pressure_tests {
 
     /// A minute at 100 Hz: time, reading with noise, true side.
     fn hanging(size_pa: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        hanging_by(size_pa, PLAY_PA)
+    }
+
+    fn hanging_by(size_pa: f64, play_pa: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let mut play = Play::new(0.0);
         let times = (0..6000_u32).map(|k| 0.01 * f64::from(k));
         let each = times.zip(white_noise(3)).map(|(t, noise)| {
             let truth = size_pa * ((1.3 * t).sin() + 0.6 * (3.1 * t).sin());
-            let read = play.update(PLAY_PA, truth);
-            (t, (read + NOISE_PA * noise, (truth - read) / PLAY_PA))
+            let read = play.update(play_pa, truth);
+            (t, (read + NOISE_PA * noise, (truth - read) / play_pa))
         });
         let (t, (read, side)): (Vec<_>, (Vec<_>, Vec<_>)) = each.unzip();
         (t, read, side)
@@ -201,7 +207,7 @@ mod pressure_tests {
     fn a_side_is_known_while_the_reading_moves_and_on_its_way_while_it_stands() {
         for size_pa in [4e5, 2e6] {
             let (t, read, truth) = hanging(size_pa);
-            let own = Sides::of(&t, &read, NOISE_PA);
+            let own = Sides::of(&t, &read, NOISE_PA, PLAY_PA);
             let mean = |is_wanted: &dyn Fn(usize) -> bool, of: &dyn Fn(usize) -> f64| {
                 let at: Vec<usize> = (100..5900).filter(|at| is_wanted(*at)).collect();
                 at.iter().map(|at| of(*at)).sum::<f64>() / at.len() as f64
@@ -214,10 +220,22 @@ mod pressure_tests {
         }
     }
 
+    /// Else a play that noise hides would come out larger than it is.
+    #[test]
+    fn what_a_side_is_expected_to_be_it_is_in_the_mean() {
+        for size_pa in [3e4, 1e5] {
+            let (t, read, truth) = hanging_by(size_pa, NOISE_PA);
+            let own = Sides::of(&t, &read, NOISE_PA, 0.0);
+            let sum = |of: &dyn Fn(usize) -> f64| (100..5900).map(of).sum::<f64>();
+            let slope = sum(&|at| own.side[at] * truth[at]) / sum(&|at| own.side[at].powi(2));
+            assert!((slope - 1.0).abs() < 0.1, "{slope}");
+        }
+    }
+
     #[test]
     fn noise_alone_turns_nothing() {
         let (t, read, _) = hanging(0.5 * PLAY_PA);
-        let own = Sides::of(&t, &read, NOISE_PA);
+        let own = Sides::of(&t, &read, NOISE_PA, PLAY_PA);
         let moving = own.side_std.iter().filter(|std| **std <= 0.0).count();
         assert!(moving < 30, "{moving} of 6000");
         assert!(own.noise_factor(1000..1020, 0.0) == 0.0 && own.noise_factor(1000..1020, 40.0) > 50.0);

@@ -140,7 +140,11 @@ impl Term {
 
     /// A size that shows clearly.
     pub(super) fn usual_size(self) -> f64 {
-        self.effect().map_or(Unlisted::USUAL_BEND, |effect| effect.spec().default_size)
+        match self {
+            Self::Effect(effect) => effect.spec().default_size,
+            Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => Unlisted::USUAL_PLAY_PA,
+            _ => Unlisted::USUAL_BEND,
+        }
     }
 
     /// Whether it is a leak.
@@ -241,6 +245,7 @@ impl Term {
             Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
             // The other way it is a leak that grows by less than the pressure, which the table has.
             Self::Unlisted(Unlisted::CubicLeakA | Unlisted::CubicLeakB) => (0.0, f64::INFINITY),
+            Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -271,6 +276,10 @@ pub(crate) enum Unlisted {
     BentPressureA,
     /// Reading of pressure sensor B in proportion to P_B².
     BentPressureB,
+    /// Play of pressure sensor A while its own reading does not show on which side it lies.
+    HiddenPlayA,
+    /// Play of pressure sensor B likewise.
+    HiddenPlayB,
     /// Force in proportion to ẋ |ẋ|.
     SquareFriction,
     /// Storage in proportion to the pressure: V P Ṗ.
@@ -278,7 +287,7 @@ pub(crate) enum Unlisted {
 }
 
 impl Unlisted {
-    pub(crate) const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 15] = [
         Self::SpeedLeak,
         Self::DirectionLeak,
         Self::SteepLeak,
@@ -290,12 +299,17 @@ impl Unlisted {
         Self::BentMeterB,
         Self::BentPressureA,
         Self::BentPressureB,
+        Self::HiddenPlayA,
+        Self::HiddenPlayB,
         Self::SquareFriction,
         Self::StiffeningOil,
     ];
 
     /// A bend of a pressure's scale that shows clearly, per Pa: 1 % at 10 bar.
     pub(super) const USUAL_BEND: f64 = 1e-8;
+
+    /// A play of a pressure sensor that shows clearly.
+    const USUAL_PLAY_PA: f64 = 5e4;
 
     /// For people.
     pub(crate) fn words(self) -> &'static str {
@@ -311,6 +325,8 @@ impl Unlisted {
             Self::BentMeterB => "a meter B whose scale differs between both ways",
             Self::BentPressureA => "a pressure sensor A whose scale bends",
             Self::BentPressureB => "a pressure sensor B whose scale bends",
+            Self::HiddenPlayA => "a play of pressure sensor A that its own reading does not show",
+            Self::HiddenPlayB => "a play of pressure sensor B that its own reading does not show",
             Self::SquareFriction => "a friction that grows with the square of the speed",
             Self::StiffeningOil => "an oil that stiffens as the pressure rises",
         }
@@ -332,6 +348,9 @@ impl Unlisted {
             Self::BentPressureA | Self::BentPressureB => {
                 model.misread(Self::USUAL_BEND, |value| self.read(value, at).unwrap_or(*at))
             }
+            Self::HiddenPlayA | Self::HiddenPlayB => {
+                model.misread(Self::USUAL_PLAY_PA, |value| self.read(value, at).unwrap_or(*at))
+            }
             Self::SquareFriction => Terms { force_n: at.v_mps * at.v_mps.abs(), ..Terms::default() },
             Self::StiffeningOil => Terms {
                 chamber_a_m3s: model.cylinder.volume_a_m3(at.x_m) * at.pa_pa * at.dpa_pas,
@@ -339,6 +358,13 @@ impl Unlisted {
                 force_n: 0.0,
             },
         }
+    }
+
+    /// Whether it is another sight of this listed effect.
+    pub(crate) fn is_sight_of(self, effect: Effect) -> bool {
+        let mut plays =
+            Signals { pa_pa: Some(Self::HiddenPlayA), pb_pa: Some(Self::HiddenPlayB), ..Signals::default() };
+        effect.hanging(&mut plays).is_some_and(|own| *own == Some(self))
     }
 
     /// What the sensors show of the truth; none where no sensor is at fault.
@@ -352,7 +378,17 @@ impl Unlisted {
                 d2p * (1.0 + 2.0 * value * p) + 2.0 * value * dp * dp,
             )
         };
+        let hangs = |p: f64, dp: f64, (side, rate): (f64, f64)| (p - value * side, dp - value * rate);
+        let (a_side, b_side) = ((truth.pa_side, truth.dpa_side_ps), (truth.pb_side, truth.dpb_side_ps));
         match self {
+            Self::HiddenPlayA => {
+                let (pa_pa, dpa_pas) = hangs(pa_pa, dpa_pas, hidden(a_side, b_side));
+                Some(Signals { pa_pa, dpa_pas, ..*truth })
+            }
+            Self::HiddenPlayB => {
+                let (pb_pa, dpb_pas) = hangs(pb_pa, dpb_pas, hidden(b_side, a_side));
+                Some(Signals { pb_pa, dpb_pas, ..*truth })
+            }
             Self::BentPressureA => {
                 let (pa_pa, dpa_pas, d2pa_pas2) = bent(pa_pa, dpa_pas, d2pa_pas2);
                 Some(Signals { pa_pa, dpa_pas, d2pa_pas2, ..*truth })
@@ -367,6 +403,21 @@ impl Unlisted {
 
     /// Whether it shows in the balance of forces.
     pub(super) fn in_force(self) -> bool {
-        matches!(self, Self::SquareFriction | Self::BentPressureA | Self::BentPressureB)
+        matches!(
+            self,
+            Self::SquareFriction
+                | Self::BentPressureA
+                | Self::BentPressureB
+                | Self::HiddenPlayA
+                | Self::HiddenPlayB
+        )
     }
+}
+
+/// Side of one pressure's play and its rate, per s, from its `own` reading and that of the `other` chamber: as far as the own one does not
+/// show it. A load that changes pushes one pressure up as the other falls.
+fn hidden(own: (f64, f64), other: (f64, f64)) -> (f64, f64) {
+    let unknown = 1.0 - own.0.abs();
+    let unknown_rate = -own.0.signum() * own.1;
+    (own.0 - unknown * other.0, own.1 - unknown_rate * other.0 - unknown * other.1)
 }
