@@ -429,29 +429,6 @@ fn effects_beside_an_unexplained_remainder_are_doubted() {
     assert!(answer.to_text(&Palette::PLAIN).contains("Doubtful"));
 }
 
-/// In wind of 13 m/s pressure B hardly moves, and A moves against it: what hangs behind in B looks in the balance of forces as if it did in A.
-#[test]
-fn a_play_that_its_own_reading_hides_makes_no_other_sensor_sure() {
-    let history = History::of(&Wind::BuiltIn(WindCase::Mps13)).expect("is built in");
-    let mut effects = EffectSet::default();
-    effects.set(Effect::PressureHysteresisB, 1.6e4, EffectConstants::default()).expect("is within bounds");
-    let scenario = Scenario {
-        leaks: LEAKS.map(|leak| LeakSize::Coefficient(leak).into()),
-        effects,
-        duration_s: 100.0,
-        sample_rate_hz: 200.0,
-        ..Scenario::new(Rig::paper(), Emulation::paper().reference(&history, 0.2).expect("fits"))
-    };
-    let truths = scenario.collect(scenario.leak_coefficients().expect("given")).expect("the plant runs");
-    let mut sensing = Sensing::new(Rig::paper().sensors(), Biases::default(), 3);
-    let mut series = Series::default();
-    truths.iter().for_each(|truth| series.push(truth.t_s, &sensing.read(&truth.sample), None));
-    let answer = ask(series, &Rig::paper());
-    assert!(!answer.effects.is_empty(), "{:?}", answer.notes);
-    let is_right = |effect: &FoundEffect| effect.id == "pressure_hysteresis_b" || !effect.confident;
-    assert!(answer.effects.iter().all(is_right), "{:?}", answer.effects);
-}
-
 #[test]
 fn a_ripple_in_one_pressure_sensor_stays_unexplained() {
     let mut series = trace(None);

@@ -421,3 +421,24 @@ fn hidden(own: (f64, f64), other: (f64, f64)) -> (f64, f64) {
     let unknown_rate = -own.0.signum() * own.1;
     (own.0 - unknown * other.0, own.1 - unknown_rate * other.0 - unknown * other.1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_play_that_its_own_reading_hides_lies_as_the_other_pressure_says() {
+        let force = |term: Term, pa_side: f64, pb_side: f64| {
+            let at = Signals { pa_side, pb_side, ..PROBE };
+            term.unit_term(&at, &Model::paper(), &EffectConstants::default()).force_n
+        };
+        let listed = Term::Effect(Effect::PressureHysteresisB);
+        let hidden = Term::Unlisted(Unlisted::HiddenPlayB);
+        for (pb_side, lies_at) in [(0.0, -1.0), (1.0, 1.0), (-1.0, -1.0)] {
+            let (own, expected) = (force(hidden, 1.0, pb_side), force(listed, 1.0, lies_at));
+            assert!((own - expected).abs() < 1e-6 * expected.abs(), "{own} {expected}");
+        }
+        assert!(Unlisted::HiddenPlayB.is_sight_of(Effect::PressureHysteresisB));
+        assert!(!Unlisted::HiddenPlayB.is_sight_of(Effect::PressureHysteresisA));
+    }
+}
