@@ -54,9 +54,8 @@ impl Motion {
         for one in effects.iter() {
             one.effect.hanging(&mut plays).into_iter().for_each(|play| *play = one.value);
         }
-        let sides = |values: &[f64], known: f64| {
-            Sides::of(&series.t_s, &smooth(values, half), noise_std, known.max(0.0))
-        };
+        let sides =
+            |values: &[f64], known: f64| Sides::of(&series.t_s, &smooth(values, half), noise_std, known);
         let way_m = own.way_m(&series.t_s);
         let stretches = (series.stretches(), series.step_s());
         let x = Followed::new(stretches, (&series.x_m, &way_m), sensors.position.noise_std).sides();

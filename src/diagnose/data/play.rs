@@ -44,7 +44,7 @@ impl Sides {
         after.iter_mut().for_each(|one| one.way = -one.way);
         let pairs = t_s.iter().zip(before.iter().zip(&after));
         // What a smaller play hides, noise hides, too.
-        let held = OF_STRAIGHT_WAY * known / (known + EVIDENT_SIGMA * play);
+        let held = if known > 0.0 { OF_STRAIGHT_WAY * known / (known + EVIDENT_SIGMA * play) } else { 0.0 };
         let (side, side_std) = pairs.map(|(t, (before, after))| between(*t, *before, *after, held)).unzip();
         Self { side, side_std }
     }
@@ -223,6 +223,8 @@ mod pressure_tests {
         let read: Vec<f64> = t.iter().map(|t| 1e6 * (t.min(1.0) + (t - 2.0).max(0.0))).collect();
         let side = |known_pa: f64| Sides::of(&t, &read, NOISE_PA, known_pa).side[150];
         assert!(side(0.0) == 0.0 && side(NOISE_PA) < 0.1 && side(40.0 * NOISE_PA) > 0.5);
+        let without_noise = Sides::of(&t, &read, 0.0, 0.0);
+        assert!(without_noise.side.iter().all(|side| side.is_finite()));
     }
 
     #[test]

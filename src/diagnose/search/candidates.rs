@@ -3,7 +3,7 @@
 use crate::diagnose::fit::{Fit, PartialColumn, Score, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CONSTANTS_TRIALS, FALSE_RATE};
-use crate::diagnose::weak_form::{Term, Unlisted};
+use crate::diagnose::weak_form::Unlisted;
 use pitchleak_core::effects::EffectConstants;
 
 /// Places of the terms that could be named.
@@ -24,8 +24,7 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
 
 /// Places of the products of signals that the table does not list, and by how much each would make a model's sum of squares fall.
 pub(super) fn unlisted<'f>(fit: &'f Fit<'_>, model: &'f Solution) -> impl Iterator<Item = (usize, f64)> + 'f {
-    let places =
-        (0..fit.problem.terms.len()).filter(|place| matches!(fit.problem.terms[*place], Term::Unlisted(_)));
+    let places = (0..fit.problem.terms.len()).filter(|place| fit.problem.terms[*place].unlisted().is_some());
     places.filter_map(|place| Some((place, fit.score(model, place)?.chi2_drop)))
 }
 

@@ -8,7 +8,6 @@ use super::selection::{self, Rival, Selected, Selection};
 use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CURVED_SHARE, MOST_EXCHANGES, MOST_ROUNDS, SIGNIFICANT_SIGMA};
-use crate::diagnose::weak_form::Unlisted;
 use crate::presence::ln_tail;
 use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
@@ -174,18 +173,21 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     is_model.then(|| Exchange { left: other.beyond(fit), dearer, ..one })
 }
 
-/// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
-fn below_zero(fit: &Fit<'_>) -> f64 {
+/// The leaks in their standard deviations, widened where the residual is more than noise.
+fn leaks_in_sigma(fit: &Fit<'_>) -> impl Iterator<Item = f64> {
     let widening = fit.dispersion(fit.bounded.chi2).sqrt();
     let leaks = Leak::ALL.into_iter().map(|leak| fit.mean_leak(leak)).filter(|own| own.std > 0.0);
-    leaks.map(|own| -2.0 * ln_tail(-own.value / (own.std * widening))).sum()
+    leaks.map(move |own| own.value / (own.std * widening))
+}
+
+/// No leak lets oil in: twice the ln of the odds against a fit's leaks for it.
+fn below_zero(fit: &Fit<'_>) -> f64 {
+    leaks_in_sigma(fit).map(|sigma| -2.0 * ln_tail(-sigma)).sum()
 }
 
 /// Whether no leak is below zero by more than chance.
 fn lets_no_oil_in(fit: &Fit<'_>) -> bool {
-    let widening = fit.dispersion(fit.bounded.chi2).sqrt();
-    let mut leaks = Leak::ALL.into_iter().map(|leak| fit.mean_leak(leak));
-    leaks.all(|own| own.value >= -SIGNIFICANT_SIGMA * own.std * widening)
+    leaks_in_sigma(fit).all(|sigma| sigma >= -SIGNIFICANT_SIGMA)
 }
 
 fn is_at_bound(fit: &Fit<'_>) -> bool {
@@ -204,10 +206,11 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange], progress: Progr
     let is_near = |worse: f64| worse < SIGNIFICANT_SIGMA.powi(2);
     for one in &mut all.effects {
         let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
-        let (unlisted, worse) = unlisted(fit, one.term, progress).unzip();
+        let unlisted = unlisted(fit, one.term, progress);
         let everything = [0, 1].map(|belief| {
-            let others = against.clone().map(|other| other.worse_by_either(dispersion));
-            others.chain(worse).map(|worse| worse[belief]).chain([0.0]).collect::<Vec<f64>>()
+            let others = against.clone().chain(&unlisted);
+            let worse = others.map(|other| other.worse_by_either(dispersion)[belief]);
+            worse.chain([0.0]).collect::<Vec<f64>>()
         });
         let of =
             |worse: [f64; 2]| f64::midpoint(share(worse[0], &everything[0]), share(worse[1], &everything[1]));
@@ -216,17 +219,15 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange], progress: Progr
             Rival { effects: effects.collect(), probability: of(other.worse_by_either(dispersion)) }
         };
         one.probability = of([0.0; 2]);
-        one.unlisted_rival = unlisted.filter(|_| worse.is_some_and(|worse| worse.into_iter().any(is_near)));
-        one.rivals = against
-            .clone()
-            .filter(|other| other.worse_by_either(dispersion).into_iter().any(is_near))
-            .map(rival)
-            .collect();
+        let is_rival = |other: &&Exchange| other.worse_by_either(dispersion).into_iter().any(is_near);
+        let law = unlisted.as_ref().filter(is_rival).and_then(|law| law.new.first());
+        one.unlisted_rival = law.and_then(|(place, _)| fit.problem.terms[*place].unlisted());
+        one.rivals = against.clone().filter(is_rival).map(rival).collect();
     }
 }
 
-/// The likeliest law that the table does not list in an effect's place, and by how much it is the worse one.
-fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<(Unlisted, [f64; 2])> {
+/// The likeliest law that the table does not list in an effect's place.
+fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<Exchange> {
     let dispersion = fit.dispersion(fit.free.chi2);
     let without = fit.solve_without(&[term]);
     let lost = without.chi2 - fit.free.chi2;
@@ -247,9 +248,7 @@ fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<(Unlis
         let is_near = law.worse(dispersion) < SIGNIFICANT_SIGMA.powi(2);
         !is_near || lets_no_oil_in(&fit.in_place_of(&law.gone, &law.new, progress))
     };
-    let likeliest = laws.into_iter().find(is_possible)?;
-    let law = fit.problem.terms[likeliest.new[0].0].unlisted()?;
-    Some((law, likeliest.worse_by_either(dispersion)))
+    laws.into_iter().find(is_possible)
 }
 
 #[cfg(test)]

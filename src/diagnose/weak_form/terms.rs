@@ -244,8 +244,8 @@ impl Term {
         match self {
             Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
             // The other way it is a leak that grows by less than the pressure, which the table has.
-            Self::Unlisted(Unlisted::CubicLeakA | Unlisted::CubicLeakB) => (0.0, f64::INFINITY),
-            Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => (0.0, f64::INFINITY),
+            Self::Unlisted(Unlisted::CubicLeakA | Unlisted::CubicLeakB)
+            | Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => (0.0, f64::INFINITY),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         }
     }
@@ -345,11 +345,9 @@ impl Unlisted {
             Self::SpoolLeak => past(at.v_mps.abs() * load / (at.pa_pa.abs() + at.pb_pa.abs() + 1e5).sqrt()),
             Self::BentMeterA => Terms { chamber_a_m3s: at.qa_m3s.abs(), ..Terms::default() },
             Self::BentMeterB => Terms { chamber_b_m3s: at.qb_m3s.abs(), ..Terms::default() },
-            Self::BentPressureA | Self::BentPressureB => {
-                model.misread(Self::USUAL_BEND, |value| self.read(value, at).unwrap_or(*at))
-            }
-            Self::HiddenPlayA | Self::HiddenPlayB => {
-                model.misread(Self::USUAL_PLAY_PA, |value| self.read(value, at).unwrap_or(*at))
+            Self::BentPressureA | Self::BentPressureB | Self::HiddenPlayA | Self::HiddenPlayB => {
+                let size = Term::Unlisted(self).usual_size();
+                model.misread(size, |value| self.read(value, at).unwrap_or(*at))
             }
             Self::SquareFriction => Terms { force_n: at.v_mps * at.v_mps.abs(), ..Terms::default() },
             Self::StiffeningOil => Terms {
@@ -403,14 +401,8 @@ impl Unlisted {
 
     /// Whether it shows in the balance of forces.
     pub(super) fn in_force(self) -> bool {
-        matches!(
-            self,
-            Self::SquareFriction
-                | Self::BentPressureA
-                | Self::BentPressureB
-                | Self::HiddenPlayA
-                | Self::HiddenPlayB
-        )
+        // The sensors at fault here are those of pressures, which push.
+        self == Self::SquareFriction || self.read(0.0, &PROBE).is_some()
     }
 }
 
