@@ -17,7 +17,7 @@ const NU: f64 = 4.0;
 /// Steps towards the scales' best values: each only changes the noise by what the fit before left over.
 const STEPS: usize = 2;
 /// Least variance, in the declared noise's: sensors without noise are quantised all the same.
-const LEAST_SCALE: f64 = 0.02;
+pub(super) const LEAST_SCALE: f64 = 0.02;
 /// Least square of a pivot, where noise products taken off leave less than the prior alone.
 const LEAST_PIVOT: f64 = 0.2;
 /// A mean square so many standard deviations from what it should be is so by chance. Chosen: the usual three.

@@ -10,7 +10,7 @@
 //! for neither side more than the noise itself differs.
 
 use super::equations::NormalEquations;
-use super::evidence::{chance_of_mean_square, ln_scale_prior};
+use super::evidence::{LEAST_SCALE, chance_of_mean_square, ln_scale_prior};
 use super::leak_sample::Weighing;
 use super::readings::Mistake;
 use pitchleak_core::continuity::EQUATIONS;
@@ -206,6 +206,7 @@ fn ln_below(rows: f64, scale: f64, left: f64) -> f64 {
 
 /// The same, less what one above it loses as far as that is chance.
 fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
+    let left = if left > 0.0 { left.max(LEAST_SCALE) } else { left };
     if left > 0.0 { 0.5 * rows * (left / scale).max(1.0 / most_by_chance(rows)).ln() } else { 0.0 }
 }
 
