@@ -20,6 +20,8 @@ pub(super) struct NormalEquations {
     left_noise: [[f64; 2]; EQUATIONS],
     /// Noise scales that the readings' own scatter makes, at least 1: what is louder is no noise of the columns.
     pub loudest: [f64; EQUATIONS],
+    /// Noise scales from which on those of a fit are sought.
+    pub sought_from: [f64; EQUATIONS],
     places: HashMap<(Column, Course), usize>,
 }
 
@@ -56,6 +58,7 @@ impl NormalEquations {
             rows: [0.0; EQUATIONS],
             left_noise: [[0.0; 2]; EQUATIONS],
             loudest: [1.0; EQUATIONS],
+            sought_from: [1.0; EQUATIONS],
             places: columns.iter().enumerate().map(|(place, key)| (*key, place)).collect(),
         };
         let kinds: HashMap<Column, [PerChamber; 2]> =
@@ -72,8 +75,9 @@ impl NormalEquations {
                 own.rows[equation] += segment.rows[equation];
             }
         }
-        own.silence(columns);
         own.loudest = own.left_noise.map(|[sheet, scattered]| f64::max(scattered / sheet, 1.0));
+        own.sought_from = own.loudest;
+        own.silence(columns);
         own
     }
 
@@ -109,19 +113,20 @@ impl NormalEquations {
         self
     }
 
-    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those.
+    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those, of which the columns' noise is.
     pub fn with_loudest(self, loudest: [f64; EQUATIONS]) -> Self {
-        Self { loudest, ..self }
+        Self { loudest, sought_from: [1.0; EQUATIONS], ..self }
     }
 
-    /// Columns that are mostly noise are zero. The left side's noise is what the residual is measured by.
+    /// Columns that are mostly noise, as loud as the readings scatter, are zero. The left side's noise is what the residual is measured by.
     fn silence(&mut self, columns: &[(Column, Course)]) {
         for equation in 0..EQUATIONS {
             self.noise[equation][0] = 0.0;
             for (place, (column, _)) in columns.iter().enumerate().skip(1) {
                 let is_leak = matches!(column, Column::LeakInternal | Column::LeakA | Column::LeakB);
                 let power = self.gram(equation).row(place)[place];
-                if !is_leak && power < LEAST_POWER * self.noise(equation).row(place)[place] {
+                let noise = self.loudest[equation] * self.noise(equation).row(place)[place];
+                if !is_leak && power < LEAST_POWER * noise {
                     for other in 0..self.size {
                         for (i, j) in [(place, other), (other, place)] {
                             self.gram[equation][i * self.size + j] = 0.0;

@@ -131,17 +131,21 @@ impl Products {
 }
 
 /// Fits `free` to the equations' left side, which is their column 0.
+///
+/// The scales are sought from the readings' own scatter down: from a noise that is too quiet on, a gain that makes the rows as
+/// quiet would be found as well. Scatter that would take off more than there is has more in it than noise.
 pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let n = equations.rows;
     let products = Products::of(equations, free);
     let size = products.size;
-    let mut scales = [1.0; 2];
+    let mut scales = equations.sought_from;
     let mut loudest = [f64::INFINITY; 2];
     let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
     let mut factor = vec![0.0; size * size];
     let mut means = vec![0.0; free.len()];
     let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
-    for step in 0..=STEPS {
+    let mut step = 0;
+    while step <= STEPS {
         for c in 0..2 {
             products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
         }
@@ -149,6 +153,10 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
             *out = one + other;
         }
         (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
+        if step == 0 && scales != [1.0; 2] && each.iter().any(|own| !is_sum_of_squares(own, size, &means)) {
+            scales = [1.0; 2];
+            continue;
+        }
         if step < STEPS {
             for c in 0..2 {
                 let mut left = residual(&each[c], size, &means);
@@ -162,6 +170,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
                 scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
             }
         }
+        step += 1;
     }
     let ln_scales: f64 = (0..2).map(|c| ln_scale_prior(scales[c]) - 0.5 * n[c] * scales[c].ln()).sum();
     let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);
@@ -224,6 +233,11 @@ fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
         means[i] = (row[last] - known) / row[i];
     }
     (ln_determinant, products[last * size + last])
+}
+
+/// Whether a fit leaves no less than nothing, and no more than there was.
+fn is_sum_of_squares(products: &[f64], size: usize, means: &[f64]) -> bool {
+    (0.0..=products[size * size - 1]).contains(&residual(products, size, means))
 }
 
 /// Sum of squared residuals, from products.
