@@ -125,7 +125,9 @@ impl NormalEquations {
             for (place, (column, _)) in columns.iter().enumerate().skip(1) {
                 let is_leak = matches!(column, Column::LeakInternal | Column::LeakA | Column::LeakB);
                 let power = self.gram(equation).row(place)[place];
-                let noise = self.loudest[equation] * self.noise(equation).row(place)[place];
+                // What tells such noise is not.
+                let louder = if *column == Column::Unpressed { 1.0 } else { self.loudest[equation] };
+                let noise = louder * self.noise(equation).row(place)[place];
                 if !is_leak && power < LEAST_POWER * noise {
                     for other in 0..self.size {
                         for (i, j) in [(place, other), (other, place)] {
