@@ -153,7 +153,8 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
             *out = one + other;
         }
         (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
-        if step == 0 && scales != [1.0; 2] && each.iter().any(|own| !is_sum_of_squares(own, size, &means)) {
+        let is_louder = scales.iter().any(|scale| *scale > 1.0);
+        if step == 0 && is_louder && each.iter().any(|own| !is_sum_of_squares(own, size, &means)) {
             scales = [1.0; 2];
             continue;
         }
