@@ -113,12 +113,14 @@ impl NormalEquations {
         self
     }
 
-    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those, of which the columns' noise is.
+    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those. The columns' noise is of them
+    /// already, so a fit's are sought from 1 on.
     pub fn with_loudest(self, loudest: [f64; EQUATIONS]) -> Self {
         Self { loudest, sought_from: [1.0; EQUATIONS], ..self }
     }
 
-    /// Columns that are mostly noise, as loud as the readings scatter, are zero. The left side's noise is what the residual is measured by.
+    /// Columns that are mostly noise, as loud as the readings scatter, are zero. The left side's noise is what the residual is
+    /// measured by.
     fn silence(&mut self, columns: &[(Column, Course)]) {
         for equation in 0..EQUATIONS {
             self.noise[equation][0] = 0.0;

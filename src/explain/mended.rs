@@ -204,10 +204,10 @@ fn ln_below(rows: f64, scale: f64, left: f64) -> f64 {
     if left > scale { 0.5 * rows * (left / scale).ln() } else { 0.0 }
 }
 
-/// The same, less what one above it loses as far as that is chance.
+/// The same, less what one above it loses as far as that is chance. No fit has a scale below the least.
 fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
-    let left = if left > 0.0 { left.max(LEAST_SCALE) } else { left };
-    if left > 0.0 { 0.5 * rows * (left / scale).max(1.0 / most_by_chance(rows)).ln() } else { 0.0 }
+    let gained = || (left.max(LEAST_SCALE) / scale).max(1.0 / most_by_chance(rows)).ln();
+    if left > 0.0 { 0.5 * rows * gained() } else { 0.0 }
 }
 
 /// A noise scale over what it truly is.
