@@ -8,7 +8,7 @@ use crate::Rig;
 use crate::explain::Decision;
 use crate::hold::HoldTest;
 use crate::replay::{ReplayError, Stream, Taken};
-use crate::report::ReplayReport;
+use crate::report::{Alarm, ReplayReport};
 use crate::trace::{BadReason, BadRows, LineLayout};
 use pitchleak_core::AlarmState;
 use serde::{Deserialize, Serialize};
@@ -230,29 +230,36 @@ impl Cylinder {
         })
     }
 
+    /// Alarms that are due: one of a leak that the posterior rules out is held back until it no longer does.
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        self.weighing.renew_now(&self.stream);
-        let report = self.stream.report_as(name, self.weighing.decision.as_ref());
-        let Some(ReplayReport { leakage, alarms, verdict, .. }) = report else { return };
-        for alarm in alarms {
-            let time_ns = self.time_ns(alarm.time_s);
-            let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));
-            let (state, status) = match alarm.state {
-                AlarmState::Raised => ("raised", verdict.status_of(alarm.fault)),
-                AlarmState::Cleared => ("cleared", verdict.status),
-            };
-            events.push(Event::Alarm(AlarmEvent {
-                id: format!("{name}:{}:{state}:{time}", alarm.fault.id()),
-                cylinder: name.to_owned(),
-                t_s: alarm.time_s,
-                fault: alarm.fault,
-                state: alarm.state,
-                status,
-                leakage: leakage[alarm.fault].into(),
-                time_ns,
-            }));
+        self.weighing.renew_for(&self.stream);
+        let decision = self.weighing.decision.as_ref();
+        let due =
+            self.stream.take_alarms(decision.map(|decision| &decision.ruled_out[..]).unwrap_or_default());
+        if due.is_empty() {
+            return;
         }
-        self.stream.forget_alarms();
+        let Some(report) = self.stream.report_as(name, decision) else { return };
+        events.extend(due.into_iter().map(|alarm| Event::Alarm(self.alarm(name, alarm, &report))));
+    }
+
+    fn alarm(&self, name: &str, alarm: Alarm, report: &ReplayReport) -> AlarmEvent {
+        let time_ns = self.time_ns(alarm.time_s);
+        let time = time_ns.map_or_else(|| format!("{} s", alarm.time_s), |ns| format!("{ns} ns"));
+        let (state, status) = match alarm.state {
+            AlarmState::Raised => ("raised", report.verdict.status_of(alarm.fault)),
+            AlarmState::Cleared => ("cleared", report.verdict.status),
+        };
+        AlarmEvent {
+            id: format!("{name}:{}:{state}:{time}", alarm.fault.id()),
+            cylinder: name.to_owned(),
+            t_s: alarm.time_s,
+            fault: alarm.fault,
+            state: alarm.state,
+            status,
+            leakage: report.leakage[alarm.fault].into(),
+            time_ns,
+        }
     }
 
     fn time_ns(&self, t_s: f64) -> Option<i64> {
@@ -306,11 +313,14 @@ impl Weighing {
         }
     }
 
-    /// Decides anew after something happened.
-    fn renew_now(&mut self, stream: &Stream) {
-        let Some(t_s) = stream.time_s() else { return };
-        self.since_s = Some(t_s);
-        self.weigh(stream, t_s);
+    /// Decides anew at once after an alarm that it has not seen, and where it is due for one that is held back.
+    fn renew_for(&mut self, stream: &Stream) {
+        let alarm_s = stream.replay().alarms().last().map(|alarm| alarm.time_s);
+        if alarm_s > self.at_s {
+            self.since_s = alarm_s;
+            self.at_s = None;
+        }
+        self.renew(stream);
     }
 
     fn weigh(&mut self, stream: &Stream, t_s: f64) {

@@ -33,7 +33,9 @@ use consistency::Consistency;
 use correction::{Correction, EffectUncertainty, added_std};
 use episodes::Episodes;
 use pitchleak_core::continuity::Block;
-use pitchleak_core::{Estimate, Innovation, LeakDetector, LeakPressures, PerLeak, RlsError, Update};
+use pitchleak_core::{
+    AlarmState, Estimate, Innovation, Leak, LeakDetector, LeakPressures, PerLeak, RlsError, Update,
+};
 use scoring::Scoring;
 use spikes::{Sifted, Spikes};
 
@@ -323,9 +325,21 @@ impl Replay {
         &self.alarms
     }
 
-    fn forget_alarms(&mut self) {
-        self.alarms.clear();
+    /// The alarms so far, but those raised for these leaks, which are kept; one that was cleared meanwhile was none.
+    fn take_alarms(&mut self, but: &[Leak]) -> Vec<Alarm> {
         self.episodes.forget();
+        let (mut taken, mut kept) = (Vec::new(), Vec::<Alarm>::new());
+        for alarm in self.alarms.drain(..) {
+            if let Some(at) = kept.iter().position(|raised| raised.fault == alarm.fault) {
+                kept.remove(at);
+            } else if alarm.state == AlarmState::Raised && but.contains(&alarm.fault) {
+                kept.push(alarm);
+            } else {
+                taken.push(alarm);
+            }
+        }
+        self.alarms = kept;
+        taken
     }
 
     /// The rig.

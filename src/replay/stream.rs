@@ -2,7 +2,7 @@ use super::state::{self, RestoreError};
 use super::{Replay, ReplayError};
 use crate::explain::{Decision, SEGMENTS, Statistic};
 use crate::hold::{self, Recorder};
-use crate::report::{ReplayReport, TraceSummary};
+use crate::report::{Alarm, ReplayReport, TraceSummary};
 use crate::rig::{ColumnMap, Rig};
 use crate::times::{Clock, TimeFormat};
 use crate::trace::{
@@ -11,6 +11,7 @@ use crate::trace::{
 };
 use crate::valve::ValveStream;
 use crate::wiring::{Refused, Wiring};
+use pitchleak_core::Leak;
 use pitchleak_core::continuity::{Block, Segment};
 use serde::{Deserialize, Serialize};
 
@@ -247,9 +248,10 @@ impl Stream {
         self.validator.as_ref().and_then(RowValidator::time_s)
     }
 
-    /// Drops the alarms so far, and all but the last episodes of each leak: a stream without end would grow with them.
-    pub fn forget_alarms(&mut self) {
-        self.replay.forget_alarms();
+    /// The alarms so far, but of these leaks, which stay; all but the last episodes of each leak are dropped: a stream without
+    /// end would grow with them.
+    pub(crate) fn take_alarms(&mut self, but: &[Leak]) -> Vec<Alarm> {
+        self.replay.take_alarms(but)
     }
 
     /// The running replay.

@@ -136,3 +136,20 @@ fn a_state_of_another_version_is_refused_by_name() {
         )
     );
 }
+
+/// What is held back is told later, or never where it was cleared before; another leak's alarm does not wait for it.
+#[test]
+fn an_alarm_of_a_leak_that_is_ruled_out_is_held_back() {
+    use AlarmState::{Cleared, Raised};
+    let mut replay = Replay::new(&Rig::paper()).expect("the paper's rig");
+    let alarm = |time_s: f64, fault, state| Alarm { time_s, fault, state };
+    let of_a = alarm(1.0, Leak::ExternalA, Raised);
+    replay.alarms = vec![of_a, alarm(1.5, Leak::Internal, Raised)];
+    assert_eq!(replay.take_alarms(&[Leak::ExternalA]), [alarm(1.5, Leak::Internal, Raised)]);
+    assert_eq!(replay.take_alarms(&[Leak::Internal]), [of_a]);
+    replay.alarms = vec![of_a];
+    assert_eq!(replay.take_alarms(&Leak::ALL), []);
+    replay.alarms.extend([alarm(2.0, Leak::Internal, Cleared), alarm(3.0, Leak::ExternalA, Cleared)]);
+    assert_eq!(replay.take_alarms(&Leak::ALL), [alarm(2.0, Leak::Internal, Cleared)]);
+    assert_eq!(replay.alarms, []);
+}
