@@ -28,6 +28,8 @@ const MISFIT_DOUBT: f64 = 3.0;
 /// What takes sizes of so many standard deviations of what sensors and rigs are off by is no explanation, but the nearest that the
 /// table has. Derived: one of two million is so large.
 const MOST_STRAIN: f64 = 5.0;
+/// A leak that wanders with this probability comes and goes: as likely as not.
+const AWAY_DOUBT: f64 = 0.5;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
@@ -158,6 +160,17 @@ impl Decision {
     /// Whether too much remains under every explanation for the leaks to be told.
     pub fn fits_nothing(&self) -> bool {
         (self.misfit > MISFIT_DOUBT || self.strained) && !self.status.is_sure()
+    }
+
+    /// Whether it rules out a leak of which an alarm stands: not where that comes and goes.
+    pub(crate) fn rules_out_alarm(&self, leak: Leak) -> bool {
+        self.ruled_out.contains(&leak) && !self.is_away(leak)
+    }
+
+    /// Whether a leak comes and goes, as likely as not, and is away.
+    pub(crate) fn is_away(&self, leak: Leak) -> bool {
+        let wandering = format!("{}:wandering", leak.id());
+        self.ruled_out.contains(&leak) && self.probability_where(|part| part == wandering) > AWAY_DOUBT
     }
 
     /// Probability of the explanations one of whose parts `is` so, as far as they are listed.

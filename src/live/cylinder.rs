@@ -10,7 +10,7 @@ use crate::hold::HoldTest;
 use crate::replay::{ReplayError, Stream, Taken};
 use crate::report::{Alarm, ReplayReport};
 use crate::trace::{BadReason, BadRows, LineLayout};
-use pitchleak_core::AlarmState;
+use pitchleak_core::{AlarmState, Leak};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -234,8 +234,9 @@ impl Cylinder {
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
         self.weighing.renew_for(&self.stream);
         let decision = self.weighing.decision.as_ref();
-        let due =
-            self.stream.take_alarms(decision.map(|decision| &decision.ruled_out[..]).unwrap_or_default());
+        let is_ruled_out = |leak: &Leak| decision.is_some_and(|decision| decision.rules_out_alarm(*leak));
+        let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
+        let due = self.stream.take_alarms(&ruled_out);
         if due.is_empty() {
             return;
         }

@@ -236,6 +236,9 @@ fn a_leak_that_comes_and_goes_is_not_gone_while_its_alarm_stands() {
     let text = away.verdict().text;
     assert!(text.contains("Internal leaks come and go, and the last seconds show none."), "{text}");
     assert!(text.contains("No external A or external B leak"), "{text}");
+    let rules_out = |id: &str, leak| with(id, INTERNAL).decision.unwrap().rules_out_alarm(leak);
+    assert!(!rules_out("internal:wandering", Leak::Internal));
+    assert!(rules_out("internal:wandering", Leak::ExternalA) && rules_out("internal:sudden", Leak::Internal));
     assert_eq!(with("internal:sudden", INTERNAL).judged(), (Status::Sound, vec![]));
     assert_eq!(with("internal:wandering", PerLeak::default()).judged(), (Status::Sound, vec![]));
 }

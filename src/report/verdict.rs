@@ -138,15 +138,9 @@ impl Findings<'_> {
 
     /// Whether a leak comes and goes, as likely as not, and is away while its alarm stands.
     pub(super) fn is_away(&self, leak: Leak) -> bool {
-        let Some(decision) = self.decision.filter(|_| self.active[leak]) else { return false };
-        let wandering = format!("{}:wandering", leak.id());
-        decision.ruled_out.contains(&leak)
-            && decision.probability_where(|part| part == wandering) > AWAY_DOUBT
+        self.active[leak] && self.decision.is_some_and(|decision| decision.is_away(leak))
     }
 }
-
-/// As likely as not.
-const AWAY_DOUBT: f64 = 0.5;
 
 /// A figure whose standard deviation is a larger share of it is none.
 const QUOTED_SHARE: f64 = 0.5;
