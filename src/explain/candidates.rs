@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, Free, at_scales, fit};
+use super::evidence::{Fit, Free, LEAST_SCALE, at_scales, chance_of_mean_square, fit, ln_scale_prior};
 use super::hypothesis::{
     CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
 };
@@ -10,17 +10,12 @@ use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::orthant::ln_most;
 use super::pass::Pass;
-use super::readings::Mistake;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
-use std::collections::HashMap;
 
 /// States of sensors and rig, best first, beside which other courses of leaks are tried; numerical.
 const STATES_WITH_COURSES: usize = 3;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
-/// ln of what columns gain at the noise of the explanation without them, from which on they speak for a mistake: more they
-/// would gain by less noise. Chosen.
-const MUCH: f64 = 30.0;
 /// Standard deviation of a share that may be any.
 const ANY: f64 = 100.0;
 /// Compressibility beyond the declared one, as its share: no oil is four times as stiff as its sheet says, and with six times its
@@ -271,38 +266,47 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let tables = self.pass.tables;
         let Some(state) = self.pass.slightly_off() else { return Vec::new() };
         let least = self.least();
-        let best_of = |is: &dyn Fn(&Scored<'a>) -> bool| {
-            let all = self.all.iter().enumerate().filter(|(_, one)| is(one));
-            all.max_by(|a, b| a.1.ln_posterior.total_cmp(&b.1.ln_posterior)).map(|(at, _)| at)
-        };
-        // A departure may have taken up already what a mistake's columns gain.
-        let mut best =
-            vec![best_of(&|_| true), best_of(&|one| one.hypothesis.state.departure == state.departure)];
-        best.dedup();
-        let best: Vec<&Scored<'_>> = best.into_iter().flatten().map(|at| &self.all[at]).collect();
-        let scales = best.first().map_or([1.0; 2], |best| best.scales);
-        let mut bounds: Vec<Bound<'_>> =
-            best.into_iter().filter_map(|best| Bound::of(best, self.declared)).collect();
         let whole = self.pass.products.whole();
         let columns = steady_columns();
         let ln_wired = ln_wired(&tables.mistakes);
         let mut kept = Vec::new();
+        let mut most_gained = f64::NEG_INFINITY;
         let scatters = self.pass.over_sheet.all_scatter();
         for (entry, mistake, ln_told) in self.pass.mistakes() {
             let equations = self.pass.equations(&whole, Some(entry), &columns);
-            let mended = Mended::new(equations, self.declared, mistake, scales, scatters);
+            let mended = Mended::new(equations, self.declared, mistake, scatters);
             let ln_share = entry.share.ln() - ln_wired + ln_told;
             let ln_prior = ln_share + mended.ln_measure;
             let begin = self.all.len();
             self.add_mistake(&mended, Mistaken { entry, state, ln_prior, wiring: kept.len() + 1 }, least);
-            let each = bounds.iter_mut().map(|bound| bound.ln_most(mistake, ln_share));
-            let most = each.reduce(f64::max).unwrap_or(f64::INFINITY);
-            self.all[begin..]
-                .iter_mut()
-                .for_each(|own| own.ln_posterior = own.ln_posterior.min(most + own.ln_sign));
+            let own = self.all[begin..].iter().map(|one| one.ln_posterior - ln_share);
+            most_gained = own.fold(most_gained, f64::max);
             kept.push(mended);
         }
+        self.take_off_what_noise_gains(state, most_gained);
         kept
+    }
+
+    /// What steady leaks explain of the readings as declared speaks for no mistake: what the best of them gains beyond the rest, ln
+    /// without their shares, it gains by noise, and the others with it.
+    fn take_off_what_noise_gains(&mut self, state: State<'_>, most_gained: f64) {
+        let steady = self.all.iter().filter(|one| one.is_steady_as_declared(state));
+        let best = steady.max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior));
+        let by_noise = best.map_or(0.0, |best| most_gained - best.ln_posterior - self.ln_unexplained(best));
+        if by_noise > 0.0 && by_noise.is_finite() {
+            let mistaken = self.all.iter_mut().filter(|one| one.wiring > 0);
+            mistaken.for_each(|one| one.ln_posterior -= by_noise);
+        }
+    }
+
+    /// ln of how much likelier a model would be that leaves no more than the readings scatter, and chance.
+    fn ln_unexplained(&self, steady: &Scored<'_>) -> f64 {
+        let ln_perfect = |c: usize| {
+            let rows = self.declared.rows[c];
+            let scale = self.declared.scatter(c).max(LEAST_SCALE) * (1.0 + chance_of_mean_square(rows));
+            ln_scale_prior(scale) - 0.5 * rows * (scale.ln() + 1.0)
+        };
+        (ln_perfect(0) + ln_perfect(1) - steady.ln_likelihood).max(0.0) - steady.ln_sign
     }
 
     /// A mistake with each set of leaks, unless no leak can make it as probable as `least`.
@@ -317,59 +321,8 @@ impl<'a, 'p> Candidates<'a, 'p> {
             hypothesis.wiring = Some(entry);
             let mut scored = Scored::new(&mended.equations, sizes, hypothesis);
             scored.wiring = wiring;
-            scored.ln_posterior += mended.ln_chance(scored.scales);
             scored
         });
-    }
-}
-
-/// What a mistake may reach at the most that its columns do not speak for: a unit is a gain, and what prefers it though its gain
-/// is not off is noise, of which no data sheet is so exact.
-struct Bound<'e> {
-    declared: &'e NormalEquations,
-    /// Of the likeliest explanation of the readings as declared, or the likeliest without a departure.
-    free: Vec<Free>,
-    scales: [f64; 2],
-    ln_posterior: f64,
-    chi_square: f64,
-    /// ln of what each set of columns gains: units of a reading share theirs.
-    gained: HashMap<&'static [Column], f64>,
-}
-
-impl<'e> Bound<'e> {
-    /// None where the readings as declared have no explanation.
-    fn of(best: &Scored<'_>, declared: &'e NormalEquations) -> Option<Self> {
-        if !best.ln_posterior.is_finite() {
-            return None;
-        }
-        let (free, scales) = (best.hypothesis.free.clone(), best.scales);
-        let (chi_square, _) = at_scales(declared, &free, scales);
-        let (ln_posterior, gained) = (best.ln_posterior, HashMap::new());
-        Some(Self { declared, free, scales, ln_posterior, chi_square, gained })
-    }
-
-    /// ln of its posterior, of a mistake with this ln prior.
-    fn ln_most(&mut self, mistake: Mistake, ln_share: f64) -> f64 {
-        let columns = mistake.as_columns();
-        let gained = match self.gained.get(columns) {
-            Some(gained) => *gained,
-            None => self.gain(columns),
-        };
-        self.gained.insert(columns, gained);
-        if columns.is_empty() || gained > MUCH {
-            f64::INFINITY
-        } else {
-            self.ln_posterior + ln_share + gained.max(0.0)
-        }
-    }
-
-    /// ln of what these columns gain, set free.
-    fn gain(&self, columns: &[Column]) -> f64 {
-        let mut free = self.free.clone();
-        for place in columns.iter().filter_map(|column| self.declared.place(*column, Course::Constant)) {
-            set_free(&mut free, place);
-        }
-        0.5 * (self.chi_square - at_scales(self.declared, &free, self.scales).0)
     }
 }
 
@@ -402,6 +355,13 @@ impl<'a> Scored<'a> {
         };
         let Fit { ln_likelihood, scales, .. } = fit;
         Self { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, wiring: 0 }
+    }
+
+    /// Whether leaks are constant, or none, beside this state of the readings as declared.
+    fn is_steady_as_declared(&self, state: State<'_>) -> bool {
+        self.wiring == 0
+            && self.hypothesis.state == state
+            && self.hypothesis.leaks.iter().flatten().all(|course| *course == LeakCourse::Constant)
     }
 }
 

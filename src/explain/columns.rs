@@ -42,10 +42,6 @@ pub enum Column {
     PositionGain,
     /// The piston's travel as read, share of it: its gain by its own readings.
     Travel,
-    /// The other meter's flow in place of each, share of it: 1 where they are exchanged.
-    Exchanged,
-    /// The same where they count the other way, too.
-    ExchangedAndTurned,
     /// Zero of the position sensor, share of the stroke.
     PositionZero,
     /// P_A past the piston: the gain of its sensor, where the internal leak is.
@@ -76,6 +72,14 @@ pub enum Column {
     OrificeA,
     /// Out of chamber B.
     OrificeB,
+}
+
+impl Column {
+    /// Whether its noise is that of the flows alone, or for the most part.
+    pub(super) fn is_of_flows(self) -> bool {
+        use Column as C;
+        matches!(self, C::LeftSide | C::GainA | C::GainB | C::Gains | C::LagA | C::LagB | C::Lags)
+    }
 }
 
 /// How a column's share changes along the trace.
@@ -167,14 +171,6 @@ impl Scales<'_> {
             Column::GainB => plain(&[], &[(R::ResidualB, 1.0)]),
             Column::Gains => plain(&[(R::ResidualA, 1.0)], &[(R::ResidualB, 1.0)]),
             Column::Travel => plain(&[(R::Travel, area_a)], &[(R::Travel, -area_b)]),
-            Column::Exchanged => plain(
-                &[(R::ResidualA, 1.0), (R::ResidualB, -1.0)],
-                &[(R::ResidualA, -1.0), (R::ResidualB, 1.0)],
-            ),
-            Column::ExchangedAndTurned => plain(
-                &[(R::ResidualA, 1.0), (R::ResidualB, 1.0)],
-                &[(R::ResidualA, 1.0), (R::ResidualB, 1.0)],
-            ),
             Column::LagA => plain(&[(R::FlowChangeA, -1.0)], &[]),
             Column::LagB => plain(&[], &[(R::FlowChangeB, -1.0)]),
             Column::Lags => plain(&[(R::FlowChangeA, -1.0)], &[(R::FlowChangeB, -1.0)]),

@@ -75,7 +75,7 @@ impl NormalEquations {
                 own.rows[equation] += segment.rows[equation];
             }
         }
-        own.loudest = own.left_noise.map(|[sheet, scattered]| f64::max(scattered / sheet, 1.0));
+        own.loudest = [0, 1].map(|equation| own.scatter(equation).max(1.0));
         own.sought_from = own.loudest;
         own.silence(columns);
         own
@@ -101,6 +101,12 @@ impl NormalEquations {
         self.left_noise[equation]
     }
 
+    /// The second over the first; 1 where no noise is declared.
+    pub fn scatter(&self, equation: usize) -> f64 {
+        let [sheet, scattered] = self.left_noise[equation];
+        if sheet > 0.0 { scattered / sheet } else { 1.0 }
+    }
+
     /// With rows whose unit is `unit` times the noise, and readings that scatter so many times as much as that allows, all
     /// squared: the columns' noise is of the readings' own scale already.
     pub fn measured_by(mut self, unit: [f64; EQUATIONS], scatter: [f64; EQUATIONS]) -> Self {
@@ -109,6 +115,20 @@ impl NormalEquations {
             self.noise[equation]
                 .iter_mut()
                 .for_each(|product| *product /= unit[equation] * scatter[equation]);
+        }
+        self
+    }
+
+    /// With readings other than the flows so many times quieter than the rows' noise scale says, squared.
+    pub fn with_louder_flows(mut self, louder: [f64; EQUATIONS]) -> Self {
+        let mut of_flows = vec![false; self.size];
+        self.places.iter().for_each(|((column, _), place)| of_flows[*place] = column.is_of_flows());
+        for (noise, louder) in self.noise.iter_mut().zip(louder) {
+            for (place, entry) in noise.iter_mut().enumerate() {
+                if !(of_flows[place / self.size] && of_flows[place % self.size]) {
+                    *entry /= louder;
+                }
+            }
         }
         self
     }

@@ -5,12 +5,10 @@
 //! sheet is no mistake. Where the declared noise and the scatter differ, the smaller change counts.
 //!
 //! A unit makes the noise of its readings another one by just its factor, so its rows stay in the sheet's noise, and how
-//! loud they are with and without it is taken off: only what is left beyond the readings' own scatter tells. What fits
-//! gain below that scatter is explained noise, what they lose above it is chance as far as a sum of squares varies: both tell
-//! for neither side more than the noise itself differs.
+//! loud they are with and without it is taken off: only what is left beyond the readings' own scatter tells.
 
 use super::equations::NormalEquations;
-use super::evidence::{LEAST_SCALE, chance_of_mean_square, ln_scale_prior};
+use super::evidence::ln_scale_prior;
 use super::leak_sample::Weighing;
 use super::readings::Mistake;
 use pitchleak_core::continuity::EQUATIONS;
@@ -39,34 +37,19 @@ struct Noise {
 /// How one equation is measured.
 #[derive(Clone, Copy)]
 struct Measure {
-    /// How many rows it has.
-    rows: f64,
-    /// Their unit, in the noise as declared, squared; …
+    /// The unit of its rows, in the noise as declared, squared; …
     unit: f64,
     /// … the same in the sheet's noise for readings without the mistake.
     unit_of_sheet: f64,
     /// How much more the readings scatter than the unit.
     scattered: f64,
-    /// Noise scales below which a fit has explained noise by chance; 0 where nothing is known of it.
-    left: f64,
-    /// ln of what the best explanation as declared gained or lost by chance, and the most that is taken back on either side;
-    /// none of what is no unit.
-    declared: Option<(f64, f64)>,
     /// ln of what the noise changes of the evidence.
     ln_noise: f64,
 }
 
 impl Default for Measure {
     fn default() -> Self {
-        Self {
-            rows: 0.0,
-            unit: 1.0,
-            unit_of_sheet: 1.0,
-            scattered: 1.0,
-            left: 0.0,
-            declared: None,
-            ln_noise: 0.0,
-        }
+        Self { unit: 1.0, unit_of_sheet: 1.0, scattered: 1.0, ln_noise: 0.0 }
     }
 }
 
@@ -84,53 +67,28 @@ impl Noise {
         (self.own / self.other).min(self.own_scatter / self.scatter)
     }
 
-    /// Of readings in another unit; `scale` is that of the best explanation as declared.
-    fn measure_unit(&self, rows: f64, scale: f64) -> Measure {
+    /// Of so many readings in another unit.
+    fn measure_unit(&self, rows: f64) -> Measure {
         let scattered = self.own_scatter / self.other;
-        Measure {
-            rows,
-            scattered,
-            left: scattered,
-            declared: Some(self.declared_by_chance(rows, scale)),
-            ln_noise: 0.5 * rows * self.louder().ln(),
-            ..Measure::default()
-        }
+        Measure { scattered, ln_noise: 0.5 * rows * self.louder().ln(), ..Measure::default() }
     }
 
     /// Of another clock: it scales no reading, but over how long its noise is summed.
-    fn measure_clock(&self, rows: f64, scale: f64) -> Measure {
+    fn measure_clock(&self) -> Measure {
         let unit = self.louder();
         let scattered = self.own_scatter / (self.other * unit);
-        Measure {
-            rows,
-            unit,
-            unit_of_sheet: unit * self.other / self.own,
-            scattered,
-            left: scattered,
-            declared: Some(self.declared_by_chance(rows, scale)),
-            ln_noise: 0.0,
-        }
-    }
-
-    /// ln of what the best explanation as declared gained or lost by chance, and the most that is taken back.
-    fn declared_by_chance(&self, rows: f64, scale: f64) -> (f64, f64) {
-        (ln_by_chance(rows, scale, self.scatter / self.other), (0.5 * rows * self.louder().ln()).abs())
+        Measure { unit, unit_of_sheet: unit * self.other / self.own, scattered, ln_noise: 0.0 }
     }
 
     /// Of any other mistake: it turns noise into other noise, which by chance may be smaller. Readings better than their sheet
     /// may be so once mended, too.
-    fn measure(&self, rows: f64, scale: f64) -> Measure {
+    fn measure(&self) -> Measure {
         let unit = self.louder();
-        let scattered = self.own_scatter / (self.other * unit);
         let as_usual = (self.own_scatter / self.other).clamp((self.scatter / self.other).min(1.0), 1.0);
-        let chance = most_by_chance(rows);
         Measure {
-            rows,
             unit,
             unit_of_sheet: unit,
-            scattered,
-            left: (scale * self.other / self.scatter).min(chance) * scattered,
-            declared: None,
+            scattered: self.own_scatter / (self.other * unit),
             ln_noise: ln_scale_prior(self.own_scatter / self.other / as_usual)
                 - ln_scale_prior((self.scatter / self.other).max(1.0)),
         }
@@ -138,15 +96,6 @@ impl Noise {
 }
 
 impl Measure {
-    /// ln of what is taken back from a fit of this noise scale, and from the best one as declared.
-    fn ln_chance(&self, scale: f64) -> f64 {
-        let gained = || ln_by_chance(self.rows, scale, self.left);
-        self.declared.map_or_else(
-            || -ln_below(self.rows, scale, self.left),
-            |(declared, most)| (declared - gained()).clamp(-most, most),
-        )
-    }
-
     /// Noise scale that the readings' own scatter makes, at least the sheet's.
     fn loudness(&self) -> f64 {
         (self.scattered * self.unit_of_sheet).max(1.0) / self.unit_of_sheet
@@ -154,21 +103,19 @@ impl Measure {
 }
 
 impl Mended {
-    /// Of readings without this mistake, all of which scatter or not; the best explanation as declared has the noise `scales`.
+    /// Of readings without this mistake, all of which scatter or not.
     pub fn new(
         mended: NormalEquations,
         declared: &NormalEquations,
         mistake: Mistake,
-        scales: [f64; EQUATIONS],
         scatters: bool,
     ) -> Self {
         let noises = [0, 1].map(|equation| Noise::of(&mended, declared, equation));
         let measure = |equation: usize| {
-            let (rows, scale) = (mended.rows[equation], scales[equation]);
             noises[equation].as_ref().map_or_else(Measure::default, |noise| match mistake {
-                Mistake::Factor(..) if scatters => noise.measure_unit(rows, scale),
-                Mistake::Clock(_) => noise.measure_clock(rows, scale),
-                _ => noise.measure(rows, scale),
+                Mistake::Factor(..) if scatters => noise.measure_unit(mended.rows[equation]),
+                Mistake::Clock(_) => noise.measure_clock(),
+                _ => noise.measure(),
             })
         };
         let measures = [0, 1].map(measure);
@@ -192,25 +139,4 @@ impl Mended {
         let each = self.measures.iter().zip(scales).map(|(own, scale)| scale * own.unit_of_sheet);
         each.fold(0.0, f64::max).sqrt()
     }
-
-    /// ln of what is taken back from a fit whose noise scales are below what the readings' own scatter leaves.
-    pub fn ln_chance(&self, scales: [f64; EQUATIONS]) -> f64 {
-        self.measures.iter().zip(scales).map(|(own, scale)| own.ln_chance(scale)).sum()
-    }
-}
-
-/// ln of what a noise scale below `left` gains.
-fn ln_below(rows: f64, scale: f64, left: f64) -> f64 {
-    if left > scale { 0.5 * rows * (left / scale).ln() } else { 0.0 }
-}
-
-/// The same, less what one above it loses as far as that is chance. No fit has a scale below the least.
-fn ln_by_chance(rows: f64, scale: f64, left: f64) -> f64 {
-    let gained = || (left.max(LEAST_SCALE) / scale).max(1.0 / most_by_chance(rows)).ln();
-    if left > 0.0 { 0.5 * rows * gained() } else { 0.0 }
-}
-
-/// A noise scale over what it truly is.
-fn most_by_chance(rows: f64) -> f64 {
-    1.0 + chance_of_mean_square(rows)
 }

@@ -2,12 +2,13 @@
 
 use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
+use super::evidence::LEAST_SCALE;
 use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State};
 use super::mistakes;
 use super::odds::Prior;
 use super::raw_products::{RawProducts, SegmentProducts, Statistic};
 use super::readings::{Mistake, Readings};
-use super::scatter::{Louder, OverSheet};
+use super::scatter::OverSheet;
 use super::table::{self, Entry, USUAL};
 use crate::rig::{Odds, Rig};
 use crate::told::Told;
@@ -114,15 +115,14 @@ impl<'a, 's> Pass<'a, 's> {
         if mistake.is_some() { equations } else { self.with_columns_of_their_own_noise(equations) }
     }
 
-    /// A fit takes all noise to be louder by one scale. Where the flows alone are, the columns' noise is not.
+    /// A fit takes all noise to be as many times the sheet's. Where the flows alone are louder, or quieter, the columns' noise is not.
     fn with_columns_of_their_own_noise(&self, equations: NormalEquations) -> NormalEquations {
-        let Louder { position, pressures, .. } = self.over_sheet.louder();
-        let of_columns = position.max(pressures).powi(2);
+        let of_columns = self.over_sheet.of_columns().powi(2);
         let louder = [0, 1].map(|equation| {
-            let [sheet, scattered] = equations.left_noise(equation);
-            if sheet > 0.0 { (scattered / sheet / of_columns).max(1.0) } else { 1.0 }
+            let of_rows = equations.scatter(equation).max(LEAST_SCALE);
+            of_rows / of_columns.clamp(of_rows.min(1.0), of_rows.max(1.0))
         });
-        equations.measured_by([1.0; EQUATIONS], louder)
+        equations.with_louder_flows(louder)
     }
 
     pub fn scales(&self, mistake: Option<&Entry>) -> Scales<'s> {
@@ -153,8 +153,6 @@ impl<'a, 's> Pass<'a, 's> {
         columns.extend(
             entries.flat_map(|entry| entry.free.iter().map(|(column, course, _)| (*column, *course))),
         );
-        let mistaken = self.mistakes().flat_map(|(_, mistake, _)| mistake.as_columns());
-        columns.extend(mistaken.map(|column| (*column, Course::Constant)));
         for leak in LEAK_COLUMNS {
             columns.extend(
                 [Course::Constant, Course::FromBegin, Course::ToEnd, Course::Accelerating]

@@ -8,7 +8,6 @@ use super::leak_sample::{LITTLE_LN, Weighed, Weighing, cut};
 use super::mended::Mended;
 use super::pass::{Pass, Tables};
 use super::raw_products::{RawProducts, Statistic};
-use super::scatter::Louder;
 use crate::rig::Rig;
 use crate::told::Told;
 use pitchleak_core::PerLeak;
@@ -91,8 +90,8 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
     candidates.add_courses();
     candidates.add_jumps();
     let mended = candidates.add_mistakes();
-    let Louder { flows, position, .. } = pass.over_sheet.louder();
-    let as_declared = Weighing { equations: declared, loudness: [flows * flows, position * position] };
+    let loudness = pass.over_sheet.louder().map(|ratio| ratio * ratio);
+    let as_declared = Weighing { equations: declared, loudness };
     let weighings: Vec<Weighing<'_>> =
         std::iter::once(as_declared).chain(mended.iter().map(Mended::weighing)).collect();
     let mut all = candidates.best_first();

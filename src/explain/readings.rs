@@ -1,6 +1,5 @@
 //! What the readings of a mistaken wiring, unit or rig truly are: linear maps of the raw sums.
 
-use super::columns::Column;
 use pitchleak_core::continuity::{RAW_SUMS, RawSum};
 use pitchleak_core::{ATMOSPHERE_PA, Cylinder, PerLeak};
 
@@ -21,22 +20,6 @@ pub enum Of {
     Pressures,
     /// x.
     Position,
-}
-
-impl Of {
-    /// Columns of its gain; that of leaks is in their coefficients.
-    fn gains(self) -> &'static [Column] {
-        match self {
-            Self::FlowA => &[Column::GainA],
-            Self::FlowB => &[Column::GainB],
-            Self::Flows => &[Column::GainA, Column::GainB],
-            Self::PressureA => &[Column::PressureGainA, Column::ThroughSealA],
-            Self::PressureB => &[Column::PressureGainB, Column::ThroughSealB],
-            Self::Pressures => &[Column::Unpressed],
-            // Readings that are too small show less of the motion than the flows do.
-            Self::Position => &[Column::Travel, Column::PositionGain],
-        }
-    }
 }
 
 /// A mistake of wiring, sign, unit or geometry, which no small error is.
@@ -262,25 +245,6 @@ impl Readings {
 }
 
 impl Mistake {
-    /// What set free beside the readings as declared does all that it does; none of what is no such column.
-    pub(super) fn as_columns(self) -> &'static [Column] {
-        match self {
-            Self::FlowsExchanged => &[Column::Exchanged],
-            Self::FlowsExchangedAndTurned => &[Column::ExchangedAndTurned],
-            Self::Sign(of) | Self::Factor(of, _) => of.gains(),
-            Self::Clock(_) => Of::Flows.gains(),
-            // The volumes count from the other end, too.
-            Self::OtherEnd => &[Column::Travel, Column::DeadVolumeA, Column::DeadVolumeB],
-            Self::Absolute(Of::PressureA) => &[Column::PressureZeroA],
-            Self::Absolute(Of::PressureB) => &[Column::PressureZeroB],
-            Self::Absolute(_) => &[Column::PressureZeroA, Column::PressureZeroB],
-            Self::AreasExchanged => &[Column::AreaA, Column::AreaB],
-            Self::Area(0, _) => &[Column::AreaA],
-            Self::Area(..) => &[Column::AreaB],
-            Self::PressuresExchanged | Self::ChambersExchanged | Self::LostSign(_) => &[],
-        }
-    }
-
     /// ln by which mending multiplies the density of both flows, given position and pressures.
     pub(super) fn ln_jacobian(self) -> f64 {
         match self {

@@ -15,7 +15,6 @@ use super::pass::Pass;
 use super::readings::{Mistake, Of};
 use super::table::{Entry, Kind, USUAL_GAIN};
 use crate::units::rounded;
-use pitchleak_core::continuity::EQUATIONS;
 use std::f64::consts::TAU;
 
 /// Readings that are further off are units, or slipped decimal points. Chosen.
@@ -111,7 +110,7 @@ pub(super) fn with_scales(pass: &Pass<'_, '_>) -> Vec<Entry> {
         for _ in 0..REFINED {
             let Some(found) = entry.mistake else { break };
             let equations = pass.equations(&whole, Some(entry), &columns);
-            let mended = Mended::new(equations, &declared, found, [1.0; EQUATIONS], scatters);
+            let mended = Mended::new(equations, &declared, found, scatters);
             let left = scaled.factor_by(pass, &mended.equations);
             factor = factor.zip(left).map(|(factor, left)| factor * left);
             entry.mistake = factor.and_then(mistake);

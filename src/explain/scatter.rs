@@ -8,7 +8,7 @@
 use super::raw_products::LEAST_SCATTER;
 use super::readings::Mistake;
 use crate::rig::Rig;
-use pitchleak_core::continuity::CHANNELS;
+use pitchleak_core::continuity::{CHANNELS, EQUATIONS};
 
 /// How often a data sheet tells the noise exactly. A guess.
 const EXACT_SHARE: f64 = 0.2;
@@ -33,10 +33,17 @@ impl OverSheet {
         }))
     }
 
-    /// How many times louder than their sheets flows, position and pressures are, the loudest of a kind, at least 1.
-    pub(super) fn louder(&self) -> Louder {
-        let [x, pa, pb, qa, qb] = self.0.map(|ratio| ratio.map_or(1.0, |ratio| ratio.max(1.0)));
-        Louder { flows: qa.max(qb), position: x, pressures: pa.max(pb) }
+    /// How many times louder than their sheets the louder flow and the position are, at least 1: what the equations have on
+    /// their left sides.
+    pub(super) fn louder(&self) -> [f64; EQUATIONS] {
+        let [x, _, _, qa, qb] = self.0.map(|ratio| ratio.map_or(1.0, |ratio| ratio.max(1.0)));
+        [qa.max(qb), x]
+    }
+
+    /// How many times louder than its sheet the loudest of position and pressures is.
+    pub(super) fn of_columns(&self) -> f64 {
+        let [x, pa, pb, _, _] = self.0.map(|ratio| ratio.unwrap_or(1.0));
+        x.max(pa).max(pb)
     }
 
     /// Whether all channels scatter: none is computed.
@@ -60,14 +67,6 @@ impl OverSheet {
             |ratio: &Option<f64>| ratio.is_some_and(|ratio| ratio.is_finite() && ratio > LEAST_SCATTER);
         self.0.iter().all(scatters).then(|| self.0.map(|ratio| ratio.unwrap_or(1.0).ln()))
     }
-}
-
-/// How many times louder than their sheets readings are.
-#[derive(Clone, Copy)]
-pub(super) struct Louder {
-    pub flows: f64,
-    pub position: f64,
-    pub pressures: f64,
 }
 
 fn ln_density(ln_ratios: &[f64; CHANNELS]) -> f64 {

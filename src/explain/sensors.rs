@@ -18,7 +18,7 @@ impl Column {
         match self {
             Self::ZeroA | Self::GainA | Self::LagA => Of::FlowA.sensors(),
             Self::ZeroB | Self::GainB | Self::LagB => Of::FlowB.sensors(),
-            Self::Gains | Self::Lags | Self::Exchanged | Self::ExchangedAndTurned => Of::Flows.sensors(),
+            Self::Gains | Self::Lags => Of::Flows.sensors(),
             Self::PositionGain | Self::PositionZero | Self::Travel => Of::Position.sensors(),
             Self::ThroughSealA | Self::PressureZeroA | Self::PressureGainA => Of::PressureA.sensors(),
             Self::ThroughSealB | Self::PressureZeroB | Self::PressureGainB => Of::PressureB.sensors(),
