@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::{Fit, Free, LEAST_SCALE, at_scales, chance_of_mean_square, fit, ln_scale_prior};
+use super::evidence::{Fit, LEAST_SCALE, at_scales, chance_of_mean_square, fit, ln_scale};
 use super::hypothesis::{
     CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
 };
@@ -16,8 +16,6 @@ use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
 const STATES_WITH_COURSES: usize = 3;
 /// Gains and areas that are off by more are units.
 const MOST_GAIN: f64 = 0.15;
-/// Standard deviation of a share that may be any.
-const ANY: f64 = 100.0;
 /// Compressibility beyond the declared one, as its share: no oil is four times as stiff as its sheet says, and with six times its
 /// compressibility it is foam. Chosen.
 const COMPRESSIBILITY: std::ops::RangeInclusive<f64> = -0.75..=5.0;
@@ -304,7 +302,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         let ln_perfect = |c: usize| {
             let rows = self.declared.rows[c];
             let scale = self.declared.scatter(c).max(LEAST_SCALE) * (1.0 + chance_of_mean_square(rows));
-            ln_scale_prior(scale) - 0.5 * rows * (scale.ln() + 1.0)
+            ln_scale(rows, scale) - 0.5 * rows
         };
         (ln_perfect(0) + ln_perfect(1) - steady.ln_likelihood).max(0.0) - steady.ln_sign
     }
@@ -324,16 +322,6 @@ impl<'a, 'p> Candidates<'a, 'p> {
             scored
         });
     }
-}
-
-/// Lets a column be any share of itself, in its own place where it was free before; gives that.
-pub(super) fn set_free(free: &mut Vec<Free>, column: usize) -> usize {
-    let at = free.iter().position(|known| known.column == column).unwrap_or_else(|| {
-        free.push(Free { column, std: ANY });
-        free.len() - 1
-    });
-    free[at].std = ANY;
-    at
 }
 
 /// A mistake of wiring as it is weighed.

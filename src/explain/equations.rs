@@ -108,7 +108,7 @@ impl NormalEquations {
     }
 
     /// With rows whose unit is `unit` times the noise, and readings that scatter so many times as much as that allows, all
-    /// squared: the columns' noise is of the readings' own scale already.
+    /// squared: the columns' noise is of the readings' own scale already, so a fit's scales are sought from 1 on.
     pub fn measured_by(mut self, unit: [f64; EQUATIONS], scatter: [f64; EQUATIONS]) -> Self {
         for equation in 0..EQUATIONS {
             self.gram[equation].iter_mut().for_each(|product| *product /= unit[equation]);
@@ -116,7 +116,7 @@ impl NormalEquations {
                 .iter_mut()
                 .for_each(|product| *product /= unit[equation] * scatter[equation]);
         }
-        self
+        Self { loudest: scatter, sought_from: [1.0; EQUATIONS], ..self }
     }
 
     /// With readings other than the flows so many times quieter than the rows' noise scale says, squared.
@@ -131,12 +131,6 @@ impl NormalEquations {
             }
         }
         self
-    }
-
-    /// Of other units than the sheet's: with scales that the readings' own scatter makes in those. The columns' noise is of them
-    /// already, so a fit's are sought from 1 on.
-    pub fn with_loudest(self, loudest: [f64; EQUATIONS]) -> Self {
-        Self { loudest, sought_from: [1.0; EQUATIONS], ..self }
     }
 
     /// Columns that are mostly noise, as loud as the readings scatter, are zero. The left side's noise is what the residual is

@@ -173,7 +173,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
         }
         step += 1;
     }
-    let ln_scales: f64 = (0..2).map(|c| ln_scale_prior(scales[c]) - 0.5 * n[c] * scales[c].ln()).sum();
+    let ln_scales: f64 = (0..2).map(|c| ln_scale(n[c], scales[c])).sum();
     let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);
     let is_possible = ln_evidence.is_finite() && chi_square > LEAST_CHI_SQUARE;
     Fit {
@@ -202,6 +202,11 @@ pub(super) fn at_scales(equations: &NormalEquations, free: &[Free], scales: [f64
 /// By how much the mean of squares of so many unit normals may be off by chance: a mean square's standard deviation is √(2/n).
 pub(super) fn chance_of_mean_square(rows: f64) -> f64 {
     CHANCE_SIGMAS * (2.0 / rows.max(1.0)).sqrt()
+}
+
+/// ln of what a noise scale s² of so many rows is worth, before what they leave: ln p(s²) − ½ n ln s².
+pub(super) fn ln_scale(rows: f64, scale: f64) -> f64 {
+    ln_scale_prior(scale) - 0.5 * rows * scale.ln()
 }
 
 /// ln of the prior density of a noise scale s², up to a constant: −½ν (ln s² + 1/s² − 1).

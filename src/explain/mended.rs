@@ -124,7 +124,7 @@ impl Mended {
         let scattered = measures.map(|own| own.scattered.max(1.0));
         Self {
             ln_measure: ln_density.min(0.0) + measures.iter().map(|own| own.ln_noise).sum::<f64>(),
-            equations: mended.measured_by(measures.map(|own| own.unit), scattered).with_loudest(scattered),
+            equations: mended.measured_by(measures.map(|own| own.unit), scattered),
             measures,
         }
     }

@@ -5,10 +5,10 @@
 //! that are always free cover [`USUAL_GAIN`] of it, so the one factor that fits has that share of the range: Occam's factor of
 //! a uniform prior (MacKay 2003, Information Theory, Inference, and Learning Algorithms, §28.1).
 
-use super::candidates::{ln_sign, set_free, steady_columns, together};
+use super::candidates::{ln_sign, steady_columns, together};
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
-use super::evidence::fit;
+use super::evidence::{Free, fit};
 use super::hypothesis::{Hypothesis, LeakCourse, subsets};
 use super::mended::Mended;
 use super::pass::Pass;
@@ -17,6 +17,8 @@ use super::table::{Entry, Kind, USUAL_GAIN};
 use crate::units::rounded;
 use std::f64::consts::TAU;
 
+/// Standard deviation of a share that may be any.
+const ANY: f64 = 100.0;
 /// Readings that are further off are units, or slipped decimal points. Chosen.
 const MOST: f64 = 10.0;
 /// Nearer to 1, ln, it is a gain, of which the table's largest is half as large. Chosen.
@@ -135,4 +137,14 @@ fn share(pass: &Pass<'_, '_>, equations: &NormalEquations, column: Column) -> Op
         (fit.ln_evidence + own.ln_prior + ln_sign(&fit, &own.positive), fit.means[at])
     });
     fits.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, share)| share)
+}
+
+/// Lets a column be any share of itself, in its own place where it was free before; gives that.
+fn set_free(free: &mut Vec<Free>, column: usize) -> usize {
+    let at = free.iter().position(|known| known.column == column).unwrap_or_else(|| {
+        free.push(Free { column, std: ANY });
+        free.len() - 1
+    });
+    free[at].std = ANY;
+    at
 }
