@@ -158,6 +158,21 @@ fn a_leak_beside_a_pressures_gain_has_its_true_size() {
     }
 }
 
+/// In calm wind a leak keeps its flow from ever being negative: that is no lost sign, also where the position is noisier than declared.
+#[test]
+fn a_leak_in_calm_wind_has_lost_no_sign() {
+    for leak in [Leak::ExternalA, Leak::ExternalB] {
+        let mut leaks = PerLeak::default();
+        leaks[leak] = LeakCourse::from(LeakSize::MeanFlow(0.5 / LPM_PER_M3S));
+        let truths = windy(WindCase::Mps5, leaks, 0.0, 300.0);
+        (1..=4).into_par_iter().for_each(|seed| {
+            let (trace, _) = recorded(&truths, &lie(&[]), 1.5e-2, seed);
+            let report = judge::replayed(trace, 1e-2).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(report.verdict.status, Status::Leak, "{leak:?} {seed}: {}", report.verdict.text);
+        });
+    }
+}
+
 /// Right columns, honest sensors: sure, and right.
 #[test]
 fn honest_traces_stay_sure() {

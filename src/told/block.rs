@@ -12,8 +12,10 @@ pub(crate) struct Block {
     pub follows: bool,
     pub time_s: f64,
     pub readings: u32,
-    /// Slope of the position, m/s, and its standard deviation for one of 1 m of each reading.
+    /// Slope of the position, m/s, and its standard deviation as the readings lie about it.
     pub speed_mps: f64,
+    pub speed_std_mps: f64,
+    /// The same for a standard deviation of 1 m of each reading.
     pub speed_std_per_m: f64,
     /// x, P_A, P_B, Q_A, Q_B, F: SI; none of what was not read all through.
     pub means: [Option<f64>; CHANNELS],
@@ -31,8 +33,8 @@ pub(crate) struct Gatherer {
     unsigned: [bool; 2],
     readings: u32,
     time_s: f64,
-    /// Σt, Σt² and Σtx.
-    moments: [f64; 3],
+    /// Σt, Σt², Σtx and Σx².
+    moments: [f64; 4],
     follows: bool,
 }
 
@@ -69,22 +71,27 @@ impl Gatherer {
         for (unsigned, flow) in self.unsigned.iter_mut().zip([s.qa_m3s, s.qb_m3s]) {
             *unsigned &= flow.is_none_or(|flow| flow >= 0.0);
         }
-        let [t, tt, tx] = &mut self.moments;
+        let [t, tt, tx, xx] = &mut self.moments;
         *t += self.time_s;
         *tt += self.time_s * self.time_s;
         *tx += self.time_s * s.x_m;
+        *xx += s.x_m * s.x_m;
     }
 
     fn block(&self) -> Block {
         let n = f64::from(self.readings);
-        let [t, tt, tx] = self.moments;
+        let [t, tt, tx, xx] = self.moments;
         let power = tt - t * t / n;
+        let x = self.sums[0];
+        let speed_mps = (tx - t * x / n) / power;
+        let left = (xx - x * x / n - speed_mps * speed_mps * power).max(0.0);
         let mean = |channel: usize| (self.counts[channel] == self.readings).then(|| self.sums[channel] / n);
         Block {
             follows: self.follows,
             time_s: self.time_s,
             readings: self.readings,
-            speed_mps: (tx - t * self.sums[0] / n) / power,
+            speed_mps,
+            speed_std_mps: (left / (n - 2.0) / power).sqrt(),
             speed_std_per_m: power.sqrt().recip(),
             means: std::array::from_fn(mean),
             unsigned: self.unsigned,

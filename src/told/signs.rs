@@ -7,7 +7,7 @@ use pitchleak_core::Cylinder;
 use serde::{Deserialize, Serialize};
 
 /// A piston moves where its speed is so many standard deviations of it. Chosen.
-const SIGMAS: f64 = 4.0;
+const SIGMAS: f64 = 3.0;
 /// Blocks of motion each way below which nothing is said. Chosen.
 const LEAST_MOVING: u32 = 2;
 /// Leaks into or out of a chamber that are tried on either side of none, up to this share of the meter's full scale.
@@ -25,9 +25,9 @@ pub(super) struct SignSums([Side; 2]);
 
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Side {
-    blocks: f64,
+    is_read: bool,
     negative: bool,
-    /// Blocks in which the piston moves out and in.
+    /// Blocks in which the piston moves out and in; the sums below are of these.
     moving: [u32; 2],
     /// Expected square of the noise.
     noise: f64,
@@ -42,7 +42,8 @@ impl SignSums {
         let sheets = [rig.instruments.flow_a, rig.instruments.flow_b];
         let [_, Some(pa), Some(pb), qa, qb, _] = block.means else { return };
         let load = (pa - pb) / (USUAL_LOAD * rig.instruments.pressure.full_scale);
-        let speed_std = rig.sensors().position.noise_std * block.speed_std_per_m;
+        let declared = rig.sensors().position.noise_std * block.speed_std_per_m;
+        let speed_std = declared.max(block.speed_std_mps);
         for (at, (flow, area)) in [qa, qb].into_iter().zip([area_a_m2, -area_b_m2]).enumerate() {
             let Some(flow) = flow else { continue };
             let own = Own { flow_m3s: area * block.speed_mps, std: area.abs() * speed_std };
@@ -55,7 +56,7 @@ impl SignSums {
     pub fn with(&self, other: &Self) -> Self {
         let mut both = *self;
         for (one, other) in both.0.iter_mut().zip(&other.0) {
-            one.blocks += other.blocks;
+            one.is_read |= other.is_read;
             one.negative |= other.negative;
             one.noise += other.noise;
             one.moving.iter_mut().zip(other.moving).for_each(|(sum, more)| *sum += more);
@@ -69,10 +70,9 @@ impl SignSums {
 
     /// Of each flow.
     pub fn found(&self) -> [Unsigned; 2] {
-        self.0.each_ref().map(|side| Unsigned {
-            is_unsigned: side.blocks > 0.0 && !side.negative,
-            ln_lost: side.ln_lost(),
-        })
+        self.0
+            .each_ref()
+            .map(|side| Unsigned { is_unsigned: side.is_read && !side.negative, ln_lost: side.ln_lost() })
     }
 }
 
@@ -85,12 +85,14 @@ struct Own {
 
 impl Side {
     fn add(&mut self, flow: f64, unsigned: bool, own: Own, shapes: [f64; 2], noise: f64, sheet: &Instrument) {
-        self.blocks += 1.0;
+        self.is_read = true;
         self.negative |= !unsigned;
-        self.noise += noise + own.std * own.std;
-        if own.flow_m3s.abs() > SIGMAS * own.std {
-            self.moving[usize::from(own.flow_m3s < 0.0)] += 1;
+        // At rest a size is as the flow: what leads to one there is the position's noise, which sizes halve.
+        if own.flow_m3s.abs() <= SIGMAS * own.std {
+            return;
         }
+        self.moving[usize::from(own.flow_m3s < 0.0)] += 1;
+        self.noise += noise + own.std * own.std;
         let [of_flow, of_size] = &mut self.left;
         for ((of_flow, of_size), shape) in of_flow.iter_mut().zip(of_size).zip(shapes) {
             each_leak(of_flow, sheet, |leak| flow - (own.flow_m3s + leak * shape));
@@ -102,12 +104,13 @@ impl Side {
         if self.negative || self.moving.iter().any(|blocks| *blocks < LEAST_MOVING) {
             return None;
         }
+        let blocks = f64::from(self.moving[0] + self.moving[1]);
         let least = |by_shape: &[[[f64; 2]; LEAKS]; 2]| {
-            let variance = |[sum, square]: &[f64; 2]| square - sum * sum / self.blocks;
+            let variance = |[sum, square]: &[f64; 2]| square - sum * sum / blocks;
             by_shape.iter().flatten().map(variance).fold(f64::MAX, f64::min).max(self.noise)
         };
         let [signed, size] = self.left.each_ref().map(least);
-        Some(0.5 * INDEPENDENT * self.blocks * (signed / size).ln())
+        Some(0.5 * INDEPENDENT * blocks * (signed / size).ln())
     }
 }
 
