@@ -4,6 +4,7 @@ use super::candidates::Scored;
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, chance_of_mean_square, fit};
+use super::given_leaks::GivenLeaks;
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::Pass;
@@ -48,12 +49,13 @@ pub(super) struct Weighing<'e> {
     pub loudness: [f64; 2],
 }
 
-/// An explanation and its fit.
+/// An explanation, its fit, and what that finds not to be as declared where leaks are at least zero.
 struct Fitted<'e, 'a> {
     pass: &'e Pass<'a, 'e>,
     weighing: Weighing<'e>,
     hypothesis: Hypothesis<'a>,
     fit: Fit,
+    found: Vec<Found>,
 }
 
 /// An explanation with its leaks at least zero, its evidence and a sample of the leaks, beside the best so far.
@@ -69,7 +71,28 @@ pub(super) fn cut<'a>(
     let count = if ln_posterior < best - LITTLE_LN { FEW_POINTS } else { POINTS };
     let orthant = positive_orthant(&means, &covariance, count);
     let ln = ln_posterior - ln_sign + orthant.ln_probability;
-    (ln, Fitted { pass, weighing, hypothesis, fit }.weighed(orthant))
+    let given = GivenLeaks::new(&means, &covariance, &orthant);
+    let size = |at: usize| {
+        let all: Vec<usize> = std::iter::once(at).chain(hypothesis.positive.iter().copied()).collect();
+        let of = &fit.covariance(&all)[0];
+        given.size(fit.means[at], of[0], &of[1..])
+    };
+    let set_free = set_free(&hypothesis, weighing.equations);
+    let found = set_free.map(|(column, at)| (column, size(at))).collect();
+    (ln, Fitted { pass, weighing, hypothesis, fit, found }.weighed(orthant))
+}
+
+/// The columns that an explanation's state sets free, as far as they are steady, with their places among its free parameters.
+fn set_free<'h>(
+    hypothesis: &'h Hypothesis<'_>,
+    equations: &'h NormalEquations,
+) -> impl Iterator<Item = (Column, usize)> + 'h {
+    let State { zeros, departure, .. } = hypothesis.state;
+    let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
+    columns.filter_map(move |(column, ..)| {
+        let place = equations.place(*column, Course::Constant)?;
+        Some((*column, hypothesis.free.iter().position(|free| free.column == place)?))
+    })
 }
 
 impl<'a> Fitted<'_, 'a> {
@@ -84,39 +107,20 @@ impl<'a> Fitted<'_, 'a> {
             misfits: self.misfits(),
             changed_ago_s: changed.map(|segment| products.total_s - segment.begin_s),
             pressures_pa: products.mean_pressures_pa(border),
-            found: self.found(),
             strain: self.strain(),
             levels_m3s: self.levels_m3s(&orthant),
             leaks_m3s: self.leaks_m3s(&orthant.points),
             weights: orthant.weights,
+            found: self.found,
             hypothesis: self.hypothesis,
         }
     }
 
-    /// The columns that its state sets free, as far as they are steady, with their places among the free parameters.
-    fn set_free(&self) -> impl Iterator<Item = (Column, usize)> {
-        let State { zeros, departure, .. } = self.hypothesis.state;
-        let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
-        columns.filter_map(|(column, ..)| Some((*column, self.place(*column)?)))
-    }
-
-    fn found(&self) -> Vec<Found> {
-        let size = |at: usize| {
-            let variance = self.fit.covariance(&[at])[0][0];
-            Estimate { value: self.fit.means[at], std: variance.max(0.0).sqrt() }
-        };
-        self.set_free().map(|(column, at)| (column, size(at))).collect()
-    }
-
+    /// The largest of what is found in the standard deviations of what sensors and rigs are off by.
     fn strain(&self) -> f64 {
-        let strain = |at: usize| self.fit.means[at].abs() / self.hypothesis.free[at].std;
-        self.set_free().map(|(_, at)| strain(at)).fold(0.0, f64::max)
-    }
-
-    /// Where a steady column stands among the free parameters.
-    fn place(&self, column: Column) -> Option<usize> {
-        let place = self.weighing.equations.place(column, Course::Constant)?;
-        self.hypothesis.free.iter().position(|free| free.column == place)
+        let set_free = set_free(&self.hypothesis, self.weighing.equations).zip(&self.found);
+        let strain = set_free.map(|((_, at), (_, size))| size.value.abs() / self.hypothesis.free[at].std);
+        strain.fold(0.0, f64::max)
     }
 
     fn levels_m3s(&self, orthant: &Orthant) -> [f64; 3] {
@@ -188,8 +192,8 @@ impl<'a> Fitted<'_, 'a> {
             Leak::ExternalA => Some(Column::AreaA),
             Leak::ExternalB => Some(Column::AreaB),
         };
-        let found = self.found();
-        let own = found.iter().find(|(column, _)| *column == Column::PositionGain || Some(*column) == area);
+        let own =
+            self.found.iter().find(|(column, _)| *column == Column::PositionGain || Some(*column) == area);
         own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| over_declared(*share))
     }
 
@@ -201,7 +205,9 @@ impl<'a> Fitted<'_, 'a> {
             _ => [0.0, -1.0],
         };
         let full_scale = self.pass.rig.instruments.pressure.full_scale;
-        let share = |column: Column| self.place(column).map_or(0.0, |at| self.fit.means[at]);
+        let share = |column: Column| {
+            self.found.iter().find(|(known, _)| *known == column).map_or(0.0, |(_, size)| size.value)
+        };
         let off_a =
             share(Column::PressureZeroA) * full_scale + share(Column::PressureGainA) * mean_pa.external_a;
         let off_b =

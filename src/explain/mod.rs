@@ -8,6 +8,7 @@ mod columns;
 mod decision;
 mod equations;
 mod evidence;
+mod given_leaks;
 mod hypothesis;
 mod independence;
 mod leak_sample;
