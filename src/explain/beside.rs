@@ -43,6 +43,12 @@ impl Told {
         }
     }
 
+    /// By how much of the stroke the position's zero may be off, at the least and the most, for the piston to be within it.
+    pub(super) fn position_zero(&self, stroke_m: f64) -> [f64; 2] {
+        let [least, most] = self.extremes[0].unwrap_or_default().map(|x_m| x_m / stroke_m);
+        [-BEYOND_STROKE - least, 1.0 + BEYOND_STROKE - most]
+    }
+
     fn is_constant(&self, sensor: Signal) -> bool {
         let extremes = channel(sensor).and_then(|channel| self.extremes[channel]);
         extremes.is_some_and(|[least, most]| most - least <= ROUNDING * least.abs().max(most.abs()))

@@ -385,11 +385,14 @@ fn is_impossible(
         let side = volumes.iter().position(|volume| *volume == place)?;
         Some(-sizes.dead_volumes[side] - MOST_GAIN)
     };
-    let unpressed = equations.place(Column::Unpressed, Course::Constant);
+    let [unpressed, position_zero] =
+        [Column::Unpressed, Column::PositionZero].map(|column| equations.place(column, Course::Constant));
+    let [lowest, highest] = sizes.position_zero;
     hypothesis.free.iter().zip(means).any(|(free, mean)| {
         let place = Some(free.column);
         mean.abs() > MOST_GAIN && places.contains(&place)
             || place == unpressed && !UNPRESSED.contains(mean)
+            || place == position_zero && !(lowest..=highest).contains(mean)
             || place == compressibility && !COMPRESSIBILITY.contains(mean)
             || free.std > USUAL_DEAD_VOLUME && least(place).is_some_and(|least| *mean < least)
     })

@@ -173,6 +173,8 @@ pub(super) struct Sizes {
     pub gains: [f64; 2],
     /// Shares of what is swept.
     pub dead_volumes: [f64; 2],
+    /// What may be off of the position's zero, share of the stroke: the piston is within its cylinder.
+    pub position_zero: [f64; 2],
 }
 
 impl Sizes {

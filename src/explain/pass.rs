@@ -93,6 +93,7 @@ impl<'a, 's> Pass<'a, 's> {
                     rig.cylinder.dead_volume_a_m3 / (rig.cylinder.area_a_m2 * rig.cylinder.stroke_m),
                     rig.cylinder.dead_volume_b_m3 / (rig.cylinder.area_b_m2 * rig.cylinder.stroke_m),
                 ],
+                position_zero: told.position_zero(rig.cylinder.stroke_m),
             },
             segments: statistic.segments().len(),
             full_scale_m3s,
