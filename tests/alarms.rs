@@ -5,9 +5,11 @@
 use pitchleak::core::{AlarmState, Leak};
 use pitchleak::live::{Event, LineFormat, LiveConfig, Watch};
 use pitchleak::replay::{ReplayError, replay};
+use pitchleak::report::Status;
 use pitchleak::trace::TraceReader;
 use pitchleak_testkit::judge::Case;
 use pitchleak_testkit::judge::worlds::{WORLDS, World};
+use rayon::prelude::*;
 use std::io::Cursor;
 
 fn world(name: &str) -> &'static World {
@@ -57,4 +59,39 @@ fn leaks_that_set_in_or_grow_raise_theirs() {
     }
     assert!(all > 8, "{all} alarms");
     assert!(held_back.is_empty(), "of {all} {held_back:?}");
+}
+
+/// Hours of sound cylinders in which a stream doubted sensors that work: zeros stood against leaks below none (u5), two lags against each
+/// other (u8), and a gain, a hose or a position's zero were found in noise (va).
+#[test]
+fn sensors_that_work_are_not_doubted() {
+    const AFTER_S: f64 = 60.0;
+    let hours = [
+        ("hum 0.2 %", 2, 21, "u5", 2391.0),
+        ("hum 0.2 %", 4, 5, "u5", 2031.0),
+        ("lag 50 ms", 2, 21, "u8", 919.0),
+        ("zero drifts 0.3 %, A", 2, 21, "va", 95.0),
+        ("noise x 1.5", 4, 5, "va", 3111.0),
+        ("hum 0.2 %", 3, 30, "va", 1251.0),
+    ];
+    hours.into_par_iter().for_each(|(name, number, mps, seed, doubted_s)| {
+        let case = Case::draw_sound(world(name), number, seed, 3600.0, mps);
+        let (mut watch, mut events) =
+            (Watch::new(LiveConfig::of(case.rig()), Some(LineFormat::Csv)), Vec::new());
+        for line in case.record().0.split(|byte| *byte == b'\n') {
+            watch.take(line, &mut events);
+            for event in events.drain(..) {
+                let Event::Estimate(estimate) = event else { continue };
+                let reasons: Vec<_> = estimate.reasons.iter().map(|reason| &reason.text).collect();
+                assert!(
+                    estimate.status != Status::Doubtful,
+                    "{name} {number}: {} s, {reasons:?}",
+                    estimate.t_s
+                );
+                if estimate.t_s > doubted_s + AFTER_S {
+                    return;
+                }
+            }
+        }
+    });
 }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 /// A column whose power is below so many times its noise says nothing in that equation. Derived: below twice, more than
 /// half of what it explains is noise.
-const LEAST_POWER: f64 = 2.0;
+pub(super) const LEAST_POWER: f64 = 2.0;
 
 /// X'X of both equations, and what the columns' noise adds to it.
 pub(super) struct NormalEquations {

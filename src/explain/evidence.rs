@@ -10,7 +10,7 @@
 //! Fuller 1987, Measurement Error Models, §2.2). The scales are those of largest posterior density; an inverse-gamma
 //! prior of ν degrees of freedom makes the likelihood Student's.
 
-use super::equations::NormalEquations;
+use super::equations::{LEAST_POWER, NormalEquations};
 
 /// Degrees of freedom of the noise scales' prior: the declared noise is worth so many blocks. A guess.
 const NU: f64 = 4.0;
@@ -57,6 +57,38 @@ impl Fit {
             dot * self.stds[of[i]] * self.stds[of[j]]
         };
         (0..of.len()).map(|i| (0..of.len()).map(|j| entry(i, j)).collect()).collect()
+    }
+
+    /// Whether a parameter's column, given all others, is mostly noise: then it tells nothing, and what it seems to is theirs. What is
+    /// left of it is M⁻¹'s column over its diagonal, and has the power 1 / (M⁻¹)ᵢᵢ − 1, less its noise.
+    pub fn is_noise(&self, equations: &NormalEquations, free: &[Free], at: usize) -> bool {
+        let column = self.inverse_column(at);
+        let left: Vec<(usize, f64)> = column
+            .iter()
+            .zip(free)
+            .map(|(entry, free)| (free.column, entry / column[at] * free.std))
+            .collect();
+        let noise = |c: usize| -> f64 {
+            let products = equations.noise(c);
+            let of = |(i, by): &(usize, f64)| {
+                let row = products.row(*i);
+                by * left.iter().map(|(j, by)| by * row[*j]).sum::<f64>()
+            };
+            left.iter().map(of).sum()
+        };
+        1.0 / column[at] - 1.0 < (LEAST_POWER - 1.0) * (noise(0) + noise(1))
+    }
+
+    /// M⁻¹ e_i.
+    fn inverse_column(&self, i: usize) -> Vec<f64> {
+        let p = self.stds.len();
+        let mut out = self.half_solved(i);
+        for row in (0..p).rev() {
+            let factor = &self.factor[row * (p + 1)..(row + 1) * (p + 1)];
+            let known: f64 = factor[row + 1..p].iter().zip(&out[row + 1..]).map(|(u, entry)| u * entry).sum();
+            out[row] = (out[row] - known) / factor[row];
+        }
+        out
     }
 
     /// U⁻ᵀ e_i.
