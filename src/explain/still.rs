@@ -48,16 +48,9 @@ pub(super) fn settle(segments: &mut [SegmentProducts]) {
     let [a, b, load] = still;
     // Where the pressures move together, B is A less the load's mean.
     let together = load.is_some() && a.is_none() && b.is_none();
-    let [flow_a, flow_b] = FLOW_CHANGES;
-    let opposite: Vec<bool> = (0..EQUATIONS).map(|equation| are_opposite(segments, equation)).collect();
+    set_opposite(segments);
     for segment in segments {
         for equation in 0..segment.gram.len() {
-            if opposite[equation] {
-                for products in segment.products_mut(equation) {
-                    replace(products, flow_a, &vec![(flow_a, 0.5), (flow_b, -0.5)]);
-                    replace(products, flow_b, &vec![(flow_a, -1.0)]);
-                }
-            }
             for chamber in 0..2 {
                 let gram = segment.gram[equation].clone();
                 let mut maps: Vec<(usize, Truly)> = Vec::new();
@@ -76,6 +69,19 @@ pub(super) fn settle(segments: &mut [SegmentProducts]) {
                 for products in segment.products_mut(equation) {
                     maps.iter().for_each(|(place, truly)| replace(products, *place, truly));
                 }
+            }
+        }
+    }
+}
+
+/// Makes each flow's change the other's opposite where they are that but for noise.
+fn set_opposite(segments: &mut [SegmentProducts]) {
+    let [flow_a, flow_b] = FLOW_CHANGES;
+    for equation in 0..EQUATIONS {
+        if are_opposite(segments, equation) {
+            for products in segments.iter_mut().flat_map(|segment| segment.products_mut(equation)) {
+                replace(products, flow_a, &vec![(flow_a, 0.5), (flow_b, -0.5)]);
+                replace(products, flow_b, &vec![(flow_a, -1.0)]);
             }
         }
     }
