@@ -336,12 +336,10 @@ impl<'a> Scored<'a> {
     fn new(equations: &NormalEquations, sizes: &Sizes, hypothesis: Hypothesis<'a>) -> Self {
         let fit = fit(equations, &hypothesis.free);
         let ln_sign = ln_sign(&fit, &hypothesis.positive);
-        let tells = !tells_by_noise(equations, &hypothesis, &fit);
-        let ln_posterior = if !tells || is_impossible(equations, sizes, &hypothesis, &fit.means) {
-            f64::NEG_INFINITY
-        } else {
-            fit.ln_evidence + hypothesis.ln_prior + ln_sign
-        };
+        let is_out = tells_by_noise(equations, &hypothesis, &fit)
+            || is_impossible(equations, sizes, &hypothesis, &fit.means);
+        let ln_posterior =
+            if is_out { f64::NEG_INFINITY } else { fit.ln_evidence + hypothesis.ln_prior + ln_sign };
         let Fit { ln_likelihood, scales, .. } = fit;
         Self { hypothesis, ln_posterior, ln_sign, ln_likelihood, scales, wiring: 0 }
     }
