@@ -8,8 +8,8 @@ use pitchleak_core::ATMOSPHERE_PA;
 
 /// Readings reach at the most so many times full scale. Chosen.
 const MOST_OF_FULL_SCALE: f64 = 1.5;
-/// A position may be so far beyond the stroke's ends, share of it. Chosen.
-const BEYOND_STROKE: f64 = 0.05;
+/// Where a position may be, shares of the stroke: a little beyond its ends. Chosen.
+const WITHIN_CYLINDER: [f64; 2] = [-0.05, 1.05];
 
 /// Means of a constant differ by less.
 const ROUNDING: f64 = 1e-12;
@@ -46,7 +46,7 @@ impl Told {
     /// By how much of the stroke the position's zero may be off, at the least and the most, for the piston to be within it.
     pub(super) fn position_zero(&self, stroke_m: f64) -> [f64; 2] {
         let [least, most] = self.extremes[0].unwrap_or_default().map(|x_m| x_m / stroke_m);
-        [-BEYOND_STROKE - least, 1.0 + BEYOND_STROKE - most]
+        [WITHIN_CYLINDER[0] - least, WITHIN_CYLINDER[1] - most]
     }
 
     fn is_constant(&self, sensor: Signal) -> bool {
@@ -83,7 +83,7 @@ fn allows(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
     let flow = |full_scale: f64| [-MOST_OF_FULL_SCALE * full_scale, MOST_OF_FULL_SCALE * full_scale];
     let stroke_m = rig.cylinder.stroke_m;
     let range = match channel {
-        0 => [-BEYOND_STROKE * stroke_m, (1.0 + BEYOND_STROKE) * stroke_m],
+        0 => WITHIN_CYLINDER.map(|share| share * stroke_m),
         1 | 2 => [-ATMOSPHERE_PA, MOST_OF_FULL_SCALE * sheets.pressure.full_scale],
         3 => flow(sheets.flow_a.full_scale),
         _ => flow(sheets.flow_b.full_scale),

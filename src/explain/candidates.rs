@@ -336,8 +336,8 @@ impl<'a> Scored<'a> {
     fn new(equations: &NormalEquations, sizes: &Sizes, hypothesis: Hypothesis<'a>) -> Self {
         let fit = fit(equations, &hypothesis.free);
         let ln_sign = ln_sign(&fit, &hypothesis.positive);
-        let is_out = tells_by_noise(equations, &hypothesis, &fit)
-            || is_impossible(equations, sizes, &hypothesis, &fit.means);
+        let is_out = is_impossible(equations, sizes, &hypothesis, &fit.means)
+            || tells_by_noise(equations, &hypothesis, &fit);
         let ln_posterior =
             if is_out { f64::NEG_INFINITY } else { fit.ln_evidence + hypothesis.ln_prior + ln_sign };
         let Fit { ln_likelihood, scales, .. } = fit;
@@ -371,12 +371,9 @@ const GAINS: [Column; 8] = [
 
 /// Whether what sensors and rig are said to be off by is sought where there is but noise.
 fn tells_by_noise(equations: &NormalEquations, hypothesis: &Hypothesis<'_>, fit: &Fit) -> bool {
-    let place = |(column, course, _): &(Column, Course, f64)| {
-        let place = equations.place(*column, *course)?;
-        hypothesis.free.iter().position(|free| free.column == place)
-    };
-    let own = &hypothesis.state.departure.free;
-    own.iter().filter_map(place).any(|at| fit.is_noise(equations, &hypothesis.free, at))
+    let own = hypothesis.state.departure.free.iter();
+    let mut places = own.filter_map(|(column, course, _)| hypothesis.place(equations, *column, *course));
+    places.any(|at| fit.is_noise(equations, &hypothesis.free, at))
 }
 
 fn is_impossible(

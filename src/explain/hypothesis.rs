@@ -223,6 +223,12 @@ impl<'a> Hypothesis<'a> {
         own
     }
 
+    /// Where a column stands among its free parameters.
+    pub fn place(&self, equations: &NormalEquations, column: Column, course: Course) -> Option<usize> {
+        let place = equations.place(column, course)?;
+        self.free.iter().position(|free| free.column == place)
+    }
+
     /// The segment from which on all leaks are as at the end: where one wanders, the last.
     pub fn last_change(&self, segments: usize) -> usize {
         let border = |course: &Option<LeakCourse>| match course {

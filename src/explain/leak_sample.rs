@@ -67,18 +67,19 @@ pub(super) fn cut<'a>(
 ) -> (f64, Weighed<'a>) {
     let fit = fit(weighing.equations, &hypothesis.free);
     let means: Vec<f64> = hypothesis.positive.iter().map(|&i| fit.means[i]).collect();
-    let covariance = fit.covariance(&hypothesis.positive);
+    let set_free: Vec<(Column, usize)> = set_free(&hypothesis, weighing.equations).collect();
+    let places = set_free.iter().map(|(_, at)| *at);
+    // Leaks first, then what is set free.
+    let covariance = fit.covariance(&hypothesis.positive.iter().copied().chain(places).collect::<Vec<_>>());
     let count = if ln_posterior < best - LITTLE_LN { FEW_POINTS } else { POINTS };
     let orthant = positive_orthant(&means, &covariance, count);
     let ln = ln_posterior - ln_sign + orthant.ln_probability;
     let given = GivenLeaks::new(&means, &covariance, &orthant);
-    let size = |at: usize| {
-        let all: Vec<usize> = std::iter::once(at).chain(hypothesis.positive.iter().copied()).collect();
-        let of = &fit.covariance(&all)[0];
-        given.size(fit.means[at], of[0], &of[1..])
-    };
-    let set_free = set_free(&hypothesis, weighing.equations);
-    let found = set_free.map(|(column, at)| (column, size(at))).collect();
+    let rows = (means.len()..).zip(covariance.iter().skip(means.len()));
+    let found = set_free.iter().zip(rows).map(|((column, at), (own, row))| {
+        (*column, given.size(fit.means[*at], row[own], &row[..means.len()]))
+    });
+    let found = found.collect();
     (ln, Fitted { pass, weighing, hypothesis, fit, found }.weighed(orthant))
 }
 
@@ -89,10 +90,8 @@ fn set_free<'h>(
 ) -> impl Iterator<Item = (Column, usize)> + 'h {
     let State { zeros, departure, .. } = hypothesis.state;
     let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
-    columns.filter_map(move |(column, ..)| {
-        let place = equations.place(*column, Course::Constant)?;
-        Some((*column, hypothesis.free.iter().position(|free| free.column == place)?))
-    })
+    columns
+        .filter_map(|(column, ..)| Some((*column, hypothesis.place(equations, *column, Course::Constant)?)))
 }
 
 impl<'a> Fitted<'_, 'a> {
@@ -118,9 +117,11 @@ impl<'a> Fitted<'_, 'a> {
 
     /// The largest of what is found in the standard deviations of what sensors and rigs are off by.
     fn strain(&self) -> f64 {
-        let set_free = set_free(&self.hypothesis, self.weighing.equations).zip(&self.found);
-        let strain = set_free.map(|((_, at), (_, size))| size.value.abs() / self.hypothesis.free[at].std);
-        strain.fold(0.0, f64::max)
+        let strain = |(column, size): &Found| {
+            let at = self.hypothesis.place(self.weighing.equations, *column, Course::Constant)?;
+            Some(size.value.abs() / self.hypothesis.free[at].std)
+        };
+        self.found.iter().filter_map(strain).fold(0.0, f64::max)
     }
 
     fn levels_m3s(&self, orthant: &Orthant) -> [f64; 3] {

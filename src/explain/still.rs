@@ -80,8 +80,8 @@ fn set_opposite(segments: &mut [SegmentProducts]) {
     for equation in 0..EQUATIONS {
         if are_opposite(segments, equation) {
             for products in segments.iter_mut().flat_map(|segment| segment.products_mut(equation)) {
-                replace(products, flow_a, &vec![(flow_a, 0.5), (flow_b, -0.5)]);
-                replace(products, flow_b, &vec![(flow_a, -1.0)]);
+                replace(products, flow_a, &[(flow_a, 0.5), (flow_b, -0.5)]);
+                replace(products, flow_b, &[(flow_a, -1.0)]);
             }
         }
     }
@@ -105,6 +105,11 @@ fn is_still(segments: &[SegmentProducts], quantity: &Quantity) -> bool {
             }
         }
     }
+    is_noise(power, noise, rows)
+}
+
+/// Whether a power over so many rows is their noise's, but for chance.
+fn is_noise(power: f64, noise: f64, rows: f64) -> bool {
     rows > 0.0 && power < noise * (1.0 + chance_of_mean_square(rows))
 }
 
@@ -119,7 +124,7 @@ fn are_opposite(segments: &[SegmentProducts], equation: usize) -> bool {
     let rows: f64 = segments.iter().map(|segment| segment.rows[equation]).sum();
     let power: f64 = segments.iter().map(|segment| square_of_sum(&segment.gram[equation])).sum();
     let noise: f64 = segments.iter().map(|segment| square_of_sum(&segment.scattered[equation])).sum();
-    rows > 0.0 && power < noise * (1.0 + chance_of_mean_square(rows))
+    is_noise(power, noise, rows)
 }
 
 const PRESSURES: [RawSum; 2] = [RawSum::PressureA, RawSum::PressureB];
@@ -154,7 +159,7 @@ fn ratio(product: f64, square: f64) -> f64 {
 }
 
 /// Puts a combination of other columns in a column's place.
-fn replace(products: &mut [f64], place: usize, truly: &Truly) {
+fn replace(products: &mut [f64], place: usize, truly: &[(usize, f64)]) {
     for other in 0..COLUMNS {
         products[place * COLUMNS + other] =
             truly.iter().map(|(column, by)| by * products[column * COLUMNS + other]).sum();
