@@ -45,11 +45,6 @@ impl SegmentProducts {
     pub fn span_s(&self) -> [f64; 2] {
         [self.begin_s, self.time_s.max(LEAST_TIME_S)]
     }
-
-    /// All of an equation.
-    pub fn products_mut(&mut self, equation: usize) -> [&mut Vec<f64>; 4] {
-        [&mut self.gram, &mut self.noise, &mut self.scattered, &mut self.quiet].map(|of| &mut of[equation])
-    }
 }
 
 impl RawProducts {
