@@ -358,6 +358,37 @@ fn sensors_better_than_declared_mislead_nobody() {
     assert!((gain.value - 0.03).abs() < 4.0 * gain.std && gain.std < 0.005, "{gain:?}");
 }
 
+/// Where the piston turns round is told by flows through noise: a direction that turns more slowly than they say leaves a meter's zero.
+#[test]
+fn a_leak_that_is_larger_one_way_is_no_meters_zero() {
+    let true_m3spa = -2e-12;
+    let mut effects = EffectSet::default();
+    effects.set(Effect::InternalLeakDirection, true_m3spa, EffectConstants::default()).expect("is in bounds");
+    let leaks = PerLeak { internal: 4e-12, ..PerLeak::default() };
+    for seed in 1..=4 {
+        let series = leaking_in_wind(WindCase::Mps30, leaks, effects.clone(), 120.0, &Rig::paper(), seed);
+        let answer = ask(series, &Rig::paper());
+        let names: Vec<_> = answer.effects.iter().map(|one| one.id).collect();
+        assert_eq!(names, ["internal_leak_direction"], "seed {seed}");
+        let leak = &answer.effects[0];
+        assert!((leak.value - true_m3spa).abs() < 4.0 * leak.std, "seed {seed}: {leak:?}");
+    }
+}
+
+/// What a sensor's reading hides of its play is another sight of that play, and no law beside it.
+#[test]
+fn a_play_has_no_rival_in_itself() {
+    let mut effects = EffectSet::default();
+    effects.set(Effect::PressureHysteresisB, 5e4, EffectConstants::default()).expect("is in bounds");
+    for seed in 1..=4 {
+        let series = in_wind(WindCase::Mps30, effects.clone(), 120.0, &Rig::paper(), seed);
+        let answer = ask(series, &Rig::paper());
+        let found = answer.effects.iter().find(|one| one.id == "pressure_hysteresis_b").expect("is found");
+        let has_rival = found.doubts.iter().any(|doubt| doubt.id == DoubtId::UnlistedLaw);
+        assert!(!has_rival, "seed {seed}: {:?}", found.doubts);
+    }
+}
+
 /// Where the pressures hardly move their noise is all that a bend of a sensor's scale would act on.
 #[test]
 fn noise_of_pressures_that_hardly_move_is_no_bend_of_a_sensor() {

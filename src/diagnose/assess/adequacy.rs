@@ -87,7 +87,7 @@ pub(crate) fn inadequacy(fit: &Fit<'_>) -> Inadequacy {
 /// The product of signals that no known effect makes which the residual follows beyond chance.
 fn beyond_chance(fit: &Fit<'_>) -> Option<(Unlisted, f64)> {
     let by_chance = statistics::bonferroni_sigma(LEAST_P, Unlisted::ALL.len()).powi(2);
-    search::strongest_unlisted(fit, &fit.free).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
+    search::strongest_unlisted(fit, &fit.free, fit.active()).filter(|(_, chi2_drop)| *chi2_drop > by_chance)
 }
 
 /// What such a product would mend.

@@ -6,6 +6,7 @@ use crate::diagnose::thresholds::{SIGNIFICANT_SIGMA, SMALL_SHARE};
 use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Cylinder, Effect, Sensors, Signals};
+use std::f64::consts::FRAC_PI_2;
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -157,11 +158,12 @@ fn mean_load_pressure(traces: &[Series]) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// The speed below which the meters' noise hides the direction of motion, m/s: what turns with the direction turns within it.
+/// The speed within which what turns with the direction of motion is seen to turn through the meters' noise, m/s: where a speed v is read
+/// through noise σ the direction is on average erf(v / (√2 σ)), nearly tanh(v / (√(π/2) σ)).
 fn turning_speed(declared: &Declared) -> f64 {
     let (sensors, cylinder) = (&declared.sensors, &declared.cylinder);
     let swept_m3s = sensors.flow_a.noise_std.hypot(sensors.flow_b.noise_std);
-    let speed_mps = SIGNIFICANT_SIGMA * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
+    let speed_mps = FRAC_PI_2.sqrt() * swept_m3s / (cylinder.area_a_m2 + cylinder.area_b_m2);
     within(EffectConstant::SlipSpeed, speed_mps)
 }
 

@@ -22,21 +22,30 @@ pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> 
     statistics::bonferroni_sigma(FALSE_RATE, count * trials)
 }
 
-/// Places of the products of signals that the table does not list, and by how much each would make a model's sum of squares fall.
-pub(super) fn unlisted<'f>(fit: &'f Fit<'_>, model: &'f Solution) -> impl Iterator<Item = (usize, f64)> + 'f {
-    let places = (0..fit.problem.terms.len()).filter(|place| fit.problem.terms[*place].unlisted().is_some());
+/// Places of the products of signals that the table does not list, and by how much each would make a model's sum of squares fall; none
+/// that is another sight of an effect `named`.
+pub(super) fn unlisted<'f>(
+    fit: &'f Fit<'_>,
+    model: &'f Solution,
+    named: &'f [usize],
+) -> impl Iterator<Item = (usize, f64)> + 'f {
+    let terms = &fit.problem.terms;
+    let is_sight = |law: Unlisted| {
+        named.iter().filter_map(|place| terms[*place].effect()).any(|effect| law.is_sight_of(effect))
+    };
+    let places =
+        (0..terms.len()).filter(move |place| terms[*place].unlisted().is_some_and(|law| !is_sight(law)));
     places.filter_map(|place| Some((place, fit.score(model, place)?.chi2_drop)))
 }
 
 /// The strongest of them.
-pub(crate) fn strongest_unlisted(fit: &Fit<'_>, model: &Solution) -> Option<(Unlisted, f64)> {
-    let (place, chi2_drop) = unlisted(fit, model).max_by(|a, b| a.1.total_cmp(&b.1))?;
+pub(crate) fn strongest_unlisted(
+    fit: &Fit<'_>,
+    model: &Solution,
+    named: &[usize],
+) -> Option<(Unlisted, f64)> {
+    let (place, chi2_drop) = unlisted(fit, model, named).max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some((fit.problem.terms[place].unlisted()?, chi2_drop))
-}
-
-/// By how much it would fall.
-pub(super) fn unlisted_chi2_drop(fit: &Fit<'_>, model: &Solution) -> f64 {
-    strongest_unlisted(fit, model).map_or(0.0, |(_, chi2_drop)| chi2_drop)
 }
 
 /// A whitened column of a term with constants that are not its present ones.

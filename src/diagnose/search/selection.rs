@@ -1,7 +1,7 @@
 //! The effects named so far: forward selection by the score test, with backward elimination, each step confirmed on data that it did
 //! not fit; and whether two effects that were found act on each other.
 
-use super::candidates::{Candidates, critical_sigma, unlisted_chi2_drop};
+use super::candidates::{Candidates, critical_sigma, strongest_unlisted};
 use super::leak_changes;
 use super::trials::{self, Trial};
 use crate::diagnose::equation::Equation;
@@ -151,8 +151,10 @@ impl Selection<'_> {
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
+        let more = chi2_drop + SIGNIFICANT_SIGMA.powi(2) * dispersion;
+        let named = [fit.active(), &[trial.score.term]].concat();
         let is_below_unlisted =
-            unlisted_chi2_drop(fit, &fit.free) > chi2_drop + SIGNIFICANT_SIGMA.powi(2) * dispersion;
+            strongest_unlisted(fit, &fit.free, &named).is_some_and(|(_, unlisted)| unlisted > more);
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
         self.fit = with(fit, &trial, progress);
         true

@@ -237,12 +237,7 @@ fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<Exchan
         let left = Beyond { chi2: lost - chi2_drop, ..Beyond::default() };
         Exchange { gone: vec![term], new: vec![(place, usual)], left, dearer }
     };
-    let named = fit.problem.terms[term].effect();
-    let is_other = |(place, _): &(usize, f64)| {
-        let law = fit.problem.terms[*place].unlisted();
-        !law.zip(named).is_some_and(|(law, effect)| law.is_sight_of(effect))
-    };
-    let mut laws: Vec<Exchange> = candidates::unlisted(fit, &without).filter(is_other).map(law).collect();
+    let mut laws: Vec<Exchange> = candidates::unlisted(fit, &without, &[term]).map(law).collect();
     laws.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
     let is_possible = |law: &Exchange| {
         let is_near = law.worse(dispersion) < SIGNIFICANT_SIGMA.powi(2);
