@@ -244,6 +244,23 @@ fn what_the_model_lacks_is_said() {
     assert!(verdict.text.contains("P_A does not change"), "{}", verdict.text);
 }
 
+/// Of a leak that drains B and of two that do the same to the pressures the one is likelier, and the words name both.
+#[test]
+fn leaks_that_look_like_the_one_named_are_said() {
+    let told = |leaks_lpm: [f64; 3], pressures_pa: [f64; 2], seed: u64| {
+        let cylinder = HeldCylinder { leaks_lpm, pressures_pa, ..HeldCylinder::default() };
+        judged(&trace(cylinder, 10.0, seed).text).verdict.text
+    };
+    for seed in 0..4 {
+        let text = told([0.05, 0.02, 0.0], [44e5, 59e5], seed);
+        let is_said =
+            text.contains("Without it internal and external A leaks would explain the readings as well");
+        assert_eq!(is_said, text.contains("External B leak of"), "{text}");
+        let text = told([0.0, 0.0, 0.02], LOADED, seed);
+        assert!(text.contains("External B leak of") && !text.contains("would explain"), "{text}");
+    }
+}
+
 #[test]
 fn what_cannot_be_told_is_not_told() {
     let empty = HeldCylinder { pressures_pa: [60e5, 2e5], ..HeldCylinder::default() };

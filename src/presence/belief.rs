@@ -34,7 +34,12 @@ pub(crate) struct Belief {
     pub smallest: f64,
     /// Standard deviation before any reading.
     pub prior_std: f64,
+    /// The leaks that explain the readings about as well without it, likelier or not.
+    pub alike: Option<Set>,
 }
+
+/// Which leaks there are.
+pub(crate) type Set = [bool; 3];
 
 /// What is believed of all leaks, and of the oil.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +76,7 @@ pub(crate) fn weigh(places: &[Place], sizes: [f64; 3], sure: f64) -> Beliefs {
             let own = leak as usize;
             let smallest = told.smallest(own, sure) * LEAK_UNIT_M3SPA;
             let prior_std = sizes[own] * LEAK_UNIT_M3SPA * (1.0 - 2.0 / PI).sqrt();
-            Belief { smallest, prior_std, ..spread(&weighed, own) }
+            Belief { smallest, prior_std, alike: alike(&weighed, own), ..spread(&weighed, own) }
         }),
         any: weighed.iter().filter(|one| !one.members.is_empty()).map(|one| one.weight).sum(),
         kappa,
@@ -99,6 +104,8 @@ struct Weighed {
     weight: f64,
     /// Of the residuals, where the likeliest leaks of this set are possible; else infinite.
     squares: f64,
+    /// The same, and what is asked of the oil.
+    asked: f64,
     orthant: Option<Orthant>,
 }
 
@@ -171,7 +178,8 @@ fn over_kappa(members: &[usize], places: &[Place], sizes: &[f64; 3]) -> Vec<Weig
         let weight = normal.ln_weight + ln_orthant + (step as f64).ln();
         let is_possible = normal.mean.iter().all(|leak| *leak >= 0.0);
         let squares = if is_possible { normal.squares } else { f64::INFINITY };
-        Some(Weighed { members: members.to_vec(), kappa: place.kappa, weight, squares, orthant })
+        let asked = squares - 2.0 * place.ln_prior;
+        Some(Weighed { members: members.to_vec(), kappa: place.kappa, weight, squares, asked, orthant })
     });
     weighed.collect()
 }
@@ -187,13 +195,24 @@ impl Weighed {
     }
 }
 
+/// Sets whose squares differ by so much look alike: two standard deviations.
+const ALIKE: f64 = 4.0;
+
+/// The leaks that do without one what the best do with it, if any do.
+fn alike(sets: &[Weighed], own: usize) -> Option<Set> {
+    let least = |one: &&Weighed, other: &&Weighed| one.asked.total_cmp(&other.asked);
+    let best = sets.iter().min_by(least)?;
+    let without = sets.iter().filter(|one| !one.members.contains(&own)).min_by(least)?;
+    (without.asked < best.asked + ALIKE).then(|| [0, 1, 2].map(|leak| without.members.contains(&leak)))
+}
+
 /// Sets of so little weight don't count.
 const LEAST_WEIGHT: f64 = 1e-6;
 
 /// Probability, mean, spread and interval of a leak over the sets that have it.
 fn spread(sets: &[Weighed], own: usize) -> Belief {
     let with: Vec<&Weighed> = sets.iter().filter(|set| set.members.contains(&own)).collect();
-    let probability: f64 = with.iter().map(|set| set.weight).sum();
+    let probability = with.iter().map(|set| set.weight).sum::<f64>().min(1.0);
     let heavy = with.iter().filter(|set| set.weight > LEAST_WEIGHT * probability);
     let mut points: Vec<(f64, f64)> = heavy.flat_map(|set| set.points(own)).collect();
     let all = points.iter().map(|(_, weight)| weight).sum::<f64>().max(f64::MIN_POSITIVE);

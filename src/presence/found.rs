@@ -122,6 +122,7 @@ impl Found {
         let mut sentences: Vec<String> = Vec::new();
         for leak in &found {
             sentences.push(self.leak(*leak, threshold_lpm[*leak]));
+            sentences.extend(self.alike(*leak));
             sentences.extend((wording.beside)(*leak));
         }
         sentences.extend(self.none_above(&excluded, &threshold_lpm));
@@ -153,7 +154,11 @@ impl Found {
                     declared_pa / 1e9,
                     std_pa / 1e9
                 ),
-                "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil",
+                if kappa > 1.0 {
+                    "compare [cylinder] with its drawing, dead volumes included, and look for air in the oil"
+                } else {
+                    "compare [cylinder] with its drawing, dead volumes included: no oil is much stiffer than its data sheet"
+                },
             )
         })
     }
@@ -200,6 +205,16 @@ impl Found {
             String::new()
         };
         format!("{} leak of {flow} L/min at {bar:.0} bar: {}.{small}", capital(leak.label()), advice(leak))
+    }
+
+    /// The leaks that look like one that was found, and are less likely only because they are more.
+    fn alike(&self, leak: Leak) -> Option<String> {
+        let set = self.beliefs.leaks[leak].alike?;
+        let others: Vec<Leak> = Leak::ALL.into_iter().filter(|other| set[*other as usize]).collect();
+        (!others.is_empty()).then(|| {
+            let others = join(&others, "and");
+            format!("Without it {others} leaks would explain the readings as well: measure again under another load.")
+        })
     }
 
     /// What is ruled out.

@@ -25,7 +25,7 @@ pub struct Arguments {
     position: Option<String>,
 
     /// Instead of wind: load against extension, constant ("2 kN") or a CSV file with t_s and force_n
-    #[arg(long, value_name = "F|FILE", requires = "position")]
+    #[arg(long, value_name = "F|FILE", requires = "position", allow_hyphen_values = true)]
     load: Option<String>,
 
     /// Rig file [default: the built-in rig wu2011]
