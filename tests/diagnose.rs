@@ -366,7 +366,7 @@ fn a_leak_that_is_larger_one_way_is_no_meters_zero() {
     effects.set(Effect::InternalLeakDirection, true_m3spa, EffectConstants::default()).expect("is in bounds");
     let leaks = PerLeak { internal: 4e-12, ..PerLeak::default() };
     for seed in 1..=4 {
-        let series = leaking_in_wind(WindCase::Mps30, leaks, effects.clone(), 120.0, &Rig::paper(), seed);
+        let series = leaking_in_wind(WindCase::Mps30, leaks, effects, 120.0, &Rig::paper(), seed);
         let answer = ask(series, &Rig::paper());
         let names: Vec<_> = answer.effects.iter().map(|one| one.id).collect();
         assert_eq!(names, ["internal_leak_direction"], "seed {seed}");
@@ -381,7 +381,7 @@ fn a_play_has_no_rival_in_itself() {
     let mut effects = EffectSet::default();
     effects.set(Effect::PressureHysteresisB, 5e4, EffectConstants::default()).expect("is in bounds");
     for seed in 1..=4 {
-        let series = in_wind(WindCase::Mps30, effects.clone(), 120.0, &Rig::paper(), seed);
+        let series = in_wind(WindCase::Mps30, effects, 120.0, &Rig::paper(), seed);
         let answer = ask(series, &Rig::paper());
         let found = answer.effects.iter().find(|one| one.id == "pressure_hysteresis_b").expect("is found");
         let has_rival = found.doubts.iter().any(|doubt| doubt.id == DoubtId::UnlistedLaw);
