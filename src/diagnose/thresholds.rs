@@ -84,7 +84,7 @@ pub(crate) const PIECES: usize = 20;
 
 // The search.
 
-/// Constants fitted to the data count as this many candidates. Chosen: more than the starts of the search (at most seven)
+/// Each constant fitted to the data counts as this many candidates. Chosen: more than the starts of the search (at most seven)
 /// and fewer than its steps, since neighbouring constants give nearly the same column.
 pub(crate) const CONSTANTS_TRIALS: usize = 20;
 /// Parts of the range of a constant, from the middle of each of which the search starts. Chosen: ends and middle.

@@ -15,6 +15,8 @@ pub(crate) struct Motion {
     pub(crate) v_mps: Vec<f64>,
     /// Standard deviation of its noise, m/s.
     pub(crate) std_mps: f64,
+    /// The time on either side over which it is a mean, s.
+    pub(crate) half_s: f64,
     /// Root mean square, m/s.
     pub(crate) rms_mps: f64,
     /// On which side of its play sensor A would read.
@@ -43,8 +45,7 @@ impl Motion {
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
             let [qa, qb] = within_bands(series, cylinder, sensors);
             let raw = raw_speed(series, residual, effects, [&qa.side, &qb.side]);
-            let (v_mps, std_mps, rms_mps) = from_flow(series, &raw, cylinder, sensors);
-            Self { v_mps, std_mps, rms_mps, qa, qb, ..Self::default() }
+            Self { qa, qb, ..from_flow(series, &raw, cylinder, sensors) }
         } else {
             Self::from_position(series, effects, sensors)
         };
@@ -96,28 +97,31 @@ impl Motion {
         let std = slope_std(sensors.position.noise_std, half, series.step_s());
         let rms_mps = root_mean_square(&v_mps);
         let [qa, qb] = [(); 2].map(|()| Sides::none(series.len()));
-        Self { v_mps, std_mps: std, rms_mps, qa, qb, ..Self::default() }
+        let half_s = half as f64 * series.step_s();
+        Self { v_mps, std_mps: std, half_s, rms_mps, qa, qb, ..Self::default() }
     }
 
-    /// Below this speed the direction of motion is not known.
-    pub(crate) fn least_sure_mps(&self) -> f64 {
-        SIGNIFICANT_SIGMA * self.std_mps
+    /// Whether the direction of motion is known at this speed and acceleration, m/s and m/s²: through its noise, and all along the time over
+    /// which it is a mean.
+    pub(crate) fn is_sure(&self, v_mps: f64, a_mps2: f64) -> bool {
+        v_mps.abs() >= SIGNIFICANT_SIGMA * self.std_mps + a_mps2.abs() * self.half_s
     }
 }
 
-/// Speed, standard deviation of its noise, and its root mean square, m/s.
-fn from_flow(
-    series: &Series,
-    raw: &[f64],
-    cylinder: &Cylinder<f64>,
-    sensors: &Sensors<f64>,
-) -> (Vec<f64>, f64, f64) {
+/// The motion as the flows tell it.
+fn from_flow(series: &Series, raw: &[f64], cylinder: &Cylinder<f64>, sensors: &Sensors<f64>) -> Motion {
     let rms = root_mean_square(raw);
     let std =
         (sensors.flow_a.noise_std / cylinder.area_a_m2).min(sensors.flow_b.noise_std / cylinder.area_b_m2);
     let (half, step) = (half_window(std, rms, 2.0), series.step_s());
     let half = half.min(longest_half(step));
-    (smooth(raw, half), std / ((2 * half + 1) as f64).sqrt(), rms)
+    Motion {
+        v_mps: smooth(raw, half),
+        std_mps: std / ((2 * half + 1) as f64).sqrt(),
+        half_s: half as f64 * step,
+        rms_mps: rms,
+        ..Motion::default()
+    }
 }
 
 /// Where in dead bands of their meters the flows A and B would lie: what the other meter shows says how they go on meanwhile, or
@@ -243,6 +247,28 @@ mod tests {
     use crate::diagnose::testing::{LEAKS, TURBULENT, declared, torn_seal};
     use pitchleak_core::Model;
     use pitchleak_core::effects::EffectConstants;
+
+    /// Where a mean tells the direction, the piston moves that way at both ends of the time over which it is taken, but for the curve that
+    /// a straight line leaves out.
+    #[test]
+    fn a_mean_over_a_turn_tells_no_direction() {
+        let half_s = 0.1;
+        let motion = Motion { half_s, ..Motion::default() };
+        let mut sure = 0;
+        for k in 0..1000 {
+            let t_s = f64::from(k) / 100.0;
+            let mean = |t_s: f64| t_s.sin() * half_s.sin() / half_s;
+            let (from, to) = ((t_s - half_s).sin(), (t_s + half_s).sin());
+            if motion.is_sure(mean(t_s), t_s.cos()) {
+                sure += 1;
+                assert!(from * to > -1e-3, "from {from} to {to} at {t_s} s");
+            } else {
+                assert!(from * to < 1e-3, "from {from} to {to} at {t_s} s");
+            }
+        }
+        assert!((850..950).contains(&sure), "{sure}");
+        assert!(!motion.is_sure(f64::NAN, 0.0));
+    }
 
     /// What an effect takes past the piston is no motion, once the model has it.
     #[test]

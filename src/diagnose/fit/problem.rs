@@ -100,9 +100,13 @@ impl<'a> Problem<'a> {
         given.iter().fold(self.usual_constants, take)
     }
 
-    /// Whether some term starts from these.
-    pub(crate) fn is_usual(&self, constants: EffectConstants<f64>) -> bool {
-        (0..self.terms.len()).any(|term| self.usual(term) == constants)
+    /// How many of these are not as some term starts from.
+    pub(crate) fn fitted_constants(&self, constants: EffectConstants<f64>) -> usize {
+        let differ = |usual: EffectConstants<f64>| {
+            let all = EffectConstant::ALL.iter();
+            all.filter(|one| usual.get(**one).to_bits() != constants.get(**one).to_bits()).count()
+        };
+        (0..self.terms.len()).map(|term| differ(self.usual(term))).min().unwrap_or(0)
     }
 
     /// The priors as increments from a linearisation.
@@ -133,7 +137,7 @@ impl<'a> Problem<'a> {
 
 /// Friction turns within the speed that these traces can resolve, and a valve opens at the mean load pressure.
 fn usual_constants(traces: &[Series], motions: &[Motion]) -> EffectConstants<f64> {
-    let slip = motions.iter().map(|motion| motion.least_sure_mps() / 3.0).fold(0.0, f64::max);
+    let slip = motions.iter().map(|motion| motion.std_mps).fold(0.0, f64::max);
     let usual = motions.iter().map(|motion| motion.rms_mps).fold(0.0, f64::max);
     EffectConstants {
         slip_speed_mps: within(EffectConstant::SlipSpeed, slip),

@@ -18,7 +18,7 @@ pub(crate) fn open(fit: &Fit<'_>) -> Vec<usize> {
 pub(crate) fn critical_sigma(fit: &Fit<'_>, constants: EffectConstants<f64>) -> f64 {
     let problem = fit.problem;
     let count = problem.terms.iter().filter(|term| term.effect().is_some()).count();
-    let trials = if problem.is_usual(constants) { 1 } else { CONSTANTS_TRIALS };
+    let trials = CONSTANTS_TRIALS.pow(problem.fitted_constants(constants) as u32);
     statistics::bonferroni_sigma(FALSE_RATE, count * trials)
 }
 
@@ -92,5 +92,28 @@ impl<'f, 'a> Candidates<'f, 'a> {
             self.columns.len() - 1
         });
         self.fit.partial(model, &self.columns[place].white)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fit::Problem;
+    use crate::diagnose::testing::{declared, sound};
+    use pitchleak_core::effects::EffectConstant;
+
+    /// A law with one more constant fits noise a little better, wherever it is looked for.
+    #[test]
+    fn each_constant_that_is_fitted_asks_for_more() {
+        let (traces, declared) = ([sound(20)], declared());
+        let problem = Problem::new(&traces, &declared, &[]);
+        let fit = Fit::declared(&problem, &|| ());
+        let usual = problem.usual_constants;
+        let one = usual.with(EffectConstant::SlipSpeed, 2.0 * usual.slip_speed_mps);
+        let two = one.with(EffectConstant::StribeckSpeed, 2.0 * usual.stribeck_speed_mps);
+        let needed = [usual, one, two].map(|constants| critical_sigma(&fit, constants).powi(2));
+        let dearer = [needed[1] - needed[0], needed[2] - needed[1]];
+        // ln of the count of trials, twice.
+        assert!(dearer.iter().all(|more| (4.0..8.0).contains(more)), "{needed:?}");
     }
 }

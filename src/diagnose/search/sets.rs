@@ -63,11 +63,6 @@ pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
 /// Names the other set.
 fn take(all: &mut Selection<'_>, other: &Exchange, progress: Progress<'_>) {
     all.fit = all.fit.changed(&other.gone, &other.new, progress);
-    for (term, _) in &other.new {
-        if let Some(better) = selection::with_better_constants(&all.fit, *term, progress) {
-            all.fit = better;
-        }
-    }
     let mended = all.effects.iter().filter(|one| other.gone.contains(&one.term));
     let mended = mended.filter_map(|one| one.mended_percent).reduce(f64::max);
     all.effects.retain(|one| !other.gone.contains(&one.term));
@@ -157,10 +152,14 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
     pairs.filter_map(pair).collect()
 }
 
-/// The exchange once it is fitted, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle,
+/// The exchange once it is fitted, with the constants of its laws, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle,
 /// leaves more than noise where the named one does not, has an effect at the end of its range, or one that has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
-    let other = fit.in_place_of(&one.gone, &one.new, progress);
+    let mut other = fit.in_place_of(&one.gone, &one.new, progress);
+    for (term, _) in &one.new {
+        other = selection::with_better_constants(&other, *term, progress).unwrap_or(other);
+    }
+    let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
         selection::loss(&other, &[*term]) > needed(fit, *constants) * dispersion
@@ -168,9 +167,10 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_settled = other.stands_still() || !fit.stands_still();
     let is_complete = !other.is_incomplete() || fit.is_incomplete();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
-    let is_model = is_settled && is_complete && is_within && one.new.iter().all(acts);
-    let dearer = one.dearer + below_zero(&other) - own_leaks;
-    is_model.then(|| Exchange { left: other.beyond(fit), dearer, ..one })
+    let is_model = is_settled && is_complete && is_within && new.iter().all(acts);
+    let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
+    let dearer = brought - spared(fit, &one.gone) + below_zero(&other) - own_leaks;
+    is_model.then(|| Exchange { new, left: other.beyond(fit), dearer, ..one })
 }
 
 /// The leaks in their standard deviations, widened where the residual is more than noise.

@@ -190,9 +190,8 @@ impl<'a> Integrand<'a> {
             *column = step.column(term, self.at);
         }
         let missing = |value: f64| if value.is_finite() { 0.0 } else { dt };
-        let unsure = means.felt_v_mps.is_nan() || means.felt_v_mps.abs() < motion.least_sure_mps();
         out.time_s = dt;
-        out.unsure_s = if unsure { dt } else { 0.0 };
+        out.unsure_s = if motion.is_sure(means.felt_v_mps, reading.a_mps2) { 0.0 } else { dt };
         out.missing_s = PerEquation {
             chamber_a: missing(reading.qa_m3s),
             chamber_b: missing(reading.qb_m3s),
