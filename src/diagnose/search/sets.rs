@@ -152,8 +152,9 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
     pairs.filter_map(pair).collect()
 }
 
-/// The exchange once it is fitted, with the constants of its laws, beside what the named set's own leaks cost. None where the other set is no model: its fit does not settle,
-/// leaves more than noise where the named one does not, has an effect at the end of its range, or one that has nothing to do.
+/// The exchange once it is fitted, its laws' constants too, beside what the named set's own leaks cost. None where the other set is no
+/// model: its fit does not settle, leaves more than noise where the named one does not, has an effect at the end of its range, or one that
+/// has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let mut other = fit.in_place_of(&one.gone, &one.new, progress);
     for (term, _) in &one.new {
