@@ -1,11 +1,10 @@
 //! Which readings a hold test rests on.
 
+use crate::presence::EMPTY_PA;
 use crate::rig::Rig;
 use crate::trace::Record;
 use serde::{Deserialize, Serialize};
 
-/// Below this gauge pressure air comes out of the oil, and a chamber is soon empty, Pa.
-const LEAST_PRESSURE_PA: f64 = 5e5;
 /// A piston that moves further isn't held: the load carries it away, m.
 const MOST_TRAVEL_M: f64 = 2e-3;
 /// Pressure and position are held against these ends as means of so many readings that their noise is this small, …
@@ -164,7 +163,7 @@ fn ending(readings: &[Reading], [of_pressure, of_position]: [usize; 2]) -> Optio
     let count = readings.len();
     if count >= of_pressure {
         let last = &readings[count - of_pressure..];
-        if mean(last, |r| r.pa_pa).min(mean(last, |r| r.pb_pa)) < LEAST_PRESSURE_PA {
+        if mean(last, |r| r.pa_pa).min(mean(last, |r| r.pb_pa)) < EMPTY_PA {
             return Some(EndedBy::Pressure);
         }
     }
@@ -179,7 +178,7 @@ fn ending(readings: &[Reading], [of_pressure, of_position]: [usize; 2]) -> Optio
 
 /// How many readings there are before a chamber may be empty: a mean that is below 5 bar has readings of none in it.
 fn filled(readings: &[Reading], std_pa: f64) -> usize {
-    let surely_pa = LEAST_PRESSURE_PA + 2.0 * std_pa;
+    let surely_pa = EMPTY_PA + 2.0 * std_pa;
     let low = |reading: &Reading| reading.pa_pa.min(reading.pb_pa) < surely_pa;
     readings.iter().position(low).unwrap_or(readings.len())
 }

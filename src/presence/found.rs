@@ -1,7 +1,7 @@
 //! What was found of the leaks, in words and as a report.
 
-use super::Pressures;
 use super::belief::{Belief, Beliefs, Place, size, weigh};
+use super::{EMPTY_PA, Pressures};
 use crate::hold::HoldSummary;
 use crate::report::{
     EstimateEntry, Estimates, Leakage, Reason, ReasonId, ReplayReport, Status, TraceSummary, Verdict, advice,
@@ -134,9 +134,26 @@ impl Found {
             _ if !found.is_empty() => (Status::Leak, Vec::new()),
             Some(undecided) => (Status::NotSure, vec![undecided.clone()]),
             None if open.is_empty() => (Status::Sound, Vec::new()),
-            None => (Status::NotSure, vec![(wording.open)(&open)]),
+            None => (Status::NotSure, vec![self.empty().unwrap_or_else(|| (wording.open)(&open))]),
         };
         told(status, found, reasons, &sentences.join(" "))
+    }
+
+    /// Says so where a chamber is nearly empty on average: little drives a leak there, and what flows in fills it up, so that none is ruled
+    /// out.
+    fn empty(&self) -> Option<Reason> {
+        let PerLeak { external_a: a_pa, external_b: b_pa, .. } = self.pressures_pa;
+        (a_pa.min(b_pa) < EMPTY_PA).then(|| {
+            Reason::new(
+                ReasonId::NotIdentifiable,
+                format!(
+                    "a chamber is nearly empty: P_A is {:.1} bar on average and P_B {:.1} bar",
+                    a_pa / 1e5,
+                    b_pa / 1e5
+                ),
+                "a leak may have emptied it: look for oil outside, and record where both chambers are under 20 bar or more",
+            )
+        })
     }
 
     /// Says so where `teller` asks for another oil than the rig file's.
@@ -176,9 +193,10 @@ impl Found {
             is_driven(*leak) && belief.probability >= sure && belief.interval[0] >= self.floor_m3spa[*leak]
         };
         let (found, others): (Vec<_>, Vec<_>) = Leak::ALL.into_iter().partition(is_found);
-        let (excluded, open) = others
-            .into_iter()
-            .partition(|leak| is_driven(*leak) && self.at_most_lpm(*leak) < threshold_lpm[*leak]);
+        let is_empty = self.empty().is_some();
+        let is_excluded =
+            |leak: &Leak| !is_empty && is_driven(*leak) && self.at_most_lpm(*leak) < threshold_lpm[*leak];
+        let (excluded, open) = others.into_iter().partition(is_excluded);
         Sorted { found, excluded, open }
     }
 

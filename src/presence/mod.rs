@@ -13,6 +13,9 @@ use nalgebra::{Matrix3, Vector3};
 use pitchleak_core::PerLeak;
 use serde::{Deserialize, Serialize};
 
+/// Below this gauge pressure air comes out of the oil, and a chamber is soon empty, Pa.
+pub(crate) const EMPTY_PA: f64 = 5e5;
+
 /// Of a coefficient of 1 L/min at 50 bar: a thousand of them, 1 σ.
 pub(crate) const LEAST_INFORMATION: f64 = 1e-6;
 /// … and a share of the best known, below which differences are rounding: constant pressures give two rates for three leaks.

@@ -222,6 +222,27 @@ fn in_calm_wind_a_valve_tells_no_oil() {
     }
 }
 
+/// A leak to the outside that has emptied a chamber is not ruled out by the little that still flows.
+#[test]
+fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
+    let folder = TempDir::new().unwrap();
+    let rig = folder.path().join("rig.toml");
+    std::fs::write(&rig, with_valve("").replace("tank = \"2 bar\"\n", "")).unwrap();
+    let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
+    let mut empty = 0;
+    for seed in ["1", "2", "3", "4"] {
+        let leak = ["--leak-external-a", "0.15 L/min", "--valve", "hysteresis=1 %", "--duration", "60 s"];
+        let arguments = ["--rig", &rig, "--wind", "5", "--noise", "rig", "--seed", seed];
+        let output = simulate(&trace, &[&arguments[..], &leak].concat());
+        assert!(output.status.success(), "{output:?}");
+        let report = replayed(&trace, &["--rig", &rig]);
+        let text = report["verdict"]["text"].as_str().unwrap();
+        assert_ne!(report["verdict"]["status"], "sound", "{seed}: {text}");
+        empty += usize::from(text.contains("nearly empty"));
+    }
+    assert!(empty > 0);
+}
+
 /// By its data sheet alone, in calm wind: the search for what is not known of the valve goes astray easily there, and then it names
 /// nothing; until it was held back it called half a litre SOUND.
 #[test]
