@@ -35,11 +35,8 @@ pub(crate) struct Belief {
     /// Standard deviation before any reading.
     pub prior_std: f64,
     /// The leaks that explain the readings about as well without it, likelier or not.
-    pub alike: Option<Set>,
+    pub alike: Option<PerLeak<bool>>,
 }
-
-/// Which leaks there are.
-pub(crate) type Set = [bool; 3];
 
 /// What is believed of all leaks, and of the oil.
 #[derive(Clone, Copy, Debug)]
@@ -199,11 +196,12 @@ impl Weighed {
 const ALIKE: f64 = 4.0;
 
 /// The leaks that do without one what the best do with it, if any do.
-fn alike(sets: &[Weighed], own: usize) -> Option<Set> {
+fn alike(sets: &[Weighed], own: usize) -> Option<PerLeak<bool>> {
     let least = |one: &&Weighed, other: &&Weighed| one.asked.total_cmp(&other.asked);
     let best = sets.iter().min_by(least)?;
     let without = sets.iter().filter(|one| !one.members.contains(&own)).min_by(least)?;
-    (without.asked < best.asked + ALIKE).then(|| [0, 1, 2].map(|leak| without.members.contains(&leak)))
+    (without.asked < best.asked + ALIKE)
+        .then(|| PerLeak::from_fn(|leak| without.members.contains(&(leak as usize))))
 }
 
 /// Sets of so little weight don't count.

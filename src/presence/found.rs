@@ -228,7 +228,7 @@ impl Found {
     /// The leaks that look like one that was found, and are less likely only because they are more.
     fn alike(&self, leak: Leak) -> Option<String> {
         let set = self.beliefs.leaks[leak].alike?;
-        let others: Vec<Leak> = Leak::ALL.into_iter().filter(|other| set[*other as usize]).collect();
+        let others: Vec<Leak> = Leak::ALL.into_iter().filter(|other| set[*other]).collect();
         (!others.is_empty()).then(|| {
             let others = join(&others, "and");
             format!("Without it {others} leaks would explain the readings as well: measure again under another load.")
