@@ -94,10 +94,15 @@ fn header_errors_say_what_is_expected() {
         ("PAR1\u{0}", if cfg!(feature = "parquet") { "damaged" } else { "Parquet" }),
         ("\u{0}\u{1}\u{2}\u{3}", "not a CSV file"),
         ("\u{1b}[31m\n", "\\u{1b}"),
+        (
+            "\"Laufzeit\nT\",x_m,pa_pa,pb_pa\n0,0.1,5e6,4e6\n1,0.1,5e6,4e6\n",
+            r#"say t = { name = "Laufzeit\nT", unit = "ms" }"#,
+        ),
     ];
     for (text, expected) in cases {
         let message = message(text);
         assert!(message.starts_with("trace.csv: ") && message.contains(expected), "{message}");
+        assert!(!message.contains('\n'), "{message}");
     }
 }
 

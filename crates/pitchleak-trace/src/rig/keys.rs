@@ -4,6 +4,7 @@ use super::bound::{self, Bound};
 use super::document::{RigError, Section};
 use crate::units::{self, Dimension, FEW_DIGITS, rounded};
 use std::fmt::Display;
+use toml_writer::{ToTomlValue, TomlStringBuilder};
 
 /// A key that can't be read is an error; to write and to name one is none.
 pub(super) type Done = Result<(), RigError>;
@@ -166,6 +167,8 @@ pub(super) fn for_people(value: f64, bound: Bound) -> String {
     text.unwrap_or_else(|| quantity(si, dimension))
 }
 
+/// On one line whatever it holds: a column's name may have line breaks, and messages say it.
 pub(super) fn toml_text(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+    let text = TomlStringBuilder::new(text);
+    text.as_basic_pretty().or_else(|| text.as_literal()).unwrap_or_else(|| text.as_basic()).to_toml_value()
 }
