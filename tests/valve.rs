@@ -140,24 +140,35 @@ fn an_external_leak_is_told_beyond_what_the_valves_clearance_may_be() {
     }
 }
 
+type Flaw = fn(&mut ValveCylinder);
+
+/// What no rig file declares (theory of leaks without flow meters), by name; the last says
+/// whether the valve was built so, and calibrated with it.
+const UNDECLARED: [(&str, Flaw, bool); 12] = [
+    (
+        "soft hysteresis of 1 %",
+        |one| {
+            (one.valve.hysteresis, one.valve.hysteresis_follows) = (0.01, 0.5);
+        },
+        false,
+    ),
+    ("hysteresis of 1 %", |one| one.valve.hysteresis = 0.01, false),
+    ("hysteresis of 0.3 %", |one| one.valve.hysteresis = 0.003, false),
+    ("null drift of 0.5 %", |one| one.valve.null_drift = 0.005, false),
+    ("spool read 10 ms late", |one| one.valve.spool_lag_s = 0.01, false),
+    ("overlap of 3 %", |one| one.valve.laps = [0.03; 4], true),
+    ("saturation of 15 %", |one| one.valve.saturation = 0.15, true),
+    ("supply droops by 2 bar", |one| one.valve.droop_pa = 2e5, false),
+    ("supply droops by 5 bar", |one| one.valve.droop_pa = 5e5, false),
+    ("pressure A 10 ms late", |one| one.pressure_lag_s = 0.01, false),
+    ("accumulator at A", |one| one.accumulator_m3pa = 2e-13, false),
+    ("dry friction of 600 N", |one| one.dry_n = 600.0, false),
+];
+
 /// What nobody declared: no leak is named that is not there.
 #[test]
 fn what_a_valve_does_beside_its_data_sheet_is_no_leak() {
-    type Flaw = fn(&mut ValveCylinder);
-    let worlds: [(&str, Flaw); 11] = [
-        ("hysteresis of 1 %", |one| one.valve.hysteresis = 0.01),
-        ("hysteresis of 0.3 %", |one| one.valve.hysteresis = 0.003),
-        ("null drift of 0.5 %", |one| one.valve.null_drift = 0.005),
-        ("spool read 10 ms late", |one| one.valve.spool_lag_s = 0.01),
-        ("overlap of 3 %", |one| one.valve.laps = [0.03; 4]),
-        ("saturation of 15 %", |one| one.valve.saturation = 0.15),
-        ("supply droops by 2 bar", |one| one.valve.droop_pa = 2e5),
-        ("supply droops by 5 bar", |one| one.valve.droop_pa = 5e5),
-        ("pressure A 10 ms late", |one| one.pressure_lag_s = 0.01),
-        ("accumulator at A", |one| one.accumulator_m3pa = 2e-13),
-        ("dry friction of 600 N", |one| one.dry_n = 600.0),
-    ];
-    for (name, flaw) in worlds {
+    for (name, flaw, _) in UNDECLARED {
         let mut counts = [0; 4];
         for wind in WINDS {
             let found = reports(runs() / 2, 60.0, |seed| {
@@ -176,6 +187,72 @@ fn what_a_valve_does_beside_its_data_sheet_is_no_leak() {
             }
         }
         println!("{name}: leak, sound, doubtful, not sure {counts:?}");
+    }
+}
+
+/// None, and of each kind 0.1 L/min at 50 bar.
+const LEAKS: [[f64; 3]; 4] = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
+
+/// Whether a sure verdict names a leak that is not there, or one of another size than there is.
+fn is_wrong(report: &ReplayReport, leaks: &[f64; 3]) -> bool {
+    let is_off = |leak: &Leak| {
+        let there = leaks[*leak as usize];
+        let [low, high] = report.estimates.leaks()[*leak].ci95.expect("an interval").map(|end| end / UNIT);
+        there == 0.0 || (0.5 * (low + high) - there).abs() > (high - low).max(0.3 * there)
+    };
+    report.verdict.status == Status::Leak && report.verdict.faults.iter().any(is_off)
+}
+
+/// Whether the one leak is named that is there, or none.
+fn is_right(report: &ReplayReport, leaks: &[f64; 3]) -> bool {
+    match Leak::ALL.into_iter().find(|leak| leaks[*leak as usize] > 0.0) {
+        Some(leak) => is_found(report, leak),
+        None => report.verdict.status == Status::Sound,
+    }
+}
+
+/// Right and wrong verdicts of valves that were calibrated with the one flaw and have the other, at these winds, and how many there are.
+fn beside_a_calibration(then: Flaw, flaw: Flaw, winds: &[f64], count: u64) -> [usize; 3] {
+    let known: Vec<_> = (0..count).into_par_iter().map(|seed| known(seed, LeaksThen::Zero, then)).collect();
+    let cases: Vec<_> = (0..known.len())
+        .flat_map(|seed| winds.iter().flat_map(move |wind| LEAKS.map(|leaks| (seed, *wind, leaks))))
+        .collect();
+    let judged = |(seed, wind, leaks): &(usize, f64, [f64; 3])| {
+        let change = |now: &mut ValveCylinder| {
+            (now.wind, now.leaks_lpm) = (*wind, *leaks);
+            flaw(now);
+        };
+        let report = later(&known[*seed], *seed as u64, change, |text| text);
+        [is_right(&report, leaks), is_wrong(&report, leaks), true].map(usize::from)
+    };
+    let sum = |a: [usize; 3], b: [usize; 3]| std::array::from_fn(|i| a[i] + b[i]);
+    cases.par_iter().map(judged).reduce(|| [0; 3], sum)
+}
+
+/// Nor beside a calibration, and a leak that is there is named in its size.
+#[test]
+fn what_a_valve_does_beside_its_calibration_is_no_leak() {
+    for (name, flaw, is_built) in UNDECLARED {
+        let then = if is_built { flaw } else { |_: &mut ValveCylinder| {} };
+        let [right, wrong, all] = beside_a_calibration(then, flaw, &WINDS, runs() / 2);
+        println!("{name}, calibrated: {right} right, {wrong} wrong of {all}");
+        // Nothing in the model follows the reading by half: one in fifty.
+        let most = if name.starts_with("soft") { all.div_ceil(50) } else { 0 };
+        assert!(wrong <= most, "{name}: {wrong} wrong");
+        // As the data sheet declares it.
+        assert!(name != "hysteresis of 0.3 %" || right * 100 >= all * 95, "{name}: {right} of {all}");
+    }
+}
+
+/// A spool that hardly leaves its middle tells what leaks, with hysteresis as declared and without.
+#[test]
+fn in_calm_wind_a_calibrated_valve_tells_what_leaks() {
+    let flaws: [(&str, Flaw, usize); 2] =
+        [("none", |_| {}, 95), ("hysteresis of 0.3 %", |one| one.valve.hysteresis = 0.003, 75)];
+    for (name, flaw, least) in flaws {
+        let [right, wrong, all] = beside_a_calibration(|_| {}, flaw, &[0.02, 0.1], runs());
+        println!("calm wind, {name}: {right} right, {wrong} wrong of {all}");
+        assert!(wrong == 0 && right * 100 >= all * least, "{name}: {right} right, {wrong} wrong of {all}");
     }
 }
 
@@ -224,24 +301,28 @@ fn calibrated(rig: &Rig, text: String, leaks: LeaksThen) -> Result<Calibration, 
     calibrator.finish()
 }
 
-/// A calibrated valve, later, when it has drifted as declared; `seen` is what is recorded then.
+/// A cylinder, and the calibration of its valve.
+fn known(seed: u64, leaks: LeaksThen, then: impl Fn(&mut ValveCylinder)) -> (ValveCylinder, String) {
+    let mut cylinder = ValveCylinder::drawn(first_seed() + 700 + seed);
+    then(&mut cylinder);
+    let found = calibrated(&rig(""), cylinder.trace(300.0, 100.0, 3e-3), leaks).expect("calibrated");
+    (cylinder, found.to_toml().expect("a file"))
+}
+
+/// That cylinder later, when its valve has drifted as declared and something has changed; `seen` is what is recorded then.
 fn later(
+    (cylinder, calibration): &(ValveCylinder, String),
     seed: u64,
-    then: LeaksThen,
-    leaks_then: [f64; 3],
-    leaks_now: [f64; 3],
+    change: impl Fn(&mut ValveCylinder),
     seen: impl Fn(String) -> String,
 ) -> ReplayReport {
-    let base = rig("");
-    let cylinder = ValveCylinder { leaks_lpm: leaks_then, ..ValveCylinder::drawn(first_seed() + 700 + seed) };
-    let text = cylinder.trace(300.0, 100.0, 3e-3);
-    let found = calibrated(&base, text, then).expect("calibrated");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("valve.toml");
-    std::fs::write(&file, found.to_toml().expect("a file")).expect("written");
+    std::fs::write(&file, calibration).expect("written");
     let mut normal = white_noise(80_000 + seed);
     let mut drift = |std: f64| std * normal.next().unwrap_or_default();
-    let mut now = ValveCylinder { leaks_lpm: leaks_now, seed: 90_000 + seed, ..cylinder };
+    let mut now = ValveCylinder { seed: 90_000 + seed, ..*cylinder };
+    change(&mut now);
     for edge in 0..4 {
         now.valve.gains[edge] *= 1.0 + drift(0.03);
         now.valve.laps[edge] += drift(0.001);
@@ -256,7 +337,14 @@ fn after_a_calibration_external_leaks_are_small_or_changes() {
     let all = |then, leaks_then: [f64; 3], leaks_now: [f64; 3]| {
         (0..runs())
             .into_par_iter()
-            .map(|seed| later(seed, then, leaks_then, leaks_now, |text| text))
+            .map(|seed| {
+                later(
+                    &known(seed, then, |one| one.leaks_lpm = leaks_then),
+                    seed,
+                    |now| now.leaks_lpm = leaks_now,
+                    |text| text,
+                )
+            })
             .collect::<Vec<_>>()
     };
     for sound in all(LeaksThen::Zero, [0.0; 3], [0.0; 3]) {
@@ -320,7 +408,10 @@ fn one_chamber_pressure_may_be_missing_after_a_calibration() {
         {
             let mut leaks = [0.0; 3];
             leak.iter().for_each(|leak| leaks[*leak as usize] = lpm);
-            let one = |seed| later(seed, LeaksThen::Zero, [0.0; 3], leaks, |text| without(column, &text));
+            let one = |seed| {
+                let known = known(seed, LeaksThen::Zero, |_| {});
+                later(&known, seed, |now| now.leaks_lpm = leaks, |text| without(column, &text))
+            };
             let reports: Vec<_> = (0..runs()).into_par_iter().map(one).collect();
             let count =
                 |of: &dyn Fn(&ReplayReport) -> bool| reports.iter().filter(|one| of(one)).count() as u64;

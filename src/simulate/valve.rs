@@ -111,7 +111,10 @@ impl ValveSensors {
         for flaw in &self.flaws {
             match *flaw {
                 ValveFlaw::Hysteresis(half) if half > 0.0 => {
-                    self.play = (self.play + moved / half).clamp(-1.0, 1.0);
+                    // The spool stands still until the reading has passed its width.
+                    if moved != 0.0 {
+                        self.play = moved.signum();
+                    }
                     shown.spool += half * self.play;
                 }
                 ValveFlaw::Hysteresis(_) | ValveFlaw::Clearance(_) => {}

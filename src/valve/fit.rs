@@ -21,7 +21,7 @@ const EASED: f64 = 30.0;
 const ROUNDS_WHOLE: usize = 8;
 /// Rounds after which the spool is followed with the hysteresis found, within these multiples of the declared one.
 const ROUNDS_FOLLOWED: [usize; 3] = [5, 8, 11];
-const PLAY_RANGE: [f64; 2] = [0.3, 2.0];
+const PLAY_RANGE: [f64; 2] = [0.3, 5.0];
 /// The search is over where no unknown moves by more than this share of its standard deviation.
 const SETTLED: f64 = 0.5;
 /// κ stays within these multiples of the rig file's on its way, and an edge is never sharper than this share of the stroke.

@@ -5,6 +5,7 @@ use super::calibration::{self, Calibration, CalibrationError, Since};
 use super::edges::{PA, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{LEAST_READINGS, Run, fit};
+use super::means::means;
 use super::parts::{CHANGED, Summary, summary};
 use super::unknowns::{Belief, LEAKS, Unknowns};
 use super::unread;
@@ -248,8 +249,10 @@ impl ValveMeter {
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
     fn settled(&self, runs: &[Run], before: &Belief, start: Unknowns, changes: usize) -> Option<Taken> {
-        let known = Known::of(&self.rig, &self.sheet);
-        let fit = fit(runs, before, start, self.sheet.hysteresis, &known)?;
+        let mut known = Known::of(&self.rig, &self.sheet);
+        let (means, count) = means(runs, &known.variances);
+        known.variances /= count as f64;
+        let fit = fit(&means, before, start, self.sheet.hysteresis, &known)?;
         let summary = summary(&fit.parts, before, &fit.at)?;
         let constant = Taken {
             summary,

@@ -82,6 +82,7 @@ impl Belief {
             change[LAPS + edge] = of_null * sheet.drift.lap;
             change[CLEARANCES + edge] = share * sheet.drift.null_leak * clearance_std(sheet);
         }
+        change[HYSTERESIS] = share * sheet.hysteresis;
         change[KAPPA] = share * rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
         let spread = self.covariance()? + Information::from_diagonal(&change.map(|std| std * std));
         Some(Self { information: spread.cholesky()?.inverse(), ..self.clone() })

@@ -37,6 +37,8 @@ pub struct TrueValve {
     pub clearances_lpm: [f64; 4],
     /// Half width of the hysteresis between the spool as read and as it is, a share of the stroke.
     pub hysteresis: f64,
+    /// The share of the reading's motion that the spool follows within it: none of a backlash.
+    pub hysteresis_follows: f64,
     /// The spool's zero walks off by this in the whole trace.
     pub null_drift: f64,
     /// By how much the spool's reading is late, s.
@@ -81,6 +83,7 @@ impl TrueValve {
             saturation: 0.0,
             clearances_lpm: [0.0; 4],
             hysteresis: 0.0,
+            hysteresis_follows: 0.0,
             null_drift: 0.0,
             spool_lag_s: 0.0,
             droop_pa: 0.0,
@@ -188,7 +191,7 @@ struct Run<'a> {
     charges: bool,
     drawn_m3s: f64,
     shown_pa: f64,
-    /// The spool's own position within its hysteresis.
+    /// Where a backlash of the hysteresis stands.
     inner: f64,
     spools: Vec<f64>,
 }
@@ -237,7 +240,12 @@ impl<'a> Run<'a> {
 
     /// The spool's opening: the reading less its play and what its zero drifted by.
     fn true_spool(&self, u: f64) -> f64 {
-        let width = self.of.valve.hysteresis;
+        let follows = self.of.valve.hysteresis_follows;
+        follows * u + (1.0 - follows) * self.backlash(u)
+    }
+
+    fn backlash(&self, u: f64) -> f64 {
+        let width = self.of.valve.hysteresis / (1.0 - self.of.valve.hysteresis_follows);
         if width > 0.0 { self.inner.clamp(u - width, u + width) } else { u }
     }
 
@@ -276,9 +284,9 @@ impl<'a> Run<'a> {
         let k3 = self.rates(t + h / 2.0, &plus(&k2, 0.5));
         let k4 = self.rates(t + h, &plus(&k3, 1.0));
         self.at = std::array::from_fn(|i| self.at[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
-        self.inner = self.true_spool(self.at[4]);
+        self.inner = self.backlash(self.at[4]);
         let [_, _, pa, pb, ..] = self.at;
-        let [qa, qb] = self.of.valve.flows(self.inner, pa, pb, self.supply_pa);
+        let [qa, qb] = self.of.valve.flows(self.true_spool(self.at[4]), pa, pb, self.supply_pa);
         self.drawn_m3s = qa.max(0.0) + qb.max(0.0);
         // A saw-tooth between 95 and 105 bar, with the pump's ripple.
         self.charges = if self.supply_pa < 95e5 { true } else { self.charges && self.supply_pa < 105e5 };

@@ -1,7 +1,7 @@
 //! What is known of a valve, its cylinder and its sensors.
 
 use super::unknowns::{
-    CLEARANCES, DRIFT_S, GAINS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, NULL_DRIFT_S, ROUNDING,
+    CLEARANCES, DRIFT_S, GAINS, HYSTERESIS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, NULL_DRIFT_S, ROUNDING,
     VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
 };
 use crate::{CylinderError, Fluid, Real};
@@ -111,7 +111,8 @@ impl<T: Real> ValveCalibration<T> {
                 KAPPA => oil * oil / day_s,
                 GAINS..LAPS => own * own / day_s,
                 LAPS..ROUNDING => self.lap_drift * self.lap_drift / day_s,
-                CLEARANCES..=19 => clearance * clearance / day_s,
+                CLEARANCES..HYSTERESIS => clearance * clearance / day_s,
+                HYSTERESIS => self.hysteresis * self.hysteresis / day_s,
                 _ => T::zero(),
             };
         }

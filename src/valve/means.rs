@@ -1,0 +1,116 @@
+//! Readings as means over as long as the signals go in straight lines.
+//!
+//! Each signal of each reading is found beside the unknowns. Where signals move by less than their noise from reading to reading, that
+//! are many numbers of which each is told badly, and by chance any κ explains them (Neyman, Scott 1948, "Consistent estimates based on
+//! partially consistent observations"). Over a straight line a mean says all, with so much less noise.
+
+use super::edges::Signals;
+use super::equations::Node;
+use super::fit::Run;
+
+/// A mean spans so long at the most, s: a tenth of a part.
+const MOST_S: f64 = 0.5;
+/// Readings that a line is told by at the least, and then twice, four times as many.
+const LEAST: usize = 4;
+/// Readings go in lines where they scatter around long ones by so much more than around the shortest: squares over squares.
+const STRAIGHT: f64 = 1.05;
+/// So many standard deviations of that by chance.
+const CHANCE_SIGMAS: f64 = 3.0;
+
+/// The runs as means, and over how many readings each is one.
+pub(super) fn means(runs: &[Run], variances: &Signals) -> (Vec<Run>, usize) {
+    let count = longest(runs, variances);
+    (runs.iter().map(|run| run.of_means(count)).collect(), count)
+}
+
+/// The most readings that lie in straight lines.
+fn longest(runs: &[Run], variances: &Signals) -> usize {
+    let shortest = scatter(runs, LEAST, variances);
+    let lengths = std::iter::successors(Some(2 * LEAST), |length| Some(2 * length));
+    let is_straight = |length: &usize| {
+        let blocks: usize = runs.iter().map(|run| run.readings.len() / length).sum();
+        let seconds = runs.iter().map(|run| run.seconds()).sum::<f64>();
+        let readings: usize = runs.iter().map(|run| run.readings.len()).sum();
+        let is_short = *length as f64 * seconds <= MOST_S * readings as f64;
+        let chance = CHANCE_SIGMAS * (2.0 / (blocks * LEAST).max(1) as f64).sqrt();
+        let long = scatter(runs, *length, variances);
+        is_short && (0..5).all(|at| long[at].is_nan() || long[at] <= (STRAIGHT + chance) * shortest[at])
+    };
+    let lines = lengths.take_while(is_straight).last();
+    lines.map_or(1, |length| length / 2)
+}
+
+/// Mean square of what is left of the signals in lines of so many readings each; of a signal without noise at least its rounding.
+fn scatter(runs: &[Run], length: usize, variances: &Signals) -> Signals {
+    let middle = 0.5 * (length as f64 - 1.0);
+    let power: f64 = (0..length).map(|at| (at as f64 - middle).powi(2)).sum();
+    let (mut squares, mut free) = (Signals::zeros(), 0.0);
+    for block in runs.iter().flat_map(|run| run.readings.chunks_exact(length)) {
+        let mean = block.iter().map(|node| node.signals).sum::<Signals>() / length as f64;
+        let places = || (0..).map(|at: u32| f64::from(at) - middle);
+        let slope = block.iter().zip(places()).map(|(node, at)| node.signals * at).sum::<Signals>() / power;
+        for (node, at) in block.iter().zip(places()) {
+            let left = node.signals - mean - slope * at;
+            squares += left.component_mul(&left);
+        }
+        free += length as f64 - 2.0;
+    }
+    (squares / f64::max(free, 1.0)).zip_map(variances, |square, variance| square + 1e-3 * variance)
+}
+
+impl Run {
+    /// One reading for each `count` of them.
+    fn of_means(&self, count: usize) -> Self {
+        let mean = |block: &[Node]| {
+            let share = 1.0 / block.len() as f64;
+            let tank_pa = block.iter().map(|node| node.spool.tank_pa).sum::<f64>() * share;
+            let mut mean = block[0];
+            mean.t_s = block.iter().map(|node| node.t_s).sum::<f64>() * share;
+            mean.signals = block.iter().map(|node| node.signals).sum::<Signals>() * share;
+            mean.spool.tank_pa = tank_pa;
+            mean
+        };
+        Self { readings: self.readings.chunks_exact(count).map(mean).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::valve::edges::{PS, X};
+    use pitchleak_testkit::white_noise;
+
+    /// A piston that goes to and fro with this frequency, and a supply that is not read.
+    fn run(frequency_hz: f64, noise_m: f64) -> Run {
+        let node = |(index, noise): (usize, f64)| {
+            let t_s = 0.01 * index as f64;
+            let mut signals = Signals::zeros();
+            signals[X] = 0.1 + 0.05 * (std::f64::consts::TAU * frequency_hz * t_s).sin() + noise_m * noise;
+            signals[PS] = 100e5;
+            Node { t_s, signals, spool: Default::default() }
+        };
+        Run { readings: white_noise(7).enumerate().take(6000).map(node).collect() }
+    }
+
+    #[test]
+    fn readings_are_means_where_signals_go_in_straight_lines() {
+        let variances = Signals::repeat(4e-8);
+        let [calm, windy] = [0.02, 2.0].map(|hz| means(&[run(hz, 2e-4)], &variances));
+        assert_eq!((calm.1, windy.1), (16, 1));
+        assert_eq!((calm.0[0].readings.len(), windy.0[0].readings.len()), (375, 6000));
+        let still = run(0.02, 0.0);
+        for (mean, readings) in calm.0[0].readings.iter().zip(still.readings.chunks(16)) {
+            assert!(
+                (mean.signals[X] - readings.iter().map(|node| node.signals[X]).sum::<f64>() / 16.0).abs()
+                    < 5.0 * 2e-4 / 4.0
+            );
+            assert!((mean.t_s - 0.5 * (readings[0].t_s + readings[15].t_s)).abs() < 1e-9);
+        }
+    }
+
+    /// A signal without noise has no lines but its own.
+    #[test]
+    fn what_moves_without_noise_is_left_as_it_is() {
+        assert_eq!(means(&[run(0.2, 0.0)], &Signals::repeat(1e-12)).1, 1);
+    }
+}
