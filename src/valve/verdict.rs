@@ -61,19 +61,22 @@ impl ValveTest {
             Leak::ExternalA => ("A–T", a),
             Leak::ExternalB => ("B–T", b),
         };
-        Some(match self.summary.calibrated {
-            Some(since) if since.leaks == LeaksThen::Unknown => {
-                format!("It is more than on {}: what leaked then is not in it.", since.date)
-            }
-            Some(since) if !since.has_evidence => {
-                format!("That nothing leaked on {}, when the valve was calibrated, is assumed.", since.date)
-            }
-            Some(_) => return None,
-            None => format!(
+        let Some(since) = self.summary.calibrated else {
+            return Some(format!(
                 "The valve's {edge} edge would look the same, and its data sheet allows {} L/min: a hold test tells.",
                 readable(clearance_lpm, 2)
-            ),
-        })
+            ));
+        };
+        let absolute = match since.leaks {
+            LeaksThen::Unknown => format!("It is more than on {}: what leaked then is not in it. ", since.date),
+            LeaksThen::Zero if since.has_evidence => String::new(),
+            LeaksThen::Zero => {
+                format!("That nothing leaked on {}, when the valve was calibrated, is assumed. ", since.date)
+            }
+        };
+        Some(format!(
+            "{absolute}The valve's {edge} edge would look the same if it has worn since: a hold test tells."
+        ))
     }
 
     /// What the verdict rests on.
