@@ -256,6 +256,15 @@ fn in_calm_wind_a_calibrated_valve_tells_what_leaks() {
     }
 }
 
+/// Means over straight lines are none where noise goes on from reading to reading.
+#[test]
+fn in_calm_wind_noise_that_is_not_white_is_no_leak() {
+    let [right, wrong, all] =
+        beside_a_calibration(|_| {}, |one| one.slow_noise = 0.8, &[0.02, 0.1, 0.3], runs());
+    println!("calm wind, slow noise: {right} right, {wrong} wrong of {all}");
+    assert_eq!(wrong, 0, "of {all}");
+}
+
 #[test]
 fn a_leak_that_sets_in_is_told_as_it_is_now() {
     let found = reports(runs(), 60.0, |seed| ValveCylinder {

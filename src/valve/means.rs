@@ -17,10 +17,30 @@ const STRAIGHT: f64 = 1.05;
 /// So many standard deviations of that by chance.
 const CHANCE_SIGMAS: f64 = 3.0;
 
-/// The runs as means, and over how many readings each is one.
-pub(super) fn means(runs: &[Run], variances: &Signals) -> (Vec<Run>, usize) {
-    let count = longest(runs, variances);
-    (runs.iter().map(|run| run.of_means(count)).collect(), count)
+/// Noise of means beyond that of the readings they are of: squares over squares. Noise that is not white is louder in means.
+const WHITE: f64 = 1.5;
+
+/// Readings as means.
+pub(super) struct Means {
+    pub runs: Vec<Run>,
+    /// Over how many readings each is one.
+    pub count: usize,
+    /// The readings' own noise, in the declared one's: squares over squares, at least 1.
+    noise: f64,
+}
+
+impl Means {
+    pub fn of(runs: &[Run], variances: &Signals) -> Self {
+        let count = longest(runs, variances);
+        let own = scatter(runs, LEAST, variances).component_div(variances);
+        let noise = own.iter().copied().filter(|own| own.is_finite()).fold(1.0, f64::max);
+        Self { runs: runs.iter().map(|run| run.of_means(count)).collect(), count, noise }
+    }
+
+    /// Whether what is left of them, in the declared noise's squares, is what white noise of the readings leaves.
+    pub fn are_white(&self, left: f64) -> bool {
+        self.count == 1 || left <= WHITE * self.noise
+    }
 }
 
 /// The most readings that lie in straight lines.
@@ -95,11 +115,11 @@ mod tests {
     #[test]
     fn readings_are_means_where_signals_go_in_straight_lines() {
         let variances = Signals::repeat(4e-8);
-        let [calm, windy] = [0.02, 2.0].map(|hz| means(&[run(hz, 2e-4)], &variances));
-        assert_eq!((calm.1, windy.1), (16, 1));
-        assert_eq!((calm.0[0].readings.len(), windy.0[0].readings.len()), (375, 6000));
+        let [calm, windy] = [0.02, 2.0].map(|hz| Means::of(&[run(hz, 2e-4)], &variances));
+        assert_eq!((calm.count, windy.count), (16, 1));
+        assert_eq!((calm.runs[0].readings.len(), windy.runs[0].readings.len()), (375, 6000));
         let still = run(0.02, 0.0);
-        for (mean, readings) in calm.0[0].readings.iter().zip(still.readings.chunks(16)) {
+        for (mean, readings) in calm.runs[0].readings.iter().zip(still.readings.chunks(16)) {
             assert!(
                 (mean.signals[X] - readings.iter().map(|node| node.signals[X]).sum::<f64>() / 16.0).abs()
                     < 5.0 * 2e-4 / 4.0
@@ -111,6 +131,6 @@ mod tests {
     /// A signal without noise has no lines but its own.
     #[test]
     fn what_moves_without_noise_is_left_as_it_is() {
-        assert_eq!(means(&[run(0.2, 0.0)], &Signals::repeat(1e-12)).1, 1);
+        assert_eq!(Means::of(&[run(0.2, 0.0)], &Signals::repeat(1e-12)).count, 1);
     }
 }

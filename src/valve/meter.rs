@@ -4,8 +4,8 @@
 use super::calibration::{self, Calibration, CalibrationError, Since};
 use super::edges::{PA, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
-use super::fit::{LEAST_READINGS, Run, fit};
-use super::means::means;
+use super::fit::{Fit, LEAST_READINGS, Run, fit};
+use super::means::Means;
 use super::parts::{CHANGED, Summary, summary};
 use super::unknowns::{Belief, LEAKS, Unknowns};
 use super::unread;
@@ -247,13 +247,23 @@ impl ValveMeter {
         Some(taken.after(last, begin_s))
     }
 
+    /// What readings say where nothing changes: as means, where they may stand for them.
+    fn fitted(&self, runs: &[Run], before: &Belief, start: Unknowns) -> Option<(Fit, Summary)> {
+        let known = Known::of(&self.rig, &self.sheet);
+        let one = |runs: &[Run], known: &Known| {
+            let fit = fit(runs, before, start, self.sheet.hysteresis, known)?;
+            let summary = summary(&fit.parts, before, &fit.at)?;
+            Some((fit, summary))
+        };
+        let means = Means::of(runs, &known.variances);
+        let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
+        let found = one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise));
+        found.or_else(|| one(runs, &known))
+    }
+
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
     fn settled(&self, runs: &[Run], before: &Belief, start: Unknowns, changes: usize) -> Option<Taken> {
-        let mut known = Known::of(&self.rig, &self.sheet);
-        let (means, count) = means(runs, &known.variances);
-        known.variances /= count as f64;
-        let fit = fit(&means, before, start, self.sheet.hysteresis, &known)?;
-        let summary = summary(&fit.parts, before, &fit.at)?;
+        let (fit, summary) = self.fitted(runs, before, start)?;
         let constant = Taken {
             summary,
             at: fit.at,

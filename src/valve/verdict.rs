@@ -68,7 +68,9 @@ impl ValveTest {
             ));
         };
         let absolute = match since.leaks {
-            LeaksThen::Unknown => format!("It is more than on {}: what leaked then is not in it. ", since.date),
+            LeaksThen::Unknown => {
+                format!("It is more than on {}: what leaked then is not in it. ", since.date)
+            }
             LeaksThen::Zero if since.has_evidence => String::new(),
             LeaksThen::Zero => {
                 format!("That nothing leaked on {}, when the valve was calibrated, is assumed. ", since.date)

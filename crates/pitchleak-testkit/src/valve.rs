@@ -66,6 +66,8 @@ pub struct ValveCylinder {
     pub pressure_lag_s: f64,
     /// An accumulator at A: what it takes, m³/Pa.
     pub accumulator_m3pa: f64,
+    /// Noise that goes on from reading to reading by 0.95, beside the white one, in that one's size.
+    pub slow_noise: f64,
     /// The command is recorded instead of the spool's position.
     pub by_command: bool,
     /// Of motion, load and noise.
@@ -135,6 +137,7 @@ impl ValveCylinder {
             dry_n: 100.0,
             pressure_lag_s: 0.0,
             accumulator_m3pa: 0.0,
+            slow_noise: 0.0,
             by_command: false,
             seed,
         }
@@ -151,13 +154,14 @@ impl ValveCylinder {
         let mut run = Run::new(self);
         let mut normal = white_noise(self.seed);
         let mut noise = |scale: f64| normal.next().unwrap_or(0.0) * scale * accuracy / 3.0;
+        let mut slow = SlowNoise { size: self.slow_noise * accuracy / 3.0, ..SlowNoise::of(self.seed) };
         let spool = if self.by_command { "valve_command_percent" } else { "spool_percent" };
         let mut text = format!("t_s,x_mm,pa_bar,pb_bar,{spool},ps_bar\n");
         let every = (STEPS_HZ / rate_hz).round() as i64;
         let warm_up = 5 * STEPS_HZ as i64;
         for k in -warm_up..(seconds * STEPS_HZ).round() as i64 {
             if k >= 0 && k % every == 0 {
-                let read = run.readings(k as f64 / STEPS_HZ, seconds);
+                let read = slow.beside(run.readings(k as f64 / STEPS_HZ, seconds));
                 let spool_noise = if self.by_command { 0.0 } else { noise(1.0) };
                 let _ = writeln!(
                     text,
@@ -173,6 +177,30 @@ impl ValveCylinder {
             run.step(k as f64 / STEPS_HZ);
         }
         text
+    }
+}
+
+/// Noise of position, pressures, spool and supply that is kept from reading to reading.
+struct SlowNoise {
+    size: f64,
+    at: [f64; 5],
+    normal: Box<dyn Iterator<Item = f64>>,
+}
+
+impl SlowNoise {
+    const KEPT: f64 = 0.95;
+
+    fn of(seed: u64) -> Self {
+        Self { size: 0.0, at: [0.0; 5], normal: Box::new(white_noise(900_000 + seed)) }
+    }
+
+    fn beside(&mut self, read: [f64; 5]) -> [f64; 5] {
+        let fresh = (1.0 - Self::KEPT * Self::KEPT).sqrt();
+        for at in &mut self.at {
+            *at = Self::KEPT * *at + fresh * self.normal.next().unwrap_or(0.0);
+        }
+        let scales = [STROKE, PRESSURE_SCALE_PA, PRESSURE_SCALE_PA, 1.0, PRESSURE_SCALE_PA];
+        std::array::from_fn(|i| read[i] + self.size * scales[i] * self.at[i])
     }
 }
 
