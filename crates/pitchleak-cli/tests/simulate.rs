@@ -231,7 +231,7 @@ fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
     let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
     let mut empty = 0;
     for seed in ["1", "2", "3", "4"] {
-        let leak = ["--leak-external-a", "0.15 L/min", "--valve", "hysteresis=1 %", "--duration", "60 s"];
+        let leak = ["--leak-external-a", "0.15 L/min", "--valve", "hysteresis=0.5 %", "--duration", "60 s"];
         let arguments = ["--rig", &rig, "--wind", "5", "--noise", "rig", "--seed", seed];
         let output = simulate(&trace, &[&arguments[..], &leak].concat());
         assert!(output.status.success(), "{output:?}");
