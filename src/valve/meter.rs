@@ -2,7 +2,7 @@
 //! and the leaks do while they stay the same.
 
 use super::calibration::{self, Calibration, CalibrationError, Since};
-use super::edges::{PA, SPOOL, Signals, Spool};
+use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Run, fit};
 use super::means::Means;
@@ -27,6 +27,8 @@ const LEAST_SPREAD: f64 = 1e-12;
 
 /// Leaks that would have to change oftener than this within a window are none (chosen).
 const SO_MANY_CHANGES: usize = 1;
+/// A pressure so many standard deviations below the atmosphere's is so for certain.
+const VOID_SIGMAS: f64 = 3.0;
 /// Fewer readings tell nothing.
 const LEAST_WINDOW: usize = 50;
 
@@ -45,6 +47,9 @@ pub struct ValveMeter {
     pub(super) window_s: f64,
     /// Least and greatest spool.
     spool_range: [f64; 2],
+    /// So long part of a chamber was void, s.
+    #[serde(default)]
+    pub(super) void_s: f64,
     /// The chamber whose pressure is not measured.
     unread: Option<usize>,
     /// The calibration that it goes by.
@@ -117,6 +122,7 @@ impl ValveMeter {
             count: 0,
             window_s: f64::INFINITY,
             spool_range: [f64::INFINITY, f64::NEG_INFINITY],
+            void_s: 0.0,
             unread: None,
             since,
             last: None,
@@ -186,6 +192,11 @@ impl ValveMeter {
         let Some(node) = self.node(record).filter(|_| record.shut != Some(true)) else { return false };
         let [least, most] = self.spool_range;
         self.spool_range = [least.min(node.signals[SPOOL]), most.max(node.signals[SPOOL])];
+        if self.is_void(&node) {
+            self.void_s += record.dt_s;
+            self.runs.push(Run::default());
+            return true;
+        }
         if self.unread.is_none() {
             self.lose(unread::chamber(&node.signals));
         }
@@ -209,6 +220,12 @@ impl ValveMeter {
     /// Whether a window ended with the last reading.
     pub(super) fn has_ended(&self) -> bool {
         self.count == 1 && self.last.is_some()
+    }
+
+    /// Whether a chamber is below the atmosphere for certain: part of it is void, and takes up what flows in at no pressure.
+    fn is_void(&self, node: &Node) -> bool {
+        let least_pa = -VOID_SIGMAS * self.rig.instruments.pressure.spread().noise_std;
+        [PA, PB].into_iter().any(|chamber| node.signals[chamber] < least_pa)
     }
 
     fn node(&self, record: &Record) -> Option<Node> {

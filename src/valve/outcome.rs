@@ -32,6 +32,9 @@ pub struct ValveSummary {
     pub clearance_lpm: [f64; 2],
     /// What the readings scatter, in the declared noise's standard deviations.
     pub scatter: f64,
+    /// So long a chamber was below the atmosphere, and part of it void, s: left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub void_s: Option<f64>,
     /// The chamber pressure that is not measured, `pa` or `pb`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unread: Option<&'static str>,
@@ -81,6 +84,7 @@ impl ValveMeter {
             spool_range,
             clearance_lpm: [clearance(pressures_pa.external_a), clearance(pressures_pa.external_b)],
             scatter: fit.map_or(1.0, |fit| fit.noise.sqrt()),
+            void_s: Some(self.void_s).filter(|void_s| *void_s > 0.0),
             unread: self.unread().map(Signal::name),
             calibrated: self.since,
             leaks: found.as_ref().map(Found::leaks),

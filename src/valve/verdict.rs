@@ -4,7 +4,7 @@ use super::calibration::LeaksThen;
 use super::meter::Taken;
 use super::outcome::ValveTest;
 use crate::presence::{Found, Wording, told};
-use crate::report::{Reason, ReasonId, Status, Verdict, join};
+use crate::report::{Reason, ReasonId, Status, Verdict, capital, join};
 use crate::rig::Rig;
 use crate::units::readable;
 use pitchleak_core::Leak;
@@ -12,10 +12,12 @@ use pitchleak_core::Leak;
 /// Leaks below zero by so much contradict it.
 const NEGATIVE_SIGMAS: f64 = 5.0;
 
+const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
+
 impl ValveTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
         let (Some(found), Some(taken)) = (&self.found, &self.taken) else {
-            let misfit = self.taken.as_ref().and_then(misfit);
+            let misfit = self.taken.as_ref().and_then(|taken| self.misfit(taken));
             let status = if misfit.is_some() { Status::Doubtful } else { Status::NotSure };
             return told(status, Vec::new(), vec![misfit.unwrap_or_else(|| self.cannot_tell())], "");
         };
@@ -26,7 +28,7 @@ impl ValveTest {
             undecided: None,
             open: &|open| self.open(found, open),
         };
-        found.verdict(rig, contradictions(taken, found, rig), &wording)
+        found.verdict(rig, self.contradictions(taken, found, rig), &wording)
     }
 
     fn cannot_tell(&self) -> Reason {
@@ -45,10 +47,16 @@ impl ValveTest {
                 "what is not known of the valve has no likeliest values in this trace, by which leaks could be told".to_owned(),
                 "record longer, with the piston moving both ways; a hold test needs no valve",
             ),
-            None => (
-                "this trace is too short to tell leaks from the valve's own gains and laps".to_owned(),
-                "record 20 s or more, in motion and both ways",
-            ),
+            None => match self.void() {
+                Some(void) => (
+                    format!("{void}, and little is left of the trace"),
+                    "a leak may have emptied it: look for oil outside",
+                ),
+                None => (
+                    "this trace is too short to tell leaks from the valve's own gains and laps".to_owned(),
+                    "record 20 s or more, in motion and both ways",
+                ),
+            },
         };
         Reason::new(ReasonId::NotIdentifiable, text, remedy)
     }
@@ -100,7 +108,9 @@ impl ValveTest {
             ""
         };
         let unread = self.unread().map(|name| format!(" {name} is not measured.")).unwrap_or_default();
-        format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}{unread}")
+        let void =
+            self.void().map(|void| format!(" {}, which is left out.", capital(&void))).unwrap_or_default();
+        format!("No flow meters: the valve's flows over {time} s{since}, {known}.{noise}{unread}{void}")
     }
 
     fn unread(&self) -> Option<&'static str> {
@@ -134,38 +144,48 @@ impl ValveTest {
             remedy,
         )
     }
-}
 
-const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
-
-fn contradictions(taken: &Taken, found: &Found, rig: &Rig) -> Vec<Reason> {
-    let mut reasons: Vec<_> = misfit(taken).into_iter().collect();
-    if found.beliefs.negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
-        reasons.push(Reason::new(
+    fn contradictions(&self, taken: &Taken, found: &Found, rig: &Rig) -> Vec<Reason> {
+        let mut reasons: Vec<_> = self.misfit(taken).into_iter().collect();
+        if found.beliefs.negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
+            reasons.push(Reason::new(
             ReasonId::NegativeLeak,
             "more oil stays in the cylinder than the valve lets in",
             "compare areas, rated_flow and rated_drop with the data sheets, and check which way the spool counts: + feeds A",
         ));
-    }
-    // In calm wind the pressures change by their noise alone, which no flow answers: oil that seems too stiff is no contradiction.
-    reasons.extend(found.other_oil(rig, "trace").filter(|_| found.beliefs.kappa.value > 1.0));
-    reasons
-}
-
-/// Where no valve as declared with leaks as leaks are explains the readings.
-fn misfit(taken: &Taken) -> Option<Reason> {
-    if taken.is_explained() {
-        return None;
-    }
-    let what = match taken.changes {
-        0 => format!(
-            "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
-            taken.summary.unlike()
-        ),
-        1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
-        times => {
-            format!("no valve as in [valve] explains this trace: its leaks would have changed {times} times")
         }
-    };
-    Some(Reason::new(ReasonId::ModelDoesNotFit, what, LOOK_FOR))
+        // In calm wind the pressures change by their noise alone, which no flow answers: oil that seems too stiff is no contradiction.
+        reasons.extend(found.other_oil(rig, "trace").filter(|_| found.beliefs.kappa.value > 1.0));
+        reasons
+    }
+
+    /// Where no valve as declared with leaks as leaks are explains the readings.
+    fn misfit(&self, taken: &Taken) -> Option<Reason> {
+        if taken.is_explained() {
+            return None;
+        }
+        let what = match taken.changes {
+            0 => format!(
+                "neither constant leaks nor the valve of [valve] explain this trace: parts of it differ by {:.1} times what noise makes of them",
+                taken.summary.unlike()
+            ),
+            1 => "neither a leak that changes nor the valve of [valve] explain this trace".to_owned(),
+            times => {
+                format!(
+                    "no valve as in [valve] explains this trace: its leaks would have changed {times} times"
+                )
+            }
+        };
+        let remedy = match self.void() {
+            Some(void) => format!("look for oil outside: {void}, and a leak may have emptied it"),
+            None => LOOK_FOR.to_owned(),
+        };
+        Some(Reason::new(ReasonId::ModelDoesNotFit, what, remedy))
+    }
+
+    /// That a chamber ran empty, and how long.
+    fn void(&self) -> Option<String> {
+        let time = readable(self.summary.void_s?, 2);
+        Some(format!("a chamber is below the atmosphere for {time} s"))
+    }
 }
