@@ -8,7 +8,7 @@
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
 use super::parts::{Normal, Part};
-use super::unknowns::{Belief, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
+use super::unknowns::{Belief, GAINS, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
 use super::unread;
 use super::whitening::Whitening;
 
@@ -24,6 +24,9 @@ const ROUNDS_FOLLOWED: [usize; 3] = [5, 8, 11];
 const PLAY_RANGE: [f64; 2] = [0.3, 5.0];
 /// The search is over where no unknown moves by more than this share of its standard deviation.
 const SETTLED: f64 = 0.5;
+/// The gain of an edge is off by no more of its standard deviations. A search that ends further off has closed an edge that the trace
+/// hardly opens, and hidden a leak in that.
+const MOST_OFF: f64 = 5.0;
 /// κ stays within these multiples of the rig file's on its way, and an edge is never sharper than this share of the stroke.
 const KAPPA_RANGE: [f64; 2] = [0.2, 5.0];
 const SHARPEST: f64 = 1e-3;
@@ -55,7 +58,7 @@ pub(super) struct Fit {
     /// Around which all is linear.
     pub at: Unknowns,
     pub parts: Vec<Part>,
-    /// Whether the search came to an end; else the place is the likeliest that it passed.
+    /// Whether the search came to an end where such a valve may be; else the place is the likeliest that it passed.
     pub is_settled: bool,
 }
 
@@ -182,7 +185,7 @@ pub(super) fn fit(
         }
         unknowns += step;
     }
-    let is_settled = settled.is_some();
+    let is_settled = settled.is_some() && has_its_edges(&unknowns, before)?;
     let whites = match settled {
         Some(whites) => whites,
         None => {
@@ -192,6 +195,13 @@ pub(super) fn fit(
     };
     let parts = runs.iter().zip(&whites).flat_map(|(run, white)| run.parts(white)).collect();
     Some(Fit { at: unknowns, parts, is_settled })
+}
+
+/// Whether each edge has about the gain that is believed of it.
+fn has_its_edges(unknowns: &Unknowns, before: &Belief) -> Option<bool> {
+    let variances = before.covariance()?.diagonal();
+    let off = |at: usize| (unknowns[at] - before.mean[at]).abs() / variances[at].sqrt();
+    Some((GAINS..GAINS + 4).all(|at| off(at) <= MOST_OFF))
 }
 
 /// Where the search passed.

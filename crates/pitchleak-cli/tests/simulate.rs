@@ -243,6 +243,41 @@ fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
     assert!(empty > 0);
 }
 
+/// In calm wind the spool opens one way as a leak grows, and an edge that is thought shut would hide it: no valve loses an edge.
+#[test]
+fn no_edge_of_a_calibrated_valve_hides_a_leak_that_grows() {
+    let folder = TempDir::new().unwrap();
+    let (rig, trace) = (folder.path().join("rig.toml"), folder.path().join("trace.csv"));
+    let untanked = |valve: &str| with_valve(valve).replace("tank = \"2 bar\"\n", "");
+    std::fs::write(&rig, untanked("")).unwrap();
+    let (name, calibration) =
+        (rig.display().to_string(), folder.path().join("valve.toml").display().to_string());
+    let settings = ["--rig", &name, "--noise", "rig", "--valve", "clearance=0.02 L/min"];
+    let then = ["--wind", "13", "--seed", "3", "--duration", "280 s"];
+    assert!(simulate(&trace, &[&settings[..], &then].concat()).status.success());
+    let path = trace.display().to_string();
+    let made = pitchleak(&["calibrate", &path, "--rig", &name, "--leaks", "zero", "--out", &calibration]);
+    assert!(made.status.success(), "{made:?}");
+    std::fs::write(&rig, untanked(&format!("calibration = {calibration:?}\n"))).unwrap();
+    for leak in ["--leak-external-a", "--leak-external-b"] {
+        for seed in ["1", "2", "3"] {
+            let grows = [
+                "--wind",
+                "5",
+                "--seed",
+                seed,
+                "--duration",
+                "60 s",
+                leak,
+                "0.02 L/min -> 0.2 L/min @ 0 s..60 s",
+            ];
+            assert!(simulate(&trace, &[&settings[..], &grows].concat()).status.success());
+            let report = replayed(&trace, &["--rig", &name]);
+            assert_ne!(report["verdict"]["status"], "sound", "{leak} {seed}: {}", report["verdict"]["text"]);
+        }
+    }
+}
+
 /// A chamber that a leak has emptied takes up what flows in at no pressure: what is read then is left out, and said.
 #[test]
 fn while_a_chamber_is_void_a_valve_tells_nothing() {
