@@ -353,6 +353,8 @@ class Valve:
     """What the clearances A-T and B-T may leak by the data sheet, 1 σ, L/min."""
     scatter: float
     """What the readings scatter, in the declared noise's standard deviations."""
+    void_s: float | None = None
+    """So long a chamber was below the atmosphere, s: left out; None where none was."""
     unread: str | None = None
     """The chamber pressure that is not measured, ``pa`` or ``pb``: of the leak at its chamber nothing is told."""
     calibrated: Since | None = None
