@@ -16,7 +16,6 @@ const LEAST: usize = 4;
 const STRAIGHT: f64 = 1.05;
 /// So many standard deviations of that by chance.
 const CHANCE_SIGMAS: f64 = 3.0;
-
 /// Noise of means beyond that of the readings they are of: squares over squares. Noise that is not white is louder in means.
 const WHITE: f64 = 1.5;
 
@@ -30,34 +29,29 @@ pub(super) struct Means {
 }
 
 impl Means {
-    pub fn of(runs: &[Run], variances: &Signals) -> Self {
-        let count = longest(runs, variances);
-        let own = scatter(runs, LEAST, variances).component_div(variances);
+    /// Over the most readings that lie in straight lines, none where two are no line already.
+    pub fn of(runs: &[Run], variances: &Signals) -> Option<Self> {
+        let shortest = scatter(runs, LEAST, variances);
+        let readings = runs.iter().map(|run| run.readings.len()).sum::<usize>() as f64;
+        let most = MOST_S * readings / runs.iter().map(Run::seconds).sum::<f64>();
+        let is_straight = |length: &usize| {
+            let blocks: usize = runs.iter().map(|run| run.readings.len() / length).sum();
+            let chance = CHANCE_SIGMAS * (2.0 / (blocks * LEAST).max(1) as f64).sqrt();
+            let long = scatter(runs, *length, variances);
+            (0..5).all(|at| long[at].is_nan() || long[at] <= (STRAIGHT + chance) * shortest[at])
+        };
+        let lengths = std::iter::successors(Some(2 * LEAST), |length| Some(2 * length));
+        let lines = lengths.take_while(|length| *length as f64 <= most).take_while(is_straight);
+        let count = lines.last()? / 2;
+        let own = shortest.component_div(variances);
         let noise = own.iter().copied().filter(|own| own.is_finite()).fold(1.0, f64::max);
-        Self { runs: runs.iter().map(|run| run.of_means(count)).collect(), count, noise }
+        Some(Self { runs: runs.iter().map(|run| run.of_means(count)).collect(), count, noise })
     }
 
     /// Whether what is left of them, in the declared noise's squares, is what white noise of the readings leaves.
     pub fn are_white(&self, left: f64) -> bool {
-        self.count == 1 || left <= WHITE * self.noise
+        left <= WHITE * self.noise
     }
-}
-
-/// The most readings that lie in straight lines.
-fn longest(runs: &[Run], variances: &Signals) -> usize {
-    let shortest = scatter(runs, LEAST, variances);
-    let lengths = std::iter::successors(Some(2 * LEAST), |length| Some(2 * length));
-    let is_straight = |length: &usize| {
-        let blocks: usize = runs.iter().map(|run| run.readings.len() / length).sum();
-        let seconds = runs.iter().map(|run| run.seconds()).sum::<f64>();
-        let readings: usize = runs.iter().map(|run| run.readings.len()).sum();
-        let is_short = *length as f64 * seconds <= MOST_S * readings as f64;
-        let chance = CHANCE_SIGMAS * (2.0 / (blocks * LEAST).max(1) as f64).sqrt();
-        let long = scatter(runs, *length, variances);
-        is_short && (0..5).all(|at| long[at].is_nan() || long[at] <= (STRAIGHT + chance) * shortest[at])
-    };
-    let lines = lengths.take_while(is_straight).last();
-    lines.map_or(1, |length| length / 2)
 }
 
 /// Mean square of what is left of the signals in lines of so many readings each; of a signal without noise at least its rounding.
@@ -116,8 +110,9 @@ mod tests {
     fn readings_are_means_where_signals_go_in_straight_lines() {
         let variances = Signals::repeat(4e-8);
         let [calm, windy] = [0.02, 2.0].map(|hz| Means::of(&[run(hz, 2e-4)], &variances));
-        assert_eq!((calm.count, windy.count), (16, 1));
-        assert_eq!((calm.runs[0].readings.len(), windy.runs[0].readings.len()), (375, 6000));
+        assert!(windy.is_none());
+        let calm = calm.expect("lines");
+        assert_eq!((calm.count, calm.runs[0].readings.len()), (16, 375));
         let still = run(0.02, 0.0);
         for (mean, readings) in calm.runs[0].readings.iter().zip(still.readings.chunks(16)) {
             assert!(
@@ -131,6 +126,6 @@ mod tests {
     /// A signal without noise has no lines but its own.
     #[test]
     fn what_moves_without_noise_is_left_as_it_is() {
-        assert_eq!(Means::of(&[run(0.2, 0.0)], &Signals::repeat(1e-12)).count, 1);
+        assert!(Means::of(&[run(0.2, 0.0)], &Signals::repeat(1e-12)).is_none());
     }
 }

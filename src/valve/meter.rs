@@ -184,17 +184,18 @@ impl ValveMeter {
 
     /// Takes in a record, and says whether it was one of the valve's: with a spool and a supply pressure, the ports open.
     pub fn push(&mut self, record: &Record) -> bool {
-        let is_apart = record.after_gap || record.shut == Some(true);
+        let node = self.node(record).filter(|_| record.shut != Some(true));
+        let is_void = node.as_ref().is_some_and(|node| self.is_void(node));
+        let is_apart = record.after_gap || record.shut == Some(true) || is_void;
         if is_apart || self.runs.is_empty() {
             self.runs.retain(|run| run.readings.len() >= LEAST_READINGS);
             self.runs.push(Run::default());
         }
-        let Some(node) = self.node(record).filter(|_| record.shut != Some(true)) else { return false };
+        let Some(node) = node else { return false };
         let [least, most] = self.spool_range;
         self.spool_range = [least.min(node.signals[SPOOL]), most.max(node.signals[SPOOL])];
-        if self.is_void(&node) {
-            self.void_s += record.dt_s;
-            self.runs.push(Run::default());
+        if is_void {
+            self.void_s += if record.after_gap { 0.0 } else { record.dt_s };
             return true;
         }
         if self.unread.is_none() {
@@ -272,9 +273,10 @@ impl ValveMeter {
             let summary = summary(&fit.parts, before, &fit.at)?;
             Some((fit, summary))
         };
-        let means = Means::of(runs, &known.variances);
-        let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
-        let found = one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise));
+        let found = Means::of(runs, &known.variances).and_then(|means| {
+            let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
+            one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise))
+        });
         found.or_else(|| one(runs, &known))
     }
 

@@ -149,10 +149,10 @@ impl ValveTest {
         let mut reasons: Vec<_> = self.misfit(taken).into_iter().collect();
         if found.beliefs.negative > NEGATIVE_SIGMAS * NEGATIVE_SIGMAS {
             reasons.push(Reason::new(
-            ReasonId::NegativeLeak,
-            "more oil stays in the cylinder than the valve lets in",
-            "compare areas, rated_flow and rated_drop with the data sheets, and check which way the spool counts: + feeds A",
-        ));
+                ReasonId::NegativeLeak,
+                "more oil stays in the cylinder than the valve lets in",
+                "compare areas, rated_flow and rated_drop with the data sheets, and check which way the spool counts: + feeds A",
+            ));
         }
         // In calm wind the pressures change by their noise alone, which no flow answers: oil that seems too stiff is no contradiction.
         reasons.extend(found.other_oil(rig, "trace").filter(|_| found.beliefs.kappa.value > 1.0));

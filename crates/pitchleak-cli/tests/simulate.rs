@@ -20,6 +20,11 @@ fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
+/// The rig of a valve without pressure in its tank, as the simulated one.
+fn untanked(valve: &str) -> String {
+    with_valve(valve).replace("tank = \"2 bar\"\n", "")
+}
+
 /// What a replay says of a trace.
 fn replayed(trace: &Path, settings: &[&str]) -> serde_json::Value {
     let path = trace.display().to_string();
@@ -227,7 +232,7 @@ fn in_calm_wind_a_valve_tells_no_oil() {
 fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("rig.toml");
-    std::fs::write(&rig, with_valve("").replace("tank = \"2 bar\"\n", "")).unwrap();
+    std::fs::write(&rig, untanked("")).unwrap();
     let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
     let mut empty = 0;
     for seed in ["1", "2", "3", "4"] {
@@ -248,7 +253,6 @@ fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
 fn no_edge_of_a_calibrated_valve_hides_a_leak_that_grows() {
     let folder = TempDir::new().unwrap();
     let (rig, trace) = (folder.path().join("rig.toml"), folder.path().join("trace.csv"));
-    let untanked = |valve: &str| with_valve(valve).replace("tank = \"2 bar\"\n", "");
     std::fs::write(&rig, untanked("")).unwrap();
     let (name, calibration) =
         (rig.display().to_string(), folder.path().join("valve.toml").display().to_string());
@@ -283,7 +287,7 @@ fn no_edge_of_a_calibrated_valve_hides_a_leak_that_grows() {
 fn while_a_chamber_is_void_a_valve_tells_nothing() {
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("rig.toml");
-    std::fs::write(&rig, with_valve("").replace("tank = \"2 bar\"\n", "")).unwrap();
+    std::fs::write(&rig, untanked("")).unwrap();
     let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
     for seed in ["1", "2", "3", "4"] {
         let arguments = ["--rig", &rig, "--wind", "13", "--noise", "rig", "--seed", seed];
@@ -304,7 +308,7 @@ fn while_a_chamber_is_void_a_valve_tells_nothing() {
 fn in_calm_wind_a_valve_hides_no_leak() {
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("rig.toml");
-    std::fs::write(&rig, with_valve("").replace("tank = \"2 bar\"\n", "")).unwrap();
+    std::fs::write(&rig, untanked("")).unwrap();
     let (rig, trace) = (rig.display().to_string(), folder.path().join("trace.csv"));
     let mut named = 0;
     for (leak, lpm) in [("external-a", 0.5), ("external-b", 0.3), ("internal", 0.1)] {

@@ -154,7 +154,7 @@ impl ValveCylinder {
         let mut run = Run::new(self);
         let mut normal = white_noise(self.seed);
         let mut noise = |scale: f64| normal.next().unwrap_or(0.0) * scale * accuracy / 3.0;
-        let mut slow = SlowNoise { size: self.slow_noise * accuracy / 3.0, ..SlowNoise::of(self.seed) };
+        let mut slow = SlowNoise::new(self.slow_noise * accuracy / 3.0, self.seed);
         let spool = if self.by_command { "valve_command_percent" } else { "spool_percent" };
         let mut text = format!("t_s,x_mm,pa_bar,pb_bar,{spool},ps_bar\n");
         let every = (STEPS_HZ / rate_hz).round() as i64;
@@ -190,8 +190,8 @@ struct SlowNoise {
 impl SlowNoise {
     const KEPT: f64 = 0.95;
 
-    fn of(seed: u64) -> Self {
-        Self { size: 0.0, at: [0.0; 5], normal: Box::new(white_noise(900_000 + seed)) }
+    fn new(size: f64, seed: u64) -> Self {
+        Self { size, at: [0.0; 5], normal: Box::new(white_noise(900_000 + seed)) }
     }
 
     fn beside(&mut self, read: [f64; 5]) -> [f64; 5] {
