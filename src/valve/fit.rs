@@ -16,8 +16,8 @@ const MOST_ROUNDS: usize = 40;
 /// The first step moves no unknown beyond what is known of it to explain the readings; so many times less holds it back from round to
 /// round.
 const EASED: f64 = 30.0;
-/// After so many rounds steps are half as long: where an edge is sharp, or a pressure and its chamber's own leak are known by their
-/// product, whole ones go to and fro.
+/// After so many rounds steps are half as long, of unknowns and signals alike: where an edge is sharp, or a pressure and its chamber's
+/// own leak are known by their product, whole ones go to and fro.
 const ROUNDS_WHOLE: usize = 8;
 /// Rounds after which the spool is followed with the hysteresis found, within these multiples of the declared one.
 const ROUNDS_FOLLOWED: [usize; 3] = [5, 8, 11];
@@ -121,11 +121,11 @@ impl Smoothed {
         Some(white)
     }
 
-    /// Moves the signals to the likeliest where the unknowns go by `step`.
-    fn smooth(&mut self, white: &Whitening, step: &Unknowns) -> Option<()> {
+    /// Moves the signals by this share of the way to the likeliest where the unknowns go by `step`.
+    fn smooth(&mut self, white: &Whitening, step: &Unknowns, share: f64) -> Option<()> {
         let corrections = white.corrections(|one| one.residual + one.by_unknowns * step)?;
         for ((node, reading), correction) in self.nodes.iter_mut().zip(&self.readings).zip(corrections) {
-            node.signals = reading.signals - correction;
+            node.signals += (reading.signals - correction - node.signals) * share;
             self.unread.iter().for_each(|chamber| unread::bound(*chamber, &mut node.signals));
         }
         Some(())
@@ -179,11 +179,12 @@ pub(super) fn fit(
         }
         let held = damping.unwrap_or((square - told).max(0.0));
         damping = Some(held / EASED);
-        let step = moved(held)? * if round < ROUNDS_WHOLE { 1.0 } else { 0.5 };
+        let step = moved(held)?;
+        let share = if round < ROUNDS_WHOLE { 1.0 } else { 0.5 };
         for (run, white) in runs.iter_mut().zip(&whites) {
-            run.smooth(white, &step)?;
+            run.smooth(white, &step, share)?;
         }
-        unknowns += step;
+        unknowns += step * share;
     }
     let is_settled = settled.is_some() && has_its_edges(&unknowns, before)?;
     let whites = match settled {

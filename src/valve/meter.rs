@@ -89,8 +89,9 @@ impl Taken {
             let changes = if is_recent { before + self.changes } else { self.changes };
             return Self { changes, ..self };
         }
-        // A window amid which leaks changed says nothing of how well the model fits.
-        let summary = if last.is_mixed { self.summary } else { self.summary.after(&last.summary) };
+        // A window amid which leaks changed, or whose search came to no end, says nothing of how well the model fits.
+        let is_like = last.is_settled && !last.is_mixed;
+        let summary = if is_like { self.summary.after(&last.summary) } else { self.summary };
         Self {
             summary,
             changed_at_s: last.changed_at_s,
@@ -327,7 +328,7 @@ impl ValveMeter {
             let later = known.later(&self.rig, &self.sheet, self.seconds());
             self.before = later.unwrap_or(known);
             self.at = self.at.filter(|_| tells);
-            if taken.is_settled || !taken.is_explained() {
+            if taken.is_settled || !taken.is_explained() || self.last.is_none() {
                 self.last = Some(taken);
             }
         }

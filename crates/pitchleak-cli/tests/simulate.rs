@@ -248,21 +248,42 @@ fn beside_an_empty_chamber_a_valve_calls_nothing_sound() {
     assert!(empty > 0);
 }
 
+/// A valve as noisy as its rig says, with a clearance.
+const OPEN_VALVE: &[&str] = &["--noise", "rig", "--valve", "clearance=0.02 L/min"];
+
+/// A rig in this folder whose valve was calibrated while nothing leaked.
+fn calibrated(folder: &Path) -> String {
+    let [rig, trace, calibration] = ["rig.toml", "then.csv", "valve.toml"].map(|name| folder.join(name));
+    std::fs::write(&rig, untanked("")).unwrap();
+    let [name, path, out] = [&rig, &trace, &calibration].map(|path| path.display().to_string());
+    let then = ["--rig", &name, "--wind", "13", "--seed", "3", "--duration", "280 s"];
+    assert!(simulate(&trace, &[OPEN_VALVE, &then].concat()).status.success());
+    let made = pitchleak(&["calibrate", &path, "--rig", &name, "--leaks", "zero", "--out", &out]);
+    assert!(made.status.success(), "{made:?}");
+    std::fs::write(&rig, untanked(&format!("calibration = {out:?}\n"))).unwrap();
+    name
+}
+
+/// A search over many minutes comes to its end, and the seconds of a window that has just begun take nothing back.
+#[test]
+fn a_calibrated_valve_names_a_steady_leak_in_minutes() {
+    let folder = TempDir::new().unwrap();
+    let (name, trace) = (calibrated(folder.path()), folder.path().join("trace.csv"));
+    for seconds in ["200 s", "400 s", "600.2 s"] {
+        let leak = ["--rig", &name, "--wind", "13", "--seed", "71", "--duration", seconds];
+        let output = simulate(&trace, &[OPEN_VALVE, &leak, &["--leak-external-a", "0.1 L/min"]].concat());
+        assert!(output.status.success(), "{output:?}");
+        let report = replayed(&trace, &["--rig", &name]);
+        assert_eq!(report["verdict"]["status"], "leak", "{seconds}: {}", report["verdict"]["text"]);
+    }
+}
+
 /// In calm wind the spool opens one way as a leak grows, and an edge that is thought shut would hide it: no valve loses an edge.
 #[test]
 fn no_edge_of_a_calibrated_valve_hides_a_leak_that_grows() {
     let folder = TempDir::new().unwrap();
-    let (rig, trace) = (folder.path().join("rig.toml"), folder.path().join("trace.csv"));
-    std::fs::write(&rig, untanked("")).unwrap();
-    let (name, calibration) =
-        (rig.display().to_string(), folder.path().join("valve.toml").display().to_string());
-    let settings = ["--rig", &name, "--noise", "rig", "--valve", "clearance=0.02 L/min"];
-    let then = ["--wind", "13", "--seed", "3", "--duration", "280 s"];
-    assert!(simulate(&trace, &[&settings[..], &then].concat()).status.success());
-    let path = trace.display().to_string();
-    let made = pitchleak(&["calibrate", &path, "--rig", &name, "--leaks", "zero", "--out", &calibration]);
-    assert!(made.status.success(), "{made:?}");
-    std::fs::write(&rig, untanked(&format!("calibration = {calibration:?}\n"))).unwrap();
+    let (name, trace) = (calibrated(folder.path()), folder.path().join("trace.csv"));
+    let settings = [&["--rig", &name], OPEN_VALVE].concat();
     for leak in ["--leak-external-a", "--leak-external-b"] {
         for seed in ["1", "2", "3"] {
             let grows = [
