@@ -36,12 +36,9 @@ impl Fit<'_> {
     pub(crate) fn held_out_residual(&self) -> Vec<f64> {
         let mut residual = vec![0.0; self.rows().y.len()];
         let fits = self.regression.leave_one_out(self.active(), &self.held_priors());
-        for (piece, solution) in fits.iter().enumerate() {
-            for (i, value) in regression::residual(self.rows(), solution).into_iter().enumerate() {
-                if self.regression.piece_of(i) == piece {
-                    residual[i] = value;
-                }
-            }
+        for (piece, solution) in self.regression.pieces.iter().zip(&fits) {
+            let all = regression::residual(self.rows(), solution);
+            residual[piece.clone()].copy_from_slice(&all[piece.clone()]);
         }
         self.in_units(self.rows(), residual)
     }

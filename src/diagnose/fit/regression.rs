@@ -6,8 +6,9 @@ use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{COLLINEAR_RIDGE, HALVINGS, MOST_OF, PIECES};
 use crate::diagnose::weak_form::{Covariances, NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What is known of a term beside the data, as an increment from the linearisation.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +20,8 @@ pub(crate) struct Prior {
 /// Whitened columns and their products.
 #[derive(Clone)]
 pub(crate) struct Regression {
-    piece_of: Vec<usize>,
+    /// The entries of each piece.
+    pub(super) pieces: [Range<usize>; PIECES],
     /// Whitened y.
     pub(crate) y: Vec<f64>,
     /// Whitened columns of length one; empty where a term does not show.
@@ -67,10 +69,12 @@ impl Regression {
     pub(crate) fn new(rows: &Rows, whitening: &Whitening, shared: &[SharedNoise]) -> Self {
         let counted: Vec<bool> = rows.entries.iter().map(|entry| rows.counts(entry)).collect();
         let total_rows = rows.rows.len().max(1);
-        let piece_of: Vec<usize> = rows.entries.iter().map(|e| e.row * PIECES / total_rows).collect();
+        let begin =
+            |piece: usize| rows.entries.partition_point(|entry| entry.row * PIECES / total_rows < piece);
+        let pieces = std::array::from_fn(|piece| begin(piece)..begin(piece + 1));
         let (y, columns, scale, noise_share) = (vec![], vec![], vec![], vec![]);
         let (grams, total, taken) = (vec![], DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
-        let mut new = Self { piece_of, y, columns, scale, counted, noise_share, grams, total, taken };
+        let mut new = Self { pieces, y, columns, scale, counted, noise_share, grams, total, taken };
         new.y = new.counting(whitening.whiten(&rows.y));
         let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
         (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
@@ -98,11 +102,12 @@ impl Regression {
 
     /// The sum over each piece.
     fn by_piece(&self, left: &[f64], right: &[f64]) -> [f64; PIECES] {
-        let mut sums = [0.0; PIECES];
-        for ((u, v), piece) in left.iter().zip(right).zip(&self.piece_of) {
-            sums[*piece] += u * v;
-        }
-        sums
+        self.pieces.clone().map(|piece| {
+            let parts = left.get(piece.clone()).zip(right.get(piece));
+            parts.map_or(0.0, |(u, v)| {
+                DVectorView::from_slice(u, u.len()).dot(&DVectorView::from_slice(v, v.len()))
+            })
+        })
     }
 
     fn products(&self) -> Vec<DMatrix<f64>> {
@@ -191,11 +196,6 @@ impl Regression {
     /// Whether a term shows in the data at all.
     pub(crate) fn shows(&self, term: usize) -> bool {
         !self.columns[term].is_empty()
-    }
-
-    /// Which piece an entry belongs to.
-    pub(crate) fn piece_of(&self, entry: usize) -> usize {
-        self.piece_of[entry]
     }
 
     /// Fits `terms` to all the data.

@@ -226,7 +226,7 @@ macro_rules! effects {
                 }
                 match self {
                     $(Self::$variant => {
-                        given_or!([$(of::<T>($reads)(at, T::one(), Signals::default()))?] Distortion::none())
+                        given_or!([$(of::<T>($reads)(at, T::one(), Signals::default()))?] Distortion::None)
                     })*
                 }
             }

@@ -138,7 +138,10 @@ impl<T: Real> EffectSet<T> {
 
     /// The truth behind a reading: [`EffectSet::read`] undone, last effect first.
     pub fn correct(&self, reading: &Signals<T>) -> Signals<T> {
-        let known = |seen: Signals<T>, active: &ActiveEffect<T>| active.effect.correct(active.value, &seen);
-        self.active.iter().rev().flatten().fold(*reading, known)
+        let mut seen = *reading;
+        for active in self.active.iter().rev().flatten() {
+            seen = active.effect.correct(active.value, &seen);
+        }
+        seen
     }
 }

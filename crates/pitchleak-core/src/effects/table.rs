@@ -18,9 +18,10 @@
 //! ```
 
 use super::entry::effects;
+use super::terms::Distortion::{Scale, Shift};
 use super::terms::{
     accumulator, area_a, area_b, bell, beyond_cracking, chamber_a, chamber_b, direction, entrained_air,
-    flow_direction, force, known, past_piston, scale, shift, stribeck,
+    flow_direction, force, known, past_piston, stribeck,
 };
 use crate::signed_root;
 
@@ -77,100 +78,100 @@ effects! {
         "Bleed port B, or declare the accumulator's volume and precharge."
         "Pressure steps on side B from below 5 bar and from above 50 bar: gas is soft at the lower ones."
     FlowMeterOffsetA "flow_meter_offset_a" ["m3/s"] Sensor -1e-3 .. 1e-3, 3.3e-6;
-        reads |_, one, none| shift(Signals { qa_m3s: one, ..none });
+        reads |_, one, none| Shift(Signals { qa_m3s: one, ..none });
         prior flow_a.bias_std;
         "Flow meter A does not read zero at rest; it passes for a leak that does not depend on pressure."
         "Zero flow meter A with the valves shut."
         "A minute with the valves shut and line A vented: what flow meter A still reads is its offset."
     FlowMeterOffsetB "flow_meter_offset_b" ["m3/s"] Sensor -1e-3 .. 1e-3, 3.3e-6;
-        reads |_, one, none| shift(Signals { qb_m3s: one, ..none });
+        reads |_, one, none| Shift(Signals { qb_m3s: one, ..none });
         prior flow_b.bias_std;
         "Flow meter B does not read zero at rest; it passes for a leak that does not depend on pressure."
         "Zero flow meter B with the valves shut."
         "A minute with the valves shut and line B vented: what flow meter B still reads is its offset."
     FlowMeterDriftA "flow_meter_drift_a" ["m3/s2"] Sensor -1e-5 .. 1e-5, 5e-8;
-        reads |at, one, none| shift(Signals { qa_m3s: at.t_s, dqa_m3s2: one, ..none });
+        reads |at, one, none| Shift(Signals { qa_m3s: at.t_s, dqa_m3s2: one, ..none });
         "The zero of flow meter A moves while the trace runs (an amplifier that warms up); it passes for a leak that grows."
         "Let flow meter A warm up, zero it, and take a trace again."
         "A minute with the valves shut and line A vented before and after the trace: by what flow meter A differs."
     FlowMeterDriftB "flow_meter_drift_b" ["m3/s2"] Sensor -1e-5 .. 1e-5, 5e-8;
-        reads |at, one, none| shift(Signals { qb_m3s: at.t_s, dqb_m3s2: one, ..none });
+        reads |at, one, none| Shift(Signals { qb_m3s: at.t_s, dqb_m3s2: one, ..none });
         "The zero of flow meter B moves while the trace runs (an amplifier that warms up); it passes for a leak that grows."
         "Let flow meter B warm up, zero it, and take a trace again."
         "A minute with the valves shut and line B vented before and after the trace: by what flow meter B differs."
     FlowMeterGainA "flow_meter_gain_a" ["1"] Sensor -0.5 .. 0.5, 2e-2;
-        reads |_, one, none| scale(Signals { qa_m3s: one, dqa_m3s2: one, ..none });
+        reads |_, one, none| Scale(Signals { qa_m3s: one, dqa_m3s2: one, ..none });
         prior flow_a.gain_std; carries FlowA;
         "Flow meter A reads a constant share too much or too little (wrong viscosity, worn turbine, wrong scale)."
         "Calibrate flow meter A against the swept volume of one full stroke."
         "A full stroke at constant speed: flow meter A against the swept volume of side A."
     FlowMeterGainB "flow_meter_gain_b" ["1"] Sensor -0.5 .. 0.5, 2e-2;
-        reads |_, one, none| scale(Signals { qb_m3s: one, dqb_m3s2: one, ..none });
+        reads |_, one, none| Scale(Signals { qb_m3s: one, dqb_m3s2: one, ..none });
         prior flow_b.gain_std; carries FlowB;
         "Flow meter B reads a constant share too much or too little (wrong viscosity, worn turbine, wrong scale)."
         "Calibrate flow meter B against the swept volume of one full stroke."
         "A full stroke at constant speed: flow meter B against the swept volume of side B."
     FlowMeterLag "flow_meter_lag" ["s"] Sensor 0.0 .. 1.0, 2e-2;
-        reads |at, _, none| shift(Signals { qa_m3s: -at.dqa_m3s2, qb_m3s: -at.dqb_m3s2, ..none });
+        reads |at, _, none| Shift(Signals { qa_m3s: -at.dqa_m3s2, qb_m3s: -at.dqb_m3s2, ..none });
         late [qa_m3s, qb_m3s];
         "Both flow meters answer late (inertia of the turbine, averaging, transport delay of the bus)."
         "Shorten the meters' averaging or shift the flow channels by the lag."
         "A step of the valve: how long the meters answer after the piston."
     PositionGain "position_gain" ["1"] Sensor -0.5 .. 0.5, 2e-2;
-        reads |_, one, none| scale(Signals { x_m: one, v_mps: one, a_mps2: one, ..none });
+        reads |_, one, none| Scale(Signals { x_m: one, v_mps: one, a_mps2: one, ..none });
         prior position.gain_std; carries Speed;
         "The position sensor reads a constant share too much or too little, so the swept flow is wrong in both chambers."
         "Calibrate the position sensor at both end stops."
         "A full stroke between the end stops: the position sensor against the stroke of the data sheet."
     PositionOffset "position_offset" ["m"] Sensor -0.1 .. 0.1, 2e-3;
-        reads |_, one, none| shift(Signals { x_m: one, ..none });
+        reads |_, one, none| Shift(Signals { x_m: one, ..none });
         prior position.bias_std;
         "The position sensor's zero is not at the A end; chamber volumes are wrong by a constant."
         "Set the position sensor's zero with the piston at the A end."
         "The piston at the A end stop: the position sensor's zero."
     PressureOffsetA "pressure_offset_a" ["Pa"] Sensor -2e6 .. 2e6, 1e5;
-        reads |_, one, none| shift(Signals { pa_pa: one, ..none });
+        reads |_, one, none| Shift(Signals { pa_pa: one, ..none });
         prior pressure.bias_std;
         "Pressure sensor A does not read zero without pressure."
         "Zero pressure sensor A with the line vented."
         "Line A vented: what pressure sensor A still reads."
     PressureOffsetB "pressure_offset_b" ["Pa"] Sensor -2e6 .. 2e6, 1e5;
-        reads |_, one, none| shift(Signals { pb_pa: one, ..none });
+        reads |_, one, none| Shift(Signals { pb_pa: one, ..none });
         prior pressure.bias_std;
         "Pressure sensor B does not read zero without pressure."
         "Zero pressure sensor B with the line vented."
         "Line B vented: what pressure sensor B still reads."
     PressureGainA "pressure_gain_a" ["1"] Sensor -0.5 .. 0.5, 2e-2;
-        reads |_, one, none| scale(Signals { pa_pa: one, dpa_pas: one, d2pa_pas2: one, ..none });
+        reads |_, one, none| Scale(Signals { pa_pa: one, dpa_pas: one, d2pa_pas2: one, ..none });
         prior pressure.gain_std; carries PressureA;
         "Pressure sensor A reads a constant share too much or too little; the force balance shows it."
         "Calibrate pressure sensor A against a reference gauge."
         "A reference gauge at port A at high pressure."
     PressureGainB "pressure_gain_b" ["1"] Sensor -0.5 .. 0.5, 2e-2;
-        reads |_, one, none| scale(Signals { pb_pa: one, dpb_pas: one, d2pb_pas2: one, ..none });
+        reads |_, one, none| Scale(Signals { pb_pa: one, dpb_pas: one, d2pb_pas2: one, ..none });
         prior pressure.gain_std; carries PressureB;
         "Pressure sensor B reads a constant share too much or too little; the force balance shows it."
         "Calibrate pressure sensor B against a reference gauge."
         "A reference gauge at port B at high pressure."
     PressureLagA "pressure_lag_a" ["s"] Sensor 0.0 .. 1.0, 2e-2;
-        reads |at, _, none| shift(Signals { pa_pa: -at.dpa_pas, dpa_pas: -at.d2pa_pas2, ..none });
+        reads |at, _, none| Shift(Signals { pa_pa: -at.dpa_pas, dpa_pas: -at.d2pa_pas2, ..none });
         late [pa_pa];
         "Pressure sensor A answers late: a thin or air-filled gauge line, a snubber, or a filter in its electronics."
         "Bleed or shorten the gauge line, take the snubber out, or declare the lag."
         "A step of the valve: how long pressure sensor A answers after the piston and the flow."
     PressureLagB "pressure_lag_b" ["s"] Sensor 0.0 .. 1.0, 2e-2;
-        reads |at, _, none| shift(Signals { pb_pa: -at.dpb_pas, dpb_pas: -at.d2pb_pas2, ..none });
+        reads |at, _, none| Shift(Signals { pb_pa: -at.dpb_pas, dpb_pas: -at.d2pb_pas2, ..none });
         late [pb_pa];
         "Pressure sensor B answers late: a thin or air-filled gauge line, a snubber, or a filter in its electronics."
         "Bleed or shorten the gauge line, take the snubber out, or declare the lag."
         "A step of the valve: how long pressure sensor B answers after the piston and the flow."
     LineResistanceA "line_resistance_a" ["Pa*s/m3"] Sensor 0.0 .. 1e12, 1e9;
-        reads |at, _, none| shift(Signals { pa_pa: known(at.qa_m3s), dpa_pas: known(at.dqa_m3s2), ..none });
+        reads |at, _, none| Shift(Signals { pa_pa: known(at.qa_m3s), dpa_pas: known(at.dqa_m3s2), ..none });
         "Pressure sensor A sits at the valve, a line away from the cylinder, and reads the line's loss on top while oil flows."
         "Move the sensor to the cylinder port, or declare the line's resistance."
         "A second pressure sensor at the cylinder's port A while oil flows."
     LineResistanceB "line_resistance_b" ["Pa*s/m3"] Sensor 0.0 .. 1e12, 1e9;
-        reads |at, _, none| shift(Signals { pb_pa: known(at.qb_m3s), dpb_pas: known(at.dqb_m3s2), ..none });
+        reads |at, _, none| Shift(Signals { pb_pa: known(at.qb_m3s), dpb_pas: known(at.dqb_m3s2), ..none });
         "Pressure sensor B sits at the valve, a line away from the cylinder, and reads the line's loss on top while oil flows."
         "Move the sensor to the cylinder port, or declare the line's resistance."
         "A second pressure sensor at the cylinder's port B while oil flows."
@@ -248,37 +249,37 @@ effects! {
         "Declare the moving mass as fitted."
         "Fast reversals without load: force in step with acceleration."
     ForceGain "force_gain" ["1"] Sensor -0.5 .. 0.5, 5e-2;
-        reads |_, one, none| scale(Signals { force_n: one, ..none });
+        reads |_, one, none| Scale(Signals { force_n: one, ..none });
         prior force.gain_std; carries Force;
         "The load cell reads a constant share too much or too little."
         "Calibrate the load cell."
         "A known weight on the load cell."
     PressureHysteresisA "pressure_hysteresis_a" ["Pa"] Sensor 0.0 .. 2e6, 5e4;
-        reads |at, _, none| shift(Signals { pa_pa: -at.pa_side, dpa_pas: -at.dpa_side_ps, ..none });
+        reads |at, _, none| Shift(Signals { pa_pa: -at.pa_side, dpa_pas: -at.dpa_side_ps, ..none });
         hangs [pa_pa];
         "Pressure sensor A hangs behind, rising and falling, by the value named: play or friction in its mechanism, or hysteresis of its membrane, which look alike."
         "Exercise pressure sensor A over its range, check its mounting torque, and replace it if its hysteresis is beyond the data sheet's."
         "A reference gauge at port A, the pressure stopped on its way up and on its way down: what is read differs by twice the value named, however long one waits; behind a lag it would meet."
     PressureHysteresisB "pressure_hysteresis_b" ["Pa"] Sensor 0.0 .. 2e6, 5e4;
-        reads |at, _, none| shift(Signals { pb_pa: -at.pb_side, dpb_pas: -at.dpb_side_ps, ..none });
+        reads |at, _, none| Shift(Signals { pb_pa: -at.pb_side, dpb_pas: -at.dpb_side_ps, ..none });
         hangs [pb_pa];
         "Pressure sensor B hangs behind, rising and falling, by the value named: play or friction in its mechanism, or hysteresis of its membrane, which look alike."
         "Exercise pressure sensor B over its range, check its mounting torque, and replace it if its hysteresis is beyond the data sheet's."
         "A reference gauge at port B, the pressure stopped on its way up and on its way down: what is read differs by twice the value named, however long one waits; behind a lag it would meet."
     PositionHysteresis "position_hysteresis" ["m"] Sensor 0.0 .. 5e-2, 5e-4;
-        reads |at, _, none| shift(Signals { x_m: -at.x_side, v_mps: -at.dx_side_ps, ..none });
+        reads |at, _, none| Shift(Signals { x_m: -at.x_side, v_mps: -at.dx_side_ps, ..none });
         hangs [x_m];
         "The position sensor hangs behind, extending and retracting, by the value named: backlash in its coupling, rod eye or gear, or a slack cable."
         "Tighten the position sensor's coupling, replace worn rod eyes or the cable's spring, or declare the play."
         "The piston pushed to and fro by hand or at low pressure: how far it goes before the position sensor follows is twice the value named."
     FlowMeterDeadBandA "flow_meter_dead_band_a" ["m3/s"] Sensor 0.0 .. 1e-3, 5e-6;
-        reads |at, _, none| shift(Signals { qa_m3s: -at.qa_unread, ..none });
+        reads |at, _, none| Shift(Signals { qa_m3s: -at.qa_unread, ..none });
         deaf [qa_m3s];
         "Flow meter A shows nothing while less than the value named flows, either way: a turbine or gear wheel that does not start, or a cut-off for small flows in its electronics."
         "Take the cut-off out of flow meter A's settings, use a meter of a smaller range, or declare the dead band."
         "The piston moved slower and slower: the flow below which meter A shows nothing while the position still changes."
     FlowMeterDeadBandB "flow_meter_dead_band_b" ["m3/s"] Sensor 0.0 .. 1e-3, 5e-6;
-        reads |at, _, none| shift(Signals { qb_m3s: -at.qb_unread, ..none });
+        reads |at, _, none| Shift(Signals { qb_m3s: -at.qb_unread, ..none });
         deaf [qb_m3s];
         "Flow meter B shows nothing while less than the value named flows, either way: a turbine or gear wheel that does not start, or a cut-off for small flows in its electronics."
         "Take the cut-off out of flow meter B's settings, use a meter of a smaller range, or declare the dead band."

@@ -106,41 +106,36 @@ pub(super) fn stribeck<T: Real>(at: &Signals<T>, constants: &EffectConstants<T>)
     (-speed * speed).libm_exp()
 }
 
-/// What one unit of a sensor effect does to the readings:
-/// `reading = truth · (1 + value · scale) + value · shift`, signal by signal.
-pub(super) struct Distortion<T> {
-    scale: Signals<T>,
-    shift: Signals<T>,
+/// What one unit of a sensor effect does to the readings, signal by signal.
+pub(super) enum Distortion<T> {
+    /// Readings as the truth.
+    None,
+    /// `reading = truth · (1 + value · scale)`.
+    Scale(Signals<T>),
+    /// `reading = truth + value · shift`.
+    Shift(Signals<T>),
 }
 
 impl<T: Real> Distortion<T> {
-    /// Readings as the truth.
-    pub fn none() -> Self {
-        Self { scale: Signals::default(), shift: Signals::default() }
-    }
-
     /// What the sensors show of the truth.
     #[inline(always)]
     pub fn read(&self, value: T, truth: &Signals<T>) -> Signals<T> {
-        let scaled = truth.zip(self.scale, |signal, gain| signal * (T::one() + value * gain));
-        scaled.zip(self.shift, |signal, more| signal + value * more)
+        match self {
+            Self::None => *truth,
+            Self::Scale(scale) => truth.zip(*scale, |signal, gain| signal * (T::one() + value * gain)),
+            Self::Shift(shift) => truth.zip(*shift, |signal, more| signal + value * more),
+        }
     }
 
     /// The truth behind a reading: [`read`](Self::read) undone.
+    #[inline(always)]
     pub fn correct(&self, value: T, reading: &Signals<T>) -> Signals<T> {
-        let shifted = reading.zip(self.shift, |signal, more| signal - value * more);
-        shifted.zip(self.scale, |signal, gain| signal / (T::one() + value * gain))
+        match self {
+            Self::None => *reading,
+            Self::Scale(scale) => reading.zip(*scale, |signal, gain| signal / (T::one() + value * gain)),
+            Self::Shift(shift) => reading.zip(*shift, |signal, more| signal - value * more),
+        }
     }
-}
-
-/// Readings in proportion to the truth.
-pub(super) fn scale<T: Real>(scale: Signals<T>) -> Distortion<T> {
-    Distortion { scale, shift: Signals::default() }
-}
-
-/// Readings beside the truth.
-pub(super) fn shift<T: Real>(shift: Signals<T>) -> Distortion<T> {
-    Distortion { scale: Signals::default(), shift }
 }
 
 /// A flow that is not measured is none: what is read in its place stays as it was.
