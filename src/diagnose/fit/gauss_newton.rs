@@ -116,6 +116,12 @@ impl<'a> Fit<'a> {
         Beyond { chi2: own.chi2 + self.paid() - others.chi2 - other.paid(), width: own.width - others.width }
     }
 
+    /// Whether it makes the readings likelier than another fit, each at the noise that it leaves: a search that went astray does not.
+    pub(crate) fn is_likelier_than(&self, other: &Self) -> bool {
+        let Beyond { chi2, width } = self.beyond(other);
+        chi2 + width < 0.0
+    }
+
     /// What it leaves of the entries that count.
     fn left(&self, counts: &[bool]) -> Beyond {
         let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);

@@ -7,6 +7,7 @@
 
 use super::integrals::{ActiveTerm, Integrals, Integrand, Step, TestFunctions};
 use super::linearisation::Linearisation;
+use super::terms::Term;
 use crate::diagnose::data::{Motion, Series};
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::ROUNDING;
@@ -204,6 +205,26 @@ impl Rows {
             self.y.push(weighted.residual[equation]);
             for (column, integral) in self.columns.iter_mut().zip(&weighted.columns) {
                 column.push(integral[equation]);
+            }
+        }
+    }
+
+    /// The columns of the scales of readings meet what the model says that is read, not the reading: were it the reading, an equation
+    /// whose readings, areas and leaks are all times nothing would leave nothing.
+    pub(super) fn meet_scales(&mut self, terms: &[Term], at: &Linearisation) {
+        let mut columns = std::mem::take(&mut self.columns);
+        for (term, column) in terms.iter().zip(&mut columns) {
+            self.meet_scale(*term, at, column, &self.y);
+        }
+        self.columns = columns;
+    }
+
+    /// What `residual` brings into a column by [`Self::meet_scales`].
+    pub(super) fn meet_scale(&self, term: Term, at: &Linearisation, column: &mut [f64], residual: &[f64]) {
+        for ((cell, entry), residual) in column.iter_mut().zip(&self.entries).zip(residual) {
+            let scaled = term.by_reading(at.value(term), &self.rows[entry.row].mean);
+            if let Some((_, slope)) = scaled.filter(|(equation, _)| *equation == entry.equation) {
+                *cell += slope * residual;
             }
         }
     }

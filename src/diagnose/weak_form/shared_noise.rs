@@ -78,6 +78,7 @@ impl SharedNoise {
             };
             sensitivity.gains.iter().zip(&sensitivity.noise_factor).zip(&drawn).map(of_one).sum()
         };
+        let in_rows: Vec<f64> = rows.entries.iter().map(in_row).collect();
         let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, signals, by_row }| {
             let noise_of = |channel: Channel, order: usize| &drawn[channel as usize][order];
             let in_column = |entry: &Entry| {
@@ -87,10 +88,12 @@ impl SharedNoise {
                 };
                 signals.map(of_one).sum()
             };
-            let noise = rows.entries.iter().map(in_column).collect();
-            NoisyColumn { term: *place, is_left_side: term.is_left_side(), noise }
+            let mut own: Vec<f64> = rows.entries.iter().map(in_column).collect();
+            rows.meet_scale(*term, noise.at, &mut own, &in_rows);
+            NoisyColumn { term: *place, is_left_side: term.is_left_side(), noise: own }
         });
-        Self { rows: rows.entries.iter().map(in_row).collect(), columns: columns.collect() }
+        let columns = columns.collect();
+        Self { rows: in_rows, columns }
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::leak_change::LeakChange;
 use crate::diagnose::data::Channel;
+use crate::diagnose::equation::Equation;
 use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
@@ -226,6 +227,21 @@ impl Term {
             Self::Effect(effect) => effect.spec().carries.is_some(),
             Self::Unlisted(product) => product == Unlisted::DirectionLeak,
             _ => false,
+        }
+    }
+
+    /// By how much its column grows with the reading on the left side of an equation, where it scales that; `value` is the term's own.
+    pub(super) fn by_reading(self, value: f64, at: &Signals<f64>) -> Option<(Equation, f64)> {
+        match self {
+            Self::Effect(effect) => match effect.spec().carries? {
+                LeftSide::FlowA => Some((Equation::ChamberA, -1.0 / (1.0 + value))),
+                LeftSide::FlowB => Some((Equation::ChamberB, -1.0 / (1.0 + value))),
+                LeftSide::Force => Some((Equation::Force, -1.0 / (1.0 + value))),
+                LeftSide::Speed | LeftSide::PressureA | LeftSide::PressureB => None,
+            },
+            Self::Unlisted(Unlisted::BentMeterA) => Some((Equation::ChamberA, at.qa_m3s.signum())),
+            Self::Unlisted(Unlisted::BentMeterB) => Some((Equation::ChamberB, at.qb_m3s.signum())),
+            _ => None,
         }
     }
 
