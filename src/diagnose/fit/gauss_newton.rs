@@ -116,12 +116,6 @@ impl<'a> Fit<'a> {
         Beyond { chi2: own.chi2 + self.paid() - others.chi2 - other.paid(), width: own.width - others.width }
     }
 
-    /// Whether it makes the readings likelier than another fit, each at the noise that it leaves: a search that went astray does not.
-    pub(crate) fn is_likelier_than(&self, other: &Self) -> bool {
-        let Beyond { chi2, width } = self.beyond(other);
-        chi2 + width < 0.0
-    }
-
     /// What it leaves of the entries that count.
     fn left(&self, counts: &[bool]) -> Beyond {
         let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);
@@ -449,7 +443,9 @@ fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, torn_seal};
+    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, seen, torn_seal};
+    use pitchleak_core::Effect;
+    use std::cell::Cell;
 
     #[test]
     fn with_an_effect_and_without_it_again_is_the_fit_before() {
@@ -470,6 +466,30 @@ mod tests {
                 "{before:?} {after:?}"
             );
         }
+    }
+
+    /// A meter known to a fifth beside readings that follow no equation: all of one times nothing leaves nothing, and is no fit.
+    #[test]
+    fn no_equation_is_explained_by_all_of_it_times_nothing() {
+        let mut declared = declared();
+        for flow in [&mut declared.sensors.flow_a, &mut declared.sensors.flow_b] {
+            flow.gain_std = 0.2;
+        }
+        let time = Cell::new(0.0_f64);
+        let traces = [seen(60, |sample| {
+            let strays = 1e-5 * time.replace(time.get() + 0.01).sin();
+            sample.qa_m3s = sample.qa_m3s.map(|q| 1.1 * q + strays);
+        })];
+        let problem = Problem::new(&traces, &declared, &[]);
+        let place = |effect: Effect| problem.place(Term::Effect(effect)).expect("is a term");
+        let (area, gain) = (place(Effect::AreaA), place(Effect::FlowMeterGainA));
+        let fit = Fit::declared(&problem, &|| ()).with(area, problem.usual_constants, &|| ());
+        let [area, gain] = [area, gain].map(|term| fit.estimate(term).expect("is fitted").value);
+        let swept = (1.0 + area / declared.cylinder.area_a_m2) * (1.0 + gain);
+        assert!(
+            fit.is_incomplete() && (0.8..1.25).contains(&(1.0 + gain)) && (1.0..1.2).contains(&swept),
+            "{area} {gain}"
+        );
     }
 
     #[test]

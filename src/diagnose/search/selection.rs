@@ -146,12 +146,8 @@ impl Selection<'_> {
         if fit.active().iter().filter(is_added).count() >= MOST_EFFECTS {
             return false;
         }
-        let trials = Candidates::of(fit).trials(&fit.free).into_iter();
-        let found = trials.filter(|trial| deserves_a_name(fit, trial)).find_map(|trial| {
-            let new = with(fit, &trial, progress);
-            new.is_likelier_than(fit).then_some((trial, new))
-        });
-        let Some((trial, new)) = found else { return false };
+        let trials = Candidates::of(fit).trials(&fit.free);
+        let Some(trial) = trials.into_iter().find(|trial| deserves_a_name(fit, trial)) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
@@ -160,7 +156,7 @@ impl Selection<'_> {
         let is_below_unlisted =
             strongest_unlisted(fit, &fit.free, &named).is_some_and(|(_, unlisted)| unlisted > more);
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
-        self.fit = new;
+        self.fit = with(fit, &trial, progress);
         true
     }
 

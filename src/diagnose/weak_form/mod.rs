@@ -60,7 +60,7 @@ impl<'a> WeakForm<'a> {
         let rows = Rows::build(traces, &motions, &Integrand::of(&at, columns), BLOCK_S);
         let mut rows = rows.at_places(columns.places, columns.terms.len());
         rows.add_leak_changes(columns.terms);
-        rows.meet_scales(columns.terms, &at);
+        rows.meet_scales(columns.terms);
         let mut sensitivities = Self::sensitivities(&rows, sensors, &noise_at);
         add_unresolved(&mut sensitivities, &mut rows, (traces, unresolved, &motions), (sensors, &noise_at));
         let (of_rows, of_noise) = (&rows, &sensitivities);
@@ -89,7 +89,7 @@ impl<'a> WeakForm<'a> {
         let rows = Rows::build(self.traces, &self.motions, &Integrand::of(&self.at, columns), BLOCK_S);
         self.rows.columns = rows.at_places(columns.places, columns.terms.len()).columns;
         self.rows.add_leak_changes(columns.terms);
-        self.rows.meet_scales(columns.terms, &self.at);
+        self.rows.meet_scales(columns.terms);
         self
     }
 
@@ -157,7 +157,7 @@ impl<'a> WeakForm<'a> {
     pub(crate) fn white_column(&self, term: Term, constants: EffectConstants<f64>) -> Vec<f64> {
         let steps = self.steps.get_or_init(|| Steps::of(self.traces, &self.motions, &self.at, BLOCK_S));
         let mut column = steps.column(&ActiveTerm::new(term, constants), &self.at, &self.rows);
-        self.rows.meet_scale(term, &self.at, &mut column, &self.rows.y);
+        self.rows.meet_scale(term, &mut column, &self.rows.y);
         self.whitening.whiten(&column)
     }
 }

@@ -211,18 +211,18 @@ impl Rows {
 
     /// The columns of the scales of readings meet what the model says that is read, not the reading: were it the reading, an equation
     /// whose readings, areas and leaks are all times nothing would leave nothing.
-    pub(super) fn meet_scales(&mut self, terms: &[Term], at: &Linearisation) {
+    pub(super) fn meet_scales(&mut self, terms: &[Term]) {
         let mut columns = std::mem::take(&mut self.columns);
         for (term, column) in terms.iter().zip(&mut columns) {
-            self.meet_scale(*term, at, column, &self.y);
+            self.meet_scale(*term, column, &self.y);
         }
         self.columns = columns;
     }
 
     /// What `residual` brings into a column by [`Self::meet_scales`].
-    pub(super) fn meet_scale(&self, term: Term, at: &Linearisation, column: &mut [f64], residual: &[f64]) {
+    pub(super) fn meet_scale(&self, term: Term, column: &mut [f64], residual: &[f64]) {
         for ((cell, entry), residual) in column.iter_mut().zip(&self.entries).zip(residual) {
-            let scaled = term.by_reading(at.value(term), &self.rows[entry.row].mean);
+            let scaled = term.by_reading(&self.rows[entry.row].mean);
             if let Some((_, slope)) = scaled.filter(|(equation, _)| *equation == entry.equation) {
                 *cell += slope * residual;
             }

@@ -89,7 +89,7 @@ impl SharedNoise {
                 signals.map(of_one).sum()
             };
             let mut own: Vec<f64> = rows.entries.iter().map(in_column).collect();
-            rows.meet_scale(*term, noise.at, &mut own, &in_rows);
+            rows.meet_scale(*term, &mut own, &in_rows);
             NoisyColumn { term: *place, is_left_side: term.is_left_side(), noise: own }
         });
         let columns = columns.collect();

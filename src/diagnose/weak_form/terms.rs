@@ -230,13 +230,13 @@ impl Term {
         }
     }
 
-    /// By how much its column grows with the reading on the left side of an equation, where it scales that; `value` is the term's own.
-    pub(super) fn by_reading(self, value: f64, at: &Signals<f64>) -> Option<(Equation, f64)> {
+    /// By how much its column grows with the reading on the left side of an equation, where it scales that.
+    pub(super) fn by_reading(self, at: &Signals<f64>) -> Option<(Equation, f64)> {
         match self {
             Self::Effect(effect) => match effect.spec().carries? {
-                LeftSide::FlowA => Some((Equation::ChamberA, -1.0 / (1.0 + value))),
-                LeftSide::FlowB => Some((Equation::ChamberB, -1.0 / (1.0 + value))),
-                LeftSide::Force => Some((Equation::Force, -1.0 / (1.0 + value))),
+                LeftSide::FlowA => Some((Equation::ChamberA, -1.0)),
+                LeftSide::FlowB => Some((Equation::ChamberB, -1.0)),
+                LeftSide::Force => Some((Equation::Force, -1.0)),
                 LeftSide::Speed | LeftSide::PressureA | LeftSide::PressureB => None,
             },
             Self::Unlisted(Unlisted::BentMeterA) => Some((Equation::ChamberA, at.qa_m3s.signum())),
