@@ -1,12 +1,15 @@
 //! The diagnosis on traces of an independent simulator, with the effects its authors put in.
 
 use pitchleak::Rig;
-use pitchleak::diagnose::{Declared, Diagnosis, Doubt, DoubtId, LeakEstimates, Series, Verdict, diagnose};
+use pitchleak::diagnose::{
+    Declared, Diagnosis, Doubt, DoubtId, Equation, LeakEstimates, Series, Verdict, diagnose,
+};
 use pitchleak::trace::TraceReader;
 use pitchleak_testkit::hopsan;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::path::Path;
 
 fn rig(mass_kg: f64, bulk_modulus_pa: f64, accuracy: f64) -> Rig {
     let mut rig = Rig::paper();
@@ -128,5 +131,30 @@ fn a_trace_in_which_nothing_happens_is_not_judged() {
         let answer = diagnose(&traces, &[], &Declared::of(&rig), &|| ());
         assert_eq!(answer.verdict, Verdict::InsufficientExcitation);
         assert!(answer.effects.is_empty());
+    }
+}
+
+/// A pump-controlled cylinder in a laboratory, where its traces are: nobody knows what the model lacks, but its areas are as measured, and
+/// what is named helps on days that were not fitted.
+#[test]
+fn a_measured_rig_keeps_its_areas_and_is_met_better() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/measured/eha");
+    let Ok(rig) = Rig::load(&folder.join("rig.toml")) else {
+        println!("skipped: no {}", folder.display());
+        return;
+    };
+    let read = |name: &str| {
+        let path = folder.join(format!("{name}.csv.gz"));
+        Series::read(&mut TraceReader::open(&path, &rig).expect("opens")).expect("reads")
+    };
+    let fitted = ["d1018_load1_stroke3", "d1018_load3_stroke3", "d1018_load5_stroke3"].map(read);
+    let judged = ["d1018_load2_stroke2", "d1017_test1"].map(read);
+    let answer = diagnose(&fitted, &judged, &Declared::of(&rig), &|| ());
+    let (before, after) = (&answer.before.quality.rmse, &answer.after.quality.rmse);
+    println!("{:?}: {before:?} {after:?}", ids(&answer));
+    assert!(!ids(&answer).iter().any(|id| id.starts_with("area")), "{:?}", ids(&answer));
+    for equation in [Equation::ChamberA, Equation::ChamberB] {
+        let [before, after] = [before, after].map(|rmse| rmse[equation].expect("is judged"));
+        assert!(after < 0.8 * before, "{equation:?}: {before} {after}");
     }
 }
