@@ -139,7 +139,7 @@ fn a_trace_in_which_nothing_happens_is_not_judged() {
 #[test]
 fn a_measured_rig_keeps_its_areas_and_is_met_better() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/measured/eha");
-    let Ok(rig) = Rig::load(&folder.join("rig.toml")) else {
+    let Ok(rig) = Rig::load(folder.join("rig.toml")) else {
         println!("skipped: no {}", folder.display());
         return;
     };
