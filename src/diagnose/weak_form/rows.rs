@@ -221,6 +221,10 @@ impl Rows {
 
     /// What `residual` brings into a column by [`Self::meet_scales`].
     pub(super) fn meet_scale(&self, term: Term, column: &mut [f64], residual: &[f64]) {
+        // Most terms scale nothing that is read.
+        if term.by_reading(&Signals::default()).is_none() {
+            return;
+        }
         for ((cell, entry), residual) in column.iter_mut().zip(&self.entries).zip(residual) {
             let scaled = term.by_reading(&self.rows[entry.row].mean);
             if let Some((_, slope)) = scaled.filter(|(equation, _)| *equation == entry.equation) {
