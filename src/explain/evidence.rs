@@ -22,8 +22,6 @@ pub(super) const LEAST_SCALE: f64 = 0.02;
 const LEAST_PIVOT: f64 = 0.2;
 /// A mean square so many standard deviations from what it should be is so by chance. Chosen: the usual three.
 const CHANCE_SIGMAS: f64 = 3.0;
-/// χ² further below zero than this is no sum of squares: more noise was taken off than there is.
-const LEAST_CHI_SQUARE: f64 = -50.0;
 
 /// A column set free, and the standard deviation of its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -207,9 +205,8 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     }
     let ln_scales: f64 = (0..2).map(|c| ln_scale(n[c], scales[c])).sum();
     let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);
-    let is_possible = ln_evidence.is_finite() && chi_square > LEAST_CHI_SQUARE;
     Fit {
-        ln_evidence: if is_possible { ln_evidence } else { f64::NEG_INFINITY },
+        ln_evidence: if ln_evidence.is_finite() { ln_evidence } else { f64::NEG_INFINITY },
         ln_likelihood: ln_evidence + 0.5 * ln_determinant,
         scales,
         means: means.iter().zip(free).map(|(mean, free)| mean * free.std).collect(),

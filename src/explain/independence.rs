@@ -13,9 +13,6 @@ use super::hypothesis::{Hypothesis, LEAK_COLUMNS};
 use super::raw_products::{RawProducts, SegmentProducts};
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 
-/// Rows of a segment that counts.
-const LEAST_ROWS: f64 = 4.0;
-
 /// By how much fewer blocks each equation is worth, at least 1.
 pub(super) fn inflation(
     products: &RawProducts,
@@ -43,9 +40,6 @@ pub(super) fn inflation(
         let scale = fit.scales[equation];
         let mut scores = vec![Vec::new(); slow.len()];
         for (index, segment) in products.segments.iter().enumerate() {
-            if segment.rows[equation] < LEAST_ROWS {
-                continue;
-            }
             let residual = residual(index, segment);
             for (own, scores) in slow.iter().zip(&mut scores) {
                 let score = segment.product(equation, own, &residual, scale);

@@ -23,8 +23,6 @@ const LEAST_ROWS: f64 = 8.0;
 
 /// A residual up to this is noise, in standard deviations of the declared noise. Chosen.
 pub(crate) const NEAR: f64 = std::f64::consts::SQRT_2;
-/// So many times smaller a mistake's residual has to be where it is more. Chosen.
-const LEAST_FALL: f64 = 1.5;
 
 /// Explanations, best first.
 pub(super) struct Posterior<'a> {
@@ -110,8 +108,7 @@ fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64)
 /// Whether mistakes leave as much as the readings as declared do, and more than noise: then what prefers one is how the noise
 /// is shared among the sensors, which no data sheet tells.
 fn tells_of_noise_alone([declared, mistaken]: [Option<f64>; 2]) -> bool {
-    let falls = |(before, after): (f64, f64)| after <= NEAR || before >= LEAST_FALL * after;
-    declared.zip(mistaken).is_some_and(|both| !falls(both))
+    declared.zip(mistaken).is_some_and(|(before, after)| after > NEAR.max(before))
 }
 
 /// Cuts leaks at zero, best first, until what follows cannot matter.

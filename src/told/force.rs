@@ -23,9 +23,6 @@ const UNDECLARED_ZERO_SHARE: f64 = 0.01;
 const INDEPENDENT: f64 = 0.25;
 /// How often a force column is one as declared, of another sign or unit, and none at all. Guesses.
 const FORCE_SHARES: [f64; 3] = [0.9, 0.09, 0.01];
-/// A unit of the pressures is told where it leaves so many times less, and this of twice the log-likelihood. Chosen.
-const CONTRAST: f64 = 4.0;
-const LEAST_DROP: f64 = 60.0;
 
 /// Sums over blocks, in constant memory.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -112,8 +109,7 @@ const SLOPE: std::ops::RangeInclusive<f64> = 0.85..=1.18;
 impl Scaled {
     /// Whether the load force, as it is read, explains these pressures.
     pub fn balances(&self) -> bool {
-        let ratio = self.left.without / self.left.as_read.max(f64::MIN_POSITIVE);
-        ratio >= CONTRAST && self.deviance_of(ratio) >= LEAST_DROP && SLOPE.contains(&self.slope)
+        SLOPE.contains(&self.slope)
     }
 
     /// Less twice the log-likelihood, where the noise is the residual.
