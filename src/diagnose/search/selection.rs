@@ -147,7 +147,13 @@ impl Selection<'_> {
             return false;
         }
         let trials = Candidates::of(fit).trials(&fit.free);
-        let Some(trial) = trials.into_iter().find(|trial| deserves_a_name(fit, trial)) else { return false };
+        let mut worthy = trials.into_iter().filter(|trial| deserves_a_name(fit, trial));
+        // One that only the end of its range stops is not what is missing.
+        let stays = |trial: Trial| {
+            let with = with(fit, &trial, progress);
+            (!with.is_at_bound(trial.score.term)).then_some((trial, with))
+        };
+        let Some((trial, with)) = worthy.find_map(stays) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
@@ -156,7 +162,7 @@ impl Selection<'_> {
         let is_below_unlisted =
             strongest_unlisted(fit, &fit.free, &named).is_some_and(|(_, unlisted)| unlisted > more);
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
-        self.fit = with(fit, &trial, progress);
+        self.fit = with;
         true
     }
 
