@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::block_sums::{Block, MPA_PER_PA, RAW_SUMS, RawSum};
-use super::leak_fit::LeakFit;
+use super::change::LeakFit;
 use super::whitening::{COLUMNS, EQUATIONS, INTEGRALS, Row, RowNoise, VOLUME_POWERS};
 use crate::{PerLeak, Real};
 

@@ -2,9 +2,8 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::evidence::Evidence;
-use super::hypothesis::Hypothesis;
+use super::hypothesis::{Hypothesis, Mixture};
 use super::information::{Posterior, Prior, Solution};
-use super::mixture::Mixture;
 use super::prior::{LEAKS, Parameter, leak_column};
 use crate::Real;
 

@@ -1,8 +1,8 @@
 // Index loops over const bounds: they read like the algebra and the bounds checks vanish.
 #![allow(clippy::needless_range_loop)]
 
+use super::Innovation;
 use super::prior::{LEAKS, Parameter, leak_column};
-use super::update::Innovation;
 use crate::Real;
 use crate::continuity::Equation;
 use crate::linalg::{Factors, Joint, Pivots};

@@ -1,12 +1,9 @@
 use super::bank::{Bank, Heard, Outlook};
-use super::block::{BALANCES, Balance, BlockSums};
-use super::change::ChangeDetector;
+use super::block::{BALANCES, Balance, BlockSums, PositionFilter};
 use super::information::{Prior, Solution};
-use super::innovations::Innovations;
-use super::position::PositionFilter;
+use super::innovations::{ChangeDetector, Innovations};
 use super::prior::{LEAKS, OffsetPrior, Parameter, Zeros, offset_units, prior_spread};
-use super::settings::{self, RlsError, RlsSettings};
-use super::update::{Innovation, Update};
+use super::{Innovation, RlsError, RlsSettings, Update};
 use crate::continuity::{
     Clocks, Equation, Integrals, Measured, MovingAverage, Next, NoiseStd, PerChannel, PressureMeans,
     PressureNoise, Readings, Row, Step, Weights, combine,
@@ -105,7 +102,7 @@ impl<T: Real, const N: usize> Rls<T, N> {
         settings: RlsSettings<T>,
     ) -> Result<Self, RlsError> {
         let () = Self::HAS_A_KNOWN_SIZE;
-        settings::check(&cylinder, &fluid, sensors, &settings)?;
+        super::check(&cylinder, &fluid, sensors, &settings)?;
         let noise = NoiseStd::of(sensors, &cylinder);
         let no_leak = PerLeak::default();
         let zeros = Zeros::of(sensors);

@@ -2,11 +2,10 @@
 
 mod chamber;
 mod cylinder_plant;
-mod end_stop;
 mod valve;
 
+pub use chamber::EndStop;
 pub use cylinder_plant::{CylinderPlant, CylinderRates, CylinderState, Drive};
-pub use end_stop::EndStop;
 pub use valve::{Supply, Valve, ValveFlows};
 
 pub(crate) use cylinder_plant::{number_or_zero, substeps};

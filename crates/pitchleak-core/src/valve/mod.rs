@@ -2,7 +2,7 @@
 //!
 //! 1. `edges`: what passes the four edges at each reading, and its slopes.
 //! 2. `hats`: integrals of those over two blocks of a tenth of a second, against a weight that rises and falls.
-//! 3. `rows`: both continuity equations over a hat, a column for each unknown, and their noise; `whitening` makes it white.
+//! 3. `rows`: both continuity equations over a hat, a column for each unknown, and their noise, made white.
 //! 4. `filter`: the three leaks, κ and what else is not known, with the calibration's covariance and its drift, by a square-root free
 //!    Kalman filter.
 //! 5. `watch`: whether noise explains what comes, and whether the leaks changed at once.
@@ -18,7 +18,6 @@ mod rows;
 pub mod unknowns;
 mod valve_filter;
 mod watch;
-mod whitening;
 
 pub use calibration::{ValveCalibration, ValveError, ValveNoise};
 pub use unknowns::{VALVE_COVARIANCES, VALVE_UNKNOWNS};

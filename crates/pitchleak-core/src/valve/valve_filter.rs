@@ -2,10 +2,9 @@ use super::calibration::{LEAK_SIZE, ValveCalibration, ValveError, ValveNoise};
 use super::edges::{Edges, PRESSURES, Scaled};
 use super::filter::Filter;
 use super::hats::{Block, Hat, Sampled};
-use super::rows::Equations;
+use super::rows::{Equations, Whitening};
 use super::unknowns::{KAPPA, LAPS, LEAK_UNIT_M3SPA, VALVE_UNKNOWNS as N};
 use super::watch::Watch;
-use super::whitening::Whitening;
 use crate::continuity::{Integrals, PressureMeans};
 use crate::{Cylinder, Estimate, Fluid, PerLeak, Real};
 
