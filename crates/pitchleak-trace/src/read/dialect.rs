@@ -1,6 +1,7 @@
 //! How a text file of numbers is written: found in its first lines, said where it is not as this program writes one, and
 //! refused where it can be read in two ways.
 
+use super::clock::{Epoch, time_format};
 use super::columns::{Column, Layout, REQUIRED};
 use super::error::TraceFault;
 use super::format::{Stream, mistaken};
@@ -8,7 +9,6 @@ use super::number::{decimal, number};
 use super::proposal::{Proposal, proposals};
 use super::records::{Encoding, Records, stopped_early};
 use super::shapes::{self, Source};
-use super::stamps::{Epoch, time_format};
 use super::table_text::TextTable;
 use crate::header::shorten;
 use crate::rig::{ColumnMap, Decimal, Delimiter, Rig};

@@ -5,12 +5,11 @@
 mod hdf5;
 mod vector;
 
-use super::bind::Bound;
+use super::clock::{Epoch, ROWS, cell_text, first_rows, time_format};
 use super::error::{Counted, TraceFault};
 use super::format::{MOST_HELD, Rows, Stream};
-use super::stamps::{Epoch, ROWS, cell_text, first_rows, time_format};
 use super::table::{Cells, TableRows};
-use super::table_text::{TextRow, TextTable};
+use super::table_text::{Bound, TextRow, TextTable};
 use crate::header::shorten;
 use crate::rig::Rig;
 use flate2::read::ZlibDecoder;

@@ -1,7 +1,5 @@
 //! Reading a trace as a stream: constant memory however long it is, and nothing lost in silence.
 
-mod ahead;
-mod bind;
 mod clock;
 mod columns;
 mod csv;
@@ -9,38 +7,32 @@ mod dialect;
 mod error;
 mod format;
 mod inspect;
-mod join;
-mod line;
 mod mat;
 mod number;
 mod own_clocks;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod proposal;
-mod quality;
 mod records;
 mod row;
 mod shapes;
-mod stamps;
 mod table;
 mod table_text;
 mod validator;
 
-pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault};
+pub use clock::seconds_between;
+pub use csv::{LineLayout, LineRead, read as read_line};
+pub use error::{BadReason, BadRow, Counted, TraceError, TraceFault, TraceQuality};
 pub use inspect::{ColumnReading, FileReading, ProposedLine, TextReading};
-pub use line::{LineLayout, LineRead, read as read_line};
-pub use quality::TraceQuality;
 pub use row::{BadRows, FlowChange, Record, ValveReading};
-pub use stamps::seconds_between;
 pub use table::{Batch, ColumnContent, TableLayout};
 pub use validator::{OVERRANGE, RowValidator};
 
 use crate::rig::{ColumnMap, Rig};
 use crate::signal::Signal;
 use crate::times::Clock;
-use join::Joined;
-use own_clocks::OwnClocks;
-use row::{Next, Row, RowSource};
+use own_clocks::{Joined, OwnClocks};
+use row::{Next, Row, RowSource, RowsAhead};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -126,7 +118,7 @@ impl TraceReader<'static> {
     #[must_use]
     pub fn ahead(self) -> Self {
         if std::thread::available_parallelism().is_ok_and(|cores| cores.get() > 1) {
-            Self { rows: Box::new(ahead::RowsAhead::of(self.rows)), ..self }
+            Self { rows: Box::new(RowsAhead::of(self.rows)), ..self }
         } else {
             self
         }

@@ -1,24 +1,21 @@
 //! Parquet: a flat table of numbers, times typed or as text, row group after row group.
 
-mod codec;
 mod footer;
 mod pages;
 mod thrift;
 
-use super::bind::Bound;
+use super::clock::{Epoch, ROWS, cell_text, first_rows, seconds_between, time_format};
 use super::columns::{Content, standard};
 use super::error::{Counted, TraceFault};
 use super::format::{Rows, Stream, mistaken};
-use super::stamps::{Epoch, ROWS, cell_text, first_rows, seconds_between, time_format};
 use super::table::{Cells, TableRows};
-use super::table_text::{TextRow, TextTable};
+use super::table_text::{Bound, TextRow, TextTable};
 use crate::header::shorten;
 use crate::rig::Rig;
 use crate::times::TimeFormat;
 use bytes::Bytes;
-use codec::UNREAD;
 use footer::{Kind, Leaf};
-use pages::Columns;
+use pages::{Columns, UNREAD};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;

@@ -569,7 +569,7 @@ fn reading_ahead_changes_nothing() {
         for end in ["", "2026-11-20T23:00:00Z,0"] {
             text.push_str(end);
             let alone = open(text.as_str(), &Rig::paper()).unwrap();
-            let ahead = ahead::RowsAhead::of(open(text.as_str(), &Rig::paper()).unwrap().rows);
+            let ahead = RowsAhead::of(open(text.as_str(), &Rig::paper()).unwrap().rows);
             let ahead = TraceReader::over("trace.csv", Box::new(ahead), &Rig::paper());
             match (read_all(ahead), read_all(alone)) {
                 (Ok(ahead), Ok(alone)) => assert_eq!(ahead, alone, "{rows} rows"),
@@ -597,7 +597,7 @@ fn a_reader_that_is_dropped_ends_its_thread() {
     let alive = std::sync::Arc::new(());
     let text = std::io::Cursor::new("t_s,x_m,pa_pa,pb_pa\n").chain(Endless { _alive: alive.clone(), row: 0 });
     let mut reader = TraceReader::from_stream("-", Box::new(text), &Rig::paper()).unwrap();
-    reader.rows = Box::new(ahead::RowsAhead::of(reader.rows));
+    reader.rows = Box::new(RowsAhead::of(reader.rows));
     let mut row = Row::empty();
     for _ in 0..10_000 {
         assert!(matches!(reader.rows.next_row(&mut row), Ok(Next::Row)));

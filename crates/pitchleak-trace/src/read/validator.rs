@@ -2,8 +2,7 @@
 
 use super::clock::{Clock, Step};
 use super::columns::Layout;
-use super::error::{BadReason, BadRow, Counted, TraceFault};
-use super::quality::TraceQuality;
+use super::error::{BadReason, BadRow, Counted, TraceFault, TraceQuality};
 use super::row::{BadRows, Record, Row, ValveReading};
 use crate::rig::Rig;
 use crate::signal::Signal;

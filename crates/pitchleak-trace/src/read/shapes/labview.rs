@@ -2,7 +2,7 @@
 //! are not written but follow from `X0` and `Delta_X`, with *Multi* each channel has its own.
 //! National Instruments, "Specification for the LabVIEW Measurement File (.lvm)".
 
-use super::{Recast, Shape, Source, Text, own_times};
+use super::{Recast, Shape, Source, Text, merged};
 use crate::read::error::TraceFault;
 use crate::read::number::number;
 use crate::read::records::text;
@@ -57,7 +57,7 @@ fn told(_: &TextTable, ahead: &[u8]) -> Option<Recast> {
         let seconds =
             |header: &String| if header == X_VALUE { "Time [s]".to_owned() } else { header.clone() };
         let headers: Vec<String> = head.headers.iter().map(seconds).collect();
-        own_times::of_columns(&headers, &[], &times.take(100).collect::<Vec<_>>())
+        merged::of_columns(&headers, &[], &times.take(100).collect::<Vec<_>>())
     };
     Some(Box::new(move |source| {
         let source = Source { delimiter: head.delimiter, last_header_line: head.line, ..source };

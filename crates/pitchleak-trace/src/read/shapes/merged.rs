@@ -1,11 +1,20 @@
 //! Readings that come one by one, each with its time, as rows: a row for each time, an empty cell where a channel has no
 //! reading then. They are held, because a channel may come after all of another.
+//!
+//! Long tables: a row is one reading, with its time, its channel's name and its value, and maybe what it is worth. So write
+//! InfluxDB (annotated CSV, <https://docs.influxdata.com/influxdb/v2/reference/syntax/annotated-csv/>), WinCC's logs
+//! (`VarName;TimeString;VarValue;Validity;Time_ms`) and most databases.
+//!
+//! A column of times before each channel or group of channels, as TwinCAT Scope, catman and DIAdem export channels of
+//! several rates: `Time;Pressure A;Time;Flow A`.
 
-use super::{Source, Text, write_cell};
+use super::{Recast, Shape, Source, Text, place, write_cell};
+use crate::header::{letters, lists};
 use crate::read::error::TraceFault;
 use crate::read::format::MOST_HELD;
 use crate::read::number::number;
-use crate::read::records::{Stop, Written, stopped_early};
+use crate::read::records::{Stop, Written, stopped_early, text};
+use crate::read::table_text::{TextTable, bare_unit};
 use crate::rig::Decimal;
 use crate::times::{self, TimeFault, TimeFormat};
 use std::collections::HashMap;
@@ -13,7 +22,7 @@ use std::ops::Range;
 
 /// How times are compared: as instants, or as numbers.
 #[derive(Clone)]
-pub(super) struct Times {
+struct Times {
     format: Option<TimeFormat>,
     last_ns: Option<i128>,
 }
@@ -30,7 +39,7 @@ impl Times {
     }
 
     /// Whether they are numbers, which say neither their unit nor their epoch.
-    pub(super) fn are_numbers(&self) -> bool {
+    fn are_numbers(&self) -> bool {
         self.format.is_none()
     }
 
@@ -52,7 +61,7 @@ struct Row {
 }
 
 #[derive(Default)]
-pub(super) struct Merged {
+struct Merged {
     /// All cells, one after the other.
     held: Vec<u8>,
     channels: Vec<String>,
@@ -90,7 +99,7 @@ impl Merged {
     }
 
     /// A reading; one whose time can't be read is left out.
-    pub(super) fn add(
+    fn add(
         &mut self,
         times: &mut Times,
         time: &[u8],
@@ -159,4 +168,163 @@ impl Merged {
         }
         text.push(b'\n');
     }
+}
+
+pub(super) const LONG: Shape = Shape { name: "a reading per row", told: told_long };
+
+const TIMES: &str = "timems time timestamp timestring datetime dateandtime ts zeitstempel zeit date";
+const CHANNELS: &str =
+    "field channel varname tag tagname signal variable metric pointname point kanal sensor item name";
+const VALUES: &str = "value varvalue wert";
+const UNITS: &str = "unit units einheit";
+/// What a reading is worth, with the cells that say that it is good, blanks between them; OPC counts 192 and more as good.
+const QUALITIES: [(&str, &str); 4] = [
+    ("validity", "1 good valid true"),
+    ("quality", "192 good ok valid true 216"),
+    ("statuscode", "0 0x00000000 good"),
+    ("status", "0 good ok valid"),
+];
+/// WinCC counts days since 30 December 1899 in millionths.
+const WINCC_TIME: &str = "timems";
+
+/// The places of a reading's parts.
+#[derive(Clone)]
+struct Places {
+    time: usize,
+    channel: usize,
+    value: usize,
+    unit: Option<usize>,
+    quality: Option<(usize, &'static str)>,
+    /// Cells of the header, which may come again.
+    header: Vec<String>,
+    time_is_wincc: bool,
+}
+
+fn told_long(table: &TextTable, _: &[u8]) -> Option<Recast> {
+    let headers = &table.headers;
+    let time = place(headers, WINCC_TIME).or_else(|| place(headers, TIMES))?;
+    let mut channel = place(headers, CHANNELS)?;
+    let value = place(headers, VALUES)?;
+    // Where every reading is of the field `value`, what was measured tells them apart.
+    let own = headers.get(channel);
+    let only_values =
+        table.column(channel).iter().all(|name| *name == "value" || Some(*name) == own.map(String::as_str));
+    if let Some(measurement) = place(headers, "measurement").filter(|_| only_values) {
+        channel = measurement;
+    }
+    let quality = QUALITIES.iter().find_map(|(name, good)| Some((place(headers, name)?, *good)));
+    let time_is_wincc = headers.get(time).is_some_and(|header| letters(header) == WINCC_TIME);
+    let cells: Vec<String> = table.column(time).iter().map(|cell| in_days(cell, time_is_wincc)).collect();
+    let times = Times::of(&cells.iter().map(String::as_str).collect::<Vec<_>>())?;
+    let places = Places {
+        time,
+        channel,
+        value,
+        unit: place(headers, UNITS),
+        quality,
+        header: headers.clone(),
+        time_is_wincc,
+    };
+    Some(Box::new(move |source| recast_long(source, &places, times)))
+}
+
+fn recast_long(source: Source, places: &Places, mut times: Times) -> Result<Text, TraceFault> {
+    // A bare number stays what the file calls it, so that a unit can be given by its name.
+    let own = places.header.get(places.time).map_or("timestamp", String::as_str);
+    let time_name = if times.are_numbers() { own } else { "timestamp" };
+    Merged::default().of(source, time_name, |merged, cells| {
+        let cell = |place: usize| text(cells.get(place).copied().unwrap_or_default()).trim().to_owned();
+        let name = cell(places.channel);
+        let is_reading =
+            !name.is_empty() && !name.starts_with("$RT_") && cell(0).bytes().next() != Some(b'#');
+        // InfluxDB begins each table with its header.
+        if !is_reading || places.header.get(places.channel) == Some(&name) {
+            return Ok(());
+        }
+        let name = match places.unit.map(cell).filter(|unit| !unit.is_empty()) {
+            Some(unit) => format!("{name} [{unit}]"),
+            None => name,
+        };
+        let channel = merged.channel(&name);
+        let is_good = places.quality.is_none_or(|(place, good)| lists(good, &cell(place).to_lowercase()));
+        if !is_good {
+            return Ok(());
+        }
+        let time = in_days(&cell(places.time), places.time_is_wincc);
+        merged.add(&mut times, time.as_bytes(), channel, cell(places.value).as_bytes())
+    })
+}
+
+/// WinCC's millionths of days as a spreadsheet's days.
+fn in_days(cell: &str, is_wincc: bool) -> String {
+    match number(cell, Decimal::Comma) {
+        Some(millionths) if is_wincc => format!("{:.11}", millionths / 1e6),
+        _ => cell.to_owned(),
+    }
+}
+
+pub(super) const OWN_TIMES: Shape =
+    Shape { name: "a column of times for each channel", told: told_own_times };
+
+/// What columns of times are called; behind it may stand a number, a unit or a rate.
+const CALLED: &[&str] = &["time", "zeit", "xvalue", "timestamp"];
+
+/// Each channel's column and that of its times.
+struct Pair {
+    time: usize,
+    channel: usize,
+}
+
+fn told_own_times(table: &TextTable, _: &[u8]) -> Option<Recast> {
+    let units = table.units.as_ref().map(|units| units.cells.as_slice()).unwrap_or_default();
+    of_columns(&table.headers, units, &table.column(0))
+}
+
+/// Of columns with these headers and units, the first of which begins with these times.
+pub(super) fn of_columns(headers: &[String], units: &[String], first_times: &[&str]) -> Option<Recast> {
+    let is_time = |header: &String| CALLED.iter().any(|name| letters(header).starts_with(name));
+    if headers.iter().filter(|header| is_time(header)).count() < 2 || !headers.first().is_some_and(is_time) {
+        return None;
+    }
+    let (mut pairs, mut time) = (Vec::new(), 0);
+    for (index, header) in headers.iter().enumerate() {
+        if is_time(header) {
+            time = index;
+        } else if !header.is_empty() && header != "Comment" {
+            pairs.push(Pair { time, channel: index });
+        }
+    }
+    let times = Times::of(first_times)?;
+    let named: Vec<String> = (0..)
+        .zip(headers)
+        .map(|(index, header): (usize, &String)| match units.get(index).filter(|unit| !unit.is_empty()) {
+            Some(unit) => format!("{header} [{}]", bare_unit(unit)),
+            None => header.clone(),
+        })
+        .collect();
+    Some(Box::new(move |source| recast_own_times(source, &pairs, &named, &times)))
+}
+
+fn recast_own_times(
+    source: Source,
+    pairs: &[Pair],
+    named: &[String],
+    times: &Times,
+) -> Result<Text, TraceFault> {
+    let name = |index: usize| named.get(index).map_or("", String::as_str);
+    let time_name = if times.are_numbers() { name(0) } else { "timestamp" };
+    let mut merged = Merged::default();
+    // A clock of its own each, for times of day that pass midnight.
+    let mut channels: Vec<_> =
+        pairs.iter().map(|pair| (merged.channel(name(pair.channel)), times.clone())).collect();
+    merged.of(source, time_name, |merged, cells| {
+        for (pair, (channel, times)) in pairs.iter().zip(&mut channels) {
+            if let (Some(time), Some(value)) = (cells.get(pair.time), cells.get(pair.channel))
+                && !value.trim_ascii().is_empty()
+            {
+                merged.add(times, time, *channel, value)?;
+            }
+        }
+        Ok(())
+    })
 }

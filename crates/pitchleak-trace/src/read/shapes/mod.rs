@@ -1,13 +1,11 @@
 //! Tables whose rows are no samples: each shape is told by its first lines and recast as rows of samples, a text with tabs
 //! between its cells, which is then read as any other. Asked only where the table makes no trace as it is.
 //!
-//! A new shape is a file and an entry of [`SHAPES`].
+//! A new shape is an entry of [`SHAPES`], and a function that tells it.
 
 mod cells;
 mod labview;
-mod long;
 mod merged;
-mod own_times;
 
 use super::error::TraceFault;
 use super::records::{Records, Stop, Written};
@@ -31,7 +29,7 @@ pub(super) type Text = Box<dyn Read + Send>;
 
 /// Every shape; the first that fits is taken.
 const SHAPES: &[Shape] =
-    &[labview::SHAPE, long::SHAPE, own_times::SHAPE, cells::DATE_AND_TIME_APART, cells::UNITS_IN_CELLS];
+    &[labview::SHAPE, merged::LONG, merged::OWN_TIMES, cells::DATE_AND_TIME_APART, cells::UNITS_IN_CELLS];
 
 /// The shape of a table, and how it is recast.
 pub(super) fn told(table: &TextTable, ahead: &[u8]) -> Option<(&'static str, Recast)> {
