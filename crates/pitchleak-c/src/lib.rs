@@ -7,14 +7,15 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 mod meters;
-mod reading;
 mod rig;
 mod running;
 mod valve;
 
 pub use meters::*;
-pub use reading::{PitchleakAlarms, PitchleakEstimate, PitchleakFound, PitchleakSample};
-pub use rig::{PitchleakCylinder, PitchleakFluid, PitchleakRig, PitchleakSensor};
+pub use rig::{
+    PitchleakAlarms, PitchleakCylinder, PitchleakEstimate, PitchleakFluid, PitchleakFound, PitchleakRig,
+    PitchleakSample, PitchleakSensor,
+};
 pub use valve::*;
 
 /// What a function did: zero or above where all is well.

@@ -1,8 +1,7 @@
 //! Leaks by flow meters: the default estimator and its alarms, in a size for each number of parameters.
 
 use crate::PitchleakResult;
-use crate::reading::{PitchleakFound, PitchleakSample};
-use crate::rig::PitchleakRig;
+use crate::rig::{PitchleakFound, PitchleakRig, PitchleakSample};
 use crate::running::{self, Kept, Memory};
 use pitchleak_core::{LeakDetector, Rls, Update};
 

@@ -1,8 +1,7 @@
 //! Leaks without flow meters, by a calibrated valve.
 
 use crate::PitchleakResult;
-use crate::reading::{PitchleakAlarms, PitchleakEstimate};
-use crate::rig::{PitchleakCylinder, PitchleakFluid, detector, possible};
+use crate::rig::{PitchleakAlarms, PitchleakCylinder, PitchleakEstimate, PitchleakFluid, detector, possible};
 use crate::running::{self, Kept, Memory};
 use pitchleak_core::{
     LeakDetector, VALVE_COVARIANCES, VALVE_UNKNOWNS, ValveCalibration, ValveError, ValveFilter, ValveNoise,

@@ -1,8 +1,8 @@
 //! Files of foreign columns: how one would be read, and a rig file for them.
 
-use crate::failure::Failure;
+use crate::Outcome;
 use crate::input::{TextFormat, rig};
-use crate::{Outcome, output};
+use crate::output::{self, Failure};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::output::{Inputs, write};

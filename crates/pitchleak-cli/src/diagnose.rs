@@ -1,6 +1,6 @@
-use crate::failure::Failure;
+use crate::Outcome;
 use crate::input::{TextFormat, rig};
-use crate::{Outcome, output};
+use crate::output::{self, Failure};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;

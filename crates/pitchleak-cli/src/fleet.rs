@@ -1,5 +1,5 @@
-use crate::failure::Failure;
-use crate::{Outcome, output};
+use crate::Outcome;
+use crate::output::{self, Failure};
 use clap::Args;
 use pitchleak::fleet::{
     FleetFile, FleetNights, FleetReport, FleetRig, FleetRow, FleetTable, FleetTrace, Stopped, judge_all,

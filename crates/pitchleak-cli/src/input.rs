@@ -1,7 +1,7 @@
 //! The arguments that say what to read.
 
-use crate::failure::Failure;
-use crate::{Outcome, output};
+use crate::Outcome;
+use crate::output::{self, Failure};
 use clap::Args;
 use indicatif::ProgressBar;
 use pitchleak::Rig;

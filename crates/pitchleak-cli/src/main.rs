@@ -1,23 +1,22 @@
-//! The program `pitchleak`: arguments in, text out, no numerics of its own.
+//! The program `pitchleak`: arguments in, text out, no numerics of its own; and what it says of itself: completions for a shell,
+//! manual pages, what a verdict weighs.
 
-mod about;
-mod calibrate;
-mod check;
 mod columns;
 mod diagnose;
-mod failure;
 mod fleet;
 mod input;
 mod output;
-mod prove;
 mod replay;
-mod reproduce;
 mod simulate;
 mod watch;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
-use failure::Failure;
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use clap_mangen::Man;
+use output::Failure;
+use pitchleak::explain::explanations;
+use pitchleak::units::readable;
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
@@ -42,21 +41,21 @@ Exit status: 0 done; 1 a fault was found and --fail-on-fault was given;
 
 #[derive(Subcommand)]
 enum Command {
-    Replay(replay::Arguments),
+    Replay(replay::ReplayArguments),
     Diagnose(diagnose::Arguments),
-    Check(check::Arguments),
-    Prove(prove::Arguments),
-    Calibrate(calibrate::Arguments),
+    Check(replay::CheckArguments),
+    Prove(replay::ProveArguments),
+    Calibrate(replay::CalibrateArguments),
     Columns(columns::Columns),
     Init(columns::Init),
     Fleet(fleet::Arguments),
     /// Lists what a verdict weighs beside leaks: sensors, rig and wiring, each with its prior share
     Explanations,
     Watch(watch::Arguments),
-    Simulate(Box<simulate::Arguments>),
-    Reproduce(reproduce::Arguments),
-    Completions(about::Completions),
-    Man(about::ManualPage),
+    Simulate(Box<simulate::SimulateArguments>),
+    Reproduce(simulate::ReproduceArguments),
+    Completions(Completions),
+    Man(ManualPage),
 }
 
 /// What a command that ran to its end has to say by its exit status.
@@ -137,22 +136,78 @@ fn in_one_line(answer: &str) -> String {
 fn run(command: &Command) -> Result<Outcome, Failure> {
     // A watch that is to end saves its state first.
     if !matches!(command, Command::Watch(_)) {
-        failure::leave_nothing_half_written()?;
+        output::leave_nothing_half_written()?;
     }
     match command {
-        Command::Replay(arguments) => replay::run(arguments),
+        Command::Replay(arguments) => arguments.run(),
         Command::Diagnose(arguments) => diagnose::run(arguments),
-        Command::Check(arguments) => check::run(arguments),
-        Command::Prove(arguments) => prove::run(arguments),
-        Command::Calibrate(arguments) => calibrate::run(arguments),
+        Command::Check(arguments) => arguments.run(),
+        Command::Prove(arguments) => arguments.run(),
+        Command::Calibrate(arguments) => arguments.run(),
         Command::Columns(arguments) => arguments.run(),
         Command::Init(arguments) => arguments.run(),
         Command::Fleet(arguments) => fleet::run(arguments),
-        Command::Explanations => about::list_explanations(),
+        Command::Explanations => list_explanations(),
         Command::Watch(arguments) => watch::run(arguments),
-        Command::Simulate(arguments) => simulate::run(arguments),
-        Command::Reproduce(arguments) => reproduce::run(arguments),
+        Command::Simulate(arguments) => arguments.run(),
+        Command::Reproduce(arguments) => arguments.run(),
         Command::Completions(arguments) => arguments.run(),
         Command::Man(arguments) => arguments.run(),
     }
+}
+
+/// Write the completions of a shell to standard output
+#[derive(Args)]
+#[command(
+    after_help = "Example: pitchleak completions bash > ~/.local/share/bash-completion/completions/pitchleak"
+)]
+struct Completions {
+    /// Which shell
+    shell: Shell,
+}
+
+/// Write a manual page to standard output: of the program, or of one of its commands
+#[derive(Args)]
+#[command(after_help = "Example: pitchleak man replay | man -l -")]
+struct ManualPage {
+    /// Which command [default: the program itself]
+    #[arg(value_name = "COMMAND")]
+    command: Option<String>,
+}
+
+impl Completions {
+    fn run(&self) -> Result<Outcome, Failure> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "pitchleak", &mut script);
+        output::print(&String::from_utf8_lossy(&script))?;
+        Ok(Outcome::Done)
+    }
+}
+
+impl ManualPage {
+    fn run(&self) -> Result<Outcome, Failure> {
+        let mut program = Cli::command();
+        program.build();
+        let command = match &self.command {
+            None => program,
+            Some(name) => {
+                program.find_subcommand(name).cloned().ok_or_else(|| Failure::NoCommand(name.clone()))?
+            }
+        };
+        let mut page = Vec::new();
+        Man::new(command).render(&mut page)?;
+        output::print(&String::from_utf8_lossy(&page))?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// A line for each, kind by kind.
+fn list_explanations() -> Result<Outcome, Failure> {
+    let mut text = format!("{:<10} {:<26} {:>9}  what\n", "kind", "id", "share");
+    for entry in explanations() {
+        let (kind, percent) = (entry.kind.name(), readable(100.0 * entry.share, 3));
+        text += &format!("{kind:<10} {:<26} {percent:>7} %  {}\n", entry.id, entry.text);
+    }
+    output::print(&text)?;
+    Ok(Outcome::Done)
 }

@@ -1,20 +1,25 @@
-use crate::failure::Failure;
-use crate::{Outcome, output};
+//! Simulated traces, and the paper's experiment on them.
+
+use crate::Outcome;
+use crate::output::{self, Failure};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::core::PerLeak;
+use pitchleak::output::{Inputs, make_folder};
 use pitchleak::simulate::{
     EffectSize, Followed, LeakCourse, Noise, Plan, SensorFault, Span, ValveFlaw, share_of_full_scale,
 };
 use pitchleak::units::{self, Dimension};
 use pitchleak::wind::{Emulation, Wind};
+use pitchleak_reproduce::{Progress, detection, reproduce};
+use pitchleak_view::page::PageFile;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 /// Simulate a rig with known leaks and write what its sensors would have recorded
 #[derive(Args)]
-#[command(after_help = EXAMPLES)]
-pub struct Arguments {
+#[command(after_help = SIMULATE_EXAMPLES)]
+pub struct SimulateArguments {
     /// What the rig follows: 5, 13, 21 or 30 (m/s, built in), OpenFAST output (.out, .outb), or CSV with
     /// t_s, pitch_deg, pitch_moment_Nm
     #[arg(long, value_name = "CASE|FILE", conflicts_with_all = ["position", "load"])]
@@ -115,7 +120,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-const EXAMPLES: &str = "\
+const SIMULATE_EXAMPLES: &str = "\
 Mistakes (--fault) of the channels t, x, pa, pb, qa, qb, force, temp; each with ' @ 20 s..40 s' where not for ever:
   'qa dead' (zero), 'qa stuck', 'qa missing', 'qa reversed', 'qa absolute', 'x other_end' (from the B end),
   'pa offset 10 bar', 'qb offset 1 %' (of full scale), 'qa drift 0.2 L/min/h', 'qa drift 1 %/h', 'qa gain 20 %',
@@ -147,20 +152,20 @@ fn leak(text: &str) -> Result<LeakCourse, String> {
     text.parse::<LeakCourse>().map_err(|error| error.to_string())
 }
 
-pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let rig = arguments.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
-    let recording = arguments.plan().recording(rig)?;
-    output::warn(&recording.warnings());
-    let bar = output::bar(1000, "{bar:40} {percent:>3} %  simulating, {eta} left");
-    recording.write(&arguments.out, |share| {
-        bar.set_position((1000.0 * share) as u64);
-        ControlFlow::Continue(())
-    })?;
-    bar.finish_and_clear();
-    Ok(Outcome::Done)
-}
+impl SimulateArguments {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let rig = self.rig.as_ref().map_or_else(|| Ok(Rig::paper()), Rig::load)?;
+        let recording = self.plan().recording(rig)?;
+        output::warn(&recording.warnings());
+        let bar = output::bar(1000, "{bar:40} {percent:>3} %  simulating, {eta} left");
+        recording.write(&self.out, |share| {
+            bar.set_position((1000.0 * share) as u64);
+            ControlFlow::Continue(())
+        })?;
+        bar.finish_and_clear();
+        Ok(Outcome::Done)
+    }
 
-impl Arguments {
     fn followed(&self) -> Followed {
         match &self.wind {
             Some(wind) => {
@@ -200,5 +205,57 @@ impl Arguments {
             duration_s: self.duration,
             sample_rate_hz: self.sample_rate,
         }
+    }
+}
+
+/// Rerun the paper's experiment: four winds, two leak settings, its law and ours on the same readings
+#[derive(Args)]
+#[command(after_help = "Example: pitchleak reproduce --out reproduction --seeds 280")]
+pub struct ReproduceArguments {
+    /// Write the figures (SVG), the table and the report into this directory
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Write the report as a page for a browser: .html, complete in itself
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+
+    /// Print the report as JSON (schema pitchleak.reproduce/1)
+    #[arg(long)]
+    json: bool,
+
+    /// Seeds per row, each with its own noise; 14 windows of 20 s take turns
+    #[arg(long, value_name = "N", default_value_t = 280, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    seeds: u64,
+
+    /// Also measure the alarms: delays, and false alarms over so many hours of sound operation
+    #[arg(long, value_name = "HOURS")]
+    detection: Option<f64>,
+}
+
+impl ReproduceArguments {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        self.out.as_deref().map(make_folder).transpose()?;
+        let page = self.report.as_ref().map(|path| PageFile::create(path, &Inputs::default())).transpose()?;
+        let bar = output::bar(1, "{bar:40} {pos:>3}/{len} {msg}, {elapsed}");
+        let show = |progress: Progress| {
+            bar.set_length(progress.count as u64);
+            bar.set_message(progress.stage);
+            bar.set_position(progress.done as u64);
+        };
+        let mut reproduction = reproduce(self.seeds, show)?;
+        if let Some(hours) = self.detection {
+            reproduction.report.detection = Some(detection(hours, show)?);
+        }
+        bar.finish_and_clear();
+        if let Some(directory) = &self.out {
+            reproduction.write(directory)?;
+        }
+        if let Some(page) = page {
+            page.finish(&pitchleak_reproduce::page(&reproduction)?)?;
+        }
+        let report = &reproduction.report;
+        output::print_as(self.json, || report.to_json(), || report.to_text())?;
+        Ok(Outcome::Done)
     }
 }

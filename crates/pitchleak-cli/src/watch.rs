@@ -1,6 +1,6 @@
-use crate::failure::{Failure, at_the_end};
+use crate::Outcome;
 use crate::input::one_of;
-use crate::{Outcome, output};
+use crate::output::{self, Failure, at_the_end};
 use clap::Args;
 use pitchleak::Rig;
 use pitchleak::live::{Checkpoint, Event, LineFormat, LiveConfig, OutputFormat, Snapshot, Watch};

@@ -9,7 +9,6 @@ mod http;
 mod log;
 mod metrics;
 mod mqtt;
-mod outbox;
 mod pace;
 mod run;
 mod saver;
@@ -19,8 +18,7 @@ mod topics;
 use clap::Parser;
 use config::Config;
 use pitchleak::live::{CheckpointError, ConfigError};
-use std::io;
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

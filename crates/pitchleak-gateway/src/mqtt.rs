@@ -1,9 +1,8 @@
 //! MQTT 5 by the crate rumqttc, in a thread of its own that waits for the network alone.
 
 use crate::Failure;
-use crate::broker::{Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{Delivery, Inbound, Keeping, Message, Next, Outbox, Ticket};
 use crate::config::{BrokerConfig, Tls};
-use crate::outbox::{Next, Outbox};
 use crate::run::{Input, network_thread};
 use rumqttc::tokio_rustls::rustls::crypto::ring::default_provider;
 use rumqttc::tokio_rustls::rustls::pki_types::pem::PemObject;

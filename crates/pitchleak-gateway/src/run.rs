@@ -2,15 +2,14 @@
 
 use crate::alarms::Alarms;
 use crate::board::Board;
-use crate::broker::Inbound;
+use crate::broker::{Inbound, Outbox};
 use crate::config::{Config, Tls};
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
-use crate::outbox::Outbox;
 use crate::pace::Pace;
-use crate::saver::{Disk, Saved, Summaries};
+use crate::saver::{self, Disk, Saved, Summaries};
 use crate::service::{Service, Waiting, status};
-use crate::{Failure, http, mqtt, saver};
+use crate::{Failure, http, mqtt};
 use pitchleak::live::{Checkpoint, Watch};
 use sd_notify::NotifyState;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};

@@ -1,14 +1,12 @@
 //! The engine for Python: `pitchleak._pitchleak`, under the package `pitchleak`. Data in, JSON and arrays
 //! out; what Python makes of them is in `python/pitchleak`.
 
-mod diagnose;
 mod errors;
 mod estimator;
 mod fleet;
 mod linkage;
 mod replay;
 mod rig;
-mod rig_arguments;
 mod signals;
 mod simulate;
 mod table;
@@ -18,8 +16,6 @@ use pyo3::prelude::*;
 /// The compiled part of pitchleak.
 #[pymodule(gil_used = false)]
 mod _pitchleak {
-    #[pymodule_export]
-    use crate::diagnose::diagnose;
     #[pymodule_export]
     use crate::errors::{RigError, TraceError};
     #[pymodule_export]
@@ -31,6 +27,8 @@ mod _pitchleak {
     };
     #[pymodule_export]
     use crate::linkage::Linkage;
+    #[pymodule_export]
+    use crate::replay::diagnose;
     #[pymodule_export]
     use crate::replay::{
         calibrate, check, check_page, explanations, over_time, prove, replay, replay_page, write_page,

@@ -1,7 +1,6 @@
 //! Figures like the paper's Fig. 5 to 8, of one window of each wind.
 
-use super::protocol::{Case, ReproduceError, Run, WINDOW_SAMPLES};
-use super::search::paper_rig;
+use super::protocol::{Case, ReproduceError, Run, WINDOW_SAMPLES, paper_rig};
 use super::trial::EstimateHistory;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
 use pitchleak::core::{Leak, PerLeak};

@@ -3,24 +3,23 @@
 
 pub mod cramer_rao;
 mod detection;
-mod efficient;
 mod figures;
 mod page;
 mod protocol;
-mod search;
 mod table;
 mod trial;
 
 pub use detection::{Delay, Detection, detection};
 pub use figures::Drawing;
 pub use page::page;
-pub use protocol::{Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, rig};
-pub use search::{Candidate, best_gains, paper_rig};
+pub use protocol::{
+    Candidate, Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, best_gains, paper_rig, rig,
+};
 pub use table::{Bound, Row, Scored};
 pub use trial::{EstimateHistory, TrialScore};
 
 use crate::cramer_rao::CramerRaoModel;
-use efficient::Efficient;
+use cramer_rao::Efficient;
 use pitchleak::Rig;
 use pitchleak::core::{Estimate, ExcitationSettings, Leak, PerLeak, Sample};
 use pitchleak::replay::leak_pressures_pa;

@@ -1,11 +1,10 @@
 //! The service: samples in, estimates and alarms out, acknowledged once they are on the disk.
 
 use crate::alarms::Alarms;
-use crate::broker::{DeadLetters, Delivery, Inbound, Keeping, Message, Ticket};
+use crate::broker::{DeadLetters, Delivery, Inbound, Keeping, Message, Outbox, Ticket};
 use crate::config::{Config, Samples};
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
-use crate::outbox::Outbox;
 use crate::pace::{Due, Pace};
 use crate::run::Input;
 use crate::saver::{Job, Saved};

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::board::Board;
-use crate::outbox::Next;
+use crate::broker::Next;
 use pitchleak::live::{BatchFormat, LiveConfig};
 use std::cell::RefCell;
 use std::sync::mpsc::{Receiver, sync_channel};

@@ -5,7 +5,6 @@ mod diagnosis;
 mod fleet;
 pub(crate) mod proof;
 mod replay;
-mod replay_terminal;
 mod valve;
 
 pub use check::CheckSketch;
@@ -13,9 +12,8 @@ pub(crate) use diagnosis::companions;
 pub use diagnosis::sentence;
 pub use fleet::fleet_terminal;
 pub(crate) use fleet::found;
-pub use replay::data_line;
+pub use replay::{ReplaySketch, data_line};
 pub(crate) use replay::{gpa, hold_line, known, misfit, missing_rig, per_bar, rig_line, unknown};
-pub use replay_terminal::ReplaySketch;
 pub(crate) use valve::valve_line;
 
 use pitchleak::core::PerLeak;
