@@ -9,7 +9,6 @@ mod http;
 mod log;
 mod metrics;
 mod mqtt;
-mod pace;
 mod run;
 mod saver;
 mod service;

@@ -19,7 +19,6 @@
 //! # }
 //! ```
 
-mod bar;
 mod envelope;
 pub mod figure;
 pub mod page;

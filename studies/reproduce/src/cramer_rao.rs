@@ -16,7 +16,7 @@
 //! the table can be at best, start and definition of steady state included.
 
 use super::protocol::SAMPLE_RATE_HZ;
-use super::trial::EstimateHistory;
+use super::table::EstimateHistory;
 use nalgebra::{Matrix2, Matrix2x5, SMatrix, SVector, SymmetricEigen, Vector5};
 use pitchleak::core::{Cylinder, Estimate, FilterError, Fluid, PerLeak, Sample, Sensors};
 use pitchleak::simulate::{Normal, Sensing, Truth};

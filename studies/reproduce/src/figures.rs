@@ -1,7 +1,7 @@
 //! Figures like the paper's Fig. 5 to 8, of one window of each wind.
 
 use super::protocol::{Case, ReproduceError, Run, WINDOW_SAMPLES, paper_rig};
-use super::trial::EstimateHistory;
+use super::table::EstimateHistory;
 use super::{Reproduction, SAMPLE_RATE_HZ, rig};
 use pitchleak::core::{Leak, PerLeak};
 use pitchleak::output::{self, Inputs};

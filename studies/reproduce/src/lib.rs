@@ -7,7 +7,6 @@ mod figures;
 mod page;
 mod protocol;
 mod table;
-mod trial;
 
 pub use detection::{Delay, Detection, detection};
 pub use figures::Drawing;
@@ -15,8 +14,7 @@ pub use page::page;
 pub use protocol::{
     Candidate, Case, ReproduceError, Run, SAMPLE_RATE_HZ, WINDOW_S, WINDOWS, best_gains, paper_rig, rig,
 };
-pub use table::{Bound, Row, Scored};
-pub use trial::{EstimateHistory, TrialScore};
+pub use table::{Bound, EstimateHistory, Row, Scored, TrialScore};
 
 use crate::cramer_rao::CramerRaoModel;
 use cramer_rao::Efficient;
@@ -30,8 +28,7 @@ use pitchleak::wind::WindCase;
 use protocol::map_counted;
 use rayon::prelude::*;
 use serde::Serialize;
-use table::Entry;
-use trial::mean;
+use table::{Entry, mean};
 
 /// Greatest bias of a sensor in the runs with biases, share of full scale.
 const BIAS: f64 = 0.01;

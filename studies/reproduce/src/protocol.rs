@@ -3,7 +3,7 @@
 //! The paper does not print λ and γ: the best ones are searched for, in the same runs.
 
 use super::Progress;
-use super::trial::{EstimateHistory, mean};
+use super::table::{EstimateHistory, mean};
 use pitchleak::Rig;
 use pitchleak::core::{Cylinder, FilterError, Leak, PerLeak, RlsError};
 use pitchleak::output::OutputError;

@@ -1,13 +1,11 @@
 //! Effects that the plain model of eq. (1)–(2) lacks. Each is written once, in its entry of `table.rs`: the plant
 //! adds its term when it simulates, the diagnosis takes the same term as a regressor.
 
-mod constants;
 mod entry;
 mod table;
 mod terms;
 
-pub use constants::{EffectConstant, EffectConstantSpec, EffectConstants};
-pub use entry::{EffectKind, EffectSpec, LeftSide};
+pub use entry::{EffectConstant, EffectConstantSpec, EffectConstants, EffectKind, EffectSpec, LeftSide};
 pub use table::{Effect, UnknownEffect};
 pub use terms::{LaggedReading, Play};
 

@@ -1,4 +1,6 @@
-use crate::Real;
+//! What is declared of a machine: its cylinder, its oil, and its sensors: what they read, and how far that may be off.
+
+use crate::{LPM_PER_M3S, Real};
 
 /// Geometry and moving mass of a single-rod cylinder, eq. (1)–(2).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,6 +109,126 @@ impl<T: Real> Fluid<T> {
             Err(CylinderError::BulkModulusSpread)
         } else {
             Ok(())
+        }
+    }
+}
+
+/// Standard atmosphere, Pa: gauge pressures count from here.
+pub const ATMOSPHERE_PA: f64 = 101_325.0;
+
+/// One reading of the sensors. A flow is `None` while its chamber has no meter (or is not fed
+/// through it): then only that chamber's equation rests.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sample<T> {
+    /// Piston position x from the A end, m.
+    pub x_m: T,
+    /// Pressure P_A of the piston-side chamber, Pa gauge.
+    pub pa_pa: T,
+    /// Pressure P_B of the rod-side chamber, Pa gauge.
+    pub pb_pa: T,
+    /// Flow Q_A into the piston-side chamber, m³/s.
+    pub qa_m3s: Option<T>,
+    /// Flow Q_B into the rod-side chamber, m³/s.
+    pub qb_m3s: Option<T>,
+    /// Load force F against extension, N.
+    pub force_n: Option<T>,
+}
+
+impl<T: Real> Sample<T> {
+    /// P_L = P_A − P_B, Pa.
+    #[inline]
+    pub fn load_pressure_pa(&self) -> T {
+        self.pa_pa - self.pb_pa
+    }
+
+    /// x, P_A, P_B, Q_A and Q_B: what the continuity equations need.
+    #[inline]
+    pub fn readings(&self) -> [Option<T>; 5] {
+        [Some(self.x_m), Some(self.pa_pa), Some(self.pb_pa), self.qa_m3s, self.qb_m3s]
+    }
+
+    /// Whether every reading that is there is a finite number.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
+        let ok = |q: Option<T>| q.is_none_or(|v| v.is_finite());
+        self.x_m.is_finite()
+            && self.pa_pa.is_finite()
+            && self.pb_pa.is_finite()
+            && ok(self.qa_m3s)
+            && ok(self.qb_m3s)
+            && ok(self.force_n)
+    }
+}
+
+/// How far one sensor's reading may be off, 1 σ each, in the sensor's SI unit.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SensorSpread<T> {
+    /// White noise of one reading.
+    pub noise_std: T,
+    /// Constant offset.
+    pub bias_std: T,
+    /// Scale error, as a share of the reading.
+    pub gain_std: T,
+    /// How far the offset may drift in an hour.
+    pub drift_std_ph: T,
+}
+
+/// The declared spread of every sensor of a rig.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sensors<T> {
+    /// Flow meter of chamber A, m³/s.
+    pub flow_a: SensorSpread<T>,
+    /// Flow meter of chamber B, m³/s.
+    pub flow_b: SensorSpread<T>,
+    /// Both pressure sensors, Pa.
+    pub pressure: SensorSpread<T>,
+    /// Position sensor, m.
+    pub position: SensorSpread<T>,
+    /// Force sensor, N.
+    pub force: SensorSpread<T>,
+}
+
+impl<T: Real> SensorSpread<T> {
+    /// A sensor of `full_scale` whose white noise has 3 σ = `accuracy` · full scale, with neither
+    /// offset nor scale error.
+    pub fn of_full_scale(full_scale: T, accuracy: T) -> Self {
+        Self {
+            noise_std: full_scale * accuracy / T::lit(3.0),
+            bias_std: T::zero(),
+            gain_std: T::zero(),
+            drift_std_ph: T::zero(),
+        }
+    }
+
+    /// Whether every spread is a number and none is negative.
+    #[cfg_attr(target_os = "none", inline(never))] // once in the flash, not for each sensor
+    pub fn is_physical(&self) -> bool {
+        let Self { noise_std, bias_std, gain_std, drift_std_ph } = *self;
+        [noise_std, bias_std, gain_std, drift_std_ph].into_iter().all(T::is_not_negative)
+    }
+}
+
+impl<T: Real> Sensors<T> {
+    /// Standard deviations of the noise of x (m), P_A, P_B (Pa), Q_A and Q_B (m³/s), in the order of
+    /// [`Sample::readings`].
+    pub fn noise_stds(&self) -> [T; 5] {
+        let Self { flow_a, flow_b, pressure, position, .. } = self;
+        [position, pressure, pressure, flow_a, flow_b].map(|spread| spread.noise_std)
+    }
+
+    /// Sensors of the paper's rig (Section III): flow meters 20 L/min full scale, 1 % of full scale.
+    pub fn paper() -> Self {
+        let one_percent = T::lit(0.01);
+        let flow = SensorSpread::of_full_scale(T::lit(20.0 / LPM_PER_M3S), one_percent);
+        Self {
+            flow_a: flow,
+            flow_b: flow,
+            pressure: SensorSpread::of_full_scale(T::lit(16e6), one_percent),
+            position: SensorSpread::of_full_scale(T::lit(0.2), one_percent),
+            force: SensorSpread::of_full_scale(T::lit(10e3), one_percent),
         }
     }
 }

@@ -3,12 +3,10 @@
 mod cylinder;
 mod leak;
 mod linkage;
-mod sensors;
 
-pub use cylinder::{Cylinder, CylinderError, Fluid};
+pub use cylinder::{ATMOSPHERE_PA, Cylinder, CylinderError, Fluid, Sample, SensorSpread, Sensors};
 pub use leak::{Estimate, Leak, LeakPressures, PerLeak};
 pub use linkage::{Linkage, LinkageError};
-pub use sensors::{ATMOSPHERE_PA, Sample, SensorSpread, Sensors};
 
 use crate::Real;
 

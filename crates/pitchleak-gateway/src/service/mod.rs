@@ -5,9 +5,8 @@ use crate::broker::{DeadLetters, Delivery, Inbound, Keeping, Message, Outbox, Ti
 use crate::config::{Config, Samples};
 use crate::log::{Level, Log};
 use crate::metrics::Metrics;
-use crate::pace::{Due, Pace};
 use crate::run::Input;
-use crate::saver::{Job, Saved};
+use crate::saver::{Due, Job, Pace, Saved};
 use crate::topics;
 use pitchleak::Rig;
 use pitchleak::live::{

@@ -2,18 +2,16 @@
 
 mod bound;
 mod document;
-mod effects;
 mod instruments;
 mod keys;
-mod odds;
+mod prior;
 mod settings;
 #[cfg(test)]
 mod tests;
 
 pub use document::{Fault, Place, RigError};
-pub use effects::{EffectMap, EffectValue};
 pub use instruments::{Instrument, Instruments, ValveDrift, ValveSheet};
-pub use odds::{Odds, explanations};
+pub use prior::{EffectMap, EffectValue, Odds, explanations};
 pub use settings::{
     ColumnMap, CsvSettings, Decimal, DecisionSettings, Delimiter, EstimatorKind, EstimatorSettings,
     ForeignColumn,
@@ -156,7 +154,7 @@ impl Rig {
             decision: root.section("decision")?.read(DecisionSettings::default(), DecisionSettings::keys)?,
             columns: settings::read_columns(&root.section("columns")?)?,
             csv: root.section("csv")?.read(CsvSettings::default(), CsvSettings::keys)?,
-            effects: effects::read(&root.section("effects")?)?,
+            effects: prior::read_effects(&root.section("effects")?)?,
             valve: ValveSheet::read(&root.section("valve")?)?,
             assumed: Assumed { rig: false, sensors: !root.section("sensors")?.is_present() },
         })
@@ -164,7 +162,7 @@ impl Rig {
 
     /// The effects of `[effects]`, switched on.
     pub fn effect_set(&self) -> EffectSet<f64> {
-        effects::effect_set(&self.effects)
+        prior::effect_set(&self.effects)
     }
 
     /// The spread of every sensor as the estimators use it.
@@ -272,10 +270,10 @@ impl Rig {
         out.push_str("\n[effects]\n");
         let mut room = EffectSet::default();
         for (effect, size) in &self.effects {
-            let value = effects::size(*effect).nearest(size.value);
+            let value = prior::effect_size(*effect).nearest(size.value);
             let _ = match room.set(*effect, value, Default::default()) {
                 Ok(()) => {
-                    let lines = lines_of(&mut size.clone(), effects::keys(*effect));
+                    let lines = lines_of(&mut size.clone(), prior::effect_keys(*effect));
                     writeln!(out, "{effect} = {}", inline(lines))
                 }
                 Err(_) => writeln!(out, "# {effect}: no room for more"),

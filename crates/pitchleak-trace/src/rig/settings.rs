@@ -4,7 +4,7 @@ use super::bound;
 use super::document::{Fault, RigError, Section};
 use super::instruments::Instruments;
 use super::keys::{Done, Keys, for_people, inline, toml_text};
-use super::odds::Odds;
+use super::prior::Odds;
 use crate::header::{self, HeaderUnit};
 use crate::signal::Signal;
 use crate::times::{TimeFormat, TimeKind, Zone};

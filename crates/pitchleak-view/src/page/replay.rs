@@ -5,9 +5,9 @@ use super::drawing::Drawing;
 use super::history::{Drawn, ink};
 use super::machine::{alarms, facts, prose, short, table, trace};
 use super::{Card, Head, History, Page, Section};
-use crate::bar::{Bar, scale};
 use crate::text::{
-    ESTIMATES, data_line, gpa, hold_line, known, missing_rig, per_bar, thresholds_lpm, unknown, valve_line,
+    Bar, ESTIMATES, data_line, gpa, hold_line, known, missing_rig, per_bar, scale, thresholds_lpm, unknown,
+    valve_line,
 };
 use maud::{Markup, html};
 use pitchleak::core::{AlarmState, Leak, PerLeak};

@@ -3,11 +3,11 @@
 use super::replay::per_bar;
 use super::{Text, significant};
 use crate::Palette;
-use crate::bar::level;
 use crate::envelope::extremes;
 use crate::residuals::{
     before_and_after, estimates, holds, name, people, people_unit, quantity, rms_errors, symbol,
 };
+use crate::text::level;
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, EquationResidual, FoundEffect, LeakEstimate, Samples, Verdict,

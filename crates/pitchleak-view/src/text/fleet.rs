@@ -2,8 +2,8 @@
 
 use super::Text;
 use crate::Palette;
-use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
+use crate::text::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use pitchleak::core::Leak;
 use pitchleak::fleet::{Counts, CylinderLeak, FleetCylinder, FleetReport, Point, count};
 use pitchleak::report::Status;

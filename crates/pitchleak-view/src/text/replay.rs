@@ -5,8 +5,8 @@
 use super::valve::valve_line;
 use super::{Text, thresholds_lpm};
 use crate::Palette;
-use crate::bar::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use crate::envelope::{Envelopes, Spot};
+use crate::text::{Bar, INTERVAL, LIMIT, VALUE, course, scale, scale_text};
 use pitchleak::core::{AlarmState, Leak, PerLeak};
 use pitchleak::hold::HoldSummary;
 use pitchleak::presence::FoundLeak;

@@ -2,15 +2,20 @@
 //! between its cells, which is then read as any other. Asked only where the table makes no trace as it is.
 //!
 //! A new shape is an entry of [`SHAPES`], and a function that tells it.
+//!
+//! Rows of samples whose cells need a hand: a unit behind each number, as Grafana exports a table (`50.1 bar`), or date and
+//! time of day in columns of their own.
 
-mod cells;
 mod labview;
 mod merged;
+#[cfg(test)]
+mod tests;
 
 use super::error::TraceFault;
 use super::records::{Records, Stop, Written};
 use super::table_text::TextTable;
-use crate::header::{letters, lists};
+use crate::header::{HeaderUnit, letters, lists};
+use crate::times::{TimeKind, guess};
 use std::borrow::Cow;
 use std::io::{self, Read};
 
@@ -29,7 +34,7 @@ pub(super) type Text = Box<dyn Read + Send>;
 
 /// Every shape; the first that fits is taken.
 const SHAPES: &[Shape] =
-    &[labview::SHAPE, merged::LONG, merged::OWN_TIMES, cells::DATE_AND_TIME_APART, cells::UNITS_IN_CELLS];
+    &[labview::SHAPE, merged::LONG, merged::OWN_TIMES, DATE_AND_TIME_APART, UNITS_IN_CELLS];
 
 /// The shape of a table, and how it is recast.
 pub(super) fn told(table: &TextTable, ahead: &[u8]) -> Option<(&'static str, Recast)> {
@@ -102,5 +107,70 @@ fn write_cell(cell: &[u8], text: &mut Vec<u8>) {
     );
 }
 
-#[cfg(test)]
-mod tests;
+const UNITS_IN_CELLS: Shape = Shape { name: "units in the cells", told: units };
+const DATE_AND_TIME_APART: Shape = Shape { name: "date and time apart", told: date_and_time };
+
+/// A number and what stands behind it.
+fn parted(cell: &str) -> (&str, &str) {
+    let end = cell.find(|c: char| !c.is_ascii_digit() && !"+-.,".contains(c)).unwrap_or(cell.len());
+    let (number, unit) = cell.split_at(end);
+    (number, unit.trim())
+}
+
+/// The unit that nearly all cells of a column have.
+fn unit_of(cells: &[&str]) -> Option<String> {
+    let unit = cells.iter().map(|cell| parted(cell).1).find(|unit| !unit.is_empty())?;
+    let fitting = cells.iter().filter(|cell| parted(cell).1 == unit && !parted(cell).0.is_empty()).count();
+    (HeaderUnit::is_known(unit) && 10 * fitting >= 9 * cells.len()).then(|| unit.to_owned())
+}
+
+fn units(table: &TextTable, _: &[u8]) -> Option<Recast> {
+    let units: Vec<Option<String>> =
+        (0..table.headers.len()).map(|index| unit_of(&table.column(index))).collect();
+    if units.iter().flatten().count() == 0 {
+        return None;
+    }
+    let header: Vec<String> = table
+        .headers
+        .iter()
+        .zip(&units)
+        .map(|(header, unit)| {
+            unit.as_ref().map_or_else(|| header.clone(), |unit| format!("{header} [{unit}]"))
+        })
+        .collect();
+    Some(Box::new(move |source| {
+        source.row_by_row(&header, move |cells| {
+            let bare = cells.iter().copied().enumerate().map(|(index, cell)| {
+                let unit = units.get(index).and_then(Option::as_ref);
+                let bare = unit.and_then(|unit| cell.trim_ascii().strip_suffix(unit.as_bytes()));
+                Cow::Borrowed(bare.unwrap_or(cell))
+            });
+            bare.collect()
+        })
+    }))
+}
+
+fn date_and_time(table: &TextTable, _: &[u8]) -> Option<Recast> {
+    let date = place(&table.headers, "date datum")?;
+    let time = place(&table.headers, "time zeit uhrzeit timeofday")?;
+    if !guess(&table.column(time)).is_ok_and(|format| format.kind == TimeKind::OfDay) {
+        return None;
+    }
+    let named = |(index, header): (usize, &String)| match index {
+        _ if index == date => Some("timestamp".to_owned()),
+        _ if index == time => None,
+        _ => Some(header.clone()),
+    };
+    let header: Vec<String> = table.headers.iter().enumerate().filter_map(named).collect();
+    Some(Box::new(move |source| {
+        source.row_by_row(&header, move |cells| {
+            let time_of_day = cells.get(time).copied().unwrap_or_default().trim_ascii();
+            let kept = cells.iter().enumerate().filter(|(index, _)| *index != time);
+            kept.map(|(index, cell)| match index == date {
+                true => Cow::Owned([cell.trim_ascii(), time_of_day].join(&b' ')),
+                false => Cow::Borrowed(*cell),
+            })
+            .collect()
+        })
+    }))
+}
