@@ -17,7 +17,7 @@ use pitchleak::valve::{Calibrator, LeaksThen};
 use pitchleak_view::Text;
 use pitchleak_view::page::{History, Page, PageFile};
 use pitchleak_view::text::{CheckSketch, ReplaySketch};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Replay traces: estimate their leaks and say what to do
 #[derive(Args)]
@@ -71,14 +71,11 @@ impl ReplayArguments {
         *kind = self.estimator.unwrap_or(*kind);
         let inputs = trace.files();
         let mut file = self.out.as_ref().map(|path| EstimateFile::create(path, &inputs)).transpose()?;
-        let page = self.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
-        let mut history = page.is_some().then(History::default);
+        let mut page = CoursePage::create(self.report.as_deref(), &inputs)?;
         let mut sketch = (output::draws() && !self.json).then(|| ReplaySketch::new(&trace.rig));
         let (mut reader, bar) = trace.open()?;
         let each = |replay: &Replay, record: &Record, renewed: bool| {
-            if let Some(history) = &mut history {
-                history.add(replay, record, renewed);
-            }
+            page.add(replay, record, renewed);
             if let Some(sketch) = &mut sketch {
                 sketch.add(replay, record, renewed);
             }
@@ -89,9 +86,7 @@ impl ReplayArguments {
         };
         let report = replay(&mut reader, &trace.rig, each)?;
         file.map(EstimateFile::finish).transpose()?;
-        if let Some((page, history)) = page.zip(history) {
-            page.finish(&Page::of_replay(&report, &trace.rig, &history))?;
-        }
+        page.finish(|history| Page::of_replay(&report, &trace.rig, history))?;
         bar.finish_and_clear();
         output::tell(&report.trace);
         let to_json = || report.to_json();
@@ -102,6 +97,29 @@ impl ReplayArguments {
         let fault = self.fail_on_fault && !report.verdict.faults.is_empty();
         let doubt = self.fail_on_doubt && !report.verdict.status.is_sure();
         Ok(if fault || doubt { Outcome::FaultFound } else { Outcome::Done })
+    }
+}
+
+/// The page that was asked for, if one was, and the trace's course that it draws.
+struct CoursePage(Option<(PageFile, History)>);
+
+impl CoursePage {
+    fn create(path: Option<&Path>, inputs: &Inputs) -> Result<Self, Failure> {
+        let page = path.map(|path| PageFile::create(path, inputs)).transpose()?;
+        Ok(Self(page.map(|page| (page, History::default()))))
+    }
+
+    fn add(&mut self, replay: &Replay, record: &Record, renewed: bool) {
+        if let Some((_, history)) = &mut self.0 {
+            history.add(replay, record, renewed);
+        }
+    }
+
+    fn finish(self, page_of: impl FnOnce(&History) -> Page) -> Result<(), Failure> {
+        if let Some((page, history)) = self.0 {
+            page.finish(&page_of(&history))?;
+        }
+        Ok(())
     }
 }
 
@@ -128,23 +146,17 @@ impl CheckArguments {
     }
 
     fn run_one(&self, trace: &Trace) -> Result<Outcome, Failure> {
-        let inputs = trace.files();
-        let page = self.report.as_ref().map(|path| PageFile::create(path, &inputs)).transpose()?;
-        let mut history = page.is_some().then(History::default);
+        let mut page = CoursePage::create(self.report.as_deref(), &trace.files())?;
         let mut sketch = (output::draws() && !self.json).then(|| CheckSketch::new(&trace.rig));
         let (mut reader, bar) = trace.open()?;
         let report = check(&mut reader, &trace.rig, |replay, record, renewed| {
-            if let Some(history) = &mut history {
-                history.add(replay, record, renewed);
-            }
+            page.add(replay, record, renewed);
             if let Some(sketch) = &mut sketch {
                 sketch.add(record);
             }
             Ok::<_, Failure>(())
         })?;
-        if let Some((page, history)) = page.zip(history) {
-            page.finish(&Page::of_check(&report, &trace.rig, &history))?;
-        }
+        page.finish(|history| Page::of_check(&report, &trace.rig, history))?;
         bar.finish_and_clear();
         output::tell(&report.trace);
         let to_json = || report.to_json();

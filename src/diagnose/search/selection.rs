@@ -150,10 +150,10 @@ impl Selection<'_> {
         let mut worthy = trials.into_iter().filter(|trial| deserves_a_name(fit, trial));
         // One that only the end of its range stops is not what is missing.
         let stays = |trial: Trial| {
-            let with = with(fit, &trial, progress);
-            (!with.is_at_bound(trial.score.term)).then_some((trial, with))
+            let next = with(fit, &trial, progress);
+            (!next.is_at_bound(trial.score.term)).then_some((trial, next))
         };
-        let Some((trial, with)) = worthy.find_map(stays) else { return false };
+        let Some((trial, next)) = worthy.find_map(stays) else { return false };
         let chi2_drop = trial.score.chi2_drop;
         let dispersion = fit.dispersion(fit.free.chi2 - chi2_drop);
         let p_value = statistics::chi2_p(chi2_drop / dispersion, 1.0);
@@ -162,7 +162,7 @@ impl Selection<'_> {
         let is_below_unlisted =
             strongest_unlisted(fit, &fit.free, &named).is_some_and(|(_, unlisted)| unlisted > more);
         self.effects.push(Selected { is_below_unlisted, ..Selected::new(trial.score.term, p_value) });
-        self.fit = with;
+        self.fit = next;
         true
     }
 
