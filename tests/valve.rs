@@ -113,6 +113,53 @@ fn a_sound_cylinder_has_no_leak_and_its_valve_is_said_to_be_open() {
     }
 }
 
+/// The same cylinder with areas, volumes, mass and valve ten times as large goes the same way, and leaks ten times as much.
+#[test]
+fn a_cylinder_ten_times_as_large_leaks_ten_times_as_much() {
+    let small = with_valve("");
+    let tenfold = [
+        ("12.6 cm^2", "126 cm^2"),
+        ("9.4 cm^2", "94 cm^2"),
+        ("60 kg", "600 kg"),
+        ("50 mL", "500 mL"),
+        ("4 L/min", "40 L/min"),
+    ];
+    let large = tenfold.iter().fold(small.clone(), |text, (from, to)| text.replace(from, to));
+    let rigs = [small, large].map(|text| Rig::parse(&text, "valve").expect("a rig"));
+    (0..runs()).into_par_iter().for_each(|seed| {
+        for (index, leak) in Leak::ALL.into_iter().enumerate() {
+            let cylinder =
+                ValveCylinder::drawn(first_seed() + 900 + seed).leaking(index, [0.1, 0.4, 0.4][index]);
+            let text = cylinder.trace(60.0, 100.0, 3e-3);
+            let [small, large] = rigs.each_ref().map(|rig| judged(text.clone(), rig));
+            assert_eq!(small.verdict.faults, [leak], "{}", small.verdict.text);
+            assert_eq!(large.verdict.faults, [leak], "{}", large.verdict.text);
+            let (small, large) = (small.leakage[leak], large.leakage[leak]);
+            let spreads = [small, large].map(|size| size.std_lpm.expect("a spread"));
+            assert!((large.mean_lpm / small.mean_lpm - 10.0).abs() < 0.1, "{large:?} {small:?}");
+            assert!((spreads[1] / spreads[0] - 10.0).abs() < 0.5, "{large:?} {small:?}");
+        }
+    });
+}
+
+/// In calm wind the clearances of all edges, larger than declared, let a false internal leak in.
+#[test]
+fn worn_edges_are_no_internal_leak() {
+    let clearance_lpm = 0.5 * 0.02 * 4.0 * 50.0 / 35.0;
+    let winds = [0.1, 0.2, 0.3];
+    let (mut named, all) = (0, 2 * runs() as usize * winds.len());
+    for wind in winds {
+        let worn = reports(2 * runs(), 60.0, |seed| {
+            let mut cylinder = ValveCylinder { wind, ..ValveCylinder::drawn(first_seed() + 1000 + seed) };
+            cylinder.valve.clearances_lpm = [3.6 * clearance_lpm; 4];
+            cylinder
+        });
+        named += worn.iter().filter(|one| one.verdict.faults.contains(&Leak::Internal)).count();
+    }
+    println!("all clearances of 3.6 sigma: an internal leak in {named} of {all}");
+    assert!(named * 20 <= all, "{named} of {all}");
+}
+
 #[test]
 fn an_external_leak_is_told_beyond_what_the_valves_clearance_may_be() {
     // 1 σ at 50 bar.

@@ -6,19 +6,22 @@
 
 use super::{LEAK_UNIT_M3SPA, LeakLikelihood};
 use crate::explain::{LEAK_SHARE, Orthant, POINTS, positive_orthant};
-use crate::units::LPM_PER_M3S;
+use crate::rig::Rig;
 use nalgebra::{DMatrix, DVector, Matrix3};
-use pitchleak_core::{Estimate, PerLeak};
+use pitchleak_core::{Estimate, Leak, PerLeak};
 use statrs::function::erf::erfc;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Size of a leak that a cylinder may have, half normal, at the pressure that drives it, L/min. A guess: that of docs/explanations.md
-/// for a meter of 20 L/min.
-const LEAK_SIZE_LPM: f64 = 1.0;
+/// A leak that a cylinder may have, half normal, is so many times what is a fault, or such a share of what its valve is rated for: the
+/// larger. Guesses: 1 L/min, as docs/explanations.md has it for a meter of 20 L/min.
+const OVER_FAULT: f64 = 10.0;
+const OF_RATED: f64 = 0.25;
 
 /// The coefficient of such a leak at a mean pressure, Pa, in [`LEAK_UNIT_M3SPA`].
-pub(crate) const fn size(pressure_pa: f64) -> f64 {
-    LEAK_SIZE_LPM / LPM_PER_M3S / pressure_pa / LEAK_UNIT_M3SPA
+pub(crate) fn size(rig: &Rig, leak: Leak, pressure_pa: f64) -> f64 {
+    let rated_m3s = rig.valve.as_ref().map_or(0.0, |sheet| sheet.rated_flow_m3s);
+    let flow_m3s = (OVER_FAULT * rig.alarms.threshold_m3s[leak]).max(OF_RATED * rated_m3s);
+    flow_m3s / pressure_pa / LEAK_UNIT_M3SPA
 }
 
 /// What is believed of one leak; coefficients in m³/(s·Pa), where there is such a leak.

@@ -16,6 +16,8 @@ use serde::Serialize;
 const LEAST_DRIVING_PA: f64 = 20e5;
 /// Below this mean |P_L| zeros of the pressure sensors decide which way oil would pass the piston, Pa.
 const LEAST_LOAD_PA: f64 = 2e5;
+/// … or, where a leak may be as large as any, from so many standard deviations on: a half normal's mean is 1.3.
+const TOLD_SIGMAS: f64 = 2.0;
 /// Standard deviation of a coefficient of which the trace tells next to nothing, in those of what is believed before.
 const UNKNOWN: f64 = 0.5;
 
@@ -69,9 +71,9 @@ pub(crate) struct Wording<'a> {
 const BULK_MODULUS_SIGMAS: f64 = 3.0;
 
 impl Belief {
-    /// Whether hardly more is known of a leak than before any reading.
+    /// Whether hardly more is known of a leak than before any reading: before it may as well be none.
     fn is_untold(&self) -> bool {
-        self.std >= UNKNOWN * self.prior_std
+        self.std >= UNKNOWN * self.prior_std && self.mean < TOLD_SIGMAS * self.std
     }
 }
 
@@ -81,7 +83,8 @@ impl Found {
         let pressures_pa = pressures.sizes_pa();
         // P_L swings about zero, and what leaks past the piston is no larger for that.
         let PerLeak { external_a: a_pa, external_b: b_pa, .. } = pressures_pa;
-        let sizes = [0.5 * (a_pa + b_pa), a_pa, b_pa].map(|pressure_pa| size(pressure_pa.max(LEAST_LOAD_PA)));
+        let driving_pa = [0.5 * (a_pa + b_pa), a_pa, b_pa];
+        let sizes = Leak::ALL.map(|leak| size(rig, leak, driving_pa[leak as usize].max(LEAST_LOAD_PA)));
         Self {
             beliefs: weigh(places, sizes, 1.0 - rig.decision.alpha),
             pressures_pa,

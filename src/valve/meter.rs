@@ -7,7 +7,7 @@ use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Run, fit};
 use super::means::Means;
 use super::parts::{CHANGED, Summary, summary};
-use super::unknowns::{Belief, LEAKS, Unknowns};
+use super::unknowns::{Belief, Unknowns};
 use super::unread;
 use crate::rig::{Rig, ValveSheet};
 use crate::signal::Signal;
@@ -150,9 +150,9 @@ impl ValveMeter {
     /// Goes on without the pressure of a chamber.
     #[inline]
     fn lose(&mut self, chamber: Option<usize>) {
-        let Some(chamber) = chamber else { return };
-        self.unread = Some(chamber);
-        if let Some(before) = self.before.clone().without_pressure_at(LEAKS + chamber) {
+        self.unread = self.unread.or(chamber);
+        let Some(leak) = chamber.and(self.untold()) else { return };
+        if let Some(before) = self.before.clone().without_pressure_at(leak, &self.rig) {
             self.before = before;
         }
     }

@@ -3,7 +3,7 @@
 use super::calibration::{LeaksThen, Since};
 use super::meter::{Taken, ValveMeter};
 use super::parts::Summary;
-use super::unknowns::{KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_std};
+use super::unknowns::{Belief, KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_std};
 use crate::presence::{self, Found, FoundLeak, LeakLikelihood, Place};
 use crate::report::{ReplayReport, TraceSummary};
 use crate::rig::Rig;
@@ -13,9 +13,10 @@ use nalgebra::{Matrix3, Vector3};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 use serde::Serialize;
 
-/// Below this an internal leak is within what valves differ from any model of them, m³/(s·Pa), 0.005 L/min at 50 bar: some effects
-/// that nobody declared look like it, and no residual tells (docs/valve.md).
-const INTERNAL_FLOOR_M3SPA: f64 = 0.005 * LEAK_UNIT_M3SPA;
+/// Below this share of the rated flow, at 50 bar, an internal leak is within what valves differ from any model of them: some effects that
+/// nobody declared look like it, and no residual tells (docs/valve.md).
+const INTERNAL_FLOOR: f64 = 0.00125;
+const FLOOR_PA: f64 = 50e5;
 
 /// In a stream nothing is said before so many parts with the same leaks: of fewer, none tells whether noise explains them (chosen by
 /// hysteresis and drift that set in).
@@ -75,7 +76,10 @@ impl ValveMeter {
         let fit = taken.as_ref().map(|taken| &taken.summary);
         let untold = self.untold();
         let told = taken.as_ref().filter(|taken| self.can_tell(taken));
-        let found = told.and_then(|taken| found(&taken.summary, untold, rig));
+        let worn = |taken: &Taken| taken.summary.belief.with_worn_clearances(&self.sheet);
+        let is_by_sheet = self.since.is_none();
+        let found = told
+            .and_then(|taken| found(&taken.summary, untold, rig, is_by_sheet.then(|| worn(taken)).flatten()));
         let pressures_pa = fit.map(|fit| fit.pressures.sizes_pa()).unwrap_or_default();
         let clearance =
             |pressure_pa: f64| clearance_std(&self.sheet) * LEAK_UNIT_M3SPA * pressure_pa * LPM_PER_M3S;
@@ -94,8 +98,8 @@ impl ValveMeter {
 }
 
 /// Means and covariances of the leaks, widened by what noise does not explain; of one that is untold they say nothing.
-fn leaks(fit: &Summary, untold: Option<Leak>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
-    let (mean, covariance) = fit.belief.leaks()?;
+fn leaks(fit: &Summary, belief: &Belief, untold: Option<Leak>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let (mean, covariance) = belief.leaks()?;
     let wider = fit.course.map(|course| course.max(fit.noise).max(1.0).sqrt());
     let mut covariance = Matrix3::from_fn(|i, j| covariance[(i, j)] * wider[i] * wider[j]);
     if let Some(leak) = untold {
@@ -104,15 +108,22 @@ fn leaks(fit: &Summary, untold: Option<Leak>) -> Option<(Vector3<f64>, Matrix3<f
     Some((mean, covariance))
 }
 
-/// Which leaks there are.
-fn found(fit: &Summary, untold: Option<Leak>, rig: &Rig) -> Option<Found> {
+/// Which leaks there are. External ones are told against clearances as the data sheet has them, and the words say so; an internal one rests
+/// on no data sheet, and counts where it is there beside a valve that has worn as well.
+fn found(fit: &Summary, untold: Option<Leak>, rig: &Rig, worn: Option<Belief>) -> Option<Found> {
     let covariance = fit.belief.covariance()?;
-    let (leaks, spread) = leaks(fit, untold)?;
-    let likelihood = LeakLikelihood { information: spread.cholesky()?.inverse(), leaks, squares: 0.0 };
     let kappa = fit.belief.mean[KAPPA];
-    let place = Place { kappa, ln_prior: 0.0, likelihood };
-    let found = Found::new(&[place], &fit.pressures, rig);
-    let floor_m3spa = PerLeak { internal: INTERNAL_FLOOR_M3SPA, ..PerLeak::default() };
+    let by = |belief: &Belief| {
+        let (leaks, spread) = leaks(fit, belief, untold)?;
+        let likelihood = LeakLikelihood { information: spread.cholesky()?.inverse(), leaks, squares: 0.0 };
+        Some(Found::new(&[Place { kappa, ln_prior: 0.0, likelihood }], &fit.pressures, rig))
+    };
+    let mut found = by(&fit.belief)?;
+    if let Some(worn) = worn {
+        found.beliefs.leaks.internal = by(&worn)?.beliefs.leaks.internal;
+    }
+    let rated_m3s = rig.valve.as_ref().map_or(0.0, |sheet| sheet.rated_flow_m3s);
+    let floor_m3spa = PerLeak { internal: INTERNAL_FLOOR * rated_m3s / FLOOR_PA, ..PerLeak::default() };
     Some(found.with_oil(kappa, covariance[(KAPPA, KAPPA)].sqrt(), floor_m3spa))
 }
 
@@ -130,7 +141,7 @@ impl ValveTest {
     /// Flows of the leaks, whatever their sign, m³/s; none where too little was read.
     pub(super) fn flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
         let fit = &self.taken.as_ref().filter(|taken| taken.is_settled)?.summary;
-        let (mean, covariance) = leaks(fit, self.untold)?;
+        let (mean, covariance) = leaks(fit, &fit.belief, self.untold)?;
         let at = |i: usize| Estimate { value: mean[i], std: covariance[(i, i)].sqrt() };
         let pressures_pa = fit.pressures.sizes_pa();
         Some(PerLeak::from_fn(|leak| at(leak as usize).scaled(LEAK_UNIT_M3SPA * pressures_pa[leak])))

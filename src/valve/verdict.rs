@@ -12,7 +12,7 @@ use pitchleak_core::Leak;
 /// Leaks below zero by so much contradict it.
 const NEGATIVE_SIGMAS: f64 = 5.0;
 
-const LOOK_FOR: &str = "look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
+const LOOK_FOR: &str = "a leak that grows does that, too; else look for a spool whose zero drifts or that sticks, a pressure line that is late or filled with air, and compare [sensors] and [valve] with their data sheets; a hold test needs no valve";
 
 impl ValveTest {
     pub(super) fn verdict(&self, rig: &Rig) -> Verdict {
