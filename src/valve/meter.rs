@@ -6,7 +6,7 @@ use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Run, fit};
 use super::means::Means;
-use super::parts::{CHANGED, Summary, summary};
+use super::parts::{CHANGED, Line, Summary, in_line, summary};
 use super::unknowns::{Belief, Unknowns};
 use super::unread;
 use crate::rig::{Rig, ValveSheet};
@@ -29,6 +29,8 @@ const LEAST_SPREAD: f64 = 1e-12;
 const SO_MANY_CHANGES: usize = 1;
 /// A pressure so many standard deviations below the atmosphere's is so for certain.
 const VOID_SIGMAS: f64 = 3.0;
+/// Fits that follow a line at the most: each makes all linear around it anew; numerical.
+const ROUNDS_IN_LINE: usize = 4;
 /// Fewer readings tell nothing.
 const LEAST_WINDOW: usize = 50;
 
@@ -270,15 +272,44 @@ impl ValveMeter {
     fn fitted(&self, runs: &[Run], before: &Belief, start: Unknowns) -> Option<(Fit, Summary)> {
         let known = Known::of(&self.rig, &self.sheet);
         let one = |runs: &[Run], known: &Known| {
-            let fit = fit(runs, before, start, self.sheet.hysteresis, known)?;
-            let summary = summary(&fit.parts, before, &fit.at)?;
-            Some((fit, summary))
+            let fit = fit(runs, before, start, self.sheet.hysteresis, known, &Line::default())?;
+            let (summary, gain) = summary(&fit.parts, before, &fit.at)?;
+            // By the data sheet alone a line that an edge makes is too easily a leak's.
+            if self.since.is_none() || summary.since == 0 && summary.is_explained() {
+                return Some((fit, summary));
+            }
+            Some(self.in_line(runs, before, &fit, gain, known).unwrap_or((fit, summary)))
         };
         let found = Means::of(runs, &known.variances).and_then(|means| {
             let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
             one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise))
         });
         found.or_else(|| one(runs, &known))
+    }
+
+    /// What readings say where leaks and the spool's zero go in straight lines, if that explains more than a change at once, which explains
+    /// `least`, and leaves noise alone.
+    fn in_line(
+        &self,
+        runs: &[Run],
+        before: &Belief,
+        found: &Fit,
+        least: f64,
+        known: &Known,
+    ) -> Option<(Fit, Summary)> {
+        let (mut line, mut at, _, gain) = in_line(&found.parts, before, &found.at, &Line::default())?;
+        if gain < least {
+            return None;
+        }
+        for _ in 0..ROUNDS_IN_LINE {
+            let fit = fit(runs, before, at, self.sheet.hysteresis, known, &line)?;
+            let summary;
+            (line, at, summary, _) = in_line(&fit.parts, before, &fit.at, &line)?;
+            if fit.is_settled && summary.is_noise() {
+                return Some((fit, summary));
+            }
+        }
+        None
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.

@@ -3,10 +3,11 @@
 
 use super::edges::{PA, PB};
 use super::equations::{Node, Slopes};
-use super::unknowns::{Belief, Information, LEAKS, UNKNOWNS, Unknowns};
+use super::unknowns::{Belief, Information, LAPS, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use crate::presence::Pressures;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
+use pitchleak_core::{Estimate, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// Normal equations Λ δ = η of a step from the unknowns of the moment.
@@ -112,6 +113,9 @@ pub(super) struct Summary {
     pub course: [f64; 3],
     pub parts: usize,
     pub pressures: Pressures,
+    /// How each leak grows where leaks go in straight lines, in their unit per second.
+    #[serde(default)]
+    pub growth: Option<PerLeak<Estimate<f64>>>,
 }
 
 impl Summary {
@@ -123,6 +127,11 @@ impl Summary {
     /// By how much parts differ, in what noise makes of them: standard deviations over standard deviations.
     pub fn unlike(&self) -> f64 {
         self.course_over_noise().max(self.noise).sqrt()
+    }
+
+    /// Whether nothing is left but noise as it is declared.
+    pub fn is_noise(&self) -> bool {
+        self.is_explained() && self.noise <= AS_DECLARED
     }
 
     /// Whether the parts differ by no more than by chance, and the readings scatter like those of sensors.
@@ -159,6 +168,8 @@ type BothRight = SMatrix<f64, { UNKNOWNS + 3 }, 1>;
 pub(super) const CHANGED: f64 = 30.7;
 /// Parts of a trace that differ by more than one in ten thousand sound ones would contradict the model, in standard deviations.
 const CHANCE_SIGMAS: f64 = 3.7;
+/// Squares of what is left over those of the noise as declared, at the most: a tenth of it is as much as a line may leave (chosen).
+const AS_DECLARED: f64 = 1.1;
 /// A scatter beyond this is no noise of these sensors.
 const MOST_SCATTER: f64 = 3.0;
 /// So many parts before count for how well noise explains a stream: ten minutes (chosen).
@@ -166,8 +177,8 @@ const MOST_PARTS: usize = 120;
 /// Leaks are known from so many parts on.
 const LEAST_PARTS: usize = 2;
 
-/// Sums up the parts of a window around the unknowns `at`; none where they say no finite number.
-pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<Summary> {
+/// Sums up the parts of a window around the unknowns `at`, and the squares that this explains; none where they say no finite number.
+pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<(Summary, f64)> {
     let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
     let noise = parts.iter().map(|part| part.squares).sum::<f64>()
         / parts.iter().map(|part| part.count).sum::<f64>().max(1.0);
@@ -178,23 +189,125 @@ pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<
         .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
         .filter(|(_, found)| found.gain > least);
     let (since, best) = changed.unwrap_or((0, constant));
-    let own = &parts[since..];
+    let moved = |_: usize| best.step;
+    let summary = summed_up(&parts[since..], &normals[since..], &best, &moved, before, at)?;
+    Some((Summary { since, ..summary }, best.gain))
+}
+
+/// What parts say that this explains; how far each of them has moved.
+fn summed_up(
+    own: &[Part],
+    normals: &[Normal],
+    best: &Split,
+    moved: &dyn Fn(usize) -> Unknowns,
+    before: &Belief,
+    at: &Unknowns,
+) -> Option<Summary> {
     let count: f64 = own.iter().map(|part| part.count).sum();
-    let moved = best.step;
-    let left = |part: &Part, normal: &Normal| {
+    let left = |(place, part): (usize, &Part)| {
+        let (moved, normal) = (moved(place), &normals[place]);
         part.squares - 2.0 * moved.dot(&normal.right) + moved.dot(&(normal.information * moved))
     };
-    let squares: f64 = own.iter().zip(&normals[since..]).map(|(part, normal)| left(part, normal)).sum();
+    let squares: f64 = own.iter().enumerate().map(left).sum();
     let covariance = best.information.cholesky()?.inverse();
-    let course = course(&normals[since..], &moved, &covariance);
+    let course = course(normals, moved, &covariance);
     Some(Summary {
-        belief: Belief { mean: at + moved, information: best.information, leak_std: before.leak_std },
-        since,
+        belief: Belief { mean: at + best.step, information: best.information, leak_std: before.leak_std },
+        since: 0,
         noise: squares / count.max(1.0),
         course,
         parts: own.len(),
         pressures: own.iter().fold(Pressures::default(), |sum, part| sum.plus(&part.pressures)),
+        growth: None,
     })
+}
+
+/// Fewer parts tell no line from a step.
+const LEAST_IN_LINE: usize = 6;
+/// A spool's zero may walk by this share of the stroke along a line, 1 σ. A guess.
+const NULL_WALK: f64 = 0.005;
+/// The leaks, and the spool's zero, which opens two edges and closes two.
+const LINES: usize = 4;
+const IN_LINE: usize = UNKNOWNS + LINES;
+
+/// Leaks and the spool's zero that go in straight lines through a window.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Line {
+    /// By how much they rise in the window.
+    rises: SVector<f64, LINES>,
+    until_s: f64,
+    span_s: f64,
+}
+
+impl Line {
+    /// What the rises do to the unknowns.
+    fn directions() -> SMatrix<f64, UNKNOWNS, LINES> {
+        let mut directions = SMatrix::zeros();
+        (0..3).for_each(|leak| directions[(LEAKS + leak, leak)] = 1.0);
+        for (edge, sign) in [-1.0, 1.0, 1.0, -1.0].into_iter().enumerate() {
+            directions[(LAPS + edge, 3)] = sign;
+        }
+        directions
+    }
+
+    /// Shares of the rises that are still to come at a time, negative.
+    fn share(&self, t_s: f64) -> f64 {
+        if self.span_s > 0.0 { (t_s - self.until_s) / self.span_s } else { 0.0 }
+    }
+
+    /// The unknowns at a time, of those at the end.
+    pub fn at(&self, end: &Unknowns, t_s: f64) -> Unknowns {
+        if self.span_s > 0.0 { end + Self::directions() * self.rises * self.share(t_s) } else { *end }
+    }
+}
+
+/// Parts in straight lines, made linear around `at` and a line: the line they follow, the unknowns at its end, what they say, and the
+/// squares that this explains.
+pub(super) fn in_line(
+    parts: &[Part],
+    before: &Belief,
+    at: &Unknowns,
+    line: &Line,
+) -> Option<(Line, Unknowns, Summary, f64)> {
+    if parts.len() < LEAST_IN_LINE {
+        return None;
+    }
+    let (begin_s, last) = (parts.first()?.from_s, parts.last()?);
+    let until_s = last.from_s + last.pressures.time_s;
+    let mut found = Line { until_s, span_s: until_s - begin_s, rises: line.rises };
+    let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
+    let columns = |part: &Part| Line::directions() * found.share(part.from_s + 0.5 * part.pressures.time_s);
+    let mut information = SMatrix::<f64, IN_LINE, IN_LINE>::zeros();
+    let mut right = SVector::<f64, IN_LINE>::zeros();
+    let mut add = |normal: &Normal, columns: &SMatrix<f64, UNKNOWNS, LINES>| {
+        let mut both = SMatrix::<f64, UNKNOWNS, IN_LINE>::zeros();
+        both.fixed_columns_mut::<UNKNOWNS>(0).fill_with_identity();
+        both.fixed_columns_mut::<LINES>(UNKNOWNS).copy_from(columns);
+        information += both.transpose() * normal.information * both;
+        right += both.transpose() * normal.right;
+    };
+    add(&Normal::prior(before, at), &SMatrix::zeros());
+    parts.iter().zip(&normals).for_each(|(part, normal)| add(normal, &columns(part)));
+    for (place, std) in before.leak_std.into_iter().chain([NULL_WALK]).enumerate() {
+        information[(UNKNOWNS + place, UNKNOWNS + place)] += std.powi(-2);
+        right[UNKNOWNS + place] -= line.rises[place] * std.powi(-2);
+    }
+    let factor = information.cholesky()?;
+    let (step, covariance) = (factor.solve(&right), factor.inverse());
+    let (end, rises) = (step.fixed_rows::<UNKNOWNS>(0).into_owned(), step.fixed_rows::<LINES>(UNKNOWNS));
+    let own = covariance.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
+    let best = Split { step: end, information: own.cholesky()?.inverse(), gain: step.dot(&right) };
+    let moved = |place: usize| end + columns(&parts[place]) * rises;
+    let summary = summed_up(parts, &normals, &best, &moved, before, at)?;
+    let rises = line.rises + rises;
+    let growth = PerLeak::from_fn(|leak| {
+        let place = UNKNOWNS + leak as usize;
+        let rise = Estimate { value: rises[leak as usize], std: covariance[(place, place)].sqrt() };
+        rise.scaled(1.0 / found.span_s)
+    });
+    found.rises = rises;
+    let gain = best.gain;
+    gain.is_finite().then(|| (found, at + end, Summary { growth: Some(growth), ..summary }, gain))
 }
 
 /// The unknowns where the leaks are others from the part `place` on.
@@ -250,10 +363,10 @@ fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Op
 
 /// The leaks' variances by the parts' own scores over those by the noise: errors of the model make neighbours alike, and parts different
 /// (the sandwich of Huber 1967, "The behavior of maximum likelihood estimates under nonstandard conditions").
-fn course(normals: &[Normal], moved: &Unknowns, covariance: &Information) -> [f64; 3] {
+fn course(normals: &[Normal], moved: &dyn Fn(usize) -> Unknowns, covariance: &Information) -> [f64; 3] {
     let (mut seen, mut expected) = ([0.0; 3], [0.0; 3]);
-    for normal in normals {
-        let score = normal.right - normal.information * moved;
+    for (place, normal) in normals.iter().enumerate() {
+        let score = normal.right - normal.information * moved(place);
         for leak in 0..3 {
             let row = covariance.row(LEAKS + leak).transpose();
             seen[leak] += row.dot(&score).powi(2);
