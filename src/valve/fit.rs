@@ -7,7 +7,8 @@
 
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
-use super::parts::{Line, Normal, Part};
+use super::line::Line;
+use super::parts::{Normal, Part};
 use super::unknowns::{Belief, GAINS, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
 use super::unread;
 use super::whitening::Whitening;

@@ -5,8 +5,9 @@ use super::calibration::{self, Calibration, CalibrationError, Since};
 use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Run, fit};
+use super::line::{Line, in_line};
 use super::means::Means;
-use super::parts::{CHANGED, Line, Summary, in_line, summary};
+use super::parts::{CHANGED, Summary, summary};
 use super::unknowns::{Belief, Unknowns};
 use super::unread;
 use crate::rig::{Rig, ValveSheet};
@@ -293,20 +294,19 @@ impl ValveMeter {
         &self,
         runs: &[Run],
         before: &Belief,
-        found: &Fit,
+        constant: &Fit,
         least: f64,
         known: &Known,
     ) -> Option<(Fit, Summary)> {
-        let (mut line, mut at, _, gain) = in_line(&found.parts, before, &found.at, &Line::default())?;
-        if gain < least {
+        let mut found = in_line(&constant.parts, before, &constant.at, &Line::default())?;
+        if found.gain < least {
             return None;
         }
         for _ in 0..ROUNDS_IN_LINE {
-            let fit = fit(runs, before, at, self.sheet.hysteresis, known, &line)?;
-            let summary;
-            (line, at, summary, _) = in_line(&fit.parts, before, &fit.at, &line)?;
-            if fit.is_settled && summary.is_noise() {
-                return Some((fit, summary));
+            let fit = fit(runs, before, found.end, self.sheet.hysteresis, known, &found.line)?;
+            found = in_line(&fit.parts, before, &fit.at, &found.line)?;
+            if fit.is_settled && found.summary.is_noise() {
+                return Some((fit, found.summary));
             }
         }
         None

@@ -12,6 +12,7 @@ mod calibration;
 mod edges;
 mod equations;
 mod fit;
+mod line;
 mod means;
 mod meter;
 mod outcome;

@@ -3,10 +3,10 @@
 
 use super::edges::{PA, PB};
 use super::equations::{Node, Slopes};
-use super::unknowns::{Belief, Information, LAPS, LEAKS, UNKNOWNS, Unknowns};
+use super::unknowns::{Belief, Information, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use crate::presence::Pressures;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use pitchleak_core::{Estimate, PerLeak};
 use serde::{Deserialize, Serialize};
 
@@ -94,7 +94,11 @@ impl Part {
         self.pressures.add(to.t_s - from.t_s, a_pa, b_pa);
     }
 
-    fn normal(&self) -> Normal {
+    pub fn middle_s(&self) -> f64 {
+        self.from_s + 0.5 * self.pressures.time_s
+    }
+
+    pub fn normal(&self) -> Normal {
         let mut normal = self.normal.clone();
         normal.information.fill_upper_triangle_with_lower_triangle();
         normal
@@ -195,7 +199,7 @@ pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<
 }
 
 /// What parts say that this explains; how far each of them has moved.
-fn summed_up(
+pub(super) fn summed_up(
     own: &[Part],
     normals: &[Normal],
     best: &Split,
@@ -222,100 +226,12 @@ fn summed_up(
     })
 }
 
-/// Fewer parts tell no line from a step.
-const LEAST_IN_LINE: usize = 6;
-/// A spool's zero may walk by this share of the stroke along a line, 1 σ. A guess.
-const NULL_WALK: f64 = 0.005;
-/// The leaks, and the spool's zero, which opens two edges and closes two.
-const LINES: usize = 4;
-const IN_LINE: usize = UNKNOWNS + LINES;
-
-/// Leaks and the spool's zero that go in straight lines through a window.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Line {
-    /// By how much they rise in the window.
-    rises: SVector<f64, LINES>,
-    until_s: f64,
-    span_s: f64,
-}
-
-impl Line {
-    /// What the rises do to the unknowns.
-    fn directions() -> SMatrix<f64, UNKNOWNS, LINES> {
-        let mut directions = SMatrix::zeros();
-        (0..3).for_each(|leak| directions[(LEAKS + leak, leak)] = 1.0);
-        for (edge, sign) in [-1.0, 1.0, 1.0, -1.0].into_iter().enumerate() {
-            directions[(LAPS + edge, 3)] = sign;
-        }
-        directions
-    }
-
-    /// Shares of the rises that are still to come at a time, negative.
-    fn share(&self, t_s: f64) -> f64 {
-        if self.span_s > 0.0 { (t_s - self.until_s) / self.span_s } else { 0.0 }
-    }
-
-    /// The unknowns at a time, of those at the end.
-    pub fn at(&self, end: &Unknowns, t_s: f64) -> Unknowns {
-        if self.span_s > 0.0 { end + Self::directions() * self.rises * self.share(t_s) } else { *end }
-    }
-}
-
-/// Parts in straight lines, made linear around `at` and a line: the line they follow, the unknowns at its end, what they say, and the
-/// squares that this explains.
-pub(super) fn in_line(
-    parts: &[Part],
-    before: &Belief,
-    at: &Unknowns,
-    line: &Line,
-) -> Option<(Line, Unknowns, Summary, f64)> {
-    if parts.len() < LEAST_IN_LINE {
-        return None;
-    }
-    let (begin_s, last) = (parts.first()?.from_s, parts.last()?);
-    let until_s = last.from_s + last.pressures.time_s;
-    let mut found = Line { until_s, span_s: until_s - begin_s, rises: line.rises };
-    let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
-    let columns = |part: &Part| Line::directions() * found.share(part.from_s + 0.5 * part.pressures.time_s);
-    let mut information = SMatrix::<f64, IN_LINE, IN_LINE>::zeros();
-    let mut right = SVector::<f64, IN_LINE>::zeros();
-    let mut add = |normal: &Normal, columns: &SMatrix<f64, UNKNOWNS, LINES>| {
-        let mut both = SMatrix::<f64, UNKNOWNS, IN_LINE>::zeros();
-        both.fixed_columns_mut::<UNKNOWNS>(0).fill_with_identity();
-        both.fixed_columns_mut::<LINES>(UNKNOWNS).copy_from(columns);
-        information += both.transpose() * normal.information * both;
-        right += both.transpose() * normal.right;
-    };
-    add(&Normal::prior(before, at), &SMatrix::zeros());
-    parts.iter().zip(&normals).for_each(|(part, normal)| add(normal, &columns(part)));
-    for (place, std) in before.leak_std.into_iter().chain([NULL_WALK]).enumerate() {
-        information[(UNKNOWNS + place, UNKNOWNS + place)] += std.powi(-2);
-        right[UNKNOWNS + place] -= line.rises[place] * std.powi(-2);
-    }
-    let factor = information.cholesky()?;
-    let (step, covariance) = (factor.solve(&right), factor.inverse());
-    let (end, rises) = (step.fixed_rows::<UNKNOWNS>(0).into_owned(), step.fixed_rows::<LINES>(UNKNOWNS));
-    let own = covariance.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
-    let best = Split { step: end, information: own.cholesky()?.inverse(), gain: step.dot(&right) };
-    let moved = |place: usize| end + columns(&parts[place]) * rises;
-    let summary = summed_up(parts, &normals, &best, &moved, before, at)?;
-    let rises = line.rises + rises;
-    let growth = PerLeak::from_fn(|leak| {
-        let place = UNKNOWNS + leak as usize;
-        let rise = Estimate { value: rises[leak as usize], std: covariance[(place, place)].sqrt() };
-        rise.scaled(1.0 / found.span_s)
-    });
-    found.rises = rises;
-    let gain = best.gain;
-    gain.is_finite().then(|| (found, at + end, Summary { growth: Some(growth), ..summary }, gain))
-}
-
 /// The unknowns where the leaks are others from the part `place` on.
-struct Split {
-    step: Unknowns,
-    information: Information,
+pub(super) struct Split {
+    pub step: Unknowns,
+    pub information: Information,
     /// Squares that it explains.
-    gain: f64,
+    pub gain: f64,
 }
 
 fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Option<Split> {
