@@ -7,7 +7,6 @@
 
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
-use super::line::Line;
 use super::parts::{Normal, Part};
 use super::unknowns::{Belief, GAINS, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
 use super::unread;
@@ -104,12 +103,12 @@ impl Smoothed {
         }
     }
 
-    fn whitened(&self, unknowns: &Unknowns, line: &Line) -> Option<Whitening> {
+    fn whitened(&self, unknowns: &Unknowns) -> Option<Whitening> {
         let known = &self.known;
         let mut white = Whitening::new(known.variances, self.nodes.len());
         let mut last: Option<(&Node, &Node, Rates)> = None;
         for (reading, node) in self.readings.iter().zip(&self.nodes) {
-            let rates = Rates::at(node, &line.at(unknowns, node.t_s), known);
+            let rates = Rates::at(node, unknowns, known);
             if let Some((first_reading, first, from)) = &last {
                 let mut step = Step::between([first, node], [from, &rates], unknowns, known);
                 // At the readings themselves, made linear at the signals.
@@ -147,14 +146,13 @@ impl Smoothed {
     }
 }
 
-/// Fits all runs together after what was believed before, beginning at `unknowns`, those of the end of a line. None where no finite number comes out.
+/// Fits all runs together after what was believed before, beginning at `unknowns`. None where no finite number comes out.
 pub(super) fn fit(
     runs: &[Run],
     before: &Belief,
     mut unknowns: Unknowns,
     half_width: f64,
     known: &Known,
-    line: &Line,
 ) -> Option<Fit> {
     let mut runs: Vec<Smoothed> =
         runs.iter().map(|run| Smoothed::begin(run, half_width, &unknowns, known)).collect();
@@ -166,7 +164,7 @@ pub(super) fn fit(
             let [least, most] = PLAY_RANGE.map(|share| share * half_width);
             runs.iter_mut().for_each(|run| run.follow(unknowns[HYSTERESIS].abs().clamp(least, most)));
         }
-        let whites = whitened(&runs, &unknowns, line)?;
+        let whites = whitened(&runs, &unknowns)?;
         let mut normal = Normal::prior(before, &unknowns);
         whites.iter().for_each(|white| normal.add_steps(white.steps()));
         let moved =
@@ -193,7 +191,7 @@ pub(super) fn fit(
         Some(whites) => whites,
         None => {
             unknowns = likeliest?.go_back(&mut runs);
-            whitened(&runs, &unknowns, line)?
+            whitened(&runs, &unknowns)?
         }
     };
     let parts = runs.iter().zip(&whites).flat_map(|(run, white)| run.parts(white)).collect();
@@ -226,8 +224,8 @@ impl Place {
     }
 }
 
-fn whitened(runs: &[Smoothed], unknowns: &Unknowns, line: &Line) -> Option<Vec<Whitening>> {
-    runs.iter().map(|run| run.whitened(unknowns, line)).collect()
+fn whitened(runs: &[Smoothed], unknowns: &Unknowns) -> Option<Vec<Whitening>> {
+    runs.iter().map(|run| run.whitened(unknowns)).collect()
 }
 
 /// Of the residuals, in those of the noise.

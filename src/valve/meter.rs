@@ -5,7 +5,6 @@ use super::calibration::{self, Calibration, CalibrationError, Since};
 use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
 use super::fit::{Fit, LEAST_READINGS, Run, fit};
-use super::line::{Line, in_line};
 use super::means::Means;
 use super::parts::{CHANGED, Summary, summary};
 use super::unknowns::{Belief, Unknowns};
@@ -30,8 +29,6 @@ const LEAST_SPREAD: f64 = 1e-12;
 const SO_MANY_CHANGES: usize = 1;
 /// A pressure so many standard deviations below the atmosphere's is so for certain.
 const VOID_SIGMAS: f64 = 3.0;
-/// Fits that follow a line at the most: each makes all linear around it anew; numerical.
-const ROUNDS_IN_LINE: usize = 4;
 /// Fewer readings tell nothing.
 const LEAST_WINDOW: usize = 50;
 
@@ -153,9 +150,12 @@ impl ValveMeter {
     /// Goes on without the pressure of a chamber.
     #[inline]
     fn lose(&mut self, chamber: Option<usize>) {
-        self.unread = self.unread.or(chamber);
-        let Some(leak) = chamber.and(self.untold()) else { return };
-        if let Some(before) = self.before.clone().without_pressure_at(leak, &self.rig) {
+        if chamber.is_none() {
+            return;
+        }
+        self.unread = chamber;
+        let without = |leak| self.before.clone().without_pressure_at(leak, &self.rig);
+        if let Some(before) = self.untold().and_then(without) {
             self.before = before;
         }
     }
@@ -273,43 +273,15 @@ impl ValveMeter {
     fn fitted(&self, runs: &[Run], before: &Belief, start: Unknowns) -> Option<(Fit, Summary)> {
         let known = Known::of(&self.rig, &self.sheet);
         let one = |runs: &[Run], known: &Known| {
-            let fit = fit(runs, before, start, self.sheet.hysteresis, known, &Line::default())?;
-            let (summary, gain) = summary(&fit.parts, before, &fit.at)?;
-            // By the data sheet alone a line that an edge makes is too easily a leak's.
-            if self.since.is_none() || summary.since == 0 && summary.is_explained() {
-                return Some((fit, summary));
-            }
-            Some(self.in_line(runs, before, &fit, gain, known).unwrap_or((fit, summary)))
+            let fit = fit(runs, before, start, self.sheet.hysteresis, known)?;
+            let summary = summary(&fit.parts, before, &fit.at)?;
+            Some((fit, summary))
         };
         let found = Means::of(runs, &known.variances).and_then(|means| {
             let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
             one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise))
         });
         found.or_else(|| one(runs, &known))
-    }
-
-    /// What readings say where leaks and the spool's zero go in straight lines, if that explains more than a change at once, which explains
-    /// `least`, and leaves noise alone.
-    fn in_line(
-        &self,
-        runs: &[Run],
-        before: &Belief,
-        constant: &Fit,
-        least: f64,
-        known: &Known,
-    ) -> Option<(Fit, Summary)> {
-        let mut found = in_line(&constant.parts, before, &constant.at, &Line::default())?;
-        if found.gain < least {
-            return None;
-        }
-        for _ in 0..ROUNDS_IN_LINE {
-            let fit = fit(runs, before, found.end, self.sheet.hysteresis, known, &found.line)?;
-            found = in_line(&fit.parts, before, &fit.at, &found.line)?;
-            if fit.is_settled && found.summary.is_noise() {
-                return Some((fit, found.summary));
-            }
-        }
-        None
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.

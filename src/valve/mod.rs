@@ -12,7 +12,6 @@ mod calibration;
 mod edges;
 mod equations;
 mod fit;
-mod line;
 mod means;
 mod meter;
 mod outcome;

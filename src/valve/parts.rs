@@ -7,7 +7,6 @@ use super::unknowns::{Belief, Information, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use crate::presence::Pressures;
 use nalgebra::SMatrix;
-use pitchleak_core::{Estimate, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// Normal equations Λ δ = η of a step from the unknowns of the moment.
@@ -94,11 +93,7 @@ impl Part {
         self.pressures.add(to.t_s - from.t_s, a_pa, b_pa);
     }
 
-    pub fn middle_s(&self) -> f64 {
-        self.from_s + 0.5 * self.pressures.time_s
-    }
-
-    pub fn normal(&self) -> Normal {
+    fn normal(&self) -> Normal {
         let mut normal = self.normal.clone();
         normal.information.fill_upper_triangle_with_lower_triangle();
         normal
@@ -117,9 +112,6 @@ pub(super) struct Summary {
     pub course: [f64; 3],
     pub parts: usize,
     pub pressures: Pressures,
-    /// How each leak grows where leaks go in straight lines, in their unit per second.
-    #[serde(default)]
-    pub growth: Option<PerLeak<Estimate<f64>>>,
 }
 
 impl Summary {
@@ -131,11 +123,6 @@ impl Summary {
     /// By how much parts differ, in what noise makes of them: standard deviations over standard deviations.
     pub fn unlike(&self) -> f64 {
         self.course_over_noise().max(self.noise).sqrt()
-    }
-
-    /// Whether nothing is left but noise as it is declared.
-    pub fn is_noise(&self) -> bool {
-        self.is_explained() && self.noise <= AS_DECLARED
     }
 
     /// Whether the parts differ by no more than by chance, and the readings scatter like those of sensors.
@@ -172,8 +159,6 @@ type BothRight = SMatrix<f64, { UNKNOWNS + 3 }, 1>;
 pub(super) const CHANGED: f64 = 30.7;
 /// Parts of a trace that differ by more than one in ten thousand sound ones would contradict the model, in standard deviations.
 const CHANCE_SIGMAS: f64 = 3.7;
-/// Squares of what is left over those of the noise as declared, at the most: a tenth of it is as much as a line may leave (chosen).
-const AS_DECLARED: f64 = 1.1;
 /// A scatter beyond this is no noise of these sensors.
 const MOST_SCATTER: f64 = 3.0;
 /// So many parts before count for how well noise explains a stream: ten minutes (chosen).
@@ -181,8 +166,8 @@ const MOST_PARTS: usize = 120;
 /// Leaks are known from so many parts on.
 const LEAST_PARTS: usize = 2;
 
-/// Sums up the parts of a window around the unknowns `at`, and the squares that this explains; none where they say no finite number.
-pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<(Summary, f64)> {
+/// Sums up the parts of a window around the unknowns `at`; none where they say no finite number.
+pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<Summary> {
     let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
     let noise = parts.iter().map(|part| part.squares).sum::<f64>()
         / parts.iter().map(|part| part.count).sum::<f64>().max(1.0);
@@ -193,45 +178,31 @@ pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<
         .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
         .filter(|(_, found)| found.gain > least);
     let (since, best) = changed.unwrap_or((0, constant));
-    let moved = |_: usize| best.step;
-    let summary = summed_up(&parts[since..], &normals[since..], &best, &moved, before, at)?;
-    Some((Summary { since, ..summary }, best.gain))
-}
-
-/// What parts say that this explains; how far each of them has moved.
-pub(super) fn summed_up(
-    own: &[Part],
-    normals: &[Normal],
-    best: &Split,
-    moved: &dyn Fn(usize) -> Unknowns,
-    before: &Belief,
-    at: &Unknowns,
-) -> Option<Summary> {
+    let own = &parts[since..];
     let count: f64 = own.iter().map(|part| part.count).sum();
-    let left = |(place, part): (usize, &Part)| {
-        let (moved, normal) = (moved(place), &normals[place]);
+    let moved = best.step;
+    let left = |part: &Part, normal: &Normal| {
         part.squares - 2.0 * moved.dot(&normal.right) + moved.dot(&(normal.information * moved))
     };
-    let squares: f64 = own.iter().enumerate().map(left).sum();
+    let squares: f64 = own.iter().zip(&normals[since..]).map(|(part, normal)| left(part, normal)).sum();
     let covariance = best.information.cholesky()?.inverse();
-    let course = course(normals, moved, &covariance);
+    let course = course(&normals[since..], &moved, &covariance);
     Some(Summary {
-        belief: Belief { mean: at + best.step, information: best.information, leak_std: before.leak_std },
-        since: 0,
+        belief: Belief { mean: at + moved, information: best.information, leak_std: before.leak_std },
+        since,
         noise: squares / count.max(1.0),
         course,
         parts: own.len(),
         pressures: own.iter().fold(Pressures::default(), |sum, part| sum.plus(&part.pressures)),
-        growth: None,
     })
 }
 
 /// The unknowns where the leaks are others from the part `place` on.
-pub(super) struct Split {
-    pub step: Unknowns,
-    pub information: Information,
+struct Split {
+    step: Unknowns,
+    information: Information,
     /// Squares that it explains.
-    pub gain: f64,
+    gain: f64,
 }
 
 fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Option<Split> {
@@ -279,10 +250,10 @@ fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Op
 
 /// The leaks' variances by the parts' own scores over those by the noise: errors of the model make neighbours alike, and parts different
 /// (the sandwich of Huber 1967, "The behavior of maximum likelihood estimates under nonstandard conditions").
-fn course(normals: &[Normal], moved: &dyn Fn(usize) -> Unknowns, covariance: &Information) -> [f64; 3] {
+fn course(normals: &[Normal], moved: &Unknowns, covariance: &Information) -> [f64; 3] {
     let (mut seen, mut expected) = ([0.0; 3], [0.0; 3]);
-    for (place, normal) in normals.iter().enumerate() {
-        let score = normal.right - normal.information * moved(place);
+    for normal in normals {
+        let score = normal.right - normal.information * moved;
         for leak in 0..3 {
             let row = covariance.row(LEAKS + leak).transpose();
             seen[leak] += row.dot(&score).powi(2);
