@@ -327,6 +327,45 @@ fn a_leak_that_sets_in_is_told_as_it_is_now() {
     assert!(right * 100 >= runs() * 80, "{right}");
 }
 
+/// A leak that grows from none in the trace, on a calibrated valve whose zero walks beside it or not: told as it is at the end.
+#[test]
+fn a_leak_that_grows_is_told_as_it_is_at_the_end() {
+    let known: Vec<_> =
+        (0..runs()).into_par_iter().map(|seed| known(seed, LeaksThen::Zero, |_| {})).collect();
+    let cases: Vec<_> = (0..known.len()).flat_map(|seed| WINDS.map(|wind| (seed, wind))).collect();
+    let (mut right, mut squares, mut doubtful, mut all) = (0, 0.0, 0, 0);
+    for (index, lpm) in [(0, 0.1), (1, 0.2), (2, 0.2)] {
+        for null_drift in [0.0, 0.005] {
+            let reports = cases.par_iter().map(|(seed, wind)| {
+                let change = |now: &mut ValveCylinder| {
+                    (now.leaks_from_s, now.leaks_until_s) = (0.0, 60.0);
+                    (now.leaks_lpm[index], now.wind, now.valve.null_drift) = (lpm, *wind, null_drift);
+                };
+                later(&known[*seed], *seed as u64, change, |text| text)
+            });
+            for report in reports.collect::<Vec<_>>() {
+                all += 1;
+                match report.verdict.status {
+                    Status::Leak => {
+                        let entry = report.estimates.leaks()[Leak::ALL[index]].clone();
+                        squares +=
+                            ((entry.value / UNIT - lpm) / (entry.std.expect("a spread") / UNIT)).powi(2);
+                        assert_eq!(report.verdict.faults, [Leak::ALL[index]], "{}", report.verdict.text);
+                        assert!(report.verdict.text.contains("grows by"), "{}", report.verdict.text);
+                        assert!(report.trend[Leak::ALL[index]].is_some(), "{}", report.verdict.text);
+                        right += 1;
+                    }
+                    Status::Doubtful => doubtful += 1,
+                    _ => panic!("{}", report.verdict.text),
+                }
+            }
+        }
+    }
+    let z = (squares / f64::from(right)).sqrt();
+    println!("grows: {right} right, {doubtful} doubtful of {all}; rms error {z:.2} spreads");
+    assert!(right * 100 >= all * 80 && z < 1.5, "{right} of {all}, {z}");
+}
+
 /// A command instead of the spool's position, with the hysteresis that the data sheet declares.
 #[test]
 fn the_command_stands_in_for_the_spool() {

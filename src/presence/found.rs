@@ -16,10 +16,10 @@ use serde::Serialize;
 const LEAST_DRIVING_PA: f64 = 20e5;
 /// Below this mean |P_L| zeros of the pressure sensors decide which way oil would pass the piston, Pa.
 const LEAST_LOAD_PA: f64 = 2e5;
+/// … or, where a leak may be as large as any, from so many standard deviations on: a half normal's mean is 1.3.
+const TOLD_SIGMAS: f64 = 2.0;
 /// Standard deviation of a coefficient of which the trace tells next to nothing, in those of what is believed before.
 const UNKNOWN: f64 = 0.5;
-/// … unless its mean is so many of its own: that of a half normal, as it is before, is 1.3.
-const TOLD_SIGMAS: f64 = 2.0;
 
 /// One leak, as a mean over the usable time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -5,12 +5,14 @@
 //! What is known before holds all but the leaks back at first: else the noise of the pressures is taken for compression, and a leak for
 //! edges as no valve has them.
 
+use super::course::Course;
 use super::edges::{SPOOL, Signals};
 use super::equations::{Known, Node, Rates, Step};
-use super::parts::{Normal, Part};
-use super::unknowns::{Belief, GAINS, HYSTERESIS, KAPPA, ROUNDING, Unknowns};
+use super::parts::Part;
+use super::unknowns::{Belief, GAINS, HYSTERESIS, KAPPA, ROUNDING, UNKNOWNS, Unknowns};
 use super::unread;
 use super::whitening::Whitening;
+use nalgebra::DVector;
 
 const MOST_ROUNDS: usize = 40;
 /// The first step moves no unknown beyond what is known of it to explain the readings; so many times less holds it back from round to
@@ -56,7 +58,7 @@ struct Smoothed {
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     /// Around which all is linear.
-    pub at: Unknowns,
+    pub place: Place,
     pub parts: Vec<Part>,
     /// Whether the search came to an end where such a valve may be; else the place is the likeliest that it passed.
     pub is_settled: bool,
@@ -103,11 +105,12 @@ impl Smoothed {
         }
     }
 
-    fn whitened(&self, unknowns: &Unknowns) -> Option<Whitening> {
+    fn whitened(&self, place: &Place) -> Option<Whitening> {
         let known = &self.known;
         let mut white = Whitening::new(known.variances, self.nodes.len());
         let mut last: Option<(&Node, &Node, Rates)> = None;
         for (reading, node) in self.readings.iter().zip(&self.nodes) {
+            let unknowns = &place.unknowns_at(node.t_s);
             let rates = Rates::at(node, unknowns, known);
             if let Some((first_reading, first, from)) = &last {
                 let mut step = Step::between([first, node], [from, &rates], unknowns, known);
@@ -121,9 +124,11 @@ impl Smoothed {
         Some(white)
     }
 
-    /// Moves the signals by this share of the way to the likeliest where the unknowns go by `step`.
-    fn smooth(&mut self, white: &Whitening, step: &Unknowns, share: f64) -> Option<()> {
-        let corrections = white.corrections(|one| one.residual + one.by_unknowns * step)?;
+    /// Moves the signals by this share of the way to the likeliest where the unknowns at a time go by `step`.
+    fn smooth(&mut self, white: &Whitening, step: impl Fn(f64) -> Unknowns, share: f64) -> Option<()> {
+        let nodes = &self.nodes;
+        let corrections =
+            white.corrections(|place, one| one.residual + one.by_unknowns * step(nodes[place].t_s))?;
         for ((node, reading), correction) in self.nodes.iter_mut().zip(&self.readings).zip(corrections) {
             node.signals += (reading.signals - correction - node.signals) * share;
             self.unread.iter().for_each(|chamber| unread::bound(*chamber, &mut node.signals));
@@ -146,56 +151,52 @@ impl Smoothed {
     }
 }
 
-/// Fits all runs together after what was believed before, beginning at `unknowns`. None where no finite number comes out.
+/// Fits all runs together after what was believed before, beginning at a place. None where no finite number comes out.
 pub(super) fn fit(
     runs: &[Run],
     before: &Belief,
-    mut unknowns: Unknowns,
+    mut place: Place,
     half_width: f64,
     known: &Known,
 ) -> Option<Fit> {
+    let [least, most] = PLAY_RANGE.map(|share| share * half_width);
+    let found = |place: &Place| place.unknowns[HYSTERESIS].abs().clamp(least, most);
+    let begin = if place.unknowns[HYSTERESIS] == 0.0 { half_width } else { found(&place) };
     let mut runs: Vec<Smoothed> =
-        runs.iter().map(|run| Smoothed::begin(run, half_width, &unknowns, known)).collect();
+        runs.iter().map(|run| Smoothed::begin(run, begin, &place.unknowns, known)).collect();
+    let begin_s = runs.first()?.nodes.first()?.t_s;
     let told: f64 = runs.iter().map(|run| run.known.told * run.nodes.len() as f64).sum();
-    let (mut settled, mut damping) = (None, None);
-    let mut likeliest: Option<Place> = None;
+    let mut damping = None;
+    let mut likeliest: Option<Passed> = None;
     for round in 0..MOST_ROUNDS {
         if half_width > 0.0 && ROUNDS_FOLLOWED.contains(&round) {
-            let [least, most] = PLAY_RANGE.map(|share| share * half_width);
-            runs.iter_mut().for_each(|run| run.follow(unknowns[HYSTERESIS].abs().clamp(least, most)));
+            runs.iter_mut().for_each(|run| run.follow(found(&place)));
         }
-        let whites = whitened(&runs, &unknowns)?;
-        let mut normal = Normal::prior(before, &unknowns);
-        whites.iter().for_each(|white| normal.add_steps(white.steps()));
-        let moved =
-            |damping: f64| Some(bounded(unknowns + normal.solve(&before.information, damping)?) - unknowns);
+        let whites = whitened(&runs, &place)?;
+        let parts = in_parts(&runs, &whites);
+        let normal = place.course.normal(&parts, before, &place.unknowns);
+        let moved = |damping: f64| Some(place.bounded(normal.solve(&before.information, damping)?));
         if normal.square(&moved(0.0)?) < SETTLED * SETTLED {
-            settled = Some(whites);
-            break;
+            let is_settled = has_its_edges(&place.unknowns, before)?;
+            return Some(Fit { place, parts, is_settled });
         }
-        let square = squares(&whites) + before.square(&unknowns);
-        if likeliest.as_ref().is_none_or(|place| square < place.square) {
-            likeliest = Some(Place::of(&runs, unknowns, square));
+        let square = squares(&whites) + before.square(&place.unknowns_at(begin_s));
+        if likeliest.as_ref().is_none_or(|passed| square < passed.square) {
+            likeliest = Some(Passed::of(&runs, &place, square));
         }
         let held = damping.unwrap_or((square - told).max(0.0));
         damping = Some(held / EASED);
-        let step = moved(held)?;
         let share = if round < ROUNDS_WHOLE { 1.0 } else { 0.5 };
+        let step = moved(held)?;
+        let next = place.moved(&step, 1.0);
         for (run, white) in runs.iter_mut().zip(&whites) {
-            run.smooth(white, &step, share)?;
+            run.smooth(white, |t_s| next.unknowns_at(t_s) - place.unknowns_at(t_s), share)?;
         }
-        unknowns += step * share;
+        place = place.moved(&step, share);
     }
-    let is_settled = settled.is_some() && has_its_edges(&unknowns, before)?;
-    let whites = match settled {
-        Some(whites) => whites,
-        None => {
-            unknowns = likeliest?.go_back(&mut runs);
-            whitened(&runs, &unknowns)?
-        }
-    };
-    let parts = runs.iter().zip(&whites).flat_map(|(run, white)| run.parts(white)).collect();
-    Some(Fit { at: unknowns, parts, is_settled })
+    let place = likeliest?.go_back(&mut runs);
+    let parts = in_parts(&runs, &whitened(&runs, &place)?);
+    Some(Fit { place, parts, is_settled: false })
 }
 
 /// Whether each edge has about the gain that is believed of it.
@@ -205,27 +206,58 @@ fn has_its_edges(unknowns: &Unknowns, before: &Belief) -> Option<bool> {
     Some((GAINS..GAINS + 4).all(|at| off(at) <= MOST_OFF))
 }
 
+/// Unknowns, those at the end of a course.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub unknowns: Unknowns,
+    pub course: Course,
+}
+
+impl Place {
+    fn unknowns_at(&self, t_s: f64) -> Unknowns {
+        self.unknowns + self.course.before_end(t_s)
+    }
+
+    /// As much of a step as brings κ and the rounding no further than they may go.
+    fn bounded(&self, mut step: DVector<f64>) -> DVector<f64> {
+        let own = bounded(self.unknowns + step.fixed_rows::<UNKNOWNS>(0)) - self.unknowns;
+        step.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&own);
+        step
+    }
+
+    fn moved(&self, step: &DVector<f64>, share: f64) -> Self {
+        Self {
+            unknowns: self.unknowns + step.fixed_rows::<UNKNOWNS>(0) * share,
+            course: self.course.moved(step, share),
+        }
+    }
+}
+
 /// Where the search passed.
-struct Place {
-    unknowns: Unknowns,
+struct Passed {
+    place: Place,
     nodes: Vec<Vec<Node>>,
     /// Of the residuals and of what was believed before.
     square: f64,
 }
 
-impl Place {
-    fn of(runs: &[Smoothed], unknowns: Unknowns, square: f64) -> Self {
-        Self { unknowns, nodes: runs.iter().map(|run| run.nodes.clone()).collect(), square }
+impl Passed {
+    fn of(runs: &[Smoothed], place: &Place, square: f64) -> Self {
+        Self { place: place.clone(), nodes: runs.iter().map(|run| run.nodes.clone()).collect(), square }
     }
 
-    fn go_back(self, runs: &mut [Smoothed]) -> Unknowns {
+    fn go_back(self, runs: &mut [Smoothed]) -> Place {
         runs.iter_mut().zip(self.nodes).for_each(|(run, nodes)| run.nodes = nodes);
-        self.unknowns
+        self.place
     }
 }
 
-fn whitened(runs: &[Smoothed], unknowns: &Unknowns) -> Option<Vec<Whitening>> {
-    runs.iter().map(|run| run.whitened(unknowns)).collect()
+fn whitened(runs: &[Smoothed], place: &Place) -> Option<Vec<Whitening>> {
+    runs.iter().map(|run| run.whitened(place)).collect()
+}
+
+fn in_parts(runs: &[Smoothed], whites: &[Whitening]) -> Vec<Part> {
+    runs.iter().zip(whites).flat_map(|(run, white)| run.parts(white)).collect()
 }
 
 /// Of the residuals, in those of the noise.

@@ -2,11 +2,12 @@
 //! and the leaks do while they stay the same.
 
 use super::calibration::{self, Calibration, CalibrationError, Since};
+use super::course::Course;
 use super::edges::{PA, PB, SPOOL, Signals, Spool};
 use super::equations::{Known, Node};
-use super::fit::{Fit, LEAST_READINGS, Run, fit};
+use super::fit::{Fit, LEAST_READINGS, Place, Run, fit};
 use super::means::Means;
-use super::parts::{CHANGED, Summary, summary};
+use super::parts::{CHANGED, Likeliest, Summary, likeliest};
 use super::unknowns::{Belief, Unknowns};
 use super::unread;
 use crate::rig::{Rig, ValveSheet};
@@ -150,12 +151,9 @@ impl ValveMeter {
     /// Goes on without the pressure of a chamber.
     #[inline]
     fn lose(&mut self, chamber: Option<usize>) {
-        if chamber.is_none() {
-            return;
-        }
-        self.unread = chamber;
-        let without = |leak| self.before.clone().without_pressure_at(leak, &self.rig);
-        if let Some(before) = self.untold().and_then(without) {
+        self.unread = self.unread.or(chamber);
+        let Some(leak) = chamber.and(self.untold()) else { return };
+        if let Some(before) = self.before.clone().without_pressure_at(leak, &self.rig) {
             self.before = before;
         }
     }
@@ -269,19 +267,45 @@ impl ValveMeter {
         Some(taken.after(last, begin_s))
     }
 
-    /// What readings say where nothing changes: as means, where they may stand for them.
+    /// What readings say in the likeliest course: as means, where they may stand for them.
     fn fitted(&self, runs: &[Run], before: &Belief, start: Unknowns) -> Option<(Fit, Summary)> {
         let known = Known::of(&self.rig, &self.sheet);
-        let one = |runs: &[Run], known: &Known| {
-            let fit = fit(runs, before, start, self.sheet.hysteresis, known)?;
-            let summary = summary(&fit.parts, before, &fit.at)?;
-            Some((fit, summary))
-        };
         let found = Means::of(runs, &known.variances).and_then(|means| {
             let quieter = Known { variances: known.variances / means.count as f64, ..known.clone() };
-            one(&means.runs, &quieter).filter(|(_, summary)| means.are_white(summary.noise))
+            self.in_course(&means.runs, before, start, &quieter)
+                .filter(|(_, summary)| means.are_white(summary.noise))
         });
-        found.or_else(|| one(runs, &known))
+        found.or_else(|| self.in_course(runs, before, start, &known))
+    }
+
+    /// Where the readings are no noise beside constant leaks, a line is tried, and else all is made linear around leaks that are others in
+    /// each part: from there a change looks as it is.
+    fn in_course(
+        &self,
+        runs: &[Run],
+        before: &Belief,
+        start: Unknowns,
+        known: &Known,
+    ) -> Option<(Fit, Summary)> {
+        let fit_in = |course: Course| {
+            let place = Place { unknowns: start, course };
+            let fit = fit(runs, before, place, self.sheet.hysteresis, known)?;
+            let found = likeliest(&fit.parts, before, &fit.place)?;
+            Some((fit, found))
+        };
+        let (constant, found) = fit_in(Course::constant())?;
+        if found.course.is_constant() && found.summary.is_explained() {
+            return Some((constant, found.summary));
+        }
+        let line = Course::line(&constant.parts).and_then(fit_in);
+        let is_line = |fit: &Fit, found: &Likeliest| {
+            fit.is_settled && found.course.is_line() && found.summary.is_explained()
+        };
+        if let Some((fit, found)) = line.filter(|(fit, found)| is_line(fit, found)) {
+            return Some((fit, found.summary));
+        }
+        let (stairs, found) = fit_in(Course::stairs(&constant.parts))?;
+        Some((stairs, found.summary))
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
@@ -289,7 +313,7 @@ impl ValveMeter {
         let (fit, summary) = self.fitted(runs, before, start)?;
         let constant = Taken {
             summary,
-            at: fit.at,
+            at: fit.place.unknowns,
             changed_at_s: None,
             is_mixed: false,
             is_settled: fit.is_settled,

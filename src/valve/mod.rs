@@ -9,6 +9,7 @@
 //! [`Calibrator`] keeps what traces of a rig say of its valve for later ones.
 
 mod calibration;
+mod course;
 mod edges;
 mod equations;
 mod fit;

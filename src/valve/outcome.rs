@@ -5,7 +5,7 @@ use super::meter::{Taken, ValveMeter};
 use super::parts::Summary;
 use super::unknowns::{Belief, KAPPA, LEAK_STD, LEAK_UNIT_M3SPA, clearance_std};
 use crate::presence::{self, Found, FoundLeak, LeakLikelihood, Place};
-use crate::report::{ReplayReport, TraceSummary};
+use crate::report::{LeakTrend, ReplayReport, TraceSummary};
 use crate::rig::Rig;
 use crate::signal::Signal;
 use crate::units::LPM_PER_M3S;
@@ -138,6 +138,13 @@ impl ValveTest {
         self.taken.as_ref().is_some_and(Taken::is_explained)
     }
 
+    /// By how much a leak grows within the trace, L/min per s, where leaks go in straight lines.
+    pub(super) fn growth_lpm_ps(&self, leak: Leak) -> Option<Estimate<f64>> {
+        let fit = &self.taken.as_ref()?.summary;
+        let unit_lpm = LEAK_UNIT_M3SPA * fit.pressures.sizes_pa()[leak] * LPM_PER_M3S;
+        Some(fit.growth?[leak].scaled(unit_lpm))
+    }
+
     /// Flows of the leaks, whatever their sign, m³/s; none where too little was read.
     pub(super) fn flows_m3s(&self) -> Option<PerLeak<Estimate<f64>>> {
         let fit = &self.taken.as_ref().filter(|taken| taken.is_settled)?.summary;
@@ -154,6 +161,14 @@ impl ValveTest {
         let since = self.summary.calibrated.filter(|since| since.leaks == LeaksThen::Unknown);
         for leak in [Leak::ExternalA, Leak::ExternalB] {
             report.leakage[leak].since = since.map(|since| since.date);
+        }
+        let threshold_lpm = rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        for leak in report.verdict.faults.clone() {
+            report.trend[leak] = self.growth_lpm_ps(leak).and_then(|slope| {
+                let size = &report.leakage[leak];
+                let flow = Estimate { value: size.mean_lpm, std: size.std_lpm? };
+                LeakTrend::new(flow, slope, threshold_lpm[leak])
+            });
         }
         let changed_at_s = self.taken.as_ref().and_then(|taken| taken.changed_at_s);
         ReplayReport { valve: Some(self.summary.clone()), changed_at_s, ..report }

@@ -1,12 +1,14 @@
 //! What some seconds of a window say, as normal equations around the same unknowns: enough to find when leaks changed, and whether what
 //! is left is noise.
 
+use super::course::{Course, Solved};
 use super::edges::{PA, PB};
 use super::equations::{Node, Slopes};
+use super::fit::Place;
 use super::unknowns::{Belief, Information, LEAKS, UNKNOWNS, Unknowns};
 use super::whitening::WhiteStep;
 use crate::presence::Pressures;
-use nalgebra::SMatrix;
+use pitchleak_core::{Estimate, PerLeak};
 use serde::{Deserialize, Serialize};
 
 /// Normal equations Λ δ = η of a step from the unknowns of the moment.
@@ -26,18 +28,6 @@ impl Normal {
         Self { information: Information::zeros(), right: Unknowns::zeros() }
     }
 
-    pub fn add(&mut self, other: &Self) {
-        self.information += other.information;
-        self.right += other.right;
-    }
-
-    pub fn add_steps(&mut self, steps: &[WhiteStep]) {
-        let mut sum = Self::none();
-        steps.iter().for_each(|step| sum.add_step(step));
-        sum.information.fill_upper_triangle_with_lower_triangle();
-        self.add(&sum);
-    }
-
     /// To the lower triangle alone.
     fn add_step(&mut self, step: &WhiteStep) {
         let columns: &Slopes = &step.by_unknowns;
@@ -48,22 +38,6 @@ impl Normal {
             }
         }
         self.right -= columns.transpose() * step.residual;
-    }
-
-    /// The step; the unknowns that are not leaks, in which the equations are not linear, are held back by so many times what was
-    /// known of each (Levenberg 1944, Marquardt 1963).
-    pub fn solve(&self, known: &Information, damping: f64) -> Option<Unknowns> {
-        let mut information = self.information;
-        for unknown in (0..UNKNOWNS).filter(|unknown| !(LEAKS..LEAKS + 3).contains(unknown)) {
-            information[(unknown, unknown)] += damping * known[(unknown, unknown)];
-        }
-        let step = information.cholesky()?.solve(&self.right);
-        step.iter().all(|number| number.is_finite()).then_some(step)
-    }
-
-    /// A step's square in the information: none of the unknowns moves by more of its standard deviations than its root.
-    pub fn square(&self, step: &Unknowns) -> f64 {
-        step.dot(&(self.information * step))
     }
 }
 
@@ -93,10 +67,23 @@ impl Part {
         self.pressures.add(to.t_s - from.t_s, a_pa, b_pa);
     }
 
-    fn normal(&self) -> Normal {
+    pub fn middle_s(&self) -> f64 {
+        self.from_s + 0.5 * self.pressures.time_s
+    }
+
+    pub fn normal(&self) -> Normal {
         let mut normal = self.normal.clone();
         normal.information.fill_upper_triangle_with_lower_triangle();
         normal
+    }
+
+    /// The same, around unknowns from which these are so far.
+    fn around(&self, far: &Unknowns) -> Self {
+        let normal = self.normal();
+        let pull = normal.information * far;
+        let squares = self.squares + far.dot(&(2.0 * normal.right + pull));
+        let right = normal.right + pull;
+        Self { normal: Normal { right, ..normal }, squares, ..self.clone() }
     }
 }
 
@@ -112,6 +99,9 @@ pub(super) struct Summary {
     pub course: [f64; 3],
     pub parts: usize,
     pub pressures: Pressures,
+    /// How each leak grows where leaks go in straight lines, in their unit per second.
+    #[serde(default)]
+    pub growth: Option<PerLeak<Estimate<f64>>>,
 }
 
 impl Summary {
@@ -153,8 +143,6 @@ fn most_by_chance(parts: usize) -> f64 {
     (1.0 - share + CHANCE_SIGMAS * share.sqrt()).powi(3)
 }
 
-type Both = SMatrix<f64, { UNKNOWNS + 3 }, { UNKNOWNS + 3 }>;
-type BothRight = SMatrix<f64, { UNKNOWNS + 3 }, 1>;
 /// Leaks have changed where that explains so much more, in squares of the noise: of three leaks, one in a million by chance.
 pub(super) const CHANGED: f64 = 30.7;
 /// Parts of a trace that differ by more than one in ten thousand sound ones would contradict the model, in standard deviations.
@@ -166,97 +154,67 @@ const MOST_PARTS: usize = 120;
 /// Leaks are known from so many parts on.
 const LEAST_PARTS: usize = 2;
 
-/// Sums up the parts of a window around the unknowns `at`; none where they say no finite number.
-pub(super) fn summary(parts: &[Part], before: &Belief, at: &Unknowns) -> Option<Summary> {
-    let normals: Vec<Normal> = parts.iter().map(Part::normal).collect();
-    let noise = parts.iter().map(|part| part.squares).sum::<f64>()
-        / parts.iter().map(|part| part.count).sum::<f64>().max(1.0);
-    let constant = split(&normals, before, at, 0)?;
-    let least = constant.gain + CHANGED * noise.max(1.0);
-    let changed = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
-        .filter_map(|place| split(&normals, before, at, place).map(|found| (place, found)))
-        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
-        .filter(|(_, found)| found.gain > least);
-    let (since, best) = changed.unwrap_or((0, constant));
-    let own = &parts[since..];
-    let count: f64 = own.iter().map(|part| part.count).sum();
-    let moved = best.step;
-    let left = |part: &Part, normal: &Normal| {
-        part.squares - 2.0 * moved.dot(&normal.right) + moved.dot(&(normal.information * moved))
+/// What readings say in the likeliest course: no change, leaks that are others from one part on, or a line.
+pub(super) struct Likeliest {
+    pub summary: Summary,
+    pub course: Course,
+}
+
+/// Sums up the parts of a window, linear around a place; none where they say no finite number.
+pub(super) fn likeliest(parts: &[Part], before: &Belief, place: &Place) -> Option<Likeliest> {
+    let parts: Vec<Part> =
+        parts.iter().map(|part| part.around(&place.course.before_end(part.middle_s()))).collect();
+    let at = &place.unknowns;
+    let solved = |course: Course| course.solved(&parts, before, at);
+    let constant = solved(Course::constant())?;
+    let is_likelier = |found: &Solved| {
+        let all = summed_up(&parts, found, before, at);
+        all.is_some_and(|all| found.gain > constant.gain + CHANGED * all.unlike().powi(2).max(1.0))
     };
-    let squares: f64 = own.iter().zip(&normals[since..]).map(|(part, normal)| left(part, normal)).sum();
-    let covariance = best.information.cholesky()?.inverse();
-    let course = course(&normals[since..], &moved, &covariance);
-    Some(Summary {
-        belief: Belief { mean: at + moved, information: best.information, leak_std: before.leak_std },
-        since,
-        noise: squares / count.max(1.0),
-        course,
-        parts: own.len(),
-        pressures: own.iter().fold(Pressures::default(), |sum, part| sum.plus(&part.pressures)),
+    let since = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
+        .filter_map(|since| solved(Course::since(parts[since].from_s)).map(|found| (since, found)));
+    let line = Course::line(&parts).and_then(solved);
+    let (since, best) = since
+        .chain(line.map(|found| (0, found)))
+        .filter(|(_, found)| is_likelier(found))
+        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
+        .unwrap_or((0, constant));
+    Some(Likeliest {
+        summary: Summary { since, ..summed_up(&parts[since..], &best, before, at)? },
+        course: best.course,
     })
 }
 
-/// The unknowns where the leaks are others from the part `place` on.
-struct Split {
-    step: Unknowns,
-    information: Information,
-    /// Squares that it explains.
-    gain: f64,
-}
-
-fn split(normals: &[Normal], before: &Belief, at: &Unknowns, place: usize) -> Option<Split> {
-    let (mut information, mut right) = (Both::zeros(), BothRight::zeros());
-    // What was believed before is of the leaks before, which stand last.
-    let early = |unknown: usize| {
-        let is_apart = place > 0 && (LEAKS..LEAKS + 3).contains(&unknown);
-        if is_apart { UNKNOWNS + unknown - LEAKS } else { unknown }
-    };
-    let mut add = |normal: &Normal, to: &dyn Fn(usize) -> usize| {
-        for j in 0..UNKNOWNS {
-            for i in 0..UNKNOWNS {
-                information[(to(i), to(j))] += normal.information[(i, j)];
-            }
-            right[to(j)] += normal.right[j];
-        }
-    };
-    let mut first = Normal::prior(before, at);
-    normals[..place].iter().for_each(|normal| first.add(normal));
-    let mut second = Normal::none();
-    normals[place..].iter().for_each(|normal| second.add(normal));
-    add(&first, &early);
-    add(&second, &|unknown| unknown);
-    for (leak, std) in before.leak_std.into_iter().enumerate() {
-        let (free, old, known) = (LEAKS + leak, UNKNOWNS + leak, std.powi(-2));
-        if place > 0 {
-            information[(free, free)] += known;
-            right[free] -= at[free] * known;
-        } else {
-            information[(old, old)] += 1.0;
-        }
-    }
-    let step = information.cholesky()?.solve(&right);
-    // The early leaks are of no interest any more.
-    let inner = information.fixed_view::<3, 3>(UNKNOWNS, UNKNOWNS).try_inverse()?;
-    let outer = information.fixed_view::<UNKNOWNS, 3>(0, UNKNOWNS).into_owned();
-    let own = information.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0) - outer * inner * outer.transpose();
-    let gain = step.dot(&right);
-    gain.is_finite().then(|| Split {
-        step: step.fixed_rows::<UNKNOWNS>(0).into_owned(),
-        information: own,
-        gain,
+/// What parts say in a course.
+fn summed_up(own: &[Part], best: &Solved, before: &Belief, at: &Unknowns) -> Option<Summary> {
+    let moved = |part: &Part| best.step + best.course.before_end(part.middle_s());
+    let around: Vec<Part> = own.iter().map(|part| part.around(&-moved(part))).collect();
+    let squares: f64 = around.iter().map(|part| part.squares).sum();
+    let count: f64 = own.iter().map(|part| part.count).sum();
+    let covariance = best.covariance();
+    Some(Summary {
+        belief: Belief {
+            mean: at + best.step,
+            information: covariance.cholesky()?.inverse(),
+            leak_std: before.leak_std,
+        },
+        since: 0,
+        noise: squares / count.max(1.0),
+        course: course(&around, &covariance),
+        parts: own.len(),
+        pressures: own.iter().fold(Pressures::default(), |sum, part| sum.plus(&part.pressures)),
+        growth: best.growth(),
     })
 }
 
 /// The leaks' variances by the parts' own scores over those by the noise: errors of the model make neighbours alike, and parts different
 /// (the sandwich of Huber 1967, "The behavior of maximum likelihood estimates under nonstandard conditions").
-fn course(normals: &[Normal], moved: &Unknowns, covariance: &Information) -> [f64; 3] {
+fn course(parts: &[Part], covariance: &Information) -> [f64; 3] {
     let (mut seen, mut expected) = ([0.0; 3], [0.0; 3]);
-    for normal in normals {
-        let score = normal.right - normal.information * moved;
+    for normal in parts.iter().map(Part::normal) {
         for leak in 0..3 {
             let row = covariance.row(LEAKS + leak).transpose();
-            seen[leak] += row.dot(&score).powi(2);
+            seen[leak] += row.dot(&normal.right).powi(2);
             expected[leak] += row.dot(&(normal.information * row));
         }
     }

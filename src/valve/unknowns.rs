@@ -27,7 +27,7 @@ const ZERO_SHARE: f64 = 1.0 / 3.0;
 /// Pressure of a chamber in which it is not measured, Pa: a guess.
 const UNREAD_PA: f64 = 50e5;
 /// By so much valves that have worn leak more at their middle than their data sheet says: 7 % of the rated flow were measured on a
-/// servovalve where 2 % are usual. Chosen.
+/// servovalve (docs/valve.md).
 const WORN: f64 = 3.6;
 /// Of what is known for certain: rounding.
 pub(super) const CERTAIN: f64 = 1e-6;

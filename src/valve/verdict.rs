@@ -4,7 +4,7 @@ use super::calibration::LeaksThen;
 use super::meter::Taken;
 use super::outcome::ValveTest;
 use crate::presence::{Found, Wording, told};
-use crate::report::{Reason, ReasonId, Status, Verdict, capital, join};
+use crate::report::{Reason, ReasonId, Status, Verdict, capital, join, with_interval};
 use crate::rig::Rig;
 use crate::units::readable;
 use pitchleak_core::Leak;
@@ -23,7 +23,10 @@ impl ValveTest {
         };
         let wording = Wording {
             teller: "The valve's flows",
-            beside: &|leak| self.against(leak),
+            beside: &|leak| {
+                let said: Vec<String> = self.grows(leak).into_iter().chain(self.against(leak)).collect();
+                (!said.is_empty()).then(|| said.join(" "))
+            },
             basis: self.basis(),
             undecided: None,
             open: &|open| self.open(found, open),
@@ -59,6 +62,15 @@ impl ValveTest {
             },
         };
         Reason::new(ReasonId::NotIdentifiable, text, remedy)
+    }
+
+    /// How a leak grows that goes in a straight line; what may be as steady is not said to.
+    fn grows(&self, leak: Leak) -> Option<String> {
+        let slope = self.growth_lpm_ps(leak)?.scaled(3600.0);
+        let verb = if slope.value > 0.0 { "grows" } else { "falls" };
+        let is_told = slope.value.abs() > slope.half_width95();
+        let size = with_interval(slope.value.abs(), Some(slope.std));
+        is_told.then(|| format!("It {verb} by {size} L/min per hour: figures are those of the trace's end."))
     }
 
     /// An external leak is told against what the valve's own clearance may leak, or against a calibration.

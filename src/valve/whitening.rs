@@ -59,12 +59,12 @@ impl Whitening {
         &self.steps
     }
 
-    /// By how much each node's signals are off, R Gᵀ S⁻¹ of what is left, where `left` is that, whitened.
-    pub fn corrections(&self, left: impl Fn(&WhiteStep) -> Vector2<f64>) -> Option<Vec<Signals>> {
+    /// By how much each node's signals are off, R Gᵀ S⁻¹ of what is left, where `left` is that of each step, whitened.
+    pub fn corrections(&self, left: impl Fn(usize, &WhiteStep) -> Vector2<f64>) -> Option<Vec<Signals>> {
         let mut corrections = vec![Signals::zeros(); self.steps.len() + 1];
         let mut carried = Vector2::zeros();
         for (index, step) in self.steps.iter().enumerate().rev() {
-            let pull = step.diagonal.tr_solve_lower_triangular(&(left(step) - carried))?;
+            let pull = step.diagonal.tr_solve_lower_triangular(&(left(index, step) - carried))?;
             corrections[index] += step.by_first.transpose() * pull;
             corrections[index + 1] += step.by_last.transpose() * pull;
             carried = step.below.transpose() * pull;

@@ -58,6 +58,8 @@ pub struct ValveCylinder {
     pub leaks_lpm: [f64; 3],
     /// The first leaks set in at this time, s.
     pub leaks_from_s: f64,
+    /// … at once, or grow steadily until this time, s.
+    pub leaks_until_s: f64,
     /// How windy it is: 1 is 13 m/s.
     pub wind: f64,
     /// Dry friction, N.
@@ -133,6 +135,7 @@ impl ValveCylinder {
             bulk_pa: 0.8e9 / (1.0 + 0.25 * off),
             leaks_lpm: [0.0; 3],
             leaks_from_s: f64::NEG_INFINITY,
+            leaks_until_s: f64::NEG_INFINITY,
             wind: 1.0,
             dry_n: 100.0,
             pressure_lag_s: 0.0,
@@ -280,8 +283,10 @@ impl<'a> Run<'a> {
     fn rates(&self, t: f64, at: &State) -> State {
         let [x, v, pa, pb, u, du] = *at;
         let of = self.of;
-        let [internal, a, b] =
-            if t >= of.leaks_from_s { of.leaks_lpm.map(|lpm| lpm * LEAK_UNIT) } else { [0.0; 3] };
+        let grows_s = of.leaks_until_s - of.leaks_from_s;
+        let share = if grows_s > 0.0 { ((t - of.leaks_from_s) / grows_s).clamp(0.0, 1.0) } else { 1.0 };
+        let share = if t >= of.leaks_from_s { share } else { 0.0 };
+        let [internal, a, b] = of.leaks_lpm.map(|lpm| share * lpm * LEAK_UNIT);
         let ps = self.supply_pa - of.valve.droop_pa * self.drawn_m3s * 6e3;
         let [qa, qb] = of.valve.flows(self.true_spool(u), pa, pb, ps);
         let through = internal * (pa - pb);
