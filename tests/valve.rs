@@ -191,7 +191,7 @@ type Flaw = fn(&mut ValveCylinder);
 
 /// What no rig file declares (theory of leaks without flow meters), by name; the last says
 /// whether the valve was built so, and calibrated with it.
-const UNDECLARED: [(&str, Flaw, bool); 12] = [
+const UNDECLARED: [(&str, Flaw, bool); 13] = [
     (
         "soft hysteresis of 1 %",
         |one| {
@@ -207,6 +207,7 @@ const UNDECLARED: [(&str, Flaw, bool); 12] = [
     ("saturation of 15 %", |one| one.valve.saturation = 0.15, true),
     ("supply droops by 2 bar", |one| one.valve.droop_pa = 2e5, false),
     ("supply droops by 5 bar", |one| one.valve.droop_pa = 5e5, false),
+    ("tank's pressure up by 2 bar", |one| one.valve.tank_pa += 2e5, false),
     ("pressure A 10 ms late", |one| one.pressure_lag_s = 0.01, false),
     ("accumulator at A", |one| one.accumulator_m3pa = 2e-13, false),
     ("dry friction of 600 N", |one| one.dry_n = 600.0, false),
@@ -286,8 +287,10 @@ fn what_a_valve_does_beside_its_calibration_is_no_leak() {
         // Nothing in the model follows the reading by half: one in fifty.
         let most = if name.starts_with("soft") { all.div_ceil(50) } else { 0 };
         assert!(wrong <= most, "{name}: {wrong} wrong");
-        // As the data sheet declares it.
-        assert!(name != "hysteresis of 0.3 %" || right * 100 >= all * 95, "{name}: {right} of {all}");
+        // As the data sheet declares them, or as unknowns of the model may go.
+        let is_known =
+            ["hysteresis of 0.3 %", "null drift of 0.5 %", "tank's pressure up by 2 bar"].contains(&name);
+        assert!(!is_known || right * 100 >= all * 95, "{name}: {right} of {all}");
     }
 }
 
@@ -327,7 +330,8 @@ fn a_leak_that_sets_in_is_told_as_it_is_now() {
     assert!(right * 100 >= runs() * 80, "{right}");
 }
 
-/// A leak that grows from none in the trace, on a calibrated valve whose zero walks beside it or not: told as it is at the end.
+/// A leak that grows from none in the trace, on a calibrated valve whose zero walks beside it, or whose spool has
+/// hysteresis, or neither: told as it is at the end.
 #[test]
 fn a_leak_that_grows_is_told_as_it_is_at_the_end() {
     let known: Vec<_> =
@@ -335,11 +339,12 @@ fn a_leak_that_grows_is_told_as_it_is_at_the_end() {
     let cases: Vec<_> = (0..known.len()).flat_map(|seed| WINDS.map(|wind| (seed, wind))).collect();
     let (mut right, mut squares, mut doubtful, mut all) = (0, 0.0, 0, 0);
     for (index, lpm) in [(0, 0.1), (1, 0.2), (2, 0.2)] {
-        for null_drift in [0.0, 0.005] {
+        for (null_drift, hysteresis) in [(0.0, 0.0), (0.005, 0.0), (0.0, 0.003)] {
             let reports = cases.par_iter().map(|(seed, wind)| {
                 let change = |now: &mut ValveCylinder| {
                     (now.leaks_from_s, now.leaks_until_s) = (0.0, 60.0);
-                    (now.leaks_lpm[index], now.wind, now.valve.null_drift) = (lpm, *wind, null_drift);
+                    (now.leaks_lpm[index], now.wind) = (lpm, *wind);
+                    (now.valve.null_drift, now.valve.hysteresis) = (null_drift, hysteresis);
                 };
                 later(&known[*seed], *seed as u64, change, |text| text)
             });

@@ -71,6 +71,22 @@ pub(super) struct Node {
     pub spool: Spool,
 }
 
+impl Node {
+    /// Half way to another one.
+    pub fn half_way(&self, to: &Self) -> Self {
+        let mean = |from: f64, to: f64| 0.5 * (from + to);
+        Self {
+            t_s: mean(self.t_s, to.t_s),
+            signals: (self.signals + to.signals) * 0.5,
+            spool: Spool {
+                rate_ps: mean(self.spool.rate_ps, to.spool.rate_ps),
+                play: mean(self.spool.play, to.spool.play),
+                tank_pa: mean(self.spool.tank_pa, to.spool.tank_pa),
+            },
+        }
+    }
+}
+
 /// A node's leaks less its flows, and their slopes.
 pub(super) struct Rates {
     net_m3s: Vector2<f64>,
@@ -117,26 +133,27 @@ pub(super) struct Step {
 impl Step {
     pub fn between(
         [first, last]: [&Node; 2],
-        [from, to]: [&Rates; 2],
+        [from, middle, to]: [&Rates; 3],
         unknowns: &Unknowns,
         known: &Known,
     ) -> Self {
         let cylinder = &known.cylinder;
-        let half_s = 0.5 * (last.t_s - first.t_s);
+        // Simpson's rule: where an edge opens, flows bend between two readings.
+        let sixth_s = (last.t_s - first.t_s) / 6.0;
         let kappa = unknowns[KAPPA] * known.kappa_ppa;
         let rise = last.signals - first.signals;
         let middle_m = 0.5 * (first.signals[X] + last.signals[X]);
         let (area_a, area_b) = (cylinder.area_a_m2, cylinder.area_b_m2);
         let (volume_a, volume_b) = (cylinder.volume_a_m3(middle_m), cylinder.volume_b_m3(middle_m));
         let mut step = Self {
-            residual_m3: (from.net_m3s + to.net_m3s) * half_s
+            residual_m3: (from.net_m3s + 4.0 * middle.net_m3s + to.net_m3s) * sixth_s
                 + Vector2::new(
                     area_a * rise[X] + kappa * volume_a * rise[PA],
                     -area_b * rise[X] + kappa * volume_b * rise[PB],
                 ),
-            by_first: from.by_signals * half_s,
-            by_last: to.by_signals * half_s,
-            by_unknowns: (from.by_unknowns + to.by_unknowns) * half_s,
+            by_first: (from.by_signals + 2.0 * middle.by_signals) * sixth_s,
+            by_last: (2.0 * middle.by_signals + to.by_signals) * sixth_s,
+            by_unknowns: (from.by_unknowns + 4.0 * middle.by_unknowns + to.by_unknowns) * sixth_s,
         };
         for (slopes, sign) in [(&mut step.by_first, -1.0), (&mut step.by_last, 1.0)] {
             slopes[(0, X)] += sign * area_a + 0.5 * kappa * area_a * rise[PA];

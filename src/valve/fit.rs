@@ -113,7 +113,8 @@ impl Smoothed {
             let unknowns = &place.unknowns_at(node.t_s);
             let rates = Rates::at(node, unknowns, known);
             if let Some((first_reading, first, from)) = &last {
-                let mut step = Step::between([first, node], [from, &rates], unknowns, known);
+                let middle = Rates::at(&first.half_way(node), unknowns, known);
+                let mut step = Step::between([first, node], [from, &middle, &rates], unknowns, known);
                 // At the readings themselves, made linear at the signals.
                 step.residual_m3 += step.by_first * (first_reading.signals - first.signals)
                     + step.by_last * (reading.signals - node.signals);

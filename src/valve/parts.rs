@@ -158,6 +158,8 @@ const LEAST_PARTS: usize = 2;
 pub(super) struct Likeliest {
     pub summary: Summary,
     pub course: Course,
+    /// What they say if leaks change at once or never.
+    pub at_once: Summary,
 }
 
 /// Sums up the parts of a window, linear around a place; none where they say no finite number.
@@ -172,16 +174,17 @@ pub(super) fn likeliest(parts: &[Part], before: &Belief, place: &Place) -> Optio
         all.is_some_and(|all| found.gain > constant.gain + CHANGED * all.unlike().powi(2).max(1.0))
     };
     let since = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
-        .filter_map(|since| solved(Course::since(parts[since].from_s)).map(|found| (since, found)));
-    let line = Course::line(&parts).and_then(solved);
-    let (since, best) = since
-        .chain(line.map(|found| (0, found)))
+        .filter_map(|since| solved(Course::since(parts[since].from_s)).map(|found| (since, found)))
         .filter(|(_, found)| is_likelier(found))
-        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
-        .unwrap_or((0, constant));
-    Some(Likeliest {
-        summary: Summary { since, ..summed_up(&parts[since..], &best, before, at)? },
-        course: best.course,
+        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
+    let line = Course::line(&parts).and_then(solved).filter(is_likelier);
+    let (since, best) = since.unwrap_or((0, constant));
+    let at_once = Summary { since, ..summed_up(&parts[since..], &best, before, at)? };
+    Some(match line.filter(|line| line.gain > best.gain) {
+        Some(line) => {
+            Likeliest { summary: summed_up(&parts, &line, before, at)?, course: line.course, at_once }
+        }
+        None => Likeliest { summary: at_once.clone(), course: best.course, at_once },
     })
 }
 

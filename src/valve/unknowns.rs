@@ -9,17 +9,16 @@ pub(super) use pitchleak_core::valve_unknowns::{
     CLEARANCES, DROOP, GAINS, HYSTERESIS, KAPPA, LAG, LAMINAR_PA, LAPS, LEAK_UNIT_M3SPA, LEAKS, PA_PER_BAR,
     ROUNDING, S_PER_MS, SATURATION, SUPPLY, TANK,
 };
-use pitchleak_core::valve_unknowns::{DRIFT_S, NULL_DRIFT_S};
+use pitchleak_core::valve_unknowns::{DRIFT_S, NULL_DRIFT_S, TANK_STD_BAR};
 
 pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 pub(super) type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// A leak's size before any reading, 1 σ: any that a cylinder may have.
 pub(super) const LEAK_STD: f64 = 100.0;
-/// Edges are rounded off by some hundredths of the stroke, and full openings lack some: guesses, as is the tank's pressure.
+/// Edges are rounded off by some hundredths of the stroke, and full openings lack some: guesses.
 const ROUNDING_USUAL: [f64; 2] = [0.02, 0.01];
 const SATURATION_STD: f64 = 0.05;
-const TANK_STD_BAR: f64 = 1.0;
 const LAG_STD_MS: f64 = 2.0;
 const DROOP_STD_BAR: f64 = 2.0;
 /// Zeros of a pressure sensor that nobody declared, a share of its accuracy: 1 σ.
@@ -99,6 +98,7 @@ impl Belief {
             change[CLEARANCES + edge] = share * sheet.drift.null_leak * clearance_std(sheet);
         }
         change[HYSTERESIS] = share * sheet.hysteresis;
+        change[TANK] = share * TANK_STD_BAR;
         change[KAPPA] = share * rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa;
         let spread = self.covariance()? + Information::from_diagonal(&change.map(|std| std * std));
         Some(Self { information: spread.cholesky()?.inverse(), ..self.clone() })

@@ -45,6 +45,8 @@ pub struct TrueValve {
     pub spool_lag_s: f64,
     /// Resistance between the supply's sensor and the valve: drop at 10 L/min, Pa.
     pub droop_pa: f64,
+    /// Of the tank.
+    pub tank_pa: f64,
 }
 
 /// A windy stretch of a pitch cylinder without flow meters.
@@ -91,6 +93,7 @@ impl TrueValve {
             null_drift: 0.0,
             spool_lag_s: 0.0,
             droop_pa: 0.0,
+            tank_pa: 2e5,
         }
     }
 
@@ -121,8 +124,10 @@ impl TrueValve {
             gain * self.opening(spool - self.laps[i], u) * root(drop)
                 + self.clearances_lpm[i] * LEAK_UNIT * drop
         };
-        let tank = 2e5;
-        [edge(0, u, ps - pa) - edge(1, -u, pa - tank), edge(2, -u, ps - pb) - edge(3, u, pb - tank)]
+        [
+            edge(0, u, ps - pa) - edge(1, -u, pa - self.tank_pa),
+            edge(2, -u, ps - pb) - edge(3, u, pb - self.tank_pa),
+        ]
     }
 }
 

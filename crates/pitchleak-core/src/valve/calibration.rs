@@ -2,7 +2,7 @@
 
 use super::unknowns::{
     CLEARANCES, DRIFT_S, GAINS, HYSTERESIS, KAPPA, LAPS, LEAK_UNIT_M3SPA, LEAKS, NULL_DRIFT_S, ROUNDING,
-    VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
+    TANK, TANK_STD_BAR, VALVE_COVARIANCES, VALVE_UNKNOWNS as N,
 };
 use crate::{CylinderError, Fluid, Real};
 
@@ -111,6 +111,7 @@ impl<T: Real> ValveCalibration<T> {
                 KAPPA => oil * oil / day_s,
                 GAINS..LAPS => own * own / day_s,
                 LAPS..ROUNDING => self.lap_drift * self.lap_drift / day_s,
+                TANK => T::lit(TANK_STD_BAR * TANK_STD_BAR) / day_s,
                 CLEARANCES..HYSTERESIS => clearance * clearance / day_s,
                 HYSTERESIS => self.hysteresis * self.hysteresis / day_s,
                 _ => T::zero(),

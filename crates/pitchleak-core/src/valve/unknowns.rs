@@ -35,6 +35,8 @@ pub const DROOP: usize = 22;
 pub const DRIFT_S: f64 = 86_400.0;
 /// See [`DRIFT_S`].
 pub const NULL_DRIFT_S: f64 = 600.0;
+/// What the tank's pressure is off by, and how far it goes in a day, 1 σ, bar: a guess.
+pub const TANK_STD_BAR: f64 = 1.0;
 /// Below this drop an edge turns laminar, Pa.
 pub const LAMINAR_PA: f64 = 1e4;
 
