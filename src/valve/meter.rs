@@ -297,17 +297,19 @@ impl ValveMeter {
         if found.course.is_constant() && found.summary.is_explained() {
             return Some((constant, found.summary));
         }
-        let told = |(fit, found): &(Fit, Likeliest)| fit.is_settled && !found.course.is_constant();
-        let line = Course::line(&constant.parts).and_then(fit_in).filter(told);
-        if let Some((fit, found)) =
-            line.filter(|(_, found)| found.course.is_line() && found.summary.is_explained())
-        {
+        let line = Course::line(&constant.parts).and_then(fit_in);
+        let is_line = |fit: &Fit, found: &Likeliest| {
+            fit.is_settled && found.course.is_line() && found.summary.is_explained()
+        };
+        if let Some((fit, found)) = line.filter(|(fit, found)| is_line(fit, found)) {
             return Some((fit, found.summary));
         }
-        match fit_in(Course::stairs(&constant.parts)).filter(told) {
-            Some((stairs, found)) => Some((stairs, found.summary)),
-            None => Some((constant, found.at_once)),
-        }
+        // Both sides of a change are fitted anew, wherever this search ended.
+        let stairs = fit_in(Course::stairs(&constant.parts)).filter(|(_, found)| found.at_once.since > 0);
+        Some(match stairs {
+            Some((stairs, found)) => (stairs, found.at_once),
+            None => (constant, found.at_once),
+        })
     }
 
     /// What readings say of the leaks since they changed; what was before the change tells of the valve alone.
