@@ -52,6 +52,9 @@ pub struct Replay {
     detector: LeakDetector<f64>,
     /// Over the trace, or since the leak changed.
     pressures: TracePressures,
+    /// Over the trace, which the decision is about.
+    #[serde(default)]
+    all_pressures: TracePressures,
     changed_at_s: Option<f64>,
     scoring: Scoring,
     alarms: Vec<Alarm>,
@@ -87,6 +90,7 @@ impl Replay {
             doubt: EffectUncertainty::of(rig)?,
             detector: LeakDetector::new(rig.alarms),
             pressures: TracePressures::default(),
+            all_pressures: TracePressures::default(),
             changed_at_s: None,
             scoring: Scoring::default(),
             alarms: Vec::new(),
@@ -174,6 +178,7 @@ impl Replay {
     #[inline]
     fn take(&mut self, record: &Record) -> bool {
         self.pressures.add(record);
+        self.all_pressures.add(record);
         self.oil.add(record);
         if self.knows_noise() {
             let fresh = &mut self.fresh;

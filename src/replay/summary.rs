@@ -170,11 +170,12 @@ impl Replay {
                 }
             });
         };
-        let shares = self.pressures.sizes().sizes_pa.zip(self.pressures.net().sizes_pa);
+        let pressures = &self.all_pressures;
+        let shares = pressures.sizes().sizes_pa.zip(pressures.net().sizes_pa);
+        let shares = shares.map(|(size_pa, net_pa)| if size_pa > 0.0 { net_pa / size_pa } else { 1.0 });
         let own = self.correction.as_ref().map_or_else(PerLeak::default, Correction::mean_leaks_m3s);
-        decision.leakage.zip(shares).zip(own).map(|((belief, (size_pa, net_pa)), own_m3s)| {
+        decision.leakage.zip(shares).zip(own).map(|((belief, net_share), own_m3s)| {
             let mean_lpm = belief.mean_lpm + own_m3s * LPM_PER_M3S;
-            let net_share = if size_pa > 0.0 { net_pa / size_pa } else { 1.0 };
             Leakage {
                 mean_lpm,
                 net_mean_lpm: Some(net_share * mean_lpm),
