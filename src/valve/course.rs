@@ -9,6 +9,8 @@ use pitchleak_core::{Estimate, PerLeak};
 const RISING: usize = 4;
 /// Fewer parts tell no line from a step.
 const LEAST_IN_LINE: usize = 6;
+/// More stairs cost more than they tell; numerical.
+const MOST_STAIRS: usize = 60;
 /// The spool's zero may walk by this share of the stroke in a window, 1 σ. A guess.
 const NULL_WALK: f64 = 0.005;
 
@@ -71,7 +73,8 @@ impl Course {
     }
 
     pub fn stairs(parts: &[Part]) -> Self {
-        let begins: Vec<f64> = parts.iter().skip(1).map(|part| part.from_s).collect();
+        let each = parts.len().div_ceil(MOST_STAIRS).max(1);
+        let begins: Vec<f64> = parts.iter().step_by(each).skip(1).map(|part| part.from_s).collect();
         Self { rises: vec![Rise::zeros(); begins.len()], shape: Shape::Stairs(begins) }
     }
 

@@ -77,6 +77,20 @@ impl Part {
         normal
     }
 
+    fn plus(&self, other: &Self) -> Self {
+        let [own, other_normal] = [self, other].map(|part| part.normal());
+        Self {
+            from_s: self.from_s,
+            normal: Normal {
+                information: own.information + other_normal.information,
+                right: own.right + other_normal.right,
+            },
+            squares: self.squares + other.squares,
+            count: self.count + other.count,
+            pressures: self.pressures.plus(&other.pressures),
+        }
+    }
+
     /// The same, around unknowns from which these are so far.
     fn around(&self, far: &Unknowns) -> Self {
         let normal = self.normal();
@@ -170,13 +184,19 @@ pub(super) fn likeliest(parts: &[Part], before: &Belief, place: &Place) -> Optio
     let solved = |course: Course| course.solved(&parts, before, at);
     let constant = solved(Course::constant())?;
     let is_likelier = |found: &Solved| {
-        let all = summed_up(&parts, found, before, at);
-        all.is_some_and(|all| found.gain > constant.gain + CHANGED * all.unlike().powi(2).max(1.0))
+        let more = found.gain - constant.gain;
+        let unlike = || summed_up(&parts, found, before, at).map(|all| all.unlike().powi(2));
+        more > CHANGED && unlike().is_some_and(|unlike| more > CHANGED * unlike)
     };
+    let (early, late) = (sums(parts.iter()), sums(parts.iter().rev()));
     let since = (LEAST_PARTS..(parts.len() + 1).saturating_sub(LEAST_PARTS))
-        .filter_map(|since| solved(Course::since(parts[since].from_s)).map(|found| (since, found)))
-        .filter(|(_, found)| is_likelier(found))
-        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
+        .filter_map(|since| {
+            let late = Part { from_s: parts[since].from_s, ..late[parts.len() - 1 - since].clone() };
+            let sides = [early[since - 1].clone(), late];
+            Some((since, Course::since(sides[1].from_s).solved(&sides, before, at)?))
+        })
+        .max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain))
+        .filter(|(_, found)| is_likelier(found));
     let line = Course::line(&parts).and_then(solved).filter(is_likelier);
     let (since, best) = since.unwrap_or((0, constant));
     let at_once = Summary { since, ..summed_up(&parts[since..], &best, before, at)? };
@@ -186,6 +206,16 @@ pub(super) fn likeliest(parts: &[Part], before: &Belief, place: &Place) -> Optio
         }
         None => Likeliest { summary: at_once.clone(), course: best.course, at_once },
     })
+}
+
+/// The sums of the first one, two and more.
+fn sums<'a>(parts: impl Iterator<Item = &'a Part>) -> Vec<Part> {
+    let sum = |sum: &mut Option<Part>, part: &Part| {
+        let next = sum.as_ref().map_or_else(|| part.clone(), |sum| sum.plus(part));
+        *sum = Some(next.clone());
+        Some(next)
+    };
+    parts.scan(None, sum).collect()
 }
 
 /// What parts say in a course.
