@@ -103,7 +103,7 @@ impl Course {
         // What was believed before is of the beginning.
         let from_s = parts.first().map_or(0.0, |part| part.from_s);
         sum.add(&Normal::prior(before, &(at + self.before_end(from_s))), self.share(from_s));
-        parts.iter().for_each(|part| sum.add(&part.normal(), self.share(part.middle_s())));
+        parts.iter().for_each(|part| sum.add(&part.normal, self.share(part.middle_s())));
         let null = if matches!(self.shape, Shape::Since(_)) { CERTAIN } else { NULL_WALK };
         for (place, rise) in self.rises.iter().enumerate() {
             for (one, std) in before.leak_std.into_iter().chain([null]).enumerate() {
@@ -132,14 +132,6 @@ impl Course {
         let gain = solution.dot(&right);
         let step = solution.fixed_rows::<UNKNOWNS>(0).into_owned();
         gain.is_finite().then(|| Solved { step, course: self.moved(&solution, 1.0), gain, covariance })
-    }
-
-    pub fn is_constant(&self) -> bool {
-        matches!(self.shape, Shape::Constant)
-    }
-
-    pub fn is_line(&self) -> bool {
-        matches!(self.shape, Shape::Line { .. })
     }
 }
 

@@ -148,7 +148,7 @@ impl Smoothed {
                 part.add(step, [from, to], self.known.told);
             }
         }
-        parts
+        parts.into_iter().map(Part::whole).collect()
     }
 }
 

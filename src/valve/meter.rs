@@ -293,22 +293,20 @@ impl ValveMeter {
             let found = likeliest(&fit.parts, before, &fit.place)?;
             Some((fit, found))
         };
-        let (constant, found) = fit_in(Course::constant())?;
-        if found.course.is_constant() && found.summary.is_explained() {
-            return Some((constant, found.summary));
+        let (constant, Likeliest { at_once, line }) = fit_in(Course::constant())?;
+        if line.is_none() && at_once.since == 0 && at_once.is_explained() {
+            return Some((constant, at_once));
         }
         let line = Course::line(&constant.parts).and_then(fit_in);
-        let is_line = |fit: &Fit, found: &Likeliest| {
-            fit.is_settled && found.course.is_line() && found.summary.is_explained()
-        };
-        if let Some((fit, found)) = line.filter(|(fit, found)| is_line(fit, found)) {
-            return Some((fit, found.summary));
+        let line = line.and_then(|(fit, found)| Some((fit, found.line?)));
+        if let Some(told) = line.filter(|(fit, summary)| fit.is_settled && summary.is_explained()) {
+            return Some(told);
         }
         // Both sides of a change are fitted anew, wherever this search ended.
         let stairs = fit_in(Course::stairs(&constant.parts)).filter(|(_, found)| found.at_once.since > 0);
         Some(match stairs {
             Some((stairs, found)) => (stairs, found.at_once),
-            None => (constant, found.at_once),
+            None => (constant, at_once),
         })
     }
 

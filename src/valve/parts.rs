@@ -45,7 +45,7 @@ impl Normal {
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub from_s: f64,
-    normal: Normal,
+    pub normal: Normal,
     /// What is left, squared, and of how many equations.
     squares: f64,
     count: f64,
@@ -71,19 +71,18 @@ impl Part {
         self.from_s + 0.5 * self.pressures.time_s
     }
 
-    pub fn normal(&self) -> Normal {
-        let mut normal = self.normal.clone();
-        normal.information.fill_upper_triangle_with_lower_triangle();
-        normal
+    /// With its normal equations whole: steps are added to the lower triangle.
+    pub fn whole(mut self) -> Self {
+        self.normal.information.fill_upper_triangle_with_lower_triangle();
+        self
     }
 
     fn plus(&self, other: &Self) -> Self {
-        let [own, other_normal] = [self, other].map(|part| part.normal());
         Self {
             from_s: self.from_s,
             normal: Normal {
-                information: own.information + other_normal.information,
-                right: own.right + other_normal.right,
+                information: self.normal.information + other.normal.information,
+                right: self.normal.right + other.normal.right,
             },
             squares: self.squares + other.squares,
             count: self.count + other.count,
@@ -93,11 +92,11 @@ impl Part {
 
     /// The same, around unknowns from which these are so far.
     fn around(&self, far: &Unknowns) -> Self {
-        let normal = self.normal();
-        let pull = normal.information * far;
-        let squares = self.squares + far.dot(&(2.0 * normal.right + pull));
-        let right = normal.right + pull;
-        Self { normal: Normal { right, ..normal }, squares, ..self.clone() }
+        let pull = self.normal.information * far;
+        let mut around = self.clone();
+        around.squares += far.dot(&(2.0 * self.normal.right + pull));
+        around.normal.right += pull;
+        around
     }
 }
 
@@ -168,12 +167,12 @@ const MOST_PARTS: usize = 120;
 /// Leaks are known from so many parts on.
 const LEAST_PARTS: usize = 2;
 
-/// What readings say in the likeliest course: no change, leaks that are others from one part on, or a line.
+/// What readings say in the likeliest courses.
 pub(super) struct Likeliest {
-    pub summary: Summary,
-    pub course: Course,
-    /// What they say if leaks change at once or never.
+    /// If leaks never change, or at once.
     pub at_once: Summary,
+    /// In a line, where that is likelier.
+    pub line: Option<Summary>,
 }
 
 /// Sums up the parts of a window, linear around a place; none where they say no finite number.
@@ -200,12 +199,8 @@ pub(super) fn likeliest(parts: &[Part], before: &Belief, place: &Place) -> Optio
     let line = Course::line(&parts).and_then(solved).filter(is_likelier);
     let (since, best) = since.unwrap_or((0, constant));
     let at_once = Summary { since, ..summed_up(&parts[since..], &best, before, at)? };
-    Some(match line.filter(|line| line.gain > best.gain) {
-        Some(line) => {
-            Likeliest { summary: summed_up(&parts, &line, before, at)?, course: line.course, at_once }
-        }
-        None => Likeliest { summary: at_once.clone(), course: best.course, at_once },
-    })
+    let line = line.filter(|line| line.gain > best.gain);
+    Some(Likeliest { at_once, line: line.and_then(|line| summed_up(&parts, &line, before, at)) })
 }
 
 /// The sums of the first one, two and more.
@@ -244,7 +239,7 @@ fn summed_up(own: &[Part], best: &Solved, before: &Belief, at: &Unknowns) -> Opt
 /// (the sandwich of Huber 1967, "The behavior of maximum likelihood estimates under nonstandard conditions").
 fn course(parts: &[Part], covariance: &Information) -> [f64; 3] {
     let (mut seen, mut expected) = ([0.0; 3], [0.0; 3]);
-    for normal in parts.iter().map(Part::normal) {
+    for Part { normal, .. } in parts {
         for leak in 0..3 {
             let row = covariance.row(LEAKS + leak).transpose();
             seen[leak] += row.dot(&normal.right).powi(2);
