@@ -13,7 +13,7 @@ use pitchleak::wind::{Emulation, History, Wind, WindCase};
 use pitchleak_testkit::lies::judge::{self, Judgement, Said, judge, recorded};
 use pitchleak_testkit::lies::{Family, LEAKING, Lie, leak_name, rig, truths};
 use pitchleak_testkit::trace_text::{file, row};
-use pitchleak_testkit::{Motion, noisy, seeded};
+use pitchleak_testkit::{Motion, Multisine, noisy, seeded};
 use rayon::prelude::*;
 use std::io::Cursor;
 
@@ -286,5 +286,36 @@ fn sizes_that_nothing_has_explain_nothing() {
         let verdict = report_on(&rows.collect::<Vec<_>>(), &rig).verdict;
         let names_outside = verdict.faults.iter().any(|leak| *leak != Leak::Internal);
         assert!(verdict.status != Status::Leak || !names_outside, "{seed}: {}", verdict.text);
+    }
+}
+
+/// Where the load is steady, a leak past the piston and zeros of both meters that are equal and opposite are alike, but for what the
+/// pressures show: and one of their sensors hangs.
+#[test]
+fn a_pressure_sensor_that_hangs_makes_no_zeros_of_a_leak() {
+    let rig = rig(1e-3);
+    let status = |internal: f64, play_pa: f64, seed: u64| {
+        let common = [(4e5, 0.11, 0.4), (2e5, 0.31, 2.2), (1e5, 0.73, 0.7)];
+        let wind_like = Motion::wind_like(PerLeak { internal, ..PerLeak::default() });
+        let pressure_a_pa = Multisine { mean: 8e6, lines: common.to_vec() };
+        let pressure_b_pa = Multisine { mean: 6e6, lines: common.to_vec() };
+        let motion = Motion { pressure_a_pa, pressure_b_pa, ..wind_like };
+        let (mut random, mut hanging_pa) = (seeded(seed), 6e6_f64);
+        let rows = (0..6000).map(|k| {
+            let t_s = 0.01 * f64::from(k);
+            let mut sample = motion.sample(t_s);
+            hanging_pa = hanging_pa.clamp(sample.pb_pa - 0.5 * play_pa, sample.pb_pa + 0.5 * play_pa);
+            sample.pb_pa = hanging_pa;
+            row(t_s, motion.position_m.slope(t_s), &noisy(&sample, &rig.sensors(), &mut random))
+        });
+        report_on(&rows.collect::<Vec<_>>(), &rig).verdict
+    };
+    for (seed, lpm) in (0..8).zip([0.16, 0.2, 0.24, 0.28].into_iter().cycle()) {
+        for play_pa in [1e5, 2e5, 4e5] {
+            let verdict = status(lpm / LPM_PER_M3S / 2e6, play_pa, seed);
+            assert_ne!(verdict.status, Status::Sound, "{lpm} L/min, {play_pa} Pa, {seed}: {}", verdict.text);
+            let sound = status(0.0, play_pa, seed);
+            assert_eq!(sound.status, Status::Sound, "{play_pa} Pa, {seed}: {}", sound.text);
+        }
     }
 }

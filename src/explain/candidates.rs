@@ -85,19 +85,20 @@ impl<'a, 'p> Candidates<'a, 'p> {
     }
 
     fn add_constant_leaks(&mut self, state: State<'a>) {
-        let own: Vec<Subset> = subsets().filter(|subset| is_asked(state, *subset)).collect();
+        let own: Vec<Subset> = subsets().filter(|subset| self.pass.is_asked(state, *subset)).collect();
         self.add_subsets(&own, self.least(), |own, subset| own.with_steady(state, subset));
     }
 
-    /// These sets of leaks, from none to all, unless no leak can make one as probable as `least`.
+    /// These sets of leaks, from the smallest to all, unless no leak can make one as probable as `least`.
     fn add_subsets(&mut self, own: &[Subset], least: f64, scored: impl Fn(&Self, Subset) -> Scored<'a>) {
-        let [none, between @ .., all] = own else { return };
-        let none = scored(self, *none);
+        let [few, between @ ..] = own else { return };
+        let few = scored(self, *few);
+        let [between @ .., all] = between else { return self.keep(few) };
         let all = scored(self, *all);
-        // No leak's prior and Occam's factor are lighter than none's, no likelihood is larger than that of all three.
-        let most = none.ln_posterior - none.ln_sign - none.ln_likelihood + all.ln_likelihood;
-        let hopeless = none.ln_posterior.is_finite() && most < least;
-        self.keep(none);
+        // No others' prior and Occam's factor are lighter than those of few, no likelihood is larger than that of all three.
+        let most = few.ln_posterior - few.ln_sign - few.ln_likelihood + all.ln_likelihood;
+        let hopeless = few.ln_posterior.is_finite() && most < least;
+        self.keep(few);
         self.keep(all);
         if !hopeless {
             for subset in between {
@@ -124,7 +125,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
 
     /// Steady leaks beside a state, asked for now where they did not matter before; none where the state has no such leaks.
     fn steady(&mut self, state: State<'a>, subset: Subset) -> Option<Steady> {
-        if !is_asked(state, subset) {
+        if !self.pass.is_asked(state, subset) {
             return None;
         }
         let leaks = together(subset, LeakCourse::Constant);
@@ -160,7 +161,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
     }
 
     fn scored(&self, hypothesis: Hypothesis<'a>) -> Scored<'a> {
-        Scored::new(self.declared, &self.pass.sizes, hypothesis)
+        Scored::new(self.declared, self.pass, hypothesis)
     }
 
     fn hypothesis(&self, state: State<'a>, leaks: Leaks, ln_course: f64) -> Hypothesis<'a> {
@@ -241,6 +242,28 @@ impl<'a, 'p> Candidates<'a, 'p> {
         }
     }
 
+    /// Leaks that do not follow the pressures as read, beside the best states, and those with usual zeros: a zero may stand for one.
+    pub fn add_unfollowed(&mut self) {
+        let Some(zeros) = self.pass.tables.zeros.first() else { return };
+        self.sort();
+        let mut states = best_states(&self.all);
+        for at in 0..states.len() {
+            let usual = State { zeros, ..states[at] };
+            if !states.contains(&usual) {
+                states.push(usual);
+            }
+        }
+        for (state, subset) in
+            states.into_iter().flat_map(|state| subsets().skip(1).map(move |own| (state, own)))
+        {
+            let Some(steady) = self.steady(state, subset) else { continue };
+            let ln_course = self.pass.ln_unfollowed(self.declared, subset);
+            for alone in [true, false] {
+                self.ask(&steady, state, together(subset, LeakCourse::Unfollowed { alone }), ln_course);
+            }
+        }
+    }
+
     /// Zeros that jump, beside constant leaks and the best states of the rest.
     pub fn add_jumps(&mut self) {
         let (borders, ln_border) = self.pass.borders();
@@ -317,7 +340,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
             let leaks = together(subset, LeakCourse::Constant);
             let mut hypothesis = Hypothesis::new(&mended.equations, sizes, segments, state, leaks, ln_prior);
             hypothesis.wiring = Some(entry);
-            let mut scored = Scored::new(&mended.equations, sizes, hypothesis);
+            let mut scored = Scored::new(&mended.equations, own.pass, hypothesis);
             scored.wiring = wiring;
             scored
         });
@@ -333,10 +356,11 @@ struct Mistaken<'a> {
 }
 
 impl<'a> Scored<'a> {
-    fn new(equations: &NormalEquations, sizes: &Sizes, hypothesis: Hypothesis<'a>) -> Self {
+    fn new(equations: &NormalEquations, pass: &Pass<'_, '_>, hypothesis: Hypothesis<'a>) -> Self {
         let fit = fit(equations, &hypothesis.free);
         let ln_sign = ln_sign(&fit, &hypothesis.positive);
-        let is_out = is_impossible(equations, sizes, &hypothesis, &fit.means)
+        let is_out = is_impossible(equations, &pass.sizes, &hypothesis, &fit.means)
+            || !pass.leaks_as_found(&hypothesis, &fit.means)
             || tells_by_noise(equations, &hypothesis, &fit);
         let ln_posterior =
             if is_out { f64::NEG_INFINITY } else { fit.ln_evidence + hypothesis.ln_prior + ln_sign };
@@ -411,11 +435,6 @@ pub(super) fn steady_columns() -> Vec<(Column, Course)> {
         .chain(usual.filter(|(_, course)| *course == Course::Constant))
         .chain(LEAK_COLUMNS.map(|leak| (leak, Course::Constant)))
         .collect()
-}
-
-/// A pressure's gain acts through the leak past the piston.
-fn is_asked(state: State<'_>, subset: Subset) -> bool {
-    subset[0] || !state.departure.is_through_seal()
 }
 
 /// These leaks on one course.

@@ -72,6 +72,12 @@ pub enum Column {
     OrificeA,
     /// Out of chamber B.
     OrificeB,
+    /// Leaks that are steady whatever the pressures show, share of full scale.
+    SteadyInternal,
+    /// Out of chamber A.
+    SteadyA,
+    /// Out of chamber B.
+    SteadyB,
 }
 
 impl Column {
@@ -222,6 +228,9 @@ impl Scales<'_> {
                 plain(&[(R::RootInternal, by)], &[(R::RootInternal, -by)])
             }
             Column::OrificeA => plain(&[(R::RootA, per_root.external_a)], &[]),
+            Column::SteadyInternal => plain(&[(R::Time, flow)], &[(R::Time, -flow)]),
+            Column::SteadyA => plain(&[(R::Time, flow)], &[]),
+            Column::SteadyB => plain(&[], &[(R::Time, flow)]),
             Column::OrificeB => plain(&[], &[(R::RootB, per_root.external_b)]),
         }
     }

@@ -2,13 +2,14 @@
 
 use super::hypothesis::{LeakCourse, State};
 use super::leak_sample::Weighed;
+use super::marginal::Marginal;
 use super::pass::{Pass, Tables};
 use super::posterior::{Posterior, has_enough, weigh};
 use super::raw_products::{RawProducts, Statistic};
 use super::readings::{Mistake, Of};
 use super::scales::with_scales;
 use super::sizes::{mended, sentence};
-use super::table::{Entry, LEAK_SHARE, explanations};
+use super::table::{Entry, explanations};
 use crate::report::Status;
 use crate::rig::Rig;
 use crate::signal::Signal;
@@ -148,7 +149,7 @@ pub fn explain(statistic: &Statistic, rig: &Rig, doubts_m3s: PerLeak<f64>, told:
     let mistakes = with_scales(&Pass::new(&statistic, &products, rig, &tables, PerLeak::default(), told));
     let tables = Tables { mistakes, ..tables };
     let Posterior { weighed, residuals } = weigh(&statistic, products, rig, &tables, doubts_m3s, told)?;
-    let decision = Decision { residuals, ..decide(&weighed, rig) };
+    let decision = Decision { residuals, ..decide(&weighed, &tables, rig) };
     let decision = decision.with_sizes(&tables, told);
     Some(match told.lost_sign() {
         Some((of, ln_ratio)) => decision.with_lost_sign(&tables, of, ln_ratio),
@@ -232,13 +233,13 @@ fn lost_sign(tables: &Tables, of: Of, probability: f64) -> Option<Explained> {
     })
 }
 
-fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
+fn decide(weighed: &[Weighed<'_>], tables: &Tables, rig: &Rig) -> Decision {
     let mass = |is: &dyn Fn(&Weighed<'_>) -> bool| {
         weighed.iter().filter(|one| is(one)).fold(0.0, |sum, one| sum + one.probability).min(1.0)
     };
     let threshold_m3s = rig.alarms.threshold_m3s;
     let alpha = rig.decision.alpha;
-    let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, leak));
+    let beliefs = PerLeak::from_fn(|leak| Marginal::of(weighed, tables, leak));
     let probability = PerLeak::from_fn(|leak| beliefs[leak].above(threshold_m3s[leak]));
     let wiring = mass(&|one| one.hypothesis.wiring.is_some());
     let wander = mass(&|one| one.hypothesis.state.wander.0 > 0.0);
@@ -282,92 +283,6 @@ fn decide(weighed: &[Weighed<'_>], rig: &Rig) -> Decision {
         wiring,
         residuals: [None; 2],
     }
-}
-
-/// The mixture's distribution of one leak: flows, rising, with weights, and whether they are a leak's; past a sound seal
-/// seeps a little.
-struct Marginal {
-    flows: Vec<Flow>,
-}
-
-struct Flow {
-    m3s: f64,
-    weight: f64,
-    /// Its weights where this leak had been as probable as none before the trace: this one alone, and each.
-    even_weights: [f64; 2],
-    is_leak: bool,
-}
-
-impl Marginal {
-    fn of(weighed: &[Weighed<'_>], leak: Leak) -> Self {
-        let of_one = |one: &Weighed<'_>| {
-            let leaks = &one.hypothesis.leaks;
-            let even = |there: &Option<_>| if there.is_some() { 1.0 - LEAK_SHARE } else { LEAK_SHARE };
-            let even_odds = [even(&leaks[leak as usize]), leaks.iter().map(even).product()];
-            let flow = |(flows, weight): (&[f64; 3], &f64)| Flow {
-                m3s: flows[leak as usize],
-                weight: weight * one.probability,
-                even_weights: even_odds.map(|odds| weight * one.probability * odds),
-                is_leak: leaks[leak as usize].is_some(),
-            };
-            one.leaks_m3s.iter().zip(&one.weights).map(flow).collect::<Vec<_>>()
-        };
-        let mut flows: Vec<Flow> = weighed.iter().flat_map(of_one).collect();
-        flows.sort_by(|a, b| a.m3s.total_cmp(&b.m3s));
-        Self { flows }
-    }
-
-    fn sum(&self, of: impl Fn(&Flow) -> f64) -> f64 {
-        self.flows.iter().map(of).sum()
-    }
-
-    fn above(&self, threshold_m3s: f64) -> f64 {
-        self.sum(|flow| if flow.m3s > threshold_m3s { flow.weight } else { 0.0 }).min(1.0)
-    }
-
-    /// The same where this leak, alone or with the others, had been as probable as none before the trace, the larger: that leaks are
-    /// rare, and two of them rarer, is no finding of this trace.
-    fn above_at_even_odds(&self, threshold_m3s: f64) -> f64 {
-        let above = |which: usize| {
-            let weight = |flow: &Flow| flow.even_weights[which];
-            self.sum(|flow| if flow.m3s > threshold_m3s { weight(flow) } else { 0.0 }) / self.sum(weight)
-        };
-        above(0).max(above(1))
-    }
-
-    fn quantile(&self, probability: f64) -> f64 {
-        quantile(self.flows.iter(), probability)
-    }
-
-    fn quantile_if_there(&self, probability: f64) -> f64 {
-        quantile(self.flows.iter().filter(|flow| flow.is_leak), probability)
-    }
-
-    fn belief(&self) -> Belief {
-        let moment = |power: i32| self.sum(|flow| flow.weight * flow.m3s.powi(power));
-        let mean = moment(1);
-        let std = (moment(2) - mean * mean).max(0.0).sqrt();
-        Belief {
-            mean_lpm: LPM_PER_M3S * mean,
-            std_lpm: LPM_PER_M3S * std,
-            quantiles_lpm: [0.025, 0.5, 0.975].map(|q| LPM_PER_M3S * self.quantile(q)),
-            below_lpm: LPM_PER_M3S * self.quantile_if_there(0.975),
-        }
-    }
-}
-
-fn quantile<'a>(flows: impl Iterator<Item = &'a Flow> + Clone, probability: f64) -> f64 {
-    let wanted = probability * flows.clone().map(|flow| flow.weight).sum::<f64>();
-    let mut below = 0.0;
-    let mut last_m3s = 0.0;
-    for flow in flows {
-        below += flow.weight;
-        last_m3s = flow.m3s;
-        if below >= wanted {
-            break;
-        }
-    }
-    last_m3s
 }
 
 /// What is not usual with probability 1 − α, of each kind.

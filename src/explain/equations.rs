@@ -1,7 +1,9 @@
 //! Normal equations of the columns of all explanations, from the statistic.
 
 use super::columns::{Column, Course, PerChamber, Scales};
+use super::hypothesis::{LEAK_COLUMNS, STEADY_COLUMNS};
 use super::raw_products::{RawProducts, SegmentProducts};
+use pitchleak_core::Leak;
 use pitchleak_core::continuity::{COLUMNS, EQUATIONS};
 use std::collections::HashMap;
 
@@ -84,6 +86,19 @@ impl NormalEquations {
     /// Where a column stands, if it was asked for.
     pub fn place(&self, column: Column, course: Course) -> Option<usize> {
         self.places.get(&(column, course)).copied()
+    }
+
+    /// Standard deviation of the pressure across a leak beside its noise, over its mean size.
+    pub fn spread(&self, leak: Leak) -> f64 {
+        let place = |columns: [Column; 3]| self.place(columns[leak as usize], Course::Constant);
+        let Some((own, steady)) = place(LEAK_COLUMNS).zip(place(STEADY_COLUMNS)) else {
+            return f64::INFINITY;
+        };
+        let product = |i: usize, j: usize| {
+            (0..EQUATIONS).map(|c| self.gram(c).row(i)[j] - self.noise(c).row(i)[j]).sum::<f64>()
+        };
+        let mean = product(own, steady) / product(steady, steady);
+        (product(own, own) / product(steady, steady) - mean * mean).max(0.0).sqrt()
     }
 
     /// Products of the columns.

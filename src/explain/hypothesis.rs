@@ -13,6 +13,10 @@ pub(super) enum LeakCourse {
     Constant,
     /// C √P beside C P.
     Orifice,
+    /// A steady flow, beside C P or alone: the pressures across it are not as read.
+    Unfollowed {
+        alone: bool,
+    },
     /// Opens at a pressure: C P less a constant flow.
     Cracking,
     /// Linear, from start ≥ 0 to end ≥ 0.
@@ -35,6 +39,7 @@ impl LeakCourse {
         match self {
             Self::Constant => "constant",
             Self::Orifice => "orifice",
+            Self::Unfollowed { .. } => "unfollowed",
             Self::Cracking => "cracking",
             Self::Growing => "growing",
             Self::Accelerating => "accelerating",
@@ -71,6 +76,10 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
         None => vec![Term { std: seepage, ..level() }],
         Some(LeakCourse::Constant) => vec![level()],
         Some(LeakCourse::Orifice) => vec![level(), Term { column: ORIFICE_COLUMNS[leak], ..level() }],
+        Some(LeakCourse::Unfollowed { alone }) => {
+            let steady = Term { column: STEADY_COLUMNS[leak], ..level() };
+            std::iter::once(steady).chain((!alone).then(level)).collect()
+        }
         Some(LeakCourse::Cracking) => {
             let less = CRACKING_COLUMNS[leak].map(|column| Term { column, at_end: -1.0, ..level() });
             std::iter::once(level()).chain(less).collect()
@@ -133,6 +142,7 @@ pub(super) const LEAK_COLUMNS: [Column; 3] = [Column::LeakInternal, Column::Leak
 /// None past the piston: the pressure across the seal changes sign, and what opens at one is no line of it.
 pub(super) const CRACKING_COLUMNS: [Option<Column>; 3] =
     [None, Some(Column::CrackingA), Some(Column::CrackingB)];
+pub(super) const STEADY_COLUMNS: [Column; 3] = [Column::SteadyInternal, Column::SteadyA, Column::SteadyB];
 pub(super) const ORIFICE_COLUMNS: [Column; 3] = [Column::OrificeInternal, Column::OrificeA, Column::OrificeB];
 
 impl State<'_> {
@@ -227,6 +237,12 @@ impl<'a> Hypothesis<'a> {
     pub fn place(&self, equations: &NormalEquations, column: Column, course: Course) -> Option<usize> {
         let place = equations.place(column, course)?;
         self.free.iter().position(|free| free.column == place)
+    }
+
+    /// How large a leak is of what rises with time or pressure, share of full scale, with free parameters of these means.
+    pub fn level(&self, leak: Leak, means: &[f64]) -> f64 {
+        let rising = self.ends[leak as usize].iter().filter(|(_, sign)| *sign > 0.0);
+        rising.map(|(place, _)| means[self.positive[*place]]).sum()
     }
 
     /// The segment from which on all leaks are as at the end: where one wanders, the last.

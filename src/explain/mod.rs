@@ -12,6 +12,7 @@ mod given_leaks;
 mod hypothesis;
 mod independence;
 mod leak_sample;
+mod marginal;
 mod mended;
 mod mistakes;
 mod odds;

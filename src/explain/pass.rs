@@ -3,7 +3,10 @@
 use super::columns::{Column, Course, Scales};
 use super::equations::NormalEquations;
 use super::evidence::LEAST_SCALE;
-use super::hypothesis::{CRACKING_COLUMNS, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, Sizes, State};
+use super::hypothesis::{
+    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, ORIFICE_COLUMNS, STEADY_COLUMNS, Sizes, State,
+    Subset,
+};
 use super::mistakes;
 use super::odds::Prior;
 use super::raw_products::{RawProducts, SegmentProducts, Statistic};
@@ -14,10 +17,16 @@ use crate::rig::{Odds, Rig};
 use crate::told::Told;
 use pitchleak_core::continuity::EQUATIONS;
 use pitchleak_core::{Leak, PerLeak};
+use std::f64::consts::{LN_2, SQRT_2};
 use std::ops::Range;
 
 /// Recorders of pitch systems take at the most 2000 readings a second. Chosen.
 const LEAST_STEP_S: f64 = 5e-4;
+
+/// Errors of pressure sensors act through leaks as found; where those are less by half, not so. Chosen.
+const LEAST_OF_FOUND: f64 = 0.5;
+/// How far a pressure sensor that hangs or lags is off, share of full scale, 1 σ. A guess.
+const HANGS: f64 = 0.004;
 
 /// The table as it is weighed.
 pub(super) struct Tables {
@@ -164,7 +173,8 @@ impl<'a, 's> Pass<'a, 's> {
             );
             columns.extend((0..self.segments).map(|k| (leak, Course::Fading(k))));
         }
-        let by_law = ORIFICE_COLUMNS.into_iter().chain(CRACKING_COLUMNS.into_iter().flatten());
+        let by_law =
+            ORIFICE_COLUMNS.into_iter().chain(STEADY_COLUMNS).chain(CRACKING_COLUMNS.into_iter().flatten());
         columns.extend(by_law.map(|law| (law, Course::Constant)));
         for zero in [Column::ZeroA, Column::ZeroB] {
             columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
@@ -206,6 +216,38 @@ impl<'a, 's> Pass<'a, 's> {
             [LeakCourse::Orifice, LeakCourse::Cracking, LeakCourse::Growing, LeakCourse::Accelerating]
                 .map(with_prior);
         others.into_iter().chain(at_once).collect()
+    }
+
+    /// What acts through leaks is asked beside those: the errors of pressure sensors.
+    pub fn is_asked(&self, state: State<'_>, subset: Subset) -> bool {
+        let State { departure, .. } = state;
+        let lacks =
+            |(leak, there): (Leak, bool)| !there && self.is_found(leak) && departure.is_through_found(leak);
+        (subset[0] || !departure.is_through_seal()) && !Leak::ALL.into_iter().zip(subset).any(lacks)
+    }
+
+    /// Whether leaks, so fitted, are about as large as those through which errors of pressure sensors act.
+    pub fn leaks_as_found(&self, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
+        let level_m3s = |leak: Leak| hypothesis.level(leak, means) * self.full_scale_m3s;
+        let is_less = |leak: Leak| level_m3s(leak) < LEAST_OF_FOUND * self.found_m3s[leak];
+        let acts = |leak: &Leak| self.is_found(*leak) && hypothesis.state.departure.is_through_found(*leak);
+        !Leak::ALL.into_iter().filter(acts).any(is_less)
+    }
+
+    fn is_found(&self, leak: Leak) -> bool {
+        self.found_m3s[leak] > self.sizes.seepage[leak] * self.full_scale_m3s
+    }
+
+    /// ln of the prior that leaks flow steadily while the pressures read change: how far those would have to be off.
+    pub fn ln_unfollowed(&self, declared: &NormalEquations, subset: Subset) -> f64 {
+        let pressure_pa = HANGS * self.rig.instruments.pressure.full_scale;
+        let sensors_pa =
+            PerLeak { internal: SQRT_2 * pressure_pa, external_a: pressure_pa, external_b: pressure_pa };
+        let mean_pa = self.products.mean_pressures_pa(0);
+        let strain = |leak: Leak| mean_pa[leak] * declared.spread(leak) / sensors_pa[leak];
+        let leaks = Leak::ALL.into_iter().zip(subset).filter(|(_, there)| *there);
+        let strain2: f64 = leaks.map(|(leak, _)| strain(leak).powi(2)).sum();
+        self.tables.ln_course(LeakCourse::Unfollowed { alone: true }) - LN_2 - 0.5 * strain2
     }
 
     /// Whether readings come as slowly as a recorder takes them, once a clock is mended: a block has one at the least.

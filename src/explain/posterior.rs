@@ -86,6 +86,7 @@ fn look<'a>(pass: &Pass<'a, '_>) -> (Vec<Weighed<'a>>, [f64; 2]) {
 fn weigh_all<'a>(pass: &Pass<'a, '_>, declared: &NormalEquations, least_ln: f64) -> Posterior<'a> {
     let mut candidates = Candidates::with_constant_leaks(pass, declared, least_ln);
     candidates.add_courses();
+    candidates.add_unfollowed();
     candidates.add_jumps();
     let mended = candidates.add_mistakes();
     let loudness = pass.over_sheet.louder().map(|ratio| ratio * ratio);

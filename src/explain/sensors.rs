@@ -34,6 +34,9 @@ impl Column {
             | Self::LeakB
             | Self::CrackingA
             | Self::CrackingB
+            | Self::SteadyInternal
+            | Self::SteadyA
+            | Self::SteadyB
             | Self::OrificeInternal
             | Self::OrificeA
             | Self::OrificeB => &[],

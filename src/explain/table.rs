@@ -8,6 +8,7 @@ use super::columns::{Column, Course};
 use super::mistakes::mistakes;
 use super::odds::Prior;
 use super::readings::Mistake;
+use pitchleak_core::Leak;
 
 /// Shares of explanations, by how often an engineer meets them. Guesses.
 mod share {
@@ -105,9 +106,19 @@ impl Entry {
         self
     }
 
-    /// Whether it acts through a leak past the piston alone.
+    /// Whether it acts through the leak past the piston alone.
     pub(super) fn is_through_seal(&self) -> bool {
         self.free.iter().any(|free| matches!(free.0, Column::ThroughSealA | Column::ThroughSealB))
+    }
+
+    /// Whether it acts through a leak as a first pass found that.
+    pub(super) fn is_through_found(&self, leak: Leak) -> bool {
+        use Column as C;
+        self.free.iter().any(|free| match free.0 {
+            C::PressureZeroA | C::PressureGainA => leak != Leak::ExternalB,
+            C::PressureZeroB | C::PressureGainB => leak != Leak::ExternalA,
+            _ => false,
+        })
     }
 
     /// From a moment on, which is found.
@@ -206,11 +217,17 @@ pub(super) fn courses() -> Vec<Entry> {
     vec![
         Entry::new("constant", Kind::Course, 0.68, "is steady"),
         Entry::new("cracking", Kind::Course, share::UNCOMMON, "opens at a pressure"),
-        Entry::new("orifice", Kind::Course, 0.08, "goes through an orifice, with the root of the pressure"),
+        Entry::new(
+            "unfollowed",
+            Kind::Course,
+            share::UNCOMMON,
+            "flows steadily while the pressures change: their sensors hang or lag",
+        ),
+        Entry::new("orifice", Kind::Course, 0.07, "goes through an orifice, with the root of the pressure"),
         Entry::new("growing", Kind::Course, 0.04, "grows or shrinks steadily"),
         Entry::new("accelerating", Kind::Course, share::UNCOMMON, "grows faster and faster"),
         Entry::new("opening", Kind::Course, 0.04, "opened at once, where there was none"),
-        Entry::new("sudden", Kind::Course, 0.06, "changed at once"),
+        Entry::new("sudden", Kind::Course, 0.05, "changed at once"),
         Entry::new("wandering", Kind::Course, 0.03, "comes and goes"),
         Entry::new("creeping", Kind::Course, 0.03, "changes little by little"),
     ]

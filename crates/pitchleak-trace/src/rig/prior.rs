@@ -160,7 +160,7 @@ pub fn explanations() -> impl Iterator<Item = (&'static str, &'static str)> {
 
 /// By kind, blanks between them.
 const EXPLANATIONS: [(&str, &str); 5] = [
-    ("course", "constant cracking orifice growing accelerating opening sudden wandering creeping"),
+    ("course", "constant unfollowed cracking orifice growing accelerating opening sudden wandering creeping"),
     (
         "zeros",
         "zeros_usual flow_zeros flow_zero_a flow_zero_b flow_zeros_gross flow_zero_jump_a flow_zero_jump_b",
