@@ -548,3 +548,31 @@ fn nothing_that_a_trace_may_hold_makes_it_panic() {
         assert!(answer.effects.iter().all(|effect| effect.value.is_finite()));
     }
 }
+
+/// Where the piston passes a worn spot on both sides its place is told; of a flank alone neither that nor the leak's size is.
+#[test]
+fn a_worn_spot_is_sure_where_the_piston_passes_it() {
+    let mut sensors = Rig::paper();
+    sensors.instruments = sensors.instruments.with_accuracy(1e-3);
+    let spot = |spot_position_m: f64| {
+        let constants = EffectConstants { spot_position_m, spot_width_m: 0.01, ..EffectConstants::default() };
+        let mut effects = EffectSet::default();
+        effects.set(Effect::PositionDependentLeak, 3e-11, constants).expect("is possible");
+        effects
+    };
+    let leaks = PerLeak { internal: 2e-12, ..PerLeak::default() };
+    let seen = |effects| leaking_in_wind(WindCase::Mps13, leaks, effects, 60.0, &sensors, 5);
+    let sound = seen(EffectSet::default());
+    let (least, most) =
+        sound.x_m.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    let named = |place_m: f64| {
+        let answer = diagnose(&[seen(spot(place_m))], &[], &Declared::of(&sensors), &|| ());
+        answer.effects.into_iter().find(|one| one.id == "position_dependent_leak")
+    };
+    let passed = named(f64::midpoint(least, most)).expect("is named");
+    assert!(passed.confident && (passed.value - 3e-11).abs() < 4.0 * passed.std, "{passed:?}");
+    for beyond_m in [0.001, 0.002, 0.003] {
+        let flank = named(most + beyond_m);
+        assert!(flank.as_ref().is_none_or(|one| !one.confident), "{least} to {most}: {flank:?}");
+    }
+}

@@ -193,9 +193,15 @@ fn one_way_friction(selection: &Selection<'_>, one: &Selected) -> Option<Doubt> 
     (own.is_constant_force() || own.is_dry_friction()).then(|| doubt(DoubtId::OneWayFriction, text()))
 }
 
-/// Its value is at an end of what physics allows.
+/// Its value is at an end of what physics allows, or a constant of its law at that of what these traces cover.
 fn at_bound(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
-    fit.is_at_bound(one.term).then(|| doubt(DoubtId::AtBound, "its value is at the end of what is possible"))
+    let of_value =
+        fit.is_at_bound(one.term).then(|| "its value is at the end of what is possible".to_owned());
+    let of_constant = || {
+        let constant = search::constant_at_end(fit, one.term)?.spec().id.replace('_', " ");
+        Some(format!("its {constant} is at the end of what the traces cover, and may lie beyond"))
+    };
+    of_value.or_else(of_constant).map(|text| doubt(DoubtId::AtBound, text))
 }
 
 /// It would take away all that the rig file declares, such as the mass that moves.

@@ -8,8 +8,8 @@ mod trials;
 
 pub(crate) use candidates::{critical_sigma, open, strongest_unlisted};
 pub(crate) use selection::{Rival, Selected, Selection, interactions, loss};
-pub(crate) use trials::std_of_constants;
 pub use trials::{Candidate, Collinearity};
+pub(crate) use trials::{constant_at_end, std_of_constants};
 
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::fit::{Fit, Problem, Progress};
@@ -89,19 +89,19 @@ fn finished<'a>(
     error: &impl Fn(&Fit<'_>) -> PerEquation<Option<f64>>,
     progress: Progress<'_>,
 ) -> Selection<'a> {
-    let mut weighed = Vec::new();
+    let is_last = |all: &Selection<'_>, weighed: &sets::Weighed| weighed.last() == Some(&all.named());
+    let mut weighed = sets::Weighed::new();
     for _ in 0..MOST_ROUNDS {
         all.drop_needless(progress);
         all.drop_needless_changes(progress);
         all.drop_doubtful(progress);
-        if all.fit.active() == weighed || !sets::weigh(&mut all, progress) {
+        if is_last(&all, &weighed) || !sets::weigh(&mut all, &mut weighed, progress) {
             return all;
         }
-        weighed = all.fit.active().to_vec();
         add_while(&mut all, |_| true, error, progress);
     }
-    if all.fit.active() != weighed {
-        sets::weigh(&mut all, progress);
+    if !is_last(&all, &weighed) {
+        sets::weigh(&mut all, &mut weighed, progress);
     }
     all
 }
@@ -162,7 +162,7 @@ mod tests {
         let area = problem.place(Term::Effect(Effect::AreaB)).expect("is a term");
         let fit = Fit::declared(&problem, &|| ()).with(area, problem.usual_constants, &|| ());
         let mut all = Selection { fit, effects: vec![Selected::new(area, 1.0)] };
-        assert!(sets::weigh(&mut all, &|| ()));
+        assert!(sets::weigh(&mut all, &mut Vec::new(), &|| ()));
         let names = names(&all);
         assert!(names.contains(&Effect::FlowMeterGainB) && !names.contains(&Effect::AreaB), "{names:?}");
         assert!(names.contains(&Effect::PressureOffsetB), "{names:?}");
@@ -178,7 +178,7 @@ mod tests {
             let effects: Vec<_> = places.map(|term| Selected::new(term, 1.0)).collect();
             let new: Vec<_> = effects.iter().map(|one| (one.term, problem.usual_constants)).collect();
             let mut all = Selection { fit: plain.changed(&[], &new, &|| ()), effects };
-            sets::weigh(&mut all, &|| ());
+            sets::weigh(&mut all, &mut Vec::new(), &|| ());
             assert!(names(&all).contains(&TURBULENT.0), "{wrong:?} became {:?}", names(&all));
             assert!(
                 names(&all).len() <= wrong.len()

@@ -126,6 +126,13 @@ impl Selection<'_> {
         misfit.iter().sum::<f64>() + needed * self.size() as f64
     }
 
+    /// Its effects, in the order of their terms.
+    pub(super) fn named(&self) -> Vec<usize> {
+        let mut named: Vec<usize> = self.effects.iter().map(|one| one.term).collect();
+        named.sort_unstable();
+        named
+    }
+
     /// Effects, and changes of leaks.
     pub(super) fn size(&self) -> usize {
         self.effects.len() + self.fit.leak_changes().count()

@@ -25,6 +25,14 @@ struct Exchange {
 }
 
 impl Exchange {
+    /// The set that it makes of another one.
+    fn instead_of(&self, named: &[usize]) -> Vec<usize> {
+        let kept = named.iter().copied().filter(|term| !self.gone.contains(term));
+        let mut all: Vec<usize> = kept.chain(self.new.iter().map(|(term, _)| *term)).collect();
+        all.sort_unstable();
+        all
+    }
+
     /// By how much the set is the worse one: twice the ln of the odds against it, where the true readings are as likely anywhere on what the
     /// model allows.
     fn worse(&self, dispersion: f64) -> f64 {
@@ -39,22 +47,30 @@ impl Exchange {
     }
 }
 
+/// Sets of effects that were named, each in the order of its terms.
+pub(super) type Weighed = Vec<Vec<usize>>;
+
 /// Gives the named effects to a set that does better, until none does; holds each against the sets without it, and orders them by what the
-/// fit loses without them. Whether others were named.
-pub(super) fn weigh(all: &mut Selection<'_>, progress: Progress<'_>) -> bool {
+/// fit loses without them. Whether others were named. None that was named before is named again: about sets that are alike, each fit's own
+/// noise finds another one better.
+pub(super) fn weigh(all: &mut Selection<'_>, weighed: &mut Weighed, progress: Progress<'_>) -> bool {
     let mut has_changed = false;
     let mut exchanges = nearest(all, progress);
     for _ in 0..MOST_ROUNDS {
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
-        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0;
+        let named = all.named();
+        let is_new = |one: &Exchange| !weighed.contains(&one.instead_of(&named));
+        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && is_new(one);
         let better = exchanges.iter().filter(is_better);
         let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
         let Some(best) = best else { break };
+        weighed.push(named);
         take(all, &best, progress);
         has_changed = true;
         exchanges = nearest(all, progress);
     }
     hold_against(all, &exchanges, progress);
+    weighed.push(all.named());
     let fit = &all.fit;
     all.effects.sort_by(|a, b| selection::loss(fit, &[b.term]).total_cmp(&selection::loss(fit, &[a.term])));
     has_changed

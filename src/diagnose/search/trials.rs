@@ -11,6 +11,9 @@ use pitchleak_core::{Effect, Signals};
 /// Half of one of the parts of a range that the search starts in: so far it is from the middle to the ends.
 const HALF_PART: f64 = 0.5 / SEARCH_STARTS as f64;
 
+/// So much of a range is its end. Chosen.
+const END_SHARE: f64 = 0.05;
+
 /// A constant and the values of it that these traces can tell apart.
 #[derive(Clone, Copy, Debug)]
 struct Range {
@@ -36,6 +39,16 @@ pub(crate) fn std_of_constants(fit: &Fit<'_>, term: usize) -> f64 {
     let unknown = |Range { parameter, low, high }| UnknownConstant { parameter, range: (low, high) };
     let unknown: Vec<_> = free(fit, term).into_iter().map(unknown).collect();
     fit.std_of_constants(term, &unknown)
+}
+
+/// A fitted constant of an effect that lies at the end of what these traces cover: of a flank alone neither the top's place nor its height
+/// can be told.
+pub(crate) fn constant_at_end(fit: &Fit<'_>, term: usize) -> Option<EffectConstant> {
+    let is_at_end = |Range { parameter, low, high }: &Range| {
+        let (value, near) = (fit.constants(term).get(*parameter), END_SHARE * (high - low));
+        parameter.is_place() && (value <= low + near || value >= high - near)
+    };
+    free(fit, term).into_iter().find(is_at_end).map(|range| range.parameter)
 }
 
 /// Whether an effect has such constants.

@@ -323,6 +323,11 @@ impl EffectConstant {
         EffectConstantSpec { id, unit, lower, upper }
     }
 
+    /// Whether it is a place among those that a trace passes: at an end of them, what lies beyond may be so as well.
+    pub fn is_place(self) -> bool {
+        matches!(self, Self::SpotPosition | Self::CrackingPressure)
+    }
+
     /// The values that a trace can tell apart: `span` gives the least and the largest value of a quantity in it, `finest` is the
     /// smallest value of this constant that it resolves. None where it tells nothing. The shares are chosen: a bell, a bend or a
     /// threshold shows only well within what the trace covers, a Stribeck speed up to half beyond it, as its bend begins at rest.

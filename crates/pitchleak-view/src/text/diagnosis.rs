@@ -8,11 +8,13 @@ use crate::residuals::{
     before_and_after, estimates, holds, name, people, people_unit, quantity, rms_errors, symbol,
 };
 use crate::text::level;
+use pitchleak::core::effects::EffectConstant;
 use pitchleak::core::{Estimate, Leak};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, EquationResidual, FoundEffect, LeakEstimate, Samples, Verdict,
 };
-use pitchleak::units::LPM_PER_M3S as LPM;
+use pitchleak::report::capital;
+use pitchleak::units::{LPM_PER_M3S as LPM, effect_unit};
 use pitchleak::wiring::Wiring;
 use std::fmt::Write;
 
@@ -209,10 +211,23 @@ fn write_wiring(out: &mut String, wiring: &Wiring) {
     wiring.columns.iter().for_each(|line| _ = writeln!(out, "  {line}"));
 }
 
+/// Where its law is: a position, a pressure.
+fn places(effect: &FoundEffect) -> impl Iterator<Item = String> {
+    let places =
+        EffectConstant::ALL.into_iter().filter(|constant| constant.is_place()).map(EffectConstant::spec);
+    places.filter_map(|place| {
+        let value = effect.constants.get(place.id)?;
+        let (factor, unit) = effect_unit(place.unit);
+        let name = capital(&place.id.replace('_', " "));
+        Some(format!("{name}: {} {unit}", significant(value * factor, 3, 4)))
+    })
+}
+
 fn write_effect(out: &mut String, effect: &FoundEffect) {
     let _ =
         writeln!(out, "\n{}: {} (95 %)", effect.id, quantity(effect.value, Some(effect.std), effect.unit));
     let _ = writeln!(out, "  {}", effect.cause);
+    places(effect).for_each(|place| _ = writeln!(out, "  {place}"));
     let _ = writeln!(out, "  To do: {}", effect.remedy);
     if let Some(doubt) = effect.doubts_in_words() {
         let _ = writeln!(out, "  Doubtful: {doubt}.");
