@@ -3,14 +3,13 @@
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::{Fit, LEAST_SCALE, at_scales, chance_of_mean_square, fit, ln_scale};
-use super::hypothesis::{
-    CRACKING_COLUMNS, Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets,
-};
+use super::hypothesis::{Hypothesis, LEAK_COLUMNS, LeakCourse, Sizes, State, Subset, subsets};
 use super::mended::Mended;
 use super::mistakes::ln_wired;
 use super::orthant::ln_most;
 use super::pass::Pass;
 use super::table::{Entry, USUAL, USUAL_DEAD_VOLUME};
+use pitchleak_core::Leak;
 
 /// States of sensors and rig, best first, beside which other courses of leaks are tried; numerical.
 const STATES_WITH_COURSES: usize = 3;
@@ -194,7 +193,10 @@ impl<'a, 'p> Candidates<'a, 'p> {
         for state in best_states(&self.all) {
             for subset in subsets().skip(1) {
                 let Some(steady) = self.steady(state, subset) else { continue };
-                let can_crack = (0..3).all(|leak| !subset[leak] || CRACKING_COLUMNS[leak].is_some());
+                let can_crack = Leak::ALL
+                    .into_iter()
+                    .zip(subset)
+                    .all(|(leak, there)| !there || self.pass.keeps_sign(leak));
                 for (course, ln_course) in &courses {
                     if can_crack || *course != LeakCourse::Cracking {
                         self.ask(&steady, state, together(subset, *course), *ln_course);

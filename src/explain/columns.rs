@@ -63,6 +63,8 @@ pub enum Column {
     /// Out of chamber B.
     LeakB,
     /// What leaks that open at a pressure let through less than C P, share of full scale.
+    CrackingInternal,
+    /// Out of chamber A.
     CrackingA,
     /// Out of chamber B.
     CrackingB,
@@ -221,6 +223,7 @@ impl Scales<'_> {
             }
             Column::LeakA => timed(&[(R::PressureA, per_mpa.external_a)], &[]),
             Column::LeakB => timed(&[], &[(R::PressureB, per_mpa.external_b)]),
+            Column::CrackingInternal => plain(&[(R::Time, -flow)], &[(R::Time, flow)]),
             Column::CrackingA => plain(&[(R::Time, -flow)], &[]),
             Column::CrackingB => plain(&[], &[(R::Time, -flow)]),
             Column::OrificeInternal => {

@@ -81,8 +81,8 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
             std::iter::once(steady).chain((!alone).then(level)).collect()
         }
         Some(LeakCourse::Cracking) => {
-            let less = CRACKING_COLUMNS[leak].map(|column| Term { column, at_end: -1.0, ..level() });
-            std::iter::once(level()).chain(less).collect()
+            let less = Term { column: CRACKING_COLUMNS[leak], at_end: -1.0, ..level() };
+            vec![level(), less]
         }
         Some(LeakCourse::Growing) => vec![own(Course::FromBegin, 0.0), own(Course::ToEnd, 1.0)],
         Some(LeakCourse::Accelerating) => {
@@ -139,9 +139,8 @@ pub(super) fn subsets() -> impl Iterator<Item = Subset> {
 }
 
 pub(super) const LEAK_COLUMNS: [Column; 3] = [Column::LeakInternal, Column::LeakA, Column::LeakB];
-/// None past the piston: the pressure across the seal changes sign, and what opens at one is no line of it.
-pub(super) const CRACKING_COLUMNS: [Option<Column>; 3] =
-    [None, Some(Column::CrackingA), Some(Column::CrackingB)];
+pub(super) const CRACKING_COLUMNS: [Column; 3] =
+    [Column::CrackingInternal, Column::CrackingA, Column::CrackingB];
 pub(super) const STEADY_COLUMNS: [Column; 3] = [Column::SteadyInternal, Column::SteadyA, Column::SteadyB];
 pub(super) const ORIFICE_COLUMNS: [Column; 3] = [Column::OrificeInternal, Column::OrificeA, Column::OrificeB];
 

@@ -25,6 +25,8 @@ const LEAST_STEP_S: f64 = 5e-4;
 
 /// Errors of pressure sensors act through leaks as found; where those are less by half, not so. Chosen.
 const LEAST_OF_FOUND: f64 = 0.5;
+/// A pressure keeps its sign where so much of its mean size is its mean. Chosen.
+const ONE_SIGN: f64 = 0.9;
 /// How far a pressure sensor that hangs or lags is off, share of full scale, 1 σ. A guess.
 const HANGS: f64 = 0.004;
 
@@ -173,8 +175,7 @@ impl<'a, 's> Pass<'a, 's> {
             );
             columns.extend((0..self.segments).map(|k| (leak, Course::Fading(k))));
         }
-        let by_law =
-            ORIFICE_COLUMNS.into_iter().chain(STEADY_COLUMNS).chain(CRACKING_COLUMNS.into_iter().flatten());
+        let by_law = ORIFICE_COLUMNS.into_iter().chain(STEADY_COLUMNS).chain(CRACKING_COLUMNS);
         columns.extend(by_law.map(|law| (law, Course::Constant)));
         for zero in [Column::ZeroA, Column::ZeroB] {
             columns.extend((0..self.segments).map(|segment| (zero, Course::Within(segment))));
@@ -236,6 +237,13 @@ impl<'a, 's> Pass<'a, 's> {
 
     fn is_found(&self, leak: Leak) -> bool {
         self.found_m3s[leak] > self.sizes.seepage[leak] * self.full_scale_m3s
+    }
+
+    /// Whether the pressure across a leak keeps its sign: what opens at one is then less by a constant.
+    pub fn keeps_sign(&self, leak: Leak) -> bool {
+        let mean_pa = self.products.mean_pressures_pa(0);
+        leak != Leak::Internal
+            || (mean_pa.external_a - mean_pa.external_b).abs() > ONE_SIGN * mean_pa.internal
     }
 
     /// ln of the prior that leaks flow steadily while the pressures read change: how far those would have to be off.

@@ -32,6 +32,7 @@ impl Column {
             | Self::LeakInternal
             | Self::LeakA
             | Self::LeakB
+            | Self::CrackingInternal
             | Self::CrackingA
             | Self::CrackingB
             | Self::SteadyInternal
