@@ -310,6 +310,9 @@ fn a_pressure_sensor_that_hangs_makes_no_zeros_of_a_leak() {
         });
         report_on(&rows.collect::<Vec<_>>(), &rig).verdict
     };
+    let large = status(1.5 / LPM_PER_M3S / 2e6, 4e5, 1);
+    assert_eq!((large.status, large.faults), (Status::Leak, vec![Leak::Internal]), "{}", large.text);
+    assert!(large.text.contains("look whether one of their sensors hangs"), "{}", large.text);
     for (seed, lpm) in (0..8).zip([0.16, 0.2, 0.24, 0.28].into_iter().cycle()) {
         for play_pa in [1e5, 2e5, 4e5] {
             let verdict = status(lpm / LPM_PER_M3S / 2e6, play_pa, seed);

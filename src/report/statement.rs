@@ -79,9 +79,22 @@ fn fault(findings: &Findings<'_>, leak: Leak) -> String {
 /// By which law they leak, where it is not the model's for certain.
 fn law(findings: &Findings<'_>) -> Option<String> {
     let decision = findings.decision?;
-    (decision.probability_where(|part| part.ends_with(":orifice")) >= LAW_SURE)
-        .then(|| "It leaks as through an orifice, by the root of the pressure.".to_owned())
+    let is_so = |law: &str| {
+        let has_law = |part: &str| part.split_once(':').is_some_and(|(_, own)| own == law);
+        decision.probability_where(has_law) >= LAW_SURE
+    };
+    LAWS.iter().find(|(law, _)| is_so(law)).map(|(_, text)| (*text).to_owned())
 }
+
+/// Laws, as in the table of explanations, and in words.
+const LAWS: [(&str, &str); 3] = [
+    ("orifice", "It leaks as through an orifice, by the root of the pressure."),
+    ("cracking", "It opens at a pressure."),
+    (
+        "unfollowed",
+        "It is steadier than the pressures read: look whether one of their sensors hangs or lags.",
+    ),
+];
 
 /// A law is named where it is at least so probable: explanations below 1 % are not listed. Chosen.
 const LAW_SURE: f64 = 0.9;
