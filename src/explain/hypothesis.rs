@@ -240,8 +240,12 @@ impl<'a> Hypothesis<'a> {
 
     /// How large a leak is of what rises with time or pressure, share of full scale, with free parameters of these means.
     pub fn level(&self, leak: Leak, means: &[f64]) -> f64 {
-        let rising = self.ends[leak as usize].iter().filter(|(_, sign)| *sign > 0.0);
-        rising.map(|(place, _)| means[self.positive[*place]]).sum()
+        self.rising(leak).map(|place| means[self.positive[place]]).sum()
+    }
+
+    /// Places, among the parameters that cannot be negative, of what rises with time or pressure of a leak.
+    pub fn rising(&self, leak: Leak) -> impl Iterator<Item = usize> + '_ {
+        self.ends[leak as usize].iter().filter(|(_, sign)| *sign > 0.0).map(|(place, _)| *place)
     }
 
     /// The segment from which on all leaks are as at the end: where one wanders, the last.

@@ -7,7 +7,7 @@ use super::evidence::{Fit, chance_of_mean_square, fit};
 use super::given_leaks::GivenLeaks;
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
-use super::pass::Pass;
+use super::pass::{Pass, follows};
 use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
 use pitchleak_core::{Estimate, Leak, PerLeak};
@@ -126,10 +126,9 @@ impl<'a> Fitted<'_, 'a> {
 
     fn levels_m3s(&self, orthant: &Orthant) -> [f64; 3] {
         [0, 1, 2].map(|leak| {
-            let rising = self.hypothesis.ends[leak].iter().filter(|(_, sign)| *sign > 0.0);
             let weighed = || orthant.points.iter().zip(&orthant.weights);
             let mean = |place: usize| weighed().map(|(point, w)| w * point[place]).sum::<f64>();
-            rising.map(|(place, _)| mean(*place)).sum::<f64>() * self.pass.full_scale_m3s
+            self.hypothesis.rising(Leak::ALL[leak]).map(mean).sum::<f64>() * self.pass.full_scale_m3s
         })
     }
 
@@ -171,9 +170,7 @@ impl<'a> Fitted<'_, 'a> {
             let off = self.pressure_off_pa(leak, pressures_pa) / pressure_pa;
             let scale = self.scale(Leak::ALL[leak]);
             // The mean size of a pressure of changing sign follows its mean for certain, and else by an unknown share.
-            let signed =
-                if leak == 0 { pressures_pa.external_a - pressures_pa.external_b } else { pressure_pa };
-            let follows = (signed / pressure_pa).clamp(-1.0, 1.0);
+            let follows = follows(Leak::ALL[leak], pressures_pa);
             let spread = sheet.hypot((1.0 - follows.abs()) * off).hypot(scale.std / scale.value);
             let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]].hypot(self.unexplained_m3s(leak));
             for (out, (point, normals)) in out.iter_mut().zip(points.iter().zip(NORMALS.iter())) {

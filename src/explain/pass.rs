@@ -221,29 +221,27 @@ impl<'a, 's> Pass<'a, 's> {
 
     /// What acts through leaks is asked beside those: the errors of pressure sensors.
     pub fn is_asked(&self, state: State<'_>, subset: Subset) -> bool {
-        let State { departure, .. } = state;
-        let lacks =
-            |(leak, there): (Leak, bool)| !there && self.is_found(leak) && departure.is_through_found(leak);
-        (subset[0] || !departure.is_through_seal()) && !Leak::ALL.into_iter().zip(subset).any(lacks)
+        let lacks = |(leak, there): (Leak, bool)| !there && self.acts_through(state.departure, leak);
+        (subset[0] || !state.departure.is_through_seal()) && !Leak::ALL.into_iter().zip(subset).any(lacks)
     }
 
     /// Whether leaks, so fitted, are about as large as those through which errors of pressure sensors act.
     pub fn leaks_as_found(&self, hypothesis: &Hypothesis<'_>, means: &[f64]) -> bool {
         let level_m3s = |leak: Leak| hypothesis.level(leak, means) * self.full_scale_m3s;
         let is_less = |leak: Leak| level_m3s(leak) < LEAST_OF_FOUND * self.found_m3s[leak];
-        let acts = |leak: &Leak| self.is_found(*leak) && hypothesis.state.departure.is_through_found(*leak);
-        !Leak::ALL.into_iter().filter(acts).any(is_less)
+        let departure = hypothesis.state.departure;
+        !Leak::ALL.into_iter().any(|leak| self.acts_through(departure, leak) && is_less(leak))
     }
 
-    fn is_found(&self, leak: Leak) -> bool {
-        self.found_m3s[leak] > self.sizes.seepage[leak] * self.full_scale_m3s
+    /// Whether it acts through a leak, and that was found to be more than what seeps.
+    fn acts_through(&self, departure: &Entry, leak: Leak) -> bool {
+        departure.is_through_found(leak)
+            && self.found_m3s[leak] > self.sizes.seepage[leak] * self.full_scale_m3s
     }
 
     /// Whether the pressure across a leak keeps its sign: what opens at one is then less by a constant.
     pub fn keeps_sign(&self, leak: Leak) -> bool {
-        let mean_pa = self.products.mean_pressures_pa(0);
-        leak != Leak::Internal
-            || (mean_pa.external_a - mean_pa.external_b).abs() > ONE_SIGN * mean_pa.internal
+        follows(leak, self.products.mean_pressures_pa(0)).abs() > ONE_SIGN
     }
 
     /// ln of the prior that leaks flow steadily while the pressures read change: how far those would have to be off.
@@ -273,5 +271,15 @@ impl<'a, 's> Pass<'a, 's> {
             let mistake = entry.mistake.filter(is_allowed)?;
             Some((entry, mistake, self.told.ln_odds(mistake) + self.over_sheet.ln_odds(mistake)))
         })
+    }
+}
+
+/// How far the mean size of the pressure across a leak follows its mean, −1 to 1: past the piston it may change its sign.
+pub(super) fn follows(leak: Leak, mean_pa: PerLeak<f64>) -> f64 {
+    match leak {
+        Leak::Internal => {
+            ((mean_pa.external_a - mean_pa.external_b) / mean_pa.internal.max(1.0)).clamp(-1.0, 1.0)
+        }
+        _ => 1.0,
     }
 }
