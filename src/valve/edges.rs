@@ -71,20 +71,24 @@ pub(super) fn flows(
     gain: f64,
     rated_m3s: f64,
 ) -> [Flow; 2] {
-    let none = Flow { m3s: 0.0, by_signals: Signals::zeros(), by_unknowns: Unknowns::zeros() };
-    let with_droop = |drawn: f64| {
-        let mut flows = [none; 2];
-        for edge in &EDGES {
-            edge.add(&mut flows[edge.chamber - PA], at, spool, unknowns, gain, drawn);
-        }
-        flows
-    };
     // What is drawn is hardly less for its own droop.
-    let drawn = with_droop(0.0).iter().map(|flow| flow.m3s.max(0.0)).sum::<f64>() / rated_m3s;
-    with_droop(drawn)
+    let undrooped = at_droop(at, spool, unknowns, gain, 0.0);
+    let drawn = undrooped.iter().map(|flow| flow.m3s.max(0.0)).sum::<f64>() / rated_m3s;
+    at_droop(at, spool, unknowns, gain, drawn)
+}
+
+/// Inlined: where flows alone are asked for, no slopes are computed.
+#[inline(always)]
+fn at_droop(at: &Signals, spool: &Spool, unknowns: &Unknowns, gain: f64, drawn: f64) -> [Flow; 2] {
+    let mut flows = [Flow { m3s: 0.0, by_signals: Signals::zeros(), by_unknowns: Unknowns::zeros() }; 2];
+    for edge in &EDGES {
+        edge.add(&mut flows[edge.chamber - PA], at, spool, unknowns, gain, drawn);
+    }
+    flows
 }
 
 impl Edge {
+    #[inline(always)]
     fn add(&self, flow: &mut Flow, at: &Signals, spool: &Spool, unknowns: &Unknowns, gain: f64, drawn: f64) {
         let u = at[SPOOL] + unknowns[LAG] * S_PER_MS * spool.rate_ps - unknowns[HYSTERESIS] * spool.play;
         let (opening, by_u, by_lap, by_rounding, by_saturation) = self.opening(u, unknowns);

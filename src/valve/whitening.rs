@@ -44,9 +44,10 @@ impl Whitening {
             by_unknowns -= below * last.by_unknowns;
         }
         let diagonal = square.cholesky()?.l();
+        let inverse = diagonal.try_inverse()?;
         self.steps.push(WhiteStep {
-            residual: diagonal.solve_lower_triangular(&residual)?,
-            by_unknowns: diagonal.solve_lower_triangular(&by_unknowns)?,
+            residual: inverse * residual,
+            by_unknowns: inverse * by_unknowns,
             by_first: step.by_first,
             by_last: step.by_last,
             diagonal,

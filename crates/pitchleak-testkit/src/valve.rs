@@ -118,7 +118,7 @@ impl TrueValve {
 
     /// Into A and into B, m³/s.
     fn flows(&self, u: f64, pa: f64, pb: f64, ps: f64) -> [f64; 2] {
-        let root = |drop: f64| drop / (drop * drop + 1e8).powf(0.25);
+        let root = |drop: f64| drop / (drop * drop + 1e8).sqrt().sqrt();
         let edge = |i: usize, spool: f64, drop: f64| {
             let gain = self.rated_lpm * EDGE_UNIT * self.gains[i];
             gain * self.opening(spool - self.laps[i], u) * root(drop)
