@@ -49,9 +49,9 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let (train, declared) = data::thinned(train, declared);
     let checks = data::check_sensors(&train, &declared);
     let problem = Problem::new(&train, &declared, &checks);
-    let plain = Fit::declared(&problem, progress);
+    let plain = Selection::none(Fit::declared(&problem, progress));
     let mut before = model_fit(&plain, &test);
-    let excited = assess::is_excited(&plain);
+    let excited = assess::is_excited(&plain.fit);
     let miswired = data::miswired(&train, &declared);
     let beyond_effects = miswired.as_ref().is_some_and(|found| found.is_beyond_effects);
     let tested = data::miswired(&test, &declared).filter(|found| found.is_beyond_effects);
@@ -61,14 +61,15 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
             let plain = || Problem::new(&train, &declared, &checks);
             changing.get_or_init(|| search::leak_changes::problem(plain, progress)).as_ref()
         };
-        search::best(plain, with_changes, |fit| HeldOut::of(fit, &test).rmse(), progress)
+        search::best(plain.fit, with_changes, |fit| HeldOut::of(fit, &test).rmse(), progress)
     } else {
-        Selection::none(plain)
+        plain
     };
     if selection.fit.has_leak_changes() {
-        before = model_fit(&Fit::declared(selection.fit.problem, progress), &test);
+        let plain = Fit::declared(selection.fit.problem, progress);
+        before = model_fit(&Selection::none(plain), &test);
     }
-    let after = model_fit(&selection.fit, &test);
+    let after = model_fit(&selection, &test);
     let judgement = assess::judge(&selection, assess::failures(&checks, &faults), [&before, &after]);
     let found = assess::found(&selection, &judgement);
     let verdict = match assess::verdict(&judgement, &found, &after.leaks) {
@@ -79,7 +80,7 @@ pub fn diagnose(train: &[Series], test: &[Series], declared: &Declared, progress
     let wiring = miswired.filter(|_| beyond_effects || verdict != Verdict::Explained);
     let judged = if test.is_empty() { &train } else { &test };
     let holds = assess::check_holds(&selection, (&train, judged), &declared, &checks, progress);
-    let Selection { fit, effects } = &selection;
+    let Selection { fit, effects, .. } = &selection;
     Diagnosis {
         samples: Samples::of(&train),
         effects: found,

@@ -42,6 +42,8 @@ pub struct Answer {
     pub diagnosis: Diagnosis,
     /// … and of the same rig, motion and noise without it.
     pub sound: Diagnosis,
+    /// The leaks that are there.
+    pub leaks: PerLeak<f64>,
 }
 
 impl Case {
@@ -119,7 +121,7 @@ impl Case {
             truth.push((spec.id, size));
         }
         let diagnosis = if truth.is_empty() { sound.clone() } else { self.diagnosed(effects)? };
-        Some(Answer { diagnosis, truth, sound })
+        Some(Answer { diagnosis, truth, sound, leaks: self.leaks })
     }
 
     /// The rig in words.
@@ -161,6 +163,18 @@ impl Answer {
         self.truth.iter().all(|(id, _)| is_named(*id))
     }
 
+    /// By how many standard deviations each leak's coefficient is off, with the effects that were named.
+    fn leaks_off_sigma(&self) -> [f64; 3] {
+        let leaks = &self.diagnosis.after.leaks;
+        let told = [
+            leaks.internal_leak_coefficient,
+            leaks.external_leak_a_coefficient,
+            leaks.external_leak_b_coefficient,
+        ];
+        let truth = [self.leaks.internal, self.leaks.external_a, self.leaks.external_b];
+        std::array::from_fn(|at| (told[at].value - truth[at]) / told[at].std)
+    }
+
     /// What is there and what was said.
     pub fn line(&self) -> String {
         let mut out = format!("{:?}; there:", self.diagnosis.verdict);
@@ -179,6 +193,7 @@ impl Answer {
                 " {right}{id} {value:.3e}±{std:.1e} {probability:.2} {doubts:?} {confusable_with:?}"
             );
         }
+        let _ = write!(out, "; leaks off by {:.1?} sigma", self.leaks_off_sigma());
         out
     }
 }
@@ -206,8 +221,11 @@ pub fn summary(answers: &[(Case, Answer)]) -> String {
         sure.filter_map(|one| Some((one.value - size(one)?).abs() <= 4.0 * one.std)).collect()
     };
     let within: Vec<bool> = answers.iter().flat_map(|(_, answer)| within(answer)).collect();
+    let explained = answers.iter().filter(|(_, answer)| answer.diagnosis.verdict == Verdict::Explained);
+    let leaks: Vec<f64> = explained.flat_map(|(_, answer)| answer.leaks_off_sigma()).collect();
     let mut out = format!(
-        "{} rigs: first right {}, in the group {}, all named {}, explained {}; names {} right, sure {}; sure values within 4 σ {} of {}; \
+        "{} rigs: first right {}, in the group {}, all named {}, explained {}; names {} right, sure {}; sure values within 4 σ {} of {}; leaks of \
+         explained traces {} of {}; \
          sound twins {} without a missing effect, {} named\n",
         answers.len(),
         count(&Answer::first_is_right),
@@ -218,6 +236,8 @@ pub fn summary(answers: &[(Case, Answer)]) -> String {
         names(&|one| one.confident),
         within.iter().filter(|held| **held).count(),
         within.len(),
+        leaks.iter().filter(|off| off.abs() <= 4.0).count(),
+        leaks.len(),
         count(&|answer| answer.sound.verdict == Verdict::NoMissingEffect),
         count(&|answer| !answer.sound.effects.is_empty()),
     );

@@ -17,6 +17,7 @@ pub fn effect_unit(si: &str) -> (f64, &str) {
         "1" => (100.0, "%"),
         "Pa" => (1e-5, "bar"),
         "m" => (1e3, "mm"),
+        "m/s" => (1e3, "mm/s"),
         "m2" => (1e6, "mm²"),
         "m3" => (1e6, "ml"),
         "m3/s" => (LPM_PER_M3S, "L/min"),

@@ -170,7 +170,7 @@ pub(crate) fn judge(
     failures: Vec<String>,
     [before, after]: [&ModelFit; 2],
 ) -> Judgement {
-    let Selection { fit, effects } = selection;
+    let Selection { fit, effects, .. } = selection;
     let Inadequacy { mut complaints, left } = inadequacy(fit);
     complaints.extend_from_slice(&failures);
     if effects.iter().any(|one| one.is_below_unlisted) {

@@ -220,10 +220,16 @@ fn takes_all_declared(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     is_small.then(|| doubt(DoubtId::TakesAllDeclared, text()))
 }
 
-/// A candidate too weak for a name, which these traces do not rule out either, would take most of it away.
+/// A candidate too weak for a name, which these traces do not rule out either, would take most of it away. One that comes near in its
+/// place was fitted there: it is a rival, or it is not.
 fn may_be_none(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     let own = fit.estimate(one.term)?;
-    let spread = own.std.hypot(unnamed_shift(fit, one.term));
+    let without = fit.solve_without(&[one.term]);
+    let near = (1.0 - CURVED_SHARE) * (without.chi2 - fit.free.chi2);
+    let is_far =
+        |candidate: &usize| fit.score(&without, *candidate).is_none_or(|score| score.chi2_drop < near);
+    let further = estimates::unnamed(fit).filter(is_far);
+    let spread = own.std.hypot(estimates::largest_shift(fit, one.term, further));
     let text = "beside an effect too weak for a name, which these traces do not rule out, it could be none";
     (own.value.abs() < SIGNIFICANT_SIGMA * spread).then(|| doubt(DoubtId::MayBeNone, text))
 }
@@ -242,20 +248,4 @@ fn negative_leak(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     [(Leak::Internal, &[a, b][..]), (Leak::ExternalA, &[a][..]), (Leak::ExternalB, &[b][..])]
         .into_iter()
         .find_map(impossible)
-}
-
-/// By how much a candidate that these traces neither name nor rule out would move an effect's value: a second effect that is too
-/// weak for a name need not be absent. One that comes near in its place was fitted there: it is a rival, or it is not.
-pub(crate) fn unnamed_shift(fit: &Fit<'_>, term: usize) -> f64 {
-    let dispersion = fit.dispersion(fit.free.chi2);
-    let without = fit.solve_without(&[term]);
-    let near = (1.0 - CURVED_SHARE) * (without.chi2 - fit.free.chi2);
-    let is_possible = |candidate: &usize| {
-        let beside = fit.score(&fit.free, *candidate);
-        let in_its_place = || fit.score(&without, *candidate);
-        beside.is_some_and(|score| score.chi2_drop > SIGNIFICANT_SIGMA.powi(2) * dispersion)
-            && in_its_place().is_none_or(|score| score.chi2_drop < near)
-    };
-    let possible = search::open(fit).into_iter().filter(is_possible);
-    possible.filter_map(|candidate| fit.shift_by(candidate, term)).map(f64::abs).fold(0.0, f64::max)
 }

@@ -21,8 +21,11 @@ fn estimate(fit: &Fit<'_>, term: Term) -> Estimate<f64> {
     fit.problem.place(term).and_then(|place| fit.estimate(place)).unwrap_or(unknown)
 }
 
-/// Leaks and bulk modulus, their standard deviations widened where the residual is more than the sensors' noise.
-pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
+/// Leaks and bulk modulus, their standard deviations widened where the residual is more than the sensors' noise, and where other sets of
+/// effects are as likely that would have them others.
+pub(super) fn leaks(selection: &Selection<'_>) -> LeakEstimates {
+    let fit = &selection.fit;
+    let spread = |term: Term| fit.problem.place(term).map_or(0.0, |place| selection.spread(place));
     let widening = fit.dispersion(fit.bounded.chi2).sqrt();
     let rows = &fit.rows().rows;
     let mean = |value: &dyn Fn(&Row) -> f64| {
@@ -30,7 +33,7 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     };
     let leak = |leak, pressure_pa: f64| {
         let Estimate { value, std } = fit.mean_leak(leak);
-        let std = std * widening;
+        let std = (std * widening).hypot(spread(Term::of_leak(leak)));
         let mean = estimated(value, std, "m3/(s*Pa)", std * pressure_pa < IDENTIFIED_M3S);
         let is_possible =
             course(fit, leak).iter().all(|at| at.value >= -SIGNIFICANT_SIGMA * at.std * widening);
@@ -41,11 +44,12 @@ pub(super) fn leaks(fit: &Fit<'_>) -> LeakEstimates {
     let prior = fit.problem.place(Term::InverseBulk).and_then(|place| fit.problem.priors[place]);
     let prior = prior.map_or(f64::INFINITY, |prior| prior.std);
     let std = if fit.held_compressibility.is_some() { prior } else { std };
+    let std = (std * widening).hypot(spread(Term::InverseBulk));
     LeakEstimates {
         internal_leak_coefficient: leak(Leak::Internal, mean(&|row| row.mean.pa_pa - row.mean.pb_pa)),
         external_leak_a_coefficient: leak(Leak::ExternalA, mean(&|row| row.mean.pa_pa)),
         external_leak_b_coefficient: leak(Leak::ExternalB, mean(&|row| row.mean.pb_pa)),
-        bulk_modulus: estimated(bulk, std * widening * bulk * bulk, "Pa", std * widening < MOST_OF * prior),
+        bulk_modulus: estimated(bulk, std * bulk * bulk, "Pa", std < MOST_OF * prior),
     }
 }
 
@@ -136,16 +140,16 @@ pub(crate) fn ratio_note(fit: &Fit<'_>, one: &Selected) -> Option<String> {
 pub(crate) fn found(selection: &Selection<'_>, judgement: &Judgement) -> Vec<FoundEffect> {
     let told = |one: &Selected| {
         let doubts = confidence::doubts(selection, one, judgement);
-        found_one(&selection.fit, one, doubts)
+        found_one(selection, one, doubts)
     };
     selection.effects.iter().filter_map(told).collect()
 }
 
-fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundEffect> {
+fn found_one(selection: &Selection<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundEffect> {
+    let fit = &selection.fit;
     let effect = fit.problem.terms[one.term].effect()?;
     let Estimate { value, std } = fit.estimate(one.term)?;
-    let std = std_with_oil(fit, one.term).unwrap_or(std);
-    let std = std.hypot(search::std_of_constants(fit, one.term));
+    let std = std_with_oil(fit, one.term).unwrap_or(std).hypot(search::std_of_constants(fit, one.term));
     let spec = effect.spec();
     let rivals = rivals(one);
     let constants = fit.constants(one.term);
@@ -153,7 +157,7 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
     Some(FoundEffect {
         id: spec.id,
         value,
-        std: (std * fit.dispersion(fit.bounded.chi2).sqrt()).hypot(confidence::unnamed_shift(fit, one.term)),
+        std: (std * fit.dispersion(fit.bounded.chi2).sqrt()).hypot(spread_over_sets(selection, one.term)),
         unit: spec.unit,
         probability: confidence::probability(one, &doubts),
         confident: doubts.is_empty(),
@@ -167,6 +171,27 @@ fn found_one(fit: &Fit<'_>, one: &Selected, doubts: Vec<Doubt>) -> Option<FoundE
         cause: spec.cause,
         remedy: spec.remedy,
     })
+}
+
+/// By how much an effect's value may be another with other effects: in the place of those that are named, or beside them.
+fn spread_over_sets(selection: &Selection<'_>, term: usize) -> f64 {
+    let fit = &selection.fit;
+    selection.spread(term).hypot(largest_shift(fit, term, unnamed(fit)))
+}
+
+/// The candidates that these traces neither name nor rule out: a second effect that is too weak for a name need not be absent.
+pub(super) fn unnamed<'f>(fit: &'f Fit<'_>) -> impl Iterator<Item = usize> + 'f {
+    let needed = SIGNIFICANT_SIGMA.powi(2) * fit.dispersion(fit.free.chi2);
+    let is_possible = move |candidate: &usize| {
+        fit.score(&fit.free, *candidate).is_some_and(|beside| beside.chi2_drop > needed)
+    };
+    search::open(fit).into_iter().filter(is_possible)
+}
+
+/// By how much one of these would move a term's value at most.
+pub(super) fn largest_shift(fit: &Fit<'_>, term: usize, beside: impl Iterator<Item = usize>) -> f64 {
+    let shifts = beside.filter_map(|candidate| fit.shift_by(candidate, term));
+    shifts.map(f64::abs).fold(0.0, f64::max)
 }
 
 /// Each effect that may stand in its place, once.

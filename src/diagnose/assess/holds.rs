@@ -27,7 +27,7 @@ pub(crate) fn check(
     checks: &[SensorCheck],
     progress: Progress<'_>,
 ) -> Option<Holds> {
-    let Selection { fit, effects } = selection;
+    let Selection { fit, effects, .. } = selection;
     if fit.has_leak_changes() {
         // Which leak a hold has depends on when it is.
         return None;

@@ -34,7 +34,7 @@ pub(crate) fn verdict(judgement: &Judgement, effects: &[FoundEffect], leaks: &Le
 
 /// All sentences for people: `after` is none where no effect was named.
 pub(crate) fn notes(
-    Selection { fit, effects }: &Selection<'_>,
+    Selection { fit, effects, .. }: &Selection<'_>,
     complaints: Vec<String>,
     before: &ModelFit,
     after: Option<&ModelFit>,

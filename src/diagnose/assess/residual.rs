@@ -6,6 +6,7 @@ use crate::diagnose::data::Series;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::fit::Fit;
 use crate::diagnose::outcome::{BinnedResidual, Correlation, EquationResidual, ModelFit, Quality};
+use crate::diagnose::search::Selection;
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{BINS, FEWEST_NUMBERS};
 use crate::diagnose::weak_form::{Entry, Row, Rows, VARIABLES};
@@ -183,14 +184,15 @@ impl Bin {
 }
 
 /// How well a model fits: on `test`, or, where that is empty, on blocks that the fit left out.
-pub(crate) fn model_fit(fit: &Fit<'_>, test: &[Series]) -> ModelFit {
+pub(crate) fn model_fit(selection: &Selection<'_>, test: &[Series]) -> ModelFit {
+    let fit = &selection.fit;
     let held_out = HeldOut::of(fit, test);
     ModelFit {
         quality: Quality {
             rmse: held_out.rmse(),
             whiteness_p: PerEquation::from_fn(|equation| fit.whiteness_p(equation)),
         },
-        leaks: leaks(fit),
+        leaks: leaks(selection),
         noise_ratio: fit.noise_ratio(),
         residuals: PerEquation::from_fn(|equation| whitened_residual(fit, equation)),
         binned_residuals: held_out.binned(),

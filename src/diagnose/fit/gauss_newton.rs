@@ -152,10 +152,23 @@ impl<'a> Fit<'a> {
         Self { equation_error: self.equation_error, ..vacated }
     }
 
-    /// Structure and linearisation without the `old` effects and with the `new` ones, these at zero.
+    /// Structure and linearisation without the `old` effects and with the `new` ones, these where this linearisation foresees them if
+    /// it has their columns, else at zero.
     fn exchanged(&self, old: &[usize], new: &[(usize, EffectConstants<f64>)]) -> (Structure, Linearisation) {
         let (structure, at) = self.left_by(old);
-        (new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants)), at)
+        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
+        let has_column = |(term, constants): &(usize, EffectConstants<f64>)| {
+            self.regression.shows(*term) && self.constants(*term) == *constants
+        };
+        if !new.iter().all(has_column) {
+            return (structure, at);
+        }
+        let further: Vec<usize> = new.iter().map(|(term, _)| *term).collect();
+        let foreseen = self.regression.solve(&[self.active(), &further].concat(), &self.priors_without(old));
+        let at = self.moved_by(&foreseen);
+        let at =
+            old.iter().fold(at, |at, term| at.with(self.problem.terms[*term], 0.0, &self.constants(*term)));
+        (structure, at)
     }
 
     /// Structure and linearisation once some effects are gone.
@@ -281,12 +294,17 @@ impl<'a> Fit<'a> {
 
     /// The linearisation at the solution.
     pub(super) fn solved(&self) -> Linearisation {
+        self.moved_by(&self.bounded)
+    }
+
+    /// The linearisation once terms have moved.
+    fn moved_by(&self, solution: &Solution) -> Linearisation {
         let step = |at: Linearisation, (place, increment): (&usize, &f64)| {
             let term = self.problem.terms[*place];
             let value = at.value(term) + increment;
             at.with(term, value, &self.structure.constants[*place])
         };
-        self.bounded.terms.iter().zip(&self.bounded.value).fold(self.weak_form.at.clone(), step)
+        solution.terms.iter().zip(&solution.value).fold(self.weak_form.at.clone(), step)
     }
 
     /// Terms that are fitted.
@@ -392,12 +410,17 @@ impl<'a> Fit<'a> {
 
     /// The fit with some effects held at zero: no new pass over the data.
     pub(crate) fn solve_without(&self, terms: &[usize]) -> Solution {
+        self.regression.solve(&self.structure.active, &self.priors_without(terms))
+    }
+
+    /// The priors with some effects held at zero.
+    fn priors_without(&self, terms: &[usize]) -> Vec<Option<Prior>> {
         let mut priors = self.problem.increments(&self.weak_form.at);
         for term in terms {
             let mean = -self.weak_form.at.value(self.problem.terms[*term]);
             priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: ROUNDING.sqrt() * own.std });
         }
-        self.regression.solve(&self.structure.active, &priors)
+        priors
     }
 
     /// By how much one further term would move the value of a fitted one: no new pass over the data.

@@ -161,7 +161,7 @@ mod tests {
         let problem = Problem::new(&traces, &declared(), &[]);
         let area = problem.place(Term::Effect(Effect::AreaB)).expect("is a term");
         let fit = Fit::declared(&problem, &|| ()).with(area, problem.usual_constants, &|| ());
-        let mut all = Selection { fit, effects: vec![Selected::new(area, 1.0)] };
+        let mut all = Selection { effects: vec![Selected::new(area, 1.0)], ..Selection::none(fit) };
         assert!(sets::weigh(&mut all, &mut Vec::new(), &|| ()));
         let names = names(&all);
         assert!(names.contains(&Effect::FlowMeterGainB) && !names.contains(&Effect::AreaB), "{names:?}");
@@ -177,7 +177,7 @@ mod tests {
             let places = wrong.iter().map(|effect| problem.place(Term::Effect(*effect)).expect("is a term"));
             let effects: Vec<_> = places.map(|term| Selected::new(term, 1.0)).collect();
             let new: Vec<_> = effects.iter().map(|one| (one.term, problem.usual_constants)).collect();
-            let mut all = Selection { fit: plain.changed(&[], &new, &|| ()), effects };
+            let mut all = Selection { effects, ..Selection::none(plain.changed(&[], &new, &|| ())) };
             sets::weigh(&mut all, &mut Vec::new(), &|| ());
             assert!(names(&all).contains(&TURBULENT.0), "{wrong:?} became {:?}", names(&all));
             assert!(

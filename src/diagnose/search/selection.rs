@@ -53,16 +53,26 @@ impl Selected {
     }
 }
 
+/// Another set of effects, fitted.
+pub(super) struct Other {
+    /// Against the set that is named.
+    pub(super) odds: f64,
+    /// Of each of its terms.
+    pub(super) values: Vec<(usize, f64)>,
+}
+
 /// The effects named so far and the fit with them.
 pub(crate) struct Selection<'a> {
     pub(crate) fit: Fit<'a>,
     pub(crate) effects: Vec<Selected>,
+    /// The sets that come near in the place of some of these.
+    pub(super) others: Vec<Other>,
 }
 
 impl<'a> Selection<'a> {
     /// No effect beside the declared model.
     pub(crate) fn none(declared: Fit<'a>) -> Self {
-        Self { fit: declared, effects: vec![] }
+        Self { fit: declared, effects: vec![], others: vec![] }
     }
 
     /// Fits friction's constants again beside what has been named since: at the noise of an incomplete model any slip speed will do.
@@ -131,6 +141,21 @@ impl Selection<'_> {
         let mut named: Vec<usize> = self.effects.iter().map(|one| one.term).collect();
         named.sort_unstable();
         named
+    }
+
+    /// By how much a term's value scatters over the sets that have it, each as likely as it is.
+    pub(crate) fn spread(&self, term: usize) -> f64 {
+        let Some(own) = self.fit.estimate(term) else { return 0.0 };
+        let of = |other: &Other| {
+            let (_, value) = other.values.iter().find(|(one, _)| *one == term)?;
+            Some((other.odds, (value - own.value).powi(2)))
+        };
+        let (odds, squares) = self
+            .others
+            .iter()
+            .filter_map(of)
+            .fold((1.0, 0.0), |(all, sum), (odds, square)| (all + odds, sum + odds * square));
+        (squares / odds).sqrt()
     }
 
     /// Effects, and changes of leaks.
@@ -241,4 +266,29 @@ pub(crate) fn interactions(fit: &Fit<'_>, selected: &[Selected]) -> Vec<Interact
         (sigma > needed).then_some(Interaction { effects, sigma, mended_percent: mended })
     };
     pairs.iter().filter_map(test).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fit::Problem;
+    use crate::diagnose::testing::{TURBULENT, declared, torn_seal};
+
+    /// Of two sets that are as likely, each value lies half their distance from the mean of both; of the named one's side it is the root
+    /// of half its square. A set without the term says nothing.
+    #[test]
+    fn a_value_scatters_over_the_sets_that_have_it() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+        let fit = Fit::declared(&problem, &|| ()).with(term, problem.usual_constants, &|| ());
+        let own = fit.estimate(term).expect("is fitted").value;
+        let mut all = Selection::none(fit);
+        assert_eq!(all.spread(term), 0.0);
+        all.others = vec![
+            Other { odds: 1.0, values: vec![(term, 3.0 * own)] },
+            Other { odds: 1.0, values: vec![(term + 1, 7.0)] },
+        ];
+        assert!((all.spread(term) / own - 2.0_f64.sqrt()).abs() < 1e-12);
+    }
 }

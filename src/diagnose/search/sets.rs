@@ -4,7 +4,7 @@
 //! One Gram matrix says what every such set would leave, as far as it is linear about what is named. The nearest are fitted.
 
 use super::candidates::{self, Candidates, critical_sigma, open};
-use super::selection::{self, Rival, Selected, Selection};
+use super::selection::{self, Other, Rival, Selected, Selection};
 use crate::diagnose::fit::{Beyond, Fit, Progress, Solution};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{CURVED_SHARE, MOST_EXCHANGES, MOST_ROUNDS, SIGNIFICANT_SIGMA};
@@ -22,6 +22,8 @@ struct Exchange {
     /// What the new effects have to bring beyond what those that go had to, as a sum of squares in that of the noise; of one that is
     /// fitted, with what leaks below zero cost.
     dearer: f64,
+    /// The value of each term that it has; none before it is fitted.
+    values: Vec<(usize, f64)>,
 }
 
 impl Exchange {
@@ -70,6 +72,9 @@ pub(super) fn weigh(all: &mut Selection<'_>, weighed: &mut Weighed, progress: Pr
         exchanges = nearest(all, progress);
     }
     hold_against(all, &exchanges, progress);
+    let dispersion = all.fit.dispersion(all.fit.free.chi2);
+    let other = |one: Exchange| Other { odds: (-0.5 * one.worse(dispersion)).exp(), values: one.values };
+    all.others = exchanges.into_iter().map(other).collect();
     weighed.push(all.named());
     let fit = &all.fit;
     all.effects.sort_by(|a, b| selection::loss(fit, &[b.term]).total_cmp(&selection::loss(fit, &[a.term])));
@@ -136,6 +141,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
         new: vec![(term, constants)],
         left: Beyond { chi2: lost - chi2_drop, ..Beyond::default() },
         dearer: needed(fit, constants) - spared,
+        values: vec![],
     };
     trials.map(|trial| exchange((trial.score.term, trial.constants, trial.score.chi2_drop))).collect()
 }
@@ -162,6 +168,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
             new: [a, b].map(|at| (terms[at], fit.constants(terms[at]))).to_vec(),
             left: Beyond { chi2: lost - both.chi2_drop, ..Beyond::default() },
             dearer: needed[a] + needed[b] - spared,
+            values: vec![],
         })
     };
     let pairs = (0..terms.len()).flat_map(|a| (a + 1..terms.len()).map(move |b| (a, b)));
@@ -187,7 +194,9 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_model = is_settled && is_complete && is_within && new.iter().all(acts);
     let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
     let dearer = brought - spared(fit, &one.gone) + below_zero(&other) - own_leaks;
-    is_model.then(|| Exchange { new, left: other.beyond(fit), dearer, ..one })
+    let value = |term: &usize| Some((*term, other.estimate(*term)?.value));
+    let values = other.active().iter().filter_map(value).collect();
+    is_model.then(|| Exchange { new, left: other.beyond(fit), dearer, values, ..one })
 }
 
 /// The leaks in their standard deviations, widened where the residual is more than noise.
@@ -252,7 +261,7 @@ fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<Exchan
     let dearer = needed(fit, usual) - needed(fit, fit.constants(term));
     let law = |(place, chi2_drop): (usize, f64)| {
         let left = Beyond { chi2: lost - chi2_drop, ..Beyond::default() };
-        Exchange { gone: vec![term], new: vec![(place, usual)], left, dearer }
+        Exchange { gone: vec![term], new: vec![(place, usual)], left, dearer, values: vec![] }
     };
     let mut laws: Vec<Exchange> = candidates::unlisted(fit, &without, &[term]).map(law).collect();
     laws.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
@@ -278,10 +287,14 @@ mod tests {
         let [named, other] = [TURBULENT.0, Effect::FlowMeterGainA]
             .map(|effect| problem.place(Term::Effect(effect)).expect("is a term"));
         let fit = Fit::declared(&problem, &|| ()).with(named, problem.usual_constants, &|| ());
-        let mut all = Selection { fit, effects: vec![Selected::new(named, 1.0)] };
+        let mut all = Selection { effects: vec![Selected::new(named, 1.0)], ..Selection::none(fit) };
         let mut held = |chi2: f64, width: f64| {
             let (new, left) = (vec![(other, problem.usual_constants)], Beyond { chi2, width });
-            hold_against(&mut all, &[Exchange { gone: vec![named], new, left, dearer: 0.0 }], &|| ());
+            hold_against(
+                &mut all,
+                &[Exchange { gone: vec![named], new, left, dearer: 0.0, values: vec![] }],
+                &|| (),
+            );
             (all.effects[0].probability, all.effects[0].rivals.len())
         };
         let (sure, rivals) = held(60.0, 10.0);

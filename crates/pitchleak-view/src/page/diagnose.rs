@@ -10,7 +10,7 @@ use crate::residuals::{
     before_and_after, drawn_bins, estimates, holds, in_a_row, name, people, people_unit, quantity,
     rms_errors, symbol,
 };
-use crate::text::ESTIMATES;
+use crate::text::{ESTIMATES, constants};
 use maud::{Markup, html};
 use pitchleak::diagnose::{
     BinnedResidual, Diagnosis, Equation, FoundEffect, HoldLeak, LeakEstimate, Verdict,
@@ -233,7 +233,7 @@ fn effects(diagnosis: &Diagnosis) -> Markup {
             (rivals(effect))
             p .note { "With it the error on samples that were not fitted falls by " (format!("{:.1}", effect.rmse_reduction_percent)) " % in the balance it \
                 mends most; chance would show as much with a probability of " (chance(effect.p_value)) "."
-                @for (constant, value) in &effect.constants { " " (spoken(constant)) ": " (format!("{value:.4e}")) "." } }
+                @for (_, constant) in constants(effect) { " " (constant) "." } }
         }
         @if !diagnosis.calibration.is_empty() {
             h3 { "Sensors, within what the rig file allows" }

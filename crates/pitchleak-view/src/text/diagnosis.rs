@@ -211,15 +211,15 @@ fn write_wiring(out: &mut String, wiring: &Wiring) {
     wiring.columns.iter().for_each(|line| _ = writeln!(out, "  {line}"));
 }
 
-/// Where its law is: a position, a pressure.
-fn places(effect: &FoundEffect) -> impl Iterator<Item = String> {
-    let places =
-        EffectConstant::ALL.into_iter().filter(|constant| constant.is_place()).map(EffectConstant::spec);
-    places.filter_map(|place| {
-        let value = effect.constants.get(place.id)?;
-        let (factor, unit) = effect_unit(place.unit);
-        let name = capital(&place.id.replace('_', " "));
-        Some(format!("{name}: {} {unit}", significant(value * factor, 3, 4)))
+/// The constants of its law, in people's units.
+pub(crate) fn constants(effect: &FoundEffect) -> impl Iterator<Item = (EffectConstant, String)> {
+    EffectConstant::ALL.into_iter().filter_map(|one| {
+        let spec = one.spec();
+        let value = effect.constants.get(spec.id)?;
+        // The exponent is no share.
+        let (factor, unit) = if spec.unit == "1" { (1.0, "") } else { effect_unit(spec.unit) };
+        let name = capital(&spec.id.replace('_', " "));
+        Some((one, format!("{name}: {} {unit}", significant(value * factor, 3, 4)).trim_end().to_owned()))
     })
 }
 
@@ -227,7 +227,8 @@ fn write_effect(out: &mut String, effect: &FoundEffect) {
     let _ =
         writeln!(out, "\n{}: {} (95 %)", effect.id, quantity(effect.value, Some(effect.std), effect.unit));
     let _ = writeln!(out, "  {}", effect.cause);
-    places(effect).for_each(|place| _ = writeln!(out, "  {place}"));
+    let places = constants(effect).filter(|(constant, _)| constant.is_place());
+    places.for_each(|(_, place)| _ = writeln!(out, "  {place}"));
     let _ = writeln!(out, "  To do: {}", effect.remedy);
     if let Some(doubt) = effect.doubts_in_words() {
         let _ = writeln!(out, "  Doubtful: {doubt}.");

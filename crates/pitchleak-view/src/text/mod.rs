@@ -10,8 +10,8 @@ mod replay;
 mod valve;
 
 pub use check::CheckSketch;
-pub(crate) use diagnosis::companions;
 pub use diagnosis::sentence;
+pub(crate) use diagnosis::{companions, constants};
 pub use fleet::fleet_terminal;
 pub(crate) use fleet::found;
 pub use replay::{ReplaySketch, data_line};

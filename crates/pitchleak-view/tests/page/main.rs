@@ -143,9 +143,15 @@ fn an_hour_at_100_hz_fits_in_a_megabyte() {
 fn a_page_of_a_diagnosis_leads_from_the_residual_to_the_effect() {
     let page = diagnosed();
     assert_complete_in_itself(&page);
-    for part in
-        ["EXPLAINED</h1>", "Coulomb friction", "What it would take to be sure", "not fitted", "Force against"]
-    {
+    for part in [
+        "EXPLAINED</h1>",
+        "Coulomb friction",
+        "Slip speed: ",
+        " mm/s.",
+        "What it would take to be sure",
+        "not fitted",
+        "Force against",
+    ] {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("<img"));
