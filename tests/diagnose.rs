@@ -576,3 +576,43 @@ fn a_worn_spot_is_sure_where_the_piston_passes_it() {
         assert!(flank.as_ref().is_none_or(|one| !one.confident), "{least} to {most}: {flank:?}");
     }
 }
+
+/// A law's place is seen through the sensor's own error: fitted alone it is where that puts it, and others are then named to make up for it.
+#[test]
+fn the_place_of_a_law_moves_with_the_gain_of_the_sensor_that_sees_it() {
+    let mut sensors = Rig::paper();
+    sensors.instruments = sensors.instruments.with_accuracy(1e-3);
+    let leaks = PerLeak { internal: 2e-12, ..PerLeak::default() };
+    let seen = |effects, seed| leaking_in_wind(WindCase::Mps13, leaks, effects, 60.0, &sensors, seed);
+    let sound = seen(EffectSet::default(), 5);
+    let (least, most) =
+        sound.x_m.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    let constants = EffectConstants {
+        spot_position_m: f64::midpoint(least, most),
+        spot_width_m: 0.01,
+        cracking_pa: 1e6,
+        ..EffectConstants::default()
+    };
+    for (law, size, gain, gain_size, seed) in [
+        (Effect::PositionDependentLeak, 3e-11, Effect::PositionGain, -0.03, 5),
+        (Effect::PositionDependentLeak, 3e-11, Effect::PositionGain, 0.03, 6),
+        (Effect::InternalLeakCracking, 2e-12, Effect::PressureGainB, -0.05, 7),
+        (Effect::InternalLeakCracking, 2e-12, Effect::PressureGainA, 0.05, 8),
+    ] {
+        let mut effects = EffectSet::default();
+        effects.set(law, size, constants).expect("is possible");
+        effects.set(gain, gain_size, constants).expect("is possible");
+        let answer = diagnose(&[seen(effects, seed)], &[], &Declared::of(&sensors), &|| ());
+        println!(
+            "{:?}",
+            answer.effects.iter().map(|one| (one.id, one.value, one.std, one.confident)).collect::<Vec<_>>()
+        );
+        let of =
+            |effect: Effect| answer.effects.iter().find(|one| one.id == effect.spec().id).expect("is named");
+        assert_eq!(answer.effects.len(), 2, "{:?}", answer.effects);
+        for (effect, size) in [(law, size), (gain, gain_size)] {
+            let found = of(effect);
+            assert!((found.value - size).abs() < 4.0 * found.std, "{found:?}");
+        }
+    }
+}

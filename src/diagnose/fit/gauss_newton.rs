@@ -24,14 +24,33 @@ pub(super) struct Structure {
 }
 
 impl Structure {
-    fn without(mut self, term: usize) -> Self {
-        self.active.retain(|one| *one != term);
+    /// Without a term, and what is fitted of its constants.
+    fn without(mut self, term: usize, problem: &Problem<'_>) -> Self {
+        let gone: Vec<usize> = problem.constants_of(term).chain([term]).collect();
+        self.active.retain(|one| !gone.contains(one));
         self
     }
 
-    fn with(mut self, term: usize, constants: EffectConstants<f64>) -> Self {
+    /// With a term; its constants are unknowns, too, unless they are the usual ones.
+    fn with(mut self, term: usize, constants: EffectConstants<f64>, problem: &Problem<'_>) -> Self {
         self.active.push(term);
         self.constants[term] = constants;
+        if constants != problem.usual(term) {
+            self.active.extend(problem.constants_of(term));
+        }
+        self
+    }
+
+    /// With the constants that a linearisation has.
+    fn standing_at(mut self, at: &Linearisation, problem: &Problem<'_>) -> Self {
+        for place in &self.active {
+            let Term::Constant(effect, constant) = problem.terms[*place] else { continue };
+            if let Some(own) =
+                problem.place(Term::Effect(effect)).filter(|_| at.value(Term::Effect(effect)) != 0.0)
+            {
+                self.constants[own] = self.constants[own].with(constant, at.value(problem.terms[*place]));
+            }
+        }
         self
     }
 }
@@ -143,7 +162,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn vacated(&self, term: usize) -> Self {
         let (structure, at) = self.left_by(&[term]);
         let vacated = Self::around(
-            &self.problem.every_place(),
+            &self.problem.every_place(&structure.active),
             self.problem,
             structure,
             (at, self.solved()),
@@ -156,7 +175,8 @@ impl<'a> Fit<'a> {
     /// it has their columns, else at zero.
     fn exchanged(&self, old: &[usize], new: &[(usize, EffectConstants<f64>)]) -> (Structure, Linearisation) {
         let (structure, at) = self.left_by(old);
-        let structure = new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants));
+        let structure =
+            new.iter().fold(structure, |all, (term, constants)| all.with(*term, *constants, self.problem));
         let has_column = |(term, constants): &(usize, EffectConstants<f64>)| {
             self.regression.shows(*term) && self.constants(*term) == *constants
         };
@@ -175,7 +195,7 @@ impl<'a> Fit<'a> {
     fn left_by(&self, old: &[usize]) -> (Structure, Linearisation) {
         let gone = |(structure, at): (Structure, Linearisation), term: &usize| {
             let constants = &self.structure.constants[*term];
-            (structure.without(*term), at.with(self.problem.terms[*term], 0.0, constants))
+            (structure.without(*term, self.problem), at.with(self.problem.terms[*term], 0.0, constants))
         };
         old.iter().fold((self.structure.clone(), self.solved()), gone)
     }
@@ -244,10 +264,11 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
         let fit = Self::linearised(problem, &structure, (at, assumed_error), next, progress);
+        let structure = fit.structure.clone();
         let columns = Columns {
             terms: &problem.terms,
             constants: &structure.constants,
-            places: &problem.every_place(),
+            places: &problem.every_place(&structure.active),
         };
         let weak_form = fit.weak_form.with_columns(columns);
         Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
@@ -262,7 +283,8 @@ impl<'a> Fit<'a> {
         progress: Progress<'_>,
     ) -> Self {
         let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
-            Self::around(&structure.active, problem, structure.clone(), (at.clone(), at), assumed_error)
+            let structure = structure.clone().standing_at(&at, problem);
+            Self::around(&structure.active.clone(), problem, structure, (at.clone(), at), assumed_error)
         };
         let mut fit = round(at, assumed_error);
         for _ in 1..MOST_ROUNDS {
@@ -304,6 +326,7 @@ impl<'a> Fit<'a> {
             let value = at.value(term) + increment;
             at.with(term, value, &self.structure.constants[*place])
         };
+        // A term stands before its constants.
         solution.terms.iter().zip(&solution.value).fold(self.weak_form.at.clone(), step)
     }
 
@@ -418,7 +441,11 @@ impl<'a> Fit<'a> {
         let mut priors = self.problem.increments(&self.weak_form.at);
         for term in terms {
             let mean = -self.weak_form.at.value(self.problem.terms[*term]);
-            priors[*term] = self.estimate(*term).map(|own| Prior { mean, std: ROUNDING.sqrt() * own.std });
+            let std = |term: usize| Some(ROUNDING.sqrt() * self.estimate(term)?.std);
+            priors[*term] = std(*term).map(|std| Prior { mean, std });
+            for constant in self.problem.constants_of(*term) {
+                priors[constant] = std(constant).map(|std| Prior { mean: 0.0, std }).or(priors[constant]);
+            }
         }
         priors
     }

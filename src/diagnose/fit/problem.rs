@@ -25,6 +25,8 @@ pub(crate) struct Problem<'a> {
     least_lag_s: f64,
     /// The constants from which a fit of them starts.
     pub(crate) usual_constants: EffectConstants<f64>,
+    /// How far a constant may lie from where it is, for each term that is one.
+    constant_stds: Vec<Option<f64>>,
     /// Those of effects whose constants are given.
     given_constants: EffectConstants<f64>,
     /// The declared model, from which the fit sets out.
@@ -35,7 +37,8 @@ impl<'a> Problem<'a> {
     pub(crate) fn new(traces: &'a [Series], declared: &Declared, checks: &[SensorCheck]) -> Self {
         let terms = all_terms();
         let start = Linearisation::declared(declared);
-        let usual_constants = usual_constants(traces, &start.motions(traces, &declared.sensors));
+        let motions = start.motions(traces, &declared.sensors);
+        let usual_constants = usual_constants(traces, &motions);
         let sensors = effective(&declared.sensors, checks);
         Self {
             traces,
@@ -44,6 +47,7 @@ impl<'a> Problem<'a> {
             sensors,
             white: white(&declared.sensors, checks),
             priors: terms.iter().map(|term| prior(*term, declared)).collect(),
+            constant_stds: terms.iter().map(|term| constant_std(*term, traces, &motions)).collect(),
             terms,
             least_lag_s: SMALL_SHARE * traces.iter().map(Series::step_s).fold(0.0, f64::max),
             given_constants: EffectConstants { slip_speed_mps: turning_speed(declared), ..usual_constants },
@@ -57,6 +61,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn with_leak_changes(mut self, changes: &[LeakChange]) -> Self {
         self.terms.extend(changes.iter().map(|change| Term::LeakChange(*change)));
         self.priors.resize(self.terms.len(), None);
+        self.constant_stds.resize(self.terms.len(), None);
         self
     }
 
@@ -82,9 +87,19 @@ impl<'a> Problem<'a> {
         &self.start.model.cylinder
     }
 
-    /// The places of all terms.
-    pub(super) fn every_place(&self) -> Vec<usize> {
-        (0..self.terms.len()).collect()
+    /// The places of all terms that could be fitted beside the `active` ones: the constants of these alone.
+    pub(super) fn every_place(&self, active: &[usize]) -> Vec<usize> {
+        let is_open = |i: &usize| self.constant_stds[*i].is_none() || active.contains(i);
+        (0..self.terms.len()).filter(is_open).collect()
+    }
+
+    /// The places of the constants of a term that are fitted.
+    pub(super) fn constants_of(&self, term: usize) -> impl Iterator<Item = usize> {
+        let is_own = move |i: &usize| {
+            let Term::Constant(effect, _) = self.terms[*i] else { return false };
+            self.constant_stds[*i].is_some() && self.terms[term].effect() == Some(effect)
+        };
+        (0..self.terms.len()).filter(is_own)
     }
 
     /// The place of a term.
@@ -109,12 +124,14 @@ impl<'a> Problem<'a> {
         (0..self.terms.len()).map(|term| differ(self.usual(term))).min().unwrap_or(0)
     }
 
-    /// The priors as increments from a linearisation.
+    /// The priors as increments from a linearisation. A constant lies anywhere within its range: what is known of it holds back a step, and
+    /// draws nowhere (Levenberg 1944).
     pub(super) fn increments(&self, at: &Linearisation) -> Vec<Option<Prior>> {
-        let from_there = |(prior, term): (&Option<Prior>, &Term)| {
-            prior.map(|prior| Prior { mean: prior.mean - at.value(*term), ..prior })
+        let from_there = |((prior, term), constant): ((&Option<Prior>, &Term), &Option<f64>)| {
+            let known = prior.map(|prior| Prior { mean: prior.mean - at.value(*term), ..prior });
+            known.or_else(|| constant.map(|std| Prior { mean: 0.0, std }))
         };
-        self.priors.iter().zip(&self.terms).map(from_there).collect()
+        self.priors.iter().zip(&self.terms).zip(&self.constant_stds).map(from_there).collect()
     }
 
     /// Values of a term that physics allows and samples can show.
@@ -147,6 +164,23 @@ fn usual_constants(traces: &[Series], motions: &[Motion]) -> EffectConstants<f64
         }),
         ..EffectConstants::default()
     }
+}
+
+/// Of a value anywhere within what these traces cover; none where the term is no constant, or they tell nothing of it.
+fn constant_std(term: Term, traces: &[Series], motions: &[Motion]) -> Option<f64> {
+    let Term::Constant(_, constant) = term else { return None };
+    let fastest = SIGNIFICANT_SIGMA * motions.iter().map(|motion| motion.rms_mps).fold(0.0, f64::max);
+    let span = |value: fn(&Signals<f64>) -> f64| {
+        let at = |((x_m, pa_pa), pb_pa): ((&f64, &f64), &f64)| {
+            value(&Signals { x_m: *x_m, pa_pa: *pa_pa, pb_pa: *pb_pa, v_mps: fastest, ..Signals::default() })
+        };
+        let all =
+            traces.iter().flat_map(|trace| trace.x_m.iter().zip(&trace.pa_pa).zip(&trace.pb_pa).map(at));
+        all.filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let (low, high) = constant.range(0.0, span)?;
+    Some((high - low) / 12.0_f64.sqrt())
 }
 
 fn within(parameter: EffectConstant, value: f64) -> f64 {

@@ -92,10 +92,11 @@ mod tests {
     /// The fit with the valve beside the leaks, and its place.
     fn with_fit(of: impl Fn(&Fit<'_>, usize)) {
         let traces = [opening()];
-        let problem = Problem::new(&traces, &declared(), &[]);
+        let mut problem = Problem::new(&traces, &declared(), &[]);
+        // Taken, not fitted: the fit has no column of its own for it.
+        problem.usual_constants.cracking_pa = CRACKING_PA;
         let term = problem.place(Term::Effect(Effect::InternalLeakCracking)).expect("is a term");
-        let constants = problem.usual(term).with(EffectConstant::CrackingPressure, CRACKING_PA);
-        of(&Fit::declared(&problem, &|| ()).with(term, constants, &|| ()), term);
+        of(&Fit::declared(&problem, &|| ()).with(term, problem.usual(term), &|| ()), term);
     }
 
     /// The spread is that of a fit with the law's derivative as one more column, known beforehand to lie in the constant's range.

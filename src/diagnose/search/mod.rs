@@ -74,7 +74,6 @@ fn add_while(
         if !goes_on(all) || !all.add_next(progress) {
             break;
         }
-        all.refine_friction(progress);
         all.drop_needless(progress);
         let now = error(&all.fit);
         let mended = reduction_percent(&last, &now);

@@ -75,15 +75,6 @@ impl<'a> Selection<'a> {
         Self { fit: declared, effects: vec![], others: vec![] }
     }
 
-    /// Fits friction's constants again beside what has been named since: at the noise of an incomplete model any slip speed will do.
-    pub(super) fn refine_friction(&mut self, progress: Progress<'_>) {
-        for one in self.effects.iter().filter(|one| self.fit.problem.terms[one.term].in_force()) {
-            if let Some(better) = with_better_constants(&self.fit, one.term, progress) {
-                self.fit = better;
-            }
-        }
-    }
-
     pub(super) fn drop_at(&mut self, at: usize, progress: Progress<'_>) {
         let gone = self.effects.remove(at);
         self.fit = self.fit.without(gone.term, progress);

@@ -179,10 +179,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 /// model: its fit does not settle, leaves more than noise where the named one does not, has an effect at the end of its range, or one that
 /// has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
-    let mut other = fit.in_place_of(&one.gone, &one.new, progress);
-    for (term, _) in &one.new {
-        other = selection::with_better_constants(&other, *term, progress).unwrap_or(other);
-    }
+    let other = fit.in_place_of(&one.gone, &one.new, progress);
     let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {

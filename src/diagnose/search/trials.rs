@@ -34,8 +34,11 @@ fn free(fit: &Fit<'_>, term: usize) -> Vec<Range> {
     effect.fitted_constants().filter_map(|parameter| range(fit, parameter)).collect()
 }
 
-/// What an effect's value has of spread because its constants are not known.
+/// What an effect's value has of spread because its constants are not known; where they were fitted the fit knows that.
 pub(crate) fn std_of_constants(fit: &Fit<'_>, term: usize) -> f64 {
+    if fit.constants(term) != fit.problem.usual(term) {
+        return 0.0;
+    }
     let unknown = |Range { parameter, low, high }| UnknownConstant { parameter, range: (low, high) };
     let unknown: Vec<_> = free(fit, term).into_iter().map(unknown).collect();
     fit.std_of_constants(term, &unknown)

@@ -5,7 +5,7 @@ use super::terms::Term;
 use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA};
-use pitchleak_core::effects::{EffectConstants, EffectKind};
+use pitchleak_core::effects::{ActiveEffect, EffectConstant, EffectConstants, EffectKind};
 use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals, Terms};
 
 /// The values around which the regression is linear.
@@ -120,7 +120,10 @@ impl Linearisation {
         at: &Signals<f64>,
         constants: &EffectConstants<f64>,
     ) -> Terms<f64> {
-        let own = term.unit_term(at, &self.model, constants);
+        let own = match term {
+            Term::Constant(effect, constant) => self.by_constant(effect, constant, at),
+            _ => term.unit_term(at, &self.model, constants),
+        };
         let is_physical = |kind| kind != EffectKind::Sensor;
         if self.effects.iter().all(|one| !is_physical(one.effect.spec().kind)) {
             return own;
@@ -130,6 +133,18 @@ impl Linearisation {
         let Some((above, below)) = above.zip(term.read(-step, at)) else { return own };
         let known = |at: &Signals<f64>| self.effects.terms(at, &self.model, is_physical);
         own.plus(-0.5 / step, known(&above).plus(-1.0, known(&below)))
+    }
+
+    /// What a unit of a constant adds, at the size that its effect has.
+    fn by_constant(&self, effect: Effect, constant: EffectConstant, at: &Signals<f64>) -> Terms<f64> {
+        let Some(active) = self.effects.iter().find(|active| active.effect == effect) else {
+            return Terms::default();
+        };
+        let value = active.constants.get(constant);
+        let step = NEGLIGIBLE_SHARE * value;
+        let unit = |value| effect.unit_term(at, &self.model, &active.constants.with(constant, value));
+        let slope = unit(value + step).plus(-1.0, unit(value - step));
+        Terms::default().plus(0.5 * active.value / step, slope)
     }
 
     /// Value of a term here; what the model does not know is zero.
@@ -142,6 +157,10 @@ impl Linearisation {
             Term::ExternalB => leaks.external_b,
             Term::Effect(effect) => {
                 self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
+            }
+            Term::Constant(effect, constant) => {
+                let active = self.effects.iter().find(|active| active.effect == effect);
+                active.map_or(0.0, |active| active.constants.get(constant))
             }
             Term::Unlisted(_) | Term::Product(..) | Term::LeakChange(_) => 0.0,
         }
@@ -168,6 +187,13 @@ impl Linearisation {
             Term::LeakChange(change) => {
                 self.changes.retain(|(own, _)| *own != change);
                 self.changes.push((change, value));
+            }
+            Term::Constant(effect, constant) => {
+                let value = value.clamp(constant.spec().lower, constant.spec().upper);
+                let active = self.effects.iter().find(|active| active.effect == effect).copied();
+                if let Some(ActiveEffect { value: size, constants, .. }) = active {
+                    self.set_effect(effect, size, &constants.with(constant, value));
+                }
             }
             Term::Unlisted(_) | Term::Product(..) => {}
         }

@@ -4,7 +4,7 @@
 use super::leak_change::LeakChange;
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::Equation;
-use pitchleak_core::effects::{EffectConstants, EffectKind, EffectSpec, LeftSide};
+use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
 /// One column of the regression.
@@ -26,6 +26,8 @@ pub(crate) enum Term {
     Product(Effect, Effect),
     /// By how much a leak is larger from some row on; its column is made of the leak's.
     LeakChange(LeakChange),
+    /// A constant of an effect's law that is fitted beside its size.
+    Constant(Effect, EffectConstant),
 }
 
 /// Which columns are built.
@@ -86,10 +88,12 @@ fn left_side(side: LeftSide) -> &'static [(Channel, usize)] {
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
 
-/// Every column: the declared model's, the candidates', the unlisted ones.
+/// Every column: the declared model's, the candidates', the unlisted ones, those of the candidates' constants.
 pub(crate) fn all_terms() -> Vec<Term> {
     let known = Effect::ALL.iter().copied().map(Term::Effect);
-    DECLARED.into_iter().chain(known).chain(Unlisted::ALL.map(Term::Unlisted)).collect()
+    let constants_of = |effect: Effect| effect.fitted_constants().map(move |own| Term::Constant(effect, own));
+    let constants = Effect::ALL.iter().copied().flat_map(constants_of);
+    DECLARED.into_iter().chain(known).chain(Unlisted::ALL.map(Term::Unlisted)).chain(constants).collect()
 }
 
 impl Term {
@@ -124,7 +128,8 @@ impl Term {
             Self::Product(one, other) => {
                 one.unit_term(at, model, constants).zip(other.unit_term(at, model, constants), |a, b| a * b)
             }
-            Self::LeakChange(_) => Terms::default(),
+            // Of a leak's column, or of where the model stands.
+            Self::LeakChange(_) | Self::Constant(..) => Terms::default(),
         }
     }
 
@@ -153,7 +158,7 @@ impl Term {
         match self {
             Self::Internal | Self::ExternalA | Self::ExternalB | Self::LeakChange(_) => true,
             Self::Effect(effect) => effect.spec().kind.is_leak(),
-            Self::InverseBulk | Self::Unlisted(_) | Self::Product(..) => false,
+            Self::InverseBulk | Self::Unlisted(_) | Self::Product(..) | Self::Constant(..) => false,
         }
     }
 
@@ -168,6 +173,7 @@ impl Term {
             }
             Self::Unlisted(product) => product.in_force(),
             Self::Product(one, other) => Self::Effect(one).in_force() && Self::Effect(other).in_force(),
+            Self::Constant(effect, _) => Self::Effect(effect).in_force(),
             _ => false,
         }
     }
@@ -177,6 +183,7 @@ impl Term {
         match self {
             Self::Effect(effect) => effect.spec().kind == EffectKind::Force,
             Self::Product(one, other) => Self::Effect(one).is_force() || Self::Effect(other).is_force(),
+            Self::Constant(effect, _) => Self::Effect(effect).is_force(),
             _ => false,
         }
     }
@@ -259,6 +266,7 @@ impl Term {
     pub(crate) fn bounds(self) -> (f64, f64) {
         match self {
             Self::Effect(effect) => (effect.spec().lower, effect.spec().upper),
+            Self::Constant(_, constant) => (constant.spec().lower, constant.spec().upper),
             // The other way it is a leak that grows by less than the pressure, which the table has.
             Self::Unlisted(Unlisted::CubicLeakA | Unlisted::CubicLeakB)
             | Self::Unlisted(Unlisted::HiddenPlayA | Unlisted::HiddenPlayB) => (0.0, f64::INFINITY),
