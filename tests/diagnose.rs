@@ -603,10 +603,6 @@ fn the_place_of_a_law_moves_with_the_gain_of_the_sensor_that_sees_it() {
         effects.set(law, size, constants).expect("is possible");
         effects.set(gain, gain_size, constants).expect("is possible");
         let answer = diagnose(&[seen(effects, seed)], &[], &Declared::of(&sensors), &|| ());
-        println!(
-            "{:?}",
-            answer.effects.iter().map(|one| (one.id, one.value, one.std, one.confident)).collect::<Vec<_>>()
-        );
         let of =
             |effect: Effect| answer.effects.iter().find(|one| one.id == effect.spec().id).expect("is named");
         assert_eq!(answer.effects.len(), 2, "{:?}", answer.effects);

@@ -5,6 +5,7 @@
 use super::problem::Problem;
 use super::regression::{self, Prior, Regression, Solution};
 use super::score::{PartialColumn, Score};
+use super::structure::Structure;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{MOST_ROUNDS, ROUNDING, SMALL_SHARE};
 use crate::diagnose::weak_form::{Columns, Linearisation, Term, WeakForm, Whitening};
@@ -14,46 +15,6 @@ use std::sync::OnceLock;
 
 /// Called at every round of a fit.
 pub type Progress<'a> = &'a dyn Fn();
-
-/// Which terms are fitted, and with which constants each column stands.
-#[derive(Clone)]
-pub(super) struct Structure {
-    /// Places among the problem's terms, those of the declared model first.
-    active: Vec<usize>,
-    constants: Vec<EffectConstants<f64>>,
-}
-
-impl Structure {
-    /// Without a term, and what is fitted of its constants.
-    fn without(mut self, term: usize, problem: &Problem<'_>) -> Self {
-        let gone: Vec<usize> = problem.constants_of(term).chain([term]).collect();
-        self.active.retain(|one| !gone.contains(one));
-        self
-    }
-
-    /// With a term; its constants are unknowns, too, unless they are the usual ones.
-    fn with(mut self, term: usize, constants: EffectConstants<f64>, problem: &Problem<'_>) -> Self {
-        self.active.push(term);
-        self.constants[term] = constants;
-        if constants != problem.usual(term) {
-            self.active.extend(problem.constants_of(term));
-        }
-        self
-    }
-
-    /// With the constants that a linearisation has.
-    fn standing_at(mut self, at: &Linearisation, problem: &Problem<'_>) -> Self {
-        for place in &self.active {
-            let Term::Constant(effect, constant) = problem.terms[*place] else { continue };
-            if let Some(own) =
-                problem.place(Term::Effect(effect)).filter(|_| at.value(Term::Effect(effect)) != 0.0)
-            {
-                self.constants[own] = self.constants[own].with(constant, at.value(problem.terms[*place]));
-            }
-        }
-        self
-    }
-}
 
 /// A fit: the regression around one linearisation, and its solution. It never changes; another effect makes another fit.
 pub(crate) struct Fit<'a> {

@@ -7,6 +7,7 @@ mod predict;
 mod problem;
 mod regression;
 mod score;
+mod structure;
 mod widening;
 
 pub(crate) use emptied::Emptied;
