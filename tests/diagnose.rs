@@ -612,3 +612,16 @@ fn the_place_of_a_law_moves_with_the_gain_of_the_sensor_that_sees_it() {
         }
     }
 }
+
+/// How full of gas a hose is shows only together with the pressure at which it was filled. That can be higher than none, never lower.
+#[test]
+fn a_gas_of_unknown_precharge_is_no_larger_than_without_one() {
+    let mut sensors = Rig::paper();
+    sensors.instruments = sensors.instruments.with_accuracy(3e-3);
+    let mut effects = EffectSet::default();
+    effects.set(Effect::AccumulatorA, 2e-5, EffectConstants::default()).expect("is possible");
+    let trace = leaking_in_wind(WindCase::Mps21, PerLeak::default(), effects, 60.0, &sensors, 3);
+    let answer = diagnose(&[trace], &[], &Declared::of(&sensors), &|| ());
+    let gas = answer.effects.iter().find(|one| one.id == "accumulator_a").expect("is named");
+    assert!((0.3 * gas.value..=1.1 * gas.value).contains(&gas.std), "{gas:?}");
+}

@@ -39,9 +39,14 @@ pub(crate) fn std_of_constants(fit: &Fit<'_>, term: usize) -> f64 {
     if fit.constants(term) != fit.problem.usual(term) {
         return 0.0;
     }
-    let unknown = |Range { parameter, low, high }| UnknownConstant { parameter, range: (low, high) };
-    let unknown: Vec<_> = free(fit, term).into_iter().map(unknown).collect();
-    fit.std_of_constants(term, &unknown)
+    let ranges = free(fit, term);
+    let unknown = |own: &Range| UnknownConstant { parameter: own.parameter, range: (own.low, own.high) };
+    let unknown: Vec<_> = ranges.iter().map(unknown).collect();
+    let linear = fit.std_of_constants(term, &unknown);
+    let size = fit.estimate(term).map_or(0.0, |own| own.value.abs());
+    let is_least = |own: &Range| fit.constants(term).get(own.parameter) <= own.low;
+    // The constant can but grow, and a law that grows by a share x with it makes the size v / (1 + x): never less than nothing.
+    if ranges.iter().any(is_least) && size > 0.0 { linear / (1.0 + linear / size) } else { linear }
 }
 
 /// A fitted constant of an effect that lies at the end of what these traces cover: of a flank alone neither the top's place nor its height
