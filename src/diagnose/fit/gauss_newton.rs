@@ -146,19 +146,20 @@ impl<'a> Fit<'a> {
         }
         let further: Vec<usize> = new.iter().map(|(term, _)| *term).collect();
         let foreseen = self.regression.solve(&[self.active(), &further].concat(), &self.priors_without(old));
-        let at = self.moved_by(&foreseen);
-        let at =
-            old.iter().fold(at, |at, term| at.with(self.problem.terms[*term], 0.0, &self.constants(*term)));
-        (structure, at)
+        (structure, self.with_none_of(old, self.moved_by(&foreseen)))
     }
 
     /// Structure and linearisation once some effects are gone.
     fn left_by(&self, old: &[usize]) -> (Structure, Linearisation) {
-        let gone = |(structure, at): (Structure, Linearisation), term: &usize| {
-            let constants = &self.structure.constants[*term];
-            (structure.without(*term, self.problem), at.with(self.problem.terms[*term], 0.0, constants))
-        };
-        old.iter().fold((self.structure.clone(), self.solved()), gone)
+        let without = |structure: Structure, term: &usize| structure.without(*term, self.problem);
+        (old.iter().fold(self.structure.clone(), without), self.with_none_of(old, self.solved()))
+    }
+
+    /// A linearisation with some effects at zero.
+    fn with_none_of(&self, old: &[usize], at: Linearisation) -> Linearisation {
+        let gone =
+            |at: Linearisation, term: &usize| at.with(self.problem.terms[*term], 0.0, &self.constants(*term));
+        old.iter().fold(at, gone)
     }
 
     /// One linearisation and its solution, with the columns of some terms, all that are fitted among them, and the noise taken elsewhere.

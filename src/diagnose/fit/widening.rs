@@ -14,7 +14,7 @@ pub(crate) struct UnknownConstant {
 }
 
 impl Fit<'_> {
-    /// Standard deviation that a fitted term's value has because of constants which were fitted, or taken, beside it: to first order, each
+    /// Standard deviation that a fitted term's value has because of constants which were taken beside it: to first order, each
     /// is one more column, the derivative of the term, with a range for a prior. Of M⁻¹, the inverse of the normal equations with these
     /// columns, the value's entry grows by eᵀ S⁻¹ e, where e is what the fitted columns explain of them and S what is new in them.
     pub(crate) fn std_of_constants(&self, term: usize, unknown: &[UnknownConstant]) -> f64 {

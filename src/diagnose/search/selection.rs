@@ -94,26 +94,15 @@ fn with<'a>(fit: &Fit<'a>, trial: &Trial, progress: Progress<'_>) -> Fit<'a> {
     if is_usual { with } else { with_better_constants(&with, term, progress).unwrap_or(with) }
 }
 
-/// The fit with an effect's constants fitted again, now that what it leaves is no longer in the way; none where they stay. The usual
-/// ones are kept unless the traces speak against them.
-pub(super) fn with_better_constants<'a>(
-    fit: &Fit<'a>,
-    term: usize,
-    progress: Progress<'_>,
-) -> Option<Fit<'a>> {
-    if !trials::are_fitted(fit, term) {
-        return None;
-    }
+/// The fit with an effect's constants fitted again, now that what it leaves is no longer in the way; none where they stay.
+fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>) -> Option<Fit<'a>> {
     let vacated = fit.vacated(term);
     let mut candidates = Candidates::of(&vacated);
     let present = vacated.score(&vacated.free, term).map_or(0.0, |own| own.chi2_drop);
     let starts = trials::first_scores(&mut candidates, &vacated.free, term);
     let first = starts.into_iter().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop))?;
     let (best, found) = trials::best_score(&mut candidates, &vacated.free, first);
-    let is_usual = fit.constants(term) == fit.problem.usual(term);
-    let needed = if is_usual { SIGNIFICANT_SIGMA.powi(2) } else { 0.0 };
-    let is_better = best.chi2_drop > present + needed * vacated.dispersion(fit.free.chi2);
-    is_better.then(|| vacated.with(term, found, progress))
+    (best.chi2_drop > present).then(|| vacated.with(term, found, progress))
 }
 
 impl Selection<'_> {

@@ -59,11 +59,6 @@ pub(crate) fn constant_at_end(fit: &Fit<'_>, term: usize) -> Option<EffectConsta
     free(fit, term).into_iter().find(is_at_end).map(|range| range.parameter)
 }
 
-/// Whether an effect has such constants.
-pub(super) fn are_fitted(fit: &Fit<'_>, term: usize) -> bool {
-    !free(fit, term).is_empty()
-}
-
 fn range(fit: &Fit<'_>, parameter: EffectConstant) -> Option<Range> {
     let span = |value: fn(&Signals<f64>) -> f64| {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);

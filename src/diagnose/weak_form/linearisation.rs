@@ -137,14 +137,17 @@ impl Linearisation {
 
     /// What a unit of a constant adds, at the size that its effect has.
     fn by_constant(&self, effect: Effect, constant: EffectConstant, at: &Signals<f64>) -> Terms<f64> {
-        let Some(active) = self.effects.iter().find(|active| active.effect == effect) else {
-            return Terms::default();
-        };
+        let Some(active) = self.active(effect) else { return Terms::default() };
+        // None can be told at zero: the column is no number then, and stays empty.
         let value = active.constants.get(constant);
         let step = NEGLIGIBLE_SHARE * value;
         let unit = |value| effect.unit_term(at, &self.model, &active.constants.with(constant, value));
         let slope = unit(value + step).plus(-1.0, unit(value - step));
         Terms::default().plus(0.5 * active.value / step, slope)
+    }
+
+    fn active(&self, effect: Effect) -> Option<&ActiveEffect<f64>> {
+        self.effects.iter().find(|active| active.effect == effect)
     }
 
     /// Value of a term here; what the model does not know is zero.
@@ -155,12 +158,9 @@ impl Linearisation {
             Term::Internal => leaks.internal,
             Term::ExternalA => leaks.external_a,
             Term::ExternalB => leaks.external_b,
-            Term::Effect(effect) => {
-                self.effects.iter().find(|active| active.effect == effect).map_or(0.0, |active| active.value)
-            }
+            Term::Effect(effect) => self.active(effect).map_or(0.0, |active| active.value),
             Term::Constant(effect, constant) => {
-                let active = self.effects.iter().find(|active| active.effect == effect);
-                active.map_or(0.0, |active| active.constants.get(constant))
+                self.active(effect).map_or(0.0, |active| active.constants.get(constant))
             }
             Term::Unlisted(_) | Term::Product(..) | Term::LeakChange(_) => 0.0,
         }
@@ -190,8 +190,7 @@ impl Linearisation {
             }
             Term::Constant(effect, constant) => {
                 let value = value.clamp(constant.spec().lower, constant.spec().upper);
-                let active = self.effects.iter().find(|active| active.effect == effect).copied();
-                if let Some(ActiveEffect { value: size, constants, .. }) = active {
+                if let Some(ActiveEffect { value: size, constants, .. }) = self.active(effect).copied() {
                     self.set_effect(effect, size, &constants.with(constant, value));
                 }
             }
