@@ -1,8 +1,8 @@
-//! Alarms of a stream against its posterior: what it rules out is held back, and nothing else.
+//! Alarms against the posterior: what it rules out is held back, and nothing else, in a file as in a stream.
 
 #![allow(clippy::unwrap_used)]
 
-use pitchleak::core::{AlarmState, Leak};
+use pitchleak::core::{AlarmState, Leak, LeakDetector};
 use pitchleak::live::{Event, LineFormat, LiveConfig, Watch};
 use pitchleak::replay::{ReplayError, replay};
 use pitchleak::report::Status;
@@ -16,12 +16,20 @@ fn world(name: &str) -> &'static World {
     WORLDS.iter().find(|world| world.name == name).unwrap()
 }
 
-/// Leaks whose flow went beyond its threshold, and those that a stream raised an alarm of.
+/// Leaks whose flow went beyond its threshold, and those of which an alarm was told: the same by a file and by a stream.
 fn raised(case: &Case) -> [Vec<Leak>; 2] {
     let (trace, rig) = (case.record().0, case.rig());
     let mut reader = TraceReader::from_stream("t", Box::new(Cursor::new(trace.clone())), &rig).unwrap();
-    let report = replay(&mut reader, &rig, |_, _, _| Ok::<(), ReplayError>(())).unwrap();
-    let beyond = report.alarms.into_iter().filter(|alarm| alarm.state == AlarmState::Raised);
+    let (mut detector, mut renewed_s, mut beyond) = (LeakDetector::new(rig.alarms), 0.0, Vec::new());
+    let report = replay(&mut reader, &rig, |replay, record, renewed| {
+        if renewed {
+            let changes = detector.update(record.t_s - renewed_s, &replay.watched_flows_m3s());
+            let changes = changes.iter().filter(|(_, change)| **change == Some(AlarmState::Raised));
+            beyond.extend(changes.map(|(fault, _)| fault));
+            renewed_s = record.t_s;
+        }
+        Ok::<(), ReplayError>(())
+    });
     let (mut watch, mut events) = (Watch::new(LiveConfig::of(rig), Some(LineFormat::Csv)), Vec::new());
     trace.split(|byte| *byte == b'\n').for_each(|line| watch.take(line, &mut events));
     watch.finish(&mut events);
@@ -29,7 +37,14 @@ fn raised(case: &Case) -> [Vec<Leak>; 2] {
         Event::Alarm(alarm) if alarm.state == AlarmState::Raised => Some(alarm.fault),
         _ => None,
     });
-    [beyond.map(|alarm| alarm.fault).collect(), told.collect()]
+    let told: Vec<Leak> = told.collect();
+    let by_file = report.unwrap().alarms.into_iter().filter(|alarm| alarm.state == AlarmState::Raised);
+    let mut by_file: Vec<Leak> = by_file.map(|alarm| alarm.fault).collect();
+    let mut by_stream = told.clone();
+    by_file.sort_by_key(|leak| leak.id());
+    by_stream.sort_by_key(|leak| leak.id());
+    assert_eq!(by_file, by_stream, "{}", case.key());
+    [beyond, told]
 }
 
 /// Meters that lag by 50 ms add up to a leak of thousandths of L/min, again and again, until it is beyond the estimator's own noise.

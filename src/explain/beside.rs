@@ -28,15 +28,19 @@ impl Told {
     }
 
     /// Whether the readings could be so on this rig: mended, they lie within its sensors' ranges. What never changes tells of
-    /// no mistake: it may as well be stuck.
+    /// no mistake: it may as well be stuck. Nor does a flow that once mended is no more than its meter's noise: it may as well be anything
+    /// that the other readings know nothing of.
     pub(super) fn allows(&self, mistake: Mistake, rig: &Rig) -> bool {
         if mistake.sensors().iter().any(|sensor| self.is_constant(*sensor)) {
             return false;
         }
         match mistake {
             Mistake::Factor(of, factor) => of.channels().all(|channel| {
-                self.extremes[channel]
-                    .is_none_or(|extremes| allows(channel, extremes.map(|value| value / factor), rig))
+                let mended = |extremes: [f64; 2]| extremes.map(|value| value / factor);
+                self.extremes[channel].is_none_or(|extremes| {
+                    allows(channel, mended(extremes), rig)
+                        && !(factor > 1.0 && is_noise(channel, mended(extremes), rig))
+                })
             }),
             Mistake::LostSign(_) => false,
             _ => true,
@@ -89,6 +93,17 @@ fn allows(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
         _ => flow(sheets.flow_b.full_scale),
     };
     range[0] <= least && most <= range[1]
+}
+
+/// Whether a flow changes by no more than its meter's noise.
+fn is_noise(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
+    let sensors = rig.sensors();
+    let noise_std = match channel {
+        3 => sensors.flow_a.noise_std,
+        4 => sensors.flow_b.noise_std,
+        _ => return false,
+    };
+    most - least < 2.0 * noise_std
 }
 
 impl Of {

@@ -266,7 +266,7 @@ impl<'a, 'p> Candidates<'a, 'p> {
         }
     }
 
-    /// Zeros that jump, beside constant leaks and the best states of the rest.
+    /// Zeros that jump, and leaks that would look the same, beside constant leaks and the best states of the rest.
     pub fn add_jumps(&mut self) {
         let (borders, ln_border) = self.pass.borders();
         self.sort();
@@ -279,6 +279,17 @@ impl<'a, 'p> Candidates<'a, 'p> {
             for zeros in self.pass.tables.zeros.iter().filter(|zeros| zeros.jumps()) {
                 for border in borders.clone() {
                     self.ask(&steady, State { zeros, border, ..state }, leaks, ln_course);
+                }
+            }
+            for leak in [Leak::ExternalA, Leak::ExternalB].into_iter().filter(|leak| !subset[*leak as usize])
+            {
+                for border in borders.clone() {
+                    let burst = LeakCourse::Burst(border);
+                    let mut leaks = leaks;
+                    leaks[leak as usize] = Some(burst);
+                    let ln_steady = self.pass.tables.ln_course(LeakCourse::Unfollowed { alone: true });
+                    let ln_own = self.pass.tables.ln_course(burst) + ln_steady;
+                    self.ask(&steady, state, leaks, ln_course + ln_own);
                 }
             }
         }

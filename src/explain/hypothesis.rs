@@ -1,5 +1,6 @@
 //! One explanation: a choice of leaks, their courses, and the state of sensors, rig and wiring.
 
+use super::SEGMENTS;
 use super::columns::{Column, Course};
 use super::equations::NormalEquations;
 use super::evidence::Free;
@@ -25,6 +26,9 @@ pub(super) enum LeakCourse {
     Accelerating,
     /// There from this segment on; before, what seeps.
     Opening(usize),
+    /// The same as a steady flow out of a chamber: within a segment pressures swing as it opens, and it can't be told from its meter's zero that
+    /// jumps.
+    Burst(usize),
     /// Another level from this segment on.
     Sudden(usize),
     /// A random walk at the segments' borders.
@@ -43,7 +47,7 @@ impl LeakCourse {
             Self::Cracking => "cracking",
             Self::Growing => "growing",
             Self::Accelerating => "accelerating",
-            Self::Opening(_) => "opening",
+            Self::Opening(_) | Self::Burst(_) => "opening",
             Self::Sudden(_) => "sudden",
             Self::Wandering => "wandering",
             Self::Creeping => "creeping",
@@ -62,13 +66,18 @@ struct Term {
 }
 
 /// What is free of a leak on this course; where there is none, what seeps.
-fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize) -> Vec<Term> {
+fn terms(leak: usize, course: Option<LeakCourse>, sizes: &Sizes, segments: usize) -> Vec<Term> {
+    let seepage = sizes.seepage[Leak::ALL[leak]];
     let own = |course: Course, at_end: f64| Term {
         column: LEAK_COLUMNS[leak],
         course,
         std: LEAK_SIZE,
         step: false,
         at_end,
+    };
+    let since = |border: usize| {
+        let per_flow = sizes.since.get(border).map_or(1.0, |since| since[Leak::ALL[leak]]);
+        Term { std: LEAK_SIZE * per_flow, ..own(Course::Since(border), 1.0) }
     };
     let level = || own(Course::Constant, 1.0);
     let step = |course: Course, std: f64| Term { std, step: true, ..own(course, 0.0) };
@@ -89,10 +98,21 @@ fn terms(leak: usize, course: Option<LeakCourse>, seepage: f64, segments: usize)
             vec![level(), own(Course::ToEnd, 1.0), own(Course::Accelerating, 1.0)]
         }
         Some(LeakCourse::Opening(border)) => {
-            vec![Term { std: seepage, ..level() }, own(Course::Since(border), 1.0)]
+            vec![Term { std: seepage, ..level() }, since(border)]
+        }
+        Some(LeakCourse::Burst(border)) => {
+            let flow = since(border);
+            let (column, unit) = if leak == Leak::ExternalA as usize {
+                (Column::ZeroA, sizes.zero_units[0])
+            } else {
+                (Column::ZeroB, sizes.zero_units[1])
+            };
+            // A steady flow is one whatever the pressures were.
+            let (std, at_end) = (LEAK_SIZE / unit, unit * flow.std / LEAK_SIZE);
+            vec![Term { std: seepage, ..level() }, Term { column, std, at_end, ..flow }]
         }
         Some(LeakCourse::Sudden(border)) => {
-            vec![own(Course::Before(border), 0.0), own(Course::Since(border), 1.0)]
+            vec![own(Course::Before(border), 0.0), since(border)]
         }
         Some(LeakCourse::Wandering) => {
             let steps = (1..segments).map(|border| step(Course::Before(border), LEAK_STEP));
@@ -177,7 +197,12 @@ impl State<'_> {
 pub(super) struct Sizes {
     /// What seeps where nothing leaks, share of full scale.
     pub seepage: PerLeak<f64>,
+    /// How many times larger the coefficient of a flow is from each border on than through the whole trace: a burst hose takes its chamber's
+    /// pressure away.
+    pub since: [PerLeak<f64>; SEGMENTS],
     pub compressibility: f64,
+    /// Units of the meters' zeros, in that of leaks.
+    pub zero_units: [f64; 2],
     pub zeros: [f64; 2],
     pub gains: [f64; 2],
     /// Shares of what is swept.
@@ -224,7 +249,7 @@ impl<'a> Hypothesis<'a> {
             if course.is_some() {
                 own.ln_prior += (LEAK_SHARE / (1.0 - LEAK_SHARE)).ln();
             }
-            for term in terms(leak, *course, sizes.seepage[Leak::ALL[leak]], segments) {
+            for term in terms(leak, *course, sizes, segments) {
                 own.add(equations, leak, &term);
             }
         }
@@ -251,7 +276,9 @@ impl<'a> Hypothesis<'a> {
     /// The segment from which on all leaks are as at the end: where one wanders, the last.
     pub fn last_change(&self, segments: usize) -> usize {
         let border = |course: &Option<LeakCourse>| match course {
-            Some(LeakCourse::Opening(border) | LeakCourse::Sudden(border)) => *border,
+            Some(LeakCourse::Opening(border) | LeakCourse::Burst(border) | LeakCourse::Sudden(border)) => {
+                *border
+            }
             Some(LeakCourse::Wandering | LeakCourse::Creeping) => segments.saturating_sub(1),
             _ => 0,
         };

@@ -97,7 +97,9 @@ impl<'a, 's> Pass<'a, 's> {
             doubts_m3s: PerLeak::default(),
             sizes: Sizes {
                 seepage: rig.alarms.threshold_m3s.map(|fault| table::USUAL_SEEPAGE * fault / full_scale_m3s),
+                since: products.coefficients_since(),
                 compressibility: rig.fluid.bulk_modulus_std_pa / rig.fluid.bulk_modulus_pa,
+                zero_units: flows.map(|flow| flow.full_scale / full_scale_m3s),
                 zeros: flows.map(|flow| flow.bias),
                 gains: flows.map(|flow| flow.gain),
                 dead_volumes: [

@@ -5,7 +5,7 @@ use crate::rig::Rig;
 use pitchleak_core::continuity::{
     CHANNELS, COLUMNS, ContinuityStatistic, EQUATIONS, RawSum, Segment, column as place_of,
 };
-use pitchleak_core::{PerLeak, Sensors};
+use pitchleak_core::{ATMOSPHERE_PA, PerLeak, Sensors};
 
 /// Segments that the engine keeps of a trace.
 pub const SEGMENTS: usize = 12;
@@ -116,7 +116,19 @@ impl RawProducts {
                 / time_s.max(LEAST_TIME_S)
         })
     }
+
+    /// How many times larger the coefficient of one flow is from each segment on than through all of them.
+    pub fn coefficients_since(&self) -> [PerLeak<f64>; SEGMENTS] {
+        let whole = self.mean_pressures_pa(0);
+        std::array::from_fn(|from| {
+            let since = if from < self.segments.len() { self.mean_pressures_pa(from) } else { whole };
+            whole.zip(since).map(|(whole, since)| whole.max(LEAST_PA) / since.max(LEAST_PA))
+        })
+    }
 }
+
+/// The atmosphere: below it a chamber has run empty, and no leak has a pressure.
+const LEAST_PA: f64 = ATMOSPHERE_PA;
 
 fn dense(entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
     let mut matrix = vec![0.0; COLUMNS * COLUMNS];

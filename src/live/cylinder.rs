@@ -10,7 +10,7 @@ use crate::hold::HoldTest;
 use crate::replay::{ReplayError, Stream, Taken};
 use crate::report::{Alarm, ReplayReport};
 use crate::trace::{BadReason, BadRows, LineLayout};
-use pitchleak_core::{AlarmState, Leak};
+use pitchleak_core::AlarmState;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -22,7 +22,6 @@ pub(super) struct Cylinder {
     told_s: Option<f64>,
     order: Order,
     pub history: History,
-    weighing: Weighing,
     #[serde(skip)]
     pub notices: Notices,
     /// Something came since the last [`Snapshot`](super::Snapshot).
@@ -64,7 +63,6 @@ impl Cylinder {
             told_s: None,
             order: Order::default(),
             history: History::default(),
-            weighing: Weighing::default(),
             notices: Notices::default(),
             changed: true,
         })
@@ -146,7 +144,7 @@ impl Cylinder {
 
     /// At the end of the input: what has not been said.
     pub(super) fn finish(&mut self, name: &str, events: &mut Vec<Event>) {
-        if [self.told_s, self.weighing.at_s] != [self.stream.time_s(); 2] {
+        if [self.told_s, self.stream.weighed_s()] != [self.stream.time_s(); 2] {
             // Kept apart: a run that goes on from here says what one run says.
             let decision = self.stream.decision();
             events.extend(self.estimate(name, decision.as_ref()).map(|told| Event::Estimate(Box::new(told))));
@@ -204,8 +202,8 @@ impl Cylinder {
         if before_s.is_none() || intervals(before_s) == intervals(self.stream.time_s()) {
             return;
         }
-        self.weighing.renew(&self.stream);
-        let Some(estimate) = self.estimate(name, self.weighing.decision.as_ref()) else { return };
+        let decision = self.stream.renewed_decision();
+        let Some(estimate) = self.estimate(name, decision.as_ref()) else { return };
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
@@ -230,17 +228,9 @@ impl Cylinder {
         })
     }
 
-    /// Alarms that are due: one of a leak that the posterior rules out is held back until it no longer does.
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        self.weighing.renew_for(&self.stream);
-        let decision = self.weighing.decision.as_ref();
-        let is_ruled_out = |leak: &Leak| decision.is_some_and(|decision| decision.rules_out_alarm(*leak));
-        let ruled_out: Vec<Leak> = Leak::ALL.into_iter().filter(is_ruled_out).collect();
-        let due = self.stream.take_alarms(&ruled_out);
-        if due.is_empty() {
-            return;
-        }
-        let Some(report) = self.stream.report_as(name, decision) else { return };
+        let (due, decision) = (self.stream.take_alarms(), self.stream.renewed_decision());
+        let Some(report) = self.stream.report_as(name, decision.as_ref()) else { return };
         events.extend(due.into_iter().map(|alarm| Event::Alarm(self.alarm(name, alarm, &report))));
     }
 
@@ -283,49 +273,5 @@ mod stream_bytes {
             return Err(de::Error::custom("bytes expected"));
         };
         Stream::restore(&bytes).map_err(de::Error::custom)
-    }
-}
-
-/// After so large a share of the time since something happened the posterior can have changed. Chosen.
-const SHARE: f64 = 0.2;
-/// At least, and at most, s. Chosen.
-const BOUNDS_S: (f64, f64) = (1.0, 60.0);
-
-/// The last decision on a stream: weighed anew at once where an alarm was raised or cleared, and soon after; ever more seldom as
-/// long as nothing happens.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Weighing {
-    /// As it stands.
-    decision: Option<Decision>,
-    /// Times of it, and of the first sample or the last alarm, s.
-    at_s: Option<f64>,
-    since_s: Option<f64>,
-}
-
-impl Weighing {
-    /// Decides anew where that is due.
-    fn renew(&mut self, stream: &Stream) {
-        let Some(t_s) = stream.time_s() else { return };
-        let since_s = *self.since_s.get_or_insert(t_s);
-        let (least_s, most_s) = BOUNDS_S;
-        let pause_s = (SHARE * (t_s - since_s)).clamp(least_s, most_s);
-        if self.at_s.is_none_or(|at_s| !(0.0..pause_s).contains(&(t_s - at_s))) {
-            self.weigh(stream, t_s);
-        }
-    }
-
-    /// Decides anew at once after an alarm that it has not seen, and where it is due for one that is held back.
-    fn renew_for(&mut self, stream: &Stream) {
-        let alarm_s = stream.replay().alarms().last().map(|alarm| alarm.time_s);
-        if alarm_s > self.at_s {
-            self.since_s = alarm_s;
-            self.at_s = None;
-        }
-        self.renew(stream);
-    }
-
-    fn weigh(&mut self, stream: &Stream, t_s: f64) {
-        self.decision = stream.decision();
-        self.at_s = Some(t_s);
     }
 }

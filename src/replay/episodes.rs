@@ -49,15 +49,21 @@ impl Episodes {
         }
     }
 
+    /// Drops the one of this leak that goes on.
+    pub fn drop(&mut self, fault: Leak) {
+        self.open[fault] = None;
+    }
+
     /// Drops all but the last.
     pub fn forget(&mut self) {
         let beyond = self.ended.len().saturating_sub(KEPT);
         self.ended.drain(..beyond);
     }
 
-    /// All of them in the order of their beginnings.
-    pub fn list(&self) -> Vec<Episode> {
-        let open = self.open.iter().filter_map(|(fault, open)| Some(open.as_ref()?.episode(fault, None)));
+    /// Those of which an alarm was told, in the order of their beginnings; `standing` are told and go on.
+    pub fn list(&self, standing: &PerLeak<bool>) -> Vec<Episode> {
+        let open = self.open.iter().filter(|(fault, _)| standing[*fault]);
+        let open = open.filter_map(|(fault, open)| Some(open.as_ref()?.episode(fault, None)));
         let mut all: Vec<Episode> = self.ended.iter().copied().chain(open).collect();
         all.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
         all
@@ -76,7 +82,7 @@ mod tests {
             let flow = (lpm / LPM_PER_M3S, 0.05 / LPM_PER_M3S);
             episodes.add(t_s, 1.0, PerLeak { internal: flow, ..PerLeak::default() }, &active);
         }
-        assert!((episodes.list()[0].mean_lpm - 0.3).abs() < 1e-12);
+        assert!((episodes.list(&active)[0].mean_lpm - 0.3).abs() < 1e-12);
     }
 
     #[test]
@@ -87,7 +93,7 @@ mod tests {
             episodes.add(f64::from(k), 1.0, PerLeak::default(), &active);
             episodes.forget();
         }
-        let list = episodes.list();
+        let list = episodes.list(&PerLeak::default());
         assert_eq!((list.len(), list.last().map(|last| last.from_s)), (KEPT, Some(9998.0)));
     }
 }

@@ -11,6 +11,7 @@ mod spikes;
 mod state;
 mod stream;
 mod summary;
+mod weighing;
 
 pub use estimate_file::{EstimateFile, EstimateFileError, EstimateRow};
 pub use estimator::{BulkModulus, Estimator};
@@ -38,6 +39,7 @@ use pitchleak_core::{
 };
 use scoring::Scoring;
 use spikes::{Sifted, Spikes};
+use weighing::Weighing;
 
 /// A stream's verdict is held against so much of it: longer than a leak takes to show, shorter than a shift. Chosen.
 const HORIZON_S: f64 = 1200.0;
@@ -58,6 +60,9 @@ pub struct Replay {
     changed_at_s: Option<f64>,
     scoring: Scoring,
     alarms: Vec<Alarm>,
+    /// When those were raised that the posterior rules out, s: they are told once it no longer does.
+    held_s: PerLeak<Option<f64>>,
+    weighing: Weighing,
     episodes: Episodes,
     channels: ChannelMonitor,
     consistency: Consistency,
@@ -94,6 +99,8 @@ impl Replay {
             changed_at_s: None,
             scoring: Scoring::default(),
             alarms: Vec::new(),
+            held_s: PerLeak::default(),
+            weighing: Weighing::default(),
             episodes: Episodes::default(),
             channels: ChannelMonitor::default(),
             consistency: Consistency::default(),
@@ -259,12 +266,47 @@ impl Replay {
     fn detect(&mut self, t_s: f64, elapsed_s: f64) {
         let flows = self.watched_flows_m3s();
         for (fault, change) in self.detector.update(elapsed_s, &flows) {
-            self.alarms.extend(change.map(|state| Alarm { time_s: t_s, fault, state }));
+            match change {
+                Some(AlarmState::Raised) => self.held_s[fault] = Some(t_s),
+                Some(AlarmState::Cleared) if self.held_s[fault].take().is_some() => self.episodes.drop(fault),
+                Some(state) => self.alarms.push(Alarm { time_s: t_s, fault, state }),
+                None => continue,
+            }
+            self.weighing.alarmed(t_s);
+        }
+        if self.held_s.iter().any(|(_, held)| held.is_some()) {
+            self.release(t_s);
         }
         let alarms = &self.rig.alarms;
         let gone_m3s = alarms.threshold_m3s.map(|threshold| alarms.clearing_m3s(threshold));
         let there = flows.map(|flow| flow.value).zip(gone_m3s);
         self.episodes.add(t_s, elapsed_s, there, &self.detector.active());
+    }
+
+    /// Tells the alarms that were held back of leaks that are no longer ruled out.
+    fn release(&mut self, t_s: f64) {
+        self.renew(t_s);
+        for fault in Leak::ALL {
+            let decision = self.weighing.decision.as_ref();
+            let is_ruled_out = decision.is_some_and(|decision| decision.rules_out_alarm(fault));
+            if let Some(time_s) = self.held_s[fault].take_if(|_| !is_ruled_out) {
+                let at = self.alarms.partition_point(|alarm| alarm.time_s <= time_s);
+                self.alarms.insert(at, Alarm { time_s, fault, state: AlarmState::Raised });
+            }
+        }
+    }
+
+    /// Decides anew where that is due.
+    fn renew(&mut self, t_s: f64) {
+        if self.weighing.is_due(t_s) {
+            let decision = self.decision();
+            self.weighing.set(t_s, decision);
+        }
+    }
+
+    /// Leaks whose alarm stands and was told.
+    fn standing(&self) -> PerLeak<bool> {
+        self.detector.active().zip(self.held_s).map(|(active, held_s)| active && held_s.is_none())
     }
 
     /// Leak flows as they are held against their alarms, m³/s: means over the estimator's memory; of the paper's law, which
@@ -317,7 +359,7 @@ impl Replay {
         let coefficients = self.leak_coefficients();
         let pressures = read_leak_pressures_pa(record, self.estimator.pressure_biases_pa());
         let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
-        EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.detector.active() }
+        EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.standing() }
     }
 
     /// Whether both ports are shut: such records are for [`crate::hold`].
@@ -330,21 +372,10 @@ impl Replay {
         &self.alarms
     }
 
-    /// The alarms so far, but those raised for these leaks, which are kept; one that was cleared meanwhile was none.
-    fn take_alarms(&mut self, but: &[Leak]) -> Vec<Alarm> {
+    /// The alarms so far, which are forgotten.
+    fn take_alarms(&mut self) -> Vec<Alarm> {
         self.episodes.forget();
-        let (mut taken, mut kept) = (Vec::new(), Vec::<Alarm>::new());
-        for alarm in self.alarms.drain(..) {
-            if let Some(at) = kept.iter().position(|raised| raised.fault == alarm.fault) {
-                kept.remove(at);
-            } else if alarm.state == AlarmState::Raised && but.contains(&alarm.fault) {
-                kept.push(alarm);
-            } else {
-                taken.push(alarm);
-            }
-        }
-        self.alarms = kept;
-        taken
+        std::mem::take(&mut self.alarms)
     }
 
     /// The rig.

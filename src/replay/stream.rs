@@ -11,7 +11,6 @@ use crate::trace::{
 };
 use crate::valve::ValveStream;
 use crate::wiring::{Refused, Wiring};
-use pitchleak_core::Leak;
 use pitchleak_core::continuity::{Block, Segment};
 use serde::{Deserialize, Serialize};
 
@@ -248,10 +247,9 @@ impl Stream {
         self.validator.as_ref().and_then(RowValidator::time_s)
     }
 
-    /// The alarms so far, but of these leaks, which stay; all but the last episodes of each leak are dropped: a stream without
-    /// end would grow with them.
-    pub(crate) fn take_alarms(&mut self, but: &[Leak]) -> Vec<Alarm> {
-        self.replay.take_alarms(but)
+    /// The alarms so far; they and all but the last episodes of each leak are dropped: a stream without end would grow with them.
+    pub(crate) fn take_alarms(&mut self) -> Vec<Alarm> {
+        self.replay.take_alarms()
     }
 
     /// The running replay.
@@ -274,7 +272,22 @@ impl Stream {
 
     /// What explains the last twenty minutes or so; none where they say too little.
     pub fn decision(&self) -> Option<Decision> {
-        self.replay.decision().map(|decision| decision.read_by(&self.rig().columns, self.rig()))
+        self.read(self.replay.decision())
+    }
+
+    /// The same, as it was weighed last, and where that is due anew.
+    pub(crate) fn renewed_decision(&mut self) -> Option<Decision> {
+        self.replay.renew(self.time_s()?);
+        self.read(self.replay.weighing.decision.clone())
+    }
+
+    /// When it was weighed last, s.
+    pub(crate) fn weighed_s(&self) -> Option<f64> {
+        self.replay.weighing.at_s
+    }
+
+    fn read(&self, decision: Option<Decision>) -> Option<Decision> {
+        decision.map(|decision| decision.read_by(&self.rig().columns, self.rig()))
     }
 
     /// The report as it stands, its verdict held against the last twenty minutes or so; `name` is the trace's. None before the

@@ -105,10 +105,10 @@ impl Replay {
         let leakage = self.leakage(found.is_some(), decision);
         let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
         Findings {
-            active: self.detector.active(),
+            active: self.standing(),
             trends: self.trend(found, &leakage, &threshold_lpm),
             leakage,
-            episodes: self.episodes.list(),
+            episodes: self.episodes.list(&self.standing()),
             threshold_lpm,
             trace,
             assumed: self.rig.assumed,

@@ -171,9 +171,9 @@ fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
-    // What may be none does not fall.
-    let [low, _] = findings.leakage[leak].ci95();
-    if value < 0.0 && low <= 0.0 || findings.is_below(leak) && is_contradicted(findings, leak, value) {
+    // What may be none does not fall, nor grow where it is below its threshold.
+    let (is_below, may_be_none) = (findings.is_below(leak), findings.leakage[leak].ci95()[0] <= 0.0);
+    if may_be_none && (value < 0.0 || is_below) || is_below && is_contradicted(findings, leak, value) {
         return None;
     }
     let slope = with_interval(value.abs(), Some(std));
