@@ -12,7 +12,7 @@ pub(super) struct Beside<'f> {
     /// Whether that sensor shows nothing at a sample.
     pub(super) is_silent: &'f dyn Fn(usize) -> bool,
     /// Standard deviation of its noise.
-    pub(super) std_m3s: f64,
+    pub(super) std_m3s: &'f dyn Fn() -> f64,
 }
 
 /// What a meter shows along a trace.
@@ -38,13 +38,15 @@ pub(super) fn within_band(meter: &Shown, beside: &[Beside]) -> Sides {
     let mut own = Sides { side: vec![0.0; count], side_std: (0..count).map(anywhere).collect() };
     let rests = meter.rests();
     let Some(band_m3s) = meter.least_shown(&rests) else { return own };
+    let beside = beside.iter().map(|other| (other, (other.std_m3s)()));
+    let beside: Vec<_> = beside.filter(|(_, std_m3s)| *std_m3s < ANYWHERE * band_m3s).collect();
     for rest in rests {
-        let shows = |other: &&Beside| {
+        let shows = |(other, _): &&(&Beside, f64)| {
             let silent = rest.clone().filter(|at| (other.is_silent)(*at)).count();
             2 * silent <= rest.len() && rest.clone().all(|at| (other.flow_m3s)(at).is_finite())
         };
-        let other = beside.iter().filter(|other| other.std_m3s < ANYWHERE * band_m3s).find(shows);
-        let foreseen = |at: usize| other.map_or(0.0, |other| (other.flow_m3s)(at));
+        let other = beside.iter().find(shows);
+        let foreseen = |at: usize| other.map_or(0.0, |(other, _)| (other.flow_m3s)(at));
         let near = if other.is_some() { NEAR } else { 1 };
         let off = |shown: &mut dyn Iterator<Item = usize>| {
             let (sum, count) = shown
@@ -55,7 +57,7 @@ pub(super) fn within_band(meter: &Shown, beside: &[Beside]) -> Sides {
         };
         let (first, last) = (rest.start - 1, rest.end);
         let (before, after) = (off(&mut (0..=first).rev()), off(&mut (last..count)));
-        let std = other.map_or(ANYWHERE, |other| other.std_m3s / band_m3s);
+        let std = other.map_or(ANYWHERE, |(_, std_m3s)| std_m3s / band_m3s);
         for at in rest {
             let share = (meter.t_s[at] - meter.t_s[first]) / (meter.t_s[last] - meter.t_s[first]);
             let flow = foreseen(at) + before + (after - before) * share;
@@ -170,14 +172,14 @@ mod tests {
     fn another_flow_shows_how_the_silent_one_goes_on_and_its_own_offset_does_not_matter() {
         let (t, flow, read) = shown();
         let shifted = |at: usize| flow[at] + 3e-6;
-        let like = |std_m3s: f64| Beside { flow_m3s: &shifted, is_silent: &|_| false, std_m3s };
-        let seen = within_band(&shown_by(&t, &read), &[like(NOISE_M3S)]);
+        let like = |std_m3s| Beside { flow_m3s: &shifted, is_silent: &|_| false, std_m3s };
+        let seen = within_band(&shown_by(&t, &read), &[like(&|| NOISE_M3S)]);
         let unseen = within_band(&shown_by(&t, &read), &[]);
         assert!(error(&seen, &flow) < 0.1, "{}", error(&seen, &flow));
         assert!(error(&unseen, &flow) < ANYWHERE, "{}", error(&unseen, &flow));
         // One noisier than the band is wide, or silent itself, is not asked.
-        let silent = Beside { flow_m3s: &|_| 0.0, is_silent: &|_| true, std_m3s: NOISE_M3S };
-        for useless in [like(BAND_M3S), silent] {
+        let silent = Beside { flow_m3s: &|_| 0.0, is_silent: &|_| true, std_m3s: &|| NOISE_M3S };
+        for useless in [like(&|| BAND_M3S), silent] {
             assert_eq!(within_band(&shown_by(&t, &read), &[useless]).side, unseen.side);
         }
     }
@@ -186,7 +188,7 @@ mod tests {
     fn what_is_shown_is_known_and_what_is_not_is_as_uncertain_as_the_other_flow() {
         let (t, flow, mut read) = shown();
         read[1000] = f64::NAN;
-        let beside = Beside { flow_m3s: &|at| flow[at], is_silent: &|_| false, std_m3s: NOISE_M3S };
+        let beside = Beside { flow_m3s: &|at| flow[at], is_silent: &|_| false, std_m3s: &|| NOISE_M3S };
         let own = within_band(&shown_by(&t, &read), &[beside]);
         let least = SIGNIFICANT_SIGMA * NOISE_M3S;
         for (read, (side, std)) in read.iter().zip(own.side.iter().zip(&own.side_std)) {

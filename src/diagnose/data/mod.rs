@@ -3,6 +3,7 @@
 mod channel;
 mod dead_band;
 mod declared;
+mod foreseen;
 mod mistakes;
 mod motion;
 mod noise;

@@ -2,7 +2,7 @@
 //! better than the position's difference does, else from the slope of the position.
 
 use super::channel::Channel;
-use super::dead_band::{Beside, Shown, is_silent, median_of_three, within_band};
+use super::foreseen::{CHAMBER_A, CHAMBER_B, Foreseen, zero_of_line};
 use super::play::{Followed, Sides};
 use super::series::Series;
 use crate::diagnose::thresholds::{BLOCK_S, SIGNIFICANT_SIGMA, SMALL_SHARE};
@@ -125,99 +125,19 @@ fn from_flow(series: &Series, raw: &[f64], cylinder: &Cylinder<f64>, sensors: &S
     }
 }
 
-/// What is special about one chamber among signals and equations.
-struct Chamber {
-    flow_m3s: fn(&mut Signals<f64>) -> &mut f64,
-    left_m3s: fn(Terms<f64>) -> f64,
-}
-
-const CHAMBER_A: Chamber = Chamber { flow_m3s: |all| &mut all.qa_m3s, left_m3s: |all| all.chamber_a_m3s };
-const CHAMBER_B: Chamber = Chamber { flow_m3s: |all| &mut all.qb_m3s, left_m3s: |all| all.chamber_b_m3s };
-
-/// Where in dead bands of their meters the flows A and B would lie: by eq. (1) the other chamber's meter says how they go on meanwhile, or the
-/// position where that shows nothing either.
+/// Where in dead bands of their meters the flows A and B would lie.
 fn within_bands(
     series: &Series,
     residual: impl Fn(f64, &Signals<f64>) -> Terms<f64>,
     effects: &EffectSet<f64>,
     sensors: &Sensors<f64>,
 ) -> [Sides; 2] {
-    let (step, half) = (series.step_s(), 1);
-    let [qa, qb] = [&series.qa_m3s, &series.qb_m3s].map(|flow| median_of_three(flow));
-    let rate = |values: &[f64], at: usize| slope(&series.t_s, values, half, at);
-    let reading = |at: usize| Signals {
-        v_mps: rate(&series.x_m, at),
-        dpa_pas: rate(&series.pa_pa, at),
-        dpb_pas: rate(&series.pb_pa, at),
-        qa_m3s: qa[at],
-        qb_m3s: qb[at],
-        ..shown(series, at)
-    };
-    let noise = {
-        let of_slope = |noise_std: f64| slope_std(noise_std, half, step);
-        let dp = of_slope(sensors.pressure.noise_std);
-        let (v, a, b) =
-            (of_slope(sensors.position.noise_std), sensors.flow_a.noise_std, sensors.flow_b.noise_std);
-        Signals { v_mps: v, dpa_pas: dp, dpb_pas: dp, qa_m3s: a, qb_m3s: b, ..Signals::default() }
-    };
-    let of = |own: &Chamber, other: &Chamber, own_m3s: (&[f64], &[f64]), other_m3s: &[f64]| {
-        let left = |seen: &Signals<f64>| residual(seen.t_s, seen);
-        let at_speed = |seen: Signals<f64>| {
-            root(|flow_m3s| {
-                let mut seen = seen;
-                *(own.flow_m3s)(&mut seen) = flow_m3s;
-                (own.left_m3s)(left(&seen))
-            })
-        };
-        let by_position = |reading: &Signals<f64>| at_speed(effects.correct(reading));
-        let by_meter = |reading: &Signals<f64>| {
-            let seen = effects.correct(reading);
-            at_speed(Signals {
-                v_mps: root(|v_mps| (other.left_m3s)(left(&Signals { v_mps, ..seen }))),
-                ..seen
-            })
-        };
-        // The square root of what each reading's noise makes of it.
-        let std = |flow_m3s: &dyn Fn(&Signals<f64>) -> f64| {
-            let middle = reading(series.len() / 2);
-            let off = |shifted: Signals<f64>| flow_m3s(&shifted) - flow_m3s(&middle);
-            let by_flow = off(Signals {
-                qa_m3s: middle.qa_m3s + noise.qa_m3s,
-                qb_m3s: middle.qb_m3s + noise.qb_m3s,
-                ..middle
-            });
-            let by_speed = off(Signals { v_mps: middle.v_mps + noise.v_mps, ..middle });
-            let by_a = off(Signals { dpa_pas: middle.dpa_pas + noise.dpa_pas, ..middle });
-            let by_b = off(Signals { dpb_pas: middle.dpb_pas + noise.dpb_pas, ..middle });
-            by_flow.hypot(by_speed).hypot(by_a).hypot(by_b)
-        };
-        let [own_std, other_std] = [own, other].map(|chamber| *(chamber.flow_m3s)(&mut noise.clone()));
-        let (meter, position) = (|at: usize| by_meter(&reading(at)), |at: usize| by_position(&reading(at)));
-        let beside = [
-            Beside {
-                flow_m3s: &meter,
-                is_silent: &|at| is_silent(other_m3s[at], other_std),
-                std_m3s: std(&by_meter),
-            },
-            Beside { flow_m3s: &position, is_silent: &|_| false, std_m3s: std(&by_position) },
-        ];
-        let meter = Shown {
-            t_s: &series.t_s,
-            flow_m3s: own_m3s.0,
-            calm_m3s: own_m3s.1,
-            noise_std_m3s: own_std,
-            mean_of: series.merged + 1,
-        };
-        within_band(&meter, &beside)
-    };
-    [
-        of(&CHAMBER_A, &CHAMBER_B, (&series.qa_m3s, &qa), &qb),
-        of(&CHAMBER_B, &CHAMBER_A, (&series.qb_m3s, &qb), &qa),
-    ]
+    let foreseen = Foreseen::new(series, residual, effects, sensors);
+    [foreseen.within_band(&CHAMBER_A, &CHAMBER_B), foreseen.within_band(&CHAMBER_B, &CHAMBER_A)]
 }
 
 /// What the sensors show at a sample, without rates.
-fn shown(series: &Series, at: usize) -> Signals<f64> {
+pub(super) fn shown(series: &Series, at: usize) -> Signals<f64> {
     Signals {
         x_m: series.x_m[at],
         pa_pa: series.pa_pa[at],
@@ -228,16 +148,6 @@ fn shown(series: &Series, at: usize) -> Signals<f64> {
         t_s: series.t_s[at],
         ..Signals::default()
     }
-}
-
-/// Where a straight line is zero.
-fn root(line: impl Fn(f64) -> f64) -> f64 {
-    zero_of_line(line(0.0), line(1.0))
-}
-
-/// Where a straight line with these values at 0 and 1 is zero.
-fn zero_of_line(at_none: f64, at_one: f64) -> f64 {
-    at_none / (at_none - at_one)
 }
 
 fn longest_half(step_s: f64) -> usize {
@@ -307,13 +217,13 @@ fn smooth(values: &[f64], half: usize) -> Vec<f64> {
 }
 
 /// Standard deviation of [`slope`] by noise.
-fn slope_std(noise_std: f64, half: usize, step_s: f64) -> f64 {
+pub(super) fn slope_std(noise_std: f64, half: usize, step_s: f64) -> f64 {
     let n = (2 * half + 1) as f64;
     noise_std * (12.0 / (n * n * n)).sqrt() / step_s.max(1e-9)
 }
 
 /// Least-squares slope at a sample, over `half` samples on each side.
-fn slope(t: &[f64], values: &[f64], half: usize, at: usize) -> f64 {
+pub(super) fn slope(t: &[f64], values: &[f64], half: usize, at: usize) -> f64 {
     let range = at.saturating_sub(half)..(at + half + 1).min(values.len());
     let n = range.len() as f64;
     let mean = |of: &[f64]| of[range.clone()].iter().sum::<f64>() / n;
