@@ -11,6 +11,9 @@ const MOST_OF_FULL_SCALE: f64 = 1.5;
 /// Where a position may be, shares of the stroke: a little beyond its ends. Chosen.
 const WITHIN_CYLINDER: [f64; 2] = [-0.05, 1.05];
 
+/// A flow that changes by fewer standard deviations of its meter's noise says nothing. Chosen.
+const LEAST_RANGE: f64 = 2.0;
+
 /// Means of a constant differ by less.
 const ROUNDING: f64 = 1e-12;
 
@@ -36,10 +39,9 @@ impl Told {
         }
         match mistake {
             Mistake::Factor(of, factor) => of.channels().all(|channel| {
-                let mended = |extremes: [f64; 2]| extremes.map(|value| value / factor);
-                self.extremes[channel].is_none_or(|extremes| {
-                    allows(channel, mended(extremes), rig)
-                        && !(factor > 1.0 && is_noise(channel, mended(extremes), rig))
+                let mended = self.extremes[channel].map(|extremes| extremes.map(|value| value / factor));
+                mended.is_none_or(|mended| {
+                    allows(channel, mended, rig) && !(factor > 1.0 && is_noise(channel, mended, rig))
                 })
             }),
             Mistake::LostSign(_) => false,
@@ -103,7 +105,7 @@ fn is_noise(channel: usize, [least, most]: [f64; 2], rig: &Rig) -> bool {
         4 => sensors.flow_b.noise_std,
         _ => return false,
     };
-    most - least < 2.0 * noise_std
+    most - least < LEAST_RANGE * noise_std
 }
 
 impl Of {

@@ -281,15 +281,12 @@ impl<'a, 'p> Candidates<'a, 'p> {
                     self.ask(&steady, State { zeros, border, ..state }, leaks, ln_course);
                 }
             }
-            for leak in [Leak::ExternalA, Leak::ExternalB].into_iter().filter(|leak| !subset[*leak as usize])
-            {
+            let externals = [Leak::ExternalA, Leak::ExternalB].map(|leak| leak as usize);
+            for leak in externals.into_iter().filter(|leak| !subset[*leak]) {
                 for border in borders.clone() {
-                    let burst = LeakCourse::Burst(border);
                     let mut leaks = leaks;
-                    leaks[leak as usize] = Some(burst);
-                    let ln_steady = self.pass.tables.ln_course(LeakCourse::Unfollowed { alone: true });
-                    let ln_own = self.pass.tables.ln_course(burst) + ln_steady;
-                    self.ask(&steady, state, leaks, ln_course + ln_own);
+                    leaks[leak] = Some(LeakCourse::Burst(border));
+                    self.ask(&steady, state, leaks, ln_course + self.pass.ln_burst());
                 }
             }
         }

@@ -258,6 +258,12 @@ impl<'a, 's> Pass<'a, 's> {
         self.tables.ln_course(LeakCourse::Unfollowed { alone: true }) - LN_2 - 0.5 * strain2
     }
 
+    /// ln of the prior that a leak opens at once and flows steadily for all that is seen of it.
+    pub fn ln_burst(&self) -> f64 {
+        let [opens, is_steady] = [LeakCourse::Burst(0), LeakCourse::Unfollowed { alone: true }];
+        self.tables.ln_course(opens) + self.tables.ln_course(is_steady)
+    }
+
     /// Whether readings come as slowly as a recorder takes them, once a clock is mended: a block has one at the least.
     fn allows_clock(&self, mistake: Mistake) -> bool {
         let Mistake::Clock(factor) = mistake else { return true };

@@ -202,8 +202,8 @@ impl Cylinder {
         if before_s.is_none() || intervals(before_s) == intervals(self.stream.time_s()) {
             return;
         }
-        let decision = self.stream.renewed_decision();
-        let Some(estimate) = self.estimate(name, decision.as_ref()) else { return };
+        self.stream.renew();
+        let Some(estimate) = self.estimate(name, self.stream.weighed()) else { return };
         self.told_s = Some(estimate.t_s);
         let at_s = estimate.time_ns.map_or(estimate.t_s, |ns| ns as f64 / 1e9);
         let ended = self.history.add(at_s, &estimate);
@@ -229,8 +229,9 @@ impl Cylinder {
     }
 
     fn tell_alarms(&mut self, name: &str, events: &mut Vec<Event>) {
-        let (due, decision) = (self.stream.take_alarms(), self.stream.renewed_decision());
-        let Some(report) = self.stream.report_as(name, decision.as_ref()) else { return };
+        let due = self.stream.take_alarms();
+        self.stream.renew();
+        let Some(report) = self.stream.report_as(name, self.stream.weighed()) else { return };
         events.extend(due.into_iter().map(|alarm| Event::Alarm(self.alarm(name, alarm, &report))));
     }
 

@@ -49,8 +49,8 @@ impl Episodes {
         }
     }
 
-    /// Drops the one of this leak that goes on.
-    pub fn drop(&mut self, fault: Leak) {
+    /// Takes back the one of this leak that goes on.
+    pub fn withdraw(&mut self, fault: Leak) {
         self.open[fault] = None;
     }
 

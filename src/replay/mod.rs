@@ -268,7 +268,9 @@ impl Replay {
         for (fault, change) in self.detector.update(elapsed_s, &flows) {
             match change {
                 Some(AlarmState::Raised) => self.held_s[fault] = Some(t_s),
-                Some(AlarmState::Cleared) if self.held_s[fault].take().is_some() => self.episodes.drop(fault),
+                Some(AlarmState::Cleared) if self.held_s[fault].take().is_some() => {
+                    self.episodes.withdraw(fault)
+                }
                 Some(state) => self.alarms.push(Alarm { time_s: t_s, fault, state }),
                 None => continue,
             }
@@ -299,7 +301,7 @@ impl Replay {
     /// Decides anew where that is due.
     fn renew(&mut self, t_s: f64) {
         if self.weighing.is_due(t_s) {
-            let decision = self.decision();
+            let decision = self.decision().map(|decision| decision.read_by(&self.rig.columns, &self.rig));
             self.weighing.set(t_s, decision);
         }
     }

@@ -272,22 +272,24 @@ impl Stream {
 
     /// What explains the last twenty minutes or so; none where they say too little.
     pub fn decision(&self) -> Option<Decision> {
-        self.read(self.replay.decision())
+        self.replay.decision().map(|decision| decision.read_by(&self.rig().columns, self.rig()))
     }
 
-    /// The same, as it was weighed last, and where that is due anew.
-    pub(crate) fn renewed_decision(&mut self) -> Option<Decision> {
-        self.replay.renew(self.time_s()?);
-        self.read(self.replay.weighing.decision.clone())
+    /// Weighs the same anew where that is due.
+    pub(crate) fn renew(&mut self) {
+        if let Some(t_s) = self.time_s() {
+            self.replay.renew(t_s);
+        }
     }
 
-    /// When it was weighed last, s.
+    /// As it was weighed last, …
+    pub(crate) fn weighed(&self) -> Option<&Decision> {
+        self.replay.weighing.decision.as_ref()
+    }
+
+    /// … and when, s.
     pub(crate) fn weighed_s(&self) -> Option<f64> {
         self.replay.weighing.at_s
-    }
-
-    fn read(&self, decision: Option<Decision>) -> Option<Decision> {
-        decision.map(|decision| decision.read_by(&self.rig().columns, self.rig()))
     }
 
     /// The report as it stands, its verdict held against the last twenty minutes or so; `name` is the trace's. None before the

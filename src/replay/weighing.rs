@@ -21,7 +21,7 @@ pub(super) struct Weighing {
 impl Weighing {
     /// Something happened now.
     pub fn alarmed(&mut self, t_s: f64) {
-        *self = Self { decision: self.decision.take(), at_s: None, since_s: Some(t_s) };
+        (self.at_s, self.since_s) = (None, Some(t_s));
     }
 
     /// Whether to decide anew.

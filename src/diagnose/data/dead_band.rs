@@ -2,7 +2,7 @@
 //! edge; how it goes on in between another sensor shows, or nothing does.
 
 use super::play::{ANYWHERE, Sides};
-use crate::diagnose::thresholds::SIGNIFICANT_SIGMA;
+use crate::diagnose::thresholds::{SAMPLES_PER_BLOCK, SIGNIFICANT_SIGMA};
 use std::ops::Range;
 
 /// What another sensor says of the flow in question, by the model.
@@ -26,9 +26,8 @@ pub(super) struct Shown<'t> {
     pub(super) mean_of: usize,
 }
 
-/// Samples on each side of a rest that say what another sensor's flow is off by there. Chosen: noise of a pressure's slope is a third of
-/// one sample's; fifty milliseconds at 100 Hz.
-const NEAR: usize = 5;
+/// Samples on each side of a rest that say what another sensor's flow is off by there: half a block's.
+const NEAR: usize = SAMPLES_PER_BLOCK / 2;
 
 /// Where in its meter's dead band a flow lies, in half widths of it: as `beside` foresees it, moved to what the meter showed last and shows next,
 /// or the straight way between these. Zero while the reading shows something.
@@ -74,7 +73,7 @@ impl Shown<'_> {
         is_silent(self.calm_m3s[at], self.noise_std_m3s)
     }
 
-    /// Whether no more than a part of what flows at a sample can be hidden.
+    /// Whether some of what flows at a sample may be hidden.
     fn hides(&self, at: usize) -> bool {
         let near = |other: usize| other < self.flow_m3s.len() && self.is_silent(other);
         let is_edge = || self.mean_of > 1 && (near(at.wrapping_sub(1)) || near(at + 1));

@@ -2,25 +2,27 @@
 //! either.
 
 use super::dead_band::{Beside, Shown, is_silent, median_of_three, within_band};
-use super::motion::{shown, slope, slope_std};
+use super::motion::{rate, shown};
 use super::play::Sides;
 use super::series::Series;
 use pitchleak_core::{EffectSet, Sensors, Signals, Terms};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// What is special about one chamber among signals and equations.
 pub(super) struct Chamber {
-    flow_m3s: fn(&Signals<f64>) -> f64,
+    /// Its place among flows.
+    flow: usize,
     with_flow: fn(Signals<f64>, f64) -> Signals<f64>,
     left_m3s: fn(Terms<f64>) -> f64,
 }
 
 pub(super) const CHAMBER_A: Chamber = Chamber {
-    flow_m3s: |all| all.qa_m3s,
+    flow: 0,
     with_flow: |all, qa_m3s| Signals { qa_m3s, ..all },
     left_m3s: |all| all.chamber_a_m3s,
 };
 pub(super) const CHAMBER_B: Chamber = Chamber {
-    flow_m3s: |all| all.qb_m3s,
+    flow: 1,
     with_flow: |all, qb_m3s| Signals { qb_m3s, ..all },
     left_m3s: |all| all.chamber_b_m3s,
 };
@@ -30,43 +32,43 @@ pub(super) struct Foreseen<'t, R> {
     series: &'t Series,
     residual: R,
     effects: &'t EffectSet<f64>,
-    /// Without single outliers, as read.
-    calm: Vec<Signals<f64>>,
-    /// Standard deviations of the readings' noise.
+    /// As the meters of A and B show them, …
+    flows_m3s: [&'t [f64]; 2],
+    /// … and without single outliers.
+    calm_m3s: [Vec<f64>; 2],
+    flow_stds_m3s: [f64; 2],
+    /// Standard deviations of what noise makes of rates.
     noise: Signals<f64>,
 }
 
 impl<'t, R: Fn(f64, &Signals<f64>) -> Terms<f64>> Foreseen<'t, R> {
     /// `residual` is that of the model at a time, of readings without `effects`.
     pub fn new(series: &'t Series, residual: R, effects: &'t EffectSet<f64>, sensors: &Sensors<f64>) -> Self {
-        let [qa, qb] = [&series.qa_m3s, &series.qb_m3s].map(|flow| median_of_three(flow));
-        let calm = |(qa_m3s, qb_m3s)| Signals { qa_m3s, qb_m3s, ..Signals::default() };
-        let of_slope = |std: f64| slope_std(std, 1, series.step_s());
-        let of_pressure = of_slope(sensors.pressure.noise_std);
-        let noise = Signals {
-            v_mps: of_slope(sensors.position.noise_std),
-            dpa_pas: of_pressure,
-            dpb_pas: of_pressure,
-            qa_m3s: sensors.flow_a.noise_std,
-            qb_m3s: sensors.flow_b.noise_std,
-            ..Signals::default()
-        };
-        Self { series, residual, effects, calm: qa.into_iter().zip(qb).map(calm).collect(), noise }
+        let flows_m3s = [series.qa_m3s.as_slice(), &series.qb_m3s];
+        // Of the difference of two readings, two steps apart.
+        let of_rate = |std: f64| std * FRAC_1_SQRT_2 / series.step_s().max(1e-9);
+        let dp_pas = of_rate(sensors.pressure.noise_std);
+        let v_mps = of_rate(sensors.position.noise_std);
+        Self {
+            series,
+            residual,
+            effects,
+            flows_m3s,
+            calm_m3s: flows_m3s.map(median_of_three),
+            flow_stds_m3s: [sensors.flow_a.noise_std, sensors.flow_b.noise_std],
+            noise: Signals { v_mps, dpa_pas: dp_pas, dpb_pas: dp_pas, ..Signals::default() },
+        }
     }
 
     /// Where in its meter's dead band the flow of a chamber would lie.
     pub fn within_band(&self, own: &Chamber, other: &Chamber) -> Sides {
-        let flows = |of: &dyn Fn(usize) -> f64| (0..self.series.len()).map(of).collect::<Vec<f64>>();
-        let (calm, raw) = (
-            flows(&|at| (own.flow_m3s)(&self.calm[at])),
-            flows(&|at| (own.flow_m3s)(&shown(self.series, at))),
-        );
         let by_meter = |reading: &Signals<f64>| self.by_meter(own, other, reading);
         let by_position = |reading: &Signals<f64>| self.at_speed(own, self.effects.correct(reading));
+        let other_m3s = &self.calm_m3s[other.flow];
         let beside = [
             Beside {
                 flow_m3s: &|at| by_meter(&self.reading(at)),
-                is_silent: &|at| is_silent((other.flow_m3s)(&self.calm[at]), (other.flow_m3s)(&self.noise)),
+                is_silent: &|at| is_silent(other_m3s[at], self.flow_stds_m3s[other.flow]),
                 std_m3s: &|| self.std(by_meter),
             },
             Beside {
@@ -77,9 +79,9 @@ impl<'t, R: Fn(f64, &Signals<f64>) -> Terms<f64>> Foreseen<'t, R> {
         ];
         let meter = Shown {
             t_s: &self.series.t_s,
-            flow_m3s: &raw,
-            calm_m3s: &calm,
-            noise_std_m3s: (own.flow_m3s)(&self.noise),
+            flow_m3s: self.flows_m3s[own.flow],
+            calm_m3s: &self.calm_m3s[own.flow],
+            noise_std_m3s: self.flow_stds_m3s[own.flow],
             mean_of: self.series.merged + 1,
         };
         within_band(&meter, &beside)
@@ -87,16 +89,9 @@ impl<'t, R: Fn(f64, &Signals<f64>) -> Terms<f64>> Foreseen<'t, R> {
 
     /// What the sensors show at a sample and its neighbours.
     fn reading(&self, at: usize) -> Signals<f64> {
-        let rate = |values: &[f64]| slope(&self.series.t_s, values, 1, at);
-        let Signals { qa_m3s, qb_m3s, .. } = self.calm[at];
-        Signals {
-            v_mps: rate(&self.series.x_m),
-            dpa_pas: rate(&self.series.pa_pa),
-            dpb_pas: rate(&self.series.pb_pa),
-            qa_m3s,
-            qb_m3s,
-            ..shown(self.series, at)
-        }
+        let [qa, qb] = &self.calm_m3s;
+        let v_mps = rate(&self.series.t_s, &self.series.x_m, at);
+        Signals { v_mps, ..shown(self.series, [qa, qb], at) }
     }
 
     /// The flow at which nothing is left of its chamber's equation, at the speed at which nothing is left of the other's.
@@ -120,9 +115,9 @@ impl<'t, R: Fn(f64, &Signals<f64>) -> Terms<f64>> Foreseen<'t, R> {
         let Some(read) = readings.find(|reading| flow_m3s(reading).is_finite()) else {
             return f64::NAN;
         };
-        let (own, noise) = (flow_m3s(&read), &self.noise);
+        let (own, noise, [a, b]) = (flow_m3s(&read), &self.noise, self.flow_stds_m3s);
         let shifted = [
-            Signals { qa_m3s: read.qa_m3s + noise.qa_m3s, qb_m3s: read.qb_m3s + noise.qb_m3s, ..read },
+            Signals { qa_m3s: read.qa_m3s + a, qb_m3s: read.qb_m3s + b, ..read },
             Signals { v_mps: read.v_mps + noise.v_mps, ..read },
             Signals { dpa_pas: read.dpa_pas + noise.dpa_pas, ..read },
             Signals { dpb_pas: read.dpb_pas + noise.dpb_pas, ..read },

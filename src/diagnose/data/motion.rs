@@ -43,7 +43,9 @@ impl Motion {
         let cylinder = &effects.built(cylinder);
         let has = |flow: &[f64]| flow.iter().any(|q| q.is_finite());
         let own = if has(&series.qa_m3s) || has(&series.qb_m3s) {
-            let [qa, qb] = within_bands(series, &residual, effects, sensors);
+            let foreseen = Foreseen::new(series, &residual, effects, sensors);
+            let qa = foreseen.within_band(&CHAMBER_A, &CHAMBER_B);
+            let qb = foreseen.within_band(&CHAMBER_B, &CHAMBER_A);
             let raw = raw_speed(series, residual, effects, [&qa.side, &qb.side]);
             Self { qa, qb, ..from_flow(series, &raw, cylinder, sensors) }
         } else {
@@ -93,8 +95,7 @@ impl Motion {
     fn from_position(series: &Series, effects: &EffectSet<f64>, sensors: &Sensors<f64>) -> Self {
         let half = longest_half(series.step_s()).max(1);
         let true_speed = |v_mps: f64| effects.correct(&Signals { v_mps, ..Signals::default() }).v_mps;
-        let slope = |at: usize| slope(&series.t_s, &series.x_m, half, at);
-        let v_mps: Vec<f64> = (0..series.len()).map(|at| true_speed(slope(at))).collect();
+        let v_mps: Vec<f64> = slope(&series.t_s, &series.x_m, half).into_iter().map(true_speed).collect();
         let std = slope_std(sensors.position.noise_std, half, series.step_s());
         let rms_mps = root_mean_square(&v_mps);
         let [qa, qb] = [(); 2].map(|()| Sides::none(series.len()));
@@ -125,29 +126,27 @@ fn from_flow(series: &Series, raw: &[f64], cylinder: &Cylinder<f64>, sensors: &S
     }
 }
 
-/// Where in dead bands of their meters the flows A and B would lie.
-fn within_bands(
-    series: &Series,
-    residual: impl Fn(f64, &Signals<f64>) -> Terms<f64>,
-    effects: &EffectSet<f64>,
-    sensors: &Sensors<f64>,
-) -> [Sides; 2] {
-    let foreseen = Foreseen::new(series, residual, effects, sensors);
-    [foreseen.within_band(&CHAMBER_A, &CHAMBER_B), foreseen.within_band(&CHAMBER_B, &CHAMBER_A)]
-}
-
-/// What the sensors show at a sample, without rates.
-pub(super) fn shown(series: &Series, at: usize) -> Signals<f64> {
+/// What the sensors show at a sample, and how fast pressures change there; `flows_m3s` are those of A and B.
+pub(super) fn shown(series: &Series, [qa_m3s, qb_m3s]: [&[f64]; 2], at: usize) -> Signals<f64> {
     Signals {
         x_m: series.x_m[at],
         pa_pa: series.pa_pa[at],
         pb_pa: series.pb_pa[at],
-        qa_m3s: series.qa_m3s[at],
-        qb_m3s: series.qb_m3s[at],
+        dpa_pas: rate(&series.t_s, &series.pa_pa, at),
+        dpb_pas: rate(&series.t_s, &series.pb_pa, at),
+        qa_m3s: qa_m3s[at],
+        qb_m3s: qb_m3s[at],
         temp_k: series.temp_k[at],
         t_s: series.t_s[at],
         ..Signals::default()
     }
+}
+
+/// From the sample before to the one after.
+pub(super) fn rate(t_s: &[f64], values: &[f64], at: usize) -> f64 {
+    let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
+    let span = t_s[to] - t_s[from];
+    if span > 0.0 { (values[to] - values[from]) / span } else { 0.0 }
 }
 
 fn longest_half(step_s: f64) -> usize {
@@ -170,20 +169,13 @@ fn raw_speed(
     effects: &EffectSet<f64>,
     [qa_unread, qb_unread]: [&[f64]; 2],
 ) -> Vec<f64> {
-    let rate = |values: &[f64], at: usize| {
-        let (from, to) = (at.saturating_sub(1), (at + 1).min(values.len() - 1));
-        let span = series.t_s[to] - series.t_s[from];
-        if span > 0.0 { (values[to] - values[from]) / span } else { 0.0 }
-    };
     let speed = |at: usize| {
         let reading = Signals {
-            dpa_pas: rate(&series.pa_pa, at),
-            dpb_pas: rate(&series.pb_pa, at),
-            dqa_m3s2: rate(&series.qa_m3s, at),
-            dqb_m3s2: rate(&series.qb_m3s, at),
+            dqa_m3s2: rate(&series.t_s, &series.qa_m3s, at),
+            dqb_m3s2: rate(&series.t_s, &series.qb_m3s, at),
             qa_unread: qa_unread[at],
             qb_unread: qb_unread[at],
-            ..shown(series, at)
+            ..shown(series, [&series.qa_m3s, &series.qb_m3s], at)
         };
         let seen = effects.correct(&reading);
         let left = |v_mps: f64| residual(series.t_s[at], &Signals { v_mps, ..seen });
@@ -217,21 +209,25 @@ fn smooth(values: &[f64], half: usize) -> Vec<f64> {
 }
 
 /// Standard deviation of [`slope`] by noise.
-pub(super) fn slope_std(noise_std: f64, half: usize, step_s: f64) -> f64 {
+fn slope_std(noise_std: f64, half: usize, step_s: f64) -> f64 {
     let n = (2 * half + 1) as f64;
     noise_std * (12.0 / (n * n * n)).sqrt() / step_s.max(1e-9)
 }
 
-/// Least-squares slope at a sample, over `half` samples on each side.
-pub(super) fn slope(t: &[f64], values: &[f64], half: usize, at: usize) -> f64 {
-    let range = at.saturating_sub(half)..(at + half + 1).min(values.len());
-    let n = range.len() as f64;
-    let mean = |of: &[f64]| of[range.clone()].iter().sum::<f64>() / n;
-    let (mt, mean_value) = (mean(t), mean(values));
-    let (num, den) = range.clone().fold((0.0, 0.0), |(num, den), i| {
-        (num + (t[i] - mt) * (values[i] - mean_value), den + (t[i] - mt) * (t[i] - mt))
-    });
-    if den > 0.0 { num / den } else { 0.0 }
+/// Least-squares slope over `half` samples on each side.
+fn slope(t: &[f64], x: &[f64], half: usize) -> Vec<f64> {
+    (0..x.len())
+        .map(|at| {
+            let range = at.saturating_sub(half)..(at + half + 1).min(x.len());
+            let n = range.len() as f64;
+            let (mt, mx) =
+                (t[range.clone()].iter().sum::<f64>() / n, x[range.clone()].iter().sum::<f64>() / n);
+            let (num, den) = range.fold((0.0, 0.0), |(num, den), i| {
+                (num + (t[i] - mt) * (x[i] - mx), den + (t[i] - mt) * (t[i] - mt))
+            });
+            if den > 0.0 { num / den } else { 0.0 }
+        })
+        .collect()
 }
 
 #[cfg(test)]
