@@ -197,7 +197,10 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
                     products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
                     left = residual(&each[c], size, &means);
                 }
-                let residual = scales[c] * left.max(0.0);
+                // No more is left than there was: where more noise was taken off than the columns have, Cholesky's factor is another
+                // matrix's, and nothing would be a better fit.
+                let there_was: f64 = each.iter().map(|own| own[size * size - 1]).sum();
+                let residual = scales[c] * left.clamp(0.0, there_was.max(0.0));
                 scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
             }
         }

@@ -31,13 +31,25 @@ pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
             columns.push(one);
         }
     }
+    let mut words = entry.text;
+    if let [(column, size)] = columns.as_mut_slice()
+        && let Some(other) = late_instead(*column).filter(|_| size.value < 0.0)
+    {
+        (words, size.value) = (other, -size.value);
+    }
     let several = columns.len() > 1;
     let sizes: Vec<String> =
         columns.iter().map(|(column, size)| text(*column, *size, rig, several)).collect();
-    if sizes.is_empty() {
-        entry.text.to_owned()
-    } else {
-        format!("{} by {}", entry.text, sizes.join(" and "))
+    if sizes.is_empty() { words.to_owned() } else { format!("{words} by {}", sizes.join(" and ")) }
+}
+
+/// What lags where a flow meter's lag is below zero.
+fn late_instead(column: Column) -> Option<&'static str> {
+    match column {
+        Column::LagA => Some("position and pressures lag behind flow meter A"),
+        Column::LagB => Some("position and pressures lag behind flow meter B"),
+        Column::Lags => Some("position and pressures lag behind both flow meters"),
+        _ => None,
     }
 }
 
@@ -94,4 +106,24 @@ fn text(column: Column, size: Estimate<f64>, rig: &Rig, several: bool) -> String
     let size = of_the_declared(column, size).scaled(factor);
     let interval = with_interval(size.value, Some(size.std.abs()));
     if several { format!("{interval} {unit} ({which})") } else { format!("{interval} {unit}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::explanations;
+    use super::*;
+
+    #[test]
+    fn no_meter_lags_by_less_than_nothing() {
+        let all = explanations();
+        let entry = all.iter().find(|one| one.id == "flow_lag_a").expect("is in the table");
+        let told =
+            |s: f64| sentence(entry, &[(Column::LagA, Estimate { value: s, std: 0.001 })], &Rig::paper());
+        assert!(told(0.065).starts_with("flow meter A lags by 65"), "{}", told(0.065));
+        assert!(
+            told(-0.065).starts_with("position and pressures lag behind flow meter A by 65"),
+            "{}",
+            told(-0.065)
+        );
+    }
 }

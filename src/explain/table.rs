@@ -249,7 +249,7 @@ pub(super) fn departures() -> Vec<Entry> {
     use Column as C;
     use share::{COMMON, RARE, UNCOMMON, VERY_RARE};
     const METER: &str = "Compare the meter with the piston's travel over a long stroke.";
-    const CLOCK: &str = "Compare the clocks and filters of flow meters and position.";
+    const CLOCK: &str = "Compare the clocks and filters of flow meters, position and pressures.";
     const AREA: &str = "Measure piston and rod, or compare the data sheet.";
     const PRESSURE: &str = "Compare both pressure sensors with a gauge.";
     // Meters come with a certificate; an area is a rod of another size, or a slip.
