@@ -18,7 +18,7 @@ const NU: f64 = 4.0;
 const STEPS: usize = 2;
 /// Least variance, in the declared noise's: sensors without noise are quantised all the same.
 pub(super) const LEAST_SCALE: f64 = 0.02;
-/// Least square of a pivot, where noise products taken off leave less than the prior alone.
+/// Least square of a pivot. A column from which more noise is taken off than this leaves, beside the columns before it, is but noise.
 const LEAST_PIVOT: f64 = 0.2;
 /// A mean square so many standard deviations from what it should be is so by chance. Chosen: the usual three.
 const CHANCE_SIGMAS: f64 = 3.0;
@@ -197,10 +197,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
                     products.clean(c, n[c], scales[c], loudest[c], &mut each[c]);
                     left = residual(&each[c], size, &means);
                 }
-                // No more is left than there was: where more noise was taken off than the columns have, Cholesky's factor is another
-                // matrix's, and nothing would be a better fit.
-                let there_was: f64 = each.iter().map(|own| own[size * size - 1]).sum();
-                let residual = scales[c] * left.clamp(0.0, there_was.max(0.0));
+                let residual = scales[c] * left.max(0.0);
                 scales[c] = ((NU + residual) / (NU + n[c])).max(LEAST_SCALE);
             }
         }
@@ -254,7 +251,12 @@ fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
     for k in 0..last {
         let (above, below) = products.split_at_mut((k + 1) * size);
         let row = &mut above[k * size..];
-        let pivot = (1.0 + row[k]).max(LEAST_PIVOT).sqrt();
+        if 1.0 + row[k] < LEAST_PIVOT {
+            row[k] = 1.0;
+            row[k + 1..].fill(0.0);
+            continue;
+        }
+        let pivot = (1.0 + row[k]).sqrt();
         ln_determinant += 2.0 * pivot.ln();
         row[k] = pivot;
         row[k + 1..].iter_mut().for_each(|entry| *entry /= pivot);
