@@ -118,6 +118,12 @@ struct Sums<T> {
     steps: u32,
 }
 
+impl<T: Real> Sums<T> {
+    fn fed() -> Self {
+        Self { fed: [true; 2], ..Self::default() }
+    }
+}
+
 /// A flow meter.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -141,10 +147,6 @@ impl<T: Real> Meter<T> {
             self.count += 1;
         }
         last.map(|last| T::lit(0.5) * (now + last) * dt_s)
-    }
-
-    fn rests(&self) -> bool {
-        self.last_m3s.is_none()
     }
 
     /// Mean of the latest readings.
@@ -183,11 +185,7 @@ impl<T: Real> BlockSums<T> {
         self.last = Some(row.sample);
         let block = self.count_down();
         if self.is_complete() {
-            let fed = self.begin_fed();
-            let mut closed = core::mem::replace(&mut self.open, Sums { fed, ..Sums::default() });
-            // Where a meter fell silent within the block, what it read does not cover the block.
-            closed.fed = [closed.fed[0] && fed[0], closed.fed[1] && fed[1]];
-            self.closed = Some(closed);
+            self.closed = Some(core::mem::replace(&mut self.open, Sums::fed()));
             self.countdown = READINGS_AFTER;
         }
         block
@@ -201,13 +199,8 @@ impl<T: Real> BlockSums<T> {
         }
         self.last = Some(*sample);
         self.begins_at = Some(self.volumes_m3(sample.x_m));
-        self.open = Sums { fed: self.begin_fed(), ..Sums::default() };
+        self.open = Sums::fed();
         self.countdown = READINGS_AFTER;
-    }
-
-    fn begin_fed(&self) -> [bool; 2] {
-        let [a, b] = &self.meters;
-        [!a.rests(), !b.rests()]
     }
 
     fn volumes_m3(&self, x_m: T) -> [T; 2] {
@@ -235,6 +228,9 @@ impl<T: Real> BlockSums<T> {
                 open.flow_m3[side] += flown_m3;
                 // Over all rows between two readings these are the square of the time between those.
                 open.time_square_s2[side] += own_step_s * dt_s;
+            } else {
+                // What a meter reads that was silent within a block does not cover the block.
+                open.fed[side] = false;
             }
         }
         let t_s = open.sums[R::Time as usize] + half * dt_s;
@@ -296,5 +292,154 @@ impl<T: Real> BlockSums<T> {
         sums[RawSum::ResidualB as usize] = if fed[1] { residual_b } else { T::zero() };
         let begins_at = self.begins_at.take();
         Some(Block { sums, fed, time_square_s2, pressure_square_s2, volumes_m3, begins_at })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clocks::PerChannel;
+    use super::*;
+    use std::vec::Vec;
+
+    const STEP_S: f64 = 0.01;
+
+    fn cylinder() -> Cylinder<f64> {
+        Cylinder { dead_volume_a_m3: 5e-5, dead_volume_b_m3: 3e-5, ..Cylinder::paper() }
+    }
+
+    /// Everything is read, and changes at constant rates.
+    fn steadily(k: u32) -> Row<f64> {
+        let t_s = STEP_S * f64::from(k);
+        let sample = Sample {
+            x_m: 0.1 - 0.004 * t_s,
+            pa_pa: 2e6 + 3e6 * t_s,
+            pb_pa: 5e6 - 2e6 * t_s,
+            qa_m3s: Some(1e-5 + 4e-5 * t_s),
+            qb_m3s: Some(7e-5 - 3e-5 * t_s),
+            force_n: None,
+        };
+        Row::read(if k == 0 { 0.0 } else { STEP_S }, &sample)
+    }
+
+    fn blocks(rows: impl Iterator<Item = Row<f64>>) -> Vec<Block<f64>> {
+        let mut sums = BlockSums::new(&cylinder(), &Fluid::paper());
+        rows.filter_map(|row| sums.push(&row)).collect()
+    }
+
+    fn assert_close(found: f64, expected: f64, what: &str) {
+        assert!((found / expected - 1.0).abs() < 1e-3, "{what}: {found}, not {expected}");
+    }
+
+    /// The second block, 0.25 to 0.5 s, in closed form.
+    #[test]
+    fn sums_are_the_integrals_of_what_was_read() {
+        const T: f64 = 0.25;
+        let block = blocks((0..60).map(steadily))[1];
+        let (cylinder, kappa) = (cylinder(), 1.0 / Fluid::<f64>::paper().bulk_modulus_pa);
+        let (a, b) = (cylinder.area_a_m2, cylinder.area_b_m2);
+        let volumes = |t_s: f64| {
+            let x_m = 0.1 - 0.004 * t_s;
+            [5e-5 + a * x_m, 3e-5 + b * (cylinder.stroke_m - x_m)]
+        };
+        let ([va, vb], travel) = (volumes(1.5 * T), -0.004 * T);
+        let flown = [(1e-5 + 4e-5 * 1.5 * T) * T, (7e-5 - 3e-5 * 1.5 * T) * T];
+        // In MPa and MPa/s; the load pressure is that of A less that of B, and below zero.
+        let pressure = |at_0: f64, rate: f64| (at_0 + rate * T, rate);
+        let [p_a, p_b, p_l] = [pressure(2.0, 3.0), pressure(5.0, -2.0), pressure(3.0, -5.0)];
+        let integral = |(p, rate): (f64, f64)| p * T + rate * T * T / 2.0;
+        let aged = |(p, rate): (f64, f64)| p * T * T / 2.0 + rate * T.powi(3) / 3.0;
+        let root = |(p, rate): (f64, f64)| 1e3 * ((p + rate * T).powf(1.5) - p.powf(1.5)) / (1.5 * rate);
+        let cases = [
+            (RawSum::ResidualA, flown[0] - a * travel - kappa * va * 3e6 * T),
+            (RawSum::ResidualB, flown[1] + b * travel + kappa * vb * 2e6 * T),
+            (RawSum::Travel, travel),
+            (RawSum::StorageA, va * 3.0 * T),
+            (RawSum::StorageB, -vb * 2.0 * T),
+            (RawSum::PressureA, integral(p_a)),
+            (RawSum::PressureB, integral(p_b)),
+            (RawSum::Time, T),
+            (RawSum::FlowChangeA, 4e-5 * T),
+            (RawSum::FlowChangeB, -3e-5 * T),
+            (RawSum::PressureChangeA, 3.0 * T),
+            (RawSum::PressureChangeB, -2.0 * T),
+            (RawSum::RootInternal, -root(p_l)),
+            (RawSum::RootA, root(p_a)),
+            (RawSum::RootB, root(p_b)),
+            (RawSum::StorageAOfB, -va * 2.0 * T),
+            (RawSum::StorageBOfA, vb * 3.0 * T),
+            (RawSum::AgedPressureA, aged(p_a)),
+            (RawSum::AgedPressureB, aged(p_b)),
+            (RawSum::AgedTime, T * T / 2.0),
+        ];
+        assert_eq!(cases.len(), RAW_SUMS);
+        for (raw, expected) in cases {
+            assert_close(block.sums[raw as usize], expected, &std::format!("{raw:?}"));
+        }
+        for (found, expected) in block.volumes_m3.into_iter().zip(volumes(2.0 * T)) {
+            assert_close(found, expected, "volume at the end");
+        }
+        for square_s2 in block.time_square_s2.into_iter().chain([block.pressure_square_s2]) {
+            assert_close(square_s2, STEP_S * T, "Σ dt²");
+        }
+        assert!(block.begins_at.is_none());
+    }
+
+    /// Outside its stroke the piston sweeps nothing. The begin is known of the first block after a pause, and
+    /// of no other.
+    #[test]
+    fn a_pause_begins_anew_with_its_own_volumes() {
+        let rows = (0..100).map(|k| {
+            let mut row = steadily(k);
+            row.sample.x_m = if k < 50 { -1.0 } else { 9.0 };
+            if k == 50 {
+                row.dt_s = 0.0;
+            }
+            row
+        });
+        let cylinder = cylinder();
+        let [whole_a, whole_b] =
+            [cylinder.area_a_m2, cylinder.area_b_m2].map(|area| area * cylinder.stroke_m);
+        let begins: Vec<_> = blocks(rows).iter().map(|block| block.begins_at).collect();
+        assert_eq!(begins, [Some([5e-5, 3e-5 + whole_b]), Some([5e-5 + whole_a, 3e-5])]);
+    }
+
+    /// What a meter read before it fell silent, or after it came back, does not cover the block.
+    #[test]
+    fn a_flow_that_is_missing_for_a_part_of_a_block_is_not_fed() {
+        for silent in [30..40, 40..55] {
+            let without_a = blocks((0..100).map(|k| {
+                let mut row = steadily(k);
+                row.sample.qa_m3s = row.sample.qa_m3s.filter(|_| !silent.contains(&k));
+                row
+            }));
+            let fed: Vec<_> = without_a.iter().map(|block| block.fed).collect();
+            let after = if silent.end > 50 { [false, true] } else { [true; 2] };
+            assert_eq!(fed, [[true; 2], [false, true], after], "{silent:?}");
+            let residual = |raw: RawSum| without_a[1].sums[raw as usize];
+            assert!(residual(RawSum::ResidualA) == 0.0 && residual(RawSum::ResidualB) != 0.0);
+        }
+    }
+
+    /// Its noise is that of one reading over the time between two.
+    #[test]
+    fn a_meter_of_its_own_clock_has_the_noise_of_its_own_readings() {
+        let rows = (0..60).map(|k| Row {
+            own_step_s: PerChannel { qb: 5.0 * STEP_S, ..steadily(k).own_step_s },
+            read: PerChannel { qb: k % 5 == 0, ..steadily(k).read },
+            ..steadily(k)
+        });
+        let block = blocks(rows)[1];
+        assert_close(block.time_square_s2[0], STEP_S * 0.25, "A");
+        assert_close(block.time_square_s2[1], 5.0 * STEP_S * 0.25, "B");
+    }
+
+    /// Slow readings make a block of eight steps, quick ones of a quarter of a second.
+    #[test]
+    fn a_block_is_an_average() {
+        for (step_s, steps) in [(0.1, 8.0), (0.001, 250.0)] {
+            let block =
+                blocks((0..600).map(|k| Row { dt_s: if k == 0 { 0.0 } else { step_s }, ..steadily(k) }))[1];
+            assert_close(block.sums[RawSum::Time as usize], steps * step_s, "time");
+        }
     }
 }
