@@ -174,3 +174,109 @@ fn a_leak_that_takes_its_own_pressure_ends_a_segment_where_it_opens() {
         assert!(ends.iter().any(|end| (30.24..30.76).contains(end)), "{seed}: {ends:?}");
     }
 }
+
+/// However few segments there are, neighbours that differ stay apart.
+#[test]
+fn the_border_where_a_leak_opened_outlasts_a_long_trace() {
+    let mut samples = at_rest(41, 12_000);
+    for sample in &mut samples[3000..] {
+        sample.qa_m3s = sample.qa_m3s.map(|q| q + 0.5 / 60e3);
+    }
+    let statistic = statistic::<4>(&samples);
+    let lengths_s: Vec<f64> = statistic.segments().iter().map(|segment| segment.time_s()).collect();
+    let ends_s = || (1..=lengths_s.len()).map(|count| lengths_s[..count].iter().sum::<f64>());
+    assert!(ends_s().any(|end_s| (end_s - 30.0).abs() < 0.6), "{lengths_s:?}");
+    assert!(ends_s().any(|end_s| (end_s - 119.9).abs() < 0.3), "{lengths_s:?}");
+}
+
+/// A stream forgets what is longer ago than its horizon once its place is needed, and no sooner.
+#[test]
+fn a_stream_forgets_what_lies_before_its_horizon() {
+    for (horizon_s, kept_s) in [(10.0, 16.0), (1000.0, 60.0)] {
+        let new = ContinuityStatistic::<f64, 4>::new(&cylinder(), &Fluid::paper(), &Sensors::paper());
+        let mut statistic = new.forgetting(horizon_s);
+        for (index, sample) in at_rest(43, 6000).iter().enumerate() {
+            statistic.push(if index == 0 { 0.0 } else { STEP_S }, sample);
+        }
+        statistic.close();
+        let found_s: f64 = statistic.segments().iter().map(|segment| segment.time_s()).sum();
+        assert!((found_s - kept_s).abs() < 4.0, "{horizon_s}: {found_s}");
+    }
+}
+
+/// Each goes on as the other would have, to the last bit.
+#[test]
+fn exchanged_segments_go_on_with_the_other_statistic() {
+    let new = || ContinuityStatistic::<f64, 4>::new(&cylinder(), &Fluid::paper(), &Sensors::paper());
+    let blocks = [51, 52].map(|seed| {
+        let mut blocks = Vec::new();
+        let mut statistic = new();
+        for (index, sample) in at_rest(seed, 4000).iter().enumerate() {
+            let step_s = if index == 0 { 0.0 } else { STEP_S };
+            statistic.push_each(step_s, sample, &mut |block| blocks.push(*block));
+        }
+        blocks
+    });
+    let told = |statistic: &mut ContinuityStatistic<f64, 4>| {
+        statistic.close();
+        (statistic.taken(), format!("{:?}", statistic.segments()))
+    };
+    let alone = blocks.each_ref().map(|blocks| {
+        let mut statistic = new();
+        blocks.iter().for_each(|block| statistic.take(block));
+        told(&mut statistic)
+    });
+    let [mut one, mut other] = [new(), new()];
+    let ([first, _], half) = (&blocks, 90);
+    first[..half].iter().for_each(|block| one.take(block));
+    one.swap_segments(&mut other);
+    first[half..].iter().for_each(|block| other.take(block));
+    blocks[1].iter().for_each(|block| one.take(block));
+    assert_eq!([told(&mut other), told(&mut one)], alone);
+    assert_ne!(alone[0], alone[1]);
+    assert_eq!(alone[0].0, blocks[0].len() as u64);
+}
+
+/// Mean roots weigh by time.
+#[test]
+fn mean_roots_are_means_over_time() {
+    let sample = at_rest(1, 1)[0];
+    let mut statistic = ContinuityStatistic::<f64, 2>::new(&cylinder(), &Fluid::paper(), &Sensors::paper());
+    for (dt_s, pa_pa, pb_pa) in [(0.0, 64e6, 0.0), (0.03, 4e6, 5e6), (0.01, 16e6, 7e6)] {
+        statistic.push(dt_s, &Sample { pa_pa, pb_pa, ..sample });
+    }
+    let roots = statistic.mean_roots();
+    let mean = |often: f64, seldom: f64| (3.0 * often.sqrt() + seldom.sqrt()) / 4.0;
+    assert!((roots.internal / mean(1e6, 9e6) - 1.0).abs() < 1e-3);
+    assert!((roots.external_a / mean(4e6, 16e6) - 1.0).abs() < 1e-3);
+    assert!((roots.external_b / mean(5e6, 7e6) - 1.0).abs() < 1e-3);
+}
+
+/// A flow that comes more rarely than the rows counts from its first reading on: no step of the rows is taken
+/// for its own.
+#[test]
+fn a_slow_flow_counts_from_its_first_reading() {
+    for of_a in [false, true] {
+        let mut samples = at_rest(61, 400);
+        for (_, sample) in samples.iter_mut().enumerate().filter(|(k, _)| k % 20 != 1) {
+            *(if of_a { &mut sample.qa_m3s } else { &mut sample.qb_m3s }) = None;
+        }
+        let statistic = statistic::<12>(&samples);
+        let [balances, of_one] =
+            [0, 1].map(|equation| statistic.segments().iter().map(|s| s.rows(equation)).sum::<f64>());
+        assert!((of_one - balances - 1.0).abs() < 1e-9, "{of_a}: {balances} of {of_one}");
+    }
+}
+
+/// Within a block, too, and where it is the only flow: of what was not read nothing is integrated.
+#[test]
+fn a_hole_of_more_than_four_steps_is_no_reading() {
+    let rows = |hole: std::ops::Range<usize>| {
+        let mut samples = at_rest(9, 3000);
+        samples.iter_mut().for_each(|sample| sample.qb_m3s = None);
+        samples[hole].iter_mut().for_each(|sample| sample.qa_m3s = None);
+        statistic::<12>(&samples).segments().iter().map(|s| s.rows(1)).sum::<f64>()
+    };
+    let missing = [1005..1008, 1005..1018].map(|hole| rows(0..0) - rows(hole));
+    assert_eq!(missing.map(|rows| rows.round() as i64), [0, 1]);
+}

@@ -181,3 +181,141 @@ impl<T: Real, const N: usize> LeakFit<T, N> {
         Self { coefficients, last_pivot: factor[N - 1][N - 1], explained }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+    use pitchleak_testkit::white_noise;
+
+    const N: usize = 4;
+
+    fn normal_equations(seed: u64) -> ([[f64; N]; N], [f64; N]) {
+        let mut noise = white_noise(seed);
+        let rows = DMatrix::from_fn(9, N, |_, _| noise.next().expect("no end"));
+        let left = DVector::from_fn(9, |_, _| noise.next().expect("no end"));
+        let (square, vector) = (rows.transpose() * &rows, rows.transpose() * left);
+        (
+            core::array::from_fn(|i| core::array::from_fn(|j| square[(i, j)])),
+            core::array::from_fn(|i| vector[i]),
+        )
+    }
+
+    /// Coefficients, what they explain, and the inverse's last entry, of those that are free.
+    fn dense(matrix: &[[f64; N]; N], vector: &[f64; N], is_free: [bool; N]) -> (DVector<f64>, f64, f64) {
+        let entry = |i: usize, j: usize| match (is_free[i] && is_free[j], i == j) {
+            (true, true) => (1.0 + RIDGE) * matrix[i][j],
+            (true, false) => matrix[i][j],
+            (false, _) => f64::from(i == j),
+        };
+        let inverse = DMatrix::from_fn(N, N, entry).try_inverse().expect("of full rank");
+        let vector = DVector::from_fn(N, |i, _| if is_free[i] { vector[i] } else { 0.0 });
+        let found = &inverse * &vector;
+        let explained = found.dot(&vector);
+        (found, explained, inverse[(N - 1, N - 1)])
+    }
+
+    /// Least squares where nothing has to be positive; else those of the leaks that are left, none of which
+    /// lets oil in.
+    #[test]
+    fn is_least_squares_of_leaks_that_let_no_oil_in() {
+        let mut left_out = 0;
+        for seed in 0..40 {
+            let (matrix, vector) = normal_equations(seed);
+            for are_leaks in [[false; N], [true, true, true, false]] {
+                let fit = LeakFit::of(&matrix, &vector, &are_leaks);
+                assert!((0..N).all(|i| !are_leaks[i] || fit.coefficients[i] >= 0.0));
+                let is_free = fit.coefficients.map(|coefficient| coefficient.abs() > 0.0);
+                assert!((0..N).all(|i| are_leaks[i] || is_free[i]));
+                left_out += is_free.into_iter().filter(|free| !free).count();
+                let (coefficients, explained, share) = dense(&matrix, &vector, is_free);
+                let found = DVector::from_row_slice(&fit.coefficients);
+                assert!((found - coefficients).amax() < 1e-9);
+                assert!((fit.explained - explained).abs() < 1e-9);
+                let (last, last_share) = fit.last().expect("its column is there");
+                assert!(
+                    (last - fit.coefficients[N - 1]).abs() < 1e-12 && (last_share / share - 1.0).abs() < 1e-9
+                );
+            }
+        }
+        assert!(left_out > 20, "{left_out}");
+    }
+
+    /// Its pivot is none, not a division by zero.
+    #[test]
+    fn a_column_of_nothing_has_no_coefficient() {
+        let (mut matrix, mut vector) = normal_equations(1);
+        (0..N).for_each(|i| (matrix[N - 1][i], matrix[i][N - 1]) = (0.0, 0.0));
+        vector[N - 1] = 0.0;
+        let fit = LeakFit::of(&matrix, &vector, &[false; N]);
+        assert!(fit.last().is_none() && fit.explained.is_finite());
+    }
+
+    /// Blocks of the balance with scatter of so many declared standard deviations; from the middle one on
+    /// more flows, in standard deviations of a block, steadily or as much as the load pressure is of its
+    /// mean.
+    fn waiting(scatter: f64, more: f64, by_pressure: bool, seed: u64) -> Waiting<f64> {
+        let mut waiting = Waiting::new(&Cylinder::paper(), &Sensors::paper());
+        let mut noise = white_noise(seed);
+        for k in 0..WAITING {
+            let mut block = Block { fed: [true; 2], time_square_s2: [2.5e-3; 2], ..Block::default() };
+            let pressure_mpa = 2.0 + noise.next().expect("no end");
+            let std_m = f64::sqrt(waiting.variance * 2.5e-3);
+            let share = if by_pressure { pressure_mpa / 2.0 } else { 1.0 };
+            let more = if k > WAITING / 2 { more * share } else { 0.0 };
+            block.sums[RawSum::Time as usize] = 0.25;
+            block.sums[RawSum::PressureA as usize] = 0.25 * (3.0 + pressure_mpa);
+            block.sums[RawSum::PressureB as usize] = 0.25 * 3.0;
+            let left_m = std_m * (scatter * noise.next().expect("no end") + more);
+            block.sums[RawSum::ResidualA as usize] = left_m * waiting.area_m2[0];
+            waiting.add(&block);
+        }
+        waiting
+    }
+
+    /// By what the blocks scatter, and no less than the meters' noise as declared, a flow shows that is large
+    /// beside it.
+    #[test]
+    fn a_change_is_one_beside_the_noise() {
+        let shows = |scatter: f64, more: f64, by_pressure: bool| {
+            (0..40).filter(|seed| waiting(scatter, more, by_pressure, *seed).change().is_some()).count()
+        };
+        for by_pressure in [false, true] {
+            assert!(shows(1.0, 0.0, by_pressure) <= 2);
+            assert!(shows(0.01, 1.0, by_pressure) == 0);
+            assert!(shows(10.0, 8.0, by_pressure) <= 2);
+            assert!(shows(1.0, 10.0, by_pressure) == 40);
+        }
+    }
+
+    /// A leak flows more where the pressure across it jumps, and is the same leak.
+    #[test]
+    fn a_leak_that_follows_its_pressure_is_no_change() {
+        for leak in 0..3 {
+            let calm = waiting(1.0, 0.0, false, 7);
+            let mut waiting = Waiting::new(&Cylinder::paper(), &Sensors::paper());
+            for (k, mut block) in calm.blocks().iter().copied().enumerate() {
+                let jump_mpa = if k > WAITING / 2 { 0.25 * 5.0 } else { 0.0 };
+                let raised = if leak == 2 { RawSum::PressureB } else { RawSum::PressureA };
+                block.sums[raised as usize] += jump_mpa;
+                let [pa, pb] = [RawSum::PressureA, RawSum::PressureB].map(|raw| block.sums[raw as usize]);
+                let left_m = 40.0 * f64::sqrt(waiting.variance * 2.5e-3) * [pb - pa, pa, pb][leak];
+                block.sums[RawSum::ResidualA as usize] += left_m * waiting.area_m2[0];
+                waiting.add(&block);
+            }
+            assert_eq!(waiting.change(), None, "{leak}");
+        }
+    }
+
+    /// The block of the change is named; of a block whose flows are not measured nobody knows.
+    #[test]
+    fn a_change_has_its_block() {
+        let mut waiting = waiting(0.5, 12.0, false, 1);
+        assert_eq!(waiting.change(), Some(WAITING / 2));
+        let mut unfed = *waiting.blocks().last().expect("a block");
+        unfed.fed = [true, false];
+        waiting.release(1);
+        waiting.add(&unfed);
+        assert_eq!(waiting.change(), None);
+    }
+}

@@ -221,3 +221,144 @@ fn explained<T: Real>(product: impl Fn(usize, usize, usize) -> T) -> T {
     }
     LeakFit::of(&matrix, &vector, &ARE_LEAKS).explained
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pitchleak_testkit::white_noise;
+    use std::vec::Vec;
+
+    const BLOCK_S: f64 = 0.5;
+
+    fn block(pa: f64, pb: f64) -> Block<f64> {
+        let mut block = Block::default();
+        block.sums[RawSum::Time as usize] = BLOCK_S;
+        block.sums[RawSum::PressureA as usize] = BLOCK_S * pa;
+        block.sums[RawSum::PressureB as usize] = BLOCK_S * pb;
+        block
+    }
+
+    /// Rows at random, all of both equations.
+    fn rows(count: usize) -> Vec<[Option<Row<f64>>; EQUATIONS]> {
+        let mut noise = white_noise(2);
+        let mut next = || noise.next().expect("no end");
+        let mut row = || {
+            let columns = core::array::from_fn(|_| next());
+            let noise = RowNoise { integral: [[next(); 3]; INTEGRALS], end: [[next(); 3]; VOLUME_POWERS] };
+            Some(Row { columns, noise })
+        };
+        (0..count).map(|_| [row(), row()]).collect()
+    }
+
+    /// The same rows with time counted from `earlier_s` before.
+    fn aged(mut rows: [Option<Row<f64>>; EQUATIONS], earlier_s: f64) -> [Option<Row<f64>>; EQUATIONS] {
+        for row in rows.iter_mut().flatten() {
+            for (aged, plain) in AGED {
+                for chamber in 0..2 {
+                    row.columns[column(aged, chamber)] += earlier_s * row.columns[column(plain, chamber)];
+                }
+            }
+        }
+        rows
+    }
+
+    fn segment(rows: impl IntoIterator<Item = [Option<Row<f64>>; EQUATIONS]>) -> Segment<f64> {
+        let mut segment = Segment::default();
+        rows.into_iter().for_each(|rows| segment.add(&rows, &block(5.0, 3.0)));
+        segment
+    }
+
+    /// Two segments in a row are the segment of all their rows, with time from the first's begin.
+    #[test]
+    fn segments_append_to_that_of_all_rows() {
+        let rows = rows(7);
+        let (one, next) = rows.split_at(3);
+        let mut both = segment(one.iter().copied());
+        both.append(&segment(next.iter().copied()));
+        let from_begin = next.iter().map(|rows| aged(*rows, 3.0 * BLOCK_S));
+        let whole = segment(one.iter().copied().chain(from_begin));
+        let is_close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs().max(1.0);
+        for equation in 0..EQUATIONS {
+            for (i, j) in (0..COLUMNS).flat_map(|i| (0..COLUMNS).map(move |j| (i, j))) {
+                let (found, expected) = (both.product(equation, i, j), whole.product(equation, i, j));
+                assert!(is_close(found, expected), "{equation} {i} {j}: {found} {expected}");
+            }
+            let flat = |s: &Segment<f64>| {
+                let noise = s.integral_noise(equation).into_iter().chain(s.end_noise(equation)).flatten();
+                noise.chain([s.rows(equation), s.time_s(), f64::from(s.blocks)]).collect::<Vec<_>>()
+            };
+            assert!(flat(&both).into_iter().zip(flat(&whole)).all(|(a, b)| is_close(a, b)));
+        }
+        let noise = |rows: &[Option<Row<f64>>; EQUATIONS]| rows[1].expect("a row").noise.integral[2][0];
+        assert!(is_close(both.integral_noise(1)[2][0], rows.iter().map(noise).sum()));
+        assert!(is_close(whole.time_s(), 3.5) && is_close(whole.rows(0), 7.0) && whole.blocks == 7);
+    }
+
+    /// By time, whichever chamber's is higher, and where no row was taken in as well.
+    #[test]
+    fn mean_pressures_are_means_over_time() {
+        let mut segment = Segment::default();
+        segment.add(&[None; EQUATIONS], &block(5.0, 3.0));
+        segment.pass(&block(2.0, -6.0));
+        let mut next = Segment::default();
+        next.pass(&block(2.0, 3.0));
+        segment.append(&next);
+        let PerLeak { internal, external_a, external_b } = segment.mean_pressures_pa();
+        for (found, mpa) in [(internal, 11.0 / 3.0), (external_a, 3.0), (external_b, 4.0)] {
+            assert!((found / (1e6 * mpa) - 1.0f64).abs() < 1e-12, "{found} {mpa}");
+        }
+    }
+
+    /// A segment in which constant flows and leaks make both equations' residuals: `flows` of both zeros,
+    /// C_ip, C_epA, C_epB.
+    fn told(size: f64, flows: [f64; DESCRIPTION], blocks: usize) -> Segment<f64> {
+        let [zero_a, zero_b, internal, external_a, external_b] = flows;
+        let mut noise = white_noise(4);
+        segment((0..blocks).map(|_| {
+            let [pa, pb] = [0, 1].map(|_| 4.0 + noise.next().expect("no end"));
+            let residuals = [
+                zero_a + internal * (pa - pb) + external_a * pa,
+                zero_b - internal * (pa - pb) + external_b * pb,
+            ];
+            [0, 1].map(|chamber| {
+                let mut columns = [0.0; COLUMNS];
+                let residual = [RawSum::ResidualA, RawSum::ResidualB][chamber];
+                let sums = [(residual, residuals[chamber]), (RawSum::PressureA, pa), (RawSum::PressureB, pb)];
+                for (raw, value) in sums.into_iter().chain([(RawSum::Time, 1.0)]) {
+                    columns[column(raw, chamber)] = size * value;
+                }
+                let noise = RowNoise { integral: [[0.0; 3]; INTEGRALS], end: [[0.0; 3]; VOLUME_POWERS] };
+                Some(Row { columns, noise })
+            })
+        }))
+    }
+
+    const FLOWS: [f64; DESCRIPTION] = [0.3, -0.2, 0.1, 0.2, 0.4];
+
+    /// Of each alone, and of all together.
+    #[test]
+    fn what_constant_flows_and_leaks_make_is_explained() {
+        let alone = |i: usize| core::array::from_fn(|j| if i == j { FLOWS[i] } else { 0.0 });
+        for flows in (0..DESCRIPTION).map(alone).chain([FLOWS]) {
+            let segment = told(10.0, flows, 40);
+            let residuals = [column(RawSum::ResidualA, 0), column(RawSum::ResidualB, 1)];
+            let square: f64 = (0..EQUATIONS).map(|c| segment.product(c, residuals[c], residuals[c])).sum();
+            let explained = explained(|equation, i, j| segment.product(equation, i, j));
+            assert!((explained / square - 1.0).abs() < 0.01, "{flows:?}: {explained} of {square}");
+        }
+    }
+
+    /// Alike, they cost their blocks; where any zero or leak differs, more; and the more rows tell of it.
+    #[test]
+    fn neighbours_that_differ_are_dear() {
+        let cost = |size: f64, next: [f64; DESCRIPTION]| told(size, FLOWS, 40).cost(&told(size, next, 60));
+        let alike = cost(1.0, FLOWS);
+        assert!((alike / 100.0 - 1.0).abs() < 0.01, "{alike}");
+        for i in 0..DESCRIPTION {
+            let mut next = FLOWS;
+            next[i] += 0.1;
+            let [by_1, by_10] = [1.0, 10.0].map(|size| cost(size, next) / cost(size, FLOWS) - 1.0);
+            assert!(by_1 > 0.01 && (by_10 / by_1 - 100.0).abs() < 5.0, "{i} {by_1} {by_10}");
+        }
+    }
+}

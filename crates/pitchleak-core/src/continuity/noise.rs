@@ -151,4 +151,40 @@ mod tests {
         let mean = readings.iter().sum::<f64>() / readings.len() as f64;
         assert!((mean - 1.0).abs() < 0.02, "{mean} of the noise");
     }
+
+    #[test]
+    fn of_no_second_difference_no_noise_is_known() {
+        let mut meter = PressureNoise::default();
+        meter.add([0.0; 2], [1e5, 2e5]);
+        assert!(meter.variance_pa2().iter().all(|variance: &f64| variance.abs() < 1e-12));
+    }
+
+    fn scatter(readings: impl Iterator<Item = f64>) -> Option<f64> {
+        let mut scatter = Scatter::default();
+        readings.for_each(|reading| scatter.add(Some(reading), false));
+        scatter.std()
+    }
+
+    /// A motion of constant acceleration has none, white noise its own.
+    #[test]
+    fn scatter_is_of_the_noise_and_not_of_the_motion() {
+        let parabola = |k: u32| 4.0 + 0.5 * f64::from(k) + 0.25 * f64::from(k * k);
+        assert_eq!(scatter((0..50).map(parabola)), Some(0.0));
+        let found = scatter((0..).map(parabola).zip(white_noise(3)).take(20_000).map(|(m, n)| m + 5.0 * n));
+        assert!((found.unwrap() / 5.0 - 1.0).abs() < 0.03, "{found:?}");
+    }
+
+    /// It is told from four readings in a row, with no gap between them; one that is missing is none.
+    #[test]
+    fn scatter_takes_four_readings_in_a_row() {
+        let jump = |k: u32| if k < 3 { 0.0 } else { 1.0 };
+        assert_eq!(scatter((0..3).map(jump)), None);
+        assert!(scatter((0..4).map(jump)).unwrap() > 0.0);
+        let mut after_gap = Scatter::default();
+        (0..6).for_each(|k| after_gap.add(Some(jump(k)), k == 3));
+        assert_eq!(after_gap.std(), None);
+        after_gap.add(None, false);
+        after_gap.add(Some(1.0), false);
+        assert_eq!(after_gap.std(), Some(0.0));
+    }
 }

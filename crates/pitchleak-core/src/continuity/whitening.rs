@@ -254,6 +254,134 @@ mod tests {
     use super::super::clocks;
     use super::*;
     use crate::Sample;
+    use nalgebra::DMatrix;
+    use std::vec::Vec;
+
+    /// Which flows are measured in each of some blocks; no two are of the same length and volumes.
+    const FED: [[bool; 2]; 9] = [
+        [true, true],
+        [true, true],
+        [true, false],
+        [true, true],
+        [false, false],
+        [false, true],
+        [false, true],
+        [true, true],
+        [true, true],
+    ];
+
+    /// Block k, whose sum k alone is 1: what becomes of that is the weight of the block's error in a row.
+    fn block(k: usize) -> Block<f64> {
+        let size = k as f64;
+        let mut block = Block {
+            fed: FED[k],
+            time_square_s2: [2e-3 + 1e-3 * size, 7e-3 - 5e-4 * size],
+            ..Block::default()
+        };
+        block.sums[k] = 1.0;
+        block.pressure_square_s2 = 1e-3 + 2e-4 * size;
+        block.volumes_m3 = [1e-4 + 2e-5 * size, 3e-4 - 1e-5 * size];
+        block.begins_at = (k == 0).then_some([3e-4, 1e-4]);
+        block
+    }
+
+    fn whitener() -> Whitener<f64> {
+        let mut sensors = Sensors::paper();
+        sensors.flow_b.noise_std *= 2.0;
+        Whitener::new(&Cylinder::paper(), &Fluid::paper(), &sensors)
+    }
+
+    fn rows() -> Vec<Row<f64>> {
+        let mut whitener = whitener();
+        (0..FED.len()).flat_map(|k| whitener.push(&block(k))).flatten().collect()
+    }
+
+    /// Weight of the error of a chamber's equation in block k, m³, in a row.
+    fn weight(row: &Row<f64>, k: usize, chamber: usize) -> f64 {
+        row.columns[chamber * RAW_SUMS + k]
+    }
+
+    /// Two rows of each block of which both flows are measured and one where one is, uncorrelated and of
+    /// variance 1 by the covariance of all errors together.
+    #[test]
+    fn rows_are_white_by_the_covariance_of_all_blocks() {
+        let whitener = whitener();
+        let mut covariance = DMatrix::zeros(2 * FED.len(), 2 * FED.len());
+        let mut end = whitener.end_variance([3e-4, 1e-4]);
+        for k in 0..FED.len() {
+            let now = whitener.end_variance(block(k).volumes_m3);
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                covariance[(2 * k + i, 2 * k + j)] = now[i][j] + end[i][j];
+                if k > 0 {
+                    covariance[(2 * k + i, 2 * k + j - 2)] = -end[i][j];
+                    covariance[(2 * k + i - 2, 2 * k + j)] = -end[i][j];
+                }
+            }
+            for side in 0..2 {
+                let flown = whitener.flow_variance[side] * block(k).time_square_s2[side];
+                covariance[(2 * k + side, 2 * k + side)] += flown / whitener.area_m2[side].powi(2);
+            }
+            end = now;
+        }
+        let rows = rows();
+        assert_eq!(rows.len(), FED.into_iter().flatten().filter(|fed| *fed).count());
+        let weights = DMatrix::from_fn(rows.len(), 2 * FED.len(), |row, error| {
+            weight(&rows[row], error / 2, error % 2) * whitener.area_m2[error % 2]
+        });
+        let found = &weights * covariance * weights.transpose();
+        assert!((found - DMatrix::identity(rows.len(), rows.len())).amax() < 1e-9);
+    }
+
+    /// The balance takes as much of both chambers' travel.
+    #[test]
+    fn the_first_row_is_free_of_the_travel() {
+        let [Some(balance), _] = whitener().push(&block(0)) else { panic!("no balance") };
+        let [a, b] = [0, 1].map(|chamber| weight(&balance, 0, chamber) * whitener().area_m2[chamber]);
+        assert!((a / b - 1.0).abs() < 1e-12);
+    }
+
+    /// Noise of what is integrated adds with each block, that of a reading between two blocks with their
+    /// difference.
+    #[test]
+    fn noise_of_columns_is_that_of_the_weights() {
+        let blocks: Vec<_> = (0..FED.len()).map(block).collect();
+        let mut whitener = whitener();
+        for (now, block) in blocks.iter().enumerate() {
+            let [va, vb] = block.volumes_m3;
+            let powers = [1.0, va, vb, va * va, va * vb, vb * vb];
+            for row in whitener.push(block).into_iter().flatten() {
+                for (pair, (of, with)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
+                    let product = |k: usize| weight(&row, k, of) * weight(&row, k, with);
+                    for integral in 0..INTEGRALS {
+                        let square = |block: &Block<f64>| {
+                            let [a, b] = block.time_square_s2;
+                            [a, b, block.pressure_square_s2][integral]
+                        };
+                        let sum: f64 = (0..=now).map(|k| product(k) * square(&blocks[k])).sum();
+                        assert!((row.noise.integral[integral][pair] - sum).abs() <= 1e-9 * sum.abs());
+                    }
+                    let step =
+                        |k: usize, chamber: usize| weight(&row, k, chamber) - weight(&row, k + 1, chamber);
+                    let between: f64 = (0..now).map(|k| step(k, of) * step(k, with)).sum();
+                    let ends = product(0) + between + product(now);
+                    for (power, found) in powers.iter().zip(row.noise.end) {
+                        assert!((found[pair] - power * ends).abs() <= 1e-9 * (power * ends).abs());
+                    }
+                }
+            }
+        }
+    }
+
+    /// What was before is forgotten: a row is that of a first block.
+    #[test]
+    fn anew_nothing_is_known() {
+        let mut whitener = whitener();
+        let first = whitener.push(&block(3));
+        whitener.push(&block(1));
+        whitener.begin_anew();
+        let anew = whitener.push(&block(3));
+        assert_eq!(std::format!("{first:?}"), std::format!("{anew:?}"));
+    }
 
     /// Neighbouring rows of a cylinder at rest, as noisy sensors read it, know nothing of each other.
     #[test]
