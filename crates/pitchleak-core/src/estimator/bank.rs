@@ -435,4 +435,35 @@ mod tests {
         let left = -bank.recent[1] / 10.0;
         assert!((left - (-1.0_f64).exp()).abs() < 0.01, "{left}");
     }
+
+    /// Which of ten blocks, each of which tells a leak to a thousandth of the prior, say that it jumped;
+    /// `leak` in thousandths.
+    fn jumps(inflation: f64, leak: impl Fn(usize) -> f64) -> std::vec::Vec<usize> {
+        let mut bank = Bank::<f64, 4>::new(f64::INFINITY);
+        let mut solution = Solution::of_prior(PRIOR.offsets);
+        let has_jumped = |block: &usize| {
+            let mut sums = BlockSums::new();
+            sums.add(&[0.0, 1.0, 0.0, 0.0], &[0.0; LEAKS], 1e-3 * leak(*block), 1e6);
+            bank.evidence.block = Block::new(0.5, &sums, &[None; 2], 0.0);
+            bank.evidence.refer(0.0, &solution.mean);
+            bank.begin([0.0; 2], inflation, &PRIOR, &solution);
+            let mut jumped = false;
+            while bank.is_renewing() && !jumped {
+                jumped = matches!(bank.go_on(&PRIOR, &mut solution), Heard::Jumped);
+            }
+            jumped
+        };
+        (0..10).filter(has_jumped).collect()
+    }
+
+    /// The block after the first that no hypothesis foretold confirms it. A wild block is none, nor is what
+    /// the noise can be.
+    #[test]
+    fn a_jump_is_confirmed_by_the_next_block() {
+        let none: [usize; 0] = [];
+        assert_eq!(jumps(1.0, |block| if block < 6 { 0.0 } else { 10.0 })[..1], [7]);
+        assert_eq!(jumps(1.0, |block| if block == 6 { 10.0 } else { 0.0 }), none);
+        assert_eq!(jumps(100.0, |block| if block < 6 { 0.0 } else { 10.0 }), none);
+        assert_eq!(jumps(1.0, |_| 10.0), none);
+    }
 }

@@ -410,6 +410,32 @@ mod tests {
         }
     }
 
+    /// A meter's zero is what is left of what it reads once the leaks through the pressures' zeros are taken
+    /// off.
+    #[test]
+    fn flow_offsets_are_without_what_leaks_through_the_pressures_zeros() {
+        let rls = fed();
+        let [bias_a, bias_b] = rls.pressure_biases_pa().map(|bias| bias.value);
+        let leaks = rls.possible_leaks_m3spa();
+        let internal = leaks.internal * (bias_a - bias_b);
+        let through = [internal + leaks.external_a * bias_a, -internal + leaks.external_b * bias_b];
+        let whole = [[1.0, 0.0], [0.0, 1.0]].map(|flows| rls.offset_sum(flows, [0.0; 2]).value);
+        for (side, found) in rls.flow_offsets_m3s().into_iter().enumerate() {
+            let expected = whole[side] + through[side];
+            assert!((found.value / expected - 1.0).abs() < 1e-9, "{found:?} {expected}");
+        }
+    }
+
+    /// As the leaks, in prior units per s and not below what the residuals show.
+    #[test]
+    fn slopes_are_of_the_leaks_units_and_noise() {
+        let mut rls = fed();
+        rls.slopes_ps = [(0.2, rls.solution.covariance[1][1]); 3];
+        let (slope, leak) = (rls.leak_slopes().internal, rls.leak_coefficients().internal);
+        assert!((slope.value / (0.2 * rls.leak_prior_std()) - 1.0).abs() < 1e-12);
+        assert!((slope.std / leak.std - 1.0).abs() < 1e-12);
+    }
+
     /// Of a sixth of the reading, a fifth of the truth: y = x (1 + γ). Its spread follows the slope of γ/(1 + γ).
     #[test]
     fn a_share_of_the_reading_is_one_of_the_truth() {

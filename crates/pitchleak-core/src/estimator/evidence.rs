@@ -242,4 +242,18 @@ mod tests {
         // Of the expected square of 4.5 nats, half would stay; what the pivot's own scatter leaves is a few hundredths.
         assert!(mean.abs() < 0.1 + 3.0 * std, "{mean} ± {std} nats");
     }
+
+    /// Noise in column 0 is in the left side too, times the prior mean that was taken off: together they tell
+    /// nothing.
+    #[test]
+    fn noise_at_the_prior_mean_tells_nothing() {
+        const MEAN_0: f64 = 0.7;
+        let mut sums = BlockSums::new();
+        for noise in [0.2, -0.1, -0.3, 0.2] {
+            sums.add(&[noise, 0.0, 0.0, 0.0], &[0.0; LEAKS], -MEAN_0 * noise, 1.0);
+        }
+        let mut evidence = Evidence { block: Block::new(0.5, &sums, &[None; 2], 0.18), ..Evidence::none() };
+        evidence.refer(MEAN_0, &[0.0; 4]);
+        assert!(evidence.score[0].abs() < 1e-12, "{}", evidence.score[0]);
+    }
 }
