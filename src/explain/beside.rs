@@ -118,3 +118,63 @@ impl Of {
 fn channel(sensor: Signal) -> Option<usize> {
     CHANNELS.iter().position(|own| *own == sensor)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(channel: usize, extremes: [f64; 2]) -> Told {
+        let mut told = Told::default();
+        told.extremes[channel] = Some(extremes);
+        told
+    }
+
+    /// Neither one that is mended by a factor nor one that counts the other way.
+    #[test]
+    fn what_never_changes_tells_of_no_mistake() {
+        let rig = Rig::paper();
+        for value in [3e-5, -3e-5] {
+            let allows = |most: f64, mistake: Mistake| {
+                let [a, b] = [value, value * most];
+                told(3, [a.min(b), a.max(b)]).allows(mistake, &rig)
+            };
+            for mistake in
+                [Mistake::Sign(Of::FlowA), Mistake::FlowsExchanged, Mistake::Factor(Of::FlowA, 0.9)]
+            {
+                assert!(!allows(1.0, mistake) && !allows(1.0 + 1e-14, mistake));
+                assert!(allows(1.5, mistake));
+            }
+            assert!(allows(1.0, Mistake::Sign(Of::FlowB)));
+        }
+    }
+
+    /// Once mended a reading lies in its sensor's range, and a flow that was read too large is more than its
+    /// noise.
+    #[test]
+    fn mended_readings_lie_within_their_sensors() {
+        let rig = Rig::paper();
+        let stroke_m = rig.cylinder.stroke_m;
+        let (full_pa, full_m3s) = (rig.instruments.pressure.full_scale, rig.instruments.flow_b.full_scale);
+        let noise_m3s = rig.sensors().flow_b.noise_std;
+        let allows = |channel: usize, extremes: [f64; 2], of: Of, factor: f64| {
+            told(channel, extremes).allows(Mistake::Factor(of, factor), &rig)
+        };
+        assert!(allows(0, [0.0, 4.0 * stroke_m], Of::Position, 4.0));
+        assert!(!allows(0, [0.0, 4.4 * stroke_m], Of::Position, 4.0));
+        assert!(!allows(0, [-0.4 * stroke_m, stroke_m], Of::Position, 4.0));
+        assert!(allows(1, [0.0, 0.7 * full_pa], Of::PressureA, 0.5));
+        assert!(!allows(2, [0.0, 0.8 * full_pa], Of::Pressures, 0.5));
+        assert!(!allows(1, [-2.0 * ATMOSPHERE_PA, full_pa], Of::PressureA, 1.5));
+        assert!(allows(4, [-0.7 * full_m3s, 0.7 * full_m3s], Of::FlowB, 0.5));
+        assert!(!allows(4, [-0.8 * full_m3s, 0.7 * full_m3s], Of::FlowB, 0.5));
+        assert!(!allows(4, [-3.0 * noise_m3s, 3.0 * noise_m3s], Of::FlowB, 10.0));
+        assert!(allows(4, [-30.0 * noise_m3s, 30.0 * noise_m3s], Of::FlowB, 10.0));
+        assert!(allows(4, [0.0, noise_m3s], Of::FlowB, 0.1));
+    }
+
+    #[test]
+    fn the_zero_of_a_position_keeps_the_piston_within_its_cylinder() {
+        let [least, most] = told(0, [0.1, 0.3]).position_zero(0.2);
+        assert!((least - -0.55).abs() < 1e-12 && (most - -0.45).abs() < 1e-12, "{least} {most}");
+    }
+}

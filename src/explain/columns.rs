@@ -281,3 +281,254 @@ impl Course {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::readings::tests::{dot, sums};
+    use super::*;
+    use pitchleak_core::{Cylinder, Sample};
+
+    const STEP_S: f64 = 0.01;
+    /// Begin of the block that is looked at.
+    const BEGIN_S: f64 = 0.25;
+    /// Rates of the motion, m/s and Pa/s, all constant: so the integrals are exact.
+    const V: f64 = 0.02;
+    const PA_RATE: f64 = 3e6;
+    const PB_RATE: f64 = -2e6;
+    /// Size of the errors.
+    const E: f64 = 1e-5;
+
+    fn rig() -> Rig {
+        let mut rig = Rig::paper();
+        rig.cylinder = Cylinder { dead_volume_a_m3: 5e-5, dead_volume_b_m3: 3e-5, ..rig.cylinder };
+        rig.instruments.flow_b.full_scale *= 0.5;
+        rig
+    }
+
+    fn scales(rig: &Rig, leaks_m3s: PerLeak<f64>) -> Scales<'_> {
+        let readings = Readings::declared(&rig.cylinder, 1e6 / rig.fluid.bulk_modulus_pa);
+        let pressures_mpa = PerLeak { internal: 2.0, external_a: 5.0, external_b: 3.0 };
+        let roots = PerLeak { internal: 1e3, external_a: 2e3, external_b: 3e3 };
+        Scales { rig, readings, pressures_mpa, roots, leaks_m3s }
+    }
+
+    /// What a cylinder that leaks reads, as declared.
+    fn honest(scales: &Scales<'_>, t_s: f64) -> Sample<f64> {
+        let Rig { cylinder, fluid, .. } = scales.rig;
+        let (x_m, pa_pa, pb_pa) = (0.08 + V * t_s, 6e6 + PA_RATE * t_s, 3e6 + PB_RATE * t_s);
+        let leak = scales.leaks_m3s.zip(scales.pressures_mpa).map(|(leak, mpa)| leak / (1e6 * mpa));
+        let past = leak.internal * (pa_pa - pb_pa);
+        let stored_a = cylinder.volume_a_m3(x_m) * PA_RATE / fluid.bulk_modulus_pa;
+        let stored_b = cylinder.volume_b_m3(x_m) * PB_RATE / fluid.bulk_modulus_pa;
+        let qa = cylinder.area_a_m2 * V + stored_a + past + leak.external_a * pa_pa;
+        let qb = -cylinder.area_b_m2 * V + stored_b - past + leak.external_b * pb_pa;
+        Sample { x_m, pa_pa, pb_pa, qa_m3s: Some(qa), qb_m3s: Some(qb), force_n: None }
+    }
+
+    fn flows(sample: Sample<f64>, a: f64, b: f64) -> Sample<f64> {
+        Sample { qa_m3s: sample.qa_m3s.map(|q| q + a), qb_m3s: sample.qb_m3s.map(|q| q + b), ..sample }
+    }
+
+    /// The reading of a rig that is not as declared, or whose leaks are not those found, by so much of this.
+    fn erring(column: Column, scales: &Scales<'_>, t_s: f64) -> Sample<f64> {
+        use Column as C;
+        let Rig { cylinder: own, fluid, instruments, .. } = scales.rig;
+        let honest = |t_s: f64| honest(scales, t_s);
+        let now = honest(t_s);
+        let (qa, qb) = (now.qa_m3s.expect("read"), now.qb_m3s.expect("read"));
+        let (kappa, flow, stroke) = (1.0 / fluid.bulk_modulus_pa, scales.full_scale_m3s(), own.stroke_m);
+        let pl_pa = now.pa_pa - now.pb_pa;
+        let per = scales.pressures_mpa.map(|mpa| flow / (1e6 * mpa));
+        let root = |pressure_pa: f64, mean: f64| E * flow * pressure_pa.sqrt() / mean;
+        let both = |a: f64, b: f64| flows(now, E * a, E * b);
+        let late = |a: f64, b: f64| {
+            let (a, b) = (honest(t_s - a), honest(t_s - b));
+            Sample { qa_m3s: a.qa_m3s, qb_m3s: b.qb_m3s, ..now }
+        };
+        let (zero_pa, swept_a, swept_b) =
+            (instruments.pressure.full_scale, kappa * own.area_a_m2 * stroke, kappa * own.area_b_m2 * stroke);
+        match column {
+            C::LeftSide => now,
+            C::Compressibility | C::Unpressed => {
+                both(kappa * own.volume_a_m3(now.x_m) * PA_RATE, kappa * own.volume_b_m3(now.x_m) * PB_RATE)
+            }
+            C::ZeroA => both(instruments.flow_a.full_scale, 0.0),
+            C::ZeroB => both(0.0, instruments.flow_b.full_scale),
+            C::GainA => both(qa, 0.0),
+            C::GainB => both(0.0, qb),
+            C::Gains => both(qa, qb),
+            C::LagA => late(E, 0.0),
+            C::LagB => late(0.0, E),
+            C::Lags => late(E, E),
+            C::DeadVolumeA => both(swept_a * PA_RATE, 0.0),
+            C::DeadVolumeB => both(0.0, swept_b * PB_RATE),
+            C::AreaA => both(own.area_a_m2 * (V + kappa * now.x_m * PA_RATE), 0.0),
+            C::AreaB => both(0.0, own.area_b_m2 * (-V + kappa * (stroke - now.x_m) * PB_RATE)),
+            C::PositionGain | C::Travel => Sample { x_m: now.x_m / (1.0 + E), ..now },
+            C::PositionZero => Sample { x_m: now.x_m - E * stroke, ..now },
+            C::ThroughSealA => both(per.external_a * now.pa_pa, -per.external_a * now.pa_pa),
+            C::ThroughSealB => both(per.external_b * now.pb_pa, -per.external_b * now.pb_pa),
+            C::PressureZeroA => Sample { pa_pa: now.pa_pa + E * zero_pa, ..now },
+            C::PressureZeroB => Sample { pb_pa: now.pb_pa + E * zero_pa, ..now },
+            C::PressureGainA => Sample { pa_pa: now.pa_pa * (1.0 + E), ..now },
+            C::PressureGainB => Sample { pb_pa: now.pb_pa * (1.0 + E), ..now },
+            C::LeakInternal => both(per.internal * pl_pa, -per.internal * pl_pa),
+            C::LeakA => both(per.external_a * now.pa_pa, 0.0),
+            C::LeakB => both(0.0, per.external_b * now.pb_pa),
+            C::CrackingInternal => both(-flow, flow),
+            C::CrackingA => both(-flow, 0.0),
+            C::CrackingB => both(0.0, -flow),
+            C::OrificeInternal => {
+                let past = root(pl_pa, scales.roots.internal);
+                flows(now, past, -past)
+            }
+            C::OrificeA => flows(now, root(now.pa_pa, scales.roots.external_a), 0.0),
+            C::OrificeB => flows(now, 0.0, root(now.pb_pa, scales.roots.external_b)),
+            C::SteadyInternal => both(flow, -flow),
+            C::SteadyA => both(flow, 0.0),
+            C::SteadyB => both(0.0, flow),
+        }
+    }
+
+    const LEAKS: [Column; 3] = [Column::LeakInternal, Column::LeakA, Column::LeakB];
+
+    /// What the left sides of both chambers hold beside the leaks found.
+    fn left_over(scales: &Scales<'_>, sums: &Combination) -> [f64; 2] {
+        let of = |column: Column| scales.column(column)[0].map(|chamber| dot(&chamber, sums));
+        let PerLeak { internal, external_a, external_b } = scales.leaks_m3s;
+        let found = LEAKS.into_iter().zip([internal, external_a, external_b]);
+        found.fold(of(Column::LeftSide), |[a, b], (leak, size_m3s)| {
+            let [of_a, of_b] = of(leak).map(|column| size_m3s / scales.full_scale_m3s() * column);
+            [a - of_a, b - of_b]
+        })
+    }
+
+    fn assert_is(found: [f64; 2], expected: [f64; 2], share: f64, what: &str) {
+        let size = expected[0].abs().max(expected[1].abs());
+        let is_close = found
+            .iter()
+            .zip(expected)
+            .all(|(found, expected)| (found - expected).abs() <= share * size + 1e-16);
+        assert!(is_close, "{what}: {found:?}, not {expected:?}");
+    }
+
+    /// An explanation's column is what its error puts into both left sides, to first order, beside leaks that
+    /// were found and without any.
+    #[test]
+    fn a_column_is_what_its_error_leaves_of_the_left_side() {
+        use Column as C;
+        let rig = rig();
+        let none = PerLeak { internal: 0.0, external_a: 0.0, external_b: 0.0 };
+        let past_piston = PerLeak { internal: 3e-6, ..none };
+        for leaks_m3s in [none, past_piston, PerLeak { external_a: 2e-6, external_b: 1e-6, ..past_piston }] {
+            let scales = scales(&rig, leaks_m3s);
+            let of_block =
+                |column: C| sums(&rig.cylinder, STEP_S, |k| erring(column, &scales, STEP_S * f64::from(k)));
+            assert_is(left_over(&scales, &of_block(C::LeftSide)), [0.0; 2], 0.0, "none");
+            for column in ALL {
+                let sums = of_block(column);
+                let expected = scales.column(column)[0].map(|chamber| E * dot(&chamber, &sums));
+                // What a leak makes of an area that is wrong is left to the leak, what the volumes make of a
+                // gain to a zero.
+                let share = match column {
+                    C::Travel => 0.02,
+                    C::PositionGain if leaks_m3s != none => continue,
+                    C::AreaA | C::AreaB if leaks_m3s.external_a > 0.0 => continue,
+                    _ => 1e-3,
+                };
+                assert_is(left_over(&scales, &sums), expected, share, &format!("{column:?}"));
+            }
+        }
+    }
+
+    /// Where a column has a moment, its error may grow with time.
+    #[test]
+    fn a_moment_is_what_grows_from_the_block_on() {
+        let rig = rig();
+        let scales = scales(&rig, PerLeak { internal: 3e-6, external_a: 2e-6, external_b: 1e-6 });
+        for column in LEAKS.into_iter().chain([Column::ZeroA, Column::ZeroB]) {
+            let sums = sums(&rig.cylinder, STEP_S, |k| {
+                let t_s = STEP_S * f64::from(k);
+                let (now, off) = (honest(&scales, t_s), erring(column, &scales, t_s));
+                let grown = |off: Option<f64>, now: Option<f64>| {
+                    (t_s - BEGIN_S) * (off.unwrap_or(0.0) - now.unwrap_or(0.0))
+                };
+                flows(now, grown(off.qa_m3s, now.qa_m3s), grown(off.qb_m3s, now.qb_m3s))
+            });
+            let expected = scales.column(column)[1].map(|chamber| E * dot(&chamber, &sums));
+            assert!(expected.iter().any(|chamber| chamber.abs() > 0.0));
+            assert_is(left_over(&scales, &sums), expected, 1e-3, &format!("{column:?}"));
+        }
+        let [_, moment] = scales.column(Column::GainA);
+        assert!(moment.into_iter().flatten().all(|entry| entry == 0.0));
+    }
+
+    const ALL: [Column; 35] = [
+        Column::Compressibility,
+        Column::Unpressed,
+        Column::ZeroA,
+        Column::ZeroB,
+        Column::GainA,
+        Column::GainB,
+        Column::Gains,
+        Column::LagA,
+        Column::LagB,
+        Column::Lags,
+        Column::DeadVolumeA,
+        Column::DeadVolumeB,
+        Column::AreaA,
+        Column::AreaB,
+        Column::PositionGain,
+        Column::Travel,
+        Column::PositionZero,
+        Column::ThroughSealA,
+        Column::ThroughSealB,
+        Column::PressureZeroA,
+        Column::PressureZeroB,
+        Column::PressureGainA,
+        Column::PressureGainB,
+        Column::LeakInternal,
+        Column::LeakA,
+        Column::LeakB,
+        Column::CrackingInternal,
+        Column::CrackingA,
+        Column::CrackingB,
+        Column::OrificeInternal,
+        Column::OrificeA,
+        Column::OrificeB,
+        Column::SteadyInternal,
+        Column::SteadyA,
+        Column::SteadyB,
+    ];
+
+    /// What a course is at a moment t: its share of the column, and t from the segment's begin on times that
+    /// of the moment.
+    #[test]
+    fn courses_go_along_the_trace() {
+        // Of a trace of 20 s, the third segment, from 8 to 12 s.
+        let at = |course: Course, t_s: f64| {
+            let [share, moment] = course.shares(2, [8.0, 4.0], 20.0);
+            share + moment * (t_s - 8.0)
+        };
+        let cases = [
+            (Course::Constant, 1.0, 1.0),
+            (Course::Drift, -0.2, 0.2),
+            (Course::FromBegin, 0.6, 0.4),
+            (Course::ToEnd, 0.4, 0.6),
+            (Course::Accelerating, 0.16, 0.36),
+            (Course::Before(2), 0.0, 0.0),
+            (Course::Before(3), 1.0, 1.0),
+            (Course::Since(2), 1.0, 1.0),
+            (Course::Since(3), 0.0, 0.0),
+            (Course::Within(2), 1.0, 1.0),
+            (Course::Within(1), 0.0, 0.0),
+            (Course::Fading(2), 1.0, 0.0),
+            (Course::Fading(1), 0.0, 0.0),
+            (Course::Fading(3), 1.0, 1.0),
+        ];
+        for (course, begin, end) in cases {
+            let found = [at(course, 8.0), at(course, 12.0)];
+            assert_is(found, [begin, end], 1e-12, &format!("{course:?}"));
+        }
+    }
+}

@@ -208,3 +208,43 @@ fn accumulate(sum: &mut [f64], columns: &[Sparse], products: &[f64]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pitchleak_core::continuity::RAW_SUMS;
+
+    /// Products of combinations are those of the sums that they combine: the columns C of G to C'GC.
+    #[test]
+    fn products_are_those_of_the_combined_sums() {
+        let wave = |i: usize, rate: f64| (rate * i as f64).sin();
+        let mut kinds = [[[[0.0; RAW_SUMS]; 2]; 2]; 3];
+        for (i, entry) in kinds.iter_mut().flatten().flatten().flatten().enumerate() {
+            *entry = wave(i, 1.3);
+        }
+        // The last has neither kind.
+        kinds[2] = [[[0.0; RAW_SUMS]; 2]; 2];
+        let shares = [[0.7, -0.4], [1.0, 0.0], [1.0, 2.0]];
+        let symmetric =
+            |i: usize| wave(i / COLUMNS, 0.7) * wave(i % COLUMNS, 0.7) + wave(i / COLUMNS + i % COLUMNS, 0.3);
+        let products: Vec<f64> = (0..COLUMNS * COLUMNS).map(symmetric).collect();
+        let whole = |column: usize, raw: usize| {
+            let [plain, moment] = kinds[column].map(|kind| kind[raw / RAW_SUMS][raw % RAW_SUMS]);
+            shares[column][0] * plain + shares[column][1] * moment
+        };
+        let columns: Vec<Sparse> =
+            kinds.iter().zip(shares).map(|(kind, shares)| combine(kind, shares)).collect();
+        assert!(columns[2].is_empty());
+        let mut sum = vec![1.0; 9];
+        accumulate(&mut sum, &columns, &products);
+        for (i, j) in (0..9).map(|place| (place / 3, place % 3)) {
+            let both = (0..COLUMNS * COLUMNS).map(|at| (at / COLUMNS, at % COLUMNS));
+            let expected: f64 =
+                both.map(|(k, l)| whole(i, k) * whole(j, l) * products[k * COLUMNS + l]).sum();
+            assert!((sum[3 * i + j] - 1.0 - expected).abs() < 1e-9, "{i} {j}");
+            if i == j {
+                assert!((square(&columns[i], &products) - expected).abs() < 1e-9);
+            }
+        }
+    }
+}

@@ -292,3 +292,71 @@ fn residual(products: &[f64], size: usize, means: &[f64]) -> f64 {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use nalgebra::{DMatrix, DVector};
+
+    const STDS: [f64; 3] = [0.5, 2.0, 1.5];
+
+    /// Six rows of three columns and the left side, in units of the priors.
+    fn rows() -> (DMatrix<f64>, DVector<f64>) {
+        let wave = |i: usize, j: usize| ((1 + 3 * i + 7 * j) as f64).sin();
+        (DMatrix::from_fn(6, 3, wave), DVector::from_fn(6, |i, _| 2.0 * wave(i, 5)))
+    }
+
+    fn solved() -> (Fit, f64, f64, Vec<f64>) {
+        let (x, y) = rows();
+        let all = DMatrix::from_fn(6, 4, |i, j| if j < 3 { x[(i, j)] } else { y[i] });
+        let mut products: Vec<f64> = (all.transpose() * &all).iter().copied().collect();
+        let (gram, mut means) = (products.clone(), [0.0; 3]);
+        let (ln_determinant, chi_square) = solve(&mut products, 4, &mut means);
+        let fit = Fit {
+            ln_evidence: 0.0,
+            ln_likelihood: 0.0,
+            scales: [1.0; 2],
+            means: means.to_vec(),
+            stds: STDS.to_vec(),
+            factor: products,
+        };
+        (fit, ln_determinant, chi_square, gram)
+    }
+
+    /// The mean and covariance of a linear model with unit priors, what it leaves, and its determinant.
+    #[test]
+    fn solves_as_dense_algebra() {
+        let (fit, ln_determinant, chi_square, gram) = solved();
+        let (x, y) = rows();
+        let information = DMatrix::identity(3, 3) + x.transpose() * &x;
+        let inverse = information.clone().try_inverse().expect("of full rank");
+        let means = &inverse * x.transpose() * &y;
+        let is_close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        (0..3).for_each(|i| is_close(fit.means[i], means[i]));
+        is_close(ln_determinant, information.determinant().ln());
+        is_close(chi_square, y.dot(&y) - means.dot(&(x.transpose() * &y)));
+        is_close(residual(&gram, 4, &fit.means), (&y - &x * &means).norm_squared());
+        assert!(is_sum_of_squares(&gram, 4, &fit.means) && !is_sum_of_squares(&gram, 4, &[9.0; 3]));
+        let covariance = fit.covariance(&[2, 0]);
+        for (row, i) in [2, 0].into_iter().enumerate() {
+            let column = fit.inverse_column(i);
+            (0..3).for_each(|j| is_close(column[j], inverse[(i, j)]));
+            for (place, j) in [2, 0].into_iter().enumerate() {
+                is_close(covariance[row][place], STDS[i] * STDS[j] * inverse[(i, j)]);
+            }
+        }
+    }
+
+    /// A unit is likeliest; at any scale the density of n rows falls as their noise's volume grows.
+    #[test]
+    fn a_noise_scale_is_worth_its_prior_and_its_volume() {
+        assert!(ln_scale_prior(1.0).abs() < 1e-12);
+        assert!([0.1, 0.9, 1.1, 10.0].iter().all(|scale| ln_scale_prior(*scale) < 0.0));
+        let each = |rows: f64| ln_scale(rows, 4.0) - ln_scale(rows, 1.0);
+        assert!((each(10.0) - each(0.0) + 5.0 * 4.0_f64.ln()).abs() < 1e-12);
+        assert!((chance_of_mean_square(200.0) - 0.3).abs() < 1e-12);
+        assert!((chance_of_mean_square(0.0) - chance_of_mean_square(1.0)).abs() < 1e-12);
+    }
+}

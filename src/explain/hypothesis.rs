@@ -294,3 +294,15 @@ impl<'a> Hypothesis<'a> {
         self.free.push(Free { column, std: term.std });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subsets_are_every_choice_of_leaks_once_and_none_first() {
+        let all: Vec<Subset> = subsets().collect();
+        assert_eq!((all.len(), all[0]), (8, [false; 3]));
+        assert!((0..8).all(|i| !all[..i].contains(&all[i])), "{all:?}");
+    }
+}

@@ -97,3 +97,56 @@ fn quantile<'a>(flows: impl Iterator<Item = &'a Flow> + Clone, probability: f64)
     }
     last_m3s
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marginal() -> Marginal {
+        let flow = |lpm: f64, weight: f64, even_weights: [f64; 3], is_leak: bool| Flow {
+            m3s: lpm / LPM_PER_M3S,
+            weight,
+            even_weights,
+            is_leak,
+        };
+        let none = [0.1, 0.2, 0.1];
+        let flows = vec![
+            flow(0.0, 0.5, none, false),
+            flow(1.0, 0.25, [0.1, 0.1, 0.1], true),
+            flow(3.0, 0.25, [0.1, 0.1, 0.2], true),
+        ];
+        Marginal { flows }
+    }
+
+    #[test]
+    fn a_leak_is_believed_by_the_weights_of_its_flows() {
+        let marginal = marginal();
+        let belief = marginal.belief();
+        let is_close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        is_close(belief.mean_lpm, 1.0);
+        is_close(belief.std_lpm, 1.5_f64.sqrt());
+        [0.0, 0.0, 3.0]
+            .iter()
+            .zip(belief.quantiles_lpm)
+            .for_each(|(expected, found)| is_close(found, *expected));
+        is_close(belief.below_lpm, 3.0);
+        is_close(marginal.above(0.5 / LPM_PER_M3S), 0.5);
+        is_close(marginal.above(2.0 / LPM_PER_M3S), 0.25);
+        is_close(marginal.quantile_if_there(0.4) * LPM_PER_M3S, 1.0);
+    }
+
+    #[test]
+    fn at_even_odds_the_largest_of_three_counts() {
+        is_half(marginal().above_at_even_odds(2.0 / LPM_PER_M3S));
+        let mut other = marginal();
+        other.flows[2].even_weights = [0.2, 0.1, 0.1];
+        is_half(other.above_at_even_odds(2.0 / LPM_PER_M3S));
+        other.flows[2].even_weights = [0.1, 0.3, 0.1];
+        is_half(other.above_at_even_odds(2.0 / LPM_PER_M3S));
+    }
+
+    fn is_half(share: f64) {
+        assert!((share - 0.5).abs() < 1e-12, "{share}");
+    }
+}

@@ -140,3 +140,63 @@ impl Mended {
         each.fold(0.0, f64::max).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(own: f64, own_scatter: f64, other: f64, scatter: f64) -> Noise {
+        Noise { own, own_scatter, other, scatter }
+    }
+
+    fn assert_is(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");
+    }
+
+    /// Readings that scatter as much as their sheet says, less, or more.
+    #[test]
+    fn what_changes_no_noise_costs_nothing_and_gains_nothing() {
+        for scatter in [3.0, 1.5, 12.0] {
+            let own = noise(3.0, scatter, 3.0, scatter);
+            for measure in [own.measure(), own.measure_clock(), own.measure_unit(40.0)] {
+                assert_is(measure.unit, 1.0);
+                assert_is(measure.unit_of_sheet, 1.0);
+                assert_is(measure.scattered, scatter / 3.0);
+                assert_is(measure.ln_noise, 0.0);
+                assert_is(measure.loudness(), (scatter / 3.0).max(1.0));
+            }
+        }
+    }
+
+    /// Of readings as loud as their sheet a mistake that would make them quieter or louder has to be less
+    /// likely, of those that are quieter so may be the mended ones; and the smaller change counts.
+    #[test]
+    fn noise_that_a_mistake_changes_counts_by_the_sheet() {
+        assert!(noise(2.0, 12.0, 2.0, 2.0).measure().ln_noise < -1.0);
+        assert!(noise(2.0, 0.5, 2.0, 2.0).measure().ln_noise < -1.0);
+        assert!(noise(2.0, 2.0, 2.0, 12.0).measure().ln_noise > 1.0);
+        assert_is(noise(2.0, 1.0, 2.0, 0.5).measure().ln_noise, 0.0);
+        assert_is(noise(2.0, 0.5, 2.0, 0.5).measure().ln_noise, 0.0);
+        assert_is(noise(6.0, 4.0, 2.0, 2.0).louder(), 2.0);
+        assert_is(noise(4.0, 6.0, 2.0, 2.0).louder(), 2.0);
+        let louder = noise(6.0, 4.0, 2.0, 2.0).measure();
+        assert_is(louder.unit, 2.0);
+        assert_is(louder.unit_of_sheet, 2.0);
+        assert_is(louder.scattered, 1.0);
+    }
+
+    /// A unit makes each row as many times louder, and no noise any other; a clock makes the rows louder
+    /// whose noise it sums.
+    #[test]
+    fn a_unit_scales_readings_and_a_clock_their_sums() {
+        let unit = noise(8.0, 8.0, 2.0, 2.0).measure_unit(30.0);
+        assert_is(unit.ln_noise, 15.0 * 4.0_f64.ln());
+        assert_is(unit.scattered, 4.0);
+        assert_is(unit.unit, 1.0);
+        let clock = noise(8.0, 6.0, 2.0, 1.0).measure_clock();
+        assert_is(clock.unit, 4.0);
+        assert_is(clock.unit_of_sheet, 1.0);
+        assert_is(clock.scattered, 0.75);
+        assert_is(clock.ln_noise, 0.0);
+    }
+}

@@ -251,4 +251,17 @@ mod tests {
         assert!((found.ln_probability - expected).abs() < 0.01, "{}", found.ln_probability);
         assert!(found.points.iter().all(|point| point[0] >= 0.0 && point[0] < 1.0));
     }
+
+    /// Drawn one by one given the others, the sample has the same mean and as many points.
+    #[test]
+    fn a_sample_drawn_anew_has_the_mean_of_quadrature() {
+        let (means, covariance) = (vec![0.5, -0.4], vec![vec![1.0, 0.6], vec![0.6, 2.0]]);
+        let from = positive_orthant(&means, &covariance, POINTS);
+        let found = gibbs(&means, &covariance, &from);
+        assert_eq!((found.points.len(), found.weights.len()), (POINTS, POINTS));
+        assert!((found.independent() / POINTS as f64 - 1.0).abs() < 1e-9);
+        let mean = found.points.iter().map(|point| point[0]).sum::<f64>() / POINTS as f64;
+        let (_, expected) = by_quadrature(&means, &covariance);
+        assert!((mean - expected).abs() < 0.05 * expected, "{mean} {expected}");
+    }
 }

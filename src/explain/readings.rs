@@ -268,3 +268,128 @@ impl Mistake {
         }
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use pitchleak_core::continuity::{BlockSums, Row};
+    use pitchleak_core::{Fluid, Sample};
+
+    /// Raw sums of the second block of readings at `step_s`, which know the time.
+    pub fn sums(cylinder: &Cylinder<f64>, step_s: f64, read: impl Fn(u32) -> Sample<f64>) -> Combination {
+        let mut blocks = BlockSums::new(cylinder, &Fluid::paper());
+        let step_s = |k: u32| if k == 0 { 0.0 } else { step_s };
+        let rows = (0..60).map(|k| Row::read(step_s(k), &read(k)));
+        rows.filter_map(|row| blocks.push(&row)).nth(1).expect("two blocks").sums
+    }
+
+    pub fn dot(combination: &Combination, sums: &Combination) -> f64 {
+        combination.iter().zip(sums).map(|(by, sum)| by * sum).sum()
+    }
+
+    const STEP_S: f64 = 0.04;
+
+    fn truly(k: u32) -> Sample<f64> {
+        let t_s = STEP_S * f64::from(k);
+        Sample {
+            x_m: 0.05 + 0.01 * t_s,
+            pa_pa: 4e6 + 2e6 * t_s,
+            pb_pa: 7e6 - 1e6 * t_s,
+            qa_m3s: Some(3e-5 + 2e-5 * t_s),
+            qb_m3s: Some(1e-5 - 5e-5 * t_s),
+            force_n: None,
+        }
+    }
+
+    /// What is read, and the cylinder as declared, where the mistake was made.
+    fn mistaken(mistake: Mistake, truth: Sample<f64>, cylinder: &mut Cylinder<f64>) -> Sample<f64> {
+        let Sample { x_m, pa_pa, pb_pa, qa_m3s, qb_m3s, .. } = truth;
+        let flows =
+            |a: f64, b: f64| Sample { qa_m3s: qa_m3s.map(|q| a * q), qb_m3s: qb_m3s.map(|q| b * q), ..truth };
+        let turned = |sample: Sample<f64>| Sample { qa_m3s: sample.qb_m3s, qb_m3s: sample.qa_m3s, ..sample };
+        let more = |a: f64, b: f64| Sample {
+            pa_pa: pa_pa + a * ATMOSPHERE_PA,
+            pb_pa: pb_pa + b * ATMOSPHERE_PA,
+            ..truth
+        };
+        match mistake {
+            Mistake::FlowsExchanged => turned(truth),
+            Mistake::PressuresExchanged => Sample { pa_pa: pb_pa, pb_pa: pa_pa, ..truth },
+            Mistake::ChambersExchanged => turned(Sample { pa_pa: pb_pa, pb_pa: pa_pa, ..truth }),
+            Mistake::FlowsExchangedAndTurned => turned(flows(-1.0, -1.0)),
+            Mistake::Sign(Of::FlowA) | Mistake::Factor(Of::FlowA, -1.0) => flows(-1.0, 1.0),
+            Mistake::Sign(Of::FlowB) => flows(1.0, -1.0),
+            Mistake::Sign(_) => flows(-1.0, -1.0),
+            Mistake::OtherEnd => Sample { x_m: cylinder.stroke_m - x_m, ..truth },
+            Mistake::Factor(Of::FlowA, by) => flows(by, 1.0),
+            Mistake::Factor(Of::FlowB, by) => flows(1.0, by),
+            Mistake::Factor(Of::Flows, by) => flows(by, by),
+            Mistake::Factor(Of::PressureA, by) => Sample { pa_pa: by * pa_pa, ..truth },
+            Mistake::Factor(Of::PressureB, by) => Sample { pb_pa: by * pb_pa, ..truth },
+            Mistake::Factor(Of::Pressures, by) => Sample { pa_pa: by * pa_pa, pb_pa: by * pb_pa, ..truth },
+            Mistake::Factor(Of::Position, by) => Sample { x_m: by * x_m, ..truth },
+            Mistake::Absolute(Of::PressureA) => more(1.0, 0.0),
+            Mistake::Absolute(Of::PressureB) => more(0.0, 1.0),
+            Mistake::Absolute(_) => more(1.0, 1.0),
+            Mistake::AreasExchanged => {
+                (cylinder.area_a_m2, cylinder.area_b_m2) = (cylinder.area_b_m2, cylinder.area_a_m2);
+                truth
+            }
+            Mistake::Area(side, by) => {
+                *(if side == 0 { &mut cylinder.area_a_m2 } else { &mut cylinder.area_b_m2 }) *= by;
+                truth
+            }
+            Mistake::LostSign(_) | Mistake::Clock(_) => truth,
+        }
+    }
+
+    /// Of every reading that is mistaken, mended, the sums are those of the truth; but for the roots of other
+    /// pressures, of which no linear map tells.
+    #[test]
+    fn mended_readings_have_the_sums_of_the_true_ones() {
+        use Mistake as M;
+        let true_cylinder = Cylinder { dead_volume_a_m3: 5e-5, dead_volume_b_m3: 3e-5, ..Cylinder::paper() };
+        let compressibility = 1e6 / Fluid::<f64>::paper().bulk_modulus_pa;
+        let factors =
+            [Of::FlowA, Of::FlowB, Of::Flows, Of::PressureA, Of::PressureB, Of::Pressures, Of::Position];
+        let others = [
+            M::FlowsExchanged,
+            M::PressuresExchanged,
+            M::ChambersExchanged,
+            M::FlowsExchangedAndTurned,
+            M::Sign(Of::FlowA),
+            M::Sign(Of::FlowB),
+            M::Sign(Of::Flows),
+            M::OtherEnd,
+            M::Clock(1.2),
+            M::Absolute(Of::PressureA),
+            M::Absolute(Of::PressureB),
+            M::Absolute(Of::Pressures),
+            M::AreasExchanged,
+            M::Area(0, 1.3),
+            M::Area(1, 0.6),
+        ];
+        for mistake in factors.map(|of| M::Factor(of, 1.5)).into_iter().chain(others) {
+            let mut cylinder = true_cylinder;
+            mistaken(mistake, truly(0), &mut cylinder);
+            let step_s = if let M::Clock(factor) = mistake { factor * STEP_S } else { STEP_S };
+            let wrong = sums(&cylinder, step_s, |k| mistaken(mistake, truly(k), &mut cylinder.clone()));
+            let mended = Readings::declared(&cylinder, compressibility).mended(mistake, &cylinder);
+            let right = sums(&true_cylinder, STEP_S, truly);
+            let declared = Readings::declared(&true_cylinder, compressibility);
+            assert!((mended.area_m2[0] / declared.area_m2[0] - 1.0).abs() < 1e-12);
+            assert!((mended.area_m2[1] / declared.area_m2[1] - 1.0).abs() < 1e-12);
+            for place in 0..RAW_SUMS {
+                let is_root = (RawSum::RootInternal as usize..=RawSum::RootB as usize).contains(&place);
+                let of_pressures = [Of::PressureA, Of::PressureB, Of::Pressures];
+                if is_root
+                    && matches!(mistake, M::Factor(of, _) | M::Absolute(of) if of_pressures.contains(&of))
+                {
+                    continue;
+                }
+                let (found, truth) = (dot(&mended.sums[place], &wrong), dot(&declared.sums[place], &right));
+                assert!((found / truth - 1.0).abs() < 1e-9, "{mistake:?} {place}: {found}, not {truth}");
+            }
+        }
+    }
+}

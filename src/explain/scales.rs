@@ -148,3 +148,25 @@ fn set_free(free: &mut Vec<Free>, column: usize) -> usize {
     free[at].std = ANY;
     at
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of readings four times too large three quarters are none, of a position that is read four times too
+    /// large as much of what it shows is too much.
+    #[test]
+    fn a_share_of_the_readings_tells_their_scale() {
+        for of in [Scaled::Reading(Of::FlowA), Scaled::Reading(Of::Flows), Scaled::Time] {
+            assert!((of.factor(0.75) - 4.0).abs() < 1e-12);
+        }
+        assert!((Scaled::Reading(Of::Position).factor(-0.75) - 4.0).abs() < 1e-12);
+    }
+
+    /// What is near 1 is a gain, what is beyond a decimal point a unit.
+    #[test]
+    fn a_scale_is_neither_a_gain_nor_a_unit() {
+        let scales = [0.09, 0.11, 0.85, 0.95, 1.0, 1.05, 1.15, 9.9, 10.1, f64::NAN, -2.0].map(is_scale);
+        assert_eq!(scales, [false, true, true, false, false, false, true, true, false, false, false]);
+    }
+}

@@ -80,3 +80,37 @@ fn ln_density(ln_ratios: &[f64; CHANNELS]) -> f64 {
     let most = exact.max(wide);
     most + ((exact - most).exp() + (wide - most).exp()).ln()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use super::super::readings::Of;
+
+    /// Readings a hundred times as loud as their sheet are in another unit, where all others are as their
+    /// sheets say; not so where those know nothing of it either, or where one is computed.
+    #[test]
+    fn a_unit_shows_in_the_scatter_beside_sheets_that_are_right() {
+        let flow_a = |ratio: f64, others: f64| OverSheet([others, others, others, ratio, others].map(Some));
+        let ln_odds = |sheet: OverSheet| sheet.ln_odds(Mistake::Factor(Of::FlowA, 100.0));
+        assert!(ln_odds(flow_a(100.0, 1.0)) > 3.0);
+        assert!(ln_odds(flow_a(1.0, 1.0)) < -10.0);
+        assert!(ln_odds(flow_a(100.0, 1.0)) > ln_odds(flow_a(100.0, 2.0)) + 3.0);
+        let mut computed = flow_a(100.0, 1.0);
+        computed.0[1] = Some(0.0);
+        assert!(ln_odds(computed) == 0.0 && !computed.all_scatter());
+        assert!(flow_a(100.0, 1.0).ln_odds(Mistake::Sign(Of::FlowA)) == 0.0);
+    }
+
+    /// Along the line of one channel, at the mean of all others, the density has the area that theirs leaves:
+    /// of two normals joined at zero.
+    #[test]
+    fn the_density_is_that_of_both_kinds_of_sheets() {
+        let steps = 400_000;
+        let at = |k: i32| 40.0 * (f64::from(k) / f64::from(steps) - 0.5);
+        let sum: f64 = (0..steps).map(|k| ln_density(&[at(k), 0.0, 0.0, 0.0, 0.0]).exp()).sum();
+        let norm = |below: f64, above: f64| (0.5 * (below + above)).powi(-4) * std::f64::consts::TAU.sqrt();
+        let expected = EXACT_SHARE * norm(EXACT, EXACT) + (1.0 - EXACT_SHARE) * norm(WIDE, WIDER);
+        assert!((sum * 40.0 / f64::from(steps) / expected - 1.0).abs() < 1e-3);
+    }
+}
