@@ -465,5 +465,24 @@ mod tests {
         assert_eq!(jumps(1.0, |block| if block == 6 { 10.0 } else { 0.0 }), none);
         assert_eq!(jumps(100.0, |block| if block < 6 { 0.0 } else { 10.0 }), none);
         assert_eq!(jumps(1.0, |_| 10.0), none);
+        // As small as one of the usual size shows.
+        assert_eq!(jumps(1.0, |block| if block < 6 { 0.0 } else { 5.0 }), [7]);
+    }
+
+    /// Before there is something to foretell with, all hypotheses say the same: none gains by it.
+    #[test]
+    fn a_first_block_is_news_to_all() {
+        let mut bank = Bank::<f64, 4>::new(f64::INFINITY);
+        let mut solution = Solution::of_prior(PRIOR.offsets);
+        let mut sums = BlockSums::new();
+        sums.add(&[0.0, 1.0, 0.0, 0.0], &[0.0; LEAKS], 0.5, 1e6);
+        bank.evidence.block = Block::new(0.5, &sums, &[None; 2], 0.0);
+        bank.evidence.refer(0.0, &solution.mean);
+        bank.begin([0.0; 2], 1.0, &PRIOR, &solution);
+        while bank.next < CONCLUDE {
+            bank.go_on(&PRIOR, &mut solution);
+        }
+        let Pending::Renewal(renewal) = &bank.pending else { panic!("no renewal") };
+        assert!(renewal.news && renewal.gained.iter().all(|gain| gain.abs() < 1e-12), "{:?}", renewal.gained);
     }
 }

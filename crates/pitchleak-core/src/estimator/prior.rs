@@ -268,6 +268,29 @@ mod tests {
         assert_eq!(widened.flow_b, zeros.flow_b);
     }
 
+    /// Of both chambers, by the meter's own and by what the pressures' drift drives through its leaks.
+    #[test]
+    fn offsets_move_with_their_own_meters_and_leaks() {
+        let mut sensors = Sensors::<f64>::paper();
+        (sensors.flow_a.bias_std, sensors.flow_b.bias_std) = (2e-6, 4e-6);
+        (sensors.flow_a.drift_std_ph, sensors.flow_b.drift_std_ph) = (3e-6, 1e-6);
+        (sensors.pressure.bias_std, sensors.pressure.drift_std_ph) = (9e4, 1e5);
+        let cylinder = Cylinder::<f64>::paper();
+        let mut zeros = Zeros::of(&sensors);
+        // A leak that empties the cylinder in 20 s at 1 MPa, at 0.09 MPa.
+        let through = 0.09 * cylinder.area_a_m2 * cylinder.stroke_m / 20.0;
+        let units = offset_units(&cylinder, &zeros);
+        for (unit, of_meter) in units.into_iter().zip([13e-12, 17e-12]) {
+            assert!((unit * unit / (of_meter + through * through) - 1.0).abs() < 1e-12);
+        }
+        let leaks = PerLeak { internal: 1e-11, external_a: 2e-12, external_b: 5e-12 };
+        let moved = zeros.advance(HOUR_S, &cylinder, &leaks);
+        let expected = [9e-12 + 1.44e-12 + 1e-12, 1e-12 + 2.25e-12 + 1e-12];
+        for side in 0..2 {
+            assert!((moved[side] * units[side] * units[side] / expected[side] - 1.0).abs() < 1e-12);
+        }
+    }
+
     fn matrix(m: [[f64; 2]; 2]) -> Matrix2<f64> {
         Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1])
     }
