@@ -359,4 +359,24 @@ mod tests {
         assert!((chance_of_mean_square(200.0) - 0.3).abs() < 1e-12);
         assert!((chance_of_mean_square(0.0) - chance_of_mean_square(1.0)).abs() < 1e-12);
     }
+
+    /// All of a column's noise is taken off, but where that leaves less than its chance; and no more than the
+    /// loudest there is.
+    #[test]
+    fn noise_is_taken_off_as_far_as_there_is_power() {
+        let (gram, noise) = (vec![10.0, 3.0, 0.0, 5.0], vec![1.0, 0.5, 0.0, 20.0]);
+        let products = Products { size: 2, gram: [gram.clone(), gram], noise: [noise.clone(), noise] };
+        // Of 200 rows a mean square is off by 0.3 by chance, of a few by 0.9 at the most.
+        let kept = |rows: f64| products.kept(0, rows, 1.0);
+        let share = 3.5_f64.sqrt() / 20.0_f64.sqrt();
+        assert!((kept(200.0)[0] - 1.0).abs() < 1e-12 && (kept(200.0)[1] - share).abs() < 1e-12);
+        assert!((kept(2.0)[1] - (0.5_f64 / 20.0).sqrt()).abs() < 1e-12);
+        let mut clean = vec![0.0; 4];
+        products.clean(0, 200.0, 2.0, 1.0, &mut clean);
+        let expected = [4.5, 1.5 - 0.25 * share, 0.0, 0.75];
+        assert!(
+            clean.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12),
+            "{clean:?}"
+        );
+    }
 }

@@ -84,3 +84,24 @@ impl SegmentProducts {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scores of segments that agree have none, and white ones as much as chance makes of its mean and a
+    /// standard deviation.
+    #[test]
+    fn excess_is_the_scatter_of_the_segments_over_that_of_chance() {
+        let is = |scores: &[(f64, f64)], scale: f64, expected: f64| {
+            let found = excess(scores, scale).expect("two segments");
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        };
+        is(&[(2.0, 1.0), (4.0, 2.0), (6.0, 3.0)], 1.0, 0.0);
+        // Of two segments that say 1 and −1 of information 4 and 1: 4 + 1 − 3²/5, of one degree of freedom.
+        is(&[(4.0, 4.0), (-1.0, 1.0)], 1.0, 3.2 / (1.0 + 2.0_f64.sqrt()));
+        is(&[(4.0, 4.0), (-1.0, 1.0)], 2.0, 1.6 / (1.0 + 2.0_f64.sqrt()));
+        is(&[(1.0, 1.0), (-1.0, 1.0), (0.0, 1.0)], 1.0, 2.0 / 4.0);
+        assert!(excess(&[(4.0, 4.0)], 1.0).is_none() && excess(&[], 1.0).is_none());
+    }
+}

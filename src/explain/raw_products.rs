@@ -262,3 +262,97 @@ fn add_pair(out: &mut [f64], one: RawSum, other: RawSum, [aa, ab, bb]: [f64; 3],
         out[i * COLUMNS + j] += variance * value;
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use pitchleak_core::{Cylinder, Sample};
+    use pitchleak_testkit::{noisy, seeded};
+
+    pub fn rig() -> Rig {
+        let mut rig = Rig::paper();
+        rig.cylinder = Cylinder { dead_volume_a_m3: 5e-5, dead_volume_b_m3: 3e-5, ..rig.cylinder };
+        rig
+    }
+
+    /// Of a piston at rest for half a minute, as noisy sensors read it, with these pressures.
+    pub fn at_rest(rig: &Rig, seed: u64, pressures_pa: impl Fn(f64) -> [f64; 2]) -> RawProducts {
+        let sensors = rig.sensors();
+        let mut statistic = Box::new(Statistic::new(&rig.cylinder, &rig.fluid, &sensors));
+        let mut random = seeded(seed);
+        for k in 0..3000 {
+            let [pa_pa, pb_pa] = pressures_pa(0.01 * f64::from(k));
+            let flow = Some(0.0);
+            let still = Sample { x_m: 0.07, pa_pa, pb_pa, qa_m3s: flow, qb_m3s: flow, force_n: None };
+            statistic.push(if k == 0 { 0.0 } else { 0.01 }, &noisy(&still, &sensors, &mut random));
+        }
+        statistic.close();
+        RawProducts::of(&statistic, rig)
+    }
+
+    /// At rest all changes are noise: their products are what is foretold of it, declared or by the readings'
+    /// scatter.
+    #[test]
+    fn products_of_nothing_but_noise_are_foretold() {
+        use RawSum as R;
+        let rig = rig();
+        let of_noise = [
+            R::ResidualA,
+            R::ResidualB,
+            R::Travel,
+            R::StorageA,
+            R::StorageB,
+            R::PressureChangeA,
+            R::PressureChangeB,
+            R::StorageAOfB,
+            R::StorageBOfA,
+        ];
+        let flow_changes = [R::FlowChangeA, R::FlowChangeB];
+        let wholes: Vec<SegmentProducts> =
+            (0..20).map(|seed| at_rest(&rig, seed, |_| [5e6, 3e6]).whole().segments.remove(0)).collect();
+        for equation in 0..EQUATIONS {
+            let sum = |of: &dyn Fn(&SegmentProducts) -> &Vec<f64>, i: usize, j: usize| {
+                wholes.iter().map(|own| of(own)[i * COLUMNS + j]).sum::<f64>()
+            };
+            for raws in [of_noise.as_slice(), flow_changes.as_slice()] {
+                let places = || raws.iter().flat_map(|raw| [0, 1].map(|chamber| place_of(*raw, chamber)));
+                for (i, j) in places().flat_map(|i| places().map(move |j| (i, j))) {
+                    let noise = |i: usize, j: usize| sum(&|own| &own.noise[equation], i, j);
+                    let size = (noise(i, i) * noise(j, j)).sqrt();
+                    let found = [
+                        noise(i, j),
+                        sum(&|own| &own.scattered[equation], i, j),
+                        sum(&|own| &own.quiet[equation], i, j),
+                    ];
+                    let gram = sum(&|own| &own.gram[equation], i, j);
+                    for found in found {
+                        assert!(
+                            (gram - found).abs() < 0.12 * size,
+                            "{equation} {i} {j}: {gram} {found} {size}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// Fewer independent blocks are worth as many times less, all of them.
+    #[test]
+    fn products_are_worth_their_blocks() {
+        let whole = at_rest(&rig(), 1, |_| [5e6, 3e6]).whole();
+        let sums = |products: &RawProducts, equation: usize| {
+            let own = &products.segments[0];
+            let all = [&own.gram, &own.noise, &own.scattered, &own.quiet];
+            all.map(|products| products[equation].iter().map(|product| product.abs()).sum::<f64>())
+        };
+        let before = [0, 1].map(|equation| (sums(&whole, equation), whole.segments[0].rows[equation]));
+        let worth = whole.worth([2.0, 4.0]);
+        for (equation, times) in [(0, 2.0), (1, 4.0)] {
+            let (products, rows) = before[equation];
+            assert!((rows / worth.segments[0].rows[equation] - times).abs() < 1e-12);
+            for (before, after) in products.into_iter().zip(sums(&worth, equation)) {
+                assert!((before / after - times).abs() < 1e-9);
+            }
+        }
+    }
+}

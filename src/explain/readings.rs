@@ -392,4 +392,36 @@ pub(super) mod tests {
             }
         }
     }
+
+    /// Flows that are mended by a factor are as much denser; a clock mends both.
+    #[test]
+    fn mending_scales_the_density_of_flows() {
+        let ln_2 = std::f64::consts::LN_2;
+        for (mistake, expected) in [
+            (Mistake::Factor(Of::FlowA, 2.0), -ln_2),
+            (Mistake::Factor(Of::FlowB, 0.5), ln_2),
+            (Mistake::Factor(Of::Flows, 2.0), -2.0 * ln_2),
+            (Mistake::Clock(2.0), -2.0 * ln_2),
+            (Mistake::Factor(Of::Pressures, 2.0), 0.0),
+            (Mistake::Sign(Of::FlowA), 0.0),
+        ] {
+            assert!((mistake.ln_jacobian() - expected).abs() < 1e-12, "{mistake:?}");
+        }
+    }
+
+    #[test]
+    fn mended_pressures_are_those_across_the_leaks() {
+        let read = PerLeak { internal: 2.0, external_a: 6.0, external_b: 4.0 };
+        let turned = PerLeak { external_a: 4.0, external_b: 6.0, ..read };
+        for (mistake, expected) in [
+            (Mistake::PressuresExchanged, turned),
+            (Mistake::ChambersExchanged, turned),
+            (Mistake::Factor(Of::Pressures, 2.0), read.map(|pressure| 0.5 * pressure)),
+            (Mistake::Factor(Of::PressureA, 2.0), PerLeak { external_a: 3.0, ..read }),
+            (Mistake::Factor(Of::PressureB, 2.0), PerLeak { external_b: 2.0, ..read }),
+            (Mistake::Clock(2.0), read),
+        ] {
+            assert_eq!(mistake.mended_pressures(read), expected, "{mistake:?}");
+        }
+    }
 }

@@ -137,3 +137,60 @@ fn replace(products: &mut [f64], place: usize, truly: &Truly) {
             truly.iter().map(|(column, by)| by * products[other * COLUMNS + column]).sum();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::raw_products::tests::{at_rest, rig};
+    use super::*;
+    use pitchleak_core::PerLeak;
+
+    const SWING_PA: f64 = 5e5;
+
+    /// Each column of a pressure in chamber A's equation: how much of its power its mean leaves, and its
+    /// noise.
+    fn left(pressures_pa: impl Fn(f64) -> [f64; 2]) -> [(f64, f64); 2] {
+        let segments = at_rest(&rig(), 3, pressures_pa).segments;
+        PRESSURES.map(|raw| {
+            let (place, time) = (place_of(raw, 0), place_of(RawSum::Time, 0));
+            let of = |products: &[f64], i: usize, j: usize| products[i * COLUMNS + j];
+            let powers = segments.iter().map(|own| {
+                let gram = &own.gram[1];
+                of(gram, place, place) - of(gram, place, time).powi(2) / of(gram, time, time)
+            });
+            (powers.sum(), segments.iter().map(|own| of(&own.noise[1], place, place)).sum())
+        })
+    }
+
+    /// What varies by no more than its noise is its mean, and has no noise; what swings stays as it was read.
+    #[test]
+    fn a_pressure_that_stands_still_is_its_mean() {
+        let swing = |t_s: f64| SWING_PA * (3.0 * t_s).sin();
+        let [still_a, still_b] = left(|_| [5e6, 3e6]);
+        let [moving_a, beside] = left(|t_s| [5e6 + swing(t_s), 3e6]);
+        for (power, noise) in [still_a, still_b, beside] {
+            assert!(power.abs() < 1e-6 * moving_a.0 && noise == 0.0, "{power} {noise}");
+        }
+        assert!(moving_a.0 > 0.0 && moving_a.1 > 0.0);
+        // Swinging together they differ by the load's mean: B is A less that, noise and all.
+        let [one, other] = left(|t_s| [5e6 + swing(t_s), 3e6 + swing(t_s)]);
+        assert!((one.0 / other.0 - 1.0).abs() < 1e-6 && (one.1 / other.1 - 1.0).abs() < 1e-6);
+        let [one, other] = left(|t_s| [5e6 + swing(t_s), 3e6 - swing(t_s)]);
+        assert!((one.1 / other.1 - 1.0).abs() < 0.1 && (one.0 / other.0 - 1.0).abs() > 1e-6);
+    }
+
+    /// Means stay as they are: of a pressure, of the load's root, in each segment.
+    #[test]
+    fn settled_sums_keep_their_means() {
+        let products = at_rest(&rig(), 3, |_| [5e6, 3e6]);
+        let PerLeak { external_a, external_b, .. } = products.segments[0].pressures_pa;
+        for segment in &products.segments {
+            let time = place_of(RawSum::Time, 0);
+            let mean = |raw: RawSum| {
+                segment.gram[1][place_of(raw, 0) * COLUMNS + time] / segment.gram[1][time * COLUMNS + time]
+            };
+            assert!((1e6 * mean(RawSum::PressureA) / external_a - 1.0).abs() < 1e-2);
+            assert!((1e6 * mean(RawSum::PressureB) / external_b - 1.0).abs() < 1e-2);
+            assert!((mean(RawSum::RootInternal) / 2e6_f64.sqrt() - 1.0).abs() < 1e-2);
+        }
+    }
+}
