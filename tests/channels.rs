@@ -120,6 +120,17 @@ fn each_fault_is_found_on_its_channel_alone() {
     }
 }
 
+/// In m³/s under a name of L/min a flow is 60,000 times too small: its meter as good as rests, while the piston moves.
+#[test]
+fn a_flow_that_never_leaves_a_part_of_its_noise_is_dead() {
+    for accuracy in [0.001, 0.003, 0.01] {
+        let wrong = changed(&readings(Some(accuracy), 100.0), CHANNELS[3].1, |_, _, now, _| now / 6e4);
+        let faults = found(&wrong, &rig(accuracy));
+        assert_eq!(faults.len(), 1, "{accuracy}: {faults:?}");
+        assert_eq!((faults[0].0, faults[0].1), (CHANNELS[3].0, ChannelFaultKind::Dead));
+    }
+}
+
 /// A standing piston's pressure follows its load; where that stands still, too, a coarse sensor may read one value.
 #[test]
 fn a_pressure_that_stands_still_under_a_changing_load_is_dead() {

@@ -139,24 +139,32 @@ struct Activity {
 }
 
 /// Constant though the cylinder moves: where other channels show that this trace has noise, or at exactly zero. An
-/// unused force column of zeros harms nobody.
+/// unused force column of zeros harms nobody. A flow whose range is a small part of its noise is constant, too: with m³/s under a
+/// name of L/min the meter as good as rests.
 fn dead(one: &Judged, witnesses: usize, activity: Activity, whole: (f64, f64)) -> Option<ChannelFault> {
     let Run { value, count, .. } = one.channel.longest;
-    let constant = count as f64 >= DEAD_SHARE * one.channel.readings as f64;
-    let zero = value == 0.0;
-    let force = one.signal == Signal::Force;
     // Only a meter's resolution could make it rest, and nothing rests as long as others scatter.
     let flow = matches!(one.signal, Signal::FlowA | Signal::FlowB);
+    let repeats = count as f64 >= DEAD_SHARE * one.channel.readings as f64;
+    let constant = repeats || flow && one.range() < AS_DECLARED * one.noise_std;
+    let zero = value == 0.0;
+    let force = one.signal == Signal::Force;
     let pressure = matches!(one.signal, Signal::PressureA | Signal::PressureB);
     let alive = activity.moves || (witnesses >= 2 && (flow || (pressure && activity.load)));
     if !constant || !alive || (force && zero) || !(zero || witnesses >= 2) {
         return None;
     }
-    let exactly = if zero { "exactly " } else { "" };
+    let reads = match (repeats, zero) {
+        (true, true) => format!("exactly {}", one.reading(value)),
+        (true, false) => one.reading(value),
+        (false, _) => {
+            let Extreme { value: least, .. } = one.channel.least;
+            format!("{} to {}", one.reading(least), one.reading(one.channel.most.value))
+        }
+    };
     let text = format!(
-        "{} reads {exactly}{} all the time although {}",
+        "{} reads {reads} all the time although {}",
         one.signal.name(),
-        one.reading(value),
         if activity.moves {
             "the cylinder moves"
         } else if pressure {

@@ -36,9 +36,10 @@ impl ChannelFaultKind {
     /// Its id, and what to check.
     fn entry(self) -> (&'static str, &'static str) {
         match self {
-            Self::Dead => {
-                ("channel_dead", "check the sensor, its supply and its cable, and which column is read")
-            }
+            Self::Dead => (
+                "channel_dead",
+                "check the sensor, its supply and its cable, and which column is read in which unit",
+            ),
             Self::Stuck => (
                 "channel_stuck",
                 "check the sensor and its cable; leave its cells empty while it does not measure",
