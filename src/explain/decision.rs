@@ -29,7 +29,7 @@ const MISFIT_DOUBT: f64 = 3.0;
 /// What takes sizes of so many standard deviations of what sensors and rigs are off by is no explanation, but the nearest that the
 /// table has. Derived: one of two million is so large.
 const MOST_STRAIN: f64 = 5.0;
-/// A leak that wanders with this probability comes and goes: as likely as not.
+/// A leak that wanders with this probability comes and goes, and one that grows with it grows: as likely as not.
 const AWAY_DOUBT: f64 = 0.5;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
@@ -172,6 +172,13 @@ impl Decision {
     pub(crate) fn is_away(&self, leak: Leak) -> bool {
         let wandering = format!("{}:wandering", leak.id());
         self.ruled_out.contains(&leak) && self.probability_where(|part| part == wandering) > AWAY_DOUBT
+    }
+
+    /// Whether a leak changes little by little, as likely as not.
+    pub(crate) fn is_drifting(&self, leak: Leak) -> bool {
+        let courses = [LeakCourse::Growing, LeakCourse::Accelerating, LeakCourse::Creeping];
+        let ids = courses.map(|course| format!("{}:{}", leak.id(), course.id()));
+        self.probability_where(|part| ids.iter().any(|id| part == id)) > AWAY_DOUBT
     }
 
     /// Probability of the explanations one of whose parts `is` so, as far as they are listed.

@@ -171,9 +171,8 @@ fn before(findings: &Findings<'_>, faults: &[Leak]) -> Vec<String> {
 fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> {
     let trend = findings.trends[leak].filter(|trend| trend.is_significant() && status != Status::Doubtful)?;
     let Estimate { value, std } = trend.slope();
-    // What may be none does not fall, nor grow where it is below its threshold.
-    let (is_below, may_be_none) = (findings.is_below(leak), findings.leakage[leak].ci95()[0] <= 0.0);
-    if may_be_none && (value < 0.0 || is_below) || is_below && is_contradicted(findings, leak, value) {
+    // A slope is the estimator's, by constant sensors: whether it is the leak's the posterior says.
+    if findings.decision.is_some_and(|decision| !decision.is_drifting(leak)) {
         return None;
     }
     let slope = with_interval(value.abs(), Some(std));
@@ -199,14 +198,6 @@ fn grows(findings: &Findings<'_>, leak: Leak, status: Status) -> Option<String> 
         oil.unwrap_or_default(),
         reaches.unwrap_or_default()
     ))
-}
-
-/// Whether a leak that is below its threshold can't have grown like this: it would be above it within a trace of minutes, or sensors are
-/// off, by which the estimator's flows change.
-fn is_contradicted(findings: &Findings<'_>, leak: Leak, lpm_per_h: f64) -> bool {
-    let grown_lpm = lpm_per_h * findings.trace.duration_s / 3600.0;
-    let outgrown = !findings.trace.is_long() && grown_lpm > findings.threshold_lpm[leak];
-    outgrown || findings.decision.is_some_and(|decision| !decision.as_declared)
 }
 
 fn sentence(text: &str) -> String {
