@@ -389,6 +389,21 @@ fn a_play_has_no_rival_in_itself() {
     }
 }
 
+/// A lag's column is the flows' rates, and mostly their noise where sensors are of 1 %: 50 ms came out as 16.
+#[test]
+fn a_lag_is_no_shorter_for_the_flows_noise() {
+    let mut effects = EffectSet::default();
+    effects.set(Effect::FlowMeterLag, 0.05, EffectConstants::default()).expect("is in bounds");
+    let mut rig = Rig::paper();
+    rig.instruments = rig.instruments.with_accuracy(0.01);
+    for seed in 1..=4 {
+        let answer = ask(in_wind(WindCase::Mps21, effects, 120.0, &rig, seed), &rig);
+        let found = answer.effects.iter().find(|one| one.id == "flow_meter_lag").expect("is found");
+        let off = (found.value - 0.05) / found.std;
+        assert!(off.abs() < 3.0, "seed {seed}: {} ± {}", found.value, found.std);
+    }
+}
+
 /// Where the pressures hardly move their noise is all that a bend of a sensor's scale would act on.
 #[test]
 fn noise_of_pressures_that_hardly_move_is_no_bend_of_a_sensor() {

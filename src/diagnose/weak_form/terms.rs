@@ -85,6 +85,14 @@ fn left_side(side: LeftSide) -> &'static [(Channel, usize)] {
     }
 }
 
+/// The flows' rates, of which a lag's column is made, with their noise.
+fn late_flows(effect: Effect) -> Vec<(Channel, usize)> {
+    let mut late = Signals::default();
+    effect.late(&mut late).into_iter().flatten().for_each(|signal| *signal = 1.0);
+    let flows = [(late.qa_m3s, Channel::FlowA), (late.qb_m3s, Channel::FlowB)];
+    flows.into_iter().filter(|(late, _)| *late > 0.0).map(|(_, channel)| (channel, 1)).collect()
+}
+
 /// The four constants of the declared model.
 pub(crate) const DECLARED: [Term; 4] = [Term::InverseBulk, Term::Internal, Term::ExternalA, Term::ExternalB];
 
@@ -205,7 +213,7 @@ impl Term {
                     _ if carries.is_some() || !shares_noise_of.is_empty() => {
                         carries.iter().chain(*shares_noise_of).copied().flat_map(left_side).copied().collect()
                     }
-                    EffectKind::Sensor => vec![],
+                    EffectKind::Sensor => late_flows(effect),
                     _ if self.in_force() => FELT.to_vec(),
                     EffectKind::Storage => STORAGE.to_vec(),
                     _ => vec![],
