@@ -55,7 +55,8 @@ fn text(component: Component<'_>) -> Option<&str> {
 
 /// A file's name before `.csv`, `.csv.gz`, …
 fn without_ending(name: &str) -> &str {
-    let name = name.strip_suffix(".gz").unwrap_or(name);
+    let is_packed = |(_, ending): &(&str, &str)| ending.eq_ignore_ascii_case("gz");
+    let name = name.rsplit_once('.').filter(is_packed).map_or(name, |(packed, _)| packed);
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
@@ -122,6 +123,7 @@ mod tests {
             ("T7.csv", "T7", None),
             ("farm/T7/B2.csv.gz", "farm/T7/B2", None),
             ("farm/T7/B2/2026-05-01.csv.gz", "farm/T7/B2", Some("2026-05-01T00:00:00Z")),
+            ("B1/2026-05-01.CSV.GZ", "B1", Some("2026-05-01T00:00:00Z")),
             ("/farm/T7-B2_20260501T063000Z.csv", "/farm/T7-B2", Some("2026-05-01T06:30:00Z")),
             ("2026-05-01_06-30 T7.parquet", "T7", Some("2026-05-01T06:30:00Z")),
             ("2026-05-01.csv", "2026-05-01", Some("2026-05-01T00:00:00Z")),
