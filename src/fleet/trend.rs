@@ -79,8 +79,14 @@ impl LongTrend {
     pub fn rate(&self) -> String {
         let Estimate { value, std } = self.monthly_lpm();
         let reached = self.trend.reaches_threshold_in_s.map_or_else(String::new, |time| {
-            let [days, low, high] = [time.value, time.ci95[0], time.ci95[1]].map(|s| s / S_PER_DAY);
-            format!("; at its alarm level in {days:.0} days ({low:.0} to {high:.0})")
+            let [days, low, high] = [time.value, time.ci95[0], time.ci95[1]].map(|s| (s / S_PER_DAY).round());
+            let when = match days {
+                ..1.0 => "within a day".to_owned(),
+                1.0 => "in 1 day".to_owned(),
+                days => format!("in {days} days"),
+            };
+            let interval = if high < 1.0 { String::new() } else { format!(" ({low} to {high})") };
+            format!("; at its alarm level {when}{interval}")
         });
         format!("{} L/min a month over {} traces{reached}", with_interval(value, Some(std)), self.traces)
     }
@@ -218,6 +224,7 @@ impl<const N: usize> Scattered<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::ReachTime;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
@@ -242,6 +249,35 @@ mod tests {
         let line = Line::through(&points).unwrap();
         assert!((line.slope.value - 0.01).abs() < 1e-12 && (line.level.value - 0.1).abs() < 1e-12);
         assert!(line.scatter.abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_time_to_an_alarm_is_told_in_days_as_people_count_them() {
+        let moment = Timestamp::UNIX_EPOCH;
+        let told = |days: [f64; 3]| {
+            let [value, low, high] = days.map(|days| days * S_PER_DAY);
+            let reached = ReachTime { value, ci95: [low, high] };
+            let trend = LeakTrend {
+                slope_lpm_per_h: 1e-4,
+                std: 1e-5,
+                reaches_threshold_in_s: Some(reached),
+                oil: None,
+            };
+            let line = LongTrend {
+                traces: 3,
+                from: moment,
+                to: moment,
+                mean_lpm: 0.1,
+                std_lpm: 0.0,
+                scatter_lpm: 0.0,
+                trend,
+            };
+            line.rate().split_once("level ").unwrap().1.to_owned()
+        };
+        assert_eq!(told([69.7, 55.2, 92.4]), "in 70 days (55 to 92)");
+        assert_eq!(told([1.2, 0.8, 2.3]), "in 1 day (1 to 2)");
+        assert_eq!(told([0.4, 0.1, 2.0]), "within a day (0 to 2)");
+        assert_eq!(told([0.1, 0.0, 0.2]), "within a day");
     }
 
     #[test]
