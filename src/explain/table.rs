@@ -244,6 +244,9 @@ pub(super) fn wanders(prior: &Prior<'_>) -> Vec<(f64, f64)> {
     std::iter::once((0.0, steady)).chain(wandering).collect()
 }
 
+/// What tells the gain of a pressure sensor.
+const GAUGE: &str = "Compare both pressure sensors with a gauge.";
+
 /// One thing of sensors or rig that is not as declared.
 pub(super) fn departures() -> Vec<Entry> {
     use Column as C;
@@ -251,7 +254,6 @@ pub(super) fn departures() -> Vec<Entry> {
     const METER: &str = "Compare the meter with the piston's travel over a long stroke.";
     const CLOCK: &str = "Compare the clocks and filters of flow meters, position and pressures.";
     const AREA: &str = "Measure piston and rod, or compare the data sheet.";
-    const PRESSURE: &str = "Compare both pressure sensors with a gauge.";
     // Meters come with a certificate; an area is a rod of another size, or a slip.
     let (late_s, very_late_s, meter_gain, gain, gross) = (0.1, 1.0, 0.02, 0.05, 0.01);
     let entry = |id, share, text| Entry::new(id, Kind::Departure, share, text);
@@ -318,10 +320,10 @@ pub(super) fn departures() -> Vec<Entry> {
     all.extend([
         entry("pressure_gain_a", RARE, "the gain of pressure sensor A is off")
             .free(C::ThroughSealA, 0.1 * gain)
-            .remedy(PRESSURE, None),
+            .remedy(GAUGE, None),
         entry("pressure_gain_b", RARE, "the gain of pressure sensor B is off")
             .free(C::ThroughSealB, 0.1 * gain)
-            .remedy(PRESSURE, None),
+            .remedy(GAUGE, None),
     ]);
     all
 }
@@ -329,8 +331,8 @@ pub(super) fn departures() -> Vec<Entry> {
 /// Pressure sensors seen through the leaks that a first pass found.
 pub(super) fn pressures() -> Vec<Entry> {
     use Column as C;
-    const PRESSURE: &str = "Open the sensor to air: what it shows is its zero.";
-    let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(PRESSURE, None);
+    const OPEN_TO_AIR: &str = "Open the sensor to air: what it shows is its zero.";
+    let entry = |id, text| Entry::new(id, Kind::Departure, share::RARE, text).remedy(OPEN_TO_AIR, None);
     let gross = 0.05;
     vec![
         entry("pressure_zero_gross_a", "the zero of pressure sensor A is far off")
@@ -339,7 +341,24 @@ pub(super) fn pressures() -> Vec<Entry> {
             .free(C::PressureZeroB, gross),
         entry("pressure_zero_a", "the zero of pressure sensor A is off").free(C::PressureZeroA, 0.01),
         entry("pressure_zero_b", "the zero of pressure sensor B is off").free(C::PressureZeroB, 0.01),
-        entry("pressure_gain_a", "the gain of pressure sensor A is off").free(C::PressureGainA, 0.05),
-        entry("pressure_gain_b", "the gain of pressure sensor B is off").free(C::PressureGainB, 0.05),
+        entry("pressure_gain_a", "the gain of pressure sensor A is off")
+            .free(C::PressureGainA, 0.05)
+            .remedy(GAUGE, None),
+        entry("pressure_gain_b", "the gain of pressure sensor B is off")
+            .free(C::PressureGainB, 0.05)
+            .remedy(GAUGE, None),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_sensor_shows_in_air_is_a_remedy_of_zeros_and_a_gauge_one_of_gains() {
+        for entry in departures().into_iter().chain(pressures()) {
+            assert!(!entry.remedy.contains("its zero") || entry.id.contains("zero"), "{}", entry.id);
+            assert_eq!(entry.remedy == GAUGE, entry.id.starts_with("pressure_gain"), "{}", entry.id);
+        }
+    }
 }
