@@ -23,7 +23,7 @@ Examples:
   pitchleak diagnose trace.csv.gz --rig turbine7.toml
   pitchleak diagnose monday/*.csv --test tuesday/*.csv --save-rig corrected.toml
   pitchleak replay trace.csv.gz --rig corrected.toml
-  pitchleak diagnose trace.csv.gz --out figures")]
+  pitchleak diagnose trace.csv.gz --out-dir figures")]
 pub struct Arguments {
     /// Traces to fit: .csv, .csv.gz, .parquet or .mat, `-` for standard input
     #[arg(value_name = "TRACE", required = true)]

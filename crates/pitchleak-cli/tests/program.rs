@@ -351,6 +351,27 @@ fn usage_errors_and_help_have_their_status() {
 }
 
 #[test]
+fn examples_in_help_have_the_options_that_help_lists() {
+    let help = |command: &str| stdout(&pitchleak().args([command, "--help"]).output().unwrap());
+    let mut examples = 0;
+    for command in ["replay", "diagnose", "check", "prove", "calibrate", "fleet", "watch", "simulate"] {
+        for part in help(command).lines().flat_map(|line| line.split(['|', '#'])) {
+            let Some((_, example)) = part.split_once("pitchleak ") else { continue };
+            let mut words = example.split_whitespace();
+            let told = help(words.next().unwrap_or_default());
+            let listed = told.lines().take_while(|line| !line.starts_with("Example"));
+            let listed: Vec<_> = listed.filter(|line| line.trim_start().starts_with('-')).collect();
+            for option in words.filter(|word| word.starts_with("--")) {
+                let is_listed = listed.iter().any(|line| line.split_whitespace().any(|word| word == option));
+                assert!(is_listed, "{command}: {option}");
+                examples += 1;
+            }
+        }
+    }
+    assert!(examples > 10, "{examples}");
+}
+
+#[test]
 fn a_reader_that_leaves_early_is_no_error() {
     let mut child = pitchleak()
         .args(["completions", "zsh"])
