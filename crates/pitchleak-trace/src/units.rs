@@ -280,10 +280,16 @@ pub fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }
 
+/// More than this is told by its power of ten: no further digit would count.
+const MOST_PLAIN: f64 = 1e15;
+
 /// A number for people: so many significant digits at the most, and no trailing zeros.
 pub fn readable(value: f64, digits: i32) -> String {
     if value.abs() < f64::MIN_POSITIVE || !value.is_finite() {
         return "0".to_owned();
+    }
+    if value.abs() > MOST_PLAIN {
+        return format!("{:e}", rounded(value, digits.unsigned_abs() as usize));
     }
     let places = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
     let text = format!("{value:.places$}");
@@ -374,6 +380,8 @@ mod tests {
             (83_091_022.899_999_99, "83091023"),
             (830.910_228_999, "830.91"),
             (-0.25, "-0.25"),
+            (1e15, "1000000000000000"),
+            (-1.234_567e302, "-1.2346e302"),
             (1e-9, "0.000000001"),
             (0.0, "0"),
         ];
