@@ -94,6 +94,9 @@ pub enum CalibrationError {
     /// A leak set in while it was recorded: when, s.
     #[error("a leak changed {0:.0} s into the traces: calibrate with traces in which nothing changes")]
     LeakChanged(f64),
+    /// A hold test that is to show that nothing leaks, beside leaks that are unknown.
+    #[error("evidence that nothing leaks stands beside leaks that are `unknown`: with it they are `zero`")]
+    UnknownInSpiteOfEvidence,
     /// A trace that was to show that nothing leaks does not.
     #[error("{trace} is no evidence that nothing leaks: {text}")]
     NoEvidence {
@@ -169,8 +172,11 @@ impl Calibrator {
     /// Rests the calibration on a hold test that shows that nothing leaks.
     ///
     /// # Errors
-    /// [`CalibrationError::NoEvidence`].
+    /// [`CalibrationError::NoEvidence`], [`CalibrationError::UnknownInSpiteOfEvidence`].
     pub fn rest_on(&mut self, hold: &ReplayReport) -> Result<(), CalibrationError> {
+        if self.leaks == LeaksThen::Unknown {
+            return Err(CalibrationError::UnknownInSpiteOfEvidence);
+        }
         let trace = hold.trace.path.clone();
         if hold.hold.is_none() || hold.verdict.status != Status::Sound {
             return Err(CalibrationError::NoEvidence { trace, text: hold.verdict.text.clone() });

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pitchleak::check::check;
 use pitchleak::core::PerLeak;
+use pitchleak::diagnose::Roles;
 use pitchleak::output::{Inputs, OutputFile};
 use pitchleak::prove::prove;
 use pitchleak::replay::{EstimateFile, Replay, ReplayError, replay};
@@ -245,7 +246,7 @@ Example:
   pitchleak calibrate week1.csv week2.csv --leaks zero --evidence hold.csv --out valve.toml
   # rig.toml: [valve] calibration = \"valve.toml\"")]
 pub struct CalibrateArguments {
-    /// Traces of one rig, ten minutes or more in all: .csv, .csv.gz, .parquet or .mat
+    /// Traces of one rig, five minutes or more in all: .csv, .csv.gz, .parquet or .mat
     #[arg(value_name = "TRACE", required = true)]
     traces: Vec<PathBuf>,
 
@@ -257,7 +258,7 @@ pub struct CalibrateArguments {
     #[arg(long, value_name = "LEAKS", value_parser = leaks_then())]
     leaks: LeaksThen,
 
-    /// A hold test that finds no leak; without one, `--leaks zero` is an assumption
+    /// A hold test that finds no leak, for `--leaks zero`, which without one is an assumption
     #[arg(long, value_name = "HOLD")]
     evidence: Option<PathBuf>,
 
@@ -277,11 +278,13 @@ impl CalibrateArguments {
         let read = self.traces.iter().chain(&self.evidence).map(PathBuf::as_path).chain(rig.file());
         let file = OutputFile::create(&self.out, &Inputs::of(read))?;
         let mut calibrator = Calibrator::new(&rig, self.leaks)?;
+        let traces = Roles::of(&self.traces, &[])?;
+        traces.repeated.iter().for_each(|same| output::warn(&[same.to_string()]));
         if let Some(hold) = &self.evidence {
             let mut reader = TraceReader::open(hold, &rig)?;
             calibrator.rest_on(&replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?)?;
         }
-        for path in &self.traces {
+        for path in &traces.fitted {
             calibrator.read(&mut TraceReader::open(path, &rig)?)?;
         }
         let found = calibrator.finish()?;

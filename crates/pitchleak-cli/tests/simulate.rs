@@ -264,6 +264,30 @@ fn calibrated(folder: &Path) -> String {
     name
 }
 
+#[test]
+fn a_calibration_reads_a_trace_once_and_takes_evidence_for_leaks_that_are_zero() {
+    let folder = TempDir::new().unwrap();
+    let name = calibrated(folder.path());
+    let [trace, hold, out] =
+        ["then.csv", "hold.csv", "again.toml"].map(|file| folder.path().join(file).display().to_string());
+    let rest = ["--rig", &name, "--leaks", "zero", "--out", &out];
+    let made = pitchleak(&[&["calibrate", &trace, &trace], &rest[..]].concat());
+    let (told, warned) = (String::from_utf8_lossy(&made.stdout), String::from_utf8_lossy(&made.stderr));
+    assert!(told.starts_with("5 min of 1 trace:"), "{told}");
+    assert!(warned.contains("then.csv is given twice: it is read once"), "{warned}");
+
+    let still = ["--position", "100 mm", "--load", "4 kN", "--shut", "2 s..", "--duration", "12 s"];
+    let output = simulate(Path::new(&hold), &[&still[..], &["--rig", &name, "--noise", "rig"]].concat());
+    assert!(output.status.success(), "{output:?}");
+    for (leaks, status) in [("zero", 0), ("unknown", 2)] {
+        let with = ["--rig", &name, "--leaks", leaks, "--evidence", &hold, "--out", &out];
+        let made = pitchleak(&[&["calibrate", &trace], &with[..]].concat());
+        assert_eq!(made.status.code(), Some(status), "{made:?}");
+        let refused = String::from_utf8_lossy(&made.stderr).contains("with it they are `zero`");
+        assert_eq!(refused, leaks == "unknown", "{made:?}");
+    }
+}
+
 /// A search over many minutes comes to its end, and the seconds of a window that has just begun take nothing back.
 #[test]
 fn a_calibrated_valve_names_a_steady_leak_in_minutes() {

@@ -185,7 +185,7 @@ pub fn calibrate(
     rig: &Rig,
     leaks: &str,
     evidence: Option<Source<'_>>,
-) -> PyResult<(String, String)> {
+) -> PyResult<(String, String, Vec<String>)> {
     let leaks = LeaksThen::by_name(leaks)
         .ok_or_else(|| value_error(format!("leaks: `{leaks}` is neither zero nor unknown")))?;
     let told = |error: CalibrationError| match &error {
@@ -200,11 +200,13 @@ pub fn calibrate(
         })?;
         calibrator.rest_on(&report).map_err(told)?;
     }
-    for trace in traces {
+    let roles = Roles::of(&paths(&traces), &[]).map_err(value_error)?;
+    for trace in each_once(&traces, &roles.fitted) {
         trace.read(py, &rig, false, |mut reader| Ok(calibrator.read(&mut reader)))?.map_err(told)?;
     }
     let found = calibrator.finish().map_err(told)?;
-    Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN)))
+    let repeated = roles.repeated.iter().map(ToString::to_string).collect();
+    Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN), repeated))
 }
 
 /// Id, kind, prior share within its kind, what it says, what to do, and ids that no trace tells it from.
@@ -239,13 +241,8 @@ pub fn diagnose(
     let roles = Roles::of(&paths(&train), &paths(&test)).map_err(value_error)?;
     let names: Vec<String> = train.iter().chain(&test).map(Source::name).collect();
     let read_all = |sources: &[Source<'_>], once: &[PathBuf]| -> PyResult<Vec<Series>> {
-        let (mut traces, mut once) = (Traces::default(), once.iter().peekable());
-        for source in sources {
-            if let Source::Path(path) = source
-                && once.next_if_eq(&path).is_none()
-            {
-                continue;
-            }
+        let mut traces = Traces::default();
+        for source in each_once(sources, once) {
             let mut signals = Signals::new(None);
             source
                 .read(py, &rig.0, strict, |mut reader| traces.read(&mut reader, &rig.0, || signals.heed()))?;
@@ -275,6 +272,18 @@ pub fn diagnose(
         residuals(&diagnosis.after.residual_over_time),
         roles.repeated.iter().map(ToString::to_string).collect(),
     ))
+}
+
+/// The sources without paths that were given before.
+fn each_once<'s, 'py>(
+    sources: &'s [Source<'py>],
+    once: &'s [PathBuf],
+) -> impl Iterator<Item = &'s Source<'py>> {
+    let mut once = once.iter().peekable();
+    sources.iter().filter(move |source| match source {
+        Source::Path(path) => once.next_if_eq(&path).is_some(),
+        Source::Table(_) => true,
+    })
 }
 
 fn paths(sources: &[Source<'_>]) -> Vec<PathBuf> {

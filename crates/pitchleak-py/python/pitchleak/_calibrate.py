@@ -50,7 +50,8 @@ def calibrate(
     """Learns the valve of a cylinder without flow meters from one trace or several of it.
 
     ``leaks`` says what leaked meanwhile: after ``"zero"`` leaks are absolute, after ``"unknown"`` external ones are
-    changes since. ``evidence`` is a hold test that finds none; without it, ``"zero"`` is an assumption.
+    changes since. ``evidence`` is a hold test that finds none, for ``"zero"``, which without it is an assumption.
+    A file that is given twice is read once, with a :class:`TraceWarning`.
 
     Raises ``ValueError`` where the rig has no ``[valve]``, or the traces say nothing of it.
     """
@@ -60,7 +61,8 @@ def calibrate(
         raise ValueError("traces: give one at least")
     found = _inputs.rig_for(many[0], rig, columns)
     hold = None if evidence is None else _inputs.source(evidence, found)
-    text, shown = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, hold)
+    text, shown, warnings = _pitchleak.calibrate([_inputs.source(one, found) for one in many], found, leaks, hold)
+    _inputs.warn(warnings)
     raw = tomllib.loads(text)
     low, high = raw["spool_range"]
     return Calibration(raw["date"], raw["leaks"], raw["seconds"], (low, high), raw["scatter"], raw, text, shown)
