@@ -89,7 +89,7 @@ pub struct Case {
 pub struct Least {
     /// L/min; none where none is.
     pub lpm: Option<f64>,
-    /// The least that any method could be sure of, L/min; none where the trace doesn't tell.
+    /// The least that any method could be sure of on average over noise, L/min; this trace's own may be kinder. None where the trace doesn't tell.
     pub bound_lpm: Option<f64>,
     /// Why none can be put in.
     pub reason: Option<&'static str>,

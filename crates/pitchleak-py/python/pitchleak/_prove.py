@@ -55,7 +55,7 @@ class LeastLeak:
     lpm: float | None
     """L/min; None where none is."""
     bound_lpm: float | None
-    """The least that any method could be sure of, L/min."""
+    """The least that any method could be sure of on average over noise, L/min; this trace's own may be kinder."""
     reason: str | None = None
     """Why none can be put in."""
 
