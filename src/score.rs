@@ -36,6 +36,9 @@ pub struct Scorer {
     last_s: f64,
     reference: Mean,
     measured: MeasuredCoefficient,
+    /// The same of what the rig file's effects let leak.
+    #[serde(default)]
+    of_effects: MeasuredCoefficient,
     /// Largest measured coefficient so far, m³/(s·Pa).
     #[serde(default)]
     largest: f64,
@@ -91,19 +94,20 @@ impl Scorer {
         pressure_pa: f64,
     ) {
         let kept = &mut Kept::default();
-        self.update_beside(t_s, leak_flow_m3s, coefficient, reference_m3s, pressure_pa, kept);
+        self.update_beside(t_s, [leak_flow_m3s, 0.0], coefficient, reference_m3s, pressure_pa, kept);
     }
 
-    /// Adds a leak beside other leaks, with what they share.
+    /// Adds a leak beside other leaks, with what they share: its flow by the coefficient, and by the rig file's effects.
     pub(crate) fn update_beside(
         &mut self,
         t_s: f64,
-        leak_flow_m3s: f64,
+        [by_coefficient_m3s, by_effects_m3s]: [f64; 2],
         coefficient: f64,
         reference_m3s: f64,
         pressure_pa: f64,
         kept: &mut Kept,
     ) {
+        let leak_flow_m3s = by_coefficient_m3s + by_effects_m3s;
         let finite = [t_s, leak_flow_m3s, coefficient, reference_m3s, pressure_pa];
         if !finite.into_iter().all(f64::is_finite) {
             return;
@@ -112,7 +116,10 @@ impl Scorer {
         self.first_s.get_or_insert(t_s);
         self.last_s = t_s;
         self.reference.add(reference_m3s.abs());
-        self.measured.add(kept.after(dt_s), reference_m3s, pressure_pa);
+        let kept = kept.after(dt_s);
+        self.measured.add(kept, reference_m3s, pressure_pa);
+        self.of_effects.add(kept, by_effects_m3s, pressure_pa);
+        let coefficient = coefficient + self.of_effects.value().unwrap_or(0.0);
         let Some(measured) = self.measured.value() else { return };
         let size_m3s = self.reference.value().max(reference_m3s.abs());
         if size_m3s > 0.0 && !self.is_mended(measured) {

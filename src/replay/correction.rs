@@ -26,7 +26,9 @@ pub(super) struct Correction {
     rates: Rates,
     #[serde(default)]
     sides: Sides,
-    /// Sizes of the effects' own leak flows, summed over time, m³.
+    /// The effects' own leak flows, m³/s; their sizes summed over time, m³.
+    #[serde(default)]
+    leaks_m3s: PerLeak<f64>,
     leaked_m3: PerLeak<f64>,
     time_s: f64,
 }
@@ -71,6 +73,7 @@ impl Correction {
             model,
             rates,
             sides,
+            leaks_m3s: PerLeak::default(),
             leaked_m3: PerLeak::default(),
             time_s: 0.0,
         })
@@ -99,8 +102,14 @@ impl Correction {
         };
         let step_s = record.step_s();
         self.time_s += step_s;
+        self.leaks_m3s = leaks;
         self.leaked_m3 = self.leaked_m3.zip(leaks).map(|(sum, flow)| sum + flow.abs() * step_s);
         Record { sample, ..*record }
+    }
+
+    /// Leak flows of the effects themselves at the last record, m³/s.
+    pub fn leaks_m3s(&self) -> PerLeak<f64> {
+        self.leaks_m3s
     }
 
     /// Mean leak flows of the effects themselves, m³/s: what a leak of another law carries beside the laminar one.

@@ -69,7 +69,7 @@ pub enum EstimateFileError {
     Output(#[from] OutputError),
 }
 
-/// A file of estimates over time, a row per record: coefficients in m³/(s·Pa), flows in L/min at the
+/// A file of estimates over time, a row per record: coefficients in m³/(s·Pa), flows with those of the rig file's effects, in L/min at the
 /// instant's pressures, active alarms as 1. It is there once it is [finished](Self::finish).
 pub struct EstimateFile(Form);
 

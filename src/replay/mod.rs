@@ -212,7 +212,7 @@ impl Replay {
             }
             _ => {}
         }
-        self.scoring.add(record);
+        self.scoring.add(record, self.by_effects_m3s());
         matches!(update, Update::Renewed { .. })
     }
 
@@ -360,8 +360,14 @@ impl Replay {
     pub fn estimate_row(&self, record: &Record) -> EstimateRow {
         let coefficients = self.leak_coefficients();
         let pressures = read_leak_pressures_pa(record, self.estimator.pressure_biases_pa());
-        let flows_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
+        let laminar_m3s = coefficients.zip(pressures).map(|(c, pressure)| c.value * pressure);
+        let flows_m3s = laminar_m3s.zip(self.by_effects_m3s()).map(|(laminar, own)| laminar + own);
         EstimateRow { t_s: record.t_s, coefficients, flows_m3s, active: self.standing() }
+    }
+
+    /// What the rig file's effects let leak at the last record, m³/s.
+    fn by_effects_m3s(&self) -> PerLeak<f64> {
+        self.correction.as_ref().map_or_else(PerLeak::default, Correction::leaks_m3s)
     }
 
     /// Whether both ports are shut: such records are for [`crate::hold`].

@@ -20,6 +20,7 @@ struct Channel {
     scorer: Scorer,
     reference: Butterworth<f64>,
     pressure: Butterworth<f64>,
+    by_effects: Butterworth<f64>,
 }
 
 impl Scoring {
@@ -29,9 +30,9 @@ impl Scoring {
         self.coefficients = coefficients.map(|coefficient| coefficient.value);
     }
 
-    /// Takes a record, after the estimates were renewed by it.
+    /// Takes a record, after the estimates were renewed by it, and what the rig file's effects let leak, m³/s.
     #[inline]
-    pub fn add(&mut self, record: &Record) {
+    pub fn add(&mut self, record: &Record, by_effects_m3s: PerLeak<f64>) {
         let reference = &record.leak_m3s;
         if reference.internal.or(reference.external_a).or(reference.external_b).is_none() {
             return;
@@ -43,8 +44,8 @@ impl Scoring {
         let pressures = read_leak_pressures_pa(record, self.pressure_biases_pa);
         let mut kept = Kept::default();
         for leak in Leak::ALL {
-            let (coefficient, reference) = (self.coefficients[leak], reference[leak]);
-            channels[leak].add(record.t_s, coefficient, reference, pressures[leak], &mut kept);
+            let estimate = (self.coefficients[leak], by_effects_m3s[leak]);
+            channels[leak].add(record.t_s, estimate, reference[leak], pressures[leak], &mut kept);
         }
     }
 
@@ -58,10 +59,10 @@ impl Channel {
     fn at_rate(rate_hz: f64, record: &Record) -> Option<PerLeak<Self>> {
         let filter = Butterworth::new(CUTOFF_HZ.min(0.4 * rate_hz), rate_hz).ok()?;
         Some(read_leak_pressures_pa(record, [0.0; 2]).zip(record.leak_m3s).map(|(start_pa, start_m3s)| {
-            let (mut reference, mut pressure) = (filter, filter);
+            let (mut reference, mut pressure, by_effects) = (filter, filter, filter);
             reference.reset(start_m3s.unwrap_or(0.0));
             pressure.reset(start_pa);
-            Self { scorer: Scorer::default(), reference, pressure }
+            Self { scorer: Scorer::default(), reference, pressure, by_effects }
         }))
     }
 
@@ -69,16 +70,17 @@ impl Channel {
     fn add(
         &mut self,
         t_s: f64,
-        coefficient: f64,
+        (coefficient, by_effects_m3s): (f64, f64),
         reference_m3s: Option<f64>,
         pressure_pa: f64,
         kept: &mut Kept,
     ) {
         let pressure = self.pressure.update(pressure_pa);
+        let by_effects = self.by_effects.update(by_effects_m3s);
         if let Some(reference) = reference_m3s {
             let reference = self.reference.update(reference);
-            let leak_m3s = coefficient * pressure;
-            self.scorer.update_beside(t_s, leak_m3s, coefficient, reference, pressure, kept);
+            let flows_m3s = [coefficient * pressure, by_effects];
+            self.scorer.update_beside(t_s, flows_m3s, coefficient, reference, pressure, kept);
         }
     }
 }

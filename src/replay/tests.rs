@@ -69,6 +69,32 @@ fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
     assert!((gapped / whole - 1.0).abs() < 1e-3, "{whole} {gapped}");
 }
 
+/// What an effect of the rig file lets leak is part of the leak, in the figures over time and in what they are worth.
+#[test]
+fn an_effects_leak_counts_as_a_leak() {
+    use crate::rig::EffectValue;
+    let (mut rig, by_root) = (Rig::paper(), 6e-9);
+    rig.effects.insert(pitchleak_core::Effect::InternalLeakTurbulent, EffectValue::new(by_root, None));
+    let mut replay = Replay::new(&rig).expect("the paper's rig");
+    let (mut off, mut whole) = (0.0, 0.0);
+    for (k, mut record) in records(&[]).into_iter().enumerate() {
+        let load_pa = record.sample.load_pressure_pa();
+        let orifice = by_root * load_pa.signum() * load_pa.abs().sqrt();
+        let leak = orifice + 1e-11 * load_pa;
+        record.sample.qa_m3s = record.sample.qa_m3s.map(|flow| flow + orifice);
+        record.sample.qb_m3s = record.sample.qb_m3s.map(|flow| flow - orifice);
+        record.leak_m3s.internal = Some(leak);
+        replay.push(&record);
+        if k > 1500 {
+            off += (replay.estimate_row(&record).flows_m3s.internal - leak).powi(2);
+            whole += leak * leak;
+        }
+    }
+    assert!(off < 0.05_f64.powi(2) * whole, "{}", (off / whole).sqrt());
+    let score = replay.scoring.scores().expect("there is a reference").internal.expect("it leaks");
+    assert!(score.leakage_mean_error_percent < 5.0 && score.convergence_time_s.is_some(), "{score:?}");
+}
+
 /// A reading with a known play is corrected to the truth but for a moment after each turn.
 #[test]
 fn a_declared_hysteresis_is_taken_out_of_the_readings() {
