@@ -94,8 +94,10 @@ pub enum CalibrationError {
     /// A leak set in while it was recorded: when, s.
     #[error("a leak changed {0:.0} s into the traces: calibrate with traces in which nothing changes")]
     LeakChanged(f64),
-    /// A hold test that is to show that nothing leaks, beside leaks that are unknown.
-    #[error("evidence that nothing leaks stands beside leaks that are `unknown`: with it they are `zero`")]
+    /// A hold test shows that nothing leaks, beside leaks that are said to be unknown: a warning, the calibration goes on without it.
+    #[error(
+        "evidence that nothing leaks is left aside beside leaks that are `unknown`: with it they are `zero`"
+    )]
     UnknownInSpiteOfEvidence,
     /// A trace that was to show that nothing leaks does not.
     #[error("{trace} is no evidence that nothing leaks: {text}")]
@@ -174,12 +176,12 @@ impl Calibrator {
     /// # Errors
     /// [`CalibrationError::NoEvidence`], [`CalibrationError::UnknownInSpiteOfEvidence`].
     pub fn rest_on(&mut self, hold: &ReplayReport) -> Result<(), CalibrationError> {
-        if self.leaks == LeaksThen::Unknown {
-            return Err(CalibrationError::UnknownInSpiteOfEvidence);
-        }
         let trace = hold.trace.path.clone();
         if hold.hold.is_none() || hold.verdict.status != Status::Sound {
             return Err(CalibrationError::NoEvidence { trace, text: hold.verdict.text.clone() });
+        }
+        if self.leaks == LeaksThen::Unknown {
+            return Err(CalibrationError::UnknownInSpiteOfEvidence);
         }
         self.evidence = Some(trace);
         Ok(())

@@ -14,7 +14,7 @@ use pitchleak::replay::{EstimateFile, Replay, ReplayError, replay};
 use pitchleak::rig::EstimatorKind;
 use pitchleak::trace::{Record, TraceReader};
 use pitchleak::units::{Dimension, LPM_PER_M3S, parse};
-use pitchleak::valve::{Calibrator, LeaksThen};
+use pitchleak::valve::{CalibrationError, Calibrator, LeaksThen};
 use pitchleak_view::Text;
 use pitchleak_view::page::{History, Page, PageFile};
 use pitchleak_view::text::{CheckSketch, ReplaySketch};
@@ -282,7 +282,11 @@ impl CalibrateArguments {
         traces.repeated.iter().for_each(|same| output::warn(&[same.to_string()]));
         if let Some(hold) = &self.evidence {
             let mut reader = TraceReader::open(hold, &rig)?;
-            calibrator.rest_on(&replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?)?;
+            let report = replay(&mut reader, &rig, |_, _, _| Ok::<_, ReplayError>(()))?;
+            match calibrator.rest_on(&report) {
+                Err(aside @ CalibrationError::UnknownInSpiteOfEvidence) => output::warn(&[aside.to_string()]),
+                rests => rests?,
+            }
         }
         for path in &traces.fitted {
             calibrator.read(&mut TraceReader::open(path, &rig)?)?;

@@ -279,12 +279,12 @@ fn a_calibration_reads_a_trace_once_and_takes_evidence_for_leaks_that_are_zero()
     let still = ["--position", "100 mm", "--load", "4 kN", "--shut", "2 s..", "--duration", "12 s"];
     let output = simulate(Path::new(&hold), &[&still[..], &["--rig", &name, "--noise", "rig"]].concat());
     assert!(output.status.success(), "{output:?}");
-    for (leaks, status) in [("zero", 0), ("unknown", 2)] {
+    for leaks in ["zero", "unknown"] {
         let with = ["--rig", &name, "--leaks", leaks, "--evidence", &hold, "--out", &out];
         let made = pitchleak(&[&["calibrate", &trace], &with[..]].concat());
-        assert_eq!(made.status.code(), Some(status), "{made:?}");
-        let refused = String::from_utf8_lossy(&made.stderr).contains("with it they are `zero`");
-        assert_eq!(refused, leaks == "unknown", "{made:?}");
+        assert!(made.status.success(), "{made:?}");
+        let left_aside = String::from_utf8_lossy(&made.stderr).contains("with it they are `zero`");
+        assert_eq!(left_aside, leaks == "unknown", "{made:?}");
     }
 }
 

@@ -194,19 +194,23 @@ pub fn calibrate(
     };
     let rig = rig.0.uncalibrated();
     let mut calibrator = Calibrator::new(&rig, leaks).map_err(told)?;
+    let mut warnings = Vec::new();
     if let Some(hold) = evidence {
         let report = hold.read(py, &rig, false, |mut reader| {
             pitchleak::replay::replay(&mut reader, &rig, |_, _, _| Ok::<_, Stopped>(()))
         })?;
-        calibrator.rest_on(&report).map_err(told)?;
+        match calibrator.rest_on(&report) {
+            Err(aside @ CalibrationError::UnknownInSpiteOfEvidence) => warnings.push(aside.to_string()),
+            rests => rests.map_err(told)?,
+        }
     }
     let roles = Roles::of(&paths(&traces), &[]).map_err(value_error)?;
+    warnings.extend(roles.repeated.iter().map(ToString::to_string));
     for trace in each_once(&traces, &roles.fitted) {
         trace.read(py, &rig, false, |mut reader| Ok(calibrator.read(&mut reader)))?.map_err(told)?;
     }
     let found = calibrator.finish().map_err(told)?;
-    let repeated = roles.repeated.iter().map(ToString::to_string).collect();
-    Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN), repeated))
+    Ok((found.to_toml().map_err(told)?, found.to_text(&Palette::PLAIN), warnings))
 }
 
 /// Id, kind, prior share within its kind, what it says, what to do, and ids that no trace tells it from.

@@ -51,6 +51,10 @@ def test_a_leak_is_found_by_the_valves_flows_and_a_calibration_tells_external_on
     pl.simulate(13, plain, noise="rig", seed=3, duration="200 s", valve=["clearance=0.02 L/min"], out=path)
     with pytest.warns(pl.TraceWarning, match=r"then\.csv is given twice: it is read once"):
         assert pl.calibrate([path, path], plain, leaks="unknown").seconds == pytest.approx(199.99)
+    still = {"position": "100 mm", "load": "4 kN", "shut": "2 s..", "duration": "12 s", "noise": "rig"}
+    hold = pl.simulate(rig=plain, **still).columns
+    with pytest.warns(pl.TraceWarning, match="with it they are `zero`"):
+        pl.calibrate(then.columns, plain, leaks="unknown", evidence=hold)
     calibration.save(tmp_path / "valve.toml")
     calibrated = rig(tmp_path, 'calibration = "valve.toml"\n')
     now = pl.simulate(21, calibrated, noise="rig", seed=4, valve="clearance=0.02 L/min", leak_external_a="0.1 L/min")
@@ -71,10 +75,6 @@ def test_what_is_wrong_is_said(tmp_path: Path) -> None:
         pl.calibrate(trace, plain, leaks="zero")
     with pytest.raises(ValueError, match="is no evidence that nothing leaks"):
         pl.calibrate(trace, plain, leaks="zero", evidence=trace)
-    still = {"position": "100 mm", "load": "4 kN", "shut": "2 s..", "duration": "12 s", "noise": "rig"}
-    hold = pl.simulate(rig=plain, **still).columns
-    with pytest.raises(ValueError, match="with it they are `zero`"):
-        pl.calibrate(trace, plain, leaks="unknown", evidence=hold)
     with pytest.raises(ValueError, match="neither zero nor unknown"):
         pl.calibrate(trace, plain, leaks="none")
     with pytest.raises(ValueError, match="droop=2 bar"):
