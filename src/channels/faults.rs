@@ -158,8 +158,8 @@ fn dead(one: &Judged, witnesses: usize, activity: Activity, whole: (f64, f64)) -
         (true, true) => format!("exactly {}", one.reading(value)),
         (true, false) => one.reading(value),
         (false, _) => {
-            let Extreme { value: least, .. } = one.channel.least;
-            format!("{} to {}", one.reading(least), one.reading(one.channel.most.value))
+            let [least, most] = [&one.channel.least, &one.channel.most].map(|end| one.reading(end.value));
+            format!("{least} to {most}")
         }
     };
     let text = format!(

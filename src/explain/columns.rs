@@ -284,7 +284,7 @@ impl Course {
 
 #[cfg(test)]
 mod tests {
-    use super::super::readings::tests::{dot, sums};
+    use super::super::testing::{dot, sums};
     use super::*;
     use pitchleak_core::{Cylinder, Sample};
 

@@ -29,8 +29,8 @@ const MISFIT_DOUBT: f64 = 3.0;
 /// What takes sizes of so many standard deviations of what sensors and rigs are off by is no explanation, but the nearest that the
 /// table has. Derived: one of two million is so large.
 const MOST_STRAIN: f64 = 5.0;
-/// A leak that wanders with this probability comes and goes, and one that grows with it grows: as likely as not.
-const AWAY_DOUBT: f64 = 0.5;
+/// A leak that has a course with this probability has it: as likely as not.
+const COURSE_DOUBT: f64 = 0.5;
 /// From here on it is told. A guess.
 pub const MISFIT_TOLD: f64 = 2.0;
 /// Explanations below this probability are not listed.
@@ -170,15 +170,20 @@ impl Decision {
 
     /// Whether a leak comes and goes, as likely as not, and is away.
     pub(crate) fn is_away(&self, leak: Leak) -> bool {
-        let wandering = format!("{}:wandering", leak.id());
-        self.ruled_out.contains(&leak) && self.probability_where(|part| part == wandering) > AWAY_DOUBT
+        self.ruled_out.contains(&leak) && self.goes_on(leak, &[LeakCourse::Wandering])
     }
 
     /// Whether a leak changes little by little, as likely as not.
     pub(crate) fn is_drifting(&self, leak: Leak) -> bool {
-        let courses = [LeakCourse::Growing, LeakCourse::Accelerating, LeakCourse::Creeping];
-        let ids = courses.map(|course| format!("{}:{}", leak.id(), course.id()));
-        self.probability_where(|part| ids.iter().any(|id| part == id)) > AWAY_DOUBT
+        self.goes_on(leak, &[LeakCourse::Growing, LeakCourse::Accelerating, LeakCourse::Creeping])
+    }
+
+    /// Whether a leak has one of these courses, as likely as not.
+    fn goes_on(&self, leak: Leak, courses: &[LeakCourse]) -> bool {
+        let is_one = |course: &str| courses.iter().any(|one| one.id() == course);
+        self.probability_where(|part| {
+            part.split_once(':').is_some_and(|(id, course)| id == leak.id() && is_one(course))
+        }) > COURSE_DOUBT
     }
 
     /// Probability of the explanations one of whose parts `is` so, as far as they are listed.

@@ -27,6 +27,8 @@ mod sensors;
 mod sizes;
 mod still;
 mod table;
+#[cfg(test)]
+mod testing;
 
 pub use columns::{Column, Course};
 pub use decision::{Belief, Decision, Explained, MISFIT_TOLD, Note, WIRING_DOUBT, explain};

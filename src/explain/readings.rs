@@ -270,22 +270,10 @@ impl Mistake {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::testing::{dot, sums};
     use super::*;
-    use pitchleak_core::continuity::{BlockSums, Row};
     use pitchleak_core::{Fluid, Sample};
-
-    /// Raw sums of the second block of readings at `step_s`, which know the time.
-    pub fn sums(cylinder: &Cylinder<f64>, step_s: f64, read: impl Fn(u32) -> Sample<f64>) -> Combination {
-        let mut blocks = BlockSums::new(cylinder, &Fluid::paper());
-        let step_s = |k: u32| if k == 0 { 0.0 } else { step_s };
-        let rows = (0..60).map(|k| Row::read(step_s(k), &read(k)));
-        rows.filter_map(|row| blocks.push(&row)).nth(1).expect("two blocks").sums
-    }
-
-    pub fn dot(combination: &Combination, sums: &Combination) -> f64 {
-        combination.iter().zip(sums).map(|(by, sum)| by * sum).sum()
-    }
 
     const STEP_S: f64 = 0.04;
 

@@ -1,7 +1,15 @@
 use super::*;
-use crate::rig::EstimatorKind;
+use crate::rig::{EffectValue, EstimatorKind};
 use crate::simulate::Normal;
+use pitchleak_core::Effect;
 use pitchleak_testkit::Motion;
+
+/// The paper's rig, of which this is known.
+fn with_effect(effect: Effect, value: f64) -> Rig {
+    let mut rig = Rig::paper();
+    rig.effects.insert(effect, EffectValue::new(value, None));
+    rig
+}
 
 /// Records at 100 Hz of a cylinder that leaks; a pause of a minute comes before the records `gaps`.
 fn records(gaps: &[usize]) -> Vec<Record> {
@@ -55,9 +63,7 @@ fn the_papers_law_waits_as_long() {
 /// The leak that an effect of the rig file carries is a mean over time that was watched.
 #[test]
 fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
-    use crate::rig::EffectValue;
-    let mut rig = Rig::paper();
-    rig.effects.insert(pitchleak_core::Effect::InternalLeakTurbulent, EffectValue::new(6e-9, None));
+    let rig = with_effect(Effect::InternalLeakTurbulent, 6e-9);
     let mean = |gaps: &[usize]| {
         let mut correction = Correction::of(&rig).expect("an effect");
         for record in records(gaps) {
@@ -72,9 +78,8 @@ fn a_gap_does_not_weigh_in_the_mean_leak_of_an_effect() {
 /// What an effect of the rig file lets leak is part of the leak, in the figures over time and in what they are worth.
 #[test]
 fn an_effects_leak_counts_as_a_leak() {
-    use crate::rig::EffectValue;
-    let (mut rig, by_root) = (Rig::paper(), 6e-9);
-    rig.effects.insert(pitchleak_core::Effect::InternalLeakTurbulent, EffectValue::new(by_root, None));
+    let by_root = 6e-9;
+    let rig = with_effect(Effect::InternalLeakTurbulent, by_root);
     let mut replay = Replay::new(&rig).expect("the paper's rig");
     let (mut off, mut whole) = (0.0, 0.0);
     for (k, mut record) in records(&[]).into_iter().enumerate() {
@@ -98,11 +103,10 @@ fn an_effects_leak_counts_as_a_leak() {
 /// A reading with a known play is corrected to the truth but for a moment after each turn.
 #[test]
 fn a_declared_hysteresis_is_taken_out_of_the_readings() {
-    use crate::rig::EffectValue;
     use pitchleak_core::effects::Play;
-    let (mut rig, width_pa) = (Rig::paper(), 1e5);
+    let width_pa = 1e5;
+    let mut rig = with_effect(Effect::PressureHysteresisA, width_pa);
     rig.instruments = rig.instruments.with_accuracy(1e-3);
-    rig.effects.insert(pitchleak_core::Effect::PressureHysteresisA, EffectValue::new(width_pa, None));
     let mut correction = Correction::of(&rig).expect("an effect");
     let all = records(&[]);
     let mut play = Play::new(all[0].sample.pa_pa);
@@ -120,9 +124,8 @@ fn a_declared_hysteresis_is_taken_out_of_the_readings() {
 /// What a meter does not show is not known: its chamber rests, and the other flow stays as it is.
 #[test]
 fn within_a_declared_dead_band_the_flow_is_missing() {
-    use crate::rig::EffectValue;
-    let (mut rig, band_m3s) = (Rig::paper(), 2e-5);
-    rig.effects.insert(pitchleak_core::Effect::FlowMeterDeadBandA, EffectValue::new(band_m3s, None));
+    let band_m3s = 2e-5;
+    let rig = with_effect(Effect::FlowMeterDeadBandA, band_m3s);
     let mut correction = Correction::of(&rig).expect("an effect");
     let (mut shown, mut hidden) = (0, 0);
     for record in records(&[]) {
@@ -153,12 +156,12 @@ fn a_state_of_another_version_is_refused_by_name() {
     let saved = stream.save().expect("saves");
     assert!(Stream::restore(&saved).is_ok());
     let mut older = saved;
-    let at = older.windows(8).position(|bytes| bytes == b"state/14").expect("names its version");
-    older[at + 7] = b'5';
+    let at = older.windows(8).position(|bytes| bytes == b"state/15").expect("names its version");
+    older[at + 7] = b'4';
     assert_eq!(
         Stream::restore(&older).err().map(|error| error.to_string()).as_deref(),
         Some(
-            "saved by another version (`pitchleak.state/15`, this one reads `pitchleak.state/14`): start the estimator anew"
+            "saved by another version (`pitchleak.state/14`, this one reads `pitchleak.state/15`): start the estimator anew"
         )
     );
 }
