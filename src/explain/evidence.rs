@@ -57,6 +57,12 @@ impl Fit {
         (0..of.len()).map(|i| (0..of.len()).map(|j| entry(i, j)).collect()).collect()
     }
 
+    /// Posterior covariances of all parameters with one.
+    pub fn covariances_with(&self, i: usize) -> Vec<f64> {
+        let column = self.inverse_column(i);
+        column.iter().zip(&self.stds).map(|(entry, std)| entry * std * self.stds[i]).collect()
+    }
+
     /// Whether a parameter's column, given all others, is mostly noise: then it tells nothing, and what it seems to is theirs. What is
     /// left of it is M⁻¹'s column over its diagonal, and has the power 1 / (M⁻¹)ᵢᵢ − 1, less its noise.
     pub fn is_noise(&self, equations: &NormalEquations, free: &[Free], at: usize) -> bool {

@@ -8,8 +8,10 @@ use super::given_leaks::GivenLeaks;
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::{Pass, follows};
+use super::pressures_off::{MeterZeros, PressuresOff};
 use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
+use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// Explanations so much less probable than the best have a sample of few points, and are left out of a first look: e⁻⁴ is two in a
@@ -56,6 +58,7 @@ struct Fitted<'e, 'a> {
     hypothesis: Hypothesis<'a>,
     fit: Fit,
     found: Vec<Found>,
+    zeros: PressuresOff,
 }
 
 /// An explanation with its leaks at least zero, its evidence and a sample of the leaks, beside the best so far.
@@ -79,8 +82,13 @@ pub(super) fn cut<'a>(
     let found = set_free.iter().zip(rows).map(|((column, at), (own, row))| {
         (*column, given.size(fit.means[*at], row[own], &row[..means.len()]))
     });
-    let found = found.collect();
-    (ln, Fitted { pass, weighing, hypothesis, fit, found }.weighed(orthant))
+    let found: Vec<Found> = found.collect();
+    let coefficients = coefficients(pass, &hypothesis, &orthant);
+    let usual_pa =
+        [Column::PressureZeroA, Column::PressureZeroB].map(|zero| usual_off_pa(pass, &found, zero));
+    let zeros = meter_zeros(pass, weighing.equations, &hypothesis, &fit);
+    let zeros = PressuresOff::new(&zeros, &coefficients, usual_pa.into());
+    (ln, Fitted { pass, weighing, hypothesis, fit, found, zeros }.weighed(orthant))
 }
 
 /// The columns that an explanation's state sets free, as far as they are steady, with their places among its free parameters.
@@ -92,6 +100,61 @@ fn set_free<'h>(
     let columns = zeros.free.iter().chain(&departure.free).filter(|free| free.1 == Course::Constant);
     columns
         .filter_map(|(column, ..)| Some((*column, hypothesis.place(equations, *column, Course::Constant)?)))
+}
+
+/// Flow of a leak at the trace's end, share of full scale.
+fn flow(hypothesis: &Hypothesis<'_>, leak: usize, point: &[f64; MOST]) -> f64 {
+    hypothesis.ends[leak].iter().map(|(at, sign)| sign * point[*at]).sum::<f64>().max(0.0)
+}
+
+/// Mean coefficient of each leak, share of full scale per Pa.
+fn coefficients(pass: &Pass<'_, '_>, hypothesis: &Hypothesis<'_>, orthant: &Orthant) -> Vector3<f64> {
+    let pressures_pa = pass.products.mean_pressures_pa(0);
+    Vector3::from_fn(|leak, _| {
+        let weighed = orthant.points.iter().zip(&orthant.weights);
+        let mean: f64 = weighed.map(|(point, weight)| weight * flow(hypothesis, leak, point)).sum();
+        mean / pressures_pa[Leak::ALL[leak]].max(1.0)
+    })
+}
+
+/// The flow meters' zeros as fitted, share of the leaks' full scale; of one that is not free nothing is known.
+fn meter_zeros(
+    pass: &Pass<'_, '_>,
+    equations: &NormalEquations,
+    hypothesis: &Hypothesis<'_>,
+    fit: &Fit,
+) -> MeterZeros {
+    let units = pass.sizes.zero_units;
+    let places =
+        [Column::ZeroA, Column::ZeroB].map(|zero| hypothesis.place(equations, zero, Course::Constant));
+    let mut zeros = MeterZeros {
+        means: Vector2::zeros(),
+        covariance: Matrix2::identity(),
+        prior_stds: Vector2::repeat(1.0),
+        with_leaks: Matrix3x2::zeros(),
+    };
+    for (meter, place) in places.into_iter().enumerate() {
+        let Some(at) = place else { continue };
+        let covariances = fit.covariances_with(at);
+        zeros.means[meter] = units[meter] * fit.means[at];
+        zeros.prior_stds[meter] = units[meter] * hypothesis.free[at].std;
+        for (other, place) in places.into_iter().enumerate() {
+            zeros.covariance[(other, meter)] =
+                place.map_or(0.0, |place| units[meter] * units[other] * covariances[place]);
+        }
+        for (leak, ends) in hypothesis.ends.iter().enumerate() {
+            let with = ends.iter().map(|(end, sign)| sign * covariances[hypothesis.positive[*end]]);
+            zeros.with_leaks[(leak, meter)] = units[meter] * with.sum::<f64>();
+        }
+    }
+    zeros
+}
+
+/// How far a pressure sensor's zero is usually off, Pa, where an explanation does not have it off.
+fn usual_off_pa(pass: &Pass<'_, '_>, found: &[Found], zero: Column) -> f64 {
+    let pressure = &pass.rig.instruments.pressure;
+    let usual = if pressure.bias > 0.0 { pressure.bias } else { USUAL_PRESSURE };
+    if found.iter().any(|(column, _)| *column == zero) { 0.0 } else { usual * pressure.full_scale }
 }
 
 impl<'a> Fitted<'_, 'a> {
@@ -152,35 +215,36 @@ impl<'a> Fitted<'_, 'a> {
         if of_leak > 0.0 { HIDDEN * (left / of_leak).sqrt() * self.pass.full_scale_m3s } else { 0.0 }
     }
 
-    /// Flow of each leak at the trace's end and the pressures as they truly are, with the spread of pressure sensors.
+    /// Flow of each leak at the trace's end and the pressures as they truly are.
     fn leaks_m3s(&self, points: &[[f64; MOST]]) -> Vec<[f64; 3]> {
-        let mut out = vec![[0.0; 3]; points.len()];
         let products = self.pass.products;
         let all_pa = products.mean_pressures_pa(0);
-        let pressures_pa = products.mean_pressures_pa(self.last_change());
-        for (leak, ends) in self.hypothesis.ends.iter().enumerate() {
-            if ends.is_empty() {
-                continue;
-            }
-            let flow =
-                |point: &[f64; MOST]| ends.iter().map(|(at, sign)| sign * point[*at]).sum::<f64>().max(0.0);
-            let pressure_pa = pressures_pa[Leak::ALL[leak]].max(1.0);
-            let lately = pressure_pa / all_pa[Leak::ALL[leak]].max(1.0);
-            let sheet = USUAL_PRESSURE * self.pass.rig.instruments.pressure.full_scale / pressure_pa;
-            let off = self.pressure_off_pa(leak, pressures_pa) / pressure_pa;
-            let scale = self.scale(Leak::ALL[leak]);
-            // The mean size of a pressure of changing sign follows its mean for certain, and else by an unknown share.
-            let follows = follows(Leak::ALL[leak], pressures_pa);
-            let spread = sheet.hypot((1.0 - follows.abs()) * off).hypot(scale.std / scale.value);
-            let doubt_m3s = self.pass.doubts_m3s[Leak::ALL[leak]].hypot(self.unexplained_m3s(leak));
-            for (out, (point, normals)) in out.iter_mut().zip(points.iter().zip(NORMALS.iter())) {
-                let doubt = doubt_m3s * normals[3 + leak];
-                let pressure = lately * (1.0 + follows * off + spread * normals[leak]);
-                out[leak] =
-                    (flow(point) * scale.value * pressure * self.pass.full_scale_m3s + doubt).max(0.0);
-            }
-        }
-        out
+        let lately_pa = products.mean_pressures_pa(self.last_change());
+        let off_pa = Leak::ALL.map(|leak| self.pressure_off_pa(leak as usize, lately_pa));
+        let doubts_m3s =
+            Leak::ALL.map(|leak| self.pass.doubts_m3s[leak].hypot(self.unexplained_m3s(leak as usize)));
+        let scales = Leak::ALL.map(|leak| self.scale(leak));
+        let follows = Leak::ALL.map(|leak| follows(leak, lately_pa));
+        let usual_pa = USUAL_PRESSURE * self.pass.rig.instruments.pressure.full_scale;
+        let at = |(point, normals): (&[f64; MOST], &[f64; MOST])| {
+            let flows = Vector3::from_fn(|leak, _| flow(&self.hypothesis, leak, point));
+            let coefficients = Vector3::from_fn(|leak, _| flows[leak] / all_pa[Leak::ALL[leak]].max(1.0));
+            let more = self.zeros.more(&coefficients, follows[0], [normals[6], normals[7]]);
+            std::array::from_fn(|i| {
+                if self.hypothesis.ends[i].is_empty() {
+                    return 0.0;
+                }
+                let pressure_pa = lately_pa[Leak::ALL[i]].max(1.0);
+                let off = off_pa[i] / pressure_pa;
+                let unknown = (1.0 - follows[i].abs()) * off.abs().hypot(usual_pa / pressure_pa);
+                let spread = unknown.hypot(scales[i].std / scales[i].value);
+                let lately = pressure_pa / all_pa[Leak::ALL[i]].max(1.0);
+                let pressure = lately * (1.0 + follows[i] * off + spread * normals[i]);
+                let truly = flows[i] * pressure + more[i];
+                (truly * scales[i].value * self.pass.full_scale_m3s + doubts_m3s[i] * normals[3 + i]).max(0.0)
+            })
+        };
+        points.iter().zip(NORMALS.iter()).map(at).collect()
     }
 
     /// By how much a leak is larger than in equations that an area off makes smaller ([`Column::AreaA`]).

@@ -19,6 +19,7 @@ mod odds;
 mod orthant;
 mod pass;
 mod posterior;
+mod pressures_off;
 mod raw_products;
 mod readings;
 mod scales;

@@ -42,8 +42,8 @@ pub(crate) const USUAL_GAIN: f64 = 0.005;
 const USUAL_LAG_S: f64 = 0.010;
 /// Hose and port, share of the swept volume: 20 cm³ of the paper's 250 cm³. A guess.
 pub(super) const USUAL_DEAD_VOLUME: f64 = 0.08;
-/// Zero and gain of a pressure sensor that declares none, share of full scale each. A guess.
-pub(super) const USUAL_PRESSURE: f64 = 0.002;
+/// Zero of a pressure sensor that declares none, share of full scale: of the usual class 0.5. A guess.
+pub(super) const USUAL_PRESSURE: f64 = 0.005;
 
 /// Which choice an entry belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
