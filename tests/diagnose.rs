@@ -404,6 +404,21 @@ fn a_lag_is_no_shorter_for_the_flows_noise() {
     }
 }
 
+/// Of a lag as short as two hundredths of the time between two samples no name is given. Nor is a play of the sensor sure in its place,
+/// which it was where the lag was not asked.
+#[test]
+fn a_lag_much_shorter_than_a_sample_is_no_play() {
+    let mut effects = EffectSet::default();
+    effects.set(Effect::PressureLagA, 1.6e-4, EffectConstants::default()).expect("is in bounds");
+    let mut rig = Rig::paper();
+    rig.instruments = rig.instruments.with_accuracy(0.001);
+    for seed in 1..=3 {
+        let answer = ask(in_wind(WindCase::Mps30, effects, 300.0, &rig, seed), &rig);
+        println!("seed {seed}: {:?}", answer.effects);
+        assert!(answer.effects.iter().all(|found| !found.confident), "seed {seed}: {:?}", answer.effects);
+    }
+}
+
 /// Where the pressures hardly move their noise is all that a bend of a sensor's scale would act on.
 #[test]
 fn noise_of_pressures_that_hardly_move_is_no_bend_of_a_sensor() {

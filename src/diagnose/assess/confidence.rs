@@ -9,7 +9,7 @@ use crate::diagnose::outcome::{Doubt, DoubtId};
 use crate::diagnose::search::{self, Rival, Selected, Selection};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{
-    CURVED_SHARE, DOUBTED_ODDS, NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA, SMALL_SHARE, UNMENDED_SHARE,
+    DOUBTED_ODDS, NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA, SMALL_SHARE, UNMENDED_SHARE,
 };
 use crate::diagnose::weak_form::{Term, Unlisted};
 use pitchleak_core::Leak;
@@ -63,7 +63,7 @@ fn own_doubts(selection: &Selection<'_>, one: &Selected, judgement: &Judgement) 
         one_way_friction(selection, one),
         at_bound(fit, one),
         takes_all_declared(fit, one),
-        may_be_none(fit, one),
+        may_be_none(selection, one),
         negative_leak(fit, one),
         held_out(fit, one, judgement),
         sensor_fault(&judgement.failures),
@@ -220,18 +220,13 @@ fn takes_all_declared(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
     is_small.then(|| doubt(DoubtId::TakesAllDeclared, text()))
 }
 
-/// A candidate too weak for a name, which these traces do not rule out either, would take most of it away. One that comes near in its
-/// place was fitted there: it is a rival, or it is not.
-fn may_be_none(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
-    let own = fit.estimate(one.term)?;
-    let without = fit.solve_without(&[one.term]);
-    let near = (1.0 - CURVED_SHARE) * (without.chi2 - fit.free.chi2);
-    let is_far =
-        |candidate: &usize| fit.score(&without, *candidate).is_none_or(|score| score.chi2_drop < near);
-    let further = estimates::unnamed(fit).filter(is_far);
-    let spread = own.std.hypot(estimates::largest_shift(fit, one.term, further));
+/// Sets of effects that these traces do not rule out either, one too weak for a name among them, would have it so much smaller that it could
+/// be none.
+fn may_be_none(selection: &Selection<'_>, one: &Selected) -> Option<Doubt> {
+    let own = selection.fit.estimate(one.term)?;
+    let std = own.std.hypot(estimates::spread_over_sets(selection, one.term));
     let text = "beside an effect too weak for a name, which these traces do not rule out, it could be none";
-    (own.value.abs() < SIGNIFICANT_SIGMA * spread).then(|| doubt(DoubtId::MayBeNone, text))
+    (own.value.abs() < SIGNIFICANT_SIGMA * std).then(|| doubt(DoubtId::MayBeNone, text))
 }
 
 /// With it a leak comes out below zero, all of its 95 % interval.

@@ -173,25 +173,16 @@ fn found_one(selection: &Selection<'_>, one: &Selected, doubts: Vec<Doubt>) -> O
     })
 }
 
-/// By how much an effect's value may be another with other effects: in the place of those that are named, or beside them.
-fn spread_over_sets(selection: &Selection<'_>, term: usize) -> f64 {
+/// By how much an effect's value may be another with other effects: in the place of those that are named, or beside them one that these
+/// traces neither name nor rule out. A second effect that is too weak for a name need not be absent.
+pub(super) fn spread_over_sets(selection: &Selection<'_>, term: usize) -> f64 {
     let fit = &selection.fit;
-    selection.spread(term).hypot(largest_shift(fit, term, unnamed(fit)))
-}
-
-/// The candidates that these traces neither name nor rule out: a second effect that is too weak for a name need not be absent.
-pub(super) fn unnamed<'f>(fit: &'f Fit<'_>) -> impl Iterator<Item = usize> + 'f {
-    let needed = SIGNIFICANT_SIGMA.powi(2) * fit.dispersion(fit.free.chi2);
-    let is_possible = move |candidate: &usize| {
-        fit.score(&fit.free, *candidate).is_some_and(|beside| beside.chi2_drop > needed)
-    };
-    search::open(fit).into_iter().filter(is_possible)
-}
-
-/// By how much one of these would move a term's value at most.
-pub(super) fn largest_shift(fit: &Fit<'_>, term: usize, beside: impl Iterator<Item = usize>) -> f64 {
-    let shifts = beside.filter_map(|candidate| fit.shift_by(candidate, term));
-    shifts.map(f64::abs).fold(0.0, f64::max)
+    let least = SIGNIFICANT_SIGMA.powi(2) * fit.dispersion(fit.free.chi2);
+    let is_possible =
+        |further: &usize| fit.score(&fit.free, *further).is_some_and(|score| score.chi2_drop > least);
+    let unnamed = search::open(fit).into_iter().filter(is_possible);
+    let shifts = unnamed.filter_map(|further| fit.shift_by(further, term)).map(f64::abs);
+    selection.spread(term).hypot(shifts.fold(0.0, f64::max))
 }
 
 /// Each effect that may stand in its place, once.

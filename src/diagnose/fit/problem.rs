@@ -141,14 +141,17 @@ impl<'a> Problem<'a> {
         (least..=upper).contains(&value)
     }
 
-    /// A lag shows from some share of a sample's length on, a meter's dead band where it silences more than what its noise does: within
-    /// that the meter showed what flowed.
+    /// A meter's dead band shows where it silences more than what its noise does: within that the meter showed what flowed.
     fn least_shown(&self, effect: Effect) -> f64 {
         let Sensors { flow_a, flow_b, .. } = self.sensors;
         let mut noise = Signals { qa_m3s: flow_a.noise_std, qb_m3s: flow_b.noise_std, ..Signals::default() };
-        let noise_m3s = effect.deaf(&mut noise).copied();
-        let lag_s = effect.is_lag().then_some(self.least_lag_s);
-        noise_m3s.map(|std| SIGNIFICANT_SIGMA * std).or(lag_s).unwrap_or(f64::NEG_INFINITY)
+        effect.deaf(&mut noise).map_or(f64::NEG_INFINITY, |std| SIGNIFICANT_SIGMA * *std)
+    }
+
+    /// Whether a term of this value may be named. Of a lag that is a small share of a sample's length the samples are taken too far
+    /// apart to tell what it is: it may stand behind another name, and has none.
+    pub(crate) fn may_name(&self, term: usize, value: f64) -> bool {
+        value >= self.least_lag_s || !self.terms[term].effect().is_some_and(Effect::is_lag)
     }
 }
 

@@ -222,7 +222,11 @@ fn deserves_a_name(fit: &Fit<'_>, trial: &Trial) -> bool {
     let chi2_drop = trial.score.chi2_drop;
     let is_significant = trial.beyond(fit.dispersion(fit.free.chi2 - chi2_drop)) >= 0.0;
     let mends_enough = !fit.is_incomplete() || chi2_drop / fit.free.chi2 >= SMALL_SHARE;
-    is_significant && mends_enough && fit.helps_held_out(trial.score.term, trial.constants)
+    let term = trial.score.term;
+    is_significant
+        && mends_enough
+        && fit.problem.may_name(term, trial.score.value)
+        && fit.helps_held_out(term, trial.constants)
 }
 
 /// The pairs whose product explains more than chance would.

@@ -11,6 +11,7 @@ use crate::diagnose::thresholds::{CURVED_SHARE, MOST_EXCHANGES, MOST_ROUNDS, SIG
 use crate::presence::ln_tail;
 use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
+use std::collections::BTreeMap;
 
 /// Some named effects gone, and others in their place.
 #[derive(Clone, Debug)]
@@ -62,7 +63,9 @@ pub(super) fn weigh(all: &mut Selection<'_>, weighed: &mut Weighed, progress: Pr
         let dispersion = all.fit.dispersion(all.fit.free.chi2);
         let named = all.named();
         let is_new = |one: &Exchange| !weighed.contains(&one.instead_of(&named));
-        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && is_new(one);
+        let may_name =
+            |one: &Exchange| one.values.iter().all(|(term, value)| all.fit.problem.may_name(*term, *value));
+        let is_better = |one: &&Exchange| one.worse(dispersion) < 0.0 && is_new(one) && may_name(one);
         let better = exchanges.iter().filter(is_better);
         let best = better.min_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion))).cloned();
         let Some(best) = best else { break };
@@ -110,9 +113,23 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
         near.extend(singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin));
     }
     near.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
-    near.truncate(MOST_EXCHANGES);
+    let near = some_of_each(near);
     let own_leaks = below_zero(fit);
     near.into_iter().filter_map(|one| fitted(fit, own_leaks, one, progress)).collect()
+}
+
+/// The most exchanges that are fitted, of all that are sorted: the first in each place, the second in each, and so on. One effect with many
+/// rivals leaves room for those of the others.
+fn some_of_each(sorted: Vec<Exchange>) -> Vec<Exchange> {
+    let mut met: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+    let mut ranked: Vec<(usize, Exchange)> = vec![];
+    for one in sorted {
+        let rank = met.entry(one.gone.clone()).or_default();
+        ranked.push((*rank, one));
+        *rank += 1;
+    }
+    ranked.sort_by_key(|(rank, _)| *rank);
+    ranked.into_iter().map(|(_, one)| one).take(MOST_EXCHANGES).collect()
 }
 
 /// All sets of these but the empty one.
@@ -276,6 +293,23 @@ mod tests {
     use crate::diagnose::testing::{TURBULENT, declared, torn_seal};
     use crate::diagnose::weak_form::Term;
     use pitchleak_core::Effect;
+
+    /// The right set may stand behind a dozen rivals of another effect, which a sort alone would have fitted in its stead.
+    #[test]
+    fn rivals_of_one_effect_leave_room_for_those_of_another() {
+        let exchange = |gone: usize, chi2: f64| Exchange {
+            gone: vec![gone],
+            new: vec![],
+            left: Beyond { chi2, width: 0.0 },
+            dearer: 0.0,
+            values: vec![],
+        };
+        let of_one = (0..2 * MOST_EXCHANGES).map(|rank| exchange(0, rank as f64));
+        let kept = some_of_each(of_one.chain([exchange(1, 1e3), exchange(1, 2e3)]).collect());
+        let order: Vec<(usize, f64)> = kept.iter().take(5).map(|one| (one.gone[0], one.left.chi2)).collect();
+        assert_eq!(order, [(0, 0.0), (1, 1e3), (0, 1.0), (1, 2e3), (0, 2.0)]);
+        assert_eq!(kept.len(), MOST_EXCHANGES);
+    }
 
     #[test]
     fn what_only_one_belief_tells_is_not_sure() {
