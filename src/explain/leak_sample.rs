@@ -11,7 +11,8 @@ use super::pass::{Pass, follows};
 use super::pressures_off::{MeterZeros, PressuresOff};
 use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
-use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
+use crate::rig::Rig;
+use nalgebra::Vector3;
 use pitchleak_core::{Estimate, Leak, PerLeak};
 
 /// Explanations so much less probable than the best have a sample of few points, and are left out of a first look: e⁻⁴ is two in a
@@ -58,7 +59,7 @@ struct Fitted<'e, 'a> {
     hypothesis: Hypothesis<'a>,
     fit: Fit,
     found: Vec<Found>,
-    zeros: PressuresOff,
+    pressures_off: PressuresOff,
 }
 
 /// An explanation with its leaks at least zero, its evidence and a sample of the leaks, beside the best so far.
@@ -84,11 +85,13 @@ pub(super) fn cut<'a>(
     });
     let found: Vec<Found> = found.collect();
     let coefficients = coefficients(pass, &hypothesis, &orthant);
-    let usual_pa =
-        [Column::PressureZeroA, Column::PressureZeroB].map(|zero| usual_off_pa(pass, &found, zero));
-    let zeros = meter_zeros(pass, weighing.equations, &hypothesis, &fit);
-    let zeros = PressuresOff::new(&zeros, &coefficients, usual_pa.into());
-    (ln, Fitted { pass, weighing, hypothesis, fit, found, zeros }.weighed(orthant))
+    // A zero that the explanation has off already is in the fit.
+    let is_free = |zero: Column| found.iter().any(|(column, _)| *column == zero);
+    let usual_pa = [Column::PressureZeroA, Column::PressureZeroB]
+        .map(|zero| if is_free(zero) { 0.0 } else { usual_off_pa(pass.rig) });
+    let zeros = MeterZeros::of(&fit, &hypothesis, weighing.equations, pass.sizes.zero_units);
+    let pressures_off = PressuresOff::new(&zeros, &coefficients, usual_pa.into());
+    (ln, Fitted { pass, weighing, hypothesis, fit, found, pressures_off }.weighed(orthant))
 }
 
 /// The columns that an explanation's state sets free, as far as they are steady, with their places among its free parameters.
@@ -117,44 +120,11 @@ fn coefficients(pass: &Pass<'_, '_>, hypothesis: &Hypothesis<'_>, orthant: &Orth
     })
 }
 
-/// The flow meters' zeros as fitted, share of the leaks' full scale; of one that is not free nothing is known.
-fn meter_zeros(
-    pass: &Pass<'_, '_>,
-    equations: &NormalEquations,
-    hypothesis: &Hypothesis<'_>,
-    fit: &Fit,
-) -> MeterZeros {
-    let units = pass.sizes.zero_units;
-    let places =
-        [Column::ZeroA, Column::ZeroB].map(|zero| hypothesis.place(equations, zero, Course::Constant));
-    let mut zeros = MeterZeros {
-        means: Vector2::zeros(),
-        covariance: Matrix2::identity(),
-        prior_stds: Vector2::repeat(1.0),
-        with_leaks: Matrix3x2::zeros(),
-    };
-    for (meter, place) in places.into_iter().enumerate() {
-        let Some(at) = place else { continue };
-        let covariances = fit.covariances_with(at);
-        zeros.means[meter] = units[meter] * fit.means[at];
-        zeros.prior_stds[meter] = units[meter] * hypothesis.free[at].std;
-        for (other, place) in places.into_iter().enumerate() {
-            zeros.covariance[(other, meter)] =
-                place.map_or(0.0, |place| units[meter] * units[other] * covariances[place]);
-        }
-        for (leak, ends) in hypothesis.ends.iter().enumerate() {
-            let with = ends.iter().map(|(end, sign)| sign * covariances[hypothesis.positive[*end]]);
-            zeros.with_leaks[(leak, meter)] = units[meter] * with.sum::<f64>();
-        }
-    }
-    zeros
-}
-
-/// How far a pressure sensor's zero is usually off, Pa, where an explanation does not have it off.
-fn usual_off_pa(pass: &Pass<'_, '_>, found: &[Found], zero: Column) -> f64 {
-    let pressure = &pass.rig.instruments.pressure;
-    let usual = if pressure.bias > 0.0 { pressure.bias } else { USUAL_PRESSURE };
-    if found.iter().any(|(column, _)| *column == zero) { 0.0 } else { usual * pressure.full_scale }
+/// How far a pressure sensor's zero is off, Pa: as declared, else as usual.
+fn usual_off_pa(rig: &Rig) -> f64 {
+    let pressure = &rig.instruments.pressure;
+    let share = if pressure.bias > 0.0 { pressure.bias } else { USUAL_PRESSURE };
+    share * pressure.full_scale
 }
 
 impl<'a> Fitted<'_, 'a> {
@@ -225,11 +195,11 @@ impl<'a> Fitted<'_, 'a> {
             Leak::ALL.map(|leak| self.pass.doubts_m3s[leak].hypot(self.unexplained_m3s(leak as usize)));
         let scales = Leak::ALL.map(|leak| self.scale(leak));
         let follows = Leak::ALL.map(|leak| follows(leak, lately_pa));
-        let usual_pa = USUAL_PRESSURE * self.pass.rig.instruments.pressure.full_scale;
+        let usual_pa = usual_off_pa(self.pass.rig);
         let at = |(point, normals): (&[f64; MOST], &[f64; MOST])| {
             let flows = Vector3::from_fn(|leak, _| flow(&self.hypothesis, leak, point));
             let coefficients = Vector3::from_fn(|leak, _| flows[leak] / all_pa[Leak::ALL[leak]].max(1.0));
-            let more = self.zeros.more(&coefficients, follows[0], [normals[6], normals[7]]);
+            let more = self.pressures_off.more(&coefficients, follows[0], [normals[6], normals[7]]);
             std::array::from_fn(|i| {
                 if self.hypothesis.ends[i].is_empty() {
                     return 0.0;

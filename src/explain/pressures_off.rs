@@ -8,6 +8,10 @@
 //!
 //! what G as columns of their own, with a prior σ_z, would have.
 
+use super::columns::{Column, Course};
+use super::equations::NormalEquations;
+use super::evidence::Fit;
+use super::hypothesis::Hypothesis;
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
 /// Zeros of the flow meters as a fit has them, in the unit of its leaks.
@@ -18,6 +22,35 @@ pub(super) struct MeterZeros {
     pub prior_stds: Vector2<f64>,
     /// Covariances of each leak at the trace's end with them.
     pub with_leaks: Matrix3x2<f64>,
+}
+
+impl MeterZeros {
+    /// Of a fit, where `units` are those of the meters' zeros in that of leaks. Of one that is not free nothing is known.
+    pub fn of(fit: &Fit, hypothesis: &Hypothesis<'_>, equations: &NormalEquations, units: [f64; 2]) -> Self {
+        let place = |zero: Column| hypothesis.place(equations, zero, Course::Constant);
+        let places = [Column::ZeroA, Column::ZeroB].map(place);
+        let mut zeros = Self {
+            means: Vector2::zeros(),
+            covariance: Matrix2::identity(),
+            prior_stds: Vector2::repeat(1.0),
+            with_leaks: Matrix3x2::zeros(),
+        };
+        for (meter, place) in places.into_iter().enumerate() {
+            let Some(at) = place else { continue };
+            let covariances = fit.covariances_with(at);
+            zeros.means[meter] = units[meter] * fit.means[at];
+            zeros.prior_stds[meter] = units[meter] * hypothesis.free[at].std;
+            for (other, place) in places.into_iter().enumerate() {
+                zeros.covariance[(other, meter)] =
+                    place.map_or(0.0, |place| units[meter] * units[other] * covariances[place]);
+            }
+            for (leak, ends) in hypothesis.ends.iter().enumerate() {
+                let with = ends.iter().map(|(end, sign)| sign * covariances[hypothesis.positive[*end]]);
+                zeros.with_leaks[(leak, meter)] = units[meter] * with.sum::<f64>();
+            }
+        }
+        zeros
+    }
 }
 
 /// Zeros of the pressure sensors beside those of the flow meters, Pa.
