@@ -1,5 +1,6 @@
 //! The columns that explanations set free: what each does to both continuity equations, over the trace.
 
+use super::raw_products::SEGMENTS;
 use super::readings::{Combination, Readings};
 use crate::rig::Rig;
 use pitchleak_core::PerLeak;
@@ -111,6 +112,28 @@ pub enum Course {
     Within(usize),
     /// Until this segment, and in it falling to 0.
     Fading(usize),
+}
+
+impl Course {
+    /// How many there are: a border may lie behind the last segment.
+    pub(super) const COUNT: usize = 5 + 4 * Self::BORDERS;
+    const BORDERS: usize = SEGMENTS + 1;
+
+    /// A number of its own, below their count.
+    pub(super) fn index(self) -> usize {
+        let of = |kind: usize, border: usize| 5 + kind * Self::BORDERS + border.min(SEGMENTS);
+        match self {
+            Self::Constant => 0,
+            Self::Drift => 1,
+            Self::FromBegin => 2,
+            Self::ToEnd => 3,
+            Self::Accelerating => 4,
+            Self::Before(border) => of(0, border),
+            Self::Since(border) => of(1, border),
+            Self::Within(segment) => of(2, segment),
+            Self::Fading(segment) => of(3, segment),
+        }
+    }
 }
 
 /// A column by chamber: combinations of raw sums in the equation of A and of B.
@@ -414,6 +437,16 @@ mod tests {
 
     /// An explanation's column is what its error puts into both left sides, to first order, beside leaks that
     /// were found and without any.
+    #[test]
+    fn each_course_has_a_number_of_its_own() {
+        let at = |of: fn(usize) -> Course| (0..=SEGMENTS).map(of);
+        let steady =
+            [Course::Constant, Course::Drift, Course::FromBegin, Course::ToEnd, Course::Accelerating];
+        let all = steady.into_iter().chain(at(Course::Before)).chain(at(Course::Since));
+        let all = all.chain(at(Course::Within)).chain(at(Course::Fading)).map(Course::index);
+        assert!(all.eq(0..Course::COUNT));
+    }
+
     #[test]
     fn a_column_is_what_its_error_leaves_of_the_left_side() {
         use Column as C;

@@ -24,7 +24,9 @@ pub(super) struct NormalEquations {
     pub loudest: [f64; EQUATIONS],
     /// Noise scales from which on those of a fit are sought.
     pub sought_from: [f64; EQUATIONS],
-    places: HashMap<(Column, Course), usize>,
+    columns: Vec<(Column, Course)>,
+    /// Where each stands, by column and course.
+    places: Vec<Option<u16>>,
 }
 
 /// A symmetric matrix.
@@ -61,7 +63,8 @@ impl NormalEquations {
             left_noise: [[0.0; 2]; EQUATIONS],
             loudest: [1.0; EQUATIONS],
             sought_from: [1.0; EQUATIONS],
-            places: columns.iter().enumerate().map(|(place, key)| (*key, place)).collect(),
+            columns: columns.to_vec(),
+            places: places(columns),
         };
         let kinds: HashMap<Column, [PerChamber; 2]> =
             columns.iter().map(|(column, _)| (*column, scales.column(*column))).collect();
@@ -85,7 +88,7 @@ impl NormalEquations {
 
     /// Where a column stands, if it was asked for.
     pub fn place(&self, column: Column, course: Course) -> Option<usize> {
-        self.places.get(&(column, course)).copied()
+        self.places.get(key(column, course)).copied().flatten().map(usize::from)
     }
 
     /// Standard deviation of the pressure across a leak beside its noise, over its mean size.
@@ -136,8 +139,7 @@ impl NormalEquations {
 
     /// With readings other than the flows so many times quieter than the rows' noise scale says, squared.
     pub fn with_louder_flows(mut self, louder: [f64; EQUATIONS]) -> Self {
-        let mut of_flows = vec![false; self.size];
-        self.places.iter().for_each(|((column, _), place)| of_flows[*place] = column.is_of_flows());
+        let of_flows: Vec<bool> = self.columns.iter().map(|(column, _)| column.is_of_flows()).collect();
         for (noise, louder) in self.noise.iter_mut().zip(louder) {
             for (place, entry) in noise.iter_mut().enumerate() {
                 if !(of_flows[place / self.size] && of_flows[place % self.size]) {
@@ -170,6 +172,20 @@ impl NormalEquations {
             }
         }
     }
+}
+
+/// A number of its own for each column and course.
+fn key(column: Column, course: Course) -> usize {
+    column as usize * Course::COUNT + course.index()
+}
+
+fn places(columns: &[(Column, Course)]) -> Vec<Option<u16>> {
+    let keys = columns.iter().map(|(column, course)| key(*column, *course));
+    let mut places = vec![None; keys.clone().max().map_or(0, |last| last + 1)];
+    for (place, key) in (0..).zip(keys) {
+        places[key] = Some(place);
+    }
+    places
 }
 
 fn combine(kind: &[PerChamber; 2], shares: [f64; 2]) -> Sparse {

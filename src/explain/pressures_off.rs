@@ -90,7 +90,7 @@ impl PressuresOff {
     pub fn more(&self, coefficients: &Vector3<f64>, follows: f64, normals: [f64; 2]) -> Vector3<f64> {
         let off_pa = self.mean_pa + self.root_pa * Vector2::from(normals);
         let across_pa = Vector3::new(follows * (off_pa[0] - off_pa[1]), off_pa[0], off_pa[1]);
-        coefficients.component_mul(&across_pa) - self.taken * steady(coefficients) * off_pa
+        coefficients.component_mul(&across_pa) - self.taken * (steady(coefficients) * off_pa)
     }
 }
 
