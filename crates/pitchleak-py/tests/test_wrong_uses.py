@@ -267,7 +267,11 @@ def test_a_file_of_another_kind_is_told(use, error, words, tmp_path):
 
 #: What may be right, and is wrong here: no leak is told, and the text says why.
 DOUBTED = {
-    "bar_called_pascal": (FRAME.rename(columns={"pa_bar": "pa_pa", "pb_bar": "pb_pa"}), "not_sure", "meters"),
+    "bar_called_pascal": (
+        FRAME.rename(columns={"pa_bar": "pa_pa", "pb_bar": "pb_pa"}),
+        "not_sure",
+        "pressures changing",
+    ),
     "no_flows": (without("qa_lpm", "qb_lpm"), "not_sure", "No flow is recorded"),
     "milliseconds_called_seconds": (FRAME.assign(t_s=FRAME["t_s"] * 1000), "doubtful", "With t divided by 1000"),
 }
