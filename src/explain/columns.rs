@@ -114,28 +114,6 @@ pub enum Course {
     Fading(usize),
 }
 
-impl Course {
-    /// How many there are: a border may lie behind the last segment.
-    pub(super) const COUNT: usize = 5 + 4 * Self::BORDERS;
-    const BORDERS: usize = SEGMENTS + 1;
-
-    /// A number of its own, below their count.
-    pub(super) fn index(self) -> usize {
-        let of = |kind: usize, border: usize| 5 + kind * Self::BORDERS + border.min(SEGMENTS);
-        match self {
-            Self::Constant => 0,
-            Self::Drift => 1,
-            Self::FromBegin => 2,
-            Self::ToEnd => 3,
-            Self::Accelerating => 4,
-            Self::Before(border) => of(0, border),
-            Self::Since(border) => of(1, border),
-            Self::Within(segment) => of(2, segment),
-            Self::Fading(segment) => of(3, segment),
-        }
-    }
-}
-
 /// A column by chamber: combinations of raw sums in the equation of A and of B.
 pub(super) type PerChamber = [Combination; 2];
 
@@ -283,6 +261,26 @@ fn aged(raw: RawSum) -> RawSum {
 }
 
 impl Course {
+    /// How many there are: a border may lie behind the last segment.
+    pub(super) const COUNT: usize = 5 + 4 * Self::BORDERS;
+    const BORDERS: usize = SEGMENTS + 1;
+
+    /// A number of its own, below their count.
+    pub(super) fn index(self) -> usize {
+        let of = |kind: usize, border: usize| 5 + kind * Self::BORDERS + border.min(SEGMENTS);
+        match self {
+            Self::Constant => 0,
+            Self::Drift => 1,
+            Self::FromBegin => 2,
+            Self::ToEnd => 3,
+            Self::Accelerating => 4,
+            Self::Before(border) => of(0, border),
+            Self::Since(border) => of(1, border),
+            Self::Within(segment) => of(2, segment),
+            Self::Fading(segment) => of(3, segment),
+        }
+    }
+
     /// Shares of the column and of its moment in time, in a segment that begins at `begin_s` and lasts `time_s`, of a trace of
     /// `total_s`.
     pub(super) fn shares(self, segment: usize, [begin_s, time_s]: [f64; 2], total_s: f64) -> [f64; 2] {
@@ -435,8 +433,6 @@ mod tests {
         assert!(is_close, "{what}: {found:?}, not {expected:?}");
     }
 
-    /// An explanation's column is what its error puts into both left sides, to first order, beside leaks that
-    /// were found and without any.
     #[test]
     fn each_course_has_a_number_of_its_own() {
         let at = |of: fn(usize) -> Course| (0..=SEGMENTS).map(of);
@@ -447,6 +443,8 @@ mod tests {
         assert!(all.eq(0..Course::COUNT));
     }
 
+    /// An explanation's column is what its error puts into both left sides, to first order, beside leaks that
+    /// were found and without any.
     #[test]
     fn a_column_is_what_its_error_leaves_of_the_left_side() {
         use Column as C;

@@ -82,7 +82,7 @@ impl NormalEquations {
         }
         own.loudest = [0, 1].map(|equation| own.scatter(equation).max(1.0));
         own.sought_from = own.loudest;
-        own.silence(columns);
+        own.silence();
         own
     }
 
@@ -152,14 +152,15 @@ impl NormalEquations {
 
     /// Columns that are mostly noise, as loud as the readings scatter, are zero. The left side's noise is what the residual is
     /// measured by.
-    fn silence(&mut self, columns: &[(Column, Course)]) {
+    fn silence(&mut self) {
         for equation in 0..EQUATIONS {
             self.noise[equation][0] = 0.0;
-            for (place, (column, _)) in columns.iter().enumerate().skip(1) {
+            for place in 1..self.size {
+                let column = self.columns[place].0;
                 let is_leak = matches!(column, Column::LeakInternal | Column::LeakA | Column::LeakB);
                 let power = self.gram(equation).row(place)[place];
                 // What tells such noise is not.
-                let louder = if *column == Column::Unpressed { 1.0 } else { self.loudest[equation] };
+                let louder = if column == Column::Unpressed { 1.0 } else { self.loudest[equation] };
                 let noise = louder * self.noise(equation).row(place)[place];
                 if !is_leak && power < LEAST_POWER * noise {
                     for other in 0..self.size {

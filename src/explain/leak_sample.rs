@@ -8,7 +8,7 @@ use super::given_leaks::GivenLeaks;
 use super::hypothesis::{Hypothesis, LEAK_COLUMNS, State};
 use super::orthant::{FEW_POINTS, MOST, NORMALS, Orthant, POINTS, positive_orthant};
 use super::pass::{Pass, follows};
-use super::pressures_off::{MeterZeros, PressuresOff};
+use super::pressures_off::{MeterZeros, PressuresOff, across};
 use super::sizes::{Found, over_declared};
 use super::table::USUAL_PRESSURE;
 use crate::rig::Rig;
@@ -190,7 +190,7 @@ impl<'a> Fitted<'_, 'a> {
         let products = self.pass.products;
         let all_pa = products.mean_pressures_pa(0);
         let lately_pa = products.mean_pressures_pa(self.last_change());
-        let off_pa = Leak::ALL.map(|leak| self.pressure_off_pa(leak as usize, lately_pa));
+        let off_pa = self.pressures_off_pa(lately_pa);
         let doubts_m3s =
             Leak::ALL.map(|leak| self.pass.doubts_m3s[leak].hypot(self.unexplained_m3s(leak as usize)));
         let scales = Leak::ALL.map(|leak| self.scale(leak));
@@ -229,13 +229,8 @@ impl<'a> Fitted<'_, 'a> {
         own.map_or(Estimate { value: 1.0, std: 0.0 }, |(_, share)| over_declared(*share))
     }
 
-    /// By how much the pressure across a leak is larger than read, Pa, where an explanation has a zero or a gain of a pressure sensor.
-    fn pressure_off_pa(&self, leak: usize, mean_pa: PerLeak<f64>) -> f64 {
-        let signs = match leak {
-            0 => [-1.0, 1.0],
-            1 => [-1.0, 0.0],
-            _ => [0.0, -1.0],
-        };
+    /// By how much the pressure across each leak is larger than read, Pa, where an explanation has a zero or a gain of a pressure sensor.
+    fn pressures_off_pa(&self, mean_pa: PerLeak<f64>) -> Vector3<f64> {
         let full_scale = self.pass.rig.instruments.pressure.full_scale;
         let share = |column: Column| {
             self.found.iter().find(|(known, _)| *known == column).map_or(0.0, |(_, size)| size.value)
@@ -244,7 +239,7 @@ impl<'a> Fitted<'_, 'a> {
             share(Column::PressureZeroA) * full_scale + share(Column::PressureGainA) * mean_pa.external_a;
         let off_b =
             share(Column::PressureZeroB) * full_scale + share(Column::PressureGainB) * mean_pa.external_b;
-        signs[0] * off_a + signs[1] * off_b
+        across([-off_a, -off_b])
     }
 
     /// The segment from which on all leaks are as at the end.

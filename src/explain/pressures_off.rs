@@ -62,6 +62,11 @@ pub(super) struct PressuresOff {
     taken: Matrix3x2<f64>,
 }
 
+/// How much more there is across each leak than is read, of sensors that are so far below their pressures.
+pub(super) fn across([a, b]: [f64; 2]) -> Vector3<f64> {
+    Vector3::new(a - b, a, b)
+}
+
 /// G: flow out of each chamber for what each sensor is below its pressure, with coefficients C of each leak.
 fn steady(coefficients: &Vector3<f64>) -> Matrix2<f64> {
     let [internal, a, b] = (*coefficients).into();
@@ -89,7 +94,8 @@ impl PressuresOff {
     /// and the zeros are so many standard deviations off.
     pub fn more(&self, coefficients: &Vector3<f64>, follows: f64, normals: [f64; 2]) -> Vector3<f64> {
         let off_pa = self.mean_pa + self.root_pa * Vector2::from(normals);
-        let across_pa = Vector3::new(follows * (off_pa[0] - off_pa[1]), off_pa[0], off_pa[1]);
+        let mut across_pa = across(off_pa.into());
+        across_pa[0] *= follows;
         coefficients.component_mul(&across_pa) - self.taken * (steady(coefficients) * off_pa)
     }
 }

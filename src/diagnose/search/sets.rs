@@ -11,7 +11,6 @@ use crate::diagnose::thresholds::{CURVED_SHARE, MOST_EXCHANGES, MOST_ROUNDS, SIG
 use crate::presence::ln_tail;
 use pitchleak_core::Leak;
 use pitchleak_core::effects::EffectConstants;
-use std::collections::BTreeMap;
 
 /// Some named effects gone, and others in their place.
 #[derive(Clone, Debug)]
@@ -103,33 +102,30 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     let dispersion = fit.dispersion(fit.free.chi2);
     let named: Vec<usize> = all.effects.iter().map(|one| one.term).collect();
     let mut candidates = Candidates::of(fit);
-    let mut near = vec![];
-    for gone in subsets(&named) {
+    let mut in_place_of = |gone: Vec<usize>| {
         let without = fit.solve_without(&gone);
         let lost = without.chi2 - fit.free.chi2;
         let margin = SIGNIFICANT_SIGMA.powi(2) + CURVED_SHARE * lost / dispersion;
         let singles = of_one(&mut candidates, &without, &gone);
         let pairs = of_two(fit, &without, &gone);
-        near.extend(singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin));
-    }
-    near.sort_by(|a, b| a.worse(dispersion).total_cmp(&b.worse(dispersion)));
-    let near = some_of_each(near);
+        singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin).collect()
+    };
+    let near = some_of_each(subsets(&named).into_iter().map(&mut in_place_of).collect(), dispersion);
     let own_leaks = below_zero(fit);
     near.into_iter().filter_map(|one| fitted(fit, own_leaks, one, progress)).collect()
 }
 
-/// The most exchanges that are fitted, of all that are sorted: the first in each place, the second in each, and so on. One effect with many
-/// rivals leaves room for those of the others.
-fn some_of_each(sorted: Vec<Exchange>) -> Vec<Exchange> {
-    let mut met: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
-    let mut ranked: Vec<(usize, Exchange)> = vec![];
-    for one in sorted {
-        let rank = met.entry(one.gone.clone()).or_default();
-        ranked.push((*rank, one));
-        *rank += 1;
-    }
-    ranked.sort_by_key(|(rank, _)| *rank);
-    ranked.into_iter().map(|(_, one)| one).take(MOST_EXCHANGES).collect()
+/// The most exchanges that are fitted: the nearest in each place, the second in each, and so on. One effect with many rivals leaves room for
+/// those of the others.
+fn some_of_each(places: Vec<Vec<Exchange>>, dispersion: f64) -> Vec<Exchange> {
+    let nearer = |a: &Exchange, b: &Exchange| a.worse(dispersion).total_cmp(&b.worse(dispersion));
+    let ranked = |mut own: Vec<Exchange>| {
+        own.sort_by(nearer);
+        own.into_iter().enumerate()
+    };
+    let mut all: Vec<(usize, Exchange)> = places.into_iter().flat_map(ranked).collect();
+    all.sort_by(|(rank, one), (other_rank, other)| rank.cmp(other_rank).then_with(|| nearer(one, other)));
+    all.into_iter().map(|(_, one)| one).take(MOST_EXCHANGES).collect()
 }
 
 /// All sets of these but the empty one.
@@ -304,8 +300,8 @@ mod tests {
             dearer: 0.0,
             values: vec![],
         };
-        let of_one = (0..2 * MOST_EXCHANGES).map(|rank| exchange(0, rank as f64));
-        let kept = some_of_each(of_one.chain([exchange(1, 1e3), exchange(1, 2e3)]).collect());
+        let of_one = (0..2 * MOST_EXCHANGES).map(|rank| exchange(0, rank as f64)).collect();
+        let kept = some_of_each(vec![of_one, vec![exchange(1, 2e3), exchange(1, 1e3)]], 1.0);
         let order: Vec<(usize, f64)> = kept.iter().take(5).map(|one| (one.gone[0], one.left.chi2)).collect();
         assert_eq!(order, [(0, 0.0), (1, 1e3), (0, 1.0), (1, 2e3), (0, 2.0)]);
         assert_eq!(kept.len(), MOST_EXCHANGES);
