@@ -235,20 +235,16 @@ impl Regression {
         let inverse = inverse(matrix);
         let scaled = &inverse * &right;
         let chi2 = chi2 - right.dot(&scaled);
-        let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
-        let std = terms
-            .iter()
-            .enumerate()
-            .map(|(i, t)| self.scatter(inverse[(i, i)], *t).sqrt() / self.scale[*t])
-            .collect();
+        let telling = |(i, term): (usize, &usize)| self.scale[*term] * self.telling_share(inverse[(i, i)], *term);
+        let telling: Vec<f64> = terms.iter().enumerate().map(telling).collect();
+        let value = scaled.iter().zip(&telling).map(|(v, telling)| v / telling).collect();
+        let std = telling.iter().enumerate().map(|(i, telling)| inverse[(i, i)].max(0.0).sqrt() / telling).collect();
         Solution { terms, value, std, chi2, scaled, inverse }
     }
 
-    /// Variance of a unit column's size, which the Gram matrix alone gives as `quiet`: of what is new in the column only the
-    /// part that is no noise tells its size.
-    fn scatter(&self, quiet: f64, term: usize) -> f64 {
-        let noise = (self.noise_share[term] * quiet.max(0.0)).min(MOST_OF);
-        quiet.max(0.0) / (1.0 - noise).powi(2)
+    /// Of what is new in a unit column, whose size has this variance, the share that is no noise: it alone tells the size.
+    fn telling_share(&self, variance: f64, term: usize) -> f64 {
+        1.0 - (self.noise_share[term] * variance.max(0.0)).min(MOST_OF)
     }
 
     /// Variance of a sum of terms, each times a factor.

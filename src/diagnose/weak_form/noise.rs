@@ -26,8 +26,9 @@ pub(crate) struct TestFunctionWeights {
     pub(crate) next: Products,
 }
 
-/// The weights of a test function over two blocks of `samples`, as `integrals.rs` takes mean, rate and curvature over a step.
-pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
+/// The weight of each sample in a test function over two blocks of `samples`, from [`SAMPLES_BEFORE`] on, as `integrals.rs` takes mean, rate
+/// and curvature over a step.
+pub(crate) fn sample_weights(samples: usize) -> [Vec<f64>; 3] {
     let m = samples as isize;
     let step = |j: isize| {
         if (0..2 * m - 1).contains(&j) { (m - (j - (m - 1)).abs()) as f64 / m as f64 } else { 0.0 }
@@ -42,7 +43,15 @@ pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
     let weight = |pattern: &[f64; 6], i: isize| {
         pattern.iter().zip(0_isize..).map(|(share, place)| share * step(i + 2 - place)).sum::<f64>()
     };
-    let weights = patterns.map(|pattern| (-3..3 * m + 3).map(|i| weight(&pattern, i)).collect::<Vec<f64>>());
+    patterns.map(|pattern| (-SAMPLES_BEFORE..2 * m + SAMPLES_BEFORE).map(|i| weight(&pattern, i)).collect())
+}
+
+/// So many samples before a test function's blocks have a weight in it, and after them.
+const SAMPLES_BEFORE: isize = 3;
+
+/// The sums of products of [`sample_weights`].
+pub(crate) fn test_function_weights(samples: usize) -> TestFunctionWeights {
+    let weights = sample_weights(samples);
     let products = |shift: usize| {
         let product = |a: &[f64], b: &[f64]| a.iter().skip(shift).zip(b).map(|(a, b)| a * b).sum::<f64>();
         std::array::from_fn(|one| std::array::from_fn(|other| product(&weights[one], &weights[other])))

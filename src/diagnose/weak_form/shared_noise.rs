@@ -1,12 +1,14 @@
 //! What columns share with the residual, drawn again and again: noise of the same sensors.
 
-use super::noise::{NoiseModel, TestFunctionWeights, test_function_weights};
+use super::linearisation::as_felt;
+use super::noise::{NoiseModel, sample_weights};
 use super::rows::{Entry, Row, Rows};
 use super::terms::{Columns, Term};
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::PerEquation;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
+use std::collections::VecDeque;
 
 /// One realisation of the noise that some columns share with the residual.
 pub(crate) struct SharedNoise {
@@ -37,29 +39,29 @@ impl Rademacher {
     }
 }
 
-/// Noise of one sensor in each row: through test functions (0), and through differences of block means (1).
-type InRows = [Vec<f64>; 2];
+/// Noise of one sensor in each row: through test functions (0), differences (1) and curvatures (2).
+type InRows = [Vec<f64>; 3];
 
-/// Unit white noise seen by each row. A test function's noise is that of its two blocks, which it shares with its
-/// neighbours, and its own, in the shares that give the known covariances.
+/// Unit white noise seen by each row, sample by sample: neighbours share those of a block.
 fn draw(rows: &[Row], signs: &mut Rademacher) -> InRows {
-    let (mut difference, mut weighted) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
-    let mut last = (usize::MAX, 0.0);
-    let mut known = (0, TestFunctionWeights::default());
+    let mut in_rows = InRows::default();
+    let (mut known, mut weights) = (0, <[Vec<f64>; 3]>::default());
+    let mut samples = VecDeque::new();
+    let mut stretch = usize::MAX;
     for row in rows {
-        let left = if last.0 == row.stretch { last.1 } else { signs.next() };
-        let right = signs.next();
-        last = (row.stretch, right);
-        if known.0 != row.samples {
-            known = (row.samples, test_function_weights(row.samples));
+        if known != row.samples {
+            (known, weights) = (row.samples, sample_weights(row.samples));
         }
-        let (own, next) = (known.1.own[0][0], known.1.next[0][0]);
+        let gone = if stretch == row.stretch { row.samples } else { samples.len() };
+        stretch = row.stretch;
+        samples.drain(..gone.min(samples.len()));
+        samples.extend((samples.len()..weights[0].len()).map(|_| signs.next()));
         let step_s = row.block_s / row.samples as f64;
-        difference.push((right - left) / (row.samples as f64).sqrt());
-        let shared = next.max(0.0).sqrt() * (left + right);
-        weighted.push(step_s * (shared + (own - 2.0 * next).max(0.0).sqrt() * signs.next()));
+        for ((drawn, weights), unit) in in_rows.iter_mut().zip(&weights).zip([step_s, 1.0, 1.0 / step_s]) {
+            drawn.push(unit * weights.iter().zip(&samples).map(|(weight, sample)| weight * sample).sum::<f64>());
+        }
     }
-    [weighted, difference]
+    in_rows
 }
 
 impl SharedNoise {
@@ -74,7 +76,7 @@ impl SharedNoise {
         let in_row = |entry: &Entry| {
             let sensitivity = &noise.sensitivities[entry.row][entry.equation];
             let of_one = |((gains, noise_factor), drawn): ((&[f64; 3], &f64), &InRows)| {
-                noise_factor * (gains[0] * drawn[0][entry.row] + gains[1] * drawn[1][entry.row])
+                noise_factor * gains.iter().zip(drawn).map(|(gain, drawn)| gain * drawn[entry.row]).sum::<f64>()
             };
             sensitivity.gains.iter().zip(&sensitivity.noise_factor).zip(&drawn).map(of_one).sum()
         };
@@ -133,11 +135,12 @@ fn slopes(
     }
     let term = (term, term.in_force());
     let of_row = |row: &Row| {
-        let seen = noise.at.effects.correct(&row.mean);
         let slope = |(channel, order): &(Channel, usize)| {
             let std = channel.noise_std(noise.sensors, &noise.at.model.cylinder);
-            channel.slope(*order, &seen, (std, row.block_s), |at| {
-                let mut unit = noise.at.both_unit_terms(term, constants, at, at);
+            channel.slope(*order, &row.mean, (std, row.block_s), |reading| {
+                let seen = noise.at.effects.correct(reading);
+                let felt = as_felt(&seen, reading);
+                let mut unit = noise.at.both_unit_terms(term, constants, &seen, &felt);
                 // Forces feel another speed than the position's.
                 match *channel {
                     Channel::FeltSpeed => (unit.chamber_a, unit.chamber_b) = (0.0, 0.0),
