@@ -185,7 +185,7 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let WeakForm { at, rows, whitening, .. } = &weak_form;
-        let mut shared = weak_form.shared_noise(&problem.white, columns);
+        let mut shared = weak_form.shared_noise(&problem.unit_noise, &problem.white, columns);
         if assumed_error != PerEquation::default() {
             // The equations' error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
             shared.iter_mut().for_each(|noise| noise.columns.retain(|column| column.is_left_side));

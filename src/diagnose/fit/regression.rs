@@ -235,10 +235,15 @@ impl Regression {
         let inverse = inverse(matrix);
         let scaled = &inverse * &right;
         let chi2 = chi2 - right.dot(&scaled);
-        let telling = |(i, term): (usize, &usize)| self.scale[*term] * self.telling_share(inverse[(i, i)], *term);
+        let telling =
+            |(i, term): (usize, &usize)| self.scale[*term] * self.telling_share(inverse[(i, i)], *term);
         let telling: Vec<f64> = terms.iter().enumerate().map(telling).collect();
         let value = scaled.iter().zip(&telling).map(|(v, telling)| v / telling).collect();
-        let std = telling.iter().enumerate().map(|(i, telling)| inverse[(i, i)].max(0.0).sqrt() / telling).collect();
+        let std = telling
+            .iter()
+            .enumerate()
+            .map(|(i, telling)| inverse[(i, i)].max(0.0).sqrt() / telling)
+            .collect();
         Solution { terms, value, std, chi2, scaled, inverse }
     }
 

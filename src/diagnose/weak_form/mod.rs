@@ -13,7 +13,7 @@ pub(crate) use leak_change::{ChangeKind, LeakChange};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
-pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
+pub(crate) use shared_noise::{NoisyColumn, SharedNoise, UnitNoise};
 pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
 
 use self::integrals::{ActiveTerm, Integrand};
@@ -22,7 +22,7 @@ use self::sensitivity::Sensitivity;
 use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use crate::diagnose::thresholds::BLOCK_S;
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
@@ -147,10 +147,15 @@ impl<'a> WeakForm<'a> {
     }
 
     /// Realisations of the noise of `sensors` that the columns share with the residual.
-    pub(crate) fn shared_noise(&self, sensors: &Sensors<f64>, columns: Columns<'_>) -> Vec<SharedNoise> {
+    pub(crate) fn shared_noise(
+        &self,
+        unit: &OnceLock<UnitNoise>,
+        sensors: &Sensors<f64>,
+        columns: Columns<'_>,
+    ) -> Vec<SharedNoise> {
         let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
         let slopes = Slopes::of(&self.rows, &noise, columns);
-        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, &slopes, number)).collect()
+        SharedNoise::all(unit.get_or_init(|| UnitNoise::draw(&self.rows)), &self.rows, &noise, &slopes)
     }
 
     /// The column of one term, whitened.

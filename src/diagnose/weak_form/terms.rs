@@ -4,6 +4,7 @@
 use super::leak_change::LeakChange;
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::Equation;
+use crate::diagnose::thresholds::NEGLIGIBLE_SHARE;
 use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
@@ -38,6 +39,13 @@ pub(crate) struct Columns<'a> {
     pub(crate) constants: &'a [EffectConstants<f64>],
     /// Places of the terms that get a column; those of the others stay empty.
     pub(crate) places: &'a [usize],
+}
+
+/// Which balances are meant: the chambers' oil, the piston's forces.
+#[derive(Clone, Copy)]
+pub(super) struct Balances {
+    pub(super) chambers: bool,
+    pub(super) force: bool,
 }
 
 /// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
@@ -176,8 +184,13 @@ impl Term {
         }
     }
 
+    /// The balances that it shows in.
+    pub(super) fn balances(self) -> Balances {
+        Balances { chambers: !self.is_force(), force: self.in_force() }
+    }
+
     /// Whether it is a force alone.
-    pub(super) fn is_force(self) -> bool {
+    fn is_force(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().kind == EffectKind::Force,
             Self::Product(one, other) => Self::Effect(one).is_force() || Self::Effect(other).is_force(),
@@ -203,26 +216,29 @@ impl Term {
                     _ if carries.is_some() || !shares_noise_of.is_empty() => {
                         carries.iter().chain(*shares_noise_of).copied().flat_map(left_side).copied().collect()
                     }
-                    EffectKind::Sensor | EffectKind::Storage => self.rates(),
+                    EffectKind::Sensor => self.rates(),
                     _ if self.in_force() => FELT.to_vec(),
-                    _ => vec![],
+                    _ => self.rates(),
                 }
             }
             _ => vec![],
         }
     }
 
-    /// The rates that it is made of, of readings that noise makes rough: of what a lag delays, of what drives stored oil. What undoes a lag
-    /// brings curvature into a rate.
+    /// The rates that it is made of, of readings whose noise makes them rough: of what a lag delays, of what drives stored oil. What undoes a
+    /// lag brings curvature into a rate.
     fn rates(self) -> Vec<(Channel, usize)> {
         let rough = [Channel::PressureA, Channel::PressureB, Channel::FlowA, Channel::FlowB];
-        let of = |at: &Signals<f64>| self.unit_term(at, &Model::paper(), &EffectConstants::default());
+        let of = |at: &Signals<f64>| {
+            let Terms { chamber_a_m3s, chamber_b_m3s, force_n } =
+                self.unit_term(at, &Model::paper(), &EffectConstants::default());
+            [chamber_a_m3s, chamber_b_m3s, force_n]
+        };
         let shows = |channel: &Channel| {
             let mut without = PROBE;
-            channel.signal(1, &mut without).is_some_and(|rate| {
-                *rate = 0.0;
-                true
-            }) && of(&without) != of(&PROBE)
+            channel.signal(1, &mut without).into_iter().for_each(|rate| *rate = 0.0);
+            let pairs = of(&PROBE).into_iter().zip(of(&without));
+            pairs.into_iter().any(|(full, without)| (full - without).abs() > NEGLIGIBLE_SHARE * full.abs())
         };
         rough.into_iter().filter(shows).flat_map(|channel| [(channel, 1), (channel, 2)]).collect()
     }
