@@ -3,11 +3,10 @@
 use super::regression::Prior;
 use crate::diagnose::data::{Declared, Motion, SensorCheck, Series, Unresolved, effective, white};
 use crate::diagnose::thresholds::{SIGNIFICANT_SIGMA, SMALL_SHARE};
-use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, UnitNoise, all_terms};
+use crate::diagnose::weak_form::{DECLARED, LeakChange, Linearisation, Term, all_terms};
 use pitchleak_core::effects::{EffectConstant, EffectConstants};
 use pitchleak_core::{Cylinder, Effect, Sensors, Signals};
 use std::f64::consts::FRAC_PI_2;
-use std::sync::OnceLock;
 
 /// Traces of one rig, the terms that may explain them, and what is known of these beside the data.
 pub(crate) struct Problem<'a> {
@@ -32,8 +31,6 @@ pub(crate) struct Problem<'a> {
     given_constants: EffectConstants<f64>,
     /// The declared model, from which the fit sets out.
     pub(super) start: Linearisation,
-    /// Filled by the first fit.
-    pub(super) unit_noise: OnceLock<UnitNoise>,
 }
 
 impl<'a> Problem<'a> {
@@ -56,7 +53,6 @@ impl<'a> Problem<'a> {
             given_constants: EffectConstants { slip_speed_mps: turning_speed(declared), ..usual_constants },
             usual_constants,
             start,
-            unit_noise: OnceLock::new(),
         }
     }
 

@@ -13,20 +13,20 @@ pub(crate) use leak_change::{ChangeKind, LeakChange};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
-pub(crate) use shared_noise::{NoisyColumn, SharedNoise, UnitNoise};
+pub(crate) use shared_noise::SharedNoise;
 pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
 
 use self::integrals::{ActiveTerm, Integrand};
 use self::rows::Steps;
 use self::sensitivity::Sensitivity;
-use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::BLOCK_S;
+use crate::diagnose::thresholds::{BLOCK_S, PIECES};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
@@ -146,16 +146,15 @@ impl<'a> WeakForm<'a> {
         rows.rows.par_iter().map(|row| Sensitivity::of(at, sensors, row)).collect()
     }
 
-    /// Realisations of the noise of `sensors` that the columns share with the residual.
+    /// The noise of `sensors` that the columns share with the residual, in these pieces of the entries.
     pub(crate) fn shared_noise(
         &self,
-        unit: &OnceLock<UnitNoise>,
         sensors: &Sensors<f64>,
         columns: Columns<'_>,
-    ) -> Vec<SharedNoise> {
+        pieces: &[Range<usize>; PIECES],
+    ) -> SharedNoise {
         let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
-        let slopes = Slopes::of(&self.rows, &noise, columns);
-        SharedNoise::all(unit.get_or_init(|| UnitNoise::draw(&self.rows)), &self.rows, &noise, &slopes)
+        SharedNoise::of(&self.rows, &noise, &self.whitening, columns, pieces)
     }
 
     /// The column of one term, whitened.

@@ -1,160 +1,280 @@
-//! What columns share with the residual, drawn again and again: noise of the same sensors.
+//! What columns share with the residual: noise of the same sensors. Whitened, the mean of a product of both is the trace of Σ⁻¹ times their
+//! covariance. That is a band, as [`noise`](super::noise) has it, so the same band of Σ⁻¹ is enough.
 
 use super::linearisation::as_felt;
-use super::noise::{NoiseModel, sample_weights};
+use super::noise::{NoiseModel, Products, Whitening, rows_apart, test_function_weights};
 use super::rows::{Entry, Row, Rows};
 use super::terms::{Balances, Columns, Term};
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::NOISE_DRAWS;
-use pitchleak_core::Effect;
+use crate::diagnose::thresholds::PIECES;
 use pitchleak_core::effects::EffectConstants;
+use pitchleak_core::{Effect, Signals};
 use rayon::prelude::*;
-use std::collections::VecDeque;
+use std::ops::Range;
 
-/// One realisation of the noise that some columns share with the residual.
+/// Means of whitened products of noise, in each piece of the traces.
+#[derive(Default)]
 pub(crate) struct SharedNoise {
-    /// In the rows.
-    pub(crate) rows: Vec<f64>,
-    /// In the columns that have it.
     pub(crate) columns: Vec<NoisyColumn>,
+    /// Those of two columns each that are in proportion to the equations' left side.
+    pub(crate) products: Vec<(usize, usize, [f64; PIECES])>,
 }
 
-/// The noise of one column.
+/// Those of a column.
 pub(crate) struct NoisyColumn {
     pub(crate) term: usize,
-    /// Whether the column is in proportion to the equations' left side.
-    pub(crate) is_left_side: bool,
-    pub(crate) noise: Vec<f64>,
-}
-
-/// Signs without an order, each as likely as the other (splitmix64), the same on every machine.
-struct Rademacher(u64);
-
-impl Rademacher {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
-    }
-}
-
-/// Unit noise of one sensor in each row: through test functions (0), differences (1) and curvatures (2).
-type InRows = [Vec<f64>; 3];
-
-/// Realisations of unit white noise of every channel as the rows see it: drawn once, as the rows stay the same ones.
-pub(crate) struct UnitNoise(Vec<[InRows; Channel::ALL.len()]>);
-
-impl UnitNoise {
-    pub(crate) fn draw(rows: &Rows) -> Self {
-        let of_number = |number: u64| {
-            let mut signs = Rademacher(number);
-            Channel::ALL.map(|_| in_rows(&rows.rows, &mut signs))
-        };
-        Self((0..NOISE_DRAWS).into_par_iter().map(of_number).collect())
-    }
-}
-
-/// What each row sees of white noise, sample by sample: neighbours share those of a block.
-fn in_rows(rows: &[Row], signs: &mut Rademacher) -> InRows {
-    let mut seen = InRows::default();
-    let (mut known, mut weights) = (0, <[Vec<f64>; 3]>::default());
-    let (mut samples, mut stretch) = (VecDeque::new(), usize::MAX);
-    for row in rows {
-        if known != row.samples {
-            (known, weights) = (row.samples, sample_weights(row.samples));
-        }
-        let gone = if stretch == row.stretch { row.samples } else { samples.len() };
-        stretch = row.stretch;
-        samples.drain(..gone);
-        samples.extend((samples.len()..weights[0].len()).map(|_| signs.next()));
-        let step_s = row.block_s / row.samples as f64;
-        for ((seen, weights), unit) in seen.iter_mut().zip(&weights).zip([step_s, 1.0, 1.0 / step_s]) {
-            seen.push(
-                unit * weights.iter().zip(&samples).map(|(weight, sample)| weight * sample).sum::<f64>(),
-            );
-        }
-    }
-    seen
+    pub(crate) with_residual: [f64; PIECES],
+    /// All in all; none of one that is in proportion to the equations' left side.
+    pub(crate) with_itself: f64,
 }
 
 impl SharedNoise {
-    /// Every realisation.
-    pub(crate) fn all(unit: &UnitNoise, rows: &Rows, noise: &NoiseModel<'_>, slopes: &Slopes) -> Vec<Self> {
-        unit.0.iter().map(|drawn| Self::of(drawn, rows, noise, slopes)).collect()
-    }
-
-    fn of(unit: &[InRows; Channel::ALL.len()], rows: &Rows, noise: &NoiseModel<'_>, slopes: &Slopes) -> Self {
-        let stds = Channel::ALL.map(|channel| channel.noise_std(noise.sensors, &noise.at.model.cylinder));
-        let in_row = |entry: &Entry| {
-            let sensitivity = &noise.sensitivities[entry.row][entry.equation];
-            let of_one = |channel: Channel| {
-                let place = channel as usize;
-                let orders = sensitivity.gains[place].iter().zip(&unit[place]);
-                let of_unit: f64 = orders.map(|(gain, unit)| gain * unit[entry.row]).sum();
-                sensitivity.noise_factor[place] * stds[place] * of_unit
-            };
-            Channel::ALL.into_iter().map(of_one).sum()
+    /// That of columns and residual in these `pieces` of the entries.
+    pub(super) fn of(
+        rows: &Rows,
+        noise: &NoiseModel<'_>,
+        whitening: &Whitening,
+        columns: Columns<'_>,
+        pieces: &[Range<usize>; PIECES],
+    ) -> Self {
+        let residual = Correlations::of(rows, noise, whitening, pieces);
+        let column = |place: &usize| ColumnNoise::of(rows, noise, columns, *place);
+        let all: Vec<ColumnNoise> = columns.places.par_iter().filter_map(column).collect();
+        let of_column = |one: &ColumnNoise| NoisyColumn {
+            term: one.term,
+            with_residual: residual.traced(|seat| one.with_residual(&residual.gains, seat)),
+            with_itself: if one.is_left_side {
+                0.0
+            } else {
+                residual.traced(|seat| one.with(one, &residual.gains, seat)).iter().sum()
+            },
         };
-        let in_rows: Vec<f64> = rows.entries.iter().map(in_row).collect();
-        let columns = slopes.0.iter().map(|SlopesOfTerm { place, term, signals, by_row }| {
-            let in_column = |entry: &Entry| {
-                let signals = signals.iter().zip(&by_row[entry.row]);
-                let of_one = |((channel, order), slope): (&(Channel, usize), &PerEquation<f64>)| {
-                    let place = *channel as usize;
-                    slope[entry.equation] * stds[place] * unit[place][*order][entry.row]
-                };
-                signals.map(of_one).sum()
-            };
-            let mut own: Vec<f64> = rows.entries.iter().map(in_column).collect();
-            rows.meet_scale(*term, &mut own, &in_rows);
-            NoisyColumn { term: *place, is_left_side: term.is_left_side(), noise: own }
-        });
-        let columns = columns.collect();
-        Self { rows: in_rows, columns }
+        let left: Vec<&ColumnNoise> = all.iter().filter(|one| one.is_left_side).collect();
+        let pairs: Vec<_> = (0..left.len()).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
+        let of_pair = |(a, b): &(usize, usize)| {
+            let (a, b) = (left[*a], left[*b]);
+            (a.term, b.term, residual.traced(|seat| a.with(b, &residual.gains, seat)))
+        };
+        Self {
+            columns: all.par_iter().map(of_column).collect(),
+            products: pairs.par_iter().map(of_pair).collect(),
+        }
     }
 }
 
-/// By how much the terms that carry noise grow with each signal they carry it from.
-pub(crate) struct Slopes(Vec<SlopesOfTerm>);
+/// How an entry takes up unit noise of each channel: by test functions (0), differences (1) and curvatures (2).
+type Gains = [[f64; 3]; Channel::ALL.len()];
 
-struct SlopesOfTerm {
-    place: usize,
-    term: Term,
+/// The noise of the residual, and of which entries it is correlated.
+struct Correlations {
+    /// Of each entry.
+    gains: Vec<Gains>,
+    /// By the samples of a block: of a row with itself, with the next and with the one before.
+    weights: Vec<(usize, [Products; 3])>,
+    pairs: Vec<Pair>,
+}
+
+/// Two entries, or one and itself.
+struct Pair {
+    earlier: usize,
+    later: usize,
+    rows_apart: usize,
+    weights: usize,
+    piece: usize,
+    /// Of Σ⁻¹.
+    inverse: f64,
+    /// Covariance of their residual.
+    covariance: f64,
+}
+
+/// Two entries in their order, as one factor of a product and the other have them.
+struct Seat<'a> {
+    one: usize,
+    other: usize,
+    /// By the order of the one's noise and the other's.
+    weights: &'a Products,
+    /// The other way.
+    turned: &'a Products,
+    /// Covariance of the residual.
+    covariance: f64,
+}
+
+impl Correlations {
+    fn of(
+        rows: &Rows,
+        noise: &NoiseModel<'_>,
+        whitening: &Whitening,
+        pieces: &[Range<usize>; PIECES],
+    ) -> Self {
+        let stds = Channel::ALL.map(|channel| channel.noise_std(noise.sensors, &noise.at.model.cylinder));
+        let of_entry = |entry: &Entry| -> Gains {
+            let own = &noise.sensitivities[entry.row][entry.equation];
+            let units = units(&rows.rows[entry.row]);
+            std::array::from_fn(|channel| {
+                let std = own.noise_factor[channel] * stds[channel];
+                std::array::from_fn(|order| own.gains[channel][order] * std * units[order])
+            })
+        };
+        let gains = rows.entries.iter().map(of_entry).collect();
+        let mut all = Self { gains, weights: vec![], pairs: vec![] };
+        for (later, inverse) in whitening.inverse().into_iter().enumerate() {
+            let own = &rows.entries[later];
+            let weights = all.weights_of(rows.rows[own.row].samples);
+            let piece = pieces.iter().position(|piece| piece.contains(&later)).unwrap_or(0);
+            for (earlier, inverse) in (0..=later).rev().zip(inverse) {
+                let Some(rows_apart) = rows_apart(rows, own, &rows.entries[earlier]) else { continue };
+                let pair = Pair { earlier, later, rows_apart, weights, piece, inverse, covariance: 0.0 };
+                let covariance = all.residual(&all.seats(&pair)[0]);
+                all.pairs.push(Pair { covariance, ..pair });
+            }
+        }
+        all
+    }
+
+    fn weights_of(&mut self, samples: usize) -> usize {
+        self.weights.iter().position(|(known, _)| *known == samples).unwrap_or_else(|| {
+            let all = test_function_weights(samples);
+            let before = std::array::from_fn(|k| std::array::from_fn(|l| all.next[l][k]));
+            self.weights.push((samples, [all.own, all.next, before]));
+            self.weights.len() - 1
+        })
+    }
+
+    /// The earlier entry first, and the later one.
+    fn seats(&self, pair: &Pair) -> [Seat<'_>; 2] {
+        let [own, next, before] = &self.weights[pair.weights].1;
+        let (weights, turned) = if pair.rows_apart == 0 { (own, own) } else { (next, before) };
+        let Pair { earlier, later, covariance, .. } = *pair;
+        [
+            Seat { one: earlier, other: later, weights, turned, covariance },
+            Seat { one: later, other: earlier, weights: turned, turned: weights, covariance },
+        ]
+    }
+
+    fn residual(&self, seat: &Seat<'_>) -> f64 {
+        let channels = self.gains[seat.one].iter().zip(&self.gains[seat.other]);
+        let of_channel = |(one, other): (&[f64; 3], &[f64; 3])| -> f64 {
+            one.iter().zip(seat.weights).map(|(gain, weights)| gain * dot(weights, other)).sum()
+        };
+        channels.map(of_channel).sum()
+    }
+
+    /// The trace of Σ⁻¹ times a covariance, in each piece.
+    fn traced(&self, covariance: impl Fn(&Seat<'_>) -> f64) -> [f64; PIECES] {
+        let mut sums = [0.0; PIECES];
+        for pair in &self.pairs {
+            let seats = self.seats(pair);
+            let wanted = if pair.earlier == pair.later { &seats[..1] } else { &seats[..] };
+            sums[pair.piece] += pair.inverse * wanted.iter().map(&covariance).sum::<f64>();
+        }
+        sums
+    }
+}
+
+/// What the weights of each order are times.
+fn units(row: &Row) -> [f64; 3] {
+    let step_s = row.block_s / row.samples as f64;
+    [step_s, 1.0, 1.0 / step_s]
+}
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The noise of a column: that of some signals, and a share of the residual's.
+struct ColumnNoise {
+    term: usize,
+    is_left_side: bool,
     /// As in [`Term::noisy_in`].
     signals: Vec<(Channel, usize)>,
-    /// By row, in their order.
-    by_row: Vec<Vec<PerEquation<f64>>>,
+    /// By entry, in the order of the signals.
+    gains: Vec<f64>,
+    /// By entry, as [`Rows::meet_scale`] brings it in; empty where there is none.
+    of_residual: Vec<f64>,
 }
 
-impl Slopes {
-    pub(crate) fn of(rows: &Rows, noise: &NoiseModel<'_>, columns: Columns<'_>) -> Self {
+impl ColumnNoise {
+    fn of(rows: &Rows, noise: &NoiseModel<'_>, columns: Columns<'_>, place: usize) -> Option<Self> {
+        let term = columns.terms[place];
         // Curvatures are in what undoes a lag alone, and in a lag's own column.
-        let has_lag = noise.at.effects.iter().any(|active| active.effect.is_lag());
-        let has_curvature = |term: Term| has_lag || term.effect().is_some_and(Effect::is_lag);
-        let of_term = |place: &usize| {
-            let (term, constants) = (columns.terms[*place], &columns.constants[*place]);
-            let signals: Vec<_> =
-                term.noisy_in().into_iter().filter(|(_, order)| *order < 2 || has_curvature(term)).collect();
-            let by_row = slopes(rows, noise, (term, &signals), constants);
-            (!signals.is_empty()).then_some(SlopesOfTerm { place: *place, term, signals, by_row })
+        let is_lag = |effect: Effect| effect.is_lag();
+        let has_lag = noise.at.effects.iter().any(|active| is_lag(active.effect));
+        let is_seen =
+            |(_, order): &(Channel, usize)| *order < 2 || has_lag || term.effect().is_some_and(is_lag);
+        let signals: Vec<_> = term.noisy_in().into_iter().filter(is_seen).collect();
+        if signals.is_empty() {
+            return None;
+        }
+        let by_row = slopes(rows, noise, (term, &signals), &columns.constants[place]);
+        let stds: Vec<f64> = signals
+            .iter()
+            .map(|(channel, _)| channel.noise_std(noise.sensors, &noise.at.model.cylinder))
+            .collect();
+        let of_entry = |entry: &Entry| {
+            let units = units(&rows.rows[entry.row]);
+            let slopes = by_row[entry.row].iter().zip(&stds).zip(&signals);
+            let gain = |((slope, std), (_, order)): ((&PerEquation<f64>, &f64), &(Channel, usize))| {
+                slope[entry.equation] * std * units[*order]
+            };
+            slopes.map(gain).collect::<Vec<f64>>()
         };
-        Self(columns.places.par_iter().filter_map(of_term).collect())
+        let gains = rows.entries.iter().flat_map(of_entry).collect();
+        let mut of_residual = vec![];
+        if term.by_reading(&Signals::default()).is_some() {
+            of_residual = vec![0.0; rows.entries.len()];
+            rows.meet_scale(term, &mut of_residual, &vec![1.0; rows.entries.len()]);
+        }
+        Some(Self { term: place, is_left_side: term.is_left_side(), signals, gains, of_residual })
+    }
+
+    /// By channel and order.
+    fn gains(&self, entry: usize) -> impl Iterator<Item = (usize, usize, f64)> {
+        let gains = &self.gains[self.signals.len() * entry..];
+        self.signals.iter().zip(gains).map(|((channel, order), gain)| (*channel as usize, *order, *gain))
+    }
+
+    fn share(&self, entry: usize) -> f64 {
+        self.of_residual.get(entry).copied().unwrap_or(0.0)
+    }
+
+    /// Covariance of what its signals bring in one entry with what the residual has in another.
+    fn by_signals(&self, entry: usize, residual: &Gains, weights: &Products) -> f64 {
+        self.gains(entry).map(|(channel, order, gain)| gain * dot(&weights[order], &residual[channel])).sum()
+    }
+
+    /// Covariance with the residual.
+    fn with_residual(&self, residual: &[Gains], seat: &Seat<'_>) -> f64 {
+        self.by_signals(seat.one, &residual[seat.other], seat.weights)
+            + self.share(seat.one) * seat.covariance
+    }
+
+    /// Covariance with a column.
+    fn with(&self, other: &Self, residual: &[Gains], seat: &Seat<'_>) -> f64 {
+        let mut sum = 0.0;
+        for (channel, order, gain) in self.gains(seat.one) {
+            for (_, of_other, others) in other.gains(seat.other).filter(|(own, ..)| *own == channel) {
+                sum += gain * others * seat.weights[order][of_other];
+            }
+        }
+        let (share, others) = (self.share(seat.one), other.share(seat.other));
+        if others != 0.0 {
+            sum += others * self.by_signals(seat.one, &residual[seat.other], seat.weights);
+        }
+        if share != 0.0 {
+            sum += share * other.by_signals(seat.other, &residual[seat.one], seat.turned);
+        }
+        sum + share * others * seat.covariance
     }
 }
 
-/// Those of one term, row by row.
+/// By how much a term grows with each signal that it carries noise from, row by row.
 fn slopes(
     rows: &Rows,
     noise: &NoiseModel<'_>,
     (term, signals): (Term, &[(Channel, usize)]),
     constants: &EffectConstants<f64>,
 ) -> Vec<Vec<PerEquation<f64>>> {
-    if signals.is_empty() {
-        return vec![];
-    }
     let own = term.balances();
     let balances = |channel: Channel| match channel {
         // Forces feel another speed than the position's.
@@ -174,38 +294,4 @@ fn slopes(
         signals.iter().map(slope).collect()
     };
     rows.rows.iter().map(of_row).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::noise::test_function_weights;
-    use super::*;
-    use pitchleak_core::Signals;
-
-    /// What is drawn has the covariances that the rows are whitened by: of each row with itself and with the next, at every order.
-    #[test]
-    fn noise_that_is_drawn_has_the_covariance_that_is_assumed() {
-        const ROWS: usize = 40_000;
-        let row = Row {
-            stretch: 0,
-            t_s: 0.0,
-            block_s: 5.0,
-            samples: 5,
-            mean: Signals::default(),
-            unsure_share: 0.0,
-            has_unseen_force: false,
-            has_leak_change: false,
-        };
-        let seen = in_rows(&vec![row; ROWS], &mut Rademacher(1));
-        let weights = test_function_weights(row.samples);
-        for (apart, expected) in [(0, weights.own), (1, weights.next)] {
-            for (one, other) in (0..9).map(|pair| (pair / 3, pair % 3)) {
-                let products = seen[one].iter().skip(apart).zip(&seen[other]).map(|(later, own)| later * own);
-                let mean = products.sum::<f64>() / (ROWS - apart) as f64;
-                let size = (weights.own[one][one] * weights.own[other][other]).sqrt();
-                let off = (mean - expected[other][one]) / size;
-                assert!(off.abs() < 0.03, "{one} {other} {apart}: {mean} {}", expected[other][one]);
-            }
-        }
-    }
 }
