@@ -209,7 +209,8 @@ impl Regression {
                 chi2 += weight * mean * mean;
             }
         }
-        let inverse = inverse(matrix);
+        let taken = || DMatrix::from_fn(terms.len(), terms.len(), |i, j| self.taken[(terms[i], terms[j])]);
+        let inverse = inverse(matrix, taken);
         let scaled = &inverse * &right;
         let chi2 = chi2 - right.dot(&scaled);
         let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
@@ -298,9 +299,11 @@ pub(crate) fn jackknife_std(values: impl Iterator<Item = f64> + Clone) -> f64 {
     ((n - 1.0) / n * values.map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+/// Of a Gram matrix, or where it has less than nothing in some direction, of what it was before noise was taken off.
+fn inverse(matrix: DMatrix<f64>, taken: impl Fn() -> DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let factor: Option<Cholesky<f64, Dyn>> = Cholesky::new(matrix.clone());
+    let factor = factor.or_else(|| Cholesky::new(&matrix + taken()));
     factor.map_or_else(
         || matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(n, n)),
         |f| f.inverse(),
