@@ -185,14 +185,12 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let WeakForm { at, rows, whitening, .. } = &weak_form;
-        // An incomplete equation's error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
-        let is_noisy =
-            |place: &usize| assumed_error == PerEquation::default() || problem.terms[*place].is_left_side();
-        let noisy: Vec<usize> = columns.places.iter().copied().filter(is_noisy).collect();
-        let noisy = Columns { places: &noisy, ..columns };
-        let pieces = regression::pieces(rows);
-        let shared = weak_form.shared_noise(&problem.white, noisy, &pieces);
-        let regression = Regression::new((rows, pieces), whitening, &shared);
+        let mut shared = weak_form.shared_noise(&problem.white, columns);
+        if assumed_error != PerEquation::default() {
+            // The equations' error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
+            shared.iter_mut().for_each(|noise| noise.columns.retain(|column| column.is_left_side));
+        }
+        let regression = Regression::new(rows, whitening, &shared);
         let mut priors = problem.increments(at);
         let free = regression.solve(&structure.active, &priors);
         let held_compressibility = beyond_range(problem, at, &free);

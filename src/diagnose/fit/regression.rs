@@ -5,7 +5,7 @@
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{COLLINEAR_RIDGE, HALVINGS, MOST_OF, PIECES};
-use crate::diagnose::weak_form::{Covariances, Rows, SharedNoise, WeakForm, Whitening};
+use crate::diagnose::weak_form::{Covariances, NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -38,11 +38,16 @@ pub(crate) struct Regression {
     pub(super) taken: DMatrix<f64>,
 }
 
-/// The entries of each piece.
-pub(super) fn pieces(rows: &Rows) -> [Range<usize>; PIECES] {
-    let total = rows.rows.len().max(1);
-    let begin = |piece: usize| rows.entries.partition_point(|entry| entry.row * PIECES / total < piece);
-    std::array::from_fn(|piece| begin(piece)..begin(piece + 1))
+/// [`SharedNoise`], whitened; columns in units of the regression's.
+struct WhiteNoise {
+    rows: Vec<f64>,
+    columns: Vec<WhiteColumn>,
+}
+
+struct WhiteColumn {
+    term: usize,
+    is_left_side: bool,
+    white: Vec<f64>,
 }
 
 /// A fit of some terms.
@@ -58,14 +63,15 @@ pub(crate) struct Solution {
 }
 
 impl Regression {
-    /// Of the rows with their pieces. The products of noise that columns share are taken off the Gram matrices, so that on average only the
-    /// signals are left in them (corrected score, bias-compensated least squares: Söderström 2018, ch. 6; Stefanski 1985).
-    pub(crate) fn new(
-        (rows, pieces): (&Rows, [Range<usize>; PIECES]),
-        whitening: &Whitening,
-        shared: &SharedNoise,
-    ) -> Self {
+    /// `shared` are realisations of the noise that columns share with the residual. Their mean products
+    /// are taken off the Gram matrices, so that on average only the signals are left in them (corrected
+    /// score, bias-compensated least squares: Söderström 2018, ch. 6; Stefanski 1985).
+    pub(crate) fn new(rows: &Rows, whitening: &Whitening, shared: &[SharedNoise]) -> Self {
         let counted: Vec<bool> = rows.entries.iter().map(|entry| rows.counts(entry)).collect();
+        let total_rows = rows.rows.len().max(1);
+        let begin =
+            |piece: usize| rows.entries.partition_point(|entry| entry.row * PIECES / total_rows < piece);
+        let pieces = std::array::from_fn(|piece| begin(piece)..begin(piece + 1));
         let (y, columns, scale, noise_share) = (vec![], vec![], vec![], vec![]);
         let (grams, total, taken) = (vec![], DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
         let mut new = Self { pieces, y, columns, scale, counted, noise_share, grams, total, taken };
@@ -73,8 +79,12 @@ impl Regression {
         let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
         (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
         new.grams = new.products();
+        let shared: Vec<WhiteNoise> = shared.iter().map(|noise| new.white_noise(noise, whitening)).collect();
+        new.noise_share = new.noise_shares(&shared);
         let as_measured = sum_of(&new.grams);
-        new.take_off(shared);
+        for noise in &shared {
+            new.take_off(noise, 1.0 / shared.len() as f64);
+        }
         new.total = sum_of(&new.grams);
         new.taken = as_measured - &new.total;
         new
@@ -138,28 +148,41 @@ impl Regression {
         white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect()
     }
 
+    fn white_noise(&self, noise: &SharedNoise, whitening: &Whitening) -> WhiteNoise {
+        let shown = noise.columns.par_iter().filter(|column| self.shows(column.term));
+        let column = |column: &NoisyColumn| {
+            let white = self.counting(whitening.whiten(&column.noise)).into_iter();
+            let (term, is_left_side) = (column.term, column.is_left_side);
+            WhiteColumn { term, is_left_side, white: white.map(|v| v / self.scale[term]).collect() }
+        };
+        WhiteNoise {
+            rows: self.counting(whitening.whiten(&noise.rows)),
+            columns: shown.map(column).collect(),
+        }
+    }
+
+    fn noise_shares(&self, shared: &[WhiteNoise]) -> Vec<f64> {
+        let mut shares = vec![0.0; self.columns.len()];
+        for column in shared.iter().flat_map(|noise| &noise.columns).filter(|column| !column.is_left_side) {
+            shares[column.term] += column.white.iter().map(|v| v * v).sum::<f64>() / shared.len() as f64;
+        }
+        shares
+    }
+
     /// Of columns that are the left side itself all products. Of the others that with the residual, which holds at the solution and
     /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
-    fn take_off(&mut self, shared: &SharedNoise) {
-        self.noise_share = vec![0.0; self.columns.len()];
+    fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
         let y = self.columns.len();
-        for column in shared.columns.iter().filter(|column| !self.columns[column.term].is_empty()) {
-            let scale = self.scale[column.term];
-            self.noise_share[column.term] = column.with_itself / scale.powi(2);
-            for (gram, sum) in self.grams.iter_mut().zip(column.with_residual) {
-                gram[(column.term, y)] -= sum / scale;
-                gram[(y, column.term)] -= sum / scale;
+        for a in &noise.columns {
+            let with_rows = self.by_piece(&a.white, &noise.rows);
+            for (gram, sum) in self.grams.iter_mut().zip(with_rows) {
+                gram[(a.term, y)] -= weight * sum;
+                gram[(y, a.term)] -= weight * sum;
             }
-        }
-        for (a, b, sums) in &shared.products {
-            if self.columns[*a].is_empty() || self.columns[*b].is_empty() {
-                continue;
-            }
-            for (gram, sum) in self.grams.iter_mut().zip(sums) {
-                let taken = sum / (self.scale[*a] * self.scale[*b]);
-                gram[(*a, *b)] -= taken;
-                if a != b {
-                    gram[(*b, *a)] -= taken;
+            for b in noise.columns.iter().filter(|b| a.is_left_side && b.is_left_side) {
+                let sums = self.by_piece(&a.white, &b.white);
+                for (gram, sum) in self.grams.iter_mut().zip(sums) {
+                    gram[(a.term, b.term)] -= weight * sum;
                 }
             }
         }
@@ -209,8 +232,7 @@ impl Regression {
                 chi2 += weight * mean * mean;
             }
         }
-        let taken = || DMatrix::from_fn(terms.len(), terms.len(), |i, j| self.taken[(terms[i], terms[j])]);
-        let inverse = inverse(matrix, taken);
+        let inverse = inverse(matrix);
         let scaled = &inverse * &right;
         let chi2 = chi2 - right.dot(&scaled);
         let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
@@ -299,11 +321,9 @@ pub(crate) fn jackknife_std(values: impl Iterator<Item = f64> + Clone) -> f64 {
     ((n - 1.0) / n * values.map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-/// Of a Gram matrix, or where it has less than nothing in some direction, of what it was before noise was taken off.
-fn inverse(matrix: DMatrix<f64>, taken: impl Fn() -> DMatrix<f64>) -> DMatrix<f64> {
+fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let factor: Option<Cholesky<f64, Dyn>> = Cholesky::new(matrix.clone());
-    let factor = factor.or_else(|| Cholesky::new(&matrix + taken()));
     factor.map_or_else(
         || matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(n, n)),
         |f| f.inverse(),

@@ -194,9 +194,9 @@ impl Regression {
 mod tests {
     use super::*;
     use crate::diagnose::equation::PerEquation;
-    use crate::diagnose::fit::{Problem, regression};
+    use crate::diagnose::fit::Problem;
     use crate::diagnose::testing::{declared, torn_seal};
-    use crate::diagnose::weak_form::{Columns, DECLARED, SharedNoise, Term, WeakForm};
+    use crate::diagnose::weak_form::{Columns, DECLARED, Term, WeakForm};
     use pitchleak_core::Effect;
 
     /// A regression of the declared model's constants and some effects, none of which share the residual's noise.
@@ -209,8 +209,7 @@ mod tests {
         let start = problem.start.clone();
         let (of, at) = ((&traces[..], &problem.unresolved[..]), (start.clone(), start));
         let form = WeakForm::new(of, &problem.sensors, at, columns, PerEquation::default());
-        let (none, pieces) = (SharedNoise::default(), regression::pieces(&form.rows));
-        test(&problem, &form, &Regression::new((&form.rows, pieces), &form.whitening, &none));
+        test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));
     }
 
     fn is_near(a: f64, b: f64) -> bool {

@@ -13,20 +13,20 @@ pub(crate) use leak_change::{ChangeKind, LeakChange};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
-pub(crate) use shared_noise::SharedNoise;
+pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
 pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
 
 use self::integrals::{ActiveTerm, Integrand};
 use self::rows::Steps;
 use self::sensitivity::Sensitivity;
+use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{BLOCK_S, PIECES};
+use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::ops::Range;
 use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
@@ -146,15 +146,11 @@ impl<'a> WeakForm<'a> {
         rows.rows.par_iter().map(|row| Sensitivity::of(at, sensors, row)).collect()
     }
 
-    /// The noise of `sensors` that the columns share with the residual, in these pieces of the entries.
-    pub(crate) fn shared_noise(
-        &self,
-        sensors: &Sensors<f64>,
-        columns: Columns<'_>,
-        pieces: &[Range<usize>; PIECES],
-    ) -> SharedNoise {
+    /// Realisations of the noise of `sensors` that the columns share with the residual.
+    pub(crate) fn shared_noise(&self, sensors: &Sensors<f64>, columns: Columns<'_>) -> Vec<SharedNoise> {
         let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
-        SharedNoise::of(&self.rows, &noise, &self.whitening, columns, pieces)
+        let slopes = Slopes::of(&self.rows, &noise, columns);
+        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, &slopes, number)).collect()
     }
 
     /// The column of one term, whitened.
