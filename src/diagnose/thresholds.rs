@@ -69,9 +69,6 @@ pub(crate) const NEXT_PLAY: f64 = 1.2;
 
 // The fit.
 
-/// Realisations of sensor noise whose mean products correct the columns that carry it. Chosen: their mean scatters
-/// half as much as one of them.
-pub(crate) const NOISE_DRAWS: u64 = 4;
 /// Rounds of whatever is repeated until it settles: linearisations, additions, exchanges, searches for changes. Chosen against cycles.
 pub(crate) const MOST_ROUNDS: usize = 8;
 /// Halvings of an interval that is searched. Derived: to a thousandth of it.

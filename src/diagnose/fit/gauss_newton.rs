@@ -185,12 +185,14 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
     ) -> Self {
         let WeakForm { at, rows, whitening, .. } = &weak_form;
-        let mut shared = weak_form.shared_noise(&problem.white, columns);
-        if assumed_error != PerEquation::default() {
-            // The equations' error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
-            shared.iter_mut().for_each(|noise| noise.columns.retain(|column| column.is_left_side));
-        }
-        let regression = Regression::new(rows, whitening, &shared);
+        // An incomplete equation's error outweighs the noise of storage and friction, whose sizes are not yet to be believed.
+        let is_noisy =
+            |place: &usize| assumed_error == PerEquation::default() || problem.terms[*place].is_left_side();
+        let noisy: Vec<usize> = columns.places.iter().copied().filter(is_noisy).collect();
+        let noisy = Columns { places: &noisy, ..columns };
+        let pieces = regression::pieces(rows);
+        let shared = weak_form.shared_noise(&problem.white, noisy, &pieces);
+        let regression = Regression::new((rows, pieces), whitening, &shared);
         let mut priors = problem.increments(at);
         let free = regression.solve(&structure.active, &priors);
         let held_compressibility = beyond_range(problem, at, &free);
@@ -478,6 +480,20 @@ mod tests {
                 "{before:?} {after:?}"
             );
         }
+    }
+
+    #[test]
+    fn an_absurd_leak_brings_no_noise_that_excuses_it() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let constants = vec![problem.usual_constants; problem.terms.len()];
+        let structure = Structure { active: problem.declared_terms(), constants };
+        let places = structure.active.clone();
+        let absurd =
+            problem.start.clone().with(Term::Internal, 1e3 * LEAKS.internal, &problem.usual_constants);
+        let incomplete = PerEquation { chamber_a: 1e-12, chamber_b: 1e-12, force: 0.0 };
+        let fit = Fit::around(&places, &problem, structure, (absurd.clone(), absurd), incomplete);
+        assert!(fit.equation_error.chamber_a > 0.0 && fit.equation_error.chamber_b > 0.0);
     }
 
     /// A meter known to a fifth beside readings that follow no equation: all of one times nothing leaves nothing, and is no fit.

@@ -5,7 +5,7 @@
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::statistics;
 use crate::diagnose::thresholds::{COLLINEAR_RIDGE, HALVINGS, MOST_OF, PIECES};
-use crate::diagnose::weak_form::{Covariances, NoisyColumn, Rows, SharedNoise, WeakForm, Whitening};
+use crate::diagnose::weak_form::{Covariances, Rows, SharedNoise, WeakForm, Whitening};
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -36,18 +36,15 @@ pub(crate) struct Regression {
     pub(super) total: DMatrix<f64>,
     /// What was taken off `total` for the noise that columns share.
     pub(super) taken: DMatrix<f64>,
+    /// Of each piece.
+    taken_of: Vec<DMatrix<f64>>,
 }
 
-/// [`SharedNoise`], whitened; columns in units of the regression's.
-struct WhiteNoise {
-    rows: Vec<f64>,
-    columns: Vec<WhiteColumn>,
-}
-
-struct WhiteColumn {
-    term: usize,
-    is_left_side: bool,
-    white: Vec<f64>,
+/// The entries of each piece.
+pub(super) fn pieces(rows: &Rows) -> [Range<usize>; PIECES] {
+    let total = rows.rows.len().max(1);
+    let begin = |piece: usize| rows.entries.partition_point(|entry| entry.row * PIECES / total < piece);
+    std::array::from_fn(|piece| begin(piece)..begin(piece + 1))
 }
 
 /// A fit of some terms.
@@ -63,30 +60,27 @@ pub(crate) struct Solution {
 }
 
 impl Regression {
-    /// `shared` are realisations of the noise that columns share with the residual. Their mean products
-    /// are taken off the Gram matrices, so that on average only the signals are left in them (corrected
-    /// score, bias-compensated least squares: Söderström 2018, ch. 6; Stefanski 1985).
-    pub(crate) fn new(rows: &Rows, whitening: &Whitening, shared: &[SharedNoise]) -> Self {
+    /// Of the rows with their pieces. The products of noise that columns share are taken off the Gram matrices, so that on average only the
+    /// signals are left in them (corrected score, bias-compensated least squares: Söderström 2018, ch. 6; Stefanski 1985).
+    pub(crate) fn new(
+        (rows, pieces): (&Rows, [Range<usize>; PIECES]),
+        whitening: &Whitening,
+        shared: &SharedNoise,
+    ) -> Self {
         let counted: Vec<bool> = rows.entries.iter().map(|entry| rows.counts(entry)).collect();
-        let total_rows = rows.rows.len().max(1);
-        let begin =
-            |piece: usize| rows.entries.partition_point(|entry| entry.row * PIECES / total_rows < piece);
-        let pieces = std::array::from_fn(|piece| begin(piece)..begin(piece + 1));
         let (y, columns, scale, noise_share) = (vec![], vec![], vec![], vec![]);
-        let (grams, total, taken) = (vec![], DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
-        let mut new = Self { pieces, y, columns, scale, counted, noise_share, grams, total, taken };
+        let (grams, taken_of) = (vec![], vec![]);
+        let (total, taken) = (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0));
+        let mut new = Self { pieces, y, columns, scale, counted, noise_share, grams, total, taken_of, taken };
         new.y = new.counting(whitening.whiten(&rows.y));
         let white = |column: &Vec<f64>| normalised(new.counting(whitening.whiten(column)));
         (new.columns, new.scale) = rows.columns.par_iter().map(white).unzip();
         new.grams = new.products();
-        let shared: Vec<WhiteNoise> = shared.iter().map(|noise| new.white_noise(noise, whitening)).collect();
-        new.noise_share = new.noise_shares(&shared);
-        let as_measured = sum_of(&new.grams);
-        for noise in &shared {
-            new.take_off(noise, 1.0 / shared.len() as f64);
-        }
+        let measured = new.grams.clone();
+        new.take_off(shared);
         new.total = sum_of(&new.grams);
-        new.taken = as_measured - &new.total;
+        new.taken_of = measured.into_iter().zip(&new.grams).map(|(measured, left)| measured - left).collect();
+        new.taken = sum_of(&new.taken_of);
         new
     }
 
@@ -148,41 +142,28 @@ impl Regression {
         white.into_iter().zip(&self.counted).map(|(v, counts)| if *counts { v } else { 0.0 }).collect()
     }
 
-    fn white_noise(&self, noise: &SharedNoise, whitening: &Whitening) -> WhiteNoise {
-        let shown = noise.columns.par_iter().filter(|column| self.shows(column.term));
-        let column = |column: &NoisyColumn| {
-            let white = self.counting(whitening.whiten(&column.noise)).into_iter();
-            let (term, is_left_side) = (column.term, column.is_left_side);
-            WhiteColumn { term, is_left_side, white: white.map(|v| v / self.scale[term]).collect() }
-        };
-        WhiteNoise {
-            rows: self.counting(whitening.whiten(&noise.rows)),
-            columns: shown.map(column).collect(),
-        }
-    }
-
-    fn noise_shares(&self, shared: &[WhiteNoise]) -> Vec<f64> {
-        let mut shares = vec![0.0; self.columns.len()];
-        for column in shared.iter().flat_map(|noise| &noise.columns).filter(|column| !column.is_left_side) {
-            shares[column.term] += column.white.iter().map(|v| v * v).sum::<f64>() / shared.len() as f64;
-        }
-        shares
-    }
-
     /// Of columns that are the left side itself all products. Of the others that with the residual, which holds at the solution and
     /// lets the linearisations find it; their own squares stay, so that no column is left with less than nothing.
-    fn take_off(&mut self, noise: &WhiteNoise, weight: f64) {
+    fn take_off(&mut self, shared: &SharedNoise) {
+        self.noise_share = vec![0.0; self.columns.len()];
         let y = self.columns.len();
-        for a in &noise.columns {
-            let with_rows = self.by_piece(&a.white, &noise.rows);
-            for (gram, sum) in self.grams.iter_mut().zip(with_rows) {
-                gram[(a.term, y)] -= weight * sum;
-                gram[(y, a.term)] -= weight * sum;
+        for column in shared.columns.iter().filter(|column| !self.columns[column.term].is_empty()) {
+            let scale = self.scale[column.term];
+            self.noise_share[column.term] = column.with_itself / scale.powi(2);
+            for (gram, sum) in self.grams.iter_mut().zip(column.with_residual) {
+                gram[(column.term, y)] -= sum / scale;
+                gram[(y, column.term)] -= sum / scale;
             }
-            for b in noise.columns.iter().filter(|b| a.is_left_side && b.is_left_side) {
-                let sums = self.by_piece(&a.white, &b.white);
-                for (gram, sum) in self.grams.iter_mut().zip(sums) {
-                    gram[(a.term, b.term)] -= weight * sum;
+        }
+        for (a, b, sums) in &shared.products {
+            if self.columns[*a].is_empty() || self.columns[*b].is_empty() {
+                continue;
+            }
+            for (gram, sum) in self.grams.iter_mut().zip(sums) {
+                let taken = sum / (self.scale[*a] * self.scale[*b]);
+                gram[(*a, *b)] -= taken;
+                if a != b {
+                    gram[(*b, *a)] -= taken;
                 }
             }
         }
@@ -200,7 +181,7 @@ impl Regression {
 
     /// Fits `terms` to all the data.
     pub(crate) fn solve(&self, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
-        self.solve_gram(&self.total, terms, priors)
+        self.solve_gram((&self.total, &self.taken), terms, priors)
     }
 
     /// Standard deviations by leaving out one piece at a time (Quenouille 1956, Tukey 1958): honest also
@@ -213,15 +194,24 @@ impl Regression {
 
     /// Fits without one piece each.
     pub(crate) fn leave_one_out(&self, terms: &[usize], priors: &[Option<Prior>]) -> Vec<Solution> {
-        self.grams.iter().map(|gram| self.solve_gram(&(&self.total - gram), terms, priors)).collect()
+        let without =
+            |(gram, taken)| self.solve_gram((&(&self.total - gram), &(&self.taken - taken)), terms, priors);
+        self.grams.iter().zip(&self.taken_of).map(without).collect()
     }
 
-    fn solve_gram(&self, gram: &DMatrix<f64>, terms: &[usize], priors: &[Option<Prior>]) -> Solution {
+    /// Of a Gram matrix off which noise is taken; where less than nothing would be left of something, of what was measured.
+    fn solve_gram(
+        &self,
+        (gram, taken): (&DMatrix<f64>, &DMatrix<f64>),
+        terms: &[usize],
+        priors: &[Option<Prior>],
+    ) -> Solution {
         let terms: Vec<usize> = terms.iter().copied().filter(|t| self.shows(*t)).collect();
         let y = self.columns.len();
-        let mut matrix = DMatrix::from_fn(terms.len(), terms.len(), |i, j| gram[(terms[i], terms[j])]);
-        let mut right = DVector::from_fn(terms.len(), |i, _| gram[(terms[i], y)]);
-        let mut chi2 = gram[(y, y)];
+        let of =
+            |all: &DMatrix<f64>| DMatrix::from_fn(terms.len(), terms.len(), |i, j| all[(terms[i], terms[j])]);
+        let pull = |all: &DMatrix<f64>| DVector::from_fn(terms.len(), |i, _| all[(terms[i], y)]);
+        let (mut matrix, mut right, mut chi2) = (of(gram), pull(gram), gram[(y, y)]);
         for (i, term) in terms.iter().enumerate() {
             matrix[(i, i)] += COLLINEAR_RIDGE;
             if let Some(prior) = priors[*term] {
@@ -232,9 +222,16 @@ impl Regression {
                 chi2 += weight * mean * mean;
             }
         }
-        let inverse = inverse(matrix);
-        let scaled = &inverse * &right;
-        let chi2 = chi2 - right.dot(&scaled);
+        let solved = |inverse: DMatrix<f64>, right: &DVector<f64>| {
+            let scaled = &inverse * right;
+            (chi2 - right.dot(&scaled), scaled, inverse)
+        };
+        let quiet = regular_inverse(&matrix).map(|inverse| solved(inverse, &right));
+        let (chi2, scaled, inverse) = quiet.filter(|(chi2, ..)| *chi2 >= 0.0).unwrap_or_else(|| {
+            matrix += of(taken);
+            right += pull(taken);
+            solved(regular_inverse(&matrix).unwrap_or_else(|| pseudo_inverse(matrix)), &right)
+        });
         let value = terms.iter().zip(scaled.iter()).map(|(t, v)| v / self.scale[*t]).collect();
         let std = terms
             .iter()
@@ -321,13 +318,13 @@ pub(crate) fn jackknife_std(values: impl Iterator<Item = f64> + Clone) -> f64 {
     ((n - 1.0) / n * values.map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt()
 }
 
-fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+fn regular_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    Cholesky::new(matrix.clone()).map(|factor: Cholesky<f64, Dyn>| factor.inverse())
+}
+
+fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
-    let factor: Option<Cholesky<f64, Dyn>> = Cholesky::new(matrix.clone());
-    factor.map_or_else(
-        || matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(n, n)),
-        |f| f.inverse(),
-    )
+    matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(n, n))
 }
 
 /// The residual of each entry, in the equation's own unit times seconds.
@@ -342,7 +339,7 @@ pub(crate) fn residual(rows: &Rows, solution: &Solution) -> Vec<f64> {
 }
 
 /// Equation error with which the residual would be as large as the noise says, so that neither priors nor weak effects
-/// are overrun by it; zero where the residual can be the sensors' noise. By bisection.
+/// are overrun by it; zero where the residual can be the sensors' noise: no absurd leak may bring what excuses it. By bisection.
 pub(super) fn equation_error(
     weak_form: &WeakForm<'_>,
     regression: &Regression,
@@ -360,7 +357,7 @@ pub(super) fn equation_error(
         }
         squares.zip(counts, |sum, count| sum / count)
     };
-    let sensors_only = levels(&weak_form.covariances(PerEquation::default()), PerEquation::default());
+    let sensors_only = levels(&weak_form.credible_covariances(), PerEquation::default());
     let mut high = PerEquation::from_fn(|equation| {
         let by_chance = statistics::chance_of_variance(counts[equation]);
         if sensors_only[equation] <= 1.0 + by_chance {

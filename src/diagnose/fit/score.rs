@@ -194,13 +194,19 @@ impl Regression {
 mod tests {
     use super::*;
     use crate::diagnose::equation::PerEquation;
-    use crate::diagnose::fit::Problem;
+    use crate::diagnose::fit::{Problem, regression};
     use crate::diagnose::testing::{declared, torn_seal};
-    use crate::diagnose::weak_form::{Columns, DECLARED, Term, WeakForm};
+    use crate::diagnose::thresholds::PIECES;
+    use crate::diagnose::weak_form::{Columns, DECLARED, NoisyColumn, SharedNoise, Term, WeakForm};
     use pitchleak_core::Effect;
+    use std::cell::RefCell;
 
     /// A regression of the declared model's constants and some effects, none of which share the residual's noise.
     fn with_regression(test: impl Fn(&Problem<'_>, &WeakForm<'_>, &Regression)) {
+        with_noise(&SharedNoise::default(), test);
+    }
+
+    fn with_noise(shared: &SharedNoise, test: impl Fn(&Problem<'_>, &WeakForm<'_>, &Regression)) {
         let (traces, declared) = ([torn_seal(20)], declared());
         let problem = Problem::new(&traces, &declared, &[]);
         let constants = vec![problem.usual_constants; problem.terms.len()];
@@ -209,7 +215,37 @@ mod tests {
         let start = problem.start.clone();
         let (of, at) = ((&traces[..], &problem.unresolved[..]), (start.clone(), start));
         let form = WeakForm::new(of, &problem.sensors, at, columns, PerEquation::default());
-        test(&problem, &form, &Regression::new(&form.rows, &form.whitening, &[]));
+        let pieces = regression::pieces(&form.rows);
+        test(&problem, &form, &Regression::new((&form.rows, pieces), &form.whitening, shared));
+    }
+
+    /// Values of the declared model's constants and χ², all in all and without one piece each.
+    fn solutions(problem: &Problem<'_>, form: &WeakForm<'_>, regression: &Regression) -> Vec<f64> {
+        let priors = problem.increments(&form.at);
+        let terms: Vec<usize> = DECLARED.iter().filter_map(|term| problem.place(*term)).collect();
+        let all = std::iter::once(regression.solve(&terms, &priors));
+        let all = all.chain(regression.leave_one_out(&terms, &priors));
+        all.flat_map(|solution| [solution.value, vec![solution.chi2]].concat()).collect()
+    }
+
+    #[test]
+    fn where_noise_would_be_more_than_was_measured_none_is_taken_off() {
+        let measured = RefCell::new(vec![]);
+        with_regression(|problem, form, regression| {
+            measured.replace(solutions(problem, form, regression));
+        });
+        let column = |with_residual| NoisyColumn { term: 1, with_residual, with_itself: 0.0 };
+        let more_than_its_square =
+            SharedNoise { columns: vec![column([1e10; PIECES])], products: vec![(1, 1, [1e27; PIECES])] };
+        let more_than_the_residual = SharedNoise { columns: vec![column([1e18; PIECES])], products: vec![] };
+        for shared in [more_than_its_square, more_than_the_residual] {
+            with_noise(&shared, |problem, form, regression| {
+                let (own, measured) = (solutions(problem, form, regression), measured.borrow());
+                for (own, measured) in own.iter().zip(measured.iter()) {
+                    assert!(is_near(*own, *measured), "{own} {measured}");
+                }
+            });
+        }
     }
 
     fn is_near(a: f64, b: f64) -> bool {

@@ -190,7 +190,8 @@ impl Selection<'_> {
         let dispersion = fit.dispersion(fit.free.chi2);
         let is_needless = |one: &Selected| {
             let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
-            loss(fit, &[one.term]) / dispersion < needed
+            let is_none = fit.estimate(one.term).is_some_and(|own| own.value.abs() <= 0.0);
+            is_none || loss(fit, &[one.term]) / dispersion < needed
         };
         self.effects.iter().position(is_needless)
     }

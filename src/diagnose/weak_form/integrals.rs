@@ -3,7 +3,7 @@
 //! corrected signals are kept.
 
 use super::linearisation::{Linearisation, as_felt};
-use super::terms::{Columns, Term};
+use super::terms::{Balances, Columns, Term};
 use crate::diagnose::data::{Motion, Series};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{EVEN_SHARE, LEAST_STEP_S, LONG_STEP};
@@ -102,13 +102,13 @@ pub(crate) struct Integrand<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct ActiveTerm {
     term: Term,
-    in_force: bool,
+    balances: Balances,
     constants: EffectConstants<f64>,
 }
 
 impl ActiveTerm {
     pub(super) fn new(term: Term, constants: EffectConstants<f64>) -> Self {
-        Self { term, in_force: term.in_force(), constants }
+        Self { term, balances: term.balances(), constants }
     }
 }
 
@@ -159,8 +159,8 @@ impl Step {
 
     /// One unit of a term in the residual, integrated.
     pub(super) fn column(&self, active: &ActiveTerm, at: &Linearisation) -> PerEquation<f64> {
-        let ActiveTerm { term, in_force, constants } = active;
-        self.integral(|seen, felt| at.both_unit_terms((*term, *in_force), constants, seen, felt))
+        let ActiveTerm { term, balances, constants } = active;
+        self.integral(|seen, felt| at.both_unit_terms((*term, *balances), constants, seen, felt))
     }
 }
 

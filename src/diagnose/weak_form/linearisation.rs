@@ -1,7 +1,7 @@
 //! Where the model stands: its constants and the effects found so far.
 
 use super::leak_change::LeakChange;
-use super::terms::Term;
+use super::terms::{Balances, Term};
 use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
 use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA};
@@ -99,16 +99,16 @@ impl Linearisation {
     }
 
     /// What one unit of a term adds to them.
-    pub(crate) fn both_unit_terms(
+    pub(super) fn both_unit_terms(
         &self,
-        (term, in_force): (Term, bool),
+        (term, balances): (Term, Balances),
         constants: &EffectConstants<f64>,
         seen: &Signals<f64>,
         felt: &Signals<f64>,
     ) -> PerEquation<f64> {
         let of_chambers =
-            if term.is_force() { Terms::default() } else { self.unit_term(term, seen, constants) };
-        let force = if in_force { self.unit_term(term, felt, constants).force_n } else { 0.0 };
+            if balances.chambers { self.unit_term(term, seen, constants) } else { Terms::default() };
+        let force = if balances.force { self.unit_term(term, felt, constants).force_n } else { 0.0 };
         PerEquation { force, ..PerEquation::from(of_chambers) }
     }
 

@@ -13,20 +13,22 @@ pub(crate) use leak_change::{ChangeKind, LeakChange};
 pub(crate) use linearisation::Linearisation;
 pub(crate) use noise::{Covariances, NoiseModel, Whitening};
 pub(crate) use rows::{Entry, RESIDUAL_TESTS, Row, Rows, VARIABLES};
-pub(crate) use shared_noise::{NoisyColumn, SharedNoise};
+#[cfg(test)]
+pub(crate) use shared_noise::NoisyColumn;
+pub(crate) use shared_noise::SharedNoise;
 pub(crate) use terms::{Columns, DECLARED, Term, Unlisted, all_terms};
 
 use self::integrals::{ActiveTerm, Integrand};
 use self::rows::Steps;
 use self::sensitivity::Sensitivity;
-use self::shared_noise::Slopes;
 use crate::diagnose::data::{Channel, Motion, Series, Unresolved};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{BLOCK_S, NOISE_DRAWS};
+use crate::diagnose::thresholds::{BLOCK_S, PIECES};
 use pitchleak_core::Sensors;
 use pitchleak_core::effects::EffectConstants;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 /// The weak form of traces at a linearisation; never changed.
@@ -115,6 +117,21 @@ impl<'a> WeakForm<'a> {
         }
     }
 
+    /// The rows' noise where leaks let in no more of the pressures' than leaks would that let all of the oil past.
+    pub(crate) fn credible_covariances(&self) -> Cow<'_, Covariances> {
+        let most = &self.rows.leak_of_all_oil;
+        let is_more =
+            |row: &PerEquation<Sensitivity>| row.iter().any(|(at, own)| own.leak_m3spa() > most[at]);
+        if !self.sensitivities.iter().any(is_more) {
+            return self.covariances(PerEquation::default());
+        }
+        let held = |row: &PerEquation<Sensitivity>| {
+            PerEquation::from_fn(|equation| row[equation].with_leaks_of_at_most(most[equation]))
+        };
+        let sensitivities: Vec<_> = self.sensitivities.iter().map(held).collect();
+        Cow::Owned(Covariances::of(&self.noise_with(&sensitivities, PerEquation::default())))
+    }
+
     /// The rows' noise at other sensitivities.
     pub(crate) fn noise_with<'b>(
         &'b self,
@@ -146,11 +163,15 @@ impl<'a> WeakForm<'a> {
         rows.rows.par_iter().map(|row| Sensitivity::of(at, sensors, row)).collect()
     }
 
-    /// Realisations of the noise of `sensors` that the columns share with the residual.
-    pub(crate) fn shared_noise(&self, sensors: &Sensors<f64>, columns: Columns<'_>) -> Vec<SharedNoise> {
+    /// The noise of `sensors` that the columns share with the residual, in these pieces of the entries.
+    pub(crate) fn shared_noise(
+        &self,
+        sensors: &Sensors<f64>,
+        columns: Columns<'_>,
+        pieces: &[Range<usize>; PIECES],
+    ) -> SharedNoise {
         let noise = NoiseModel { sensors, ..self.noise(PerEquation::default()) };
-        let slopes = Slopes::of(&self.rows, &noise, columns);
-        (0..NOISE_DRAWS).map(|number| SharedNoise::draw(&self.rows, &noise, &slopes, number)).collect()
+        SharedNoise::of(&self.rows, &noise, &self.whitening, columns, pieces)
     }
 
     /// The column of one term, whitened.

@@ -8,14 +8,14 @@
 use super::integrals::{QUINTIC, QUINTIC_UNIT};
 use super::linearisation::Linearisation;
 use super::rows::{Entry, Row, Rows};
-use super::sensitivity::Sensitivity;
+use super::sensitivity::{Sensitivity, held};
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::{Equation, PerEquation};
 use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, ROUNDING};
 use pitchleak_core::Sensors;
 
 /// Sums of products of the weights of samples in two rows: by test functions (0), differences (1) and curvatures (2).
-type Products = [[f64; 3]; 3];
+pub(super) type Products = [[f64; 3]; 3];
 
 /// How samples of white noise weigh in rows, with steps of one.
 #[derive(Clone, Copy, Default)]
@@ -78,15 +78,12 @@ impl NoiseModel<'_> {
         let leak_gain = flow_std / self.sensors.pressure.noise_std;
         let stored = volume_m3.abs() / self.at.model.fluid.bulk_modulus_pa;
         let [a, b] = [Channel::PressureA as usize, Channel::PressureB as usize];
-        let held = |gain: f64, most: f64| if gain > most { most / gain } else { 1.0 };
-        let leaks = held(own.gains[a][0].hypot(own.gains[b][0]), leak_gain);
         let storage = held(own.gains[a][1].hypot(own.gains[b][1]), stored);
         for place in [a, b] {
-            own.gains[place][0] *= leaks;
             own.gains[place][1] *= storage;
             own.gains[place][2] *= storage;
         }
-        own
+        own.with_leaks_of_at_most(leak_gain)
     }
 
     /// Variance of one row of an equation, as if all of it were white in the flow or force.
@@ -139,6 +136,14 @@ impl NoiseModel<'_> {
         }
         sum
     }
+}
+
+/// How many rows an entry is after another one whose noise it shares: none or one.
+pub(super) fn rows_apart(rows: &Rows, own: &Entry, other: &Entry) -> Option<usize> {
+    let apart = own.row - other.row;
+    let is_force = |entry: &Entry| entry.equation == Equation::Force;
+    let is_near = apart <= 1 && rows.rows[other.row].stretch == rows.rows[own.row].stretch;
+    (is_near && is_force(own) == is_force(other)).then_some(apart)
 }
 
 /// Entries to the left of the diagonal that can be correlated: three of the row before, two of the own.
@@ -197,12 +202,7 @@ impl Covariances {
                 counts: rows.counts(own),
             };
             for (distance, other) in rows.entries[..=i].iter().rev().take(BAND + 1).enumerate() {
-                let rows_apart = own.row - other.row;
-                let is_force = |entry: &Entry| entry.equation == Equation::Force;
-                let are_apart = rows_apart > 1 || rows.rows[other.row].stretch != row.stretch;
-                if are_apart || is_force(own) != is_force(other) {
-                    continue;
-                }
+                let Some(rows_apart) = rows_apart(rows, own, other) else { continue };
                 let weights = if rows_apart == 0 { &known.1.own } else { &known.1.next };
                 let pair = (&sensitivities[1 - rows_apart][other.equation], &sensitivities[1][own.equation]);
                 line.sensors[distance] = noise.sensors_covariance(pair, weights, step_s);
@@ -254,6 +254,25 @@ impl Whitening {
         self.factor.iter().map(|line| line[0])
     }
 
+    /// Σ⁻¹ where Σ has a band, by the distance from the diagonal: Z_{i,i−d} (Takahashi, Fagan and Chin 1973, "Formation of a sparse bus
+    /// impedance matrix").
+    pub(super) fn inverse(&self) -> Vec<[f64; BAND + 1]> {
+        let n = self.factor.len();
+        let mut inverse = vec![[0.0; BAND + 1]; n];
+        for i in (0..n).rev() {
+            let below = BAND.min(n - 1 - i);
+            let pivot = self.factor[i][0];
+            for m in (0..=below).rev() {
+                // Σ_k L_{i+k,i} Z_{i+k,i+m}
+                let done: f64 =
+                    (1..=below).map(|k| self.factor[i + k][k] * inverse[i + k.max(m)][k.abs_diff(m)]).sum();
+                let own = if m == 0 { 1.0 / pivot } else { 0.0 };
+                inverse[i + m][m] = (own - done) / pivot;
+            }
+        }
+        inverse
+    }
+
     /// L⁻¹ v.
     pub(crate) fn whiten(&self, v: &[f64]) -> Vec<f64> {
         let mut out: Vec<f64> = Vec::with_capacity(v.len());
@@ -290,7 +309,7 @@ mod whitening_tests {
     use pitchleak_testkit::white_noise;
 
     #[test]
-    fn whitening_is_that_of_a_dense_cholesky_factor() {
+    fn whitening_and_the_band_of_the_inverse_are_those_of_dense_algebra() {
         let declared = declared();
         let at = Linearisation::declared(&declared);
         let rows = residual_rows(&[sound(5), sound(3)], &declared.sensors, &at, 0.1);
@@ -304,11 +323,19 @@ mod whitening_tests {
             if i - j <= BAND { lines[i].covariance(i - j, &equation_error) } else { 0.0 }
         };
         let dense = DMatrix::from_fn(n, n, |i, j| between(i.max(j), i.min(j)));
+        let inverse = dense.clone().try_inverse().expect("regular");
         let factor = dense.cholesky().expect("a covariance");
         let v: Vec<f64> = white_noise(1).take(n).collect();
         let expected = factor.l().solve_lower_triangular(&DVector::from_vec(v.clone())).expect("regular");
-        let white = Whitening::new(&noise).whiten(&v);
+        let whitening = Whitening::new(&noise);
+        let white = whitening.whiten(&v);
         let worst = white.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(n > 100 && worst < 1e-9 * expected.amax(), "{worst} of {}", expected.amax());
+        for (i, line) in whitening.inverse().into_iter().enumerate() {
+            for (d, own) in line.into_iter().enumerate().take(i + 1) {
+                let size = (inverse[(i, i)] * inverse[(i - d, i - d)]).sqrt();
+                assert!((own - inverse[(i, i - d)]).abs() < 1e-6 * size, "{i} {d}: {own}");
+            }
+        }
     }
 }

@@ -88,6 +88,8 @@ pub(crate) struct Rows {
     pub(crate) y: Vec<f64>,
     /// One column per term; empty where it was not asked for.
     pub(crate) columns: Vec<Vec<f64>>,
+    /// Leaks that would let past all the oil that the meters count, m³/(s·Pa); no bound of the forces.
+    pub(super) leak_of_all_oil: PerEquation<f64>,
 }
 
 /// Numbers set aside for the stretches of one trace.
@@ -137,11 +139,26 @@ impl Rows {
         let parts: Vec<Self> = parts(traces, block_s).par_iter().map(of_part).collect();
         let mut all = Self::empty(integrand.width());
         parts.into_iter().for_each(|part| all.append(part));
+        all.leak_of_all_oil = all.all_oil_as_a_leak();
         all
     }
 
     fn empty(terms: usize) -> Self {
-        Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
+        let columns = vec![vec![]; terms];
+        Self { rows: vec![], entries: vec![], y: vec![], columns, leak_of_all_oil: PerEquation::default() }
+    }
+
+    fn all_oil_as_a_leak(&self) -> PerEquation<f64> {
+        let size = |signal: fn(&Signals<f64>) -> f64| -> f64 {
+            self.rows.iter().map(|row| signal(&row.mean).powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE)
+        };
+        // In both pressures an internal leak is as large.
+        let load = size(|at| at.pa_pa - at.pb_pa) / std::f64::consts::SQRT_2;
+        PerEquation {
+            chamber_a: size(|at| at.qa_m3s) / load.min(size(|at| at.pa_pa)),
+            chamber_b: size(|at| at.qb_m3s) / load.min(size(|at| at.pb_pa)),
+            force: f64::INFINITY,
+        }
     }
 
     /// The row with its columns at these places among `count`.

@@ -16,6 +16,11 @@ pub(crate) struct Sensitivity {
     pub(crate) noise_factor: [f64; Channel::ALL.len()],
 }
 
+/// The share of a gain that is no more than `most`.
+pub(super) fn held(gain: f64, most: f64) -> f64 {
+    if gain > most { most / gain } else { 1.0 }
+}
+
 impl Default for Sensitivity {
     fn default() -> Self {
         Self { gains: [[0.0; 3]; Channel::ALL.len()], noise_factor: [1.0; Channel::ALL.len()] }
@@ -59,6 +64,22 @@ impl Sensitivity {
             channels.for_each(|(gains, times)| *gains = gains.map(|gain| gain * times));
         }
         self
+    }
+
+    /// These sensitivities where leaks let no more of the pressures' noise in than one of this size.
+    #[must_use]
+    pub(super) fn with_leaks_of_at_most(mut self, leak_m3spa: f64) -> Self {
+        let share = held(self.leak_m3spa(), leak_m3spa);
+        for place in [Channel::PressureA, Channel::PressureB] {
+            self.gains[place as usize][0] *= share;
+        }
+        self
+    }
+
+    /// What a chamber's equation takes in of the pressures, as a leak, m³/(s·Pa).
+    pub(super) fn leak_m3spa(&self) -> f64 {
+        let [a, b] = [Channel::PressureA, Channel::PressureB].map(|place| self.gains[place as usize][0]);
+        a.hypot(b)
     }
 
     /// Of all three equations at a row.

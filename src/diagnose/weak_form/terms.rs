@@ -4,6 +4,7 @@
 use super::leak_change::LeakChange;
 use crate::diagnose::data::Channel;
 use crate::diagnose::equation::Equation;
+use crate::diagnose::thresholds::NEGLIGIBLE_SHARE;
 use pitchleak_core::effects::{EffectConstant, EffectConstants, EffectKind, EffectSpec, LeftSide};
 use pitchleak_core::{Effect, Leak, Model, Signals, Terms};
 
@@ -40,6 +41,13 @@ pub(crate) struct Columns<'a> {
     pub(crate) places: &'a [usize],
 }
 
+/// Which balances are meant: the chambers' oil, the piston's forces.
+#[derive(Clone, Copy)]
+pub(super) struct Balances {
+    pub(super) chambers: bool,
+    pub(super) force: bool,
+}
+
 /// An instant at which nothing is zero: what an effect's term leaves out there, it leaves out always.
 const PROBE: Signals<f64> = Signals {
     x_m: 0.1,
@@ -68,8 +76,6 @@ const PROBE: Signals<f64> = Signals {
     t_s: 10.0,
 };
 
-/// Oil that is stored goes with the pressures' rates.
-const STORAGE: [(Channel, usize); 2] = [(Channel::PressureA, 1), (Channel::PressureB, 1)];
 /// Forces feel speed and acceleration.
 const FELT: [(Channel, usize); 2] = [(Channel::FeltSpeed, 0), (Channel::FeltSpeed, 1)];
 
@@ -79,18 +85,10 @@ fn left_side(side: LeftSide) -> &'static [(Channel, usize)] {
         LeftSide::Speed => &[(Channel::Position, 1)],
         LeftSide::FlowA => &[(Channel::FlowA, 0)],
         LeftSide::FlowB => &[(Channel::FlowB, 0)],
-        LeftSide::PressureA => &[(Channel::PressureA, 0), (Channel::PressureA, 1)],
-        LeftSide::PressureB => &[(Channel::PressureB, 0), (Channel::PressureB, 1)],
+        LeftSide::PressureA => &[(Channel::PressureA, 0), (Channel::PressureA, 1), (Channel::PressureA, 2)],
+        LeftSide::PressureB => &[(Channel::PressureB, 0), (Channel::PressureB, 1), (Channel::PressureB, 2)],
         LeftSide::Force => &[(Channel::Force, 0)],
     }
-}
-
-/// The flows' rates, of which a lag's column is made, with their noise.
-fn late_flows(effect: Effect) -> Vec<(Channel, usize)> {
-    let mut late = Signals::default();
-    effect.late(&mut late).into_iter().flatten().for_each(|signal| *signal = 1.0);
-    let flows = [(late.qa_m3s, Channel::FlowA), (late.qb_m3s, Channel::FlowB)];
-    flows.into_iter().filter(|(late, _)| *late > 0.0).map(|(_, channel)| (channel, 1)).collect()
 }
 
 /// The four constants of the declared model.
@@ -186,8 +184,13 @@ impl Term {
         }
     }
 
+    /// The balances that it shows in.
+    pub(super) fn balances(self) -> Balances {
+        Balances { chambers: !self.is_force(), force: self.in_force() }
+    }
+
     /// Whether it is a force alone.
-    pub(super) fn is_force(self) -> bool {
+    fn is_force(self) -> bool {
         match self {
             Self::Effect(effect) => effect.spec().kind == EffectKind::Force,
             Self::Product(one, other) => Self::Effect(one).is_force() || Self::Effect(other).is_force(),
@@ -200,7 +203,7 @@ impl Term {
     /// its rate (1). The others' columns are quiet against what they vary.
     pub(crate) fn noisy_in(self) -> Vec<(Channel, usize)> {
         match self {
-            Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => STORAGE.to_vec(),
+            Self::InverseBulk | Self::Unlisted(Unlisted::StiffeningOil) => self.rates(),
             Self::Unlisted(Unlisted::DirectionLeak) => left_side(LeftSide::Speed).to_vec(),
             Self::Unlisted(Unlisted::BentMeterA) => left_side(LeftSide::FlowA).to_vec(),
             Self::Unlisted(Unlisted::BentMeterB) => left_side(LeftSide::FlowB).to_vec(),
@@ -213,14 +216,31 @@ impl Term {
                     _ if carries.is_some() || !shares_noise_of.is_empty() => {
                         carries.iter().chain(*shares_noise_of).copied().flat_map(left_side).copied().collect()
                     }
-                    EffectKind::Sensor => late_flows(effect),
+                    EffectKind::Sensor => self.rates(),
                     _ if self.in_force() => FELT.to_vec(),
-                    EffectKind::Storage => STORAGE.to_vec(),
-                    _ => vec![],
+                    _ => self.rates(),
                 }
             }
             _ => vec![],
         }
+    }
+
+    /// The rates that it is made of, of readings whose noise makes them rough: of what a lag delays, of what drives stored oil. What undoes a
+    /// lag brings curvature into a rate.
+    fn rates(self) -> Vec<(Channel, usize)> {
+        let rough = [Channel::PressureA, Channel::PressureB, Channel::FlowA, Channel::FlowB];
+        let of = |at: &Signals<f64>| {
+            let Terms { chamber_a_m3s, chamber_b_m3s, force_n } =
+                self.unit_term(at, &Model::paper(), &EffectConstants::default());
+            [chamber_a_m3s, chamber_b_m3s, force_n]
+        };
+        let shows = |channel: &Channel| {
+            let mut without = PROBE;
+            channel.signal(1, &mut without).into_iter().for_each(|rate| *rate = 0.0);
+            let pairs = of(&PROBE).into_iter().zip(of(&without));
+            pairs.into_iter().any(|(full, without)| (full - without).abs() > NEGLIGIBLE_SHARE * full.abs())
+        };
+        rough.into_iter().filter(shows).flat_map(|channel| [(channel, 1), (channel, 2)]).collect()
     }
 
     /// Whether it is a force that never changes.
