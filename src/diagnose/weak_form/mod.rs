@@ -119,7 +119,7 @@ impl<'a> WeakForm<'a> {
 
     /// The rows' noise where leaks let in no more of the pressures' than leaks would that let all of the oil past.
     pub(crate) fn credible_covariances(&self) -> Cow<'_, Covariances> {
-        let most = &self.rows.leak_of_all_oil;
+        let most = self.rows.leak_of_all_oil();
         let is_more =
             |row: &PerEquation<Sensitivity>| row.iter().any(|(at, own)| own.leak_m3spa() > most[at]);
         if !self.sensitivities.iter().any(is_more) {

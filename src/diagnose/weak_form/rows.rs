@@ -88,8 +88,6 @@ pub(crate) struct Rows {
     pub(crate) y: Vec<f64>,
     /// One column per term; empty where it was not asked for.
     pub(crate) columns: Vec<Vec<f64>>,
-    /// Leaks that would let past all the oil that the meters count, m³/(s·Pa); no bound of the forces.
-    pub(super) leak_of_all_oil: PerEquation<f64>,
 }
 
 /// Numbers set aside for the stretches of one trace.
@@ -139,16 +137,15 @@ impl Rows {
         let parts: Vec<Self> = parts(traces, block_s).par_iter().map(of_part).collect();
         let mut all = Self::empty(integrand.width());
         parts.into_iter().for_each(|part| all.append(part));
-        all.leak_of_all_oil = all.all_oil_as_a_leak();
         all
     }
 
     fn empty(terms: usize) -> Self {
-        let columns = vec![vec![]; terms];
-        Self { rows: vec![], entries: vec![], y: vec![], columns, leak_of_all_oil: PerEquation::default() }
+        Self { rows: vec![], entries: vec![], y: vec![], columns: vec![vec![]; terms] }
     }
 
-    fn all_oil_as_a_leak(&self) -> PerEquation<f64> {
+    /// Leaks that would let past all the oil that the meters count, m³/(s·Pa); no bound of the forces.
+    pub(super) fn leak_of_all_oil(&self) -> PerEquation<f64> {
         let size = |signal: fn(&Signals<f64>) -> f64| -> f64 {
             self.rows.iter().map(|row| signal(&row.mean).powi(2)).sum::<f64>().sqrt().max(f64::MIN_POSITIVE)
         };
