@@ -133,6 +133,10 @@ impl Regression {
                 gram[(other, term)] = sum;
             }
         }
+        for taken in new.taken_of.iter_mut().chain([&mut new.taken]) {
+            taken.row_mut(term).fill(0.0);
+            taken.column_mut(term).fill(0.0);
+        }
         new.total = sum_of(&new.grams);
         new
     }

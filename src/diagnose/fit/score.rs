@@ -311,19 +311,31 @@ mod tests {
 
     #[test]
     fn a_column_put_in_is_as_if_it_had_been_there() {
-        with_regression(|problem, form, regression| {
-            let place = |effect| problem.place(Term::Effect(effect)).expect("is a term");
-            let (air, offset) = (place(Effect::EntrainedAir), place(Effect::FlowMeterOffsetA));
-            let white = form.white_column(Term::Effect(Effect::EntrainedAir), problem.usual_constants);
-            let replaced = regression.with_column(offset, white);
-            let priors = vec![None; problem.terms.len()];
-            let (own, there) =
-                (regression.solve(&[0, 1, air], &priors), replaced.solve(&[0, 1, offset], &priors));
-            assert!(own.value.iter().zip(&there.value).all(|(a, b)| is_near(*a, *b)));
-            assert!(is_near(own.chi2, there.chi2));
-            let errors = regression.held_out(&[0, 1, air], &priors);
-            let replaced = replaced.held_out(&[0, 1, offset], &priors);
-            assert!(errors.iter().zip(&replaced).all(|(a, b)| is_near(*a, *b)));
+        with_regression(compare_with_a_column_put_in);
+    }
+
+    #[test]
+    fn a_column_put_in_brings_nothing_of_the_noise_of_the_one_before() {
+        let offset = RefCell::new(0);
+        with_regression(|problem, _, _| {
+            offset.replace(problem.place(Term::Effect(Effect::FlowMeterOffsetA)).expect("is a term"));
         });
+        // So much that it is put back.
+        let products = [1, offset.take()].map(|term| (term, term, [1e30; PIECES])).to_vec();
+        with_noise(&SharedNoise { columns: vec![], products }, compare_with_a_column_put_in);
+    }
+
+    fn compare_with_a_column_put_in(problem: &Problem<'_>, form: &WeakForm<'_>, regression: &Regression) {
+        let place = |effect| problem.place(Term::Effect(effect)).expect("is a term");
+        let (air, offset) = (place(Effect::EntrainedAir), place(Effect::FlowMeterOffsetA));
+        let white = form.white_column(Term::Effect(Effect::EntrainedAir), problem.usual_constants);
+        let replaced = regression.with_column(offset, white);
+        let priors = vec![None; problem.terms.len()];
+        let (own, there) = (regression.solve(&[0, 1, air], &priors), replaced.solve(&[0, 1, offset], &priors));
+        assert!(own.value.iter().zip(&there.value).all(|(a, b)| is_near(*a, *b)));
+        assert!(is_near(own.chi2, there.chi2));
+        let errors = regression.held_out(&[0, 1, air], &priors);
+        let replaced = replaced.held_out(&[0, 1, offset], &priors);
+        assert!(errors.iter().zip(&replaced).all(|(a, b)| is_near(*a, *b)));
     }
 }
