@@ -4,6 +4,7 @@ use super::data::{Declared, Series};
 use crate::rig::Instruments;
 use pitchleak_core::{Cylinder, Effect, EffectSet, Fluid, PerLeak, Sample};
 use pitchleak_testkit::{Motion, noisy, seeded, sensors_of};
+use std::cell::Cell;
 
 /// What the cylinder leaks, m³/(s·Pa).
 pub(crate) const LEAKS: PerLeak<f64> = PerLeak { internal: 1e-11, external_a: 3e-12, external_b: 2e-12 };
@@ -32,6 +33,18 @@ pub(crate) fn torn_seal(seconds: u32) -> Series {
         let past = TURBULENT.1 * load.signum() * load.abs().sqrt();
         sample.qa_m3s = sample.qa_m3s.map(|q| q + past);
         sample.qb_m3s = sample.qb_m3s.map(|q| q - past);
+    })
+}
+
+/// Some seconds of one with gas at port A, 10 cm³ at 5 bar, and with a flow that goes to and fro into A as nothing tells.
+pub(crate) fn gas_beside(strays_m3s: f64, seconds: u32) -> Series {
+    let before = Cell::new((0.0_f64, None));
+    seen(seconds, |sample| {
+        let pa = sample.pa_pa;
+        let (t, last) = before.get();
+        before.set((t + 0.01, Some(pa)));
+        let taken = 5.0 / pa.powi(2) * (pa - last.unwrap_or(pa)) / 0.01;
+        sample.qa_m3s = sample.qa_m3s.map(|q| q + taken + strays_m3s * (3.0 * t).sin());
     })
 }
 

@@ -405,13 +405,34 @@ impl<'a> Fit<'a> {
         let mut priors = self.problem.increments(&self.weak_form.at);
         for term in terms {
             let mean = -self.weak_form.at.value(self.problem.terms[*term]);
-            let std = |term: usize| Some(ROUNDING.sqrt() * self.estimate(term)?.std);
-            priors[*term] = std(*term).map(|std| Prior { mean, std });
-            for constant in self.problem.constants_of(*term) {
-                priors[constant] = std(constant).map(|std| Prior { mean: 0.0, std }).or(priors[constant]);
-            }
+            priors[*term] = self.held_at(*term, mean).or(priors[*term]);
+            self.hold_constants(*term, &mut priors);
         }
         priors
+    }
+
+    /// Holds the constants of a term's law where they are.
+    fn hold_constants(&self, term: usize, priors: &mut [Option<Prior>]) {
+        for constant in self.problem.constants_of(term) {
+            priors[constant] = self.held_at(constant, 0.0).or(priors[constant]);
+        }
+    }
+
+    /// What holds a fitted term so far from its linearisation.
+    fn held_at(&self, term: usize, mean: f64) -> Option<Prior> {
+        let own = self.estimate(term)?;
+        Some(Prior { mean, std: ROUNDING.sqrt() * own.std })
+    }
+
+    /// A fitted term's value in standard deviations of what the pieces of the data say while the constants of its law stay: which law
+    /// it is may be open where it is certain that there is one.
+    pub(crate) fn sigma_of_pieces(&self, term: usize) -> Option<f64> {
+        let place = self.bounded.terms.iter().position(|one| *one == term)?;
+        let mut priors = self.held_priors();
+        self.hold_constants(term, &mut priors);
+        let alone = self.regression.solve(&self.bounded.terms, &priors).std[place];
+        let of_pieces = self.regression.jackknife(&self.bounded.terms, &priors)[place];
+        Some(self.estimate(term)?.value.abs() / alone.max(of_pieces))
     }
 
     /// By how much one further term would move the value of a fitted one: no new pass over the data.
@@ -457,7 +478,7 @@ fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, seen, torn_seal};
+    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, gas_beside, seen, torn_seal};
     use pitchleak_core::Effect;
     use std::cell::Cell;
 
@@ -535,6 +556,25 @@ mod tests {
             let own = problem.place(term).and_then(|place| fit.estimate(place)).expect("is fitted");
             assert!((own.value - truth).abs() < 4.0 * own.std && own.std < 0.2 * truth, "{term:?}: {own:?}");
         }
+    }
+
+    /// Gas of which these pressures tell neither volume nor precharge apart is certain all the same.
+    #[test]
+    fn that_an_effect_is_there_may_be_certain_where_the_constants_of_its_law_are_not() {
+        let traces = [gas_beside(0.0, 60)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(Effect::AccumulatorA)).expect("is a term");
+        let usual = problem.usual(term);
+        let plain = Fit::declared(&problem, &|| ());
+        let sigmas = |fit: &Fit<'_>| {
+            let own = fit.estimate(term).expect("is fitted");
+            [own.value / own.std, fit.sigma_of_pieces(term).expect("is fitted")]
+        };
+        let [of_value, there] = sigmas(&plain.with(term, usual, &|| ()));
+        assert!((of_value / there - 1.0).abs() < 1e-3 && there > 50.0, "{of_value} {there}");
+        let unknown = EffectConstants { precharge_pa: 3e5, ..usual };
+        let [of_value, there] = sigmas(&plain.with(term, unknown, &|| ()));
+        assert!(of_value < 1.0 && there > 50.0, "{of_value} {there}");
     }
 
     #[test]

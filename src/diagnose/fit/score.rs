@@ -331,7 +331,8 @@ mod tests {
         let white = form.white_column(Term::Effect(Effect::EntrainedAir), problem.usual_constants);
         let replaced = regression.with_column(offset, white);
         let priors = vec![None; problem.terms.len()];
-        let (own, there) = (regression.solve(&[0, 1, air], &priors), replaced.solve(&[0, 1, offset], &priors));
+        let (own, there) =
+            (regression.solve(&[0, 1, air], &priors), replaced.solve(&[0, 1, offset], &priors));
         assert!(own.value.iter().zip(&there.value).all(|(a, b)| is_near(*a, *b)));
         assert!(is_near(own.chi2, there.chi2));
         let errors = regression.held_out(&[0, 1, air], &priors);

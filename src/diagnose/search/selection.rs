@@ -208,11 +208,9 @@ impl Selection<'_> {
     /// alone may be the work of something else.
     pub(super) fn drop_doubtful(&mut self, progress: Progress<'_>) {
         while self.fit.is_incomplete() {
-            let ratio =
-                |one: &Selected| self.fit.estimate(one.term).map_or(0.0, |own| own.value.abs() / own.std);
-            let ratios = self.effects.iter().map(ratio).enumerate();
-            let weakest = ratios.min_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((at, _)) = weakest.filter(|(_, ratio)| *ratio < SIGNIFICANT_SIGMA) else { return };
+            let sigma = |one: &Selected| self.fit.sigma_of_pieces(one.term).unwrap_or(0.0);
+            let weakest = self.effects.iter().map(sigma).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((at, _)) = weakest.filter(|(_, sigma)| *sigma < SIGNIFICANT_SIGMA) else { return };
             self.drop_at(at, progress);
         }
     }
@@ -257,7 +255,8 @@ pub(crate) fn interactions(fit: &Fit<'_>, selected: &[Selected]) -> Vec<Interact
 mod tests {
     use super::*;
     use crate::diagnose::fit::Problem;
-    use crate::diagnose::testing::{TURBULENT, declared, torn_seal};
+    use crate::diagnose::testing::{TURBULENT, declared, gas_beside, torn_seal};
+    use pitchleak_core::effects::EffectConstants;
 
     /// Of two sets that are as likely, each value lies half their distance from the mean of both; of the named one's side it is the root
     /// of half its square. A set without the term says nothing.
@@ -275,5 +274,19 @@ mod tests {
             Other { odds: 1.0, values: vec![(term + 1, 7.0)] },
         ];
         assert!((all.spread(term) / own - 2.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    /// What else is missing leaves gas in doubt of its law, not of its being there.
+    #[test]
+    fn an_effect_of_unknown_constants_is_not_dropped_for_them() {
+        let traces = [gas_beside(1e-6, 60)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let term = problem.place(Term::Effect(Effect::AccumulatorA)).expect("is a term");
+        let unknown = EffectConstants { precharge_pa: 3e5, ..problem.usual(term) };
+        let fit = Fit::declared(&problem, &|| ()).with(term, unknown, &|| ());
+        let mut all = Selection { effects: vec![Selected::new(term, 1.0)], ..Selection::none(fit) };
+        assert!(all.fit.is_incomplete());
+        all.drop_doubtful(&|| ());
+        assert_eq!(all.named(), [term]);
     }
 }
