@@ -25,6 +25,10 @@ pub enum Column {
     GainB,
     /// One gain of both.
     Gains,
+    /// By how much more meter A reads of what drives the piston out than of what comes back, half of it, share of what it shows.
+    DirectionA,
+    /// The same of meter B.
+    DirectionB,
     /// Lag of a flow meter, s.
     LagA,
     /// The same of meter B.
@@ -179,6 +183,8 @@ impl Scales<'_> {
             Column::GainA => plain(&[(R::ResidualA, 1.0)], &[]),
             Column::GainB => plain(&[], &[(R::ResidualB, 1.0)]),
             Column::Gains => plain(&[(R::ResidualA, 1.0)], &[(R::ResidualB, 1.0)]),
+            Column::DirectionA => plain(&[(R::Way, area_a)], &[]),
+            Column::DirectionB => plain(&[], &[(R::Way, area_b)]),
             Column::Travel => plain(&[(R::Travel, area_a)], &[(R::Travel, -area_b)]),
             Column::LagA => plain(&[(R::FlowChangeA, -1.0)], &[]),
             Column::LagB => plain(&[], &[(R::FlowChangeB, -1.0)]),
@@ -378,6 +384,8 @@ mod tests {
             C::GainA => both(qa, 0.0),
             C::GainB => both(0.0, qb),
             C::Gains => both(qa, qb),
+            C::DirectionA => both(own.area_a_m2 * V.abs(), 0.0),
+            C::DirectionB => both(0.0, own.area_b_m2 * V.abs()),
             C::LagA => late(E, 0.0),
             C::LagB => late(0.0, E),
             C::Lags => late(E, E),
@@ -494,7 +502,7 @@ mod tests {
         assert!(moment.into_iter().flatten().all(|entry| entry == 0.0));
     }
 
-    const ALL: [Column; 35] = [
+    const ALL: [Column; 37] = [
         Column::Compressibility,
         Column::Unpressed,
         Column::ZeroA,
@@ -502,6 +510,8 @@ mod tests {
         Column::GainA,
         Column::GainB,
         Column::Gains,
+        Column::DirectionA,
+        Column::DirectionB,
         Column::LagA,
         Column::LagB,
         Column::Lags,

@@ -210,7 +210,9 @@ impl NoiseOf {
         }
         let [area_a, area_b] = self.area_m2;
         let kappa = self.compressibility;
-        let ends: [(f64, Vec<AtEnd>); 5] = [
+        let ends: [(f64, Vec<AtEnd>); 6] = [
+            // Out and in alike, so that it goes with nothing else.
+            (self.position, vec![(R::Way, 1.0, 0)]),
             (self.position, vec![(R::Travel, 1.0, 0), (R::ResidualA, -area_a, 0), (R::ResidualB, area_b, 0)]),
             (
                 self.pressure_mpa[0],

@@ -190,6 +190,7 @@ impl Readings {
             }
             Of::Position => {
                 self.multiply(&[RawSum::Travel], by);
+                self.multiply(&[RawSum::Way], by.abs());
                 let Cylinder { dead_volume_a_m3, dead_volume_b_m3, area_b_m2, stroke_m, .. } = *cylinder;
                 self.scale_volume(0, by, dead_volume_a_m3);
                 // Chamber B has what of the stroke is left.

@@ -16,8 +16,8 @@ impl Entry {
 impl Column {
     fn sensors(self) -> &'static [Signal] {
         match self {
-            Self::ZeroA | Self::GainA | Self::LagA => Of::FlowA.sensors(),
-            Self::ZeroB | Self::GainB | Self::LagB => Of::FlowB.sensors(),
+            Self::ZeroA | Self::GainA | Self::DirectionA | Self::LagA => Of::FlowA.sensors(),
+            Self::ZeroB | Self::GainB | Self::DirectionB | Self::LagB => Of::FlowB.sensors(),
             Self::Gains | Self::Lags => Of::Flows.sensors(),
             Self::PositionGain | Self::PositionZero | Self::Travel => Of::Position.sensors(),
             Self::ThroughSealA | Self::PressureZeroA | Self::PressureGainA => Of::PressureA.sensors(),

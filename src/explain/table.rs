@@ -252,10 +252,11 @@ pub(super) fn departures() -> Vec<Entry> {
     use Column as C;
     use share::{COMMON, RARE, UNCOMMON, VERY_RARE};
     const METER: &str = "Compare the meter with the piston's travel over a long stroke.";
+    const BOTH_WAYS: &str = "Compare the meter with the piston's travel over a long stroke, out and in.";
     const CLOCK: &str = "Compare the clocks and filters of flow meters, position and pressures.";
     const AREA: &str = "Measure piston and rod, or compare the data sheet.";
     // Meters come with a certificate; an area is a rod of another size, or a slip.
-    let (late_s, very_late_s, meter_gain, gain, gross) = (0.1, 1.0, 0.02, 0.05, 0.01);
+    let (late_s, very_late_s, meter_gain, one_way, gain, gross) = (0.1, 1.0, 0.02, 0.01, 0.05, 0.01);
     let entry = |id, share, text| Entry::new(id, Kind::Departure, share, text);
     let as_declared = entry("as_declared", 0.80, "sensors and rig are as declared");
     let mut all = vec![
@@ -281,6 +282,12 @@ pub(super) fn departures() -> Vec<Entry> {
             .free(C::Gains, gain)
             .remedy(METER, None)
             .alike(&["position_gain", "areas"]),
+        entry("flow_direction_a", RARE, "flow meter A reads more one way than the other")
+            .free(C::DirectionA, one_way)
+            .remedy(BOTH_WAYS, None),
+        entry("flow_direction_b", RARE, "flow meter B reads more one way than the other")
+            .free(C::DirectionB, one_way)
+            .remedy(BOTH_WAYS, None),
         entry("flow_drift_a", RARE, "flow meter A's zero drifts").drifting(C::ZeroA, gross),
         entry("flow_drift_b", RARE, "flow meter B's zero drifts").drifting(C::ZeroB, gross),
         entry("area_a", RARE, "piston area A is not as declared")

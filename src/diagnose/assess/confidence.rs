@@ -224,7 +224,8 @@ fn takes_all_declared(fit: &Fit<'_>, one: &Selected) -> Option<Doubt> {
 /// be none.
 fn may_be_none(selection: &Selection<'_>, one: &Selected) -> Option<Doubt> {
     let own = selection.fit.estimate(one.term)?;
-    let std = own.std.hypot(estimates::spread_over_sets(selection, one.term));
+    let std =
+        selection.fit.std_with_law_held(one.term)?.hypot(estimates::spread_over_sets(selection, one.term));
     let text = "beside an effect too weak for a name, which these traces do not rule out, it could be none";
     (own.value.abs() < SIGNIFICANT_SIGMA * std).then(|| doubt(DoubtId::MayBeNone, text))
 }

@@ -197,11 +197,7 @@ impl<'a> Fit<'a> {
         let free = regression.solve(&structure.active, &priors);
         let held_compressibility = beyond_range(problem, at, &free);
         hold(&mut priors, problem, at, held_compressibility);
-        let mut bounded = regression.solve(&structure.active, &priors);
-        if assumed_error != PerEquation::default() {
-            let pieces = regression.jackknife(&structure.active, &priors);
-            bounded.std.iter_mut().zip(pieces).for_each(|(std, wide)| *std = std.max(wide));
-        }
+        let bounded = bounded(&regression, &structure.active, &priors, assumed_error);
         let equation_error = regression::equation_error(&weak_form, &regression, &bounded);
         Self {
             problem,
@@ -424,15 +420,13 @@ impl<'a> Fit<'a> {
         Some(Prior { mean, std: ROUNDING.sqrt() * own.std })
     }
 
-    /// A fitted term's value in standard deviations of what the pieces of the data say while the constants of its law stay: which law
-    /// it is may be open where it is certain that there is one.
-    pub(crate) fn sigma_of_pieces(&self, term: usize) -> Option<f64> {
-        let place = self.bounded.terms.iter().position(|one| *one == term)?;
+    /// A fitted term's standard deviation while the constants of its law stay: which law it is may be open where it is certain that there
+    /// is one.
+    pub(crate) fn std_with_law_held(&self, term: usize) -> Option<f64> {
         let mut priors = self.held_priors();
         self.hold_constants(term, &mut priors);
-        let alone = self.regression.solve(&self.bounded.terms, &priors).std[place];
-        let of_pieces = self.regression.jackknife(&self.bounded.terms, &priors)[place];
-        Some(self.estimate(term)?.value.abs() / alone.max(of_pieces))
+        let held = bounded(&self.regression, self.active(), &priors, self.assumed_error);
+        held.terms.iter().position(|one| *one == term).map(|place| held.std[place])
     }
 
     /// By how much one further term would move the value of a fitted one: no new pass over the data.
@@ -457,6 +451,21 @@ impl<'a> Fit<'a> {
         let sum: f64 = before.iter().zip(&after).map(|(b, a)| b - a).sum();
         sum > 0.0 && 2 * better > before.len()
     }
+}
+
+/// The solution; where an equation has an error, no surer than the pieces of the data agree.
+fn bounded(
+    regression: &Regression,
+    terms: &[usize],
+    priors: &[Option<Prior>],
+    assumed_error: PerEquation<f64>,
+) -> Solution {
+    let mut solution = regression.solve(terms, priors);
+    if assumed_error != PerEquation::default() {
+        let pieces = regression.jackknife(terms, priors);
+        solution.std.iter_mut().zip(pieces).for_each(|(std, wide)| *std = std.max(wide));
+    }
+    solution
 }
 
 /// The end of the oil's range beyond which the data alone would take 1/β.
@@ -568,7 +577,7 @@ mod tests {
         let plain = Fit::declared(&problem, &|| ());
         let sigmas = |fit: &Fit<'_>| {
             let own = fit.estimate(term).expect("is fitted");
-            [own.value / own.std, fit.sigma_of_pieces(term).expect("is fitted")]
+            [own.value / own.std, own.value / fit.std_with_law_held(term).expect("is fitted")]
         };
         let [of_value, there] = sigmas(&plain.with(term, usual, &|| ()));
         assert!((of_value / there - 1.0).abs() < 1e-3 && there > 50.0, "{of_value} {there}");

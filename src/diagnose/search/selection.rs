@@ -208,7 +208,10 @@ impl Selection<'_> {
     /// alone may be the work of something else.
     pub(super) fn drop_doubtful(&mut self, progress: Progress<'_>) {
         while self.fit.is_incomplete() {
-            let sigma = |one: &Selected| self.fit.sigma_of_pieces(one.term).unwrap_or(0.0);
+            let sigma = |one: &Selected| {
+                let own = self.fit.estimate(one.term).zip(self.fit.std_with_law_held(one.term));
+                own.map_or(0.0, |(own, std)| own.value.abs() / std)
+            };
             let weakest = self.effects.iter().map(sigma).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             let Some((at, _)) = weakest.filter(|(_, sigma)| *sigma < SIGNIFICANT_SIGMA) else { return };
             self.drop_at(at, progress);

@@ -29,6 +29,8 @@ pub enum RawSum {
     ResidualB,
     /// Δx, m.
     Travel,
+    /// |Δx|, m: what a meter sees otherwise on the way out than on the way in goes with it.
+    Way,
     /// ∫V_A dP_A, m³ MPa.
     StorageA,
     /// ∫V_B dP_B, m³ MPa.
@@ -285,6 +287,7 @@ impl<T: Real> BlockSums<T> {
         }
         let Sums { flow_m3, mut sums, time_square_s2, pressure_square_s2, volumes_m3, fed, .. } = sums?;
         let travel = sums[RawSum::Travel as usize];
+        sums[RawSum::Way as usize] = travel.abs();
         let stored = |raw: RawSum| self.compressibility * sums[raw as usize];
         let residual_a = flow_m3[0] - self.area_m2[0] * travel - stored(RawSum::StorageA);
         let residual_b = flow_m3[1] + self.area_m2[1] * travel - stored(RawSum::StorageB);
@@ -353,6 +356,7 @@ mod tests {
             (RawSum::ResidualA, flown[0] - a * travel - kappa * va * 3e6 * T),
             (RawSum::ResidualB, flown[1] + b * travel + kappa * vb * 2e6 * T),
             (RawSum::Travel, travel),
+            (RawSum::Way, -travel),
             (RawSum::StorageA, va * 3.0 * T),
             (RawSum::StorageB, -vb * 2.0 * T),
             (RawSum::PressureA, integral(p_a)),
