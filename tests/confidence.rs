@@ -132,6 +132,16 @@ fn what_another_set_of_effects_may_be_is_not_surely_the_first() {
     }
 }
 
+/// A leak the other way would explain the rest: that is no reason to take it for none, and a meter's zero for sure in its stead.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]
+fn what_would_turn_a_leak_is_no_next_effect() {
+    let case = subsets::Case::draw(0x62b3e8, 7, 2);
+    let answer = case.ask().expect("can be built");
+    let is_named = answer.diagnosis.effects.iter().any(|effect| effect.id == "external_leak_b_turbulent");
+    assert!(is_named && !answer.has_a_sure_wrong_name(), "{}: {}", case.words(), answer.line());
+}
+
 /// Near its end stop a chamber is small, its oil rings faster than is sampled and evaporates at times: nothing is missing there.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "too slow without optimisation: run with --release")]

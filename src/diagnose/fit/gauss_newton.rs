@@ -315,6 +315,12 @@ impl<'a> Fit<'a> {
         Some(Estimate { value: value.clamp(lower, upper), std: self.bounded.std[at] })
     }
 
+    /// Whether an effect is fitted that physics leaves nothing of: the other way it can't be.
+    pub(crate) fn is_none(&self, term: usize) -> bool {
+        let is_effect = self.problem.terms[term].effect().is_some();
+        is_effect && self.estimate(term).is_some_and(|own| own.value.abs() <= 0.0)
+    }
+
     /// Whether a fitted term lies at an end of what physics allows, or within its standard deviation of it.
     pub(crate) fn is_at_bound(&self, term: usize) -> bool {
         let (lower, upper) = self.problem.terms[term].bounds();

@@ -163,7 +163,8 @@ impl Selection<'_> {
         // One that only the end of its range stops is not what is missing.
         let stays = |trial: Trial| {
             let next = with(fit, &trial, progress);
-            (!next.is_at_bound(trial.score.term)).then_some((trial, next))
+            let is_within = !next.is_at_bound(trial.score.term);
+            (is_within && self.is_better_with(&trial, &next, progress)).then_some((trial, next))
         };
         let Some((trial, next)) = worthy.find_map(stays) else { return false };
         let chi2_drop = trial.score.chi2_drop;
@@ -178,6 +179,18 @@ impl Selection<'_> {
         true
     }
 
+    /// Whether a further effect leaves no more than noise, or less even without those of which it leaves nothing: its score let them be the
+    /// other way than they can.
+    fn is_better_with(&self, trial: &Trial, next: &Fit<'_>, progress: Progress<'_>) -> bool {
+        let gone = self.effects.iter().map(|one| one.term).filter(|term| next.is_none(*term));
+        let gone: Vec<usize> = gone.collect();
+        let new = [(trial.score.term, trial.constants)];
+        let completes = self.fit.is_incomplete() && !next.is_incomplete();
+        gone.is_empty()
+            || completes
+            || self.fit.in_place_of(&gone, &new, progress).beyond(&self.fit).chi2 < 0.0
+    }
+
     /// Drops effects that those added later have made needless.
     pub(super) fn drop_needless(&mut self, progress: Progress<'_>) {
         while let Some(at) = self.first_needless() {
@@ -190,8 +203,7 @@ impl Selection<'_> {
         let dispersion = fit.dispersion(fit.free.chi2);
         let is_needless = |one: &Selected| {
             let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
-            let is_none = fit.estimate(one.term).is_some_and(|own| own.value.abs() <= 0.0);
-            is_none || loss(fit, &[one.term]) / dispersion < needed
+            fit.is_none(one.term) || loss(fit, &[one.term]) / dispersion < needed
         };
         self.effects.iter().position(is_needless)
     }

@@ -192,7 +192,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 /// model: its fit does not settle, leaves more than noise where the named one does not, has an effect at the end of its range, or one that
 /// has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
-    let other = fit.in_place_of(&one.gone, &one.new, progress);
+    let (one, other) = without_none(fit, one, progress);
     let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
@@ -201,12 +201,26 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let is_settled = other.stands_still() || !fit.stands_still();
     let is_complete = !other.is_incomplete() || fit.is_incomplete();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
-    let is_model = is_settled && is_complete && is_within && new.iter().all(acts);
+    let is_there = other.active().iter().all(|term| !other.is_none(*term));
+    let is_model = is_settled && is_complete && is_within && is_there && new.iter().all(acts);
     let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
     let dearer = brought - spared(fit, &one.gone) + below_zero(&other) - own_leaks;
     let value = |term: &usize| Some((*term, other.estimate(*term)?.value));
     let values = other.active().iter().filter_map(value).collect();
     is_model.then(|| Exchange { new, left: other.beyond(fit), dearer, values, ..one })
+}
+
+/// The fit of an exchange; those of the kept effects go too that it leaves nothing of.
+fn without_none<'a>(fit: &Fit<'a>, one: Exchange, progress: Progress<'_>) -> (Exchange, Fit<'a>) {
+    let other = fit.in_place_of(&one.gone, &one.new, progress);
+    let is_new = |term: &usize| one.new.iter().any(|(new, _)| new == term);
+    let none = other.active().iter().copied().filter(|term| other.is_none(*term) && !is_new(term));
+    let gone: Vec<usize> = one.gone.iter().copied().chain(none).collect();
+    if gone.len() == one.gone.len() {
+        return (one, other);
+    }
+    let other = fit.in_place_of(&gone, &one.new, progress);
+    (Exchange { gone, ..one }, other)
 }
 
 /// The leaks in their standard deviations, widened where the residual is more than noise.
@@ -286,7 +300,7 @@ fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<Exchan
 mod tests {
     use super::*;
     use crate::diagnose::fit::Problem;
-    use crate::diagnose::testing::{TURBULENT, declared, torn_seal};
+    use crate::diagnose::testing::{TURBULENT, declared, seen, torn_seal};
     use crate::diagnose::weak_form::Term;
     use pitchleak_core::Effect;
 
@@ -305,6 +319,31 @@ mod tests {
         let order: Vec<(usize, f64)> = kept.iter().take(5).map(|one| (one.gone[0], one.left.chi2)).collect();
         assert_eq!(order, [(0, 0.0), (1, 1e3), (0, 1.0), (1, 2e3), (0, 2.0)]);
         assert_eq!(kept.len(), MOST_EXCHANGES);
+    }
+
+    /// Flow against the pressure fits a turbulent leak the other way, which there is none of.
+    #[test]
+    fn a_set_with_an_effect_the_way_it_can_not_be_is_no_model() {
+        let model = |past: f64| {
+            let traces = [seen(30, |sample| {
+                let past = past * sample.load_pressure_pa().signum() * sample.load_pressure_pa().abs().sqrt();
+                sample.qa_m3s = sample.qa_m3s.map(|q| q + past);
+                sample.qb_m3s = sample.qb_m3s.map(|q| q - past);
+            })];
+            let problem = Problem::new(&traces, &declared(), &[]);
+            let [wrong, turbulent] = [Effect::FlowMeterGainA, TURBULENT.0]
+                .map(|effect| problem.place(Term::Effect(effect)).expect("is a term"));
+            let fit = Fit::declared(&problem, &|| ()).with(wrong, problem.usual_constants, &|| ());
+            let exchange = Exchange {
+                gone: vec![wrong],
+                new: vec![(turbulent, problem.usual_constants)],
+                left: Beyond::default(),
+                dearer: 0.0,
+                values: vec![],
+            };
+            fitted(&fit, below_zero(&fit), exchange, &|| ()).is_some()
+        };
+        assert!(model(TURBULENT.1) && !model(-TURBULENT.1));
     }
 
     #[test]
