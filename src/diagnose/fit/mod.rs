@@ -3,6 +3,7 @@
 mod emptied;
 mod gauss_newton;
 mod leak_levels;
+mod linear;
 mod predict;
 mod problem;
 mod regression;
