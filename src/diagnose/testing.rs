@@ -28,9 +28,14 @@ pub(crate) fn sound(seconds: u32) -> Series {
 
 /// Some seconds of one with a turbulent leak past the piston.
 pub(crate) fn torn_seal(seconds: u32) -> Series {
+    past_the_seal(TURBULENT.1, seconds)
+}
+
+/// Some seconds of one with so much of it, m³/(s·√Pa).
+pub(crate) fn past_the_seal(size: f64, seconds: u32) -> Series {
     seen(seconds, |sample| {
         let load = sample.load_pressure_pa();
-        let past = TURBULENT.1 * load.signum() * load.abs().sqrt();
+        let past = size * load.signum() * load.abs().sqrt();
         sample.qa_m3s = sample.qa_m3s.map(|q| q + past);
         sample.qb_m3s = sample.qb_m3s.map(|q| q - past);
     })

@@ -300,7 +300,7 @@ fn unlisted(fit: &Fit<'_>, term: usize, progress: Progress<'_>) -> Option<Exchan
 mod tests {
     use super::*;
     use crate::diagnose::fit::Problem;
-    use crate::diagnose::testing::{TURBULENT, declared, seen, torn_seal};
+    use crate::diagnose::testing::{TURBULENT, declared, past_the_seal, torn_seal};
     use crate::diagnose::weak_form::Term;
     use pitchleak_core::Effect;
 
@@ -324,12 +324,8 @@ mod tests {
     /// Flow against the pressure fits a turbulent leak the other way, which there is none of.
     #[test]
     fn a_set_with_an_effect_the_way_it_can_not_be_is_no_model() {
-        let model = |past: f64| {
-            let traces = [seen(30, |sample| {
-                let past = past * sample.load_pressure_pa().signum() * sample.load_pressure_pa().abs().sqrt();
-                sample.qa_m3s = sample.qa_m3s.map(|q| q + past);
-                sample.qb_m3s = sample.qb_m3s.map(|q| q - past);
-            })];
+        let is_model = |size: f64| {
+            let traces = [past_the_seal(size, 30)];
             let problem = Problem::new(&traces, &declared(), &[]);
             let [wrong, turbulent] = [Effect::FlowMeterGainA, TURBULENT.0]
                 .map(|effect| problem.place(Term::Effect(effect)).expect("is a term"));
@@ -343,7 +339,7 @@ mod tests {
             };
             fitted(&fit, below_zero(&fit), exchange, &|| ()).is_some()
         };
-        assert!(model(TURBULENT.1) && !model(-TURBULENT.1));
+        assert!(is_model(TURBULENT.1) && !is_model(-TURBULENT.1));
     }
 
     #[test]
