@@ -266,7 +266,7 @@ fn what_nothing_explains_is_weighed_by_its_size() {
 fn a_meter_that_reads_more_one_way_is_told_and_is_no_leak() {
     let rig = rig(1e-3);
     let motion = Motion::wind_like(PerLeak::default());
-    for (share, of_b) in [(0.02, false), (-0.02, false), (0.015, true)] {
+    for (share, of_b) in [(0.02, false), (-0.02, false), (0.015, true), (0.003, false)] {
         let mut random = seeded(5);
         let read = |k: u32| {
             let t_s = 0.01 * f64::from(k);
@@ -282,6 +282,8 @@ fn a_meter_that_reads_more_one_way_is_told_and_is_no_leak() {
         let named = verdict.explanations.iter().filter(|one| one.id.split('+').any(|part| part == id));
         let probability: f64 = named.map(|one| one.probability).sum();
         assert!(probability > 0.9, "{share}: {probability} {}", verdict.text);
+        // No meter is better than that.
+        assert_eq!(verdict.text.contains("one way than the other"), share.abs() > 0.01, "{}", verdict.text);
     }
 }
 

@@ -8,7 +8,7 @@ use super::posterior::{Posterior, has_enough, weigh};
 use super::raw_products::{RawProducts, Statistic};
 use super::readings::{Mistake, Of};
 use super::scales::with_scales;
-use super::sizes::{mended, sentence};
+use super::sizes::{is_usual_direction, mended, sentence};
 use super::table::{Entry, explanations};
 use crate::report::Status;
 use crate::rig::Rig;
@@ -316,6 +316,9 @@ fn note(weighed: &[Weighed<'_>], kind: usize, rig: &Rig) -> Option<Note> {
     let probability = masses.iter().map(|(_, mass)| mass).sum();
     let (best, _) = *masses.first().filter(|_| probability >= 1.0 - alpha)?;
     let likeliest = weighed.iter().find(|one| found(one)[kind].is_some_and(|entry| entry.id == best.id));
+    if likeliest.is_some_and(|one| is_usual_direction(best, &one.found)) {
+        return None;
+    }
     let others = masses.iter().skip(1).filter(|(_, mass)| *mass > alpha).map(|(entry, _)| entry.id);
     let rivals: BTreeSet<&str> = others.chain(best.alike.iter().copied()).collect();
     let text = likeliest.map_or_else(|| best.text.to_owned(), |one| sentence(best, &one.found, rig));

@@ -2,7 +2,7 @@
 
 use super::columns::Column;
 use super::readings::Mistake;
-use super::table::Entry;
+use super::table::{Entry, USUAL_GAIN};
 use crate::report::with_interval;
 use crate::rig::Rig;
 use crate::units::LPM_PER_M3S;
@@ -41,6 +41,15 @@ pub(super) fn sentence(entry: &Entry, found: &[Found], rig: &Rig) -> String {
     let sizes: Vec<String> =
         columns.iter().map(|(column, size)| text(*column, *size, rig, several)).collect();
     if sizes.is_empty() { words.to_owned() } else { format!("{words} by {}", sizes.join(" and ")) }
+}
+
+/// Whether all that was found is a meter that reads more one way than the other by less than its usual gain is off: no news of it.
+pub(super) fn is_usual_direction(entry: &Entry, found: &[Found]) -> bool {
+    let is_direction = |column: &Column| matches!(column, Column::DirectionA | Column::DirectionB);
+    let is_small =
+        |column: &Column| found.iter().any(|(known, size)| known == column && size.value.abs() < USUAL_GAIN);
+    let mut columns = entry.free.iter().map(|(column, ..)| column);
+    !entry.free.is_empty() && columns.all(|column| is_direction(column) && is_small(column))
 }
 
 /// What lags where a flow meter's lag is below zero.
