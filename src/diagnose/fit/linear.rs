@@ -63,6 +63,9 @@ impl Fit<'_> {
     /// A fitted term's standard deviation while the constants of its law stay: which law it is may be open where it is certain that there
     /// is one.
     pub(crate) fn std_with_law_held(&self, term: usize) -> Option<f64> {
+        if !self.problem.constants_of(term).any(|constant| self.active().contains(&constant)) {
+            return self.estimate(term).map(|own| own.std);
+        }
         let mut priors = self.held_priors();
         self.hold_constants(term, &mut priors);
         let held = bounded(&self.regression, self.active(), &priors, self.assumed_error);

@@ -167,8 +167,8 @@ const EXPLANATIONS: [(&str, &str); 5] = [
     ),
     (
         "departure",
-        "as_declared flow_lag flow_lag_a flow_lag_b flow_lag_gross flow_gain_a flow_gain_b flow_gain flow_direction_a flow_direction_b flow_drift_a \
-         flow_drift_b area_a area_b position_gain position_zero dead_volume_a dead_volume_b bulk_modulus \
+        "as_declared flow_lag flow_lag_a flow_lag_b flow_lag_gross flow_gain_a flow_gain_b flow_gain flow_direction_a \
+         flow_direction_b flow_drift_a flow_drift_b area_a area_b position_gain position_zero dead_volume_a dead_volume_b bulk_modulus \
          flow_lag_and_gains pressure_noise pressure_zero_gross_a pressure_zero_gross_b pressure_zero_a \
          pressure_zero_b pressure_gain_a pressure_gain_b",
     ),
