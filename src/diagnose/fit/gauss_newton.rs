@@ -39,9 +39,10 @@ pub(crate) struct Fit<'a> {
 /// By how much more one fit leaves than another. So an equation times a constant is the same equation.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Beyond {
-    /// Squares of what is left over, each fit's at the noise that its own model gives, and what the priors pay.
+    /// Squares of what is left over, each fit's at the noise that its own model gives; what the priors pay; and twice the ln of how much
+    /// wider the equations' error makes that noise. A fit that leaves more than noise pays for it as a likelihood does.
     pub(crate) chi2: f64,
-    /// Twice the ln of how wide that noise is, in what the meters and the load cell read.
+    /// Twice the ln of how wide the noise of the sensors alone is, in what the meters and the load cell read.
     pub(crate) width: f64,
 }
 
@@ -74,7 +75,7 @@ impl<'a> Fit<'a> {
         Self::settled(self.problem, structure, at, self.equation_error, progress)
     }
 
-    /// Best fit without the `old` effects and with the `new` ones, while the equations' error stays: see [`beyond`](Self::beyond).
+    /// Best fit without the `old` effects and with the `new` ones, with no columns but its own: see [`beyond`](Self::beyond).
     pub(crate) fn in_place_of(
         &self,
         old: &[usize],
@@ -82,9 +83,8 @@ impl<'a> Fit<'a> {
         progress: Progress<'_>,
     ) -> Self {
         let (structure, at) = self.exchanged(old, new);
-        let error = self.assumed_error;
-        let next = |fit: &Self| (!fit.stands_still()).then_some(error);
-        Self::linearised(self.problem, &structure, (at, error), next, progress)
+        let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
+        Self::linearised(self.problem, &structure, (at, self.equation_error), next, progress)
     }
 
     /// How it does beside another fit of the same traces, on the rows that count for both.
@@ -99,12 +99,13 @@ impl<'a> Fit<'a> {
     fn left(&self, counts: &[bool]) -> Beyond {
         let covariances = self.weak_form.covariances(self.assumed_error).counting(counts);
         let whitening = Whitening::of(&covariances, &self.assumed_error);
+        let of_sensors = Whitening::of(&covariances, &PerEquation::default());
         let white = whitening.whiten(&regression::residual(self.rows(), &self.free));
-        let widths = whitening.widths().zip(self.weak_form.left_gains());
+        let widths = whitening.widths().zip(of_sensors.widths()).zip(self.weak_form.left_gains());
         let counted = white.iter().zip(widths).zip(counts).filter(|(_, counts)| **counts);
-        counted.fold(Beyond::default(), |sum, ((value, (width, gain)), _)| Beyond {
-            chi2: sum.chi2 + value * value,
-            width: sum.width + 2.0 * (width / gain).ln(),
+        counted.fold(Beyond::default(), |sum, ((value, ((width, of_sensors), gain)), _)| Beyond {
+            chi2: sum.chi2 + value * value + 2.0 * (width / of_sensors).ln(),
+            width: sum.width + 2.0 * (of_sensors / gain).ln(),
         })
     }
 
@@ -432,6 +433,20 @@ mod tests {
                 "{before:?} {after:?}"
             );
         }
+    }
+
+    /// Each is as large as its own noise: what tells them apart is how much of that is the equations' error.
+    #[test]
+    fn a_fit_that_leaves_more_than_noise_is_the_less_likely_one() {
+        let traces = [torn_seal(30)];
+        let problem = Problem::new(&traces, &declared(), &[]);
+        let plain = Fit::declared(&problem, &|| ());
+        let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+        let with = plain.with(term, problem.usual_constants, &|| ());
+        let per_entry = |one: &Fit<'_>| one.free.chi2 / one.regression.count() as f64;
+        assert!((per_entry(&plain) - 1.0).abs() < 0.2 && (per_entry(&with) - 1.0).abs() < 0.2);
+        let (worse, better) = (plain.beyond(&with).chi2, with.beyond(&plain).chi2);
+        assert!(worse > with.regression.count() as f64 && (worse + better).abs() < 1e-6 * worse, "{worse}");
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub(crate) fn best<'a>(
     };
     add_while(&mut staying, |_| true, &error, progress);
     let staying = finished(staying, &error, progress);
-    changing.into_iter().fold(staying, |best, other| if other.cost() < best.cost() { other } else { best })
+    changing.filter(|other| other.is_likelier_than(&staying)).unwrap_or(staying)
 }
 
 /// Names effect after effect while each is significant; `error` gives the held-out error of a fit.

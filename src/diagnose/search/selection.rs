@@ -4,7 +4,6 @@
 use super::candidates::{Candidates, critical_sigma, strongest_unlisted};
 use super::leak_changes;
 use super::trials::{self, Trial};
-use crate::diagnose::equation::Equation;
 use crate::diagnose::fit::{Fit, Progress};
 use crate::diagnose::outcome::Interaction;
 use crate::diagnose::statistics;
@@ -106,14 +105,11 @@ fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>)
 }
 
 impl Selection<'_> {
-    /// Twice the log likelihood that it lacks of sensor noise, with the equations' noise as found, and what each of its effects and of the
-    /// leaks' changes has to bring.
-    pub(crate) fn cost(&self) -> f64 {
-        let fit = &self.fit;
-        let ratios = fit.noise_ratio();
-        let misfit = Equation::ALL.map(|one| 2.0 * ratios[one].ln() * fit.innovations(one).len() as f64);
-        let needed = critical_sigma(fit, fit.problem.usual_constants).powi(2);
-        misfit.iter().sum::<f64>() + needed * self.size() as f64
+    /// Whether it is the likelier one, with what each of its effects and of the leaks' changes has to bring.
+    pub(super) fn is_likelier_than(&self, other: &Self) -> bool {
+        let needed = critical_sigma(&self.fit, self.fit.problem.usual_constants).powi(2);
+        let more = self.size() as f64 - other.size() as f64;
+        self.fit.beyond(&other.fit).chi2 + needed * more < 0.0
     }
 
     /// Its effects, in the order of their terms.
@@ -185,10 +181,7 @@ impl Selection<'_> {
         let gone = self.effects.iter().map(|one| one.term).filter(|term| next.is_none(*term));
         let gone: Vec<usize> = gone.collect();
         let new = [(trial.score.term, trial.constants)];
-        let completes = self.fit.is_incomplete() && !next.is_incomplete();
-        gone.is_empty()
-            || completes
-            || self.fit.in_place_of(&gone, &new, progress).beyond(&self.fit).chi2 < 0.0
+        gone.is_empty() || self.fit.in_place_of(&gone, &new, progress).beyond(&self.fit).chi2 < 0.0
     }
 
     /// Drops effects that those added later have made needless.

@@ -199,10 +199,9 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
         selection::loss(&other, &[*term]) > needed(fit, *constants) * dispersion
     };
     let is_settled = other.stands_still() || !fit.stands_still();
-    let is_complete = !other.is_incomplete() || fit.is_incomplete();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
     let is_there = other.active().iter().all(|term| !other.is_none(*term));
-    let is_model = is_settled && is_complete && is_within && is_there && new.iter().all(acts);
+    let is_model = is_settled && is_within && is_there && new.iter().all(acts);
     let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
     let dearer = brought - spared(fit, &one.gone) + below_zero(&other) - own_leaks;
     let value = |term: &usize| Some((*term, other.estimate(*term)?.value));
