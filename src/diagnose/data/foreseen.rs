@@ -12,17 +12,20 @@ use std::f64::consts::FRAC_1_SQRT_2;
 pub(super) struct Chamber {
     /// Its place among flows.
     flow: usize,
+    of: fn(&Signals<f64>) -> f64,
     with_flow: fn(Signals<f64>, f64) -> Signals<f64>,
     left_m3s: fn(Terms<f64>) -> f64,
 }
 
 pub(super) const CHAMBER_A: Chamber = Chamber {
     flow: 0,
+    of: |all| all.qa_m3s,
     with_flow: |all, qa_m3s| Signals { qa_m3s, ..all },
     left_m3s: |all| all.chamber_a_m3s,
 };
 pub(super) const CHAMBER_B: Chamber = Chamber {
     flow: 1,
+    of: |all| all.qb_m3s,
     with_flow: |all, qb_m3s| Signals { qb_m3s, ..all },
     left_m3s: |all| all.chamber_b_m3s,
 };
@@ -94,17 +97,18 @@ impl<'t, R: Fn(f64, &Signals<f64>) -> Terms<f64>> Foreseen<'t, R> {
         Signals { v_mps, ..shown(self.series, [qa, qb], at) }
     }
 
-    /// The flow at which nothing is left of its chamber's equation, at the speed at which nothing is left of the other's.
+    /// What the meter would show at the speed at which nothing is left of the other chamber's equation.
     fn by_meter(&self, own: &Chamber, other: &Chamber, reading: &Signals<f64>) -> f64 {
         let seen = self.effects.correct(reading);
         let left = |v_mps: f64| (other.left_m3s)((self.residual)(seen.t_s, &Signals { v_mps, ..seen }));
         self.at_speed(own, Signals { v_mps: zero_of_line(left(0.0), left(1.0)), ..seen })
     }
 
+    /// What the meter would show, without its dead band, of the flow at which nothing is left of its chamber's equation.
     fn at_speed(&self, own: &Chamber, seen: Signals<f64>) -> f64 {
-        let left =
-            |flow_m3s: f64| (own.left_m3s)((self.residual)(seen.t_s, &(own.with_flow)(seen, flow_m3s)));
-        zero_of_line(left(0.0), left(1.0))
+        let with = |flow_m3s: f64| (own.with_flow)(seen, flow_m3s);
+        let left = |flow_m3s: f64| (own.left_m3s)((self.residual)(seen.t_s, &with(flow_m3s)));
+        (own.of)(&self.effects.read(&with(zero_of_line(left(0.0), left(1.0)))))
     }
 
     /// What the readings' noise makes of a flow that is foreseen, standard deviation; NaN where no sample has all that it needs.

@@ -260,27 +260,32 @@ mod tests {
     }
 
     /// Load presses oil together, so that one flow is not the other times a ratio of areas; a sample that is a mean shows a part of what flows at
-    /// the edge of the band.
+    /// the edge of the band; and a meter hides what it would show, not what flows.
     #[test]
     fn what_a_dead_band_hides_is_what_eq_1_lacks() {
         const BAND_M3S: f64 = 4e-5;
-        let hidden = std::cell::RefCell::new(vec![]);
-        let series = seen(60, |sample| {
-            let flow = sample.qa_m3s.filter(|flow| flow.abs() < BAND_M3S);
-            hidden.borrow_mut().push(flow.unwrap_or_default());
-            sample.qa_m3s = sample.qa_m3s.map(|shown| shown - flow.unwrap_or_default());
-        });
-        let (declared, hidden) = (declared(), hidden.into_inner());
-        let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: LEAKS };
-        let none = EffectSet::default();
-        for mean_of in [1, 2] {
+        for (gain, mean_of) in [(0.0, 1), (0.0, 2), (-0.3, 1), (-0.3, 2)] {
+            let hidden = std::cell::RefCell::new(vec![]);
+            let series = seen(60, |sample| {
+                let flow = sample.qa_m3s.map(|flow| (1.0 + gain) * flow);
+                let hides = flow.filter(|flow| flow.abs() < BAND_M3S);
+                hidden.borrow_mut().push(hides.unwrap_or_default());
+                sample.qa_m3s = flow.map(|shown| shown - hides.unwrap_or_default());
+            });
+            let (declared, hidden) = (declared(), hidden.into_inner());
+            let model = Model { cylinder: declared.cylinder, fluid: declared.fluid, leaks_m3spa: LEAKS };
+            let mut known = EffectSet::default();
+            known.set(Effect::FlowMeterGainA, gain, EffectConstants::default()).expect("is physical");
             let (series, sensors) = (series.thinned(mean_of), &declared.sensors);
-            let motion = Motion::of(&series, &model.cylinder, |_, at| model.residual(at), &none, sensors);
+            let motion = Motion::of(&series, &model.cylinder, |_, at| model.residual(at), &known, sensors);
             let true_m3s = hidden.chunks_exact(mean_of).map(|all| all.iter().sum::<f64>() / mean_of as f64);
             let pairs: Vec<_> = motion.qa.side.iter().copied().zip(true_m3s).collect();
             let sum = |of: fn((f64, f64)) -> f64| pairs.iter().map(|pair| of(*pair)).sum::<f64>();
             let size_m3s = sum(|(side, flow)| side * flow) / sum(|(side, _)| side * side);
-            assert!((size_m3s / BAND_M3S - 1.0).abs() < 0.05, "{size_m3s} m³/s of means of {mean_of}");
+            assert!(
+                (size_m3s / BAND_M3S - 1.0).abs() < 0.05,
+                "{size_m3s} m³/s of means of {mean_of}, gain {gain}"
+            );
         }
     }
 
