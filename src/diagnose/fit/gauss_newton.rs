@@ -234,7 +234,7 @@ impl<'a> Fit<'a> {
         Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
     }
 
-    /// Linearises anew, with the equations' error that `next` gives, until that gives none.
+    /// Linearises anew, with the equations' error that `next` gives, until that gives none; without the effects that turn out to be none.
     fn linearised(
         problem: &'a Problem<'a>,
         structure: &Structure,
@@ -252,7 +252,12 @@ impl<'a> Fit<'a> {
             progress();
             fit = round(fit.solved(), error);
         }
-        fit
+        let none: Vec<usize> = fit.active().iter().copied().filter(|term| fit.is_none(*term)).collect();
+        if none.is_empty() {
+            return fit;
+        }
+        let (structure, at) = fit.left_by(&none);
+        Self::linearised(problem, &structure, (at, fit.equation_error), next, progress)
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and
@@ -315,9 +320,9 @@ impl<'a> Fit<'a> {
         Some(Estimate { value: value.clamp(lower, upper), std: self.bounded.std[at] })
     }
 
-    /// Whether an effect is fitted that physics leaves nothing of: the other way it can't be.
-    pub(crate) fn is_none(&self, term: usize) -> bool {
-        let is_effect = self.problem.terms[term].effect().is_some();
+    /// Whether physics leaves nothing of a fitted effect, which is not declared: it would be the way that it can't.
+    fn is_none(&self, term: usize) -> bool {
+        let is_effect = self.problem.terms[term].effect().is_some() && self.problem.priors[term].is_none();
         is_effect && self.estimate(term).is_some_and(|own| own.value.abs() <= 0.0)
     }
 
@@ -410,7 +415,7 @@ fn hold(priors: &mut [Option<Prior>], problem: &Problem<'_>, at: &Linearisation,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, seen, torn_seal};
+    use crate::diagnose::testing::{LEAKS, TURBULENT, declared, past_the_seal, seen, torn_seal};
     use pitchleak_core::Effect;
     use std::cell::Cell;
 
@@ -433,6 +438,22 @@ mod tests {
                 "{before:?} {after:?}"
             );
         }
+    }
+
+    /// A turbulent leak lets none in; what is not fitted beside the leaks explains nothing.
+    #[test]
+    fn an_effect_that_would_be_the_way_that_it_can_not_is_not_fitted() {
+        let has = |size: f64| {
+            let traces = [past_the_seal(size, 30)];
+            let problem = Problem::new(&traces, &declared(), &[]);
+            let term = problem.place(Term::Effect(TURBULENT.0)).expect("is a term");
+            let plain = Fit::declared(&problem, &|| ());
+            let with = plain.with(term, problem.usual_constants, &|| ());
+            (with.active().contains(&term), with.free.chi2 / plain.free.chi2)
+        };
+        assert!(has(TURBULENT.1).0);
+        let (is_fitted, left) = has(-TURBULENT.1);
+        assert!(!is_fitted && (left - 1.0).abs() < 0.01, "{left}");
     }
 
     /// Each is as large as its own noise: what tells them apart is how much of that is the equations' error.

@@ -105,11 +105,11 @@ fn with_better_constants<'a>(fit: &Fit<'a>, term: usize, progress: Progress<'_>)
 }
 
 impl Selection<'_> {
-    /// Whether it is the likelier one, with what each of its effects and of the leaks' changes has to bring.
+    /// Whether it is the likelier one by more than chance, with what each of its effects and of the leaks' changes has to bring.
     pub(super) fn is_likelier_than(&self, other: &Self) -> bool {
         let needed = critical_sigma(&self.fit, self.fit.problem.usual_constants).powi(2);
         let more = self.size() as f64 - other.size() as f64;
-        self.fit.beyond(&other.fit).chi2 + needed * more < 0.0
+        self.fit.beyond(&other.fit).chi2 + needed * more < -SIGNIFICANT_SIGMA.powi(2)
     }
 
     /// Its effects, in the order of their terms.
@@ -156,11 +156,13 @@ impl Selection<'_> {
         }
         let trials = Candidates::of(fit).trials(&fit.free);
         let mut worthy = trials.into_iter().filter(|trial| deserves_a_name(fit, trial));
-        // One that only the end of its range stops is not what is missing.
+        // One that only the end of its range stops is not what is missing, nor is one that takes another's place and does no better there.
         let stays = |trial: Trial| {
             let next = with(fit, &trial, progress);
-            let is_within = !next.is_at_bound(trial.score.term);
-            (is_within && self.is_better_with(&trial, &next, progress)).then_some((trial, next))
+            let term = trial.score.term;
+            let is_within = next.active().contains(&term) && !next.is_at_bound(term);
+            let keeps_all = self.effects.iter().all(|one| next.active().contains(&one.term));
+            (is_within && (keeps_all || next.beyond(fit).chi2 < 0.0)).then_some((trial, next))
         };
         let Some((trial, next)) = worthy.find_map(stays) else { return false };
         let chi2_drop = trial.score.chi2_drop;
@@ -175,15 +177,6 @@ impl Selection<'_> {
         true
     }
 
-    /// Whether a further effect leaves no more than noise, or less even without those of which it leaves nothing: its score let them be the
-    /// other way than they can.
-    fn is_better_with(&self, trial: &Trial, next: &Fit<'_>, progress: Progress<'_>) -> bool {
-        let gone = self.effects.iter().map(|one| one.term).filter(|term| next.is_none(*term));
-        let gone: Vec<usize> = gone.collect();
-        let new = [(trial.score.term, trial.constants)];
-        gone.is_empty() || self.fit.in_place_of(&gone, &new, progress).beyond(&self.fit).chi2 < 0.0
-    }
-
     /// Drops effects that those added later have made needless.
     pub(super) fn drop_needless(&mut self, progress: Progress<'_>) {
         while let Some(at) = self.first_needless() {
@@ -196,7 +189,7 @@ impl Selection<'_> {
         let dispersion = fit.dispersion(fit.free.chi2);
         let is_needless = |one: &Selected| {
             let needed = critical_sigma(fit, fit.constants(one.term)).powi(2);
-            fit.is_none(one.term) || loss(fit, &[one.term]) / dispersion < needed
+            loss(fit, &[one.term]) / dispersion < needed
         };
         self.effects.iter().position(is_needless)
     }

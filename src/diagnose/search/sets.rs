@@ -88,7 +88,7 @@ fn take(all: &mut Selection<'_>, other: &Exchange, progress: Progress<'_>) {
     all.fit = all.fit.changed(&other.gone, &other.new, progress);
     let mended = all.effects.iter().filter(|one| other.gone.contains(&one.term));
     let mended = mended.filter_map(|one| one.mended_percent).reduce(f64::max);
-    all.effects.retain(|one| !other.gone.contains(&one.term));
+    all.effects.retain(|one| all.fit.active().contains(&one.term));
     let dispersion = all.fit.dispersion(all.fit.free.chi2);
     for (term, _) in &other.new {
         let p_value = statistics::chi2_p(selection::loss(&all.fit, &[*term]) / dispersion, 1.0);
@@ -192,7 +192,10 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 /// model: its fit does not settle, leaves more than noise where the named one does not, has an effect at the end of its range, or one that
 /// has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
-    let (one, other) = without_none(fit, one, progress);
+    let other = fit.in_place_of(&one.gone, &one.new, progress);
+    let is_gone =
+        |term: &usize| fit.problem.terms[*term].effect().is_some() && !other.active().contains(term);
+    let gone: Vec<usize> = fit.active().iter().copied().filter(is_gone).collect();
     let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
@@ -200,26 +203,12 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     };
     let is_settled = other.stands_still() || !fit.stands_still();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
-    let is_there = other.active().iter().all(|term| !other.is_none(*term));
-    let is_model = is_settled && is_within && is_there && new.iter().all(acts);
+    let is_model = is_settled && is_within && new.iter().all(acts);
     let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
-    let dearer = brought - spared(fit, &one.gone) + below_zero(&other) - own_leaks;
+    let dearer = brought - spared(fit, &gone) + below_zero(&other) - own_leaks;
     let value = |term: &usize| Some((*term, other.estimate(*term)?.value));
     let values = other.active().iter().filter_map(value).collect();
-    is_model.then(|| Exchange { new, left: other.beyond(fit), dearer, values, ..one })
-}
-
-/// The fit of an exchange; those of the kept effects go too that it leaves nothing of.
-fn without_none<'a>(fit: &Fit<'a>, one: Exchange, progress: Progress<'_>) -> (Exchange, Fit<'a>) {
-    let other = fit.in_place_of(&one.gone, &one.new, progress);
-    let is_new = |term: &usize| one.new.iter().any(|(new, _)| new == term);
-    let none = other.active().iter().copied().filter(|term| other.is_none(*term) && !is_new(term));
-    let gone: Vec<usize> = one.gone.iter().copied().chain(none).collect();
-    if gone.len() == one.gone.len() {
-        return (one, other);
-    }
-    let other = fit.in_place_of(&gone, &one.new, progress);
-    (Exchange { gone, ..one }, other)
+    is_model.then(|| Exchange { gone, new, left: other.beyond(fit), dearer, values })
 }
 
 /// The leaks in their standard deviations, widened where the residual is more than noise.
