@@ -9,6 +9,7 @@ use pitchleak::reference::Reference;
 use pitchleak::simulate::{Biases, LeakSize, Scenario, Sensing, Truth};
 use pitchleak::units::LPM_PER_BAR;
 use pitchleak::wind::{Emulation, History, Wind, WindCase};
+use pitchleak_testkit::subsets::Case;
 use pitchleak_view::{Palette, Text};
 use std::f64::consts::TAU;
 
@@ -422,6 +423,18 @@ fn a_lag_is_no_shorter_for_the_noise_of_a_pressures_rate() {
     let off: Vec<f64> = answers.filter_map(of_answer).collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
     assert!(off.len() >= 4 && mean.abs() < 1.5 && off.iter().all(|off| off.abs() < 3.0), "{off:?}");
+}
+
+/// How fast dry friction turns shows once the friction is named, and has to be asked again then: what was left of the turn made a second
+/// friction, sure, of half the size.
+#[test]
+fn friction_that_turns_slowly_is_not_two_frictions() {
+    let answer = Case::draw(0x062b_3e8, 80, 2).ask().expect("is a rig");
+    let truth = answer.truth.iter().find(|(id, _)| *id == "seal_friction").expect("is there").1;
+    let effects = &answer.diagnosis.effects;
+    assert!(effects.iter().all(|one| one.id != "coulomb_friction"), "{effects:?}");
+    let seal = effects.iter().find(|one| one.id == "seal_friction").expect("is found");
+    assert!((seal.value - truth).abs() < 3.0 * seal.std && seal.std < 0.05 * truth, "{seal:?}");
 }
 
 /// Of a lag as short as two hundredths of the time between two samples no name is given. A play of the sensor in its place is as

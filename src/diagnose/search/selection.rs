@@ -154,7 +154,7 @@ impl Selection<'_> {
         if fit.active().iter().filter(is_added).count() >= MOST_EFFECTS {
             return false;
         }
-        let trials = Candidates::of(fit).trials(&fit.free);
+        let trials = Candidates::of(fit).trials(&fit.free, &[]);
         let mut worthy = trials.into_iter().filter(|trial| deserves_a_name(fit, trial));
         // One that only the end of its range stops is not what is missing, nor is one that takes another's place and does no better there.
         let stays = |trial: Trial| {

@@ -35,6 +35,11 @@ impl Exchange {
         all
     }
 
+    /// Whether it is the same set, with other constants of a law.
+    fn is_same_set(&self) -> bool {
+        self.new.len() == self.gone.len() && self.new.iter().all(|(term, _)| self.gone.contains(term))
+    }
+
     /// By how much the set is the worse one: twice the ln of the odds against it, where the true readings are as likely anywhere on what the
     /// model allows.
     fn worse(&self, dispersion: f64) -> f64 {
@@ -88,7 +93,7 @@ fn take(all: &mut Selection<'_>, other: &Exchange, progress: Progress<'_>) {
     all.fit = all.fit.changed(&other.gone, &other.new, progress);
     let mended = all.effects.iter().filter(|one| other.gone.contains(&one.term));
     let mended = mended.filter_map(|one| one.mended_percent).reduce(f64::max);
-    all.effects.retain(|one| all.fit.active().contains(&one.term));
+    all.effects.retain(|one| !other.gone.contains(&one.term));
     let dispersion = all.fit.dispersion(all.fit.free.chi2);
     for (term, _) in &other.new {
         let p_value = statistics::chi2_p(selection::loss(&all.fit, &[*term]) / dispersion, 1.0);
@@ -105,10 +110,13 @@ fn nearest(all: &Selection<'_>, progress: Progress<'_>) -> Vec<Exchange> {
     let mut in_place_of = |gone: Vec<usize>| {
         let without = fit.solve_without(&gone);
         let lost = without.chi2 - fit.free.chi2;
-        let margin = SIGNIFICANT_SIGMA.powi(2) + CURVED_SHARE * lost / dispersion;
+        let by_chance = SIGNIFICANT_SIGMA.powi(2);
+        let margin = by_chance + CURVED_SHARE * lost / dispersion;
+        let is_near =
+            |one: &Exchange| one.worse(dispersion) < if one.is_same_set() { -by_chance } else { margin };
         let singles = of_one(&mut candidates, &without, &gone);
         let pairs = of_two(fit, &without, &gone);
-        singles.into_iter().chain(pairs).filter(|one| one.worse(dispersion) < margin).collect()
+        singles.into_iter().chain(pairs).filter(is_near).collect()
     };
     let near = some_of_each(subsets(&named).into_iter().map(&mut in_place_of).collect(), dispersion);
     let own_leaks = below_zero(fit);
@@ -148,7 +156,7 @@ fn of_one(candidates: &mut Candidates<'_, '_>, without: &Solution, gone: &[usize
     let fit = candidates.fit;
     let lost = without.chi2 - fit.free.chi2;
     let spared = spared(fit, gone);
-    let trials = candidates.trials(without).into_iter();
+    let trials = candidates.trials(without, gone).into_iter();
     let exchange = |(term, constants, chi2_drop)| Exchange {
         gone: gone.to_vec(),
         new: vec![(term, constants)],
@@ -189,13 +197,13 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 }
 
 /// The exchange once it is fitted, its laws' constants too, beside what the named set's own leaks cost. None where the other set is no
-/// model: its fit does not settle, leaves more than noise where the named one does not, has an effect at the end of its range, or one that
-/// has nothing to do.
+/// model: its fit does not settle, has an effect at the end of its range, or one that has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
-    let is_gone =
+    let is_lost =
         |term: &usize| fit.problem.terms[*term].effect().is_some() && !other.active().contains(term);
-    let gone: Vec<usize> = fit.active().iter().copied().filter(is_gone).collect();
+    let lost = fit.active().iter().copied().filter(|term| is_lost(term) && !one.gone.contains(term));
+    let gone: Vec<usize> = one.gone.iter().copied().chain(lost).collect();
     let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
@@ -243,7 +251,10 @@ fn hold_against(all: &mut Selection<'_>, exchanges: &[Exchange], progress: Progr
     let dispersion = fit.dispersion(fit.free.chi2);
     let is_near = |worse: f64| worse < SIGNIFICANT_SIGMA.powi(2);
     for one in &mut all.effects {
-        let against = exchanges.iter().filter(|other| other.gone.contains(&one.term));
+        let is_against = |other: &&Exchange| {
+            other.gone.contains(&one.term) && other.new.iter().all(|(term, _)| *term != one.term)
+        };
+        let against = exchanges.iter().filter(is_against);
         let unlisted = unlisted(fit, one.term, progress);
         let everything = [0, 1].map(|belief| {
             let others = against.clone().chain(&unlisted);

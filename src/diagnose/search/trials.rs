@@ -161,9 +161,9 @@ impl Trial {
 }
 
 impl Candidates<'_, '_> {
-    /// Every candidate at its best against a model; the best first.
-    pub(super) fn trials(&mut self, model: &Solution) -> Vec<Trial> {
-        let mut scores = self.starts(model);
+    /// Every candidate at its best against a model, the best first; those that are `gone` from it with other constants than they had.
+    pub(super) fn trials(&mut self, model: &Solution, gone: &[usize]) -> Vec<Trial> {
+        let mut scores = self.starts(model, gone);
         let best = scores.iter().flatten().map(|(score, _)| score.chi2_drop).fold(0.0, f64::max);
         for of_one in &mut scores {
             let top = of_one.iter().copied().max_by(|a, b| a.0.chi2_drop.total_cmp(&b.0.chi2_drop));
@@ -174,8 +174,9 @@ impl Candidates<'_, '_> {
     }
 
     /// The scores of each candidate with its usual constants and at a few places of their ranges.
-    fn starts(&mut self, model: &Solution) -> Vec<Vec<(Score, EffectConstants<f64>)>> {
-        open(self.fit).into_iter().map(|term| first_scores(self, model, term)).collect()
+    fn starts(&mut self, model: &Solution, gone: &[usize]) -> Vec<Vec<(Score, EffectConstants<f64>)>> {
+        let terms = open(self.fit).into_iter().chain(gone.iter().copied());
+        terms.map(|term| first_scores(self, model, term)).collect()
     }
 
     fn ranked(&self, model: &Solution, scores: Vec<Vec<(Score, EffectConstants<f64>)>>) -> Vec<Trial> {
