@@ -429,7 +429,7 @@ fn a_lag_is_no_shorter_for_the_noise_of_a_pressures_rate() {
 /// friction, sure, of half the size.
 #[test]
 fn friction_that_turns_slowly_is_not_two_frictions() {
-    let answer = Case::draw(0x062b_3e8, 80, 2).ask().expect("is a rig");
+    let answer = Case::draw(0x62_b3e8, 80, 2).ask().expect("is a rig");
     let truth = answer.truth.iter().find(|(id, _)| *id == "seal_friction").expect("is there").1;
     let effects = &answer.diagnosis.effects;
     assert!(effects.iter().all(|one| one.id != "coulomb_friction"), "{effects:?}");
