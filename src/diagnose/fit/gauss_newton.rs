@@ -83,8 +83,7 @@ impl<'a> Fit<'a> {
         progress: Progress<'_>,
     ) -> Self {
         let (structure, at) = self.exchanged(old, new);
-        let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
-        Self::linearised(self.problem, &structure, (at, self.equation_error), next, progress)
+        Self::linearised(self.problem, &structure, (at, self.equation_error), progress)
     }
 
     /// How it does beside another fit of the same traces, on the rows that count for both.
@@ -219,8 +218,7 @@ impl<'a> Fit<'a> {
         assumed_error: PerEquation<f64>,
         progress: Progress<'_>,
     ) -> Self {
-        let next = |fit: &Self| (!fit.has_converged()).then_some(fit.equation_error);
-        let fit = Self::linearised(problem, &structure, (at, assumed_error), next, progress);
+        let fit = Self::linearised(problem, &structure, (at, assumed_error), progress);
         let structure = fit.structure.clone();
         let columns = Columns {
             terms: &problem.terms,
@@ -231,12 +229,11 @@ impl<'a> Fit<'a> {
         Self::solving(weak_form, columns, problem, structure.clone(), fit.assumed_error)
     }
 
-    /// Linearises anew, with the equations' error that `next` gives, until that gives none; without the effects that turn out to be none.
+    /// Linearises anew, with the equations' error as it shows, until that changes nothing; without the effects that turn out to be none.
     fn linearised(
         problem: &'a Problem<'a>,
         structure: &Structure,
         (at, assumed_error): (Linearisation, PerEquation<f64>),
-        next: impl Fn(&Self) -> Option<PerEquation<f64>>,
         progress: Progress<'_>,
     ) -> Self {
         let round = |at: Linearisation, assumed_error: PerEquation<f64>| {
@@ -245,16 +242,18 @@ impl<'a> Fit<'a> {
         };
         let mut fit = round(at, assumed_error);
         for _ in 1..MOST_ROUNDS {
-            let Some(error) = next(&fit) else { break };
+            if fit.has_converged() {
+                break;
+            }
             progress();
-            fit = round(fit.solved(), error);
+            fit = round(fit.solved(), fit.equation_error);
         }
         let none: Vec<usize> = fit.active().iter().copied().filter(|term| fit.is_none(*term)).collect();
         if none.is_empty() {
             return fit;
         }
         let (structure, at) = fit.left_by(&none);
-        Self::linearised(problem, &structure, (at, fit.equation_error), next, progress)
+        Self::linearised(problem, &structure, (at, fit.equation_error), progress)
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only, and
@@ -267,7 +266,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Whether linearising once more would move every estimate by a small share of its standard deviation only.
-    pub(crate) fn stands_still(&self) -> bool {
+    fn stands_still(&self) -> bool {
         let (at, solved) = (&self.weak_form.at, self.solved());
         let is_still = |(term, std): (&usize, &f64)| {
             let term = self.problem.terms[*term];
