@@ -437,15 +437,6 @@ fn friction_that_turns_slowly_is_not_two_frictions() {
     assert!((seal.value - truth).abs() < 3.0 * seal.std && seal.std < 0.05 * truth, "{seal:?}");
 }
 
-/// Beside gas whose precharge no trace tells, fits go on to move along what makes no difference: the right set was no model for that, and a
-/// wrong one sure.
-#[test]
-fn a_set_is_weighed_though_its_gas_is_of_any_precharge() {
-    let answer = Case::draw(0x03be_d54a, 0, 3).ask().expect("is a rig");
-    assert!(answer.truth.iter().any(|(id, _)| id.starts_with("accumulator")));
-    assert!(!answer.has_a_sure_wrong_name(), "{}", answer.line());
-}
-
 /// Of a lag as short as two hundredths of the time between two samples no name is given. A play of the sensor in its place is as
 /// improbable as the lag makes it: where that was not asked, it had 81 and 75 %.
 #[test]

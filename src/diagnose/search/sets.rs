@@ -197,7 +197,7 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 }
 
 /// The exchange once it is fitted, its laws' constants too, beside what the named set's own leaks cost. None where the other set is no
-/// model: it has an effect at the end of its range, or one that has nothing to do.
+/// model: its fit does not settle, has an effect at the end of its range, or one that has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
     let is_lost =
@@ -209,8 +209,9 @@ fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) 
     let acts = |(term, constants): &(usize, EffectConstants<f64>)| {
         selection::loss(&other, &[*term]) > needed(fit, *constants) * dispersion
     };
+    let is_settled = other.stands_still() || !fit.stands_still();
     let is_within = !is_at_bound(&other) || is_at_bound(fit);
-    let is_model = is_within && new.iter().all(acts);
+    let is_model = is_settled && is_within && new.iter().all(acts);
     let brought: f64 = new.iter().map(|(_, constants)| needed(fit, *constants)).sum();
     let dearer = brought - spared(fit, &gone) + below_zero(&other) - own_leaks;
     let value = |term: &usize| Some((*term, other.estimate(*term)?.value));
