@@ -200,9 +200,11 @@ fn of_two(fit: &Fit<'_>, without: &Solution, gone: &[usize]) -> Vec<Exchange> {
 /// model: its fit does not settle, has an effect at the end of its range, or one that has nothing to do.
 fn fitted(fit: &Fit<'_>, own_leaks: f64, one: Exchange, progress: Progress<'_>) -> Option<Exchange> {
     let other = fit.in_place_of(&one.gone, &one.new, progress);
-    let is_lost =
-        |term: &usize| fit.problem.terms[*term].effect().is_some() && !other.active().contains(term);
-    let lost = fit.active().iter().copied().filter(|term| is_lost(term) && !one.gone.contains(term));
+    let is_lost = |term: &usize| {
+        let is_effect = fit.problem.terms[*term].effect().is_some();
+        is_effect && !one.gone.contains(term) && !other.active().contains(term)
+    };
+    let lost = fit.active().iter().copied().filter(is_lost);
     let gone: Vec<usize> = one.gone.iter().copied().chain(lost).collect();
     let new: Vec<_> = one.new.iter().map(|(term, _)| (*term, other.constants(*term))).collect();
     let dispersion = other.dispersion(other.free.chi2);
