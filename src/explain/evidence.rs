@@ -179,7 +179,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
     let mut each = [vec![0.0; size * size], vec![0.0; size * size]];
     let mut factor = vec![0.0; size * size];
     let mut means = vec![0.0; free.len()];
-    let (mut chi_square, mut ln_determinant) = (0.0, 0.0);
+    let mut chi_square = 0.0;
     let mut step = 0;
     while step <= STEPS {
         for c in 0..2 {
@@ -188,7 +188,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
         for (out, (one, other)) in factor.iter_mut().zip(each[0].iter().zip(&each[1])) {
             *out = one + other;
         }
-        (ln_determinant, chi_square) = solve(&mut factor, size, &mut means);
+        chi_square = solve(&mut factor, size, &mut means);
         let is_louder = scales.iter().any(|scale| *scale > 1.0);
         if step == 0 && is_louder && each.iter().any(|own| !is_sum_of_squares(own, size, &means)) {
             scales = [1.0; 2];
@@ -210,6 +210,7 @@ pub(super) fn fit(equations: &NormalEquations, free: &[Free]) -> Fit {
         step += 1;
     }
     let ln_scales: f64 = (0..2).map(|c| ln_scale(n[c], scales[c])).sum();
+    let ln_determinant = ln_determinant(&factor, size);
     let ln_evidence = ln_scales - 0.5 * (chi_square + ln_determinant);
     Fit {
         ln_evidence: if ln_evidence.is_finite() { ln_evidence } else { f64::NEG_INFINITY },
@@ -230,8 +231,8 @@ pub(super) fn at_scales(equations: &NormalEquations, free: &[Free], scales: [f64
         products.clean(c, equations.rows[c], scale, equations.loudest[c], &mut one);
         sum.iter_mut().zip(&one).for_each(|(sum, one)| *sum += one);
     }
-    let (ln_determinant, chi_square) = solve(&mut sum, size, &mut vec![0.0; free.len()]);
-    (chi_square, ln_determinant)
+    let chi_square = solve(&mut sum, size, &mut vec![0.0; free.len()]);
+    (chi_square, ln_determinant(&sum, size))
 }
 
 /// By how much the mean of squares of so many unit normals may be off by chance: a mean square's standard deviation is √(2/n).
@@ -250,10 +251,9 @@ pub(super) fn ln_scale_prior(scale: f64) -> f64 {
 }
 
 /// Solves (1 + X'X) θ = X'y for the scaled products, of which the last row and column are y's, and leaves Cholesky's factor
-/// in their place: ln of its determinant, and y'y less what the fit explains.
-fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
+/// in their place: y'y less what the fit explains.
+fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> f64 {
     let last = size - 1;
-    let mut ln_determinant = 0.0;
     for k in 0..last {
         let (above, below) = products.split_at_mut((k + 1) * size);
         let row = &mut above[k * size..];
@@ -263,9 +263,9 @@ fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
             continue;
         }
         let pivot = (1.0 + row[k]).sqrt();
-        ln_determinant += 2.0 * pivot.ln();
         row[k] = pivot;
-        row[k + 1..].iter_mut().for_each(|entry| *entry /= pivot);
+        let over_pivot = 1.0 / pivot;
+        row[k + 1..].iter_mut().for_each(|entry| *entry *= over_pivot);
         for (i, other) in (k + 1..size).zip(below.chunks_exact_mut(size)) {
             let by = row[i];
             for (out, entry) in other[i..].iter_mut().zip(&row[i..]) {
@@ -278,7 +278,12 @@ fn solve(products: &mut [f64], size: usize, means: &mut [f64]) -> (f64, f64) {
         let known: f64 = row[i + 1..last].iter().zip(&means[i + 1..]).map(|(u, mean)| u * mean).sum();
         means[i] = (row[last] - known) / row[i];
     }
-    (ln_determinant, products[last * size + last])
+    products[last * size + last]
+}
+
+/// ln |M| by its factor.
+fn ln_determinant(factor: &[f64], size: usize) -> f64 {
+    (0..size - 1).map(|k| 2.0 * factor[k * size + k].ln()).sum()
 }
 
 /// Whether a fit leaves no less than nothing, and no more than there was.
@@ -318,7 +323,8 @@ mod tests {
         let all = DMatrix::from_fn(6, 4, |i, j| if j < 3 { x[(i, j)] } else { y[i] });
         let mut products: Vec<f64> = (all.transpose() * &all).iter().copied().collect();
         let (gram, mut means) = (products.clone(), [0.0; 3]);
-        let (ln_determinant, chi_square) = solve(&mut products, 4, &mut means);
+        let chi_square = solve(&mut products, 4, &mut means);
+        let ln_determinant = ln_determinant(&products, 4);
         let fit = Fit {
             ln_evidence: 0.0,
             ln_likelihood: 0.0,

@@ -15,7 +15,7 @@ use super::unknowns::{
     S_PER_MS, SATURATION, SUPPLY, TANK, Unknowns,
 };
 use nalgebra::SVector;
-use pitchleak_core::{metering, metering_slope};
+use pitchleak_core::metering_with_slope;
 
 /// Readings at one instant: x in m, P_A, P_B in Pa, spool as a share of its stroke, P_S in Pa.
 pub(super) type Signals = SVector<f64, 5>;
@@ -63,6 +63,45 @@ const EDGES: [Edge; 4] = [
     Edge { index: 3, sign: -1.0, opens: 1.0, chamber: PB },
 ];
 
+impl Edge {
+    const fn is_into(&self) -> bool {
+        self.sign > 0.0
+    }
+
+    fn opening(&self, u: f64, unknowns: &Unknowns) -> Opening {
+        let (w, c) = (unknowns[ROUNDING], unknowns[SATURATION]);
+        let s = self.opens * u - unknowns[LAPS + self.index];
+        let root = (s * s + w * w).sqrt();
+        let (open, by_s) = (0.5 * (root + s), 0.5 * (s / root + 1.0));
+        let full = 1.0 - c * u * u;
+        Opening {
+            o: open * full,
+            by_u: self.opens * by_s * full - 2.0 * open * c * u,
+            by_lap: -by_s * full,
+            by_rounding: 0.5 * w / root * full,
+            by_saturation: -open * u * u,
+        }
+    }
+}
+
+/// o of an edge, and its slopes by u, d, w and c.
+#[derive(Clone, Copy)]
+struct Opening {
+    o: f64,
+    by_u: f64,
+    by_lap: f64,
+    by_rounding: f64,
+    by_saturation: f64,
+}
+
+/// The pressure drop over an edge, its root and that one's slope, and what drives the flow over the clearance.
+#[derive(Clone, Copy)]
+struct Drop {
+    root: f64,
+    root_slope: f64,
+    clearance_pa: f64,
+}
+
 /// Flows into A and B; `gain` is k_v, m³/(s·√Pa), and `rated_m3s` what passes a full opening.
 pub(super) fn flows(
     at: &Signals,
@@ -71,68 +110,79 @@ pub(super) fn flows(
     gain: f64,
     rated_m3s: f64,
 ) -> [Flow; 2] {
+    let u = at[SPOOL] + unknowns[LAG] * S_PER_MS * spool.rate_ps - unknowns[HYSTERESIS] * spool.play;
+    let supply_pa = at[PS] + unknowns[SUPPLY] * PA_PER_BAR;
+    let valve = Valve { unknowns, gain, openings: EDGES.each_ref().map(|edge| edge.opening(u, unknowns)) };
+    let tank_pa = spool.tank_pa + unknowns[TANK] * PA_PER_BAR;
+    let drop = |edge: &Edge, supply_pa: f64| {
+        let chamber_pa = at[edge.chamber];
+        let drop_pa = if edge.is_into() { supply_pa - chamber_pa } else { chamber_pa - tank_pa };
+        let (root, root_slope) = metering_with_slope(drop_pa, LAMINAR_PA);
+        // To the tank as to the outside: where its pressure is found anew at each look, the two would seem to differ.
+        Drop { root, root_slope, clearance_pa: if edge.is_into() { drop_pa } else { chamber_pa } }
+    };
+    let mut drops = EDGES.each_ref().map(|edge| drop(edge, supply_pa));
     // What is drawn is hardly less for its own droop.
-    let undrooped = at_droop(at, spool, unknowns, gain, 0.0);
-    let drawn = undrooped.iter().map(|flow| flow.m3s.max(0.0)).sum::<f64>() / rated_m3s;
-    at_droop(at, spool, unknowns, gain, drawn)
-}
-
-/// Inlined: where flows alone are asked for, no slopes are computed.
-#[inline(always)]
-fn at_droop(at: &Signals, spool: &Spool, unknowns: &Unknowns, gain: f64, drawn: f64) -> [Flow; 2] {
+    let into = |edges: [usize; 2]| {
+        edges.map(|index| valve.flow_m3s(&EDGES[index], &drops[index])).iter().sum::<f64>()
+    };
+    let drawn = (into([0, 1]).max(0.0) + into([2, 3]).max(0.0)) / rated_m3s;
+    let drooped_pa = supply_pa - unknowns[DROOP] * drawn * PA_PER_BAR;
     let mut flows = [Flow { m3s: 0.0, by_signals: Signals::zeros(), by_unknowns: Unknowns::zeros() }; 2];
-    for edge in &EDGES {
-        edge.add(&mut flows[edge.chamber - PA], at, spool, unknowns, gain, drawn);
+    for (edge, drop_then) in EDGES.iter().zip(&mut drops) {
+        if edge.is_into() {
+            *drop_then = drop(edge, drooped_pa);
+        }
+        valve.add(edge, drop_then, spool, drawn, &mut flows[edge.chamber - PA]);
     }
     flows
 }
 
-impl Edge {
-    #[inline(always)]
-    fn add(&self, flow: &mut Flow, at: &Signals, spool: &Spool, unknowns: &Unknowns, gain: f64, drawn: f64) {
-        let u = at[SPOOL] + unknowns[LAG] * S_PER_MS * spool.rate_ps - unknowns[HYSTERESIS] * spool.play;
-        let (opening, by_u, by_lap, by_rounding, by_saturation) = self.opening(u, unknowns);
-        let supply_pa = at[PS] + (unknowns[SUPPLY] - unknowns[DROOP] * drawn) * PA_PER_BAR;
-        let tank_pa = spool.tank_pa + unknowns[TANK] * PA_PER_BAR;
-        let into = self.sign > 0.0;
-        let drop_pa = if into { supply_pa - at[self.chamber] } else { at[self.chamber] - tank_pa };
-        let (root, root_slope) = (metering(drop_pa, LAMINAR_PA), metering_slope(drop_pa, LAMINAR_PA));
-        let edge_gain = self.sign * gain * unknowns[GAINS + self.index];
-        let clearance = self.sign * unknowns[CLEARANCES + self.index] * LEAK_UNIT_M3SPA;
-        // To the tank as to the outside: where its pressure is found anew at each look, the two would seem to differ.
-        let passing_pa = if into { drop_pa } else { at[self.chamber] };
-        flow.m3s += edge_gain * opening * root + clearance * passing_pa;
-        let by_drop = edge_gain * opening * root_slope;
-        let by_spool = edge_gain * by_u * root;
+/// The valve as its spool stands.
+struct Valve<'a> {
+    unknowns: &'a Unknowns,
+    gain: f64,
+    openings: [Opening; 4],
+}
+
+impl Valve<'_> {
+    fn edge_gain(&self, edge: &Edge) -> f64 {
+        edge.sign * self.gain * self.unknowns[GAINS + edge.index]
+    }
+
+    fn clearance(&self, edge: &Edge) -> f64 {
+        edge.sign * self.unknowns[CLEARANCES + edge.index] * LEAK_UNIT_M3SPA
+    }
+
+    /// Into the edge's chamber.
+    fn flow_m3s(&self, edge: &Edge, drop: &Drop) -> f64 {
+        let opening = &self.openings[edge.index];
+        self.edge_gain(edge) * opening.o * drop.root + self.clearance(edge) * drop.clearance_pa
+    }
+
+    fn add(&self, edge: &Edge, drop: &Drop, spool: &Spool, drawn: f64, flow: &mut Flow) {
+        let (opening, edge_gain) = (&self.openings[edge.index], self.edge_gain(edge));
+        flow.m3s += self.flow_m3s(edge, drop);
+        let by_drop = edge_gain * opening.o * drop.root_slope;
+        let by_spool = edge_gain * opening.by_u * drop.root;
         flow.by_signals[SPOOL] += by_spool;
         flow.by_unknowns[LAG] += by_spool * spool.rate_ps * S_PER_MS;
         flow.by_unknowns[HYSTERESIS] -= by_spool * spool.play;
-        if into {
-            let by_supply = by_drop + clearance;
+        if edge.is_into() {
+            let by_supply = by_drop + self.clearance(edge);
             flow.by_signals[PS] += by_supply;
-            flow.by_signals[self.chamber] -= by_supply;
+            flow.by_signals[edge.chamber] -= by_supply;
             flow.by_unknowns[SUPPLY] += by_supply * PA_PER_BAR;
             flow.by_unknowns[DROOP] -= by_supply * drawn * PA_PER_BAR;
         } else {
-            flow.by_signals[self.chamber] += by_drop + clearance;
+            flow.by_signals[edge.chamber] += by_drop + self.clearance(edge);
             flow.by_unknowns[TANK] -= by_drop * PA_PER_BAR;
         }
-        flow.by_unknowns[GAINS + self.index] += self.sign * gain * opening * root;
-        flow.by_unknowns[LAPS + self.index] += edge_gain * by_lap * root;
-        flow.by_unknowns[ROUNDING] += edge_gain * by_rounding * root;
-        flow.by_unknowns[SATURATION] += edge_gain * by_saturation * root;
-        flow.by_unknowns[CLEARANCES + self.index] += self.sign * LEAK_UNIT_M3SPA * passing_pa;
-    }
-
-    /// o, and its slopes by u, d, w and c.
-    fn opening(&self, u: f64, unknowns: &Unknowns) -> (f64, f64, f64, f64, f64) {
-        let (w, c) = (unknowns[ROUNDING], unknowns[SATURATION]);
-        let s = self.opens * u - unknowns[LAPS + self.index];
-        let root = (s * s + w * w).sqrt();
-        let (open, by_s) = (0.5 * (root + s), 0.5 * (s / root + 1.0));
-        let full = 1.0 - c * u * u;
-        let by_u = self.opens * by_s * full - 2.0 * open * c * u;
-        (open * full, by_u, -by_s * full, 0.5 * w / root * full, -open * u * u)
+        flow.by_unknowns[GAINS + edge.index] += edge.sign * self.gain * opening.o * drop.root;
+        flow.by_unknowns[LAPS + edge.index] += edge_gain * opening.by_lap * drop.root;
+        flow.by_unknowns[ROUNDING] += edge_gain * opening.by_rounding * drop.root;
+        flow.by_unknowns[SATURATION] += edge_gain * opening.by_saturation * drop.root;
+        flow.by_unknowns[CLEARANCES + edge.index] += edge.sign * LEAK_UNIT_M3SPA * drop.clearance_pa;
     }
 }
 

@@ -109,7 +109,8 @@ pub use estimator::{
 pub use filter::{Butterworth, FadingMemoryFilter, FilterError, LoadEstimator, Momentum, force_imbalance_n};
 pub use model::{
     ATMOSPHERE_PA, Cylinder, CylinderError, Estimate, Fluid, Leak, LeakPressures, Linkage, LinkageError,
-    Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_slope, signed_root,
+    Model, PerLeak, Sample, SensorSpread, Sensors, Signals, Terms, metering, metering_with_slope,
+    signed_root,
 };
 #[cfg(feature = "serde")]
 pub(crate) use number::Saved;

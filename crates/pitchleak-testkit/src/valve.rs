@@ -9,6 +9,8 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 const STEPS_HZ: f64 = 2000.0;
+/// A trace begins so long after the motion does, s.
+const WARM_UP_S: f64 = 5.0;
 const AREA_A: f64 = 12.6e-4;
 const AREA_B: f64 = 9.4e-4;
 const STROKE: f64 = 0.2;
@@ -166,7 +168,7 @@ impl ValveCylinder {
         let spool = if self.by_command { "valve_command_percent" } else { "spool_percent" };
         let mut text = format!("t_s,x_mm,pa_bar,pb_bar,{spool},ps_bar\n");
         let every = (STEPS_HZ / rate_hz).round() as i64;
-        let warm_up = 5 * STEPS_HZ as i64;
+        let warm_up = (WARM_UP_S * STEPS_HZ) as i64;
         for k in -warm_up..(seconds * STEPS_HZ).round() as i64 {
             if k >= 0 && k % every == 0 {
                 let read = slow.beside(run.readings(k as f64 / STEPS_HZ, seconds));
@@ -218,9 +220,8 @@ type State = [f64; 6];
 struct Run<'a> {
     of: &'a ValveCylinder,
     at: State,
-    /// Sines of the position and of the load: amplitude, Hz, phase.
-    position: Vec<[f64; 3]>,
-    load: Vec<[f64; 3]>,
+    position: Vec<Wave>,
+    load: Vec<Wave>,
     command: f64,
     integral: f64,
     supply_pa: f64,
@@ -232,12 +233,35 @@ struct Run<'a> {
     spools: Vec<f64>,
 }
 
-fn sum(lines: &[[f64; 3]], t: f64) -> f64 {
-    lines.iter().map(|[a, f, p]| a * (TAU * f * t + p).sin()).sum()
+/// A sine that is turned by half a step at a time: two products instead of a sine.
+struct Wave {
+    amplitude: f64,
+    rad_ps: f64,
+    /// Cosine and sine of its phase now, and of half a step.
+    phase: [f64; 2],
+    half_step: [f64; 2],
 }
 
-fn slope(lines: &[[f64; 3]], t: f64) -> f64 {
-    lines.iter().map(|[a, f, p]| a * TAU * f * (TAU * f * t + p).cos()).sum()
+impl Wave {
+    fn new(amplitude: f64, hz: f64, phase: f64) -> Self {
+        let rad_ps = TAU * hz;
+        let pair = |angle: f64| [angle.cos(), angle.sin()];
+        let begin = rad_ps * -WARM_UP_S + phase;
+        Self { amplitude, rad_ps, phase: pair(begin), half_step: pair(0.5 * rad_ps / STEPS_HZ) }
+    }
+
+    fn turn(&mut self) {
+        let ([c, s], [by_c, by_s]) = (self.phase, self.half_step);
+        self.phase = [c * by_c - s * by_s, s * by_c + c * by_s];
+    }
+}
+
+fn sum(waves: &[Wave]) -> f64 {
+    waves.iter().map(|wave| wave.amplitude * wave.phase[1]).sum()
+}
+
+fn slope(waves: &[Wave]) -> f64 {
+    waves.iter().map(|wave| wave.amplitude * wave.rad_ps * wave.phase[0]).sum()
 }
 
 impl<'a> Run<'a> {
@@ -248,7 +272,7 @@ impl<'a> Run<'a> {
                 .iter()
                 .map(|[amplitude, hz]| {
                     let [a, f, p] = [(); 3].map(|()| normal.next().unwrap_or(0.0).clamp(-2.0, 2.0));
-                    [scale * amplitude * (1.0 + 0.3 * a), hz * (1.0 + 0.1 * f), 3.0 * p]
+                    Wave::new(scale * amplitude * (1.0 + 0.3 * a), hz * (1.0 + 0.1 * f), 3.0 * p)
                 })
                 .collect::<Vec<_>>()
         };
@@ -285,7 +309,16 @@ impl<'a> Run<'a> {
         if width > 0.0 { self.inner.clamp(u - width, u + width) } else { u }
     }
 
-    fn rates(&self, t: f64, at: &State) -> State {
+    fn load_n(&self) -> f64 {
+        2500.0 + sum(&self.load)
+    }
+
+    /// Motion and load half a step on.
+    fn turn(&mut self) {
+        self.position.iter_mut().chain(&mut self.load).for_each(Wave::turn);
+    }
+
+    fn rates(&self, t: f64, load_n: f64, at: &State) -> State {
         let [x, v, pa, pb, u, du] = *at;
         let of = self.of;
         let grows_s = of.leaks_until_s - of.leaks_from_s;
@@ -295,12 +328,11 @@ impl<'a> Run<'a> {
         let ps = self.supply_pa - of.valve.droop_pa * self.drawn_m3s * 6e3;
         let [qa, qb] = of.valve.flows(self.true_spool(u), pa, pb, ps);
         let through = internal * (pa - pb);
-        let load = 2500.0 + sum(&self.load, t);
         let friction = of.dry_n * v / (v * v + 1e-8).sqrt() + 2e3 * v;
         let omega = TAU * 60.0;
         [
             v,
-            (pa * AREA_A - pb * AREA_B - load - friction) / MASS,
+            (pa * AREA_A - pb * AREA_B - load_n - friction) / MASS,
             (qa - AREA_A * v - through - a * pa)
                 / ((AREA_A * x + DEAD_M3) / of.bulk_pa + of.accumulator_m3pa),
             (qb + AREA_B * v + through - b * pb) / ((AREA_B * (STROKE - x) + DEAD_M3) / of.bulk_pa),
@@ -311,16 +343,21 @@ impl<'a> Run<'a> {
 
     fn step(&mut self, t: f64) {
         let h = 1.0 / STEPS_HZ;
-        let target = 0.1 + sum(&self.position, t);
+        let target = 0.1 + sum(&self.position);
         let error = target - self.at[0];
         self.integral = (self.integral + 10.0 * h * error).clamp(-0.02, 0.02);
-        let feed = slope(&self.position, t) * AREA_A * 60e3 / self.of.valve.rated_lpm;
+        let feed = slope(&self.position) * AREA_A * 60e3 / self.of.valve.rated_lpm;
         self.command = (feed + 12.0 * error + 12.0 * self.integral).clamp(-1.0, 1.0);
+        let begin_n = self.load_n();
+        self.turn();
+        let middle_n = self.load_n();
+        self.turn();
+        let end_n = self.load_n();
         let plus = |rate: &State, part: f64| std::array::from_fn(|i| self.at[i] + part * h * rate[i]);
-        let k1 = self.rates(t, &self.at);
-        let k2 = self.rates(t + h / 2.0, &plus(&k1, 0.5));
-        let k3 = self.rates(t + h / 2.0, &plus(&k2, 0.5));
-        let k4 = self.rates(t + h, &plus(&k3, 1.0));
+        let k1 = self.rates(t, begin_n, &self.at);
+        let k2 = self.rates(t + h / 2.0, middle_n, &plus(&k1, 0.5));
+        let k3 = self.rates(t + h / 2.0, middle_n, &plus(&k2, 0.5));
+        let k4 = self.rates(t + h, end_n, &plus(&k3, 1.0));
         self.at = std::array::from_fn(|i| self.at[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
         self.inner = self.backlash(self.at[4]);
         let [_, _, pa, pb, ..] = self.at;

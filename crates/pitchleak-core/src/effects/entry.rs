@@ -123,6 +123,7 @@ macro_rules! effects {
             pub const ALL: &'static [Self] = &[$(Self::$variant),*];
 
             /// What is fixed about the effect.
+            #[inline]
             pub const fn spec(self) -> &'static EffectSpec {
                 match self {
                     $(Self::$variant => &EffectSpec {

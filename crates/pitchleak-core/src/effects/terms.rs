@@ -69,7 +69,9 @@ pub(super) fn accumulator<T: Real>(pressure_pa: T, constants: &EffectConstants<T
 fn gas_compressibility<T: Real>(pressure_pa: T, from_pa: T, constants: &EffectConstants<T>) -> T {
     let absolute = (pressure_pa + T::lit(ATMOSPHERE_PA)).max(T::lit(LEAST_ABSOLUTE_PA));
     let exponent = T::one() / constants.polytropic_exponent;
-    exponent * (from_pa.max(T::zero()) / absolute).libm_powf(exponent) / absolute
+    // The two take half the time of a power.
+    let volume = (exponent * (from_pa.max(T::zero()) / absolute).libm_ln()).libm_exp();
+    exponent * volume / absolute
 }
 
 /// Pressure beyond that at which a valve or seal opens, either way; none within.

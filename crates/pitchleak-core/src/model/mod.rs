@@ -199,22 +199,20 @@ pub fn signed_root<T: Real>(difference_pa: T) -> T {
 /// [`signed_root`] with the transition at `laminar_pa`.
 #[inline]
 pub fn metering<T: Real>(difference_pa: T, laminar_pa: T) -> T {
-    difference_pa / (difference_pa * difference_pa + laminar_pa * laminar_pa).sqrt().sqrt()
+    metering_with_slope(difference_pa, laminar_pa).0
 }
 
-/// Slope of [`metering`] by the difference.
+/// [`metering`] and its slope by the difference.
 #[inline]
-pub fn metering_slope<T: Real>(difference_pa: T, laminar_pa: T) -> T {
-    let size = difference_pa.abs().max(laminar_pa);
-    let (own, laminar) = (difference_pa / size, laminar_pa / size);
-    let (own, laminar) = (own * own, laminar * laminar);
-    let square = own + laminar;
-    (own * T::lit(0.5) + laminar) / (square * square.sqrt().sqrt() * size.sqrt())
+pub fn metering_with_slope<T: Real>(difference_pa: T, laminar_pa: T) -> (T, T) {
+    let (own, laminar) = (difference_pa * difference_pa, laminar_pa * laminar_pa);
+    let root = (own + laminar).sqrt().sqrt();
+    (difference_pa / root, (own * T::lit(0.5) + laminar) / ((own + laminar) * root))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{metering, metering_slope, signed_root};
+    use super::{metering, metering_with_slope, signed_root};
 
     #[test]
     fn is_the_root_at_metering_pressures_and_smooth_at_zero() {
@@ -231,7 +229,7 @@ mod tests {
         for p in [-3e6, -2e4, -7.0, 0.0, 9e3, 1e4, 5e6_f64] {
             let step = 1.0 + 1e-5 * p.abs();
             let rise = metering(p + step, 1e4) - metering(p - step, 1e4);
-            let slope = metering_slope(p, 1e4);
+            let (_, slope) = metering_with_slope(p, 1e4);
             assert!((rise / (2.0 * step) / slope - 1.0).abs() < 1e-6, "{p}: {slope}");
         }
     }

@@ -51,8 +51,6 @@ pub trait Real:
     fn libm_ln(self) -> Self;
     /// Natural logarithm of `1 + self`, exact near zero.
     fn libm_ln_1p(self) -> Self;
-    /// `self` to the power of `exponent`.
-    fn libm_powf(self, exponent: Self) -> Self;
     /// Sine of an angle in rad.
     fn libm_sin(self) -> Self;
     /// Cosine of an angle in rad.
@@ -79,7 +77,7 @@ mod sealed {
 }
 
 macro_rules! real {
-    ($type:ty, $inverse_root:expr, $powf:ident, $($function:ident $libm:ident),*) => {
+    ($type:ty, $inverse_root:expr, $($function:ident $libm:ident),*) => {
         impl Real for $type {
             #[inline(always)]
             fn lit(value: f64) -> Self {
@@ -92,9 +90,6 @@ macro_rules! real {
             #[inline(always)]
             fn inverse_root(self) -> Self {
                 $inverse_root(self)
-            }
-            fn libm_powf(self, exponent: Self) -> Self {
-                libm::$powf(self, exponent)
             }
             $(
                 #[cfg_attr(target_os = "none", inline(never))] // once in the flash
@@ -118,11 +113,11 @@ fn newtons_inverse_root(number: f32) -> f32 {
 }
 
 real!(
-    f32, newtons_inverse_root, powf, libm_exp expf, libm_ln logf, libm_ln_1p log1pf, libm_sin sinf, libm_cos cosf, libm_tan tanf,
+    f32, newtons_inverse_root, libm_exp expf, libm_ln logf, libm_ln_1p log1pf, libm_sin sinf, libm_cos cosf, libm_tan tanf,
     libm_acos acosf, libm_tanh tanhf
 );
 real!(
-    f64, |number: f64| 1.0 / number.sqrt(), pow, libm_exp exp, libm_ln log, libm_ln_1p log1p, libm_sin sin, libm_cos cos,
+    f64, |number: f64| 1.0 / number.sqrt(), libm_exp exp, libm_ln log, libm_ln_1p log1p, libm_sin sin, libm_cos cos,
     libm_tan tan, libm_acos acos, libm_tanh tanh
 );
 
