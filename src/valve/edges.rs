@@ -123,10 +123,10 @@ pub(super) fn flows(
     };
     let mut drops = EDGES.each_ref().map(|edge| drop(edge, supply_pa));
     // What is drawn is hardly less for its own droop.
-    let into = |edges: [usize; 2]| {
-        edges.map(|index| valve.flow_m3s(&EDGES[index], &drops[index])).iter().sum::<f64>()
+    let taken_m3s = |edges: [usize; 2]| {
+        edges.map(|index| valve.flow_m3s(&EDGES[index], &drops[index])).iter().sum::<f64>().max(0.0)
     };
-    let drawn = (into([0, 1]).max(0.0) + into([2, 3]).max(0.0)) / rated_m3s;
+    let drawn = (taken_m3s([0, 1]) + taken_m3s([2, 3])) / rated_m3s;
     let drooped_pa = supply_pa - unknowns[DROOP] * drawn * PA_PER_BAR;
     let mut flows = [Flow { m3s: 0.0, by_signals: Signals::zeros(), by_unknowns: Unknowns::zeros() }; 2];
     for (edge, drop_then) in EDGES.iter().zip(&mut drops) {
