@@ -96,7 +96,7 @@ struct Opening {
 
 /// The pressure drop over an edge, its root and that one's slope, and what drives the flow over the clearance.
 #[derive(Clone, Copy)]
-struct Drop {
+struct PressureDrop {
     root: f64,
     root_slope: f64,
     clearance_pa: f64,
@@ -114,26 +114,27 @@ pub(super) fn flows(
     let supply_pa = at[PS] + unknowns[SUPPLY] * PA_PER_BAR;
     let valve = Valve { unknowns, gain, openings: EDGES.each_ref().map(|edge| edge.opening(u, unknowns)) };
     let tank_pa = spool.tank_pa + unknowns[TANK] * PA_PER_BAR;
-    let drop = |edge: &Edge, supply_pa: f64| {
+    let drop_over = |edge: &Edge, supply_pa: f64| {
         let chamber_pa = at[edge.chamber];
         let drop_pa = if edge.is_into() { supply_pa - chamber_pa } else { chamber_pa - tank_pa };
         let (root, root_slope) = metering_with_slope(drop_pa, LAMINAR_PA);
         // To the tank as to the outside: where its pressure is found anew at each look, the two would seem to differ.
-        Drop { root, root_slope, clearance_pa: if edge.is_into() { drop_pa } else { chamber_pa } }
+        PressureDrop { root, root_slope, clearance_pa: if edge.is_into() { drop_pa } else { chamber_pa } }
     };
-    let mut drops = EDGES.each_ref().map(|edge| drop(edge, supply_pa));
+    let mut drops = EDGES.each_ref().map(|edge| drop_over(edge, supply_pa));
     // What is drawn is hardly less for its own droop.
-    let taken_m3s = |edges: [usize; 2]| {
-        edges.map(|index| valve.flow_m3s(&EDGES[index], &drops[index])).iter().sum::<f64>().max(0.0)
+    let taken_m3s = |chamber: usize| {
+        let own = EDGES.iter().zip(&drops).filter(|(edge, _)| edge.chamber == chamber);
+        own.map(|(edge, drop)| valve.flow_m3s(edge, drop)).sum::<f64>().max(0.0)
     };
-    let drawn = (taken_m3s([0, 1]) + taken_m3s([2, 3])) / rated_m3s;
+    let drawn = (taken_m3s(PA) + taken_m3s(PB)) / rated_m3s;
     let drooped_pa = supply_pa - unknowns[DROOP] * drawn * PA_PER_BAR;
     let mut flows = [Flow { m3s: 0.0, by_signals: Signals::zeros(), by_unknowns: Unknowns::zeros() }; 2];
-    for (edge, drop_then) in EDGES.iter().zip(&mut drops) {
+    for (edge, drop) in EDGES.iter().zip(&mut drops) {
         if edge.is_into() {
-            *drop_then = drop(edge, drooped_pa);
+            *drop = drop_over(edge, drooped_pa);
         }
-        valve.add(edge, drop_then, spool, drawn, &mut flows[edge.chamber - PA]);
+        valve.add(edge, drop, spool, drawn, &mut flows[edge.chamber - PA]);
     }
     flows
 }
@@ -155,12 +156,12 @@ impl Valve<'_> {
     }
 
     /// Into the edge's chamber.
-    fn flow_m3s(&self, edge: &Edge, drop: &Drop) -> f64 {
+    fn flow_m3s(&self, edge: &Edge, drop: &PressureDrop) -> f64 {
         let opening = &self.openings[edge.index];
         self.edge_gain(edge) * opening.o * drop.root + self.clearance(edge) * drop.clearance_pa
     }
 
-    fn add(&self, edge: &Edge, drop: &Drop, spool: &Spool, drawn: f64, flow: &mut Flow) {
+    fn add(&self, edge: &Edge, drop: &PressureDrop, spool: &Spool, drawn: f64, flow: &mut Flow) {
         let (opening, edge_gain) = (&self.openings[edge.index], self.edge_gain(edge));
         flow.m3s += self.flow_m3s(edge, drop);
         let by_drop = edge_gain * opening.o * drop.root_slope;
