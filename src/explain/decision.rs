@@ -163,6 +163,11 @@ impl Decision {
         (self.misfit > MISFIT_DOUBT || self.strained) && !self.status.is_sure()
     }
 
+    /// Whether it names a leak or rules it out.
+    pub(crate) fn tells(&self, leak: Leak) -> bool {
+        self.ruled_out.contains(&leak) || self.status.is_sure() && self.faults.contains(&leak)
+    }
+
     /// Whether it rules out a leak of which an alarm stands: not where that comes and goes.
     pub(crate) fn rules_out_alarm(&self, leak: Leak) -> bool {
         self.ruled_out.contains(&leak) && !self.is_away(leak)

@@ -104,11 +104,21 @@ impl Replay {
         trace.warnings.extend(self.spikes.warning());
         let leakage = self.leakage(found.is_some(), decision);
         let threshold_lpm = self.rig.alarms.threshold_m3s.map(|flow| flow * LPM_PER_M3S);
+        let changed_at_s = match decision {
+            Some(decision) => decision.changed_ago_s.map(|ago_s| self.end_s - ago_s),
+            None => self.changed_at_s,
+        };
+        let mut episodes = self.episodes.list(&self.standing());
+        // A leak that comes and goes is gone when the posterior has it so, not when its alarm is cleared.
+        for open in episodes.iter_mut().filter(|one| one.to_s.is_none()) {
+            let is_away = decision.is_some_and(|decision| decision.is_away(open.fault));
+            open.to_s = changed_at_s.filter(|at_s| is_away && *at_s > open.from_s);
+        }
         Findings {
             active: self.standing(),
             trends: self.trend(found, &leakage, &threshold_lpm),
             leakage,
-            episodes: self.episodes.list(&self.standing()),
+            episodes,
             threshold_lpm,
             trace,
             assumed: self.rig.assumed,
@@ -116,10 +126,7 @@ impl Replay {
             end_s: self.end_s,
             knows_noise: self.knows_noise(),
             restarts_in_all: self.consistency.restarts(),
-            changed_at_s: match decision {
-                Some(decision) => decision.changed_ago_s.map(|ago_s| self.end_s - ago_s),
-                None => self.changed_at_s,
-            },
+            changed_at_s,
             channels: weighed.channels,
             earlier_channels: weighed.earlier_channels,
             wiring,
@@ -198,11 +205,15 @@ impl Replay {
             }
             _ => coefficients[leak],
         });
-        let entries = coefficients.zip(per_leak).map(|(coefficient, excitation)| {
-            let unit = EstimateEntry::COEFFICIENT_UNIT;
-            match excitation {
+        let entries = PerLeak::from_fn(|leak| {
+            let (coefficient, unit) = (coefficients[leak], EstimateEntry::COEFFICIENT_UNIT);
+            match per_leak[leak] {
                 _ if !is_known(&coefficient) => {
                     EstimateEntry::without_spread(coefficient.value, unit).not_identifiable(NO_NUMBER)
+                }
+                // What is named or ruled out is told, whatever the estimator alone makes of it.
+                Some(_) if decision.is_some_and(|decision| decision.tells(leak)) => {
+                    EstimateEntry::new(coefficient, unit)
                 }
                 None => EstimateEntry::without_spread(coefficient.value, unit),
                 Some(excitation) => judged(EstimateEntry::new(coefficient, unit), &excitation),

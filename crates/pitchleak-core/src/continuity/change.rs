@@ -23,6 +23,9 @@ const REGRESSORS: usize = 5;
 /// Those that let no oil in. What falls with the pressure that a leak takes away is the leak that opened, and no other one that does.
 const ARE_LEAKS: [bool; REGRESSORS] = [false, true, true, true, false];
 
+/// What a change may follow, as shares of time, P_A and P_B: nothing, as a meter's zero, or the pressure across each leak.
+const FOLLOWED: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// The waiting blocks.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(bound = "T: crate::Saved"))]
@@ -69,8 +72,8 @@ impl<T: Real> Waiting<T> {
         let latest = self.blocks().len().checked_sub(LEAST_SIDE)?;
         let mut best = (None, T::lit(CHANGE_SIGMAS * CHANGE_SIGMAS));
         for at in LEAST_SIDE..latest {
-            for internal in [false, true] {
-                let square = self.contrast(at, internal).unwrap_or(T::zero());
+            for follows in FOLLOWED {
+                let square = self.contrast(at, follows).unwrap_or(T::zero());
                 if square > best.1 {
                     best = (Some(at), square);
                 }
@@ -79,9 +82,8 @@ impl<T: Real> Waiting<T> {
         best.0
     }
 
-    /// Square of a change's size in its standard deviations, the block `at` itself left out: of a constant flow, or of one
-    /// that follows the load pressure.
-    fn contrast(&self, at: usize, internal: bool) -> Option<T> {
+    /// Square of the size in its standard deviations of a change that `follows` these pressures, the block `at` itself left out.
+    fn contrast(&self, at: usize, follows: [f64; 3]) -> Option<T> {
         let mut matrix = [[T::zero(); REGRESSORS]; REGRESSORS];
         let mut vector = [T::zero(); REGRESSORS];
         let (mut square, mut declared, mut rows) = (T::zero(), T::zero(), T::zero());
@@ -89,7 +91,7 @@ impl<T: Real> Waiting<T> {
             if block.fed != [true, true] {
                 return None;
             }
-            let (left, row) = self.balance(block, place > at, internal);
+            let (left, row) = self.balance(block, place > at, follows);
             for i in 0..REGRESSORS {
                 for j in 0..=i {
                     matrix[i][j] += row[i] * row[j];
@@ -108,11 +110,12 @@ impl<T: Real> Waiting<T> {
     }
 
     /// The balance of a block, in metres of travel: its left side, and the regressors.
-    fn balance(&self, block: &Block<T>, after: bool, internal: bool) -> (T, [T; REGRESSORS]) {
+    fn balance(&self, block: &Block<T>, after: bool, follows: [f64; 3]) -> (T, [T; REGRESSORS]) {
         let sum = |raw: RawSum| block.sums[raw as usize];
         let [a, b] = self.area_m2;
         let (pa, pb, time) = (sum(RawSum::PressureA), sum(RawSum::PressureB), sum(RawSum::Time));
-        let changed = if internal { pa - pb } else { time };
+        let changed =
+            [time, pa, pb].into_iter().zip(follows).fold(T::zero(), |all, (sum, by)| all + T::lit(by) * sum);
         let changed = if after { changed } else { T::zero() };
         (sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b, [time, pb - pa, pa, pb, changed])
     }
@@ -317,5 +320,24 @@ mod tests {
         waiting.release(1);
         waiting.add(&unfed);
         assert_eq!(waiting.change(), None);
+    }
+
+    /// A leak out of chamber B empties it where the valve is shut: its flow falls with the pressure within a block. A change that
+    /// follows nothing, or the load pressure, would be found a block too soon, and the pressure before that leak be held against it.
+    #[test]
+    fn a_leak_that_empties_its_chamber_has_its_block() {
+        let calm = waiting(1.0, 0.0, false, 3);
+        let mut waiting = Waiting::new(&Cylinder::paper(), &Sensors::paper());
+        let opens = WAITING - LEAST_SIDE;
+        for (k, mut block) in calm.blocks().iter().copied().enumerate() {
+            let pressure_mpa = [4.1, 0.6, 0.36][usize::from(k >= opens) + usize::from(k > opens)];
+            block.sums[RawSum::PressureA as usize] = 0.25 * (pressure_mpa + 1.9);
+            block.sums[RawSum::PressureB as usize] = 0.25 * pressure_mpa;
+            let flow = if k >= opens { 50.0 * pressure_mpa } else { 0.0 };
+            let left_m = f64::sqrt(waiting.variance * 2.5e-3) * flow;
+            block.sums[RawSum::ResidualA as usize] += left_m * waiting.area_m2[0];
+            waiting.add(&block);
+        }
+        assert_eq!(waiting.change(), Some(opens - 1));
     }
 }
