@@ -55,6 +55,8 @@ pub(crate) const MOST_SAMPLES: usize = 80_000;
 pub(crate) const LONG_STEP: f64 = 1.5;
 /// Steps are even that differ by less than this share. Chosen: the jitter of a recorder's clock.
 pub(crate) const EVEN_SHARE: f64 = 0.1;
+/// Dry friction has turned beyond so many times the speed within which it turns. Derived: tanh 3 = 0.995.
+pub(crate) const TURNED: f64 = 3.0;
 /// The machine moves no faster than that, Hz. Chosen: wind and pitch control stay below.
 pub(crate) const FASTEST_MOTION_HZ: f64 = 2.0;
 /// Noise is a ripple where it is larger than declared by this share, and correlated by it. Chosen: less harms nothing, and is four standard

@@ -109,7 +109,13 @@ pub(crate) fn negative_leaks(leaks: &LeakEstimates, model: &str) -> Vec<String> 
     .filter(|(_, leak)| !leak.physical)
     .map(|(name, leak)| {
         let sigma = -leak.value / leak.std;
-        format!("{model} needs a negative {name} ({sigma:.0} sigma below zero): evidence of a missing effect")
+        if sigma > SIGNIFICANT_SIGMA {
+            format!(
+                "{model} needs a negative {name} ({sigma:.0} sigma below zero): evidence of a missing effect"
+            )
+        } else {
+            format!("{model} needs an {name} that is below zero for some time: evidence of a missing effect")
+        }
     })
     .collect()
 }

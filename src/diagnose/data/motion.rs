@@ -19,6 +19,8 @@ pub(crate) struct Motion {
     pub(crate) half_s: f64,
     /// Root mean square, m/s.
     pub(crate) rms_mps: f64,
+    /// The speed beyond which the dry friction that the rig file declares has turned, m/s; zero where it declares none.
+    pub(crate) turned_mps: f64,
     /// On which side of its play sensor A would read.
     pub(crate) pa: Sides,
     /// On which side of its play sensor B would read.
@@ -103,10 +105,10 @@ impl Motion {
         Self { v_mps, std_mps: std, half_s, rms_mps, qa, qb, ..Self::default() }
     }
 
-    /// Whether the direction of motion is known at this speed and acceleration, m/s and m/s²: through its noise, and all along the time over
-    /// which it is a mean.
+    /// Whether the direction of motion is known at this speed and acceleration, m/s and m/s²: through its noise, all along the time over
+    /// which it is a mean, and beyond the speeds at which a declared dry friction turns, where its force hangs on the speed's last digit.
     pub(crate) fn is_sure(&self, v_mps: f64, a_mps2: f64) -> bool {
-        v_mps.abs() >= SIGNIFICANT_SIGMA * self.std_mps + a_mps2.abs() * self.half_s
+        v_mps.abs() >= SIGNIFICANT_SIGMA * self.std_mps + a_mps2.abs() * self.half_s + self.turned_mps
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is said of effects and of leaks.
 
+use crate::diagnose::thresholds::EVIDENT_SIGMA;
 use pitchleak_core::Estimate;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -184,12 +185,20 @@ pub struct LeakEstimates {
 impl LeakEstimates {
     /// Whether physics allows all three leaks.
     pub fn are_physical(&self) -> bool {
-        let Self {
-            internal_leak_coefficient, external_leak_a_coefficient, external_leak_b_coefficient, ..
-        } = self;
-        [internal_leak_coefficient, external_leak_a_coefficient, external_leak_b_coefficient]
-            .iter()
-            .all(|leak| leak.physical)
+        self.leaks().iter().all(|leak| leak.physical)
+    }
+
+    /// Whether a leak is below zero, for certain.
+    pub(crate) fn let_oil_in(&self) -> bool {
+        self.leaks().iter().any(|leak| leak.value < -EVIDENT_SIGMA * leak.std)
+    }
+
+    fn leaks(&self) -> [&LeakEstimate; 3] {
+        [
+            &self.internal_leak_coefficient,
+            &self.external_leak_a_coefficient,
+            &self.external_leak_b_coefficient,
+        ]
     }
 }
 

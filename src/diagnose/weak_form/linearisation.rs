@@ -4,7 +4,7 @@ use super::leak_change::LeakChange;
 use super::terms::{Balances, Term};
 use crate::diagnose::data::{Declared, Motion, Series};
 use crate::diagnose::equation::PerEquation;
-use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA};
+use crate::diagnose::thresholds::{NEGLIGIBLE_SHARE, SIGNIFICANT_SIGMA, TURNED};
 use pitchleak_core::effects::{ActiveEffect, EffectConstant, EffectConstants, EffectKind};
 use pitchleak_core::{Effect, EffectSet, Model, PerLeak, Sensors, Signals, Terms};
 
@@ -14,6 +14,8 @@ pub(crate) struct Linearisation {
     pub(crate) model: Model<f64>,
     /// Sensor effects are undone on the readings; physical ones are subtracted.
     pub(crate) effects: EffectSet<f64>,
+    /// The speed beyond which the dry friction that the rig file declares has turned, m/s; zero where it declares none.
+    turned_mps: f64,
     /// Values of 1/β that the rig file leaves possible, per Pa.
     pub(crate) compressibility: (f64, f64),
     /// What the leaks' changes came to last. They stay in what is left over, as their columns are exact at any size: only the speed that
@@ -34,6 +36,12 @@ fn is_same(one: &Signals<f64>, other: &Signals<f64>) -> bool {
     motion(one) == motion(other) && oil(one) == oil(other)
 }
 
+/// The speed beyond which all dry friction among these effects has turned, m/s.
+fn turned_mps(declared: &EffectSet<f64>) -> f64 {
+    let dry = declared.iter().filter(|one| Term::Effect(one.effect).is_dry_friction());
+    dry.map(|one| TURNED * one.constants.slip_speed_mps).fold(0.0, f64::max)
+}
+
 impl Linearisation {
     /// The declared model without leaks.
     pub(crate) fn declared(declared: &Declared) -> Self {
@@ -43,6 +51,7 @@ impl Linearisation {
         Self {
             model: Model { cylinder: declared.cylinder, fluid, leaks_m3spa: PerLeak::default() },
             effects: declared.effects,
+            turned_mps: turned_mps(&declared.effects),
             // What is softer or stiffer is no oil but an effect.
             compressibility: (compressibility / (1.0 + share), compressibility * (1.0 + share)),
             changes: Vec::new(),
@@ -74,7 +83,8 @@ impl Linearisation {
         let of = |(trace, series): (usize, &Series)| {
             let model_at = |t_s: f64| Model { leaks_m3spa: self.leaks_at(trace, t_s), ..self.model };
             let residual = |t_s: f64, seen: &Signals<f64>| self.residual_with(&model_at(t_s), seen);
-            Motion::of(series, &self.model.cylinder, residual, &self.effects, sensors)
+            let motion = Motion::of(series, &self.model.cylinder, residual, &self.effects, sensors);
+            Motion { turned_mps: self.turned_mps, ..motion }
         };
         traces.iter().enumerate().map(of).collect()
     }
