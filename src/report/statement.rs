@@ -109,7 +109,11 @@ fn excluded(findings: &Findings<'_>, below: &[Leak]) -> Option<String> {
 fn notes(findings: &Findings<'_>) -> impl Iterator<Item = String> {
     let notes = findings.decision.into_iter().flat_map(|decision| &decision.notes);
     let stands = Leak::ALL.into_iter().filter(|leak| findings.active[*leak] && findings.is_below(*leak));
-    let stands = stands.map(|leak| format!("That explains the alarm of the {} leak.", leak.label()));
+    let stands = match stands.collect::<Vec<_>>().as_slice() {
+        [] => None,
+        [one] => Some(format!("That explains the alarm of the {} leak.", one.label())),
+        some => Some(format!("That explains the alarms of the {} leaks.", join(some, "and"))),
+    };
     notes.map(|note| format!("Besides, {}.", note.text)).chain(stands)
 }
 

@@ -219,6 +219,10 @@ fn an_alarm_that_the_whole_trace_speaks_against_is_explained() {
     standing.decision.as_mut().unwrap().ruled_out = Leak::ALL.to_vec();
     assert_eq!(standing.judged(), (Status::Sound, vec![]));
     assert!(standing.verdict().text.contains("That explains the alarm of the internal leak."));
+    standing.active = PerLeak { internal: true, external_a: true, external_b: false };
+    assert!(
+        standing.verdict().text.contains("That explains the alarms of the internal and external A leaks.")
+    );
 }
 
 /// That the last seconds show none is no news of a leak that comes and goes; of one that stopped it is.
