@@ -36,10 +36,11 @@ fn is_same(one: &Signals<f64>, other: &Signals<f64>) -> bool {
     motion(one) == motion(other) && oil(one) == oil(other)
 }
 
-/// The speed beyond which all dry friction among these effects has turned, m/s.
+/// The speed beyond which all dry friction among these effects has turned, m/s. One that turns more slowly than is usual was measured.
 fn turned_mps(declared: &EffectSet<f64>) -> f64 {
+    let usual_mps = EffectConstants::<f64>::default().slip_speed_mps;
     let dry = declared.iter().filter(|one| Term::Effect(one.effect).is_dry_friction());
-    dry.map(|one| TURNED * one.constants.slip_speed_mps).fold(0.0, f64::max)
+    dry.map(|one| TURNED * one.constants.slip_speed_mps.min(usual_mps)).fold(0.0, f64::max)
 }
 
 impl Linearisation {
