@@ -18,13 +18,15 @@ pub(super) const SEGMENT_BLOCKS: usize = 16;
 const LEAST_SIDE: usize = 4;
 /// A change shows by so many standard deviations. A false one costs a border; chosen.
 const CHANGE_SIGMAS: f64 = 5.0;
-/// Constant flow, the leaks, and the change.
-const REGRESSORS: usize = 5;
+/// Constant flow, and the leaks.
+const STEADY: usize = 4;
+/// Those, and the change.
+const REGRESSORS: usize = STEADY + 1;
 /// Those that let no oil in. What falls with the pressure that a leak takes away is the leak that opened, and no other one that does.
 const ARE_LEAKS: [bool; REGRESSORS] = [false, true, true, true, false];
 
-/// What a change may follow, as shares of time, P_A and P_B: nothing, as a meter's zero, or the pressure across each leak.
-const FOLLOWED: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// What a change may follow: time, as a meter's zero, or the pressure across a leak.
+const FOLLOWED: usize = 4;
 
 /// The waiting blocks.
 #[derive(Clone, Debug)]
@@ -72,8 +74,7 @@ impl<T: Real> Waiting<T> {
         let latest = self.blocks().len().checked_sub(LEAST_SIDE)?;
         let mut best = (None, T::lit(CHANGE_SIGMAS * CHANGE_SIGMAS));
         for at in LEAST_SIDE..latest {
-            for follows in FOLLOWED {
-                let square = self.contrast(at, follows).unwrap_or(T::zero());
+            for square in self.contrasts(at).into_iter().flatten().flatten() {
                 if square > best.1 {
                     best = (Some(at), square);
                 }
@@ -82,42 +83,85 @@ impl<T: Real> Waiting<T> {
         best.0
     }
 
-    /// Square of the size in its standard deviations of a change that `follows` these pressures, the block `at` itself left out.
-    fn contrast(&self, at: usize, follows: [f64; 3]) -> Option<T> {
-        let mut matrix = [[T::zero(); REGRESSORS]; REGRESSORS];
-        let mut vector = [T::zero(); REGRESSORS];
+    /// Squares of the sizes in their standard deviations of changes that follow each of [`FOLLOWED`], the block `at` itself left out.
+    fn contrasts(&self, at: usize) -> Option<[Option<T>; FOLLOWED]> {
+        let mut steady = [[T::zero(); STEADY]; STEADY];
+        let mut vector = [T::zero(); STEADY];
+        let mut changes = [Change::default(); FOLLOWED];
         let (mut square, mut declared, mut rows) = (T::zero(), T::zero(), T::zero());
         for (place, block) in self.blocks().iter().enumerate().filter(|(place, _)| *place != at) {
             if block.fed != [true, true] {
                 return None;
             }
-            let (left, row) = self.balance(block, place > at, follows);
-            for i in 0..REGRESSORS {
+            let (left, row, followed) = self.balance(block);
+            for i in 0..STEADY {
                 for j in 0..=i {
-                    matrix[i][j] += row[i] * row[j];
+                    steady[i][j] += row[i] * row[j];
                 }
                 vector[i] += row[i] * left;
+            }
+            if place > at {
+                changes.iter_mut().zip(followed).for_each(|(change, own)| change.add(own, &row, left));
             }
             square += left * left;
             declared += self.variance * block.time_square_s2[0];
             rows += T::one();
         }
         let freedom = rows - T::lit(REGRESSORS as f64);
-        let fit = LeakFit::of(&matrix, &vector, &ARE_LEAKS);
-        let (last, variance_share) = fit.last()?;
-        let variance = ((square - fit.explained) / freedom).at_least(declared / rows);
-        Some(last * last / (variance * variance_share))
+        Some(changes.map(|change| {
+            let (matrix, vector) = change.beside(&steady, &vector);
+            let fit = LeakFit::of(&matrix, &vector, &ARE_LEAKS);
+            let (last, variance_share) = fit.last()?;
+            let variance = ((square - fit.explained) / freedom).at_least(declared / rows);
+            Some(last * last / (variance * variance_share))
+        }))
     }
 
-    /// The balance of a block, in metres of travel: its left side, and the regressors.
-    fn balance(&self, block: &Block<T>, after: bool, follows: [f64; 3]) -> (T, [T; REGRESSORS]) {
+    /// The balance of a block, in metres of travel: its left side, the steady regressors, and what a change may follow.
+    fn balance(&self, block: &Block<T>) -> (T, [T; STEADY], [T; FOLLOWED]) {
         let sum = |raw: RawSum| block.sums[raw as usize];
         let [a, b] = self.area_m2;
         let (pa, pb, time) = (sum(RawSum::PressureA), sum(RawSum::PressureB), sum(RawSum::Time));
-        let changed =
-            [time, pa, pb].into_iter().zip(follows).fold(T::zero(), |all, (sum, by)| all + T::lit(by) * sum);
-        let changed = if after { changed } else { T::zero() };
-        (sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b, [time, pb - pa, pa, pb, changed])
+        let left = sum(RawSum::ResidualA) / a + sum(RawSum::ResidualB) / b;
+        (left, [time, pb - pa, pa, pb], [time, pa - pb, pa, pb])
+    }
+}
+
+/// Products of a change's column.
+#[derive(Clone, Copy)]
+struct Change<T> {
+    with_steady: [T; STEADY],
+    square: T,
+    with_left: T,
+}
+
+impl<T: Real> Default for Change<T> {
+    fn default() -> Self {
+        Self { with_steady: [T::zero(); STEADY], square: T::zero(), with_left: T::zero() }
+    }
+}
+
+impl<T: Real> Change<T> {
+    fn add(&mut self, own: T, row: &[T; STEADY], left: T) {
+        self.with_steady.iter_mut().zip(row).for_each(|(sum, value)| *sum += own * *value);
+        self.square += own * own;
+        self.with_left += own * left;
+    }
+
+    /// Normal equations of the steady regressors and this one.
+    fn beside(
+        &self,
+        steady: &[[T; STEADY]; STEADY],
+        vector: &[T; STEADY],
+    ) -> ([[T; REGRESSORS]; REGRESSORS], [T; REGRESSORS]) {
+        let entry = |i: usize, j: usize| match (i < STEADY, j < STEADY) {
+            (true, true) => steady[i][j],
+            (false, true) => self.with_steady[j],
+            (true, false) => T::zero(),
+            (false, false) => self.square,
+        };
+        let matrix = core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j)));
+        (matrix, core::array::from_fn(|i| if i < STEADY { vector[i] } else { self.with_left }))
     }
 }
 
